@@ -93,8 +93,8 @@ impl Arm {
         if group.is_some() && (base.is_some() || tip.is_some()) {
             return Err(argument_error("group", "it names base and tip", "leave base and tip out"));
         }
-        let chosen = ArmFiles { urdf, base, tip, srdf, group }.load();
-        chosen.map(Self).map_err(|e| option_error(&e))
+        let arm = ArmFiles { urdf, base, tip, srdf, group }.load();
+        arm.map(Self).map_err(|e| option_error(&e))
     }
 
     /// Name of the robot.
@@ -154,7 +154,8 @@ impl Arm {
     }
 
     fn __repr__(&self) -> String {
-        let (robot, chain) = (&self.0.model.name, &self.0.chain);
+        let robot = &self.0.model.name;
+        let chain = &self.0.chain;
         format!("Arm({robot}, {} to {}, {} joints)", chain.base, chain.tip, chain.variables.len())
     }
 
@@ -168,7 +169,8 @@ impl Arm {
         let rows = matrix_rows("joints", &joints, chain.variables.len())?;
         let skeleton = chain.skeleton();
         let frames: Vec<Frames> = py.detach(|| rows.iter().map(|row| chain.forward(row)).collect());
-        let (n, dict) = (rows.len(), PyDict::new(py));
+        let n = rows.len();
+        let dict = PyDict::new(py);
         let flat = |of: &dyn Fn(&Frames) -> Vec<f64>| frames.iter().flat_map(of).collect();
         dict.set_item("tip", to_array(py, flat(&|f| f.tip.origin_m.to_vec()), vec![n, 3])?)?;
         let rotation = flat(&|f| f.tip.rotation.concat());
@@ -178,9 +180,9 @@ impl Arm {
         let connectors = flat(&|f| chain.connectors(&skeleton, f).concat());
         let count = chain.connectors(&skeleton, &chain.forward(&chain.rest_values())).len();
         dict.set_item("connectors", to_array(py, connectors, vec![n, count, 3])?)?;
-        let inside: Vec<bool> =
+        let is_inside: Vec<bool> =
             rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
-        dict.set_item("inside_limits", inside.to_pyarray(py))?;
+        dict.set_item("inside_limits", is_inside.to_pyarray(py))?;
         Ok(dict)
     }
 
@@ -208,15 +210,16 @@ impl Arm {
             let mut solved: Vec<(usize, IkResult)> = Vec::with_capacity(goals.len());
             let solve = |k: &usize| {
                 let start = &start[if start.len() == 1 { 0 } else { *k }];
-                let answer = || chain.solve(&goals[*k], start).map(|answer| (*k, answer));
-                watcher.should_continue().then(answer)
+                let result = || chain.solve(&goals[*k], start).map(|result| (*k, result));
+                watcher.should_continue().then(result)
             };
-            run_cells(&numbers, options.workers.max(1), solve, &mut |answer| {
-                solved.push(answer);
+            run_cells(&numbers, options.workers.max(1), solve, &mut |result| {
+                solved.push(result);
                 Ok::<_, InputError>(())
             })?;
+            // Results arrive in the order of their completion, which depends on the workers.
             solved.sort_by_key(|(k, _)| *k);
-            Ok(solved.into_iter().map(|(_, answer)| answer).collect::<Vec<_>>())
+            Ok(solved.into_iter().map(|(_, result)| result).collect::<Vec<_>>())
         })?;
         result_arrays(
             py,
@@ -255,17 +258,18 @@ impl IkOptions {
             "dls" => Engine::Dls,
             other => return Err(unknown_value("engine", other, "auto, chain or dls")),
         };
-        let (own, shapes) = match self.body.as_str() {
+        // Without obstacles and without the arm's own links, no shape can be touched: none is read.
+        let (is_own, has_shapes) = match self.body.as_str() {
             "rods" => (false, false),
             "shapes" => (false, !self.obstacles.is_empty()),
             "own" => (true, true),
             other => return Err(unknown_value("body", other, "rods, shapes or own")),
         };
-        let (body, remarks) = match shapes.then(|| arm.body()) {
+        let (body, remarks) = match has_shapes.then(|| arm.body()) {
             Some((body, remarks)) => (Some(body), remarks),
             None => (None, Vec::new()),
         };
-        if own && body.as_ref().is_none_or(ArmBody::is_empty) {
+        if is_own && body.as_ref().is_none_or(ArmBody::is_empty) {
             let cause = [&["no link has a collision shape that can be read".into()], &remarks[..]];
             let remedy = "give the links boxes, cylinders, spheres or STL meshes";
             return Err(argument_error("body", cause.concat().join("; "), remedy));
@@ -284,7 +288,7 @@ impl IkOptions {
             ignore_limits: self.ignore_limits,
             spheres: self.obstacles.iter().map(sphere).collect(),
             body,
-            own_body: own,
+            own_body: is_own,
             ..ArmGoal::new([0.0; 3])
         };
         Ok((goal, remarks))
@@ -292,11 +296,11 @@ impl IkOptions {
 
     /// Returns the goal of one target.
     fn target_goal(&self, goal: &ArmGoal, target: &[f64]) -> PyResult<ArmGoal> {
-        let place = row_vector(target);
+        let position = row_vector(target);
         let target_pose = match target.len() {
-            3 => Transform { origin_m: place, ..Transform::IDENTITY },
+            3 => Transform { origin_m: position, ..Transform::IDENTITY },
             6 => Transform::from_origin(&sidestep::import::urdf::Origin {
-                xyz_m: place,
+                xyz_m: position,
                 rpy_rad: row_vector(&target[3..]),
             }),
             width if width != 7 => {
@@ -306,7 +310,8 @@ impl IkOptions {
             }
             _ => {
                 let xyzw = std::array::from_fn(|k| target[3 + k]);
-                Transform::from_quaternion("targets", place, xyzw).map_err(|e| option_error(&e))?
+                Transform::from_quaternion("targets", position, xyzw)
+                    .map_err(|e| option_error(&e))?
             }
         };
         let is_free = |name: &str| self.free.iter().any(|free| free == name);
@@ -315,7 +320,8 @@ impl IkOptions {
         {
             return Err(unknown_value("free", other, "x, y, z, rx, ry, rz"));
         }
-        let (along, about) = (["x", "y", "z"].map(is_free), ["rx", "ry", "rz"].map(is_free));
+        let along = ["x", "y", "z"].map(is_free);
+        let about = ["rx", "ry", "rz"].map(is_free);
         let asked =
             PoseMask::with_free(target.len() > 3, along, about).map_err(|e| option_error(&e))?;
         Ok(ArmGoal { target: target_pose, asked, ..goal.clone() })
@@ -326,38 +332,38 @@ fn unknown_value(name: &str, value: &str, known: &str) -> PyErr {
     argument_error(name, format!("`{value}` is none of {known}"), format!("give {known}"))
 }
 
-/// Returns answers as arrays, one row for each target.
+/// Returns results as arrays, one row for each target.
 fn result_arrays<'py>(
     py: Python<'py>,
-    answers: Vec<IkResult>,
+    results: Vec<IkResult>,
     width: usize,
     remarks: Vec<String>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let n = answers.len();
-    let joints = answers.iter().flat_map(|answer| answer.values.clone()).collect();
+    let n = results.len();
+    let joints = results.iter().flat_map(|result| result.values.clone()).collect();
     dict.set_item("joints", to_array(py, joints, vec![n, width])?)?;
-    let reached: Vec<bool> = answers.iter().map(|answer| answer.reached).collect();
+    let reached: Vec<bool> = results.iter().map(|result| result.reached).collect();
     dict.set_item("reached", reached.to_pyarray(py))?;
     for (name, of) in
         [("error_m", (|a| a.error_m) as fn(&IkResult) -> f64), ("error_rad", |a| a.error_rad)]
     {
-        dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(of)))?;
+        dict.set_item(name, PyArray1::from_iter(py, results.iter().map(of)))?;
     }
     for (name, of) in
         [("iterations", (|a| a.iterations) as fn(&IkResult) -> usize), ("starts", |a| a.starts)]
     {
-        dict.set_item(name, PyArray1::from_iter(py, answers.iter().map(|a| of(a) as i64)))?;
+        dict.set_item(name, PyArray1::from_iter(py, results.iter().map(|a| of(a) as i64)))?;
     }
     dict.set_item(
         "reasons",
-        to_list(py, answers.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
+        to_list(py, results.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
     )?;
     let others = PyList::empty(py);
-    for answer in &answers {
-        let flat: Vec<f64> = answer.others.iter().flat_map(|other| other.values.clone()).collect();
+    for result in &results {
+        let flat: Vec<f64> = result.others.iter().flat_map(|other| other.values.clone()).collect();
         let rows: Bound<'_, PyArray2<f64>> =
-            PyArray1::from_vec(py, flat).reshape([answer.others.len(), width])?;
+            PyArray1::from_vec(py, flat).reshape([result.others.len(), width])?;
         others.append(rows)?;
     }
     dict.set_item("others", others)?;

@@ -29,17 +29,19 @@ impl FromPyObject<'_, '_> for WholeNumber {
 
 /// Returns the ids of agents; truth values are no ids, although they are integers in Python.
 pub(crate) fn agent_ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
-    let told = || {
-        let words = "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`";
-        error::OrderError::new_err(words)
+    let error = || {
+        error::OrderError::new_err(
+            "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`",
+        )
     };
     let array = py.import("numpy")?.call_method1("atleast_1d", (agents,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let is_empty = array.len()? == 0;
     match kind.as_str() {
-        "i" | "u" => array.call_method0("tolist")?.extract().map_err(|_| told()),
+        "i" | "u" => array.call_method0("tolist")?.extract().map_err(|_| error()),
+        // NumPy gives an empty list the type of floats.
         _ if is_empty => Ok(Vec::new()),
-        _ => Err(told()),
+        _ => Err(error()),
     }
 }
 
@@ -52,24 +54,26 @@ pub(crate) fn order_values(
     agents: usize,
     shape: Option<&[usize]>,
 ) -> PyResult<Vec<f64>> {
-    let told = |cause: String| error::OrderError::new_err(format!("the order `{order}` {cause}"));
+    let refused =
+        |cause: String| error::OrderError::new_err(format!("the order `{order}` {cause}"));
     let float = py.import("numpy")?.getattr("float64")?;
     let array = py.import("numpy")?.call_method1("asarray", (values, float));
-    let array = array.map_err(|e| told(format!("must be numbers: {}", e.value(py))))?;
-    let array = array.cast::<PyArrayDyn<f64>>().map_err(|e| told(e.to_string()))?;
-    // An unknown order is refused with the names of the known ones.
+    let array = array.map_err(|e| refused(format!("must be numbers: {}", e.value(py))))?;
+    let array = array.cast::<PyArrayDyn<f64>>().map_err(|e| refused(e.to_string()))?;
+    // The run refuses an unknown order, with the names of the known ones.
     let Some(shape) = shape else { return Ok(array.to_vec().unwrap_or_default()) };
-    let wanted: Vec<usize> = [agents].iter().chain(shape).copied().collect();
+    let expected: Vec<usize> = [agents].iter().chain(shape).copied().collect();
     if array.ndim() == 0 {
-        let width: usize = wanted.iter().product();
-        return Ok(vec![array.readonly().as_array().iter().copied().next().unwrap_or(0.0); width]);
+        let len: usize = expected.iter().product();
+        return Ok(vec![array.readonly().as_array().iter().copied().next().unwrap_or(0.0); len]);
     }
-    if array.shape() != wanted {
-        let (has, wanted) = (PyTuple::new(py, array.shape())?, PyTuple::new(py, &wanted)?);
-        return Err(told(format!("needs an array of the shape {wanted}, not {has}")));
+    if array.shape() != expected {
+        let found = PyTuple::new(py, array.shape())?;
+        let expected = PyTuple::new(py, &expected)?;
+        return Err(refused(format!("needs an array of the shape {expected}, not {found}")));
     }
     let array = array.readonly();
-    // Contiguous values are copied at once.
+    // Contiguous values are copied as one block.
     Ok(array
         .as_slice()
         .map_or_else(|_| array.as_array().iter().copied().collect(), <[f64]>::to_vec))
@@ -83,22 +87,22 @@ pub(crate) fn rows_by_name<'py>(
     names: Vec<Bound<'py, PyString>>,
     columns: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    // A copy of a dict with all keys has room for them; a growing one takes longer.
-    let empty = PyDict::new(py);
+    // A copy of a dict that has all keys allocates once; a growing one allocates again and again.
+    let template = PyDict::new(py);
     let mut cells = Vec::with_capacity(columns.len());
     for (key, column) in columns {
-        empty.set_item(&key, py.None())?;
+        template.set_item(&key, py.None())?;
         cells.push((key, column.cast_into::<PyList>()?));
     }
-    let found = PyDict::new(py);
+    let rows = PyDict::new(py);
     for (k, name) in names.into_iter().enumerate() {
-        let row = empty.copy()?;
+        let row = template.copy()?;
         for (key, column) in &cells {
             row.set_item(key, column.get_item(k)?)?;
         }
-        found.set_item(name, row)?;
+        rows.set_item(name, row)?;
     }
-    Ok(found)
+    Ok(rows)
 }
 
 /// Returns a number for each body.
@@ -120,7 +124,7 @@ pub(crate) fn body_rows<'py, const N: usize>(
     PyArray1::from_vec(py, flat).reshape([bodies.len(), N])
 }
 
-/// Returns a word for each body.
+/// Returns a text for each body.
 pub(crate) fn body_texts<'py>(
     py: Python<'py>,
     bodies: &[Body],

@@ -14,10 +14,11 @@ use sidestep::scenario::Source;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time after which Python is asked for signals, between two cycles.
+/// Time after which Python is asked for signals, between two cycles: too short for users to notice.
 const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Largest number of worlds.
+/// Largest number of worlds. Without it, a number from a mistaken unit would take all memory before anything could be
+/// reported.
 const MAX_WORLDS: usize = 1 << 20;
 /// Largest number of workers, as for a sweep.
 const MAX_WORKERS: usize = 1024;
@@ -81,9 +82,8 @@ impl Batch {
 
     /// Returns a seed for each world.
     fn parse_seeds(&self, seeds: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
-        let given: Option<Vec<u64>> = whole_numbers(seeds);
-        given
-            .filter(|given| given.len() == self.worlds)
+        whole_numbers(seeds)
+            .filter(|seeds| seeds.len() == self.worlds)
             .ok_or_else(|| self.row_count_error("seeds", "seeds (whole numbers from 0 on)", seeds))
     }
 
@@ -99,13 +99,13 @@ impl Batch {
     }
 }
 
-/// Returns a number of things, which must be at most `most`.
-fn bounded_count(name: &str, WholeNumber(count): WholeNumber, most: usize) -> PyResult<usize> {
+/// Returns a number of things, which must be from 1 to `max`.
+fn bounded_count(name: &str, WholeNumber(count): WholeNumber, max: usize) -> PyResult<usize> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
-    if (1..=most).contains(&count) {
+    if (1..=max).contains(&count) {
         return Ok(count);
     }
-    Err(argument_error(name, format!("is {count}"), format!("give a number from 1 to {most}")))
+    Err(argument_error(name, format!("is {count}"), format!("give a number from 1 to {max}")))
 }
 
 /// Returns whole numbers, of a list or an array.
@@ -132,13 +132,14 @@ fn batch_error(error: &BatchError) -> PyErr {
     }
 }
 
-/// Returns the function that makes a world at its start: no checkpoints are made of it, so that all seeds share one
-/// text.
+/// Returns the function that creates a world at its start. All seeds share one text: it only identifies checkpoints, and a
+/// batch makes none.
 fn start_function(scenario: &Arc<LoadedScenario>) -> PyResult<Arc<SimulationFactory>> {
     let source = Source::new("scenario.toml", scenario.identity()?, "");
-    let (own, scenario) = (scenario.compiled.plan().seed, Arc::clone(scenario));
+    let scenario = Arc::clone(scenario);
+    let first_seed = scenario.compiled.plan().seed;
     Ok(Arc::new(move |seed| {
-        if seed == own {
+        if seed == first_seed {
             return Ok(scenario.compiled.start(&source, 1));
         }
         let fresh = match scenario.compiled.reseeded(seed) {
@@ -181,8 +182,8 @@ impl Batch {
             }
         };
         let start = start_function(&scenario)?;
-        let made = py.detach(|| batch::Batch::new(start, &seeds, workers));
-        let batch = made.map_err(|e| batch_error(&e))?;
+        let batch = py.detach(|| batch::Batch::new(start, &seeds, workers));
+        let batch = batch.map_err(|e| batch_error(&e))?;
         let teams = batch.teams().iter().cloned().map(Arc::new).collect();
         Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
     }
@@ -258,7 +259,7 @@ impl Batch {
             space.map(|space| [team.agents.len()].iter().chain(&space.shape).copied().collect());
         let values = match &shape {
             Some(shape) => order_values(py, name, values, self.worlds, Some(shape))?,
-            // An unknown order is refused with the names of the known ones.
+            // The batch refuses an unknown order, with the names of the known ones.
             None => vec![0.0; self.worlds * team.agents.len()],
         };
         self.with_worlds(py, |batch| batch.order(number, name, values))
@@ -282,20 +283,23 @@ impl Batch {
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let mask = self.parse_mask(mask)?;
-        let (mut left, mut at_once) = (cycles.0, 1);
+        let mut remaining = cycles.0;
+        let mut chunk = 1;
         loop {
-            let now = left.min(at_once);
-            let began = Instant::now();
+            let now = remaining.min(chunk);
+            let start = Instant::now();
             self.with_worlds(py, |batch| batch.advance(now, mask.as_deref()))?;
-            left -= now;
-            if left == 0 {
+            remaining -= now;
+            if remaining == 0 {
                 return Ok(());
             }
             py.check_signals()?;
-            at_once = if began.elapsed() < SIGNAL_POLL_INTERVAL / 2 {
-                at_once * 2
+            // Signals can be checked only between two calls, each of which wakes all workers: the number of cycles per call
+            // grows as long as twice as many take less than the interval.
+            chunk = if start.elapsed() < SIGNAL_POLL_INTERVAL / 2 {
+                chunk * 2
             } else {
-                (at_once / 2).max(1)
+                (chunk / 2).max(1)
             };
         }
     }
@@ -321,9 +325,9 @@ impl Batch {
             Some(out) => out,
             None => zeroed_arrays(py, team, self.worlds)?,
         };
-        let mut lent = OutArrays::from_dict(&out, team, self.worlds)?;
-        let cells = &mut lent.buffers_mut()?;
-        self.with_worlds(py, |batch| batch.observe(number, cells))?;
+        let mut arrays = OutArrays::from_dict(&out, team, self.worlds)?;
+        let buffers = &mut arrays.buffers_mut()?;
+        self.with_worlds(py, |batch| batch.observe(number, buffers))?;
         Ok(out)
     }
 
@@ -342,10 +346,11 @@ impl Batch {
         seeds: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (seeds, mask) = (self.parse_seeds(seeds)?, self.parse_mask(mask)?);
-        let wanted = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
+        let seeds = self.parse_seeds(seeds)?;
+        let mask = self.parse_mask(mask)?;
+        let is_reset = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
         let seeds: Vec<Option<u64>> =
-            seeds.into_iter().enumerate().map(|(k, seed)| wanted(k).then_some(seed)).collect();
+            seeds.into_iter().enumerate().map(|(k, seed)| is_reset(k).then_some(seed)).collect();
         self.with_worlds(py, |batch| batch.restart(&seeds))
     }
 

@@ -28,11 +28,11 @@ impl Blocks {
         if now >= self.until || run.getattr("is_over")?.extract()? {
             return Ok(None);
         }
-        let how = PyDict::new(py);
-        how.set_item("decide", &self.decide)?;
-        how.set_item("state", &self.state)?;
+        let arguments = PyDict::new(py);
+        arguments.set_item("decide", &self.decide)?;
+        arguments.set_item("state", &self.state)?;
         let goal = now.saturating_add(self.cycles).min(self.until);
-        run.call_method("run", (goal,), Some(&how))?;
+        run.call_method("run", (goal,), Some(&arguments))?;
         run.call_method0("tables").map(Some)
     }
 }

@@ -38,8 +38,8 @@ pub(crate) struct MinimizeOptions {
 }
 
 fn parse_choice<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResult<T> {
-    let found = known.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
-    found.ok_or_else(|| {
+    let value = known.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
+    value.ok_or_else(|| {
         let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
         argument_error(name, format!("`{word}` is not known"), format!("give {names}"))
     })
@@ -47,10 +47,10 @@ fn parse_choice<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResul
 
 /// Refuses a number outside of (0, 1].
 fn check_fraction(name: &str, value: f64) -> PyResult<f64> {
-    match value > 0.0 && value <= 1.0 {
-        true => Ok(value),
-        false => Err(argument_error(name, format!("is {value}"), "give a number above 0, up to 1")),
+    if value > 0.0 && value <= 1.0 {
+        return Ok(value);
     }
+    Err(argument_error(name, format!("is {value}"), "give a number above 0, up to 1"))
 }
 
 impl MinimizeOptions {
@@ -65,7 +65,8 @@ impl MinimizeOptions {
         }
         let step = check_fraction("step", self.step)?;
         let sampled = Estimator::Sampled { block: self.block, ageing: self.ageing };
-        let (newton, brouwer) = (Update::NearestNewton { step }, Update::Brouwer { step });
+        let newton = Update::NearestNewton { step };
+        let brouwer = Update::Brouwer { step };
         Ok(OptimizerConfig {
             estimator: parse_choice(
                 "estimator",
@@ -103,7 +104,7 @@ impl MinimizeOptions {
 
     fn uniform(&self) -> impl Fn(usize, u64) -> f64 + use<> {
         let streams = Streams::new(Seed(self.seed));
-        // One pair of numbers for each player and draw, so that any of them can be drawn without those before it.
+        // The stream is keyed by player and draw, so that a number depends on no other draw and on no order of players.
         move |player, k| streams.draws(player as u32, k, SAMPLES_PURPOSE).uniform()
     }
 }
@@ -145,7 +146,8 @@ pub(crate) fn minimize_pairs<'py>(
         }
         game.add_pair(*a, *b, costs.iter().copied().collect());
     }
-    let (settings, uniform) = (options.settings()?, options.uniform());
+    let settings = options.settings()?;
+    let uniform = options.uniform();
     let outcome = run_interruptible(py, || optimize(&game, &settings, uniform))?;
     let cost = game.cost(&outcome.joint);
     result_dict(py, &outcome, cost)
@@ -184,7 +186,7 @@ impl Game for Objective {
     fn cost(&self, joint: &[usize]) -> f64 {
         self.evaluate(joint).unwrap_or_else(|error| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            // It unwinds: there is no cost to go on with.
+            // Unwinds out of the optimizer, whose games have no errors: there is no cost to go on with.
             self.interrupt.raise();
             interrupt::check();
             f64::NAN
@@ -204,17 +206,22 @@ pub(crate) fn minimize_objective<'py>(
         let remedy = "give a number of strategies for each player, 1 or more";
         return Err(argument_error("strategies", "a player has no strategy", remedy));
     }
-    let (raised, interrupt) = (Mutex::default(), Interrupt::default());
-    let game = Objective { strategies, cost: objective, raised, interrupt };
-    let (settings, uniform) = (options.settings()?, options.uniform());
-    let found = catch_interrupt(&game.interrupt, || {
+    let game = Objective {
+        strategies,
+        cost: objective,
+        raised: Mutex::default(),
+        interrupt: Interrupt::default(),
+    };
+    let settings = options.settings()?;
+    let uniform = options.uniform();
+    let result = catch_interrupt(&game.interrupt, || {
         let outcome = optimize(&game, &settings, uniform);
         let cost = game.cost(&outcome.joint);
         (outcome, cost)
     });
     let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
     raised.map_or(Ok(()), Err)?;
-    let (outcome, cost) = found.ok_or_else(interrupted_error)?;
+    let (outcome, cost) = result.ok_or_else(interrupted_error)?;
     result_dict(py, &outcome, cost)
 }
 

@@ -27,14 +27,22 @@ pub(crate) fn input_error(error: &kernel::InputError) -> PyErr {
     ))
 }
 
-/// Returns the exception of input that came as a dict: its text was made from the dict, so the error names the
-/// key and no line.
+/// Returns the exception of input that was given as a dict: its text was written from the dict, so the error has the key
+/// and no line.
 pub(crate) fn dict_input_error(error: &kernel::InputError) -> PyErr {
     let place = error.key().unwrap_or(error.place()).to_string();
-    let told = format!("{place}: {}\n  help: {}", error.cause(), error.remedy());
-    let none: Option<usize> = None;
-    let (cause, remedy) = (error.cause().to_string(), error.remedy().to_string());
-    InputError::new_err((told, place, none, none, error.key().map(str::to_string), cause, remedy))
+    let message = format!("{place}: {}\n  help: {}", error.cause(), error.remedy());
+    let line: Option<usize> = None;
+    let column: Option<usize> = None;
+    InputError::new_err((
+        message,
+        place,
+        line,
+        column,
+        error.key().map(str::to_string),
+        error.cause().to_string(),
+        error.remedy().to_string(),
+    ))
 }
 
 /// Returns the exception of wrong input that has no text: place, cause and remedy.

@@ -63,8 +63,8 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Val
     if let Ok(path) = value.call_method0("__fspath__") {
         return to_toml(&path, key);
     }
-    let sort = value.get_type();
-    let cause = format!("a value of the type {} does not fit into a scenario", sort.name()?);
+    let ty = value.get_type();
+    let cause = format!("a value of the type {} does not fit into a scenario", ty.name()?);
     Err(argument_error(
         key,
         cause,
@@ -81,8 +81,8 @@ pub(crate) fn to_toml_table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResu
             let place = if key.is_empty() { "scenario" } else { key };
             argument_error(place, format!("the key {name} is no text"), "give text as keys")
         })?;
-        let way = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-        table.insert(name, to_toml(&value, &way)?);
+        let path = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+        table.insert(name, to_toml(&value, &path)?);
     }
     Ok(table)
 }

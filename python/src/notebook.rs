@@ -2,7 +2,10 @@
 
 use pyo3::prelude::*;
 
-/// Returns an object as HTML, made by the function for its kind.
-pub(crate) fn to_html<'py>(thing: &Bound<'py, PyAny>, sort: &str) -> PyResult<Bound<'py, PyAny>> {
-    thing.py().import("sidestep._notebook")?.call_method1(sort, (thing,))
+/// Returns an object as HTML, from the function for its kind.
+pub(crate) fn to_html<'py>(
+    object: &Bound<'py, PyAny>,
+    function: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    object.py().import("sidestep._notebook")?.call_method1(function, (object,))
 }

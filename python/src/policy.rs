@@ -1,4 +1,4 @@
-//! Functions in Python that decide for a team, between observing and acting.
+//! Policies: functions in Python that decide for a team, between observing and acting.
 
 use crate::error::OrderError;
 use pyo3::prelude::*;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// A team, preceded by its number.
 pub(crate) type IndexedTeam = (usize, Arc<Team>);
 
-/// A run, as far as functions decide in it.
+/// The part of a run that policies need.
 pub(crate) trait PolicyRun {
     /// Returns the cycles done.
     fn now(&self, py: Python<'_>) -> PyResult<Cycle>;
@@ -42,7 +42,7 @@ struct TeamPolicy<'py> {
     decide: Bound<'py, PyAny>,
 }
 
-/// Advances a run to a cycle in which functions decide, and returns the number of cycles done.
+/// Advances a run to a cycle under the control of policies, and returns the number of cycles done.
 pub(crate) fn run_with_policies(
     py: Python<'_>,
     run: &impl PolicyRun,
@@ -50,13 +50,13 @@ pub(crate) fn run_with_policies(
     state: Option<Bound<'_, PyAny>>,
     until: Cycle,
 ) -> PyResult<u64> {
-    let deciders = team_policies(run, decide)?;
+    let policies = team_policies(run, decide)?;
     let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
     let from = run.now(py)?;
     while run.now(py)? < until && !run.has_ended(py)? {
-        for decider in &deciders {
-            decider.order(py, run, &state).inspect_err(|raised| {
-                // The traceback shows the cycle of the run; nothing else depends on it.
+        for policy in &policies {
+            policy.order(py, run, &state).inspect_err(|raised| {
+                // Without the note, the exception itself still reaches the user.
                 let _ = add_cycle_note(py, run, raised);
             })?;
         }
@@ -67,12 +67,15 @@ pub(crate) fn run_with_policies(
 
 /// Adds the cycle of the run to an exception of a function, in versions of Python that can do so.
 fn add_cycle_note(py: Python<'_>, run: &impl PolicyRun, raised: &PyErr) -> PyResult<()> {
-    let (plan, cycle, version) = (run.plan(), run.now(py)?, sidestep::VERSION);
-    let words = format!(
-        "deciding for cycle {cycle} of `{}`, seed {}, sidestep {version}; the run is at that cycle still",
-        plan.name, plan.seed
+    let plan = run.plan();
+    let cycle = run.now(py)?;
+    let note = format!(
+        "deciding for cycle {cycle} of `{}`, seed {}, sidestep {}; the run is at that cycle still",
+        plan.name,
+        plan.seed,
+        sidestep::VERSION
     );
-    raised.value(py).call_method1("add_note", (words,)).map(drop)
+    raised.value(py).call_method1("add_note", (note,)).map(drop)
 }
 
 /// Returns the functions by team: one function decides for all that take orders.
@@ -80,26 +83,27 @@ fn team_policies<'py>(
     run: &impl PolicyRun,
     decide: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<TeamPolicy<'py>>> {
-    let mut deciders = Vec::new();
+    let mut policies = Vec::new();
     if let Ok(by_team) = decide.cast::<PyMapping>() {
         for entry in by_team.items()?.iter() {
             let (team, decide): (Bound<'_, PyAny>, Bound<'_, PyAny>) = entry.extract()?;
-            deciders.push(TeamPolicy::new(run.team(&team)?, &decide)?);
+            policies.push(TeamPolicy::new(run.team(&team)?, &decide)?);
         }
-        return Ok(deciders);
+        return Ok(policies);
     }
     for team in run.ordered_teams() {
-        deciders.push(TeamPolicy::new(team, decide)?);
+        policies.push(TeamPolicy::new(team, decide)?);
     }
-    if deciders.is_empty() {
-        let words = "no agent of this scenario takes orders; let it say that some are `external`";
-        return Err(OrderError::new_err(words));
+    if policies.is_empty() {
+        return Err(OrderError::new_err(
+            "no agent of this scenario takes orders; let it say that some are `external`",
+        ));
     }
-    Ok(deciders)
+    Ok(policies)
 }
 
 impl<'py> TeamPolicy<'py> {
-    /// Returns the decider of a team: the function, or its result for that team if it makes a function for each.
+    /// Returns the policy of a team: the function, or the one that its `of_team` returns for this team.
     fn new(team: IndexedTeam, decide: &Bound<'py, PyAny>) -> PyResult<Self> {
         let decide = match decide.getattr_opt("of_team")? {
             Some(of_team) => of_team.call1((crate::space::Team(Arc::clone(&team.1)),))?,
@@ -120,16 +124,16 @@ impl<'py> TeamPolicy<'py> {
         let (_, team) = &self.team;
         if decided.is_none() {
             // This is far more often a forgotten `return` than a decision.
-            let words = format!(
+            let message = format!(
                 "the function that decides for team `{}` returned None; return its orders, {{}} for none",
                 team.name
             );
-            return Err(OrderError::new_err(words));
+            return Err(OrderError::new_err(message));
         }
         let Ok(by_name) = decided.cast::<PyMapping>() else {
             let Some(first) = team.action_spaces.first() else {
-                let words = format!("the agents of team `{}` decide for themselves", team.name);
-                return Err(OrderError::new_err(words));
+                let message = format!("the agents of team `{}` decide for themselves", team.name);
+                return Err(OrderError::new_err(message));
             };
             return run.give_order(py, &first.name, &decided, team);
         };

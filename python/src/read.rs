@@ -33,15 +33,14 @@ pub(crate) fn read<'py>(
     folder: PathBuf,
     tables: Option<Vec<String>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let wanted = tables;
     if Folder::is_at(&folder) {
-        return read_sweep_folder(py, &folder, wanted.as_ref());
+        return read_sweep_folder(py, &folder, tables.as_ref());
     }
     let read = || {
-        let names = wanted.map_or_else(|| tables_of(&folder), Ok)?;
+        let names = tables.map_or_else(|| tables_of(&folder), Ok)?;
         names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
     };
-    let read: Result<Vec<_>, sidestep::kernel::InputError> = py.detach(read);
+    let read: Result<Vec<_>, InputError> = py.detach(read);
     let dict = PyDict::new(py);
     for (name, table) in read.map_err(|e| error::input_error(&e))? {
         dict.set_item(name, Table::new(table.schema, table.columns)?)?;
@@ -53,7 +52,7 @@ pub(crate) fn read<'py>(
 fn read_sweep_folder<'py>(
     py: Python<'py>,
     folder: &Path,
-    wanted: Option<&Vec<String>>,
+    names: Option<&Vec<String>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let finished = py.detach(|| {
         let folder = Folder::open(folder)?;
@@ -63,12 +62,12 @@ fn read_sweep_folder<'py>(
     let (table, world) = finished.map_err(|e: InputError| error::input_error(&e))?;
     let dict = PyDict::new(py);
     for (name, columns) in SWEEP_TABLES.into_iter().zip([table.results(), table.timings()]) {
-        if wanted.is_none_or(|wanted| wanted.iter().any(|other| other == name)) {
+        if names.is_none_or(|names| names.iter().any(|other| other == name)) {
             let columns = columns.into_iter().cloned().collect();
             dict.set_item(name, Table::from_runs(name, columns, &world)?)?;
         }
     }
-    let unknown = wanted.into_iter().flatten().find(|name| !SWEEP_TABLES.contains(&name.as_str()));
+    let unknown = names.into_iter().flatten().find(|name| !SWEEP_TABLES.contains(&name.as_str()));
     match unknown {
         Some(name) => {
             let cause = format!("there is no table `{name}`");

@@ -12,7 +12,8 @@ use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// Number of bodies up to which reseeding takes less time than starting an interruptible thread.
+/// Number of bodies up to which reseeding takes less time than starting an interruptible thread: learning in small worlds
+/// reseeds before each episode.
 const MAX_UNINTERRUPTED_BODIES: usize = 100;
 
 /// A scenario, read, checked and compiled. It never changes; simulations share it.
@@ -66,21 +67,24 @@ impl LoadedScenario {
         is_dict: bool,
         unpacked: Option<Arc<tempfile::TempDir>>,
     ) -> Self {
-        let (resolved, seedless) = (OnceLock::new(), OnceLock::new());
+        let resolved = OnceLock::new();
+        let seedless = OnceLock::new();
         Self { compiled, text, is_dict, resolved, seedless, unpacked }
     }
 
     /// Returns the scenario of a bundle.
     pub(crate) fn from_bundle(py: Python<'_>, resolved: ResolvedScenario) -> PyResult<Self> {
-        let unpacked = match resolved.files.is_empty() {
-            true => None,
-            false => Some(Arc::new(unpack_files(&resolved.files)?)),
+        let unpacked = if resolved.files.is_empty() {
+            None
+        } else {
+            Some(Arc::new(unpack_files(&resolved.files)?))
         };
         let base = unpacked.as_ref().map_or_else(PathBuf::new, |dir| dir.path().to_path_buf());
         let source = Source::new("scenario.toml", resolved.text.clone(), base);
-        let made = Self::new(py, source, false)?;
-        let _ = made.resolved.set(Ok(resolved));
-        Ok(Self { unpacked, ..made })
+        let loaded = Self::new(py, source, false)?;
+        // A bundle is a resolved scenario already; resolving it again would give the paths of its temporary folder.
+        let _ = loaded.resolved.set(Ok(resolved));
+        Ok(Self { unpacked, ..loaded })
     }
 
     /// Returns its text with the origin of that.
@@ -113,8 +117,8 @@ impl LoadedScenario {
     /// Returns the text to which checkpoints belong: the resolved one.
     pub(crate) fn identity(&self) -> PyResult<String> {
         if let ScenarioText::Reseeded { of, seed, .. } = &self.text {
-            let (resolved, find) = (of.resolved()?, ResolvedScenario::seed_template);
-            if let Some(seedless) = of.seedless.get_or_init(|| find(resolved)) {
+            let resolved = of.resolved()?;
+            if let Some(seedless) = of.seedless.get_or_init(|| resolved.seed_template()) {
                 return Ok(seedless.with_seed(*seed));
             }
         }
@@ -133,10 +137,11 @@ impl LoadedScenario {
             ScenarioText::Own(_) => self,
             ScenarioText::Reseeded { of, .. } => of,
         };
-        let reseeded = || self.compiled.reseeded(seed);
-        let reseeded = match self.compiled.body_count() > MAX_UNINTERRUPTED_BODIES {
-            true => run_interruptible(py, reseeded)?,
-            false => py.detach(reseeded),
+        let reseed = || self.compiled.reseeded(seed);
+        let reseeded = if self.compiled.body_count() > MAX_UNINTERRUPTED_BODIES {
+            run_interruptible(py, reseed)?
+        } else {
+            py.detach(reseed)
         };
         let compiled = match reseeded {
             Some(compiled) => compiled,
@@ -169,17 +174,17 @@ fn scenario_error(error: &InputError, is_dict: bool) -> PyErr {
 }
 
 fn unpack_files(files: &[(String, Vec<u8>)]) -> PyResult<tempfile::TempDir> {
-    let stored = || {
-        let dir = tempfile::tempdir()?;
-        for (name, bytes) in files {
-            let path = dir.path().join(name);
-            std::fs::create_dir_all(path.parent().unwrap_or(dir.path()))?;
-            std::fs::write(path, bytes)?;
-        }
-        Ok(dir)
-    };
-    let failed = |e: std::io::Error| error::RecordError::new_err(format!("cannot unpack: {e}"));
-    stored().map_err(failed)
+    write_files(files).map_err(|e| error::RecordError::new_err(format!("cannot unpack: {e}")))
+}
+
+fn write_files(files: &[(String, Vec<u8>)]) -> std::io::Result<tempfile::TempDir> {
+    let dir = tempfile::tempdir()?;
+    for (name, bytes) in files {
+        let path = dir.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap_or(dir.path()))?;
+        std::fs::write(path, bytes)?;
+    }
+    Ok(dir)
 }
 
 /// Returns a scenario from anything that represents one: a path, a dict, or a scenario.
@@ -239,7 +244,7 @@ impl Scenario {
         text: Option<&str>,
         base: Option<PathBuf>,
     ) -> PyResult<Self> {
-        load_any(py, scenario, text, base).map(|made| Self(Arc::new(made)))
+        load_any(py, scenario, text, base).map(|loaded| Self(Arc::new(loaded)))
     }
 
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
@@ -264,7 +269,7 @@ impl Scenario {
                 overrides.push(format!("{key}={}", to_toml(&value, &key)?));
             }
         }
-        self.0.with(py, &overrides).map(|made| Self(Arc::new(made)))
+        self.0.with(py, &overrides).map(|loaded| Self(Arc::new(loaded)))
     }
 
     /// Returns the surprises for its author, the weightiest first: `key: words`.
@@ -334,7 +339,8 @@ impl Scenario {
 
     fn __repr__(&self) -> String {
         let plan = self.0.compiled.plan();
-        let (world, n) = (self.0.compiled.world(), self.0.compiled.body_count());
+        let world = self.0.compiled.world();
+        let n = self.0.compiled.body_count();
         let name =
             if plan.name.is_empty() { world.into() } else { format!("{world} {}", plan.name) };
         format!("Scenario({name}, {n} bodies, seed {}, {} cycles)", plan.seed, plan.cycles)
@@ -352,7 +358,7 @@ pub(crate) fn unpack_scenario(
     files: Vec<(String, Vec<u8>)>,
 ) -> PyResult<Scenario> {
     LoadedScenario::from_bundle(py, ResolvedScenario { text, files })
-        .map(|made| Scenario(Arc::new(made)))
+        .map(|loaded| Scenario(Arc::new(loaded)))
 }
 
 /// Returns the JSON Schema of the scenarios of a world, or of any, as a dict.
@@ -368,7 +374,8 @@ pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>>
     match WORLDS.schema(world) {
         Some(schema) => to_python(py, &schema),
         None => {
-            let (names, world) = (WORLDS.names().join(", "), world.unwrap_or_default());
+            let names = WORLDS.names().join(", ");
+            let world = world.unwrap_or_default();
             Err(argument_error(
                 "schema",
                 format!("there is no world `{world}`"),

@@ -55,9 +55,9 @@ pub(crate) struct Simulation {
     /// Its teams, which never change and are needed in every cycle.
     teams: Vec<Arc<control::Team>>,
     /// `None` when it is closed.
-    journey: Mutex<Option<ManagedRun>>,
-    /// The view of its pictures, with their width in pixels.
-    film: Mutex<Option<(u32, AnimationRenderer)>>,
+    run: Mutex<Option<ManagedRun>>,
+    /// The renderer of its pictures, with their width in pixels: kept, since it draws the scenery once for all pictures.
+    renderer: Mutex<Option<(u32, AnimationRenderer)>>,
 }
 
 impl Simulation {
@@ -66,24 +66,25 @@ impl Simulation {
         py: Python<'_>,
         scenario: Arc<LoadedScenario>,
         workers: usize,
-        keep: OutputPaths<'_>,
+        paths: OutputPaths<'_>,
     ) -> PyResult<Self> {
         if workers == 0 {
             return Err(argument_error("workers", "0 workers cannot simulate", "give 1 or more"));
         }
-        let journey = py.detach(|| {
-            // Without a folder it is identified by the text that a folder would have, so that checkpoints fit both.
-            let source = match keep.folder {
+        let run = py.detach(|| {
+            // Without a folder, the run is identified by the text that its folder would have: so checkpoints of either can be
+            // restored in the other.
+            let source = match paths.folder {
                 Some(_) => scenario.source()?.clone(),
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
-            let journey =
-                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, keep);
-            journey.map_err(|e| error::session_error(&e))
+            let run =
+                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, paths);
+            run.map_err(|e| error::session_error(&e))
         })?;
-        let teams = journey.simulation().teams().iter().cloned().map(Arc::new).collect();
-        let journey = Mutex::new(Some(journey));
-        Ok(Self { scenario, workers, teams, journey, film: Mutex::default() })
+        let teams = run.simulation().teams().iter().cloned().map(Arc::new).collect();
+        let run = Mutex::new(Some(run));
+        Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
     }
 
     /// Works with the run while other threads of Python go on.
@@ -93,8 +94,8 @@ impl Simulation {
         work: impl FnOnce(&mut ManagedRun) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         py.detach(|| {
-            let mut journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            work(journey.as_mut().ok_or_else(closed_error)?)
+            let mut run = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            work(run.as_mut().ok_or_else(closed_error)?)
         })
     }
 
@@ -102,14 +103,14 @@ impl Simulation {
     fn read<T: Send>(
         &self,
         py: Python<'_>,
-        ask: impl FnOnce(&dyn AnySimulation) -> T + Send,
+        query: impl FnOnce(&dyn AnySimulation) -> T + Send,
     ) -> PyResult<T> {
-        self.with_run(py, |journey| Ok(ask(journey.simulation())))
+        self.with_run(py, |run| Ok(query(run.simulation())))
     }
 
     /// Returns the state as bytes.
     fn checkpoint_bytes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
-        self.with_run(py, |journey| journey.checkpoint().map_err(|e| error::record_error(&e)))
+        self.with_run(py, |run| run.checkpoint().map_err(|e| error::record_error(&e)))
     }
 
     /// Advances to the goal, or to the end of the run, and returns the number of cycles done.
@@ -129,23 +130,23 @@ impl Simulation {
         }
     }
 
-    /// Advances toward a goal for a little while.
+    /// Advances toward a goal for one time slice.
     ///
     /// The cycle is read and the run advanced under one lock, with no other thread in between: of two threads that
     /// step at once, each adds its own step.
     fn advance_slice(&self, py: Python<'_>, goal: Goal) -> PyResult<SliceOutcome> {
         py.detach(|| {
-            let mut held = self.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            let journey = held.as_mut().ok_or_else(closed_error)?;
-            let from = journey.cycle();
+            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            let run = guard.as_mut().ok_or_else(closed_error)?;
+            let from = run.cycle();
             let until = goal.end_from(from);
-            if let Err(error) = journey.advance_to(until, &TimeSlice::default()) {
-                // A run that broke off has no usable state.
-                *held = None;
+            if let Err(error) = run.advance_to(until, &TimeSlice::default()) {
+                // The state may be in the middle of a cycle, so it is not used further.
+                *guard = None;
                 return Err(error::session_error(&error));
             }
-            let now = journey.cycle();
-            let is_last = now >= until || journey.simulation().is_over();
+            let now = run.cycle();
+            let is_last = now >= until || run.simulation().is_over();
             Ok(SliceOutcome { done: now - from, is_last })
         })
     }
@@ -155,7 +156,8 @@ impl Simulation {
         find_team(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
 
-    /// Returns the team of an agent; the first one for an agent that is in none: its order will be refused.
+    /// Returns the team of an agent; the first one for an agent that is in none, whose order the run then refuses with a
+    /// reason.
     fn team_of(&self, agent: Option<EntityId>) -> PyResult<IndexedTeam> {
         let has = |team: &Arc<control::Team>| {
             agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
@@ -170,12 +172,12 @@ impl Simulation {
         number: usize,
         team: &Arc<control::Team>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let mut room = ObservationBuffers::from_team(team);
-        let written = self.with_run(py, |journey| {
-            let written = journey.simulation().observe(number, &mut room.buffers_mut());
-            written.map_err(|e| error::order_error(&e)).map(|()| room)
+        let mut buffers = ObservationBuffers::from_team(team);
+        let buffers = self.with_run(py, |run| {
+            let observed = run.simulation().observe(number, &mut buffers.buffers_mut());
+            observed.map_err(|e| error::order_error(&e)).map(|()| buffers)
         });
-        written?.into_dict(py, team)
+        buffers?.into_dict(py, team)
     }
 
     /// Gives an order to agents of a team.
@@ -190,28 +192,27 @@ impl Simulation {
         let shape =
             team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
         let values = order_values(py, order, values, agents.len(), shape)?;
-        self.with_run(py, |journey| {
+        self.with_run(py, |run| {
             let orders = Orders { order, agents, values: &values };
-            journey.order(&orders).map_err(|e| error::order_error(&e))
+            run.order(&orders).map_err(|e| error::order_error(&e))
         })
     }
 
     /// Draws the present state.
     fn draw(&self, py: Python<'_>, width: u32) -> PyResult<(AnimationFrame, (u32, u32))> {
-        self.with_run(py, |journey| {
-            let run = journey.simulation_mut();
-            let frame = run.frame(FrameOptions::WITHOUT_SCANS);
-            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
-            let made = film.take().filter(|(its, _)| *its == width);
-            let made = made.map_or_else(
-                || AnimationRenderer::new(run.scenery(), &[], width),
-                |(_, it)| Ok(it),
-            );
-            let made =
-                made.map_err(|e| argument_error("width", e.to_string(), "give 1 to 4096 pixels"))?;
-            let (caption, size) = (format!("cycle {}", frame.cycle), made.size_px());
-            let still = made.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
-            *film = Some((width, made));
+        self.with_run(py, |run| {
+            let simulation = run.simulation_mut();
+            let frame = simulation.frame(FrameOptions::WITHOUT_SCANS);
+            let mut kept = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
+            let renderer = match kept.take() {
+                Some((kept_width, renderer)) if kept_width == width => renderer,
+                _ => AnimationRenderer::new(simulation.scenery(), &[], width)
+                    .map_err(|e| argument_error("width", e.to_string(), "give 1 to 4096 pixels"))?,
+            };
+            let caption = format!("cycle {}", frame.cycle);
+            let still = renderer.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
+            let size = renderer.size_px();
+            *kept = Some((width, renderer));
             Ok((still, size))
         })
     }
@@ -249,7 +250,7 @@ impl Goal {
     }
 }
 
-/// The outcome of advancing for a little while.
+/// The outcome of one time slice.
 struct SliceOutcome {
     /// Cycles done.
     done: u64,
@@ -280,8 +281,8 @@ impl FromPyObject<'_, '_> for RecordArgument {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        if let Ok(is_wanted) = value.extract::<bool>() {
-            return Ok(Self(is_wanted.then(RowSelection::default)));
+        if let Ok(is_recorded) = value.extract::<bool>() {
+            return Ok(Self(is_recorded.then(RowSelection::default)));
         }
         let names = value.extract::<Vec<String>>().map_err(|_| {
             let remedy = "give True, False, or a list of names: record=[\"events\"]";
@@ -315,12 +316,12 @@ impl Simulation {
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
-        let keep = OutputPaths { folder: out.as_deref(), mcap: None, replace };
-        let simulation = Self::start(py, scenario, workers.0 as usize, keep)?;
-        if let RecordArgument(Some(wanted)) = record {
-            let mut journey = simulation.journey.lock().unwrap_or_else(PoisonError::into_inner);
-            let journey = journey.as_mut().ok_or_else(closed_error)?;
-            journey.keep_rows(&wanted).map_err(|e| error::input_error(&e))?;
+        let paths = OutputPaths { folder: out.as_deref(), mcap: None, replace };
+        let simulation = Self::start(py, scenario, workers.0 as usize, paths)?;
+        if let RecordArgument(Some(selection)) = record {
+            let mut run = simulation.run.lock().unwrap_or_else(PoisonError::into_inner);
+            let run = run.as_mut().ok_or_else(closed_error)?;
+            run.keep_rows(&selection).map_err(|e| error::input_error(&e))?;
         }
         Ok(simulation)
     }
@@ -479,9 +480,7 @@ impl Simulation {
     /// >>> sim.cycle
     /// 10
     fn restore(&self, py: Python<'_>, checkpoint: Vec<u8>) -> PyResult<()> {
-        self.with_run(py, |journey| {
-            journey.restore(&checkpoint).map_err(|e| error::restore_error(&e))
-        })
+        self.with_run(py, |run| run.restore(&checkpoint).map_err(|e| error::restore_error(&e)))
     }
 
     /// Returns an independent copy in the same state, which records nothing.
@@ -506,7 +505,8 @@ impl Simulation {
 
     /// Pickles the simulation with its scenario, all files of that, and its state.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, PickledArgs<'py>)> {
-        let (py, simulation) = (slf.py(), slf.get());
+        let py = slf.py();
+        let simulation = slf.get();
         let maker = py.import("sidestep._native")?.getattr("rebuild")?;
         let ResolvedScenario { text, files } = simulation.scenario.resolved()?.clone();
         Ok((maker, ((text, files), simulation.workers, simulation.checkpoint(py)?)))
@@ -518,10 +518,10 @@ impl Simulation {
     /// >>> sim.snapshot()["at_m"].shape
     /// (2, 3)
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let frame = self.with_run(py, |journey| {
-            Ok(journey.simulation_mut().frame(FrameOptions::WITHOUT_SCANS))
-        })?;
-        let (dict, bodies) = (PyDict::new(py), &frame.bodies);
+        let frame =
+            self.with_run(py, |run| Ok(run.simulation_mut().frame(FrameOptions::WITHOUT_SCANS)))?;
+        let bodies = &frame.bodies;
+        let dict = PyDict::new(py);
         dict.set_item("cycle", frame.cycle)?;
         dict.set_item("time_s", frame.time_s)?;
         dict.set_item("kind", body_texts(py, bodies, |body| body.kind.name().to_string())?)?;
@@ -563,7 +563,7 @@ impl Simulation {
     /// >>> len(sim.frame()), sim.frame().units["x_m"]
     /// (2, 'm')
     fn frame(&self, py: Python<'_>) -> PyResult<Table> {
-        let rows = self.with_run(py, |journey| Ok(frame_rows(journey.simulation_mut())));
+        let rows = self.with_run(py, |run| Ok(frame_rows(run.simulation_mut())));
         rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
@@ -582,7 +582,7 @@ impl Simulation {
         number: u32,
         part: Option<u32>,
     ) -> PyResult<Py<PyAny>> {
-        let known = BodyKind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
+        let kind = BodyKind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
             let names: Vec<_> = BodyKind::ALL.iter().map(|kind| kind.name()).collect();
             argument_error(
                 "kind",
@@ -590,11 +590,11 @@ impl Simulation {
                 format!("one of {}", names.join(", ")),
             )
         })?;
-        let told = self.read(py, |run| {
-            let told = run.inspect(BodyId::new(known, number, part));
-            told.and_then(|told| serde_json::to_value(told).ok()).unwrap_or_default()
+        let inspection = self.read(py, |run| {
+            let inspection = run.inspect(BodyId::new(kind, number, part));
+            inspection.and_then(|it| serde_json::to_value(it).ok()).unwrap_or_default()
         })?;
-        to_python(py, &told)
+        to_python(py, &inspection)
     }
 
     /// Keeps rows in memory from now on: those of all tables, or of these; with `frames=n` also the table `frames`, with all
@@ -615,17 +615,18 @@ impl Simulation {
         tables: Option<RecordArgument>,
         frames: Option<WholeNumber>,
     ) -> PyResult<()> {
-        let RecordArgument(wanted) =
+        let RecordArgument(selection) =
             tables.unwrap_or(RecordArgument(Some(RowSelection::default())));
-        let Some(wanted) = wanted else {
+        let Some(selection) = selection else {
             return Err(argument_error(
                 "record",
                 "rows that are kept are not dropped",
                 "leave it out",
             ));
         };
-        let wanted = RowSelection { frames: frames.map(|WholeNumber(frames)| frames), ..wanted };
-        self.with_run(py, |journey| journey.keep_rows(&wanted).map_err(|e| error::input_error(&e)))
+        let frames = frames.map(|WholeNumber(frames)| frames);
+        let selection = RowSelection { frames, ..selection };
+        self.with_run(py, |run| run.keep_rows(&selection).map_err(|e| error::input_error(&e)))
     }
 
     /// Takes the rows recorded since the last call: tables by name. Needs `record=True`, or `record` before.
@@ -635,16 +636,17 @@ impl Simulation {
     /// >>> len(sim.tables()["trajectories"])
     /// 20
     fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let rows = self.with_run(py, |journey| {
-            let remedy = "make it with record=True; with `out` read its folder when it is closed";
-            if !journey.keeps_rows() {
+        let rows = self.with_run(py, |run| {
+            if !run.keeps_rows() {
+                let remedy =
+                    "make it with record=True; with `out` read its folder when it is closed";
                 return Err(argument_error(
                     "tables",
                     "the rows of this run are not kept in memory",
                     remedy,
                 ));
             }
-            journey.take_rows().map_err(|e| error::record_error(&e))
+            run.take_rows().map_err(|e| error::record_error(&e))
         })?;
         tables_dict(py, rows)
     }
@@ -671,7 +673,8 @@ impl Simulation {
         decide: Option<Py<PyAny>>,
         state: Option<Py<PyAny>>,
     ) -> PyResult<Blocks> {
-        let (py, simulation) = (slf.py(), slf.get());
+        let py = slf.py();
+        let simulation = slf.get();
         if cycles.0 == 0 {
             return Err(argument_error(
                 "cycles",
@@ -679,11 +682,11 @@ impl Simulation {
                 "give 1 or more",
             ));
         }
-        simulation.with_run(py, |journey| match journey.keeps_rows() {
-            true => Ok(()),
-            false => {
-                journey.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
+        simulation.with_run(py, |run| {
+            if run.keeps_rows() {
+                return Ok(());
             }
+            run.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
         })?;
         let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
         // Functions keep their state from block to block, as from cycle to cycle.
@@ -702,8 +705,8 @@ impl Simulation {
     fn close(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let signals = SignalWatcher::default();
         let summary = py.detach(|| {
-            let journey = self.journey.lock().unwrap_or_else(PoisonError::into_inner).take();
-            journey.map(|journey| journey.finish(&signals)).transpose()
+            let run = self.run.lock().unwrap_or_else(PoisonError::into_inner).take();
+            run.map(|run| run.finish(&signals)).transpose()
         });
         match summary.map_err(|e| error::session_error(&e))? {
             None => Ok(py.None()),

@@ -178,12 +178,13 @@ pub(crate) fn team_at(
     number: usize,
 ) -> PyResult<(usize, &Arc<control::Team>)> {
     teams.get(number).map(|team| (number, team)).ok_or_else(|| {
-        let words = format!("there is no team {number}; the scenario has {}, from 0", teams.len());
-        error::OrderError::new_err(words)
+        let message =
+            format!("there is no team {number}; the scenario has {}, from 0", teams.len());
+        error::OrderError::new_err(message)
     })
 }
 
-/// Room for the observations of a team, one buffer for each of its spaces.
+/// Buffers for the observations of a team, one for each of its spaces.
 pub(crate) struct ObservationBuffers(Vec<Buffer>);
 
 enum Buffer {
@@ -194,14 +195,14 @@ enum Buffer {
 impl Buffer {
     fn as_buffer_mut(&mut self) -> BufferMut<'_> {
         match self {
-            Self::Whole(room) => BufferMut::Integer(room),
-            Self::Real(room) => BufferMut::Real(room),
+            Self::Whole(values) => BufferMut::Integer(values),
+            Self::Real(values) => BufferMut::Real(values),
         }
     }
 }
 
 impl ObservationBuffers {
-    /// Returns room for the observations of `team`.
+    /// Returns buffers for the observations of `team`.
     pub(crate) fn from_team(team: &control::Team) -> Self {
         let buffer = |space: &control::Space| {
             let n = team.agents.len() * space.width();
@@ -210,7 +211,7 @@ impl ObservationBuffers {
         Self(team.observation_spaces.iter().map(buffer).collect())
     }
 
-    /// Returns the room to write into.
+    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> Vec<BufferMut<'_>> {
         self.0.iter_mut().map(Buffer::as_buffer_mut).collect()
     }
@@ -253,9 +254,10 @@ pub(crate) fn zeroed_arrays<'py>(
     let dict = PyDict::new(py);
     for space in &team.observation_spaces {
         let shape = shape(space, team, worlds);
-        match space.is_integer() {
-            true => dict.set_item(&space.name, PyArrayDyn::<i64>::zeros(py, shape, false))?,
-            false => dict.set_item(&space.name, PyArrayDyn::<f64>::zeros(py, shape, false))?,
+        if space.is_integer() {
+            dict.set_item(&space.name, PyArrayDyn::<i64>::zeros(py, shape, false))?;
+        } else {
+            dict.set_item(&space.name, PyArrayDyn::<f64>::zeros(py, shape, false))?;
         }
     }
     Ok(dict)
@@ -280,31 +282,34 @@ impl<'py> OutArrays<'py> {
         team: &control::Team,
         worlds: usize,
     ) -> PyResult<Self> {
-        let one = |space: &control::Space| {
+        let mut arrays = Vec::with_capacity(team.observation_spaces.len());
+        for space in &team.observation_spaces {
             let shape = shape(space, team, worlds);
             let array = out.get_item(&space.name)?;
-            let lent = array.and_then(|array| match space.is_integer() {
-                true => writable_array(&array, &shape).map(Array::Whole),
-                false => writable_array(&array, &shape).map(Array::Real),
+            let array = array.and_then(|array| {
+                if space.is_integer() {
+                    writable_array(&array, &shape).map(Array::Whole)
+                } else {
+                    writable_array(&array, &shape).map(Array::Real)
+                }
             });
-            lent.ok_or_else(|| {
-                let (name, dtype) =
-                    (&space.name, if space.is_integer() { "int64" } else { "float64" });
-                let cause = "it is missing, in use, or another array than an earlier call returned";
-                let remedy = format!(
-                    "give a writable array in C order of the shape {}, {dtype}",
-                    format_shape(&shape)
-                );
-                argument_error(&format!("out.{name}"), cause, remedy)
-            })
-        };
-        team.observation_spaces.iter().map(one).collect::<PyResult<_>>().map(Self)
+            arrays.push(array.ok_or_else(|| out_array_error(space, &shape))?);
+        }
+        Ok(Self(arrays))
     }
 
-    /// Returns the room to write into.
+    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> PyResult<Vec<BufferMut<'_>>> {
         self.0.iter_mut().map(Array::as_buffer_mut).collect()
     }
+}
+
+fn out_array_error(space: &control::Space, shape: &[usize]) -> PyErr {
+    let dtype = if space.is_integer() { "int64" } else { "float64" };
+    let cause = "it is missing, in use, or another array than an earlier call returned";
+    let shape = format_shape(shape);
+    let remedy = format!("give a writable array in C order of the shape {shape}, {dtype}");
+    argument_error(&format!("out.{}", space.name), cause, remedy)
 }
 
 impl Array<'_> {

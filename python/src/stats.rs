@@ -27,14 +27,13 @@ pub(crate) fn stats_mean(
 ) -> (Option<f64>, Option<f64>, IntervalEnds, IntervalEnds, usize, usize) {
     let sample = Sample::from_runs(to_options(&values));
     let bootstrap = py.detach(|| Bootstrap::default().mean(&sample.values));
-    let (n, missing) = (sample.values.len(), sample.missing);
     (
         statistics::mean(&sample.values),
         statistics::sample_sd(&sample.values),
         statistics::mean_interval(&sample.values).map(ends),
         bootstrap.map(ends),
-        n,
-        missing,
+        sample.values.len(),
+        sample.missing,
     )
 }
 
@@ -46,9 +45,11 @@ pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64,
         return Err(argument_error("successes", cause, "give at most as many as there are trials"));
     }
     let wilson = statistics::wilson(successes as f64, n as f64);
-    let exact = match n {
-        0 => Interval { low: 0.0, high: 1.0 },
-        _ => statistics::clopper_pearson(successes, n),
+    let exact = if n == 0 {
+        // Without a trial, any share is possible.
+        Interval { low: 0.0, high: 1.0 }
+    } else {
+        statistics::clopper_pearson(successes, n)
     };
     Ok((ends(wilson), ends(exact)))
 }
@@ -62,8 +63,8 @@ pub(crate) fn stats_quantile(
 ) -> (Option<f64>, IntervalEnds, Option<f64>) {
     let sorted = Sample::from_runs(to_options(&values)).sorted();
     let interval = statistics::quantile_interval(&sorted, q);
-    let coverage = interval.map(|found| found.coverage);
-    (statistics::percentile(&sorted, q), interval.map(|found| ends(found.interval)), coverage)
+    let coverage = interval.map(|interval| interval.coverage);
+    (statistics::percentile(&sorted, q), interval.map(|quantile| ends(quantile.interval)), coverage)
 }
 
 /// The outcome of two treatments of the same cases.
@@ -82,7 +83,8 @@ pub(crate) fn stats_paired(
     a: PyValues<'_>,
     b: PyValues<'_>,
 ) -> PyResult<PairedResult> {
-    let (a, b) = (to_options(&a), to_options(&b));
+    let a = to_options(&a);
+    let b = to_options(&b);
     if a.len() != b.len() {
         let cause = format!("{} and {} values are no pairs", a.len(), b.len());
         return Err(argument_error(
@@ -119,8 +121,8 @@ pub(crate) fn stats_correlation(
     let pair = |(a, b): (Option<f64>, Option<f64>)| Some((a?, b?));
     let pairs: Vec<(f64, f64)> =
         to_options(&a).into_iter().zip(to_options(&b)).filter_map(pair).collect();
-    let found = statistics::rank_correlation(&pairs)?;
-    Some((found.value, found.interval.map(ends), pairs.len()))
+    let correlation = statistics::rank_correlation(&pairs)?;
+    Some((correlation.value, correlation.interval.map(ends), pairs.len()))
 }
 
 /// The stopping rule: the native part of `sidestep.stats.StoppingRule`. Returns the number of runs, and the reason if

@@ -1,4 +1,4 @@
-//! Sweeps: the plan, the journal and the stopping rule of the command, with runs in threads or by a crew.
+//! Sweeps: the plan, the journal and the stopping rule of the command, with runs on threads or by an executor in Python.
 
 use crate::error::{self, argument_error};
 use crate::json::{to_python, to_toml};
@@ -44,10 +44,12 @@ pub(crate) struct SweepOptions<'py> {
     record: bool,
 }
 
-/// A requested sweep; the scenario from which it was made, if any, keeps its files.
+/// A requested sweep.
 struct SweepRequest {
     sweep: Sweep,
-    _made: Option<Arc<LoadedScenario>>,
+    /// The scenario that it varies, if it was given one: an unpickled scenario deletes its temporary files when it is
+    /// dropped, and the sweep reads them.
+    _loaded: Option<Arc<LoadedScenario>>,
 }
 
 fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
@@ -61,15 +63,8 @@ fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Settin
 
 impl SweepOptions<'_> {
     fn factors(&self) -> PyResult<Vec<Factor>> {
-        let told = |key: &str| {
-            let remedy = "give a list, such as {\"robots.count\": [10, 20]}; what does not vary belongs into `set`";
-            argument_error("vary", format!("`{key}` has no list of values"), remedy)
-        };
-        let factor = |Setting { key, value }: Setting| match value {
-            toml::Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
-            _ => Err(told(&key)),
-        };
-        parse_settings(self.vary.as_ref())?.into_iter().map(factor).collect()
+        let settings = parse_settings(self.vary.as_ref())?;
+        settings.into_iter().map(parse_factor).collect()
     }
 
     fn changes(&self) -> PyResult<SweepOverrides> {
@@ -78,8 +73,8 @@ impl SweepOptions<'_> {
                 "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
             text.parse().map_err(|cause: String| argument_error("until", cause, remedy))
         };
-        let is_asked = self.baseline.is_some() || self.baseline_name.is_some();
-        let wanted = BaselineSpec {
+        let has_baseline = self.baseline.is_some() || self.baseline_name.is_some();
+        let baseline = BaselineSpec {
             name: self.baseline_name.clone(),
             settings: parse_settings(self.baseline.as_ref())?,
         };
@@ -90,7 +85,7 @@ impl SweepOptions<'_> {
             replicates: self.replicate,
             max_runs: self.max_runs,
             metrics: self.metrics.clone(),
-            baseline: is_asked.then_some(wanted),
+            baseline: has_baseline.then_some(baseline),
             first_seed: self.seed,
             record: self.record,
         })
@@ -98,17 +93,29 @@ impl SweepOptions<'_> {
 
     /// Returns the sweep of a file, a dict or a scenario.
     fn request(&self, of: &Bound<'_, PyAny>) -> PyResult<SweepRequest> {
-        let (sweep, made) = parse_any(of)?;
+        let (sweep, loaded) = parse_any(of)?;
         if self.max_runs.is_some() && self.until.is_none() && sweep.until.is_none() {
             let cause = "it bounds the runs of a sweep with a target precision";
             return Err(argument_error("max_runs", cause, "give until=\"ci=0.05\" as well"));
         }
         let sweep = sweep.with_overrides(self.changes()?).map_err(|e| error::input_error(&e))?;
-        Ok(SweepRequest { sweep, _made: made })
+        Ok(SweepRequest { sweep, _loaded: loaded })
     }
 }
 
-/// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario in any form.
+fn parse_factor(setting: Setting) -> PyResult<Factor> {
+    let Setting { key, value } = setting;
+    match value {
+        toml::Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
+        _ => {
+            let remedy = "give a list, such as {\"robots.count\": [10, 20]}; what does not vary belongs into `set`";
+            Err(argument_error("vary", format!("`{key}` has no list of values"), remedy))
+        }
+    }
+}
+
+/// Returns the sweep of a sweep file, or of a dict of the same keys, or of a scenario in any form; and the scenario, in
+/// the last case.
 fn parse_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<LoadedScenario>>)> {
     if let Ok(path) = of.extract::<PathBuf>() {
         return Ok((Sweep::read(&path).map_err(|e| error::input_error(&e))?, None));
@@ -124,15 +131,17 @@ fn parse_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<LoadedScenari
         let source = Source::new("sweep", text, "");
         return Ok((Sweep::parse(&source).map_err(|e| error::dict_input_error(&e))?, None));
     }
-    let made = load(of)?;
-    Ok((Sweep::from_source(made.source()?.clone()), Some(made)))
+    let loaded = load(of)?;
+    let sweep = Sweep::from_source(loaded.source()?.clone());
+    Ok((sweep, Some(loaded)))
 }
 
 /// The outcome of a sweep.
 struct SweepResult {
     results: Vec<RunColumn>,
     timings: Vec<RunColumn>,
-    told: serde_json::Value,
+    /// The same JSON as that of `sidestep sweep --json`.
+    summary: serde_json::Value,
     world: String,
 }
 
@@ -143,22 +152,15 @@ fn run(
     engine: Engine<'_>,
     watcher: &dyn Watcher,
 ) -> Result<Option<SweepResult>, Error> {
-    let (folder, plan, ended);
-    match out {
-        Some(out) => {
-            let there =
-                sweep::open_or_create(&WORLDS, sweep, out, engine.planning_workers(), watcher)?;
-            ended = sweep::run_remaining(&WORLDS, &there, engine, watcher)?;
-            plan = there.plan().clone();
-            folder = Some(there);
-        }
-        None => {
-            (plan, ended) = sweep::run_in_memory(&WORLDS, sweep, engine, watcher)?;
-            folder = None;
-        }
-    }
-    let SweepEnd::Done(done) = ended else { return Ok(None) };
-    sweep_result(&plan, folder.as_ref(), &done).map(Some).map_err(Error::from)
+    let Some(out) = out else {
+        let (plan, end) = sweep::run_in_memory(&WORLDS, sweep, engine, watcher)?;
+        let SweepEnd::Done(done) = end else { return Ok(None) };
+        return Ok(Some(sweep_result(&plan, None, &done)?));
+    };
+    let folder = sweep::open_or_create(&WORLDS, sweep, out, engine.planning_workers(), watcher)?;
+    let end = sweep::run_remaining(&WORLDS, &folder, engine, watcher)?;
+    let SweepEnd::Done(done) = end else { return Ok(None) };
+    Ok(Some(sweep_result(folder.plan(), Some(&folder), &done)?))
 }
 
 fn sweep_result(
@@ -167,20 +169,23 @@ fn sweep_result(
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
     let summary = plan.summary(&WORLDS, &done.table)?;
-    let own = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
+    let cloned = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
-        results: own(done.table.results()),
-        timings: own(done.table.timings()),
-        told: done.to_json(plan, folder, &summary),
+        results: cloned(done.table.results()),
+        timings: cloned(done.table.timings()),
+        summary: done.to_json(plan, folder, &summary),
         world: plan.world.clone(),
     })
 }
 
-/// A crew that runs cells: a generator of Python that is driven from here.
+/// An executor of cells in Python (such as one for Dask or Ray): a generator that is driven from here, so that its code
+/// runs on the caller's thread and needs no callbacks into Rust.
 struct PyExecutor {
     /// Called with the cells; returns a generator of requests and outcomes.
     begin: Py<PyAny>,
-    at_once: usize,
+    /// Number of cells that it runs at the same time.
+    parallelism: usize,
+    /// The exception of the generator, which [`Error`] cannot carry.
     raised: Mutex<Option<PyErr>>,
 }
 
@@ -188,63 +193,63 @@ struct PyExecutor {
 type CellTuple = (u64, u32, u32, u64);
 
 impl PyExecutor {
-    /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes.
+    /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes. Scenarios are
+    /// sent on request, since a resumed sweep may have no cells left of most variants.
     fn drive(
         &self,
         py: Python<'_>,
-        deal: &CellBatch<'_>,
-        take: &mut OutcomeSink<'_>,
+        batch: &CellBatch<'_>,
+        store: &mut OutcomeSink<'_>,
     ) -> PyResult<()> {
         let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
-        let cells: Vec<CellTuple> = deal.cells().iter().map(tuple).collect();
+        let cells: Vec<CellTuple> = batch.cells().iter().map(tuple).collect();
         let generator = self.begin.bind(py).call1((WORLDS.build(), cells))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
-                Err(ended) if ended.is_instance_of::<PyStopIteration>(py) => return Ok(()),
+                Err(raised) if raised.is_instance_of::<PyStopIteration>(py) => return Ok(()),
                 yielded => yielded?,
             };
             answer = py.None();
             if let Ok(variant) = yielded.extract::<u32>() {
                 let ResolvedScenario { text, files } =
-                    deal.scenario(variant).map_err(|e| error::input_error(&e))?;
+                    batch.scenario(variant).map_err(|e| error::input_error(&e))?;
                 answer = (text, files).into_pyobject(py)?.into_any().unbind();
                 continue;
             }
             for outcome in yielded.extract::<Vec<String>>()? {
-                take(read(&outcome)?).map_err(|e| error::session_error(&e))?;
+                store(parse_outcome(&outcome)?).map_err(|e| error::session_error(&e))?;
             }
         }
     }
 }
 
-/// Reads an outcome received as text.
-fn read(text: &str) -> PyResult<Outcome> {
-    let told = |e: serde_json::Error| {
+/// Returns an outcome from JSON that [`run_task`] has written, maybe on another machine.
+fn parse_outcome(text: &str) -> PyResult<Outcome> {
+    serde_json::from_str(text).map_err(|e| {
         let remedy = "install the same build of sidestep wherever tasks run";
         argument_error("an outcome of a task", e.to_string(), remedy)
-    };
-    serde_json::from_str(text).map_err(told)
+    })
 }
 
 impl CellExecutor for PyExecutor {
-    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error> {
-        Python::attach(|py| self.drive(py, deal, take)).map_err(|raised| {
+    fn run(&self, batch: &CellBatch<'_>, store: &mut OutcomeSink<'_>) -> Result<(), Error> {
+        Python::attach(|py| self.drive(py, batch, store)).map_err(|raised| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
-            // The caller raises it; no code in between looks at the reason.
+            // `run_sweep` raises the exception itself; this error only ends the sweep.
             Error::Interrupted
         })
     }
 
     fn parallelism(&self) -> usize {
-        self.at_once
+        self.parallelism
     }
 }
 
 /// Tables of results and of timings, and the summary.
 type SweepTables<'py> = (Table, Table, Bound<'py, PyAny>);
 
-/// Runs a sweep on threads, all processors if `workers` is 0, or by a crew: the native part of `sidestep.sweep`.
+/// Runs a sweep on threads, all processors if `workers` is 0, or by an executor: the native part of `sidestep.sweep`.
 #[pyfunction]
 #[pyo3(signature = (sweep, options, out, workers, begin))]
 pub(crate) fn run_sweep<'py>(
@@ -256,27 +261,27 @@ pub(crate) fn run_sweep<'py>(
     begin: Option<Py<PyAny>>,
 ) -> PyResult<SweepTables<'py>> {
     let workers = if workers == 0 { available_workers() } else { workers };
-    let asked = options.request(sweep)?;
-    let (sweep, out) = (&asked.sweep, out.as_ref());
-    let came = match begin {
+    let request = options.request(sweep)?;
+    let sweep = &request.sweep;
+    let out = out.as_ref();
+    let result = match begin {
         None => run_polling(py, |watcher| run(sweep, out, Engine::Workers(workers), watcher))?,
         Some(begin) => {
-            let (signals, raised) = (SignalWatcher::default(), Mutex::default());
-            let others = PyExecutor { begin, at_once: workers, raised };
-            let came = py.detach(|| run(sweep, out, Engine::Executor(&others), &signals));
-            let raised = others.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let signals = SignalWatcher::default();
+            let executor = PyExecutor { begin, parallelism: workers, raised: Mutex::default() };
+            let result = py.detach(|| run(sweep, out, Engine::Executor(&executor), &signals));
+            let raised = executor.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
             raised.map_or(Ok(()), Err)?;
             signals.into_result()?;
-            came
+            result
         }
     };
-    // A run is interrupted only by a signal, which is raised before.
-    let came = came.and_then(|came| came.ok_or(Error::Interrupted));
-    let SweepResult { results, timings, told, world } =
-        came.map_err(|e| error::session_error(&e))?;
-    let results = Table::from_runs("results", results, &world)?;
-    let timings = Table::from_runs("timings", timings, &world)?;
-    Ok((results, timings, to_python(py, &told)?.into_bound(py)))
+    // A sweep without a result was interrupted by a signal, whose exception has been raised above.
+    let result = result.and_then(|result| result.ok_or(Error::Interrupted));
+    let result = result.map_err(|e| error::session_error(&e))?;
+    let results = Table::from_runs("results", result.results, &result.world)?;
+    let timings = Table::from_runs("timings", result.timings, &result.world)?;
+    Ok((results, timings, to_python(py, &result.summary)?.into_bound(py)))
 }
 
 /// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: the function that
@@ -326,41 +331,44 @@ pub(crate) fn compare_methods(
     seed: Option<u64>,
     workers: usize,
 ) -> PyResult<Py<PyAny>> {
-    let given = load(scenario)?;
-    let source = given.source()?;
-    let named = |name: &String| Method::ALL.into_iter().find(|m| m.name() == name);
-    let method = |name: &String| {
-        let known = Method::ALL.map(Method::name).join(", ");
-        let told = || argument_error("methods", format!("there is no method `{name}`"), known);
-        named(name).ok_or_else(told)
-    };
-    let methods = methods.iter().map(method).collect::<PyResult<Vec<_>>>()?;
-    let Some(compiled) = given.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
+    let loaded = load(scenario)?;
+    let source = loaded.source()?;
+    let methods =
+        methods.iter().map(|name| find_method(name)).collect::<PyResult<Vec<Method>>>()?;
+    let Some(compiled) = loaded.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
         let cause = "methods of collision avoidance are of the world `airspace` alone";
         return Err(argument_error("scenario", cause, "give a scenario with world = \"airspace\""));
     };
     let seeds = methods::SeedSpan { first: seed.unwrap_or(compiled.seed), runs };
     let workers = if workers == 0 { available_workers() } else { workers };
     let results = run_polling(py, |watcher| {
-        let heeded = watcher.interrupt();
+        let interrupt = watcher.interrupt();
         let run = || {
             let progress = &mut |_: &str, _: f64| ();
-            methods::compare_with_interrupt(source, &methods, seeds, workers, progress, &heeded)
+            methods::compare_with_interrupt(source, &methods, seeds, workers, progress, &interrupt)
         };
         catch_unwind(AssertUnwindSafe(run))
-            .unwrap_or_else(|payload| resume_unless(payload, &heeded))
+            .unwrap_or_else(|payload| resume_unless(payload, &interrupt))
     })?;
     let results = results.map_err(|e| error::input_error(&e))?;
     to_python(py, &json!({ "name": compiled.name, "seed": seeds.first, "methods": results }))
 }
 
-/// Goes on unwinding, unless the interrupt explains it: then the results are not used.
+fn find_method(name: &str) -> PyResult<Method> {
+    Method::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
+        let known = Method::ALL.map(Method::name).join(", ");
+        argument_error("methods", format!("there is no method `{name}`"), known)
+    })
+}
+
+/// Goes on unwinding, unless the interrupt has caused it: then the caller raises the exception of the signal and uses no
+/// result.
 fn resume_unless<T>(
     payload: Box<dyn Any + Send>,
     interrupt: &Interrupt,
 ) -> Result<Vec<T>, InputError> {
-    match interrupt.caused(payload.as_ref()) {
-        true => Ok(Vec::new()),
-        false => resume_unwind(payload),
+    if interrupt.caused(payload.as_ref()) {
+        return Ok(Vec::new());
     }
+    resume_unwind(payload)
 }

@@ -58,14 +58,10 @@ impl Table {
 
     /// Returns a table of a sweep's runs; numbers are not copied.
     pub(crate) fn from_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
-        let meanings = WORLDS.find(world).map_or(&[][..], |world| world.metric_infos());
+        let infos = WORLDS.find(world).map_or(&[][..], |world| world.metric_infos());
         let spec = |column: &RunColumn| ColumnSpec {
             is_nullable: true,
-            ..ColumnSpec::new(
-                &column.name,
-                column.values.ty(),
-                &column_description(column, meanings),
-            )
+            ..ColumnSpec::new(&column.name, column.values.ty(), &column_description(column, infos))
         };
         let schema = TableSchema::new(name, columns.iter().map(spec).collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())
@@ -200,7 +196,7 @@ impl Table {
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
-        // The protocol allows ignoring it.
+        // The Arrow PyCapsule protocol allows a producer to ignore it.
         let _ = requested_schema;
         let batches = vec![Ok::<_, ArrowError>(self.batch.clone())];
         let reader: Box<dyn RecordBatchReader + Send> =
@@ -210,8 +206,8 @@ impl Table {
 }
 
 /// Returns one sentence about a column of a table of runs.
-fn column_description(column: &RunColumn, meanings: &[MetricInfo]) -> String {
-    let words = match column.role {
+fn column_description(column: &RunColumn, infos: &[MetricInfo]) -> String {
+    let description = match column.role {
         Role::Cell => "Number of the run.",
         Role::Variant => "Number of its variant.",
         Role::Replicate => {
@@ -219,11 +215,11 @@ fn column_description(column: &RunColumn, meanings: &[MetricInfo]) -> String {
         }
         Role::Seed => "The seed.",
         Role::Parameter => "Value of this key in the scenario.",
-        Role::Metric => metric_label(meanings, &column.name).meaning,
+        Role::Metric => metric_label(infos, &column.name).meaning,
         Role::Digest => "Digest of the last state.",
         Role::Cost => "A time that the run took; it differs when the run is made again.",
     };
-    words.to_string()
+    description.to_string()
 }
 
 fn arrow_error(error: &ArrowError) -> PyErr {
@@ -314,7 +310,7 @@ fn to_numpy_column<'py>(
         ColumnType::I32 => to_numpy(array.as_primitive::<Int32Type>(), py, f64::from),
         ColumnType::I64 => to_numpy(array.as_primitive::<Int64Type>(), py, |value| value as f64),
         ColumnType::F64 => to_numpy(array.as_primitive::<Float64Type>(), py, |value| value),
-        // As objects, so that they can be compared and used as a mask.
+        // As objects, because they may be missing (None); they can still be compared and used as a mask.
         ColumnType::Bool | ColumnType::Text | ColumnType::Label => {
             py.import("numpy")?.call_method1("array", (to_python_values(py, array, ty)?, "O"))
         }

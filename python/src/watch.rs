@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 /// Time after which a run is handed back, so that Python can be checked for signals: too short for users to notice.
 const TIME_SLICE: Duration = Duration::from_millis(50);
 
-/// A watcher that stops a run between two cycles after a while. It does not call Python: the driver of the run holds
-/// its lock, and a signal handler may want that.
+/// A watcher that stops a run between two cycles after [`TIME_SLICE`]. It does not call Python: the thread that advances the
+/// run holds the run's lock, which a signal handler in Python may need.
 #[derive(Debug, Default)]
 pub(crate) struct TimeSlice(OnceLock<Instant>);
 
@@ -23,7 +23,7 @@ impl Watcher for TimeSlice {
     }
 }
 
-/// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may want.
+/// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may need.
 #[derive(Debug, Default)]
 pub(crate) struct SignalWatcher(Mutex<Option<PyErr>>);
 
@@ -37,7 +37,7 @@ impl SignalWatcher {
 
 impl Watcher for SignalWatcher {
     fn should_continue(&self) -> bool {
-        // Python reports a signal once.
+        // Python reports a signal once, so the exception is kept.
         let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.is_none() {
             *raised = Python::attach(|py| py.check_signals()).err();
@@ -55,7 +55,8 @@ impl Watcher for SignalWatcher {
     }
 }
 
-/// A watcher of work in other threads, which do not hear of signals: the calling one checks for them.
+/// A watcher of work in other threads: Python handles signals on the main thread only, so the calling thread checks for
+/// them.
 #[derive(Debug, Default)]
 struct PolledWatcher {
     signals: SignalWatcher,
@@ -88,20 +89,20 @@ impl Watcher for PolledWatcher {
     }
 }
 
-/// Does work that heeds an interrupt; returns `None` if that was raised.
+/// Does work that an interrupt can stop; returns `None` if it did.
 pub(crate) fn catch_interrupt<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
-    let heeded = || {
-        let _heeded = interrupt.attach();
+    let attached_work = || {
+        let _attached = interrupt.attach();
         work()
     };
-    match catch_unwind(AssertUnwindSafe(heeded)) {
+    match catch_unwind(AssertUnwindSafe(attached_work)) {
         Ok(done) => Some(done),
         Err(payload) if interrupt.caused(payload.as_ref()) => None,
         Err(payload) => resume_unwind(payload),
     }
 }
 
-/// Does work on another thread that heeds an interrupt, while this one waits without Python's lock and checks for
+/// Does work on another thread that an interrupt can stop, while this one waits without Python's lock and checks for
 /// signals.
 ///
 /// # Errors
