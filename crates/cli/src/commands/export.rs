@@ -159,7 +159,7 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
         ExportFormat::Mp4Frames => export::Format::Frames(animation),
     };
     ExportRequest {
-        format,
+        form: format,
         out: args.out.as_deref(),
         replace: args.replace,
         from: args.from,
@@ -194,7 +194,7 @@ fn print_result(
     written: &ExportResult,
     console: Console,
 ) -> Result<(), Failure> {
-    let ExportResult { paths, is_confirmed, animation } = written;
+    let ExportResult { paths, is_confirmed, film: animation } = written;
     let shown: Vec<String> = paths.iter().map(display_path).collect();
     let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
