@@ -42,7 +42,7 @@ impl Summary {
         Self::from_table_with_progress(table, options, &mut |_| ())
     }
 
-    /// Summarizes a table of runs like [`Summary::of`], and passes on the share of the work that is
+    /// Summarizes a table of runs like [`Summary::from_table`], and passes on the share of the work that is
     /// done.
     ///
     /// # Errors

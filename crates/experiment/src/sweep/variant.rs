@@ -46,7 +46,7 @@ impl Setting {
     }
 
     /// Returns the setting as an override of a scenario, see
-    /// [`Source::with`](sidestep_scenario::Source::with).
+    /// [`Source::with_overrides`](sidestep_scenario::Source::with_overrides).
     pub fn to_override(&self) -> String {
         format!("{}={}", self.key, self.value)
     }

@@ -74,7 +74,7 @@ pub struct Scanner<'a> {
 /// are skipped, and so are ranges below the least that the scanner measures.
 ///
 /// # Errors
-/// Those of [`bag::read`](sidestep_import::bag::read) and [`load_pixel_map`](sidestep_import::pixel_map); when scans
+/// Those of [`bag::read`](sidestep_import::bag::read) and [`load_pixel_map`](sidestep_import::load_pixel_map); when scans
 /// are not wanted, no beam can be judged, or `options` are not valid.
 pub fn from_bag(
     path: &Path,

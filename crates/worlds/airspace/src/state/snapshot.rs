@@ -17,7 +17,7 @@ use sidestep_kernel::{Cycle, Digest, EntityId};
 pub struct AirplaneRecord {
     /// Pose at the start of the cycle.
     pub pose: Pose2,
-    /// See [`super::Cell::ended`].
+    /// See [`super::AirplaneState::end`].
     pub ended: PackedEnd,
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
