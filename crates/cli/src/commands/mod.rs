@@ -78,7 +78,7 @@ pub(crate) enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Compute a recorded run again and compare it with the recording
     Replay(replay::ReplayArgs),
-    /// Export a recorded run as tables, pictures, animations or recordings
+    /// Export a recorded run: tables, pictures, animations, recordings
     Export(export::ExportArgs),
     /// Print the completions of a shell
     Completions(completions::CompletionsArgs),

@@ -90,7 +90,7 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("coincident connectors", "connectors = 4\nat_m = [0.0, 0.0]", "points_m = [[0.0, 0.0], [0.0, 0.0]]", "same place"),
     ("connectors too far apart", "connectors = 4\nat_m = [0.0, 0.0]", "points_m = [[0.0, 0.0], [3.0, 0.0]]", "3 m apart"),
     ("no points", "connectors = 4\nat_m = [0.0, 0.0]", "points_m = []", "points_m"),
-    ("placed twice", "connectors = 4", "connectors = 4\npoints_m = [[0.0, 0.0]]", "two ways"),
+    ("placed twice", "connectors = 4", "connectors = 4\npoints_m = [[0.0, 0.0]]", "placed twice"),
     ("initiator that is not there", "kind = \"targets\"", "kind = \"targets\"\nconnector = 4", "connector = 4 of a chain of 4"),
     ("limit of nobody", "[[chains.tasks]]", "[[chains.limits]]\nconnector = 9\n[[chains.tasks]]", "connector = 9"),
     ("change of nobody", "[[chains.tasks]]", "[[chains.changes]]\nat_s = 1.0\nconnector = 9\nfailed = true\n[[chains.tasks]]", "of 4"),

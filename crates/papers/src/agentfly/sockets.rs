@@ -233,6 +233,6 @@ mod tests {
     fn what_was_left_out_judges_nothing_and_says_why() {
         let left_out = SocketMeasurements::LeftOut { reason: "not found; get it".into() };
         assert_eq!(left_out.claim(), None);
-        assert_eq!(left_out.table().note, "Left out: it is not there; get it");
+        assert_eq!(left_out.table().note, "Left out: not found; get it");
     }
 }

@@ -183,7 +183,7 @@ fn wrong_scenarios_are_refused_with_a_remedy() {
         ("[airspace]\nupdate = { kind = \"nearest-newton\", step = 0.0 }\n", "above 0 and at most"),
         ("[airspace]\nposition_noise_m = 1e300\n", "give 0 to 1e6"),
         ("[airspace]\nheading_noise_deg = 1e300\n", "nothing is left of a heading"),
-        ("[airspace]\ndt_s = 1e12\ndtau_s = 1e12\n", "one decision an hour"),
+        ("[airspace]\ndt_s = 1e12\ndtau_s = 1e12\n", "one decision per hour"),
         ("[airspace]\ndt_s = 3600\n", "up to 1000"),
         ("[airspace]\ndt_s = 1e-9\ndtau_s = 1e-9\n", "0.01 to 3600 s"),
         ("[airspace]\nhorizon = 60\ndtau_s = 5.0\n", "write horizon_s = 300.0"),

@@ -128,7 +128,7 @@ fn no_text_that_is_saved_is_read_as_a_map_or_a_floor_that_names_files_elsewhere(
         let id = page.send(json!({ "do": "restart", "seed": null, "text": text }));
         let reply = page.wait(id);
         let cause = reply["problem"]["cause"].as_str().unwrap_or_default();
-        assert!(cause.contains("the file name does not say"), "{text}: {reply}");
+        assert!(cause.contains("the file name is not that of"), "{text}: {reply}");
     }
 }
 
