@@ -24,6 +24,7 @@ pub enum Estimator {
 /// The order in which the players update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Order")]
 pub enum UpdateOrder {
     /// All at once, on the distributions of the round before.
     #[default]

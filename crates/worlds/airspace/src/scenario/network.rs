@@ -16,6 +16,7 @@ pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Airp
 /// A period in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Silence")]
 pub(super) struct RadioOutageSection {
     /// Id of the airplane.
     airplane: EntityId,
@@ -31,6 +32,7 @@ pub(super) struct RadioOutageSection {
 /// are heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Partition")]
 pub(super) struct PartitionSection {
     /// Ids of the airplanes on each side.
     sides: Vec<Vec<EntityId>>,
@@ -45,6 +47,7 @@ pub(super) struct PartitionSection {
 /// A period in which a link works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "OneWay")]
 pub(super) struct UnidirectionalLinkSection {
     /// Id of the airplane that is heard by the other.
     sender: EntityId,

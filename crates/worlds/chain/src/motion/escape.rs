@@ -30,6 +30,7 @@ pub(crate) use threat::ChainPart;
 /// The method by which a chain escapes from moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Method")]
 pub enum EscapeMethod {
     /// All constraints of a tick are solved at once; caught parts are led out.
     #[default]

@@ -13,6 +13,7 @@ use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "MayComeWord")]
 enum MovableEndWord {
     #[default]
     Nobody,

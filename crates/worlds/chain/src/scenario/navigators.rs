@@ -61,6 +61,7 @@ impl Rule for TurnAngleRule {
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "LeavingWord")]
 enum WallLossWord {
     #[default]
     Latched,
@@ -70,6 +71,7 @@ enum WallLossWord {
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "TurningWord")]
 enum TurnModeWord {
     #[default]
     AboutAWheel,

@@ -13,6 +13,7 @@ pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<Conn
 /// A period in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Silence")]
 pub(super) struct RadioOutageSection {
     /// Number of the connector in its chain.
     connector: u32,
@@ -31,6 +32,7 @@ pub(super) struct RadioOutageSection {
 /// heard by all.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Partition")]
 pub(super) struct PartitionSection {
     /// Numbers of the connectors on each side.
     sides: Vec<Vec<u32>>,
@@ -48,6 +50,7 @@ pub(super) struct PartitionSection {
 /// A period in which a link between two neighbors works one way only.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "OneWay")]
 pub(super) struct UnidirectionalLinkSection {
     /// Number of the connector that is heard by the other.
     sender: u32,

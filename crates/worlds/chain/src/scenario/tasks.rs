@@ -21,6 +21,7 @@ const DEFAULT_PLAN_DELAY_S: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Kind")]
 enum TaskKindWord {
     /// Rests, but gets out of the way.
     Rest,
