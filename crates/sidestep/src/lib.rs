@@ -25,8 +25,9 @@
 //! "#);
 //! let mut run = office.start()?;
 //! run.advance(500)?;
-//! assert_eq!(run.metrics()["total"]["actions"], 4 * 500);
-//! assert!(run.downcast::<RobotsRun>().expect("robots").metrics().coverage > 0.0);
+//! let metrics = run.downcast::<RobotsRun>().expect("robots").metrics();
+//! assert_eq!(metrics.total.actions, 4 * 500);
+//! assert!(metrics.coverage > 0.0);
 //!
 //! // The number of workers is no part of the result.
 //! let mut serial = office.workers(1).start()?;
@@ -41,11 +42,10 @@
 //! let chain = sidestep::parse(r#"
 //!     format = 1
 //!     world = "chain"
-//!     record = { events = true }
-//!
 //!     [[chains]]
 //!     connectors = 3
 //!     at_m = [0.0, 0.0]
+//!     rod_m = 0.7
 //!     tasks = [{ kind = "targets", targets_m = [[-1.0, 1.0]] }]
 //! "#);
 //! let mut run = chain.keep_tables().start()?;
