@@ -160,7 +160,7 @@ def separation(rows: Rows, *, limit_m: float | None = None, ax: Any = None) -> A
     """
     positions = places(rows)
     if len(np.unique(positions.agent)) < 2:
-        raise input_error("rows", "there are fewer than two agents", "give a run with at minimum two")
+        raise input_error("rows", "there are fewer than two agents", "give a run with at least two")
     cycles, starts = np.unique(positions.cycle, return_index=True)
     nearest = [
         _nearest(positions.agent[own], positions.x_m[own], positions.y_m[own])

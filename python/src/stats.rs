@@ -41,7 +41,7 @@ pub(crate) fn stats_mean(
 #[pyfunction]
 pub(crate) fn stats_share(successes: u64, n: u64) -> PyResult<((f64, f64), (f64, f64))> {
     if successes > n {
-        let cause = format!("{successes} of {n} cannot be");
+        let cause = format!("there cannot be {successes} successes in {n} trials");
         return Err(argument_error("successes", cause, "give at most as many as there are trials"));
     }
     let wilson = statistics::wilson(successes as f64, n as f64);

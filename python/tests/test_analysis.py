@@ -60,7 +60,7 @@ def test_targets_out_of_reach_say_why(urdf):
 ARM_ERRORS = [
     ({"targets": [1, 2]}, "targets: has the shape (1, 2)"),
     ({"targets": [[0, 0, float("nan")]]}, "targets: row 0 is"),
-    ({"targets": "far"}, "targets: are no numbers"),
+    ({"targets": "far"}, "targets: are not numbers"),
     ({"targets": [0, 0, 1], "rpy": [0, 0, 0], "quaternion": [0, 0, 0, 1]}, "give one of them"),
     ({"targets": [0, 0, 1], "rpy": [0, 0]}, "rpy: has the shape (1, 2)"),
     ({"targets": [0, 0, 1], "quaternion": [0, 0, 0, 0]}, "targets:"),
@@ -181,10 +181,10 @@ def test_the_stopping_rule_looks_at_rounds():
 
 
 STATS_ERRORS = [
-    (lambda: stats.mean("abc"), "values: are no numbers"),
+    (lambda: stats.mean("abc"), "values: are not numbers"),
     (lambda: stats.mean([[1.0]]), "values: have the shape"),
     (lambda: stats.paired([1.0], [1.0, 2.0]), "1 and 2 values are no pairs"),
-    (lambda: stats.proportion(3, 2), "3 of 2 is impossible"),
+    (lambda: stats.proportion(3, 2), "there cannot be 3 successes in 2 trials"),
     (lambda: stats.quantile([1.0], 1.0), "q: is 1.0"),
     (lambda: stats.StoppingRule(0.0), "half_width: is 0.0"),
     (lambda: stats.StoppingRule(0.1, min_runs=1), "min_runs: is 1"),
@@ -239,7 +239,7 @@ GAME_ERRORS = [
     ({"own": [[1.0]], "step": 0.0}, "step: is 0"),
     ({"own": [[1.0]], "cooling": 2.0}, "cooling: is 2"),
     ({"own": [[1.0]], "update": "slow"}, "`slow` is not known"),
-    ({"objective": len}, "an objective needs the numbers of strategies"),
+    ({"objective": len}, "an objective needs numbers of strategies"),
     ({"objective": len, "strategies": [2], "estimator": "exact"}, "has no closed form"),
     ({"strategies": [2]}, "tables need each player's own costs"),
 ]
@@ -258,7 +258,7 @@ def test_numbers_out_of_range_are_told_with_the_range(urdf):
         (lambda: sidestep.ik(arm, [0.3, 0, 0.3], restarts=-1), "restarts: is -1"),
         (lambda: sidestep.ik(arm, [0.3, 0, 0.3], seed=2**64), "give a number from 0 to"),
         (lambda: sidestep.ik(arm, [0.3, 0, 0.3], workers=0), "workers: is 0"),
-        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], obstacles=[[0, 0, np.nan, 1]]), "no numbers"),
+        (lambda: sidestep.ik(arm, [0.3, 0, 0.3], obstacles=[[0, 0, np.nan, 1]]), "not numbers"),
         (lambda: collectives.minimize([[0.0, 1.0]], seed=-1), "seed: is -1"),
         (lambda: collectives.minimize([[0.0, 1.0]], block=0), "block: is 0"),
     ]:

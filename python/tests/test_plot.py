@@ -68,5 +68,5 @@ def test_groups_are_counted(root, tmp_path):
 def test_one_agent_has_no_separation(root):
     sim = sidestep.Simulation(root / "scenarios/robots/one-robot.toml", record=True)
     sim.step(3)
-    with pytest.raises(sidestep.InputError, match="no two agents"):
+    with pytest.raises(sidestep.InputError, match="fewer than two agents"):
         plot.separation(sim.tables())
