@@ -58,7 +58,7 @@ test("a node that is selected tells whom it hears and who hears it", async () =>
   await facts.getByText("none").waitFor();
   await expect
     .poll(() => facts.textContent(), { timeout: WAIT_MS })
-    .toMatch(/HearsONE11, ONE12, ONE14.*Is heard bynone/);
+    .toMatch(/Hears ONE11, ONE12, ONE14.*Is heard by none/);
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
   await page.getByText("Select a node to see its links.").waitFor();
 });

@@ -137,7 +137,7 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     const facts = page.getByTestId("node");
     await expect
       .poll(() => facts.textContent(), { timeout: WAIT_MS })
-      .toMatch(/Hearsconnector 1\/0, connector 1\/2 Is heard byconnector 1\/0, connector 1\/2/);
+      .toMatch(/Hears connector 1\/0, connector 1\/2 Is heard by connector 1\/0, connector 1\/2/);
     await page.screenshot({ path: "screenshots/real-fleet-chains-1280.png" });
     await land(fleet);
     await page
