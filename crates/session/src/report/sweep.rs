@@ -7,7 +7,7 @@ use crate::{Error, Watcher};
 use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
-use sidestep_experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
+use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial};
 use sidestep_kernel::ports::Values;
 use sidestep_scenario::Worlds;
 
@@ -249,18 +249,18 @@ fn pictures(
     let digests = table.columns_with_role(Role::Digest).next();
     let mut pictures = RunPictures::default();
     for (variant, title) in (0u32..).zip(plan.names()).take(MAX_PICTURES) {
-        let cell = plan.cell(variant, 0);
-        let Some(row) = row_of(table, cell.id).filter(|row| is_short(table, *row)) else {
+        let trial = plan.trial(variant, 0);
+        let Some(row) = row_of(table, trial.id).filter(|row| is_short(table, *row)) else {
             continue;
         };
         let digest = digests.map_or_else(String::new, |c| c.values.text(row));
-        match run_picture(worlds, folder, cell, &digest, watcher)? {
+        match run_picture(worlds, folder, trial, &digest, watcher)? {
             Ok(svg) => {
-                let caption = caption(folder, cell, row);
+                let caption = caption(folder, trial, row);
                 pictures.all.push(Picture { title, caption, svg });
             }
             Err(why) => {
-                let seed = cell.seed;
+                let seed = trial.seed;
                 let remark = format!("There is no picture of {title}, seed {seed}: {why}.");
                 pictures.remarks.push(remark);
             }
@@ -269,18 +269,18 @@ fn pictures(
     Ok(pictures)
 }
 
-fn caption(folder: &Folder, cell: Cell, row: usize) -> String {
-    let (seed, id) = (cell.seed, cell.id);
+fn caption(folder: &Folder, trial: Trial, row: usize) -> String {
+    let (seed, id) = (trial.seed, trial.id);
     match folder.is_complete() {
         true => format!("Seed {seed}; its digest and metrics are in row {row} of results.parquet."),
-        false => format!("Seed {seed}; its cell has the number {id}."),
+        false => format!("Seed {seed}; its trial has the number {id}."),
     }
 }
 
-/// Returns the row of a cell, counted from 0.
-fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
-    let cells = table.column("cell")?;
-    (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
+/// Returns the row of a trial, counted from 0.
+fn row_of(table: &RunTable, trial: u64) -> Option<usize> {
+    let trials = table.column("cell")?;
+    (0..table.runs()).find(|&row| trials.values.number(row) == Some(trial as f64))
 }
 
 /// Returns whether a run did not fail, and is quick to repeat.

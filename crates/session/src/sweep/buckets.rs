@@ -1,6 +1,6 @@
 //! Finished runs in any order -> the table of runs, block by block, within a bounded memory.
 //!
-//! Each outcome is put on the pile of its cell: [`BUCKET_CELLS`] consecutive cells. A sweep of one pile is joined in memory;
+//! Each outcome is put on the pile of its trial: [`BUCKET_TRIALS`] consecutive trials. A sweep of one pile is joined in memory;
 //! with more, piles are files, read one by one, and one below the other they form the table.
 
 use super::folder::Folder;
@@ -13,15 +13,15 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::PathBuf;
 
-/// Number of cells of a pile: with 40 metrics, 100 MB while it is sorted.
-pub(super) const BUCKET_CELLS: u64 = 1 << 18;
+/// Number of trials of a pile: with 40 metrics, 100 MB while it is sorted.
+pub(super) const BUCKET_TRIALS: u64 = 1 << 18;
 
 /// Outcomes that wait to be joined.
 pub(super) struct OutcomeBuckets<'a> {
     plan: &'a Plan,
     shape: ColumnSchema,
-    trials: PilotRuns<'a>,
-    cells: u64,
+    pilots: PilotRuns<'a>,
+    trials: u64,
     kept: BucketStorage,
     failure: Option<Error>,
 }
@@ -35,13 +35,13 @@ enum BucketStorage {
 }
 
 impl<'a> OutcomeBuckets<'a> {
-    /// Makes room for all runs of a sweep, in piles of a number of cells.
+    /// Makes room for all runs of a sweep, in piles of a number of trials.
     ///
     /// # Errors
     /// When files cannot be made.
-    pub(super) fn new(folder: &'a Folder, cells: u64) -> Result<Self, Error> {
+    pub(super) fn new(folder: &'a Folder, trials: u64) -> Result<Self, Error> {
         let plan = folder.plan();
-        let count = plan.len().div_ceil(cells);
+        let count = plan.len().div_ceil(trials);
         let kept = match count {
             0 | 1 => BucketStorage::Memory(RunTableBuilder::default()),
             _ => {
@@ -56,21 +56,21 @@ impl<'a> OutcomeBuckets<'a> {
                 BucketStorage::Files(scratch, files)
             }
         };
-        let (shape, trials) = (ColumnSchema::default(), PilotRuns::new(plan));
-        Ok(Self { plan, shape, trials, cells, kept, failure: None })
+        let (shape, pilots) = (ColumnSchema::default(), PilotRuns::new(plan));
+        Ok(Self { plan, shape, pilots, trials, kept, failure: None })
     }
 
     /// Puts an outcome on its pile, unless it is not in the plan.
     pub(super) fn push(&mut self, outcome: &Outcome) {
-        if self.failure.is_some() || self.plan.cell_of(outcome.cell).is_none() {
+        if self.failure.is_some() || self.plan.trial_of(outcome.trial).is_none() {
             return;
         }
         self.shape.add(outcome);
-        self.trials.add(outcome);
+        self.pilots.add(outcome);
         match &mut self.kept {
             BucketStorage::Memory(rows) => rows.push(outcome),
             BucketStorage::Files(scratch, files) => {
-                let k = outcome.cell / self.cells;
+                let k = outcome.trial / self.trials;
                 if let Err(error) = write_line(&mut files[k as usize], outcome) {
                     self.failure = Some(Error::cannot_write(&bucket_path(scratch, k), &error));
                 }
@@ -78,10 +78,10 @@ impl<'a> OutcomeBuckets<'a> {
         }
     }
 
-    /// Passes on the blocks of the table, from the first cells to the last: at least one, even if it has no rows.
+    /// Passes on the blocks of the table, from the first trials to the last: at least one, even if it has no rows.
     ///
     /// # Errors
-    /// When piles cannot be written or read, two runs of a cell differ, or `each` fails.
+    /// When piles cannot be written or read, two runs of a trial differ, or `each` fails.
     pub(super) fn for_each_block(
         self,
         mut each: impl FnMut(RunTable) -> Result<(), Error>,
@@ -91,7 +91,7 @@ impl<'a> OutcomeBuckets<'a> {
         }
         let (scratch, files) = match self.kept {
             BucketStorage::Memory(rows) => {
-                return each(rows.build_block(self.plan, &self.shape, &self.trials)?);
+                return each(rows.build_block(self.plan, &self.shape, &self.pilots)?);
             }
             BucketStorage::Files(scratch, files) => (scratch, files),
         };
@@ -104,7 +104,7 @@ impl<'a> OutcomeBuckets<'a> {
             let rows = read_bucket(&bucket_path(&scratch, k))
                 .map_err(|e| Error::cannot_write(scratch.path(), &e))?;
             if k == 0 || !rows.is_empty() {
-                each(rows.build_block(self.plan, &self.shape, &self.trials)?)?;
+                each(rows.build_block(self.plan, &self.shape, &self.pilots)?)?;
             }
         }
         Ok(())

@@ -1,10 +1,10 @@
 //! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
-use super::cell_runner::run_recorded;
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table};
+use super::trial_runner::run_recorded;
 use crate::watcher::NestedWatcher;
 use crate::{Error, Watcher};
-use sidestep_experiment::sweep::{Cell, RunTable, RunTableBuilder};
+use sidestep_experiment::sweep::{RunTable, RunTableBuilder, Trial};
 use sidestep_kernel::InputError;
 use sidestep_record::RunReader;
 use sidestep_scenario::{Source, Worlds};
@@ -40,7 +40,7 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
     Ok(FinishedRuns { table: rows.build(folder.plan())?, is_complete: false })
 }
 
-/// Returns the picture of the run of a cell that ended with `digest`, as SVG: from its run folder, or from a repeated
+/// Returns the picture of the run of a trial that ended with `digest`, as SVG: from its run folder, or from a repeated
 /// run. If there is none of that very run, returns the reason.
 ///
 /// # Errors
@@ -48,24 +48,24 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
 pub(crate) fn run_picture(
     worlds: &Worlds,
     folder: &Folder,
-    cell: Cell,
+    trial: Trial,
     digest: &str,
     watcher: &dyn Watcher,
 ) -> Result<Result<String, String>, Error> {
-    let kept = folder.run_folder(cell.id);
+    let kept = folder.run_folder(trial.id);
     if let Some(svg) = stored_picture(&kept) {
         let made = RunReader::open(&kept).ok().and_then(|view| view.manifest.digest);
         let other = || format!("the run in {} is another one", kept.display());
         return Ok(if made.as_deref() == Some(digest) { Ok(svg) } else { Err(other()) });
     }
     // Another build or another scenario makes another run.
-    if let Err(e) = check_build(worlds, folder).and_then(|()| folder.check_variant(cell.variant)) {
+    if let Err(e) = check_build(worlds, folder).and_then(|()| folder.check_variant(trial.variant)) {
         return Ok(Err(e.cause().to_string()));
     }
     let place = tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
     let again = place.path().join("run");
-    let source = Source::read(&folder.scenario(cell.variant), &[])?;
-    let outcome = match run_recorded(worlds, cell, source, 1, &again, &NestedWatcher(watcher)) {
+    let source = Source::read(&folder.scenario(trial.variant), &[])?;
+    let outcome = match run_recorded(worlds, trial, source, 1, &again, &NestedWatcher(watcher)) {
         Err(Error::Input(e)) => return Ok(Err(e.cause().to_string())),
         made => made?.ok_or(Error::Interrupted)?,
     };

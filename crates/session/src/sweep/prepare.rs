@@ -4,8 +4,8 @@
 use crate::scenario::{read_scenario, read_source};
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep_experiment::sweep::cell::metric_names;
-use sidestep_experiment::sweep::scheduler::run_cells;
+use sidestep_experiment::sweep::scheduler::run_trials;
+use sidestep_experiment::sweep::trial::metric_names;
 use sidestep_experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
@@ -82,7 +82,7 @@ fn for_each_variant<T: Send>(
     watcher: &dyn Watcher,
     work: &(dyn Fn(u32, &Variant) -> Result<T, Error> + Sync),
 ) -> Result<Vec<T>, Error> {
-    let cells: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
+    let numbered: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
     // Variants before a wrong one are completed, because one of them may be wrong, too.
     let wrong_at = AtomicU32::new(u32::MAX);
     let run = |(k, variant): &(u32, &Variant)| {
@@ -97,7 +97,7 @@ fn for_each_variant<T: Send>(
     };
     let watched = ProgressGuard(watcher);
     let mut results: Vec<(u32, Result<T, Error>)> = Vec::with_capacity(variants.len());
-    run_cells(&cells, workers, run, &mut |result| {
+    run_trials(&numbered, workers, run, &mut |result| {
         results.push(result);
         let share = results.len() as f64 / variants.len() as f64;
         watched.report(Progress::Stage { what: "checking variants", share });

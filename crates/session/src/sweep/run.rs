@@ -1,20 +1,20 @@
 //! The path from a sweep to the table of its runs: in memory, in a folder, or share by share.
 
-use super::buckets::{BUCKET_CELLS, OutcomeBuckets};
-use super::cell_runner::{CellRunner, OutcomeHandler};
+use super::buckets::{BUCKET_TRIALS, OutcomeBuckets};
 use super::executor::Engine;
 use super::finished_runs::read_finished;
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table, to_share};
 use super::journal::TimestampedOutcome;
 use super::prepare::{VariantFn, prepare};
 use super::timing::SweepTiming;
+use super::trial_runner::{OutcomeHandler, TrialRunner};
 use crate::VERSION;
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use sidestep_experiment::sweep::rounds::Rounds;
 use sidestep_experiment::sweep::seeds::PilotRuns;
 use sidestep_experiment::sweep::{
-    Cell, Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, rows::cell_table,
+    Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, Trial, rows::trial_table,
 };
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::{ResultsWriter, fingerprint};
@@ -70,8 +70,8 @@ pub fn run_in_memory<'a>(
     let (plan, sources) = prepare(worlds, sweep, engine.planning_workers(), watcher, make)?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
     let agents = plan.agents;
-    let work = CellRunner { worlds, agents, source: &source, record: None, engine, watcher };
-    let (mut log, mut rows) = (CellScheduler::new(&plan), RunTableBuilder::default());
+    let work = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
+    let (mut log, mut rows) = (TrialScheduler::new(&plan), RunTableBuilder::default());
     let effort = log.run_all(&work, &mut |outcome| {
         rows.push(outcome);
         Ok(())
@@ -101,8 +101,8 @@ pub fn create(
                 Folder::write_variant(staging, k, &text, &files)?;
                 Ok(fingerprint(text.as_bytes(), &files))
             })?;
-        let cells = cell_table(&plan).columns;
-        Ok::<_, Error>((plan, fingerprints, cells))
+        let trials = trial_table(&plan).columns;
+        Ok::<_, Error>((plan, fingerprints, trials))
     })
 }
 
@@ -147,7 +147,7 @@ fn open_same(
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
-/// Runs all cells that are not finished, and joins all runs into one table.
+/// Runs all trials that are not finished, and joins all runs into one table.
 ///
 /// # Errors
 /// When runs cannot be read or stored.
@@ -161,13 +161,13 @@ pub fn run_remaining<'a>(
         return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
     }
     check_build(worlds, folder)?;
-    let mut log = CellScheduler::new(folder.plan());
+    let mut log = TrialScheduler::new(folder.plan());
     for_each_outcome(folder, Some(Shard::ALL), |outcome| log.record(&outcome))?;
     let mut effort = SweepTiming::default();
     // Locked until everything is joined, so that no other process begins to join.
     let mut journal = folder.journal(to_share(Shard::ALL), |o: Outcome| log.record(&o))?;
     if let Some(journal) = &mut journal {
-        with_cell_runner(worlds, folder, engine.into(), watcher, |work| {
+        with_trial_runner(worlds, folder, engine.into(), watcher, |work| {
             let mut keep =
                 |outcome: &Outcome| Ok(journal.append(&TimestampedOutcome::now(outcome))?);
             effort =
@@ -179,19 +179,19 @@ pub fn run_remaining<'a>(
     if !watcher.should_continue() {
         return Ok(SweepEnd::Interrupted(log.finished.len()));
     }
-    join_runs(folder, BUCKET_CELLS, effort, watcher)
+    join_runs(folder, BUCKET_TRIALS, effort, watcher)
 }
 
-/// Joins all runs into the sweep's tables, in blocks of a number of cells: only one block is in memory at a time.
+/// Joins all runs into the sweep's tables, in blocks of a number of trials: only one block is in memory at a time.
 fn join_runs(
     folder: &Folder,
-    cells: u64,
+    trials: u64,
     effort: SweepTiming,
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
     let watched = ProgressGuard(watcher);
     watched.report(Progress::Stage { what: "joining the runs", share: 0.0 });
-    let mut piles = OutcomeBuckets::new(folder, cells)?;
+    let mut piles = OutcomeBuckets::new(folder, trials)?;
     for_each_outcome(folder, None, |outcome| piles.push(&outcome))?;
     watched.report(Progress::Stage { what: "writing the results", share: 0.5 });
     let (mut completion, mut only) = (None::<ResultsWriter>, None);
@@ -219,7 +219,7 @@ fn join_runs(
     Ok(SweepResult::complete(table, effort))
 }
 
-/// Runs one share of the cells and writes its part.
+/// Runs one share of the trials and writes its part.
 ///
 /// # Errors
 /// When the sweep stops at a precision or is of another build, or runs cannot be read or stored.
@@ -239,7 +239,7 @@ pub fn run_share(
             "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
         return Err(InputError::new(folder.path().display(), cause, remedy).into());
     }
-    let (mut log, mut rows) = (CellScheduler::new(plan), RunTableBuilder::default());
+    let (mut log, mut rows) = (TrialScheduler::new(plan), RunTableBuilder::default());
     let mut note = |outcome: Outcome| {
         log.record(&outcome);
         rows.push(&outcome);
@@ -254,17 +254,18 @@ pub fn run_share(
     // Shares of another count, or a sweep that continued here, may have finished some of these
     // runs.
     let mut elsewhere = BTreeSet::new();
-    for_each_outcome(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
-    let cells: Vec<Cell> = plan.shard_cells(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
+    for_each_outcome(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.trial))?;
+    let trials: Vec<Trial> =
+        plan.shard_trials(shard).filter(|trial| !elsewhere.contains(&trial.id)).collect();
     let mut effort = SweepTiming::default();
-    with_cell_runner(worlds, folder, workers.into(), watcher, |work| {
+    with_trial_runner(worlds, folder, workers.into(), watcher, |work| {
         let mut keep = |outcome: &Outcome| {
             journal.append(&TimestampedOutcome::now(outcome))?;
             rows.push(outcome);
             Ok(())
         };
         effort =
-            log.run(work, &cells, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+            log.run(work, &trials, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
         Ok(())
     })?;
     journal.sync()?;
@@ -276,12 +277,12 @@ pub fn run_share(
     Ok(SweepResult::complete(table, effort))
 }
 
-/// Returns the finished runs of the cells of a share, regardless of their maker.
+/// Returns the finished runs of the trials of a share, regardless of their maker.
 fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
-    let own: BTreeSet<u64> = folder.plan().shard_cells(shard).map(|c| c.id).collect();
+    let own: BTreeSet<u64> = folder.plan().shard_trials(shard).map(|trial| trial.id).collect();
     let mut rows = RunTableBuilder::default();
     let mut take = |outcome: Outcome| {
-        if own.contains(&outcome.cell) {
+        if own.contains(&outcome.trial) {
             rows.push(&outcome);
         }
     };
@@ -302,25 +303,25 @@ pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Resul
     }
     check_build(worlds, folder)?;
     let plan = folder.plan();
-    let mut log = CellScheduler::new(plan);
+    let mut log = TrialScheduler::new(plan);
     for_each_outcome(folder, None, |outcome| log.record(&outcome))?;
-    let missing = if log.rounds.is_some() { log.next_cells() } else { log.missing_cells() }.len();
+    let missing = if log.rounds.is_some() { log.next_trials() } else { log.missing_trials() }.len();
     if missing > 0 {
         let cause = format!("{missing} of {} runs are missing", plan.runs());
         let remedy = "run the shares that are not finished (finished ones are not run again), or \
                       run the rest here: sidestep resume DIR";
         return Err(Error::other(cause, remedy));
     }
-    join_runs(folder, BUCKET_CELLS, SweepTiming::default(), watcher)
+    join_runs(folder, BUCKET_TRIALS, SweepTiming::default(), watcher)
 }
 
-/// Passes on everything needed to run the cells of a folder.
-fn with_cell_runner(
+/// Passes on everything needed to run the trials of a folder.
+fn with_trial_runner(
     worlds: &Worlds,
     folder: &Folder,
     engine: Engine<'_>,
     watcher: &dyn Watcher,
-    run: impl FnOnce(&CellRunner<'_>) -> Result<(), Error>,
+    run: impl FnOnce(&TrialRunner<'_>) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let plan = folder.plan();
     if plan.record && matches!(engine, Engine::Executor(_)) {
@@ -338,10 +339,10 @@ fn with_cell_runner(
         }
         Source::read(&folder.scenario(variant), &[])
     };
-    let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
+    let place = |trial: u64| -> PathBuf { folder.run_folder(trial) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
         if plan.record { Some(&place) } else { None };
-    run(&CellRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+    run(&TrialRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
 }
 
 /// Adds to a storage error the runs that are saved, and words for continuing.
@@ -357,59 +358,59 @@ fn with_resume_hint(error: Error, folder: &Path) -> Error {
 }
 
 /// The finished runs, as far as needed to choose the next ones: a number for each.
-struct CellScheduler<'a> {
+struct TrialScheduler<'a> {
     plan: &'a Plan,
     finished: Vec<u64>,
     rounds: Option<Rounds<'a>>,
-    trials: PilotRuns<'a>,
+    pilots: PilotRuns<'a>,
 }
 
 /// Stores an outcome, if there is a place for it.
 type OutcomeWriter<'a> = dyn FnMut(&Outcome) -> Result<(), Error> + Send + 'a;
 
-impl<'a> CellScheduler<'a> {
+impl<'a> TrialScheduler<'a> {
     fn new(plan: &'a Plan) -> Self {
         let rounds = plan.until.as_ref().map(|until| Rounds::new(plan, until));
-        Self { plan, finished: Vec::new(), rounds, trials: PilotRuns::new(plan) }
+        Self { plan, finished: Vec::new(), rounds, pilots: PilotRuns::new(plan) }
     }
 
     fn record(&mut self, outcome: &Outcome) {
         if let Some(rounds) = &mut self.rounds {
             rounds.add(outcome);
         }
-        self.trials.add(outcome);
-        self.finished.push(outcome.cell);
+        self.pilots.add(outcome);
+        self.finished.push(outcome.trial);
     }
 
-    /// Returns the cells to run next: of the next round, or all, trials first.
-    fn next_cells(&self) -> Vec<Cell> {
+    /// Returns the trials to run next: of the next round, or all, pilots first.
+    fn next_trials(&self) -> Vec<Trial> {
         match &self.rounds {
-            Some(rounds) => rounds.next_cells(),
-            None => self.trials.next_cells(self.missing_cells()),
+            Some(rounds) => rounds.next_trials(),
+            None => self.pilots.next_trials(self.missing_trials()),
         }
     }
 
-    /// Returns the cells of a fixed number of runs that are not finished.
-    fn missing_cells(&self) -> Vec<Cell> {
-        let cells = self.plan.shard_cells(Shard::ALL);
-        self.unfinished_of(cells.filter(|cell| self.trials.needs(cell)))
+    /// Returns the trials of a fixed number of runs that are not finished.
+    fn missing_trials(&self) -> Vec<Trial> {
+        let trials = self.plan.shard_trials(Shard::ALL);
+        self.unfinished_of(trials.filter(|trial| self.pilots.needs(trial)))
     }
 
-    fn unfinished_of(&self, cells: impl Iterator<Item = Cell>) -> Vec<Cell> {
+    fn unfinished_of(&self, trials: impl Iterator<Item = Trial>) -> Vec<Trial> {
         let mut finished = self.finished.clone();
         finished.sort_unstable();
-        cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
+        trials.filter(|trial| finished.binary_search(&trial.id).is_err()).collect()
     }
 
-    /// Runs all open cells, round by round if a precision ends the sweep.
+    /// Runs all open trials, round by round if a precision ends the sweep.
     fn run_all(
         &mut self,
-        work: &CellRunner<'_>,
+        work: &TrialRunner<'_>,
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
         let mut effort = SweepTiming::default();
         loop {
-            let open = self.next_cells();
+            let open = self.next_trials();
             if open.is_empty() || !work.watcher.should_continue() {
                 return Ok(effort);
             }
@@ -417,14 +418,14 @@ impl<'a> CellScheduler<'a> {
         }
     }
 
-    /// Runs the cells that are not finished.
+    /// Runs the trials that are not finished.
     fn run(
         &mut self,
-        work: &CellRunner<'_>,
-        cells: &[Cell],
+        work: &TrialRunner<'_>,
+        trials: &[Trial],
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
-        let open = self.unfinished_of(cells.iter().copied());
+        let open = self.unfinished_of(trials.iter().copied());
         let before = self.finished.len() as u64;
         let mut effort = SweepTiming::start();
         let mut take = |outcome: Outcome| {
@@ -457,54 +458,54 @@ mod tests {
         sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
         sweep.replicates = 300;
         let folder = create(&WORLDS, &sweep, &place.join("sweep"), 2, &NoWatcher).expect("planned");
-        let mut cells: Vec<Cell> = folder.plan().shard_cells(Shard::ALL).collect();
-        cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
+        let mut trials: Vec<Trial> = folder.plan().shard_trials(Shard::ALL).collect();
+        trials.sort_by_key(|trial| trial.id.wrapping_mul(2_654_435_761) % 1009);
         for index in 0..2 {
             let share = Share { index, count: 2 };
             let mut journal =
                 folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
-            for cell in cells.iter().filter(|cell| cell.id % 2 == u64::from(index)) {
-                journal.append(&outcome(*cell)).expect("written");
+            for trial in trials.iter().filter(|trial| trial.id % 2 == u64::from(index)) {
+                journal.append(&outcome(*trial)).expect("written");
             }
         }
         folder
     }
 
-    /// Columns that come and go, and one with a type that only a late cell reveals.
-    fn outcome(cell: Cell) -> Outcome {
-        let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
+    /// Columns that come and go, and one with a type that only a late trial reveals.
+    fn outcome(trial: Trial) -> Outcome {
+        let value = if trial.id == 555 { json!(0.5) } else { json!(trial.id) };
         let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);
-        if cell.id > 400 {
-            metrics.insert("late".into(), json!(cell.id.is_multiple_of(3)));
+        if trial.id > 400 {
+            metrics.insert("late".into(), json!(trial.id.is_multiple_of(3)));
         }
         let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
-        let (digest, failure) = (format!("end {}", cell.id), None);
-        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(cell, "") }
+        let (digest, failure) = (format!("end {}", trial.id), None);
+        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(trial, "") }
     }
 
     #[test]
     fn runs_joined_in_blocks_give_the_files_that_all_at_once_give() {
         let place = tempfile::tempdir().expect("a folder");
         let folder = folder(place.path());
-        let tables = |cells| {
+        let tables = |trials| {
             let ended =
-                join_runs(&folder, cells, SweepTiming::default(), &NoWatcher).expect("joined");
+                join_runs(&folder, trials, SweepTiming::default(), &NoWatcher).expect("joined");
             let SweepEnd::Done(done) = ended else { panic!("nobody interrupts") };
             let file = read_finished(&folder).expect("it is done");
             std::fs::remove_file(folder.results_file()).expect("there");
-            assert_eq!(done.table, file.table, "{cells} cells at a time");
+            assert_eq!(done.table, file.table, "{trials} trials at a time");
             file.table
         };
-        let whole = tables(BUCKET_CELLS);
+        let whole = tables(BUCKET_TRIALS);
         assert_eq!(whole.runs(), 600);
-        for cells in [1000, 600, 599, 64, 7] {
-            assert_eq!(tables(cells), whole, "{cells} cells at a time");
+        for trials in [1000, 600, 599, 64, 7] {
+            assert_eq!(tables(trials), whole, "{trials} trials at a time");
         }
         assert!(!folder.path().join("joining.partial").exists());
     }
 
     #[test]
-    fn no_more_rows_are_in_memory_than_a_block_has_cells() {
+    fn no_more_rows_are_in_memory_than_a_block_has_trials() {
         let place = tempfile::tempdir().expect("a folder");
         let folder = folder(place.path());
         let mut piles = OutcomeBuckets::new(&folder, 50).expect("room");

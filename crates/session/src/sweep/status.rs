@@ -62,8 +62,9 @@ impl SweepStatus {
 /// A run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FailedRun {
-    /// Number of its trial.
-    pub cell: u64,
+    /// Number of its trial; `--json` calls it `cell`.
+    #[serde(rename = "cell")]
+    pub trial: u64,
     /// Name of its variant.
     pub variant: String,
     /// Its seed.
@@ -90,7 +91,7 @@ pub struct ShareStatus {
 /// What a scan of the folder finds.
 #[derive(Default)]
 struct FolderScan {
-    cells: BTreeSet<u64>,
+    trials: BTreeSet<u64>,
     failed: Vec<(u64, String)>,
     /// The times at which runs of shares in progress finished.
     stamps: Vec<f64>,
@@ -98,9 +99,9 @@ struct FolderScan {
 
 impl FolderScan {
     fn add(&mut self, outcome: Outcome) {
-        let is_new = self.cells.insert(outcome.cell);
+        let is_new = self.trials.insert(outcome.trial);
         if let Some(why) = outcome.failure.filter(|_| is_new) {
-            self.failed.push((outcome.cell, why));
+            self.failed.push((outcome.trial, why));
         }
     }
 }
@@ -122,7 +123,7 @@ pub fn read_status(folder: &Folder) -> Result<SweepStatus, InputError> {
             shares.push(share_status(folder, share, is_done, &mut found, now_s)?);
         }
     }
-    let (runs, until_precise) = (found.cells.len() as u64, plan.until.is_some());
+    let (runs, until_precise) = (found.trials.len() as u64, plan.until.is_some());
     let total = if is_complete { runs } else { plan.runs() };
     let newest_s = found.stamps.iter().copied().reduce(f64::max);
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
@@ -154,7 +155,7 @@ fn share_status(
     now_s: f64,
 ) -> Result<ShareStatus, InputError> {
     let shard = Shard { index: share.index, count: share.count };
-    let of = folder.plan().shard_cells(shard).count() as u64;
+    let of = folder.plan().shard_trials(shard).count() as u64;
     let done =
         || ShareStatus { share: shard.to_string(), runs: of, of, is_done: true, idle_s: None };
     if is_done {
@@ -215,10 +216,10 @@ fn is_active(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -
 fn failures(plan: &Plan, failed: &mut [(u64, String)]) -> Vec<FailedRun> {
     failed.sort();
     let names = plan.names();
-    let told = |(cell, why): &(u64, String)| {
-        let its = plan.cell_of(*cell)?;
+    let told = |(trial, why): &(u64, String)| {
+        let its = plan.trial_of(*trial)?;
         let variant = names[its.variant as usize].clone();
-        Some(FailedRun { cell: *cell, variant, seed: its.seed, why: why.clone() })
+        Some(FailedRun { trial: *trial, variant, seed: its.seed, why: why.clone() })
     };
     failed.iter().take(MAX_LISTED_FAILURES).filter_map(told).collect()
 }

@@ -1,13 +1,13 @@
-//! Cells -> outcomes: many at once, or one after another on all workers.
+//! Trials -> outcomes: many at once, or one after another on all workers.
 
-use super::executor::{CellBatch, CellExecutor, Engine};
+use super::executor::{Engine, TrialBatch, TrialExecutor};
 use crate::managed_run::record_to_end;
 use crate::run_recorder::RunRecorder;
 use crate::watcher::{NestedWatcher, Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use serde_json::json;
-use sidestep_experiment::sweep::scheduler::{self, run_cells};
-use sidestep_experiment::sweep::{Cell, Outcome, start_cell};
+use sidestep_experiment::sweep::scheduler::{self, run_trials};
+use sidestep_experiment::sweep::{Outcome, Trial, start_trial};
 use sidestep_kernel::InputError;
 use sidestep_record::IfExists;
 use sidestep_scenario::{Source, Worlds};
@@ -20,14 +20,14 @@ use std::time::Instant;
 /// another, each on all workers, which also bounds the memory.
 const LARGE_WORLD_AGENTS: u64 = 20_000;
 
-/// Everything that is needed to run cells.
-pub(super) struct CellRunner<'a> {
+/// Everything that is needed to run trials.
+pub(super) struct TrialRunner<'a> {
     pub(super) worlds: &'a Worlds,
     /// Number of agents of the largest variant.
     pub(super) agents: u64,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
-    /// Returns the folder in which the run of a cell is recorded, if it is.
+    /// Returns the folder in which the run of a trial is recorded, if it is.
     pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
     pub(super) engine: Engine<'a>,
     pub(super) watcher: &'a dyn Watcher,
@@ -36,16 +36,16 @@ pub(super) struct CellRunner<'a> {
 /// Takes an outcome: once it returns, the run is finished.
 pub(super) type OutcomeHandler<'a> = scheduler::ResultSink<'a, Outcome, Error>;
 
-impl CellRunner<'_> {
-    /// Runs the cells, in order as far as there are workers, until all are done, something fails,
+impl TrialRunner<'_> {
+    /// Runs the trials, in order as far as there are workers, until all are done, something fails,
     /// or the watcher asks to stop. `before` and `total` are for the progress bar: the runs that
     /// were done before, and all.
     ///
     /// # Errors
-    /// The error of `take`; no cell starts after that.
+    /// The error of `take`; no trial starts after that.
     pub(super) fn run(
         &self,
-        cells: &[Cell],
+        trials: &[Trial],
         before: u64,
         total: u64,
         take: &mut OutcomeHandler<'_>,
@@ -60,26 +60,26 @@ impl CellRunner<'_> {
             Ok(())
         };
         match self.engine {
-            Engine::Executor(crew) => self.run_on_executor(crew, cells, &mut take),
+            Engine::Executor(crew) => self.run_on_executor(crew, trials, &mut take),
             Engine::Workers(workers) => {
-                let at_once = self.parallelism(cells.len());
+                let at_once = self.parallelism(trials.len());
                 let each = (workers / at_once).max(1);
-                run_cells(cells, at_once, |cell| self.run_cell(*cell, each), &mut take)
+                run_trials(trials, at_once, |trial| self.run_trial(*trial, each), &mut take)
             }
         }
     }
 
-    /// Lets a crew run the cells. The first outcome of a cell counts.
+    /// Lets a crew run the trials. The first outcome of a trial counts.
     fn run_on_executor(
         &self,
-        crew: &dyn CellExecutor,
-        cells: &[Cell],
+        crew: &dyn TrialExecutor,
+        trials: &[Trial],
         take: &mut OutcomeHandler<'_>,
     ) -> Result<(), Error> {
-        let mut open: BTreeSet<u64> = cells.iter().map(|cell| cell.id).collect();
+        let mut open: BTreeSet<u64> = trials.iter().map(|trial| trial.id).collect();
         let Self { worlds, source, .. } = *self;
-        crew.run(&CellBatch { cells, worlds, source }, &mut |outcome| match open
-            .remove(&outcome.cell)
+        crew.run(&TrialBatch { trials, worlds, source }, &mut |outcome| match open
+            .remove(&outcome.trial)
         {
             true => take(outcome),
             false => Ok(()),
@@ -96,45 +96,45 @@ impl CellRunner<'_> {
         most.min(runs).max(1)
     }
 
-    /// Runs a cell; `None` if it was interrupted.
-    fn run_cell(&self, cell: Cell, workers: usize) -> Option<Result<Outcome, Error>> {
+    /// Runs a trial; `None` if it was interrupted.
+    fn run_trial(&self, trial: Trial, workers: usize) -> Option<Result<Outcome, Error>> {
         if !self.watcher.should_continue() {
             return None;
         }
         // An error of the folder is not an outcome of a run, because it may be repaired.
-        let source = match (self.source)(cell.variant) {
+        let source = match (self.source)(trial.variant) {
             Ok(source) => source,
             Err(e) => return Some(Err(e.into())),
         };
         let run = || match self.record {
-            None => self.run_unrecorded(cell, &source, workers),
+            None => self.run_unrecorded(trial, &source, workers),
             Some(folder) => {
-                let folder = folder(cell.id);
-                run_recorded(self.worlds, cell, source, workers, &folder, self.watcher)
+                let folder = folder(trial.id);
+                run_recorded(self.worlds, trial, source, workers, &folder, self.watcher)
             }
         };
         match catch_unwind(AssertUnwindSafe(run)) {
             Ok(Ok(outcome)) => outcome.map(Ok),
             // For example a seed for which a scenario has no start: the other runs continue.
-            Ok(Err(Error::Input(e))) => Some(Ok(Outcome::from_failure(cell, e.to_string()))),
+            Ok(Err(Error::Input(e))) => Some(Ok(Outcome::from_failure(trial, e.to_string()))),
             Ok(Err(Error::InterruptedInCycle(_))) => None,
             Ok(Err(failure)) => Some(Err(failure)),
             Err(payload) if self.watcher.interrupt().caused(payload.as_ref()) => None,
             Err(_) => {
-                Some(Ok(Outcome::from_failure(cell, "a bug in sidestep: see standard error")))
+                Some(Ok(Outcome::from_failure(trial, "a bug in sidestep: see standard error")))
             }
         }
     }
 
-    /// Runs a cell and keeps only its row.
+    /// Runs a trial and keeps only its row.
     fn run_unrecorded(
         &self,
-        cell: Cell,
+        trial: Trial,
         variant: &Source,
         workers: usize,
     ) -> Result<Option<Outcome>, Error> {
         let begun = Instant::now();
-        let started = start_cell(self.worlds, cell, variant, workers)?
+        let started = start_trial(self.worlds, trial, variant, workers)?
             .with_interrupt(self.watcher.interrupt());
         let compiled = Instant::now();
         let outcome = started.run(&|| self.watcher.should_continue());
@@ -142,21 +142,21 @@ impl CellRunner<'_> {
     }
 }
 
-/// Runs a cell into a run folder of its own; `None` if it was interrupted. A folder left by a
+/// Runs a trial into a run folder of its own; `None` if it was interrupted. A folder left by a
 /// killed process is started again.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed, or something cannot be stored.
 pub(super) fn run_recorded(
     worlds: &Worlds,
-    cell: Cell,
+    trial: Trial,
     variant: Source,
     workers: usize,
     folder: &Path,
     watcher: &dyn Watcher,
 ) -> Result<Option<Outcome>, Error> {
     let begun = Instant::now();
-    let source = variant.with_overrides(&[format!("seed={}", cell.seed)])?;
+    let source = variant.with_overrides(&[format!("seed={}", trial.seed)])?;
     let compiled = worlds.compile(&source)?;
     let resolved = compiled.resolve(&source)?;
     let itself = Source::new("scenario.toml", &*resolved.text, folder);
@@ -167,7 +167,7 @@ pub(super) fn run_recorded(
     let recording = recording.map_err(folder_error)?;
     let compiled = Instant::now();
     let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
-    let outcome = is_complete.then(|| Outcome::from_simulation(cell, run.as_ref()));
+    let outcome = is_complete.then(|| Outcome::from_simulation(trial, run.as_ref()));
     Ok(outcome.map(|outcome| with_times(outcome, [compiled - begun, compiled.elapsed()])))
 }
 
