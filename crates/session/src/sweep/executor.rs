@@ -1,7 +1,7 @@
 //! Runners of trials outside of this process: other processes, nodes of a cluster.
 //!
-//! The plan, the journal and the stopping rule stay with the process that drives the sweep. A crew gets trials and
-//! self-contained scenarios, and gives outcomes back, in any order: no common file system is needed.
+//! The plan, the journal and the stopping rule stay with the process that drives the sweep. An executor gets trials and
+//! self-contained scenarios, and returns outcomes, in any order: no common file system is needed.
 
 use crate::Error;
 use sidestep_experiment::sweep::{Outcome, Trial};
@@ -13,12 +13,12 @@ pub type OutcomeSink<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
 
 /// A runner of trials.
 pub trait TrialExecutor: Sync {
-    /// Runs all dealt trials, in any order, and passes each outcome on; an outcome that comes a second time is
-    /// ignored. Trials that it does not finish are dealt again by the next call.
+    /// Runs all trials of a batch, in any order, and passes each outcome on; a second outcome of a trial is ignored.
+    /// Trials that it does not finish are in the batch of the next call.
     ///
     /// # Errors
     /// Those of `take`; any error that ends the sweep.
-    fn run(&self, deal: &TrialBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error>;
+    fn run(&self, batch: &TrialBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error>;
 
     /// Returns the number of runs in progress at once.
     fn parallelism(&self) -> usize;
@@ -29,7 +29,7 @@ pub trait TrialExecutor: Sync {
 pub enum Engine<'a> {
     /// This many threads of this process.
     Workers(usize),
-    /// A crew outside of this process.
+    /// An executor outside of this process.
     Executor(&'a dyn TrialExecutor),
 }
 
@@ -49,7 +49,7 @@ impl Engine<'_> {
     }
 }
 
-/// Trials that a crew is to run, with their scenarios.
+/// Trials that an executor is to run, with their scenarios.
 pub struct TrialBatch<'a> {
     pub(super) trials: &'a [Trial],
     pub(super) worlds: &'a Worlds,

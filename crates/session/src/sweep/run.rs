@@ -70,17 +70,19 @@ pub fn run_in_memory<'a>(
     let (plan, sources) = prepare(worlds, sweep, engine.planning_workers(), watcher, make)?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
     let agents = plan.agents;
-    let work = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
-    let (mut log, mut rows) = (TrialScheduler::new(&plan), RunTableBuilder::default());
-    let effort = log.run_all(&work, &mut |outcome| {
+    let runner = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
+    let mut scheduler = TrialScheduler::new(&plan);
+    let mut rows = RunTableBuilder::default();
+    let effort = scheduler.run_all(&runner, &mut |outcome| {
         rows.push(outcome);
         Ok(())
     })?;
-    let ended = match watcher.should_continue() {
-        true => SweepResult::complete(rows.build(&plan)?, effort),
-        false => SweepEnd::Interrupted(log.finished.len()),
+    let end = if watcher.should_continue() {
+        SweepResult::complete(rows.build(&plan)?, effort)
+    } else {
+        SweepEnd::Interrupted(scheduler.finished.len())
     };
-    Ok((plan, ended))
+    Ok((plan, end))
 }
 
 /// Plans a sweep into a folder, on a number of workers: completely or not at all.
@@ -117,9 +119,10 @@ pub fn open_or_create(
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
-    match Folder::is_at(out) {
-        false => create(worlds, sweep, out, workers, watcher),
-        true => open_same(worlds, sweep, out, workers, watcher),
+    if Folder::is_at(out) {
+        open_same(worlds, sweep, out, workers, watcher)
+    } else {
+        create(worlds, sweep, out, workers, watcher)
     }
 }
 
@@ -161,23 +164,27 @@ pub fn run_remaining<'a>(
         return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
     }
     check_build(worlds, folder)?;
-    let mut log = TrialScheduler::new(folder.plan());
-    for_each_outcome(folder, Some(Shard::ALL), |outcome| log.record(&outcome))?;
+    let mut scheduler = TrialScheduler::new(folder.plan());
+    // The journal of this share is read when it is locked, below: until then another process may append to it.
+    for_each_outcome(folder, Some(Shard::ALL), |outcome| scheduler.record(&outcome))?;
     let mut effort = SweepTiming::default();
     // Locked until everything is joined, so that no other process begins to join.
-    let mut journal = folder.journal(to_share(Shard::ALL), |o: Outcome| log.record(&o))?;
+    let mut journal = folder.journal(to_share(Shard::ALL), |outcome: Outcome| {
+        scheduler.record(&outcome);
+    })?;
     if let Some(journal) = &mut journal {
-        with_trial_runner(worlds, folder, engine.into(), watcher, |work| {
-            let mut keep =
-                |outcome: &Outcome| Ok(journal.append(&TimestampedOutcome::now(outcome))?);
-            effort =
-                log.run_all(work, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+        with_trial_runner(worlds, folder, engine.into(), watcher, |runner| {
+            effort = scheduler
+                .run_all(runner, &mut |outcome| {
+                    Ok(journal.append(&TimestampedOutcome::now(outcome))?)
+                })
+                .map_err(|e| with_resume_hint(e, folder.path()))?;
             Ok(())
         })?;
         journal.sync()?;
     }
     if !watcher.should_continue() {
-        return Ok(SweepEnd::Interrupted(log.finished.len()));
+        return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
     }
     join_runs(folder, BUCKET_TRIALS, effort, watcher)
 }
@@ -191,28 +198,33 @@ fn join_runs(
 ) -> Result<SweepEnd, Error> {
     let watched = ProgressGuard(watcher);
     watched.report(Progress::Stage { what: "joining the runs", share: 0.0 });
-    let mut piles = OutcomeBuckets::new(folder, trials)?;
-    for_each_outcome(folder, None, |outcome| piles.push(&outcome))?;
+    let mut buckets = OutcomeBuckets::new(folder, trials)?;
+    for_each_outcome(folder, None, |outcome| buckets.push(&outcome))?;
     watched.report(Progress::Stage { what: "writing the results", share: 0.5 });
-    let (mut completion, mut only) = (None::<ResultsWriter>, None);
-    let of = folder.plan().len().max(1) as f64;
+    let mut writer: Option<ResultsWriter> = None;
+    let mut only_block = None;
+    let planned = folder.plan().len().max(1) as f64;
     let mut written = 0;
-    piles.for_each_block(|block| {
-        let (results, timings) = (block.results(), block.timings());
-        let completion = match &mut completion {
-            Some(completion) => completion,
-            begun => begun.insert(folder.results_writer(&results, &timings)?),
+    buckets.for_each_block(|block| {
+        let results = block.results();
+        let timings = block.timings();
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            // All blocks have the columns of the first one, so they are known from it.
+            None => writer.insert(folder.results_writer(&results, &timings)?),
         };
-        completion.append(&results, &timings)?;
+        writer.append(&results, &timings)?;
         written += block.runs();
-        let share = 0.5 + 0.5 * (written as f64 / of).min(1.0);
+        let share = 0.5 + 0.5 * (written as f64 / planned).min(1.0);
         watched.report(Progress::Stage { what: "writing the results", share });
-        only = (written == block.runs()).then_some(block);
+        only_block = (written == block.runs()).then_some(block);
         Ok(())
     })?;
-    completion.map_or(Ok(()), ResultsWriter::finish)?;
+    if let Some(writer) = writer {
+        writer.finish()?;
+    }
     // A table of several blocks is read again once the data that joined them is out of memory.
-    let table = match only {
+    let table = match only_block {
         Some(table) => table,
         None => read_finished(folder)?.table,
     };
@@ -231,23 +243,18 @@ pub fn run_share(
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
     check_build(worlds, folder)?;
+    refuse_precision(folder)?;
     let plan = folder.plan();
-    if plan.until.is_some() {
-        let cause =
-            "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
-        let remedy =
-            "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
-        return Err(InputError::new(folder.path().display(), cause, remedy).into());
+    if folder.is_complete() {
+        return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
     }
-    let (mut log, mut rows) = (TrialScheduler::new(plan), RunTableBuilder::default());
-    let mut note = |outcome: Outcome| {
-        log.record(&outcome);
+    let mut scheduler = TrialScheduler::new(plan);
+    let mut rows = RunTableBuilder::default();
+    let journal = folder.journal(to_share(shard), |outcome: Outcome| {
+        scheduler.record(&outcome);
         rows.push(&outcome);
-    };
-    let journal = match folder.is_complete() {
-        true => None,
-        false => folder.journal(to_share(shard), &mut note)?,
-    };
+    })?;
+    // A share that is done has no journal.
     let Some(mut journal) = journal else {
         return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
     };
@@ -258,37 +265,48 @@ pub fn run_share(
     let trials: Vec<Trial> =
         plan.shard_trials(shard).filter(|trial| !elsewhere.contains(&trial.id)).collect();
     let mut effort = SweepTiming::default();
-    with_trial_runner(worlds, folder, workers.into(), watcher, |work| {
-        let mut keep = |outcome: &Outcome| {
-            journal.append(&TimestampedOutcome::now(outcome))?;
-            rows.push(outcome);
-            Ok(())
-        };
-        effort =
-            log.run(work, &trials, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+    with_trial_runner(worlds, folder, workers.into(), watcher, |runner| {
+        effort = scheduler
+            .run(runner, &trials, &mut |outcome| {
+                journal.append(&TimestampedOutcome::now(outcome))?;
+                rows.push(outcome);
+                Ok(())
+            })
+            .map_err(|e| with_resume_hint(e, folder.path()))?;
         Ok(())
     })?;
     journal.sync()?;
     if !watcher.should_continue() {
-        return Ok(SweepEnd::Interrupted(log.finished.len()));
+        return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
     }
     let table = rows.build(plan)?;
     folder.finish_share(to_share(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
     Ok(SweepResult::complete(table, effort))
 }
 
-/// Returns the finished runs of the trials of a share, regardless of their maker.
+fn refuse_precision(folder: &Folder) -> Result<(), InputError> {
+    if folder.plan().until.is_none() {
+        return Ok(());
+    }
+    let cause =
+        "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
+    let remedy = "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
+    Err(InputError::new(folder.path().display(), cause, remedy))
+}
+
+/// Returns the finished runs of the trials of a share, whichever process finished them.
 fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
     let own: BTreeSet<u64> = folder.plan().shard_trials(shard).map(|trial| trial.id).collect();
     let mut rows = RunTableBuilder::default();
-    let mut take = |outcome: Outcome| {
+    let push_own = |outcome: Outcome| {
         if own.contains(&outcome.trial) {
             rows.push(&outcome);
         }
     };
-    match folder.is_complete() {
-        true => to_run_table(folder.results()?).for_each_outcome(&mut take),
-        false => for_each_outcome(folder, None, &mut take)?,
+    if folder.is_complete() {
+        to_run_table(folder.results()?).for_each_outcome(push_own);
+    } else {
+        for_each_outcome(folder, None, push_own)?;
     }
     Ok(rows.build(folder.plan())?)
 }
@@ -303,9 +321,14 @@ pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Resul
     }
     check_build(worlds, folder)?;
     let plan = folder.plan();
-    let mut log = TrialScheduler::new(plan);
-    for_each_outcome(folder, None, |outcome| log.record(&outcome))?;
-    let missing = if log.rounds.is_some() { log.next_trials() } else { log.missing_trials() }.len();
+    let mut scheduler = TrialScheduler::new(plan);
+    for_each_outcome(folder, None, |outcome| scheduler.record(&outcome))?;
+    // Where a precision ends the sweep, how many runs come after the next round is not known.
+    let missing = if scheduler.rounds.is_some() {
+        scheduler.next_trials().len()
+    } else {
+        scheduler.missing_trials().len()
+    };
     if missing > 0 {
         let cause = format!("{missing} of {} runs are missing", plan.runs());
         let remedy = "run the shares that are not finished (finished ones are not run again), or \
@@ -330,19 +353,25 @@ fn with_trial_runner(
         return Err(InputError::new(folder.path().display(), cause, remedy).into());
     }
     let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
-    let source = |variant: u32| {
-        // A scenario that was edited in between would make runs of another sweep.
-        let checked = &checked[variant as usize];
-        if !checked.load(Ordering::Relaxed) {
-            folder.check_variant(variant)?;
-            checked.store(true, Ordering::Relaxed);
-        }
-        Source::read(&folder.scenario(variant), &[])
-    };
-    let place = |trial: u64| -> PathBuf { folder.run_folder(trial) };
+    let source = |variant: u32| read_checked_variant(folder, variant, &checked[variant as usize]);
+    let run_folder = |trial: u64| -> PathBuf { folder.run_folder(trial) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
-        if plan.record { Some(&place) } else { None };
+        if plan.record { Some(&run_folder) } else { None };
     run(&TrialRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+}
+
+/// Reads the scenario of a variant, checked when it is read for the first time: one that was edited since the plan was
+/// made would make runs of another sweep. Two threads may both check it, which does no harm.
+fn read_checked_variant(
+    folder: &Folder,
+    variant: u32,
+    is_checked: &AtomicBool,
+) -> Result<Source, InputError> {
+    if !is_checked.load(Ordering::Relaxed) {
+        folder.check_variant(variant)?;
+        is_checked.store(true, Ordering::Relaxed);
+    }
+    Source::read(&folder.scenario(variant), &[])
 }
 
 /// Adds to a storage error the runs that are saved, and words for continuing.
@@ -405,39 +434,39 @@ impl<'a> TrialScheduler<'a> {
     /// Runs all open trials, round by round if a precision ends the sweep.
     fn run_all(
         &mut self,
-        work: &TrialRunner<'_>,
+        runner: &TrialRunner<'_>,
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
         let mut effort = SweepTiming::default();
         loop {
             let open = self.next_trials();
-            if open.is_empty() || !work.watcher.should_continue() {
+            if open.is_empty() || !runner.watcher.should_continue() {
                 return Ok(effort);
             }
-            effort.add(self.run(work, &open, keep)?);
+            effort.add(self.run(runner, &open, keep)?);
         }
     }
 
     /// Runs the trials that are not finished.
     fn run(
         &mut self,
-        work: &TrialRunner<'_>,
+        runner: &TrialRunner<'_>,
         trials: &[Trial],
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
         let open = self.unfinished_of(trials.iter().copied());
         let before = self.finished.len() as u64;
         let mut effort = SweepTiming::start();
-        let mut take = |outcome: Outcome| {
+        let accept: &mut OutcomeHandler<'_> = &mut |outcome: Outcome| {
+            // Stored first: an outcome that could not be stored does not count as finished.
             keep(&outcome)?;
             effort.record(&outcome);
             self.record(&outcome);
             Ok(())
         };
-        let take: &mut OutcomeHandler<'_> = &mut take;
-        let ran = work.run(&open, before, before + open.len() as u64, take);
-        effort.stop(work.parallelism(open.len()));
-        ran.map(|()| effort)
+        runner.run(&open, before, before + open.len() as u64, accept)?;
+        effort.stop(runner.parallelism(open.len()));
+        Ok(effort)
     }
 }
 

@@ -40,21 +40,27 @@ impl Task {
             let source = Source::new("scenario.toml", scenario.text.clone(), folder);
             sources.push((*variant, source));
         }
-        let source = |variant: u32| {
-            let found = sources.iter().find(|(k, _)| *k == variant).map(|(_, source)| source);
-            let cause = format!("the scenario of variant {variant} is missing");
-            let missing = || InputError::new("a task of a sweep", cause, "send it along");
-            found.cloned().ok_or_else(missing)
-        };
+        let source = |variant: u32| find_source(&sources, variant);
+        // One worker, because the cluster runs as many tasks on a node as it has cores.
         let engine = Engine::Workers(1);
-        let work =
+        let runner =
             TrialRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };
         let mut outcomes = Vec::with_capacity(self.trials.len());
-        work.run(&self.trials, 0, self.trials.len() as u64, &mut |outcome| {
+        runner.run(&self.trials, 0, self.trials.len() as u64, &mut |outcome| {
             outcomes.push(outcome);
             Ok(())
         })?;
         Ok(outcomes)
+    }
+}
+
+fn find_source(sources: &[(u32, Source)], variant: u32) -> Result<Source, InputError> {
+    match sources.iter().find(|(own, _)| *own == variant) {
+        Some((_, source)) => Ok(source.clone()),
+        None => {
+            let cause = format!("the scenario of variant {variant} is missing");
+            Err(InputError::new("a task of a sweep", cause, "send it along"))
+        }
     }
 }
 

@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Number of agents from which a single world fills the caches: such runs are made one after
-/// another, each on all workers, which also bounds the memory.
+/// another, each on all workers, which also bounds the memory. Smaller runs are faster side by side, because they never
+/// wait for each other.
 const LARGE_WORLD_AGENTS: u64 = 20_000;
 
 /// Everything that is needed to run trials.
@@ -60,7 +61,7 @@ impl TrialRunner<'_> {
             Ok(())
         };
         match self.engine {
-            Engine::Executor(crew) => self.run_on_executor(crew, trials, &mut take),
+            Engine::Executor(executor) => self.run_on_executor(executor, trials, &mut take),
             Engine::Workers(workers) => {
                 let at_once = self.parallelism(trials.len());
                 let each = (workers / at_once).max(1);
@@ -69,31 +70,32 @@ impl TrialRunner<'_> {
         }
     }
 
-    /// Lets a crew run the trials. The first outcome of a trial counts.
+    /// Runs the trials on an executor. The first outcome of a trial counts: an executor that lost contact with a process
+    /// may run its trials again.
     fn run_on_executor(
         &self,
-        crew: &dyn TrialExecutor,
+        executor: &dyn TrialExecutor,
         trials: &[Trial],
         take: &mut OutcomeHandler<'_>,
     ) -> Result<(), Error> {
         let mut open: BTreeSet<u64> = trials.iter().map(|trial| trial.id).collect();
         let Self { worlds, source, .. } = *self;
-        crew.run(&TrialBatch { trials, worlds, source }, &mut |outcome| match open
-            .remove(&outcome.trial)
-        {
-            true => take(outcome),
-            false => Ok(()),
+        executor.run(&TrialBatch { trials, worlds, source }, &mut |outcome| {
+            if open.remove(&outcome.trial) {
+                return take(outcome);
+            }
+            Ok(())
         })
     }
 
     /// Returns the number of `runs` in progress at once; each has its part of the workers.
     pub(super) fn parallelism(&self, runs: usize) -> usize {
-        let most = match self.engine {
-            Engine::Executor(crew) => crew.parallelism(),
+        let max = match self.engine {
+            Engine::Executor(executor) => executor.parallelism(),
             Engine::Workers(_) if self.agents >= LARGE_WORLD_AGENTS => 1,
             Engine::Workers(workers) => workers,
         };
-        most.min(runs).max(1)
+        max.min(runs).max(1)
     }
 
     /// Runs a trial; `None` if it was interrupted.
@@ -106,20 +108,21 @@ impl TrialRunner<'_> {
             Ok(source) => source,
             Err(e) => return Some(Err(e.into())),
         };
-        let run = || match self.record {
+        let result = catch_unwind(AssertUnwindSafe(|| match self.record {
             None => self.run_unrecorded(trial, &source, workers),
             Some(folder) => {
-                let folder = folder(trial.id);
-                run_recorded(self.worlds, trial, source, workers, &folder, self.watcher)
+                let run = RecordedTrial { trial, source, workers, folder: &folder(trial.id) };
+                run.run(self.worlds, self.watcher)
             }
-        };
-        match catch_unwind(AssertUnwindSafe(run)) {
+        }));
+        match result {
             Ok(Ok(outcome)) => outcome.map(Ok),
             // For example a seed for which a scenario has no start: the other runs continue.
             Ok(Err(Error::Input(e))) => Some(Ok(Outcome::from_failure(trial, e.to_string()))),
             Ok(Err(Error::InterruptedInCycle(_))) => None,
             Ok(Err(failure)) => Some(Err(failure)),
             Err(payload) if self.watcher.interrupt().caused(payload.as_ref()) => None,
+            // A bug in one run costs only that run, not a sweep of days.
             Err(_) => {
                 Some(Ok(Outcome::from_failure(trial, "a bug in sidestep: see standard error")))
             }
@@ -133,42 +136,56 @@ impl TrialRunner<'_> {
         variant: &Source,
         workers: usize,
     ) -> Result<Option<Outcome>, Error> {
-        let begun = Instant::now();
+        let started_at = Instant::now();
         let started = start_trial(self.worlds, trial, variant, workers)?
             .with_interrupt(self.watcher.interrupt());
-        let compiled = Instant::now();
+        let compiled_at = Instant::now();
         let outcome = started.run(&|| self.watcher.should_continue());
-        Ok(outcome.map(|outcome| with_times(outcome, [compiled - begun, compiled.elapsed()])))
+        let times = [compiled_at - started_at, compiled_at.elapsed()];
+        Ok(outcome.map(|outcome| with_times(outcome, times)))
     }
 }
 
-/// Runs a trial into a run folder of its own; `None` if it was interrupted. A folder left by a
-/// killed process is started again.
-///
-/// # Errors
-/// When the scenario is wrong with this seed, or something cannot be stored.
-pub(super) fn run_recorded(
-    worlds: &Worlds,
-    trial: Trial,
-    variant: Source,
-    workers: usize,
-    folder: &Path,
-    watcher: &dyn Watcher,
-) -> Result<Option<Outcome>, Error> {
-    let begun = Instant::now();
-    let source = variant.with_overrides(&[format!("seed={}", trial.seed)])?;
-    let compiled = worlds.compile(&source)?;
-    let resolved = compiled.resolve(&source)?;
-    let itself = Source::new("scenario.toml", &*resolved.text, folder);
-    let mut run = compiled.start(&itself, workers);
-    let existing = IfExists::Replace;
-    let build = worlds.build();
-    let recording = RunRecorder::create(folder, &resolved, run.as_mut(), existing, build);
-    let recording = recording.map_err(folder_error)?;
-    let compiled = Instant::now();
-    let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
-    let outcome = is_complete.then(|| Outcome::from_simulation(trial, run.as_ref()));
-    Ok(outcome.map(|outcome| with_times(outcome, [compiled - begun, compiled.elapsed()])))
+/// A trial that is run into a run folder of its own.
+pub(super) struct RecordedTrial<'a> {
+    pub(super) trial: Trial,
+    /// The scenario of its variant.
+    pub(super) source: Source,
+    pub(super) workers: usize,
+    pub(super) folder: &'a Path,
+}
+
+impl RecordedTrial<'_> {
+    /// Runs the trial; `None` if it was interrupted. A folder left by a killed process is started again, because a run
+    /// of a sweep is short beside the sweep.
+    ///
+    /// # Errors
+    /// When the scenario is wrong with this seed, or something cannot be stored.
+    pub(super) fn run(
+        self,
+        worlds: &Worlds,
+        watcher: &dyn Watcher,
+    ) -> Result<Option<Outcome>, Error> {
+        let Self { trial, source, workers, folder } = self;
+        let started_at = Instant::now();
+        let source = source.with_overrides(&[format!("seed={}", trial.seed)])?;
+        let compiled = worlds.compile(&source)?;
+        let resolved = compiled.resolve(&source)?;
+        // The run is of the text in its folder, so that it can be computed again from there.
+        let in_folder = Source::new("scenario.toml", &*resolved.text, folder);
+        let mut run = compiled.start(&in_folder, workers);
+        let existing = IfExists::Replace;
+        let recording =
+            RunRecorder::create(folder, &resolved, run.as_mut(), existing, worlds.build())
+                .map_err(folder_error)?;
+        let compiled_at = Instant::now();
+        let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
+        if !is_complete {
+            return Ok(None);
+        }
+        let outcome = Outcome::from_simulation(trial, run.as_ref());
+        Ok(Some(with_times(outcome, [compiled_at - started_at, compiled_at.elapsed()])))
+    }
 }
 
 /// Returns an error of the folder itself as a stop, because it is not an outcome of a run.
