@@ -8,7 +8,6 @@ mod exports;
 mod links;
 mod orders;
 mod places;
-mod pond;
 mod runs;
 mod support;
 mod sweeps;
