@@ -68,6 +68,7 @@ fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scenario::schema, module)?)?;
     module.add_function(wrap_pyfunction!(scenario::unpack_scenario, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::rebuild, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::world_facts, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::worlds, module)?)
 }
 

@@ -1,6 +1,9 @@
-//! The list of worlds of a native module.
+//! The list of worlds of a native module, and what each declares of itself.
 
+use crate::error::argument_error;
+use crate::json::to_python;
 use pyo3::prelude::*;
+use serde_json::{Value, json};
 use sidestep::scenario::Worlds;
 use std::sync::OnceLock;
 
@@ -27,4 +30,25 @@ pub(crate) fn list() -> &'static Worlds {
 #[pyfunction]
 pub(crate) fn worlds() -> Vec<&'static str> {
     list().names()
+}
+
+/// Returns the facts that a world declares of itself, as a dict: `agent` (the noun for an agent), `default_order`,
+/// `reward_terms`, `positions` and `group_sizes`. By these the package's own modules serve worlds that they do not know.
+///
+/// Raises InputError when there is no such world.
+///
+/// >>> from sidestep._native import world_facts
+/// >>> world_facts("robots")["agent"]
+/// 'robot'
+#[pyfunction]
+pub(crate) fn world_facts(py: Python<'_>, world: &str) -> PyResult<Py<PyAny>> {
+    let Some(found) = list().find(world) else {
+        let cause = format!("there is no world `{world}`");
+        return Err(argument_error("world", cause, format!("it is one of {}", list().names().join(", "))));
+    };
+    let mut facts = serde_json::to_value(found.facts()).unwrap_or_default();
+    if let Value::Object(members) = &mut facts {
+        members.insert("agent".into(), json!(found.agent()));
+    }
+    to_python(py, &facts)
 }

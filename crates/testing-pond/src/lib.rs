@@ -5,6 +5,7 @@
 //! none of these can rely on a world that is shipped.
 
 mod external;
+mod facts;
 mod rows;
 mod world_impl;
 mod world_type;

@@ -6,7 +6,9 @@ use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::text::{Description, align_pairs, key_value};
 use sidestep_kernel::{InputError, Run, RunConfig, RunStart, Seed, Simulation};
-use sidestep_scenario::{CompiledScenario, ResolvedScenario, Source, WorldType};
+use sidestep_scenario::{
+    CompiledScenario, Editing, ResolvedScenario, Source, WorldFacts, WorldType,
+};
 use std::any::Any;
 use std::sync::Arc;
 
@@ -74,6 +76,14 @@ impl WorldType for Pond {
     fn default_scenario(&self) -> &'static str {
         "format = 1\nworld = \"pond\"\nname = \"evening\"\nseed = 1\ncycles = 6000\n\
          [pond]\nfrogs = 12\nwidth = 8\nheight = 6\ncheckpoint_every = 500\n"
+    }
+
+    fn facts(&self) -> WorldFacts {
+        super::facts::FACTS
+    }
+
+    fn editing(&self) -> Editing {
+        super::facts::editing()
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
