@@ -44,7 +44,11 @@ pub(crate) fn worlds() -> Vec<&'static str> {
 pub(crate) fn world_facts(py: Python<'_>, world: &str) -> PyResult<Py<PyAny>> {
     let Some(found) = list().find(world) else {
         let cause = format!("there is no world `{world}`");
-        return Err(argument_error("world", cause, format!("it is one of {}", list().names().join(", "))));
+        return Err(argument_error(
+            "world",
+            cause,
+            format!("it is one of {}", list().names().join(", ")),
+        ));
     };
     let mut facts = serde_json::to_value(found.facts()).unwrap_or_default();
     if let Value::Object(members) = &mut facts {

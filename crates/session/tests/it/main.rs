@@ -4,6 +4,7 @@ mod builds;
 mod changed;
 mod controls;
 mod exports;
+mod fleets;
 #[cfg(unix)]
 mod links;
 mod orders;
