@@ -24,6 +24,7 @@ mod cycle_context;
 pub mod decide;
 pub mod exact;
 mod external;
+mod facts;
 mod inspect;
 mod join;
 mod metric_info;
