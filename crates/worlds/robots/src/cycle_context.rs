@@ -16,11 +16,14 @@ pub(super) struct CycleContext<'a, T: BoxWord> {
     pub(super) now: Cycle,
 }
 
-/// Evaluates an expression with the scene of a world's state. The phases are compiled for each
-/// width of the floor's words; this picks the right one.
+/// Evaluates an expression with the context of a world's state. The phases are compiled for each
+/// width of the floor's words, because small words mean fewer cache misses and a branch at each box would cost
+/// more than they save; this picks the right one once.
 macro_rules! with_scene {
     ($world:expr, $state:expr, $now:expr, |$scene:ident| $value:expr) => {{
-        let (world, state, now) = ($world, $state, $now);
+        let world = $world;
+        let state = $state;
+        let now = $now;
         match &state.floor {
             sidestep_kernel::space::Floor::Narrow(floor) => {
                 let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
@@ -71,5 +74,6 @@ pub(super) fn box_index(base: u32, offset: i32) -> usize {
 /// Returns whether some boxes are all empty.
 #[inline]
 pub(super) fn are_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
+    // Free is the highest bit of a word, so one branch at the end answers for all boxes.
     offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(box_index(base, offset))).is_free()
 }
