@@ -16,27 +16,27 @@ pub(super) struct CycleContext<'a, T: BoxWord> {
     pub(super) now: Cycle,
 }
 
-/// Evaluates an expression with the context of a world's state. The phases are compiled for each
+/// Evaluates an expression with the context of a cycle. The phases are compiled for each
 /// width of the floor's words, because small words mean fewer cache misses and a branch at each box would cost
 /// more than they save; this picks the right one once.
-macro_rules! with_scene {
-    ($world:expr, $state:expr, $now:expr, |$scene:ident| $value:expr) => {{
+macro_rules! with_cycle {
+    ($world:expr, $state:expr, $now:expr, |$cycle:ident| $value:expr) => {{
         let world = $world;
         let state = $state;
         let now = $now;
         match &state.floor {
             sidestep_kernel::space::Floor::Narrow(floor) => {
-                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
             sidestep_kernel::space::Floor::Wide(floor) => {
-                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
         }
     }};
 }
-pub(super) use with_scene;
+pub(super) use with_cycle;
 
 impl<'a, T: BoxWord> CycleContext<'a, T> {
     /// Returns the changing part of a body.

@@ -304,14 +304,14 @@ fn for_each_swept<T: BoxWord>(
 /// would run out of registers.
 #[inline(never)]
 fn cast_beams<T: BoxWord>(
-    scene: &CycleContext<'_, T>,
+    cycle: &CycleContext<'_, T>,
     sensor: &MountedSensor,
     cell: &BodyState,
     truths: &mut Vec<RowIndex>,
 ) {
-    let floor = scene.floor;
-    let state = scene.state;
-    let base = scene.base(cell);
+    let floor = cycle.floor;
+    let state = cycle.state;
+    let base = cycle.base(cell);
     let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
     truths.clear();
     let mut from = 0;
