@@ -15,7 +15,7 @@ pub(in crate::scenario) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("external", &[]),
 ];
 
-/// A key that does nothing, with the reason.
+/// A key, whether it is given and does nothing, and the reason.
 struct UnusedKeyRule(&'static str, bool, &'static str);
 
 /// Refuses keys that do nothing in a scenario; `own` are behaviors beside the built-in ones,
@@ -69,7 +69,8 @@ fn check_robots(
     s: &RobotSection,
     own: &Behaviours,
 ) -> Result<(), InputError> {
-    let (scen, at) = (s.scen.is_some(), !s.at.is_empty());
+    let scen = s.scen.is_some();
+    let at = !s.at.is_empty();
     let listed = "beside `scen`, which lists starts and goals";
     let rules = [
         UnusedKeyRule("at", at && scen, listed),
@@ -100,9 +101,6 @@ fn check_behaviour(
         // Its name is wrong, and that error is the one to report.
         None => return Ok(()),
     };
-    let error = |key: &str, cause: String, remedy: String| {
-        Err(source.error_at(&format!("{path}{key}"), cause, remedy))
-    };
     let foreign =
         s.given_keys().into_iter().find(|(key, is_given)| *is_given && !known.contains(key));
     if let Some((key, _)) = foreign {
@@ -110,19 +108,23 @@ fn check_behaviour(
             Some((other, _)) => format!("leave it out: it is a key of `{other}`"),
             None => "leave it out".into(),
         };
-        return error(key, format!("`{key}` does nothing in the behaviour `{own_kind}`"), remedy);
+        let cause = format!("`{key}` does nothing in the behaviour `{own_kind}`");
+        return Err(source.error_at(&format!("{path}{key}"), cause, remedy));
     }
     let lists = [
         ("goals", s.goals.as_ref().is_some_and(Vec::is_empty), "[col, row]"),
         ("actions", s.actions.as_ref().is_some_and(Vec::is_empty), "action, e.g. \"forward\""),
     ];
     if let Some((key, _, one)) = lists.into_iter().find(|(_, is_empty, _)| *is_empty) {
-        return error(key, format!("`{key}` is empty"), format!("give at least one {one}"));
+        let cause = format!("`{key}` is empty");
+        let remedy = format!("give at least one {one}");
+        return Err(source.error_at(&format!("{path}{key}"), cause, remedy));
     }
-    match s.turn_every {
-        Some(0) => error("turn_every", "turn_every = 0".into(), "give 1 or more actions".into()),
-        _ => Ok(()),
+    if s.turn_every == Some(0) {
+        let key = format!("{path}turn_every");
+        return Err(source.error_at(&key, "turn_every = 0", "give 1 or more actions"));
     }
+    Ok(())
 }
 
 fn check_people(source: &Source, path: &str, s: &MoverSection) -> Result<(), InputError> {
