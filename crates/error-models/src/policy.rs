@@ -81,9 +81,11 @@ impl ActionDistribution {
 
     /// Returns equal shares for `actions`.
     fn uniform_over(actions: &[ActionId]) -> Self {
-        let longest = actions.iter().max().map_or(0, |&a| usize::from(a) + 1);
-        let mut row = vec![0.0; longest.max(STANDARD_ACTIONS.len())];
-        actions.iter().for_each(|&a| row[usize::from(a)] = 1.0 / actions.len() as f64);
+        let last = actions.iter().max().map_or(0, |&action| usize::from(action) + 1);
+        let mut row = vec![0.0; last.max(STANDARD_ACTIONS.len())];
+        for &action in actions {
+            row[usize::from(action)] = 1.0 / actions.len() as f64;
+        }
         Self::new(row).expect("equal shares of 1 are a distribution")
     }
 }

@@ -264,7 +264,8 @@ pub fn find_violation(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String
         if world.is_door(id) && body.facing.is_open() {
             continue;
         }
-        let (cols, rows) = (body.at.0..body.at.0 + ty.size.0, body.at.1..body.at.1 + ty.size.1);
+        let cols = body.at.0..body.at.0 + ty.size.0;
+        let rows = body.at.1..body.at.1 + ty.size.1;
         for (col, row) in rows.flat_map(|r| cols.clone().map(move |c| (c, r))) {
             let outside = col >= width || row >= world.map.height();
             if outside || world.map.cell(col, row) != Cell::Free {

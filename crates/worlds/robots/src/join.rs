@@ -54,7 +54,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
         if intent.is_idle() {
             return;
         }
-        if self.world.has_asks {
+        if self.world.has_requests {
             self.deliver_request(cell);
         }
         let mut joiner = NeighborJoiner { slot, last_met: slot, groups };

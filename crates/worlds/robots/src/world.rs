@@ -109,7 +109,7 @@ pub struct RobotsWorld {
     pub(super) teams: Arc<Teams>,
     pub(super) robots: Vec<EntityId>,
     /// Whether there are robots that ask each other to make room.
-    pub(super) has_asks: bool,
+    pub(super) has_requests: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,

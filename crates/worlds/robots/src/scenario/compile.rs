@@ -187,16 +187,11 @@ impl<'a> Compiler<'a> {
         placer: Placer,
         placed: Placement,
     ) -> Result<Compiled, InputError> {
-        let mut robots = Vec::new();
-        for body in &placed.bodies {
-            if let Role::Robot(_) = self.types[usize::from(body.ty)].role {
-                robots.push(body.id);
-            }
-        }
+        let robots = self.robot_ids(&placed.bodies);
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
-        let has_asks = self.has_requests();
+        let has_requests = self.has_requests();
         let kind_rank = self.kind_rank()?;
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -211,7 +206,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
-            has_asks,
+            has_requests,
             storage: order,
             streams: self.streams,
             border: self.border,
@@ -232,6 +227,16 @@ impl<'a> Compiler<'a> {
             remarks,
             placer: Arc::new(placer),
         })
+    }
+
+    fn robot_ids(&self, bodies: &[Body]) -> Vec<EntityId> {
+        let mut ids = Vec::new();
+        for body in bodies {
+            if matches!(self.types[usize::from(body.ty)].role, Role::Robot(_)) {
+                ids.push(body.id);
+            }
+        }
+        ids
     }
 
     fn stride(&self) -> u32 {

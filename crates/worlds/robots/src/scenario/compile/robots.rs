@@ -5,6 +5,8 @@ use super::bodies::{BodyGroup, GroupTypes, period_cycles};
 use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
+use sidestep_import::movingai::{ScenRow, load_scen};
+use std::path::PathBuf;
 
 impl Compiler<'_> {
     pub(super) fn robots(
@@ -38,10 +40,10 @@ impl Compiler<'_> {
     fn robots_from_scen(
         &mut self,
         s: &RobotSection,
-        scen: &Spanned<std::path::PathBuf>,
+        scen: &Spanned<PathBuf>,
         span: &Range<usize>,
     ) -> Result<BodyGroup, InputError> {
-        let rows = sidestep_import::movingai::load_scen(&self.source.path(scen.get_ref()));
+        let rows = load_scen(&self.source.path(scen.get_ref()));
         let rows = rows.map_err(|error| self.source.with_key_at(scen.span(), error))?;
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
@@ -54,18 +56,9 @@ impl Compiler<'_> {
         let avoidance = self.avoidance(None, &free, size, &body);
         let mut places = Vec::new();
         let mut types = Vec::new();
-        let place = self.source.path(scen.get_ref()).display().to_string();
         for row in &rows[..count] {
-            let checked = row.check_against(&place, &self.map);
-            checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
-            let goals = vec![Arc::new(FlowField::to_nearest(&free, size, &[row.goal]))];
+            let goals = vec![self.scen_goal(scen, row, &free, size)?];
             let avoidance = avoidance.clone();
-            if !goals[0].is_goal(row.goal.0, row.goal.1) {
-                let cause =
-                    format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
-                let remedy = "give smaller robots, or another list";
-                return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
-            }
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel::new(Arc::clone(&body), behaviour);
             let actions = Arc::clone(&body.actions);
@@ -82,6 +75,26 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
         })
+    }
+
+    /// Returns the shortest paths to the goal of a row of a MovingAI list.
+    fn scen_goal(
+        &self,
+        scen: &Spanned<PathBuf>,
+        row: &ScenRow,
+        free: &FreeSpace,
+        size: u32,
+    ) -> Result<Arc<FlowField>, InputError> {
+        let place = self.source.path(scen.get_ref()).display().to_string();
+        let checked = row.check_against(&place, &self.map);
+        checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
+        let field = FlowField::to_nearest(free, size, &[row.goal]);
+        if !field.is_goal(row.goal.0, row.goal.1) {
+            let cause = format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
+            let remedy = "give smaller robots, or another list";
+            return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
+        }
+        Ok(Arc::new(field))
     }
 
     fn robot_body(&mut self, s: &RobotSection, size: u32) -> Result<RobotBody, InputError> {
