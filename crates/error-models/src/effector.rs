@@ -79,7 +79,7 @@ pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 /// many rings of wall, so a bound keeps conflicts local.
 pub const MAX_PATH_STEPS: usize = 16;
 
-/// One way an action may end, in free space.
+/// One possible end of an action, in free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Probability of the transition.

@@ -3,7 +3,7 @@
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STANDARD_ACTIONS};
 use sidestep_kernel::distr::{Categorical, RowError};
 
-/// Draws each action from fixed probabilities: one row while the way is free, another after a
+/// Draws each action from fixed probabilities: one row while nothing blocks, another after a
 /// contact. It has no memory and asks for nothing else that a robot perceives, so a robot alone in a
 /// building is a Markov chain over its poses.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! *Act*: the bodies of a group act one after the other; the environment decides.
+//! *Act*, the paper's second pool: the bodies of a group act one after the other; the environment decides.
 
 use super::action::{Action, StepPath};
 use super::cycle_context::{CycleContext, are_free, box_index};
@@ -35,28 +35,28 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Lets one body act with the draw of its own stream.
     #[inline]
     pub(super) fn act_with_draw(&self, slot: Slot, scratch: &mut Scratch) {
-        let [word, _] = self.act_words(self.cell(slot).id);
+        let [word, _] = self.act_words(self.body(slot).id);
         self.act(slot, word, scratch);
     }
 
     /// Lets one body act on the state left by those before it; `word` is its draw.
     #[inline]
     pub(super) fn act(&self, slot: Slot, word: u32, scratch: &mut Scratch) {
-        let cell = self.cell(slot);
-        if cell.intent.get().is_idle() {
+        let body = self.body(slot);
+        if body.intent.get().is_idle() {
             return;
         }
-        let body = self.type_of(cell);
+        let ty = self.type_of(body);
         // A door has no actions in its type, so it toggles.
-        let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
+        let Some(action) = ty.actions.get(usize::from(body.action.get())) else {
             return self.toggle(slot, scratch);
         };
         let walk = &action.walks[self.draw_transition(action, slot, word)];
-        if are_free(self.floor, self.base(cell), &walk.whole.enter) {
+        if are_free(self.floor, self.base(body), &walk.whole.enter) {
             self.execute_whole(walk, slot);
             if scratch.keep_motions {
                 let result = WalkResult { steps: walk.steps.len(), contact: None };
-                self.record_motion(walk, result, cell, scratch);
+                self.record_motion(walk, result, body, scratch);
             }
         } else {
             self.execute_blocked(walk, slot, scratch);
@@ -81,11 +81,11 @@ impl<T: BoxWord> CycleContext<'_, T> {
     #[inline]
     fn execute_whole(&self, walk: &StepPath, slot: Slot) {
         let floor = self.floor;
-        let cell = self.cell(slot);
-        let base = self.base(cell);
-        cell.contact.set(LastContact::NONE);
+        let body = self.body(slot);
+        let base = self.base(body);
+        body.contact.set(LastContact::NONE);
         if walk.turn != 0 {
-            cell.facing.set(cell.facing.get().turned(walk.turn));
+            body.facing.set(body.facing.get().turned(walk.turn));
         }
         if walk.steps.is_empty() {
             return;
@@ -93,22 +93,22 @@ impl<T: BoxWord> CycleContext<'_, T> {
         let whole = &walk.whole;
         whole.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
         whole.fill.iter().for_each(|&offset| floor.set(box_index(base, offset), T::standing(slot)));
-        cell.anchor.set(cell.position().offset(whole.delta.0, whole.delta.1).word());
-        cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
-        if self.type_of(cell).marks {
+        body.anchor.set(body.position().offset(whole.delta.0, whole.delta.1).word());
+        body.moves.set(body.moves.get() + walk.steps.len() as u32);
+        if self.type_of(body).marks {
             let mut first_visits = 0;
             for &offset in &whole.enter {
                 first_visits += u32::from(self.state.visited.insert(box_index(base, offset)));
             }
-            cell.first_visits.set(cell.first_visits.get() + first_visits);
+            body.first_visits.set(body.first_visits.get() + first_visits);
         }
     }
 
     /// Makes a walk that an obstacle may cut short.
     fn execute_blocked(&self, walk: &StepPath, slot: Slot, scratch: &mut Scratch) {
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let result = self.walk_result(walk, slot);
-        let is_mover = matches!(self.type_of(cell).role, Role::Mover(_));
+        let is_mover = matches!(self.type_of(body).role, Role::Mover(_));
         // People try single boxes, which cannot be cut short.
         let keeps_steps = self.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
         let steps = if result.contact.is_none() || keeps_steps { result.steps } else { 0 };
@@ -119,42 +119,42 @@ impl<T: BoxWord> CycleContext<'_, T> {
         }
         if scratch.keep_motions {
             let result = WalkResult { steps, ..result };
-            self.record_motion(walk, result, cell, scratch);
+            self.record_motion(walk, result, body, scratch);
         }
         match result.contact {
             None => {
-                cell.contact.set(LastContact::NONE);
+                body.contact.set(LastContact::NONE);
                 if walk.turn != 0 {
-                    cell.facing.set(cell.facing.get().turned(walk.turn));
+                    body.facing.set(body.facing.get().turned(walk.turn));
                 }
             }
-            Some(blocker) => self.record_contact(cell, blocker, scratch),
+            Some(blocker) => self.record_contact(body, blocker, scratch),
         }
     }
 
     /// Records a contact in the body's state, in its counters and, where events are kept, as an event.
-    fn record_contact(&self, cell: &BodyState, blocker: Blocker, scratch: &mut Scratch) {
+    fn record_contact(&self, body: &BodyState, blocker: Blocker, scratch: &mut Scratch) {
         let Blocker { kind, side, by } = blocker;
-        cell.contact.set(LastContact::from_contact(Contact { kind, side }));
+        body.contact.set(LastContact::from_contact(Contact { kind, side }));
         let kinds = self.world.kinds.len();
-        self.state.contacts.add(cell.id as usize * kinds + usize::from(kind), 1);
+        self.state.contacts.add(body.id as usize * kinds + usize::from(kind), 1);
         if scratch.keep_events {
-            let with = by.map(|slot| self.cell(slot).id);
+            let with = by.map(|slot| self.body(slot).id);
             let event = EventKind::Contact { kind, side, with };
-            scratch.events.push(self.body_event(cell, event));
+            scratch.events.push(self.body_event(body, event));
         }
     }
 
     /// Returns an event of a body, which is where it happens.
-    fn body_event(&self, cell: &BodyState, event: EventKind) -> Event {
-        let at = self.world.map_position(cell.position());
-        Event { cycle: self.now, body: cell.id, at, event }
+    fn body_event(&self, body: &BodyState, event: EventKind) -> Event {
+        let at = self.world.map_position(body.position());
+        Event { cycle: self.now, body: body.id, at, event }
     }
 
     /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
     pub(super) fn walk_result(&self, walk: &StepPath, slot: Slot) -> WalkResult {
-        let base = self.base(self.cell(slot));
+        let base = self.base(self.body(slot));
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
                 let word = self.floor.get(box_index(base, offset));
@@ -179,10 +179,10 @@ impl<T: BoxWord> CycleContext<'_, T> {
             return;
         }
         let floor = self.floor;
-        let cell = self.cell(slot);
-        let base = self.base(cell);
-        let marks = self.type_of(cell).marks;
-        let mut moved = cell.position();
+        let body = self.body(slot);
+        let base = self.base(body);
+        let marks = self.type_of(body).marks;
+        let mut moved = body.position();
         let mut first_visits = 0;
         for step in &walk.steps[..steps] {
             step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
@@ -193,9 +193,9 @@ impl<T: BoxWord> CycleContext<'_, T> {
             }
             moved = moved.offset(step.delta.0, step.delta.1);
         }
-        cell.anchor.set(moved.word());
-        cell.moves.set(cell.moves.get() + steps as u32);
-        cell.first_visits.set(cell.first_visits.get() + first_visits);
+        body.anchor.set(moved.word());
+        body.moves.set(body.moves.get() + steps as u32);
+        body.first_visits.set(body.first_visits.get() + first_visits);
     }
 
     /// Returns the distribution over the walks that are not blocked here (the paper's update of the
@@ -220,19 +220,19 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Opens a door, or closes it when no body stands in it; otherwise closing waits.
     fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
         let floor = self.floor;
-        let cell = self.cell(slot);
-        let base = self.base(cell);
-        let own = &self.type_of(cell).own;
-        let opens = cell.facing.get() == Facing::CLOSED;
+        let body = self.body(slot);
+        let base = self.base(body);
+        let own = &self.type_of(body).own;
+        let opens = body.facing.get() == Facing::CLOSED;
         if !opens && !are_free(floor, base, own) {
             return;
         }
         let word = if opens { T::FREE } else { T::standing(slot) };
         own.iter().for_each(|&offset| floor.set(box_index(base, offset), word));
-        cell.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
+        body.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
         if scratch.keep_events {
             let event = if opens { EventKind::DoorOpened } else { EventKind::DoorClosed };
-            scratch.events.push(self.body_event(cell, event));
+            scratch.events.push(self.body_event(body, event));
         }
     }
 
@@ -243,10 +243,10 @@ impl<T: BoxWord> CycleContext<'_, T> {
         &self,
         walk: &StepPath,
         result: WalkResult,
-        cell: &BodyState,
+        body: &BodyState,
         scratch: &mut Scratch,
     ) {
-        if matches!(self.type_of(cell).role, Role::Mover(_)) {
+        if matches!(self.type_of(body).role, Role::Mover(_)) {
             return;
         }
         let mut ahead = 0;
@@ -256,8 +256,8 @@ impl<T: BoxWord> CycleContext<'_, T> {
         }
         scratch.motion_samples.push(MotionSample {
             cycle: self.now,
-            robot: cell.id,
-            action: cell.intent.get().number(),
+            robot: body.id,
+            action: body.intent.get().number(),
             ahead,
             left,
             quarter_turns: if result.contact.is_none() { walk.turn } else { 0 },

@@ -26,11 +26,11 @@ pub(super) struct Bid {
 impl<T: BoxWord> CycleContext<'_, T> {
     /// Bids for all boxes that a body covers or may come to cover.
     fn bid(&self, slot: Slot) -> Bid {
-        let cell = self.cell(slot);
-        let [word, draw] = self.act_words(cell.id);
+        let body = self.body(slot);
+        let [word, draw] = self.act_words(body.id);
         // Inverted, because the smallest (draw, id) acts first.
-        let value = !(u64::from(draw) << 32 | u64::from(cell.id));
-        let bid = Bid { slot, word, at: cell.position(), value };
+        let value = !(u64::from(draw) << 32 | u64::from(body.id));
+        let bid = Bid { slot, word, at: body.position(), value };
         self.for_each_box_of(bid, |index| {
             self.state.bids[index].fetch_max(value, Relaxed);
         });
@@ -52,15 +52,15 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Calls `each` for all boxes that a bidder covers, or may come to cover if it acts; walls
     /// included, for which no body contends.
     fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
-        let cell = self.cell(bid.slot);
-        let body = self.type_of(cell);
+        let body = self.body(bid.slot);
+        let ty = self.type_of(body);
         let base = bid.at.index(self.world.stride);
-        for &offset in &body.own {
+        for &offset in &ty.own {
             each(box_index(base, offset));
         }
         // A door has no actions, and claims only its own boxes.
-        if !cell.intent.get().is_idle()
-            && let Some(action) = body.actions.get(usize::from(cell.action.get()))
+        if !body.intent.get().is_idle()
+            && let Some(action) = ty.actions.get(usize::from(body.action.get()))
         {
             for &offset in &action.claims {
                 each(box_index(base, offset));
@@ -70,8 +70,8 @@ impl<T: BoxWord> CycleContext<'_, T> {
 }
 
 impl Auction<Self> for RobotsWorld {
-    fn bid(&self, phase: &mut PhaseContext<'_, Self>, body: Slot) {
-        let bid = with_cycle!(self, phase.state, phase.now, |cycle| cycle.bid(body));
+    fn bid(&self, phase: &mut PhaseContext<'_, Self>, slot: Slot) {
+        let bid = with_cycle!(self, phase.state, phase.now, |cycle| cycle.bid(slot));
         phase.scratch.bids.push(bid);
     }
 

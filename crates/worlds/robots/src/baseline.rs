@@ -157,8 +157,8 @@ impl BaselineRun {
     }
 }
 
-/// Runs a worker's part of one cycle: its own bodies perceive; barrier, because nobody may act while
-/// others look; those inside the band act; barrier; one worker moves the rest and hands over; barrier.
+/// Runs a worker's part of one cycle: its own bodies perceive; barrier, because no body may act while
+/// others perceive; those inside the band act; barrier; one worker moves the rest and hands over; barrier.
 fn partition_cycle<T: BoxWord>(
     cycle: &CycleContext<'_, T>,
     exchange: &HaloExchange,
@@ -186,7 +186,7 @@ fn partition_cycle<T: BoxWord>(
         *serial_acts += crossing.len() as u64;
         for slot in crossing {
             cycle.act_with_draw(slot, scratch);
-            exchange.transfer(slot, cycle.cell(slot).position().col());
+            exchange.transfer(slot, cycle.body(slot).position().col());
         }
     }
     worker.barrier();
@@ -235,16 +235,16 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
     fn is_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
         let world = self.world;
-        let cell = self.cell(slot);
-        let col = cell.position().col();
-        let width = self.type_of(cell).size.0;
+        let body = self.body(slot);
+        let col = body.position().col();
+        let width = self.type_of(body).size.0;
         let reach = world.reach;
         // Most bodies are far from a border, and their claims need not be walked.
         if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
             return true;
         }
         let covers = band.contains(&col) && band.contains(&(col + width - 1));
-        if !covers || cell.intent.get().is_idle() {
+        if !covers || body.intent.get().is_idle() {
             return covers;
         }
         let mut inside = true;

@@ -41,20 +41,20 @@ pub(super) use with_cycle;
 impl<'a, T: BoxWord> CycleContext<'a, T> {
     /// Returns the changing part of a body.
     #[inline(always)]
-    pub(super) fn cell(&self, slot: Slot) -> &'a BodyState {
+    pub(super) fn body(&self, slot: Slot) -> &'a BodyState {
         &self.state.bodies[slot as usize]
     }
 
     /// Returns the properties that a body shares with others of its type.
     #[inline(always)]
-    pub(super) fn type_of(&self, cell: &BodyState) -> &'a BodyType {
-        &self.world.types[usize::from(cell.ty)]
+    pub(super) fn type_of(&self, body: &BodyState) -> &'a BodyType {
+        &self.world.types[usize::from(body.ty)]
     }
 
     /// Returns the index of a body's lower-left box on the floor.
     #[inline(always)]
-    pub(super) fn base(&self, cell: &BodyState) -> u32 {
-        cell.position().index(self.world.stride)
+    pub(super) fn base(&self, body: &BodyState) -> u32 {
+        body.position().index(self.world.stride)
     }
 
     /// Returns the draws of a body's action: that of its outcome, and that of its priority.

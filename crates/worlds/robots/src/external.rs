@@ -175,9 +175,9 @@ impl<T: BoxWord> CycleContext<'_, T> {
         buffers: &mut [BufferMut<'_>],
     ) {
         let slot = self.state.slot_of_id[id as usize];
-        let cell = self.cell(slot);
-        let Role::Robot(model) = &self.type_of(cell).role else { return };
-        self.sense(model, cell, scratch);
+        let body = self.body(slot);
+        let Role::Robot(model) = &self.type_of(body).role else { return };
+        self.sense(model, body, scratch);
         let (of_sensors, others) = buffers.split_at_mut(2 * model.body.sensors.len());
         let mut readings = scratch.readings.iter();
         for (sensor, pair) in model.body.sensors.iter().zip(of_sensors.as_chunks_mut().0) {
@@ -188,15 +188,15 @@ impl<T: BoxWord> CycleContext<'_, T> {
                 classes.set_integer(row * beams + k, i64::from(reading.class));
             }
         }
-        let contact = cell.contact.get().get();
-        let (col, map_row) = self.world.map_position(cell.position());
+        let contact = body.contact.get().get();
+        let (col, map_row) = self.world.map_position(body.position());
         let is_due = self.world.bodies[id as usize].is_due(self.now);
         // 0 is no contact.
         others[0].set_integer(row, contact.map_or(0, |contact| i64::from(contact.kind) + 1));
         others[1].set_integer(row, contact.map_or(0, |contact| contact.side as i64 + 1));
         others[2].set_integer(2 * row, i64::from(col));
         others[2].set_integer(2 * row + 1, i64::from(map_row));
-        others[3].set_integer(row, i64::from(cell.facing.get().heading()));
+        others[3].set_integer(row, i64::from(body.facing.get().heading()));
         others[4].set_integer(row, i64::from(is_due));
         if let Some(radio) = &self.world.radio {
             scratch.heard.clear();

@@ -89,14 +89,14 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
     /// Adds the facts known before the cycle.
     fn add_present(&mut self) {
         let cycle = self.cycle;
-        let cell = cycle.cell(self.slot);
-        let body = &cycle.world.bodies[self.id as usize];
+        let body = cycle.body(self.slot);
+        let timing = &cycle.world.bodies[self.id as usize];
         let section = FactSection::new("Now")
             .fact("place", self.position_m())
             .fact("heading", self.facing())
-            .fact("due", body.is_due(cycle.now))
-            .fact("acts every", FactValue::number(f64::from(body.period), "cycles"));
-        let section = match &cycle.type_of(cell).role {
+            .fact("due", timing.is_due(cycle.now))
+            .fact("acts every", FactValue::number(f64::from(timing.period), "cycles"));
+        let section = match &cycle.type_of(body).role {
             Role::Robot(_) => section.fact("last contact", self.last_contact()),
             _ => section,
         };
@@ -105,20 +105,20 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 
     /// Returns where the body is.
     fn position_m(&self) -> view::Vec3 {
-        self.cycle.world.visible_body(self.id, self.cycle.cell(self.slot)).pose.at_m
+        self.cycle.world.visible_body(self.id, self.cycle.body(self.slot)).pose.at_m
     }
 
     /// Returns its heading, or of a door whether it is open.
     fn facing(&self) -> FactValue {
-        let cell = self.cycle.cell(self.slot);
-        match &self.cycle.type_of(cell).role {
-            Role::Door(_) => (if cell.facing.get().is_open() { "open" } else { "closed" }).into(),
-            _ => RobotsWorld::heading_name(cell.facing.get().heading()).into(),
+        let body = self.cycle.body(self.slot);
+        match &self.cycle.type_of(body).role {
+            Role::Door(_) => (if body.facing.get().is_open() { "open" } else { "closed" }).into(),
+            _ => RobotsWorld::heading_name(body.facing.get().heading()).into(),
         }
     }
 
     fn last_contact(&self) -> FactValue {
-        let Some(contact) = self.cycle.cell(self.slot).contact.get().get() else {
+        let Some(contact) = self.cycle.body(self.slot).contact.get().get() else {
             return FactValue::None;
         };
         let kind = &self.cycle.world.kinds[usize::from(contact.kind)];
@@ -127,9 +127,9 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 
     /// Returns the action that it is about to do; none for doors, and for those that do nothing.
     fn action(&self) -> Option<&'a Action> {
-        let cell = self.cycle.cell(self.slot);
-        let is_idle = cell.intent.get().is_idle();
-        let action = self.cycle.type_of(cell).actions.get(usize::from(cell.action.get()));
+        let body = self.cycle.body(self.slot);
+        let is_idle = body.intent.get().is_idle();
+        let action = self.cycle.type_of(body).actions.get(usize::from(body.action.get()));
         action.filter(|_| !is_idle)
     }
 
@@ -137,7 +137,7 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
     fn add_claims(&mut self) {
         let cycle = self.cycle;
         let slot = self.slot;
-        let intent = cycle.cell(slot).intent.get();
+        let intent = cycle.body(slot).intent.get();
         let mut boxes = Vec::new();
         if !intent.is_idle() {
             cycle.for_each_claimed(slot, |index, word| boxes.push((index, word)));
@@ -177,8 +177,8 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
         let mut table = FactTable::new(["turn", "body", "draw"]);
         let members = order.iter().enumerate().skip(from).take(MAX_MEMBERS);
         for (k, place) in members.filter(|_| order.len() > 1) {
-            let cell = self.cycle.cell(place.slot);
-            let who = world.body_id(cell.id);
+            let body = self.cycle.body(place.slot);
+            let who = world.body_id(body.id);
             // The draw is a word of 32 bits, shown as a number below 1.
             let draw = f64::from(place.key.1) / 4_294_967_296.0;
             let draw = match world.policy {
@@ -186,7 +186,7 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
                 _ => FactValue::number(draw, ""),
             };
             table.push_row([FactValue::count(k + 1), who.into(), draw]);
-            let boxes = world.type_of(cell.id).boxes(world.map_position(cell.position()));
+            let boxes = world.type_of(body.id).boxes(world.map_position(body.position()));
             let corners_m = world.corners_m(boxes);
             let label = format!("{}. {who}", k + 1);
             self.inspection.add_mark(view::MarkRole::Group, label, MarkShape::Area { corners_m });

@@ -1,4 +1,5 @@
-//! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
+//! *Claim*, the paper's first pool: bodies that are due perceive the frozen state, decide, and claim the boxes
+//! that they may come to cover.
 
 use super::action::SweptVolume;
 use super::alias_table::RowIndex;
@@ -17,32 +18,33 @@ impl<T: BoxWord> CycleContext<'_, T> {
     #[inline]
     pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
         let world = self.world;
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         if let Some(frames) = &self.state.frames {
-            let index = (self.now - frames.first) as usize * frames.bodies + cell.id as usize;
-            frames.poses.set(index, PackedPose::new(cell.position(), cell.facing.get()));
+            let index = (self.now - frames.first) as usize * frames.bodies + body.id as usize;
+            frames.poses.set(index, PackedPose::new(body.position(), body.facing.get()));
         }
         // Most bodies act in every cycle, and their constant part need not be read.
-        let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
+        let is_due = body.period == 1 || world.bodies[body.id as usize].is_due(self.now);
         if !is_due && world.radio.is_some() {
-            self.state.voices.record(cell.id, self.now, None);
+            // The word of a robot that does not decide goes on to the page that is read next.
+            self.state.voices.record(body.id, self.now, None);
         }
-        let intent = match &self.type_of(cell).role {
+        let intent = match &self.type_of(body).role {
             _ if !is_due => Intent::IDLE,
             Role::Robot(model) => self.decide_robot(model, slot, scratch),
-            Role::Mover(mover) => self.mover_intent(mover, cell),
-            Role::Door(door) => self.door_intent(door, cell),
+            Role::Mover(mover) => self.mover_intent(mover, body),
+            Role::Door(door) => self.door_intent(door, body),
         };
         let is_clear = !intent.is_idle() && self.claim(slot, intent);
-        cell.intent.set(if is_clear { intent.with_clear() } else { intent });
+        body.intent.set(if is_clear { intent.with_clear() } else { intent });
     }
 
     #[inline]
     fn decide_robot(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let (decision, memory) = self.decision(model, slot, scratch);
-        store_memory(cell, memory);
-        self.record_decision(cell, decision);
+        store_memory(body, memory);
+        self.record_decision(body, decision);
         // Behaviors may be a user's own.
         let is_known = usize::from(decision.action) < model.body.effector.actions.len();
         debug_assert!(is_known, "behaviors choose among the effector's actions");
@@ -58,21 +60,21 @@ impl<T: BoxWord> CycleContext<'_, T> {
         slot: Slot,
         scratch: &mut Scratch,
     ) -> (Decision, Memory) {
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let nearest = self.fill_percept(model, slot, scratch);
         let percept = Percept {
             now: self.now,
-            id: cell.id,
+            id: body.id,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
             nearest_in: nearest,
-            contact: cell.contact.get().get(),
-            at: self.world.map_position(cell.position()),
-            heading: cell.facing.get().heading(),
+            contact: body.contact.get().get(),
+            at: self.world.map_position(body.position()),
+            heading: body.facing.get().heading(),
             heard: &scratch.heard,
         };
-        let mut memory = memory_of(cell);
-        let mut draws = self.world.streams.draws(cell.id, self.now, purpose::DECIDE);
+        let mut memory = memory_of(body);
+        let mut draws = self.world.streams.draws(body.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         (decision, memory)
     }
@@ -87,7 +89,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
             scratch.readings.clear();
             return [UNSEEN; 4];
         }
-        let nearest = self.sense(model, self.cell(slot), scratch);
+        let nearest = self.sense(model, self.body(slot), scratch);
         if let Some(radio) = &self.world.radio {
             self.listen(radio, slot, &mut scratch.heard);
         }
@@ -96,17 +98,17 @@ impl<T: BoxWord> CycleContext<'_, T> {
 
     /// Records the parts of a decision beside the action: trips and broadcasts.
     #[inline]
-    fn record_decision(&self, cell: &BodyState, decision: Decision) {
+    fn record_decision(&self, body: &BodyState, decision: Decision) {
         let now = self.now;
         if let Some(trip) = decision.trip {
             if trip == TripEvent::Completed {
-                cell.trips.set(cell.trips.get() + 1);
-                cell.trip_cycles.set(cell.trip_cycles.get() + now - cell.trip_begun.get());
+                body.trips.set(body.trips.get() + 1);
+                body.trip_cycles.set(body.trip_cycles.get() + now - body.trip_begun.get());
             }
-            cell.trip_begun.set(now);
+            body.trip_begun.set(now);
         }
         if self.world.radio.is_some() {
-            self.state.voices.record(cell.id, now, decision.broadcast);
+            self.state.voices.record(body.id, now, decision.broadcast);
         }
     }
 
@@ -116,10 +118,10 @@ impl<T: BoxWord> CycleContext<'_, T> {
     pub(super) fn sense(
         &self,
         model: &RobotModel,
-        cell: &BodyState,
+        body: &BodyState,
         scratch: &mut Scratch,
     ) -> [u8; 4] {
-        let id = cell.id;
+        let id = body.id;
         let Scratch { readings, truths, .. } = scratch;
         readings.resize(model.body.sectors.len(), Reading::default());
         let mut nearest = [UNSEEN; 4];
@@ -129,7 +131,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
             first = beams.end;
             let readings = &mut readings[beams.clone()];
             let sectors = &model.body.sectors[beams];
-            cast_beams(self, sensor, cell, truths);
+            cast_beams(self, sensor, body, truths);
             sample_reports(
                 sensor,
                 truths,
@@ -153,10 +155,10 @@ impl<T: BoxWord> CycleContext<'_, T> {
     pub(super) fn beam_hits(
         &self,
         sensor: &MountedSensor,
-        cell: &BodyState,
+        body: &BodyState,
     ) -> Vec<Option<(T, f64)>> {
-        let base = self.base(cell);
-        let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
+        let base = self.base(body);
+        let boxes = &*sensor.boxes[usize::from(body.facing.get().heading())];
         let mut hits = Vec::with_capacity(sensor.ends.len());
         let mut first = 0;
         for &end in &sensor.ends {
@@ -174,20 +176,20 @@ impl<T: BoxWord> CycleContext<'_, T> {
 
     /// Returns the intent of a mover: people and the like continue as before or draw a new
     /// direction.
-    fn mover_intent(&self, mover: &Mover, cell: &BodyState) -> Intent {
-        let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
+    fn mover_intent(&self, mover: &Mover, body: &BodyState) -> Intent {
+        let words = self.world.streams.block(body.id, self.now, purpose::MOVE, 0);
         if !mover.straight.sample(words[0]) {
-            cell.facing.set(Facing::from_heading((words[1] >> 30) as u8));
+            body.facing.set(Facing::from_heading((words[1] >> 30) as u8));
         }
         Intent::ONLY_ACTION
     }
 
     /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
     /// a body blocks waits.
-    fn door_intent(&self, door: &Door, cell: &BodyState) -> Intent {
-        let is_open = cell.facing.get().is_open();
+    fn door_intent(&self, door: &Door, body: &BodyState) -> Intent {
+        let is_open = body.facing.get().is_open();
         let wants_open = door.wants_open(is_open, self.now, || {
-            self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0]
+            self.world.streams.block(body.id, self.now, purpose::DOOR, 0)[0]
         });
         if wants_open == is_open { Intent::IDLE } else { Intent::ONLY_ACTION }
     }
@@ -200,14 +202,14 @@ impl<T: BoxWord> CycleContext<'_, T> {
     #[inline]
     fn claim(&self, slot: Slot, intent: Intent) -> bool {
         let floor = self.floor;
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let claim = T::claimed(slot);
-        let base = self.base(cell);
-        let body = self.type_of(cell);
-        if !body.actions.is_empty() {
-            let action = body.action_index(cell.facing.get().heading(), intent.number());
-            cell.action.set(action);
-            let boxes = &*body.actions[usize::from(action)].claims;
+        let base = self.base(body);
+        let ty = self.type_of(body);
+        if !ty.actions.is_empty() {
+            let action = ty.action_index(body.facing.get().heading(), intent.number());
+            body.action.set(action);
+            let boxes = &*ty.actions[usize::from(action)].claims;
             if are_free(floor, base, boxes) {
                 boxes.iter().for_each(|&offset| floor.set(box_index(base, offset), claim));
                 return true;
@@ -226,12 +228,12 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// idle.
     pub(super) fn for_each_claimed(&self, slot: Slot, mut each: impl FnMut(usize, T)) {
         let floor = self.floor;
-        let cell = self.cell(slot);
-        let base = self.base(cell);
-        let body = self.type_of(cell);
-        match body.actions.get(usize::from(cell.action.get())) {
+        let body = self.body(slot);
+        let base = self.base(body);
+        let ty = self.type_of(body);
+        match ty.actions.get(usize::from(body.action.get())) {
             Some(action) => for_each_swept(floor, &action.sweep, base, each),
-            None => body.own.iter().for_each(|&offset| {
+            None => ty.own.iter().for_each(|&offset| {
                 let index = box_index(base, offset);
                 each(index, floor.get(index));
             }),
@@ -243,7 +245,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
     pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<ReceivedMessage>) {
         let world = self.world;
         let state = self.state;
-        let id = self.cell(slot).id;
+        let id = self.body(slot).id;
         for &sender in &world.robots {
             let other = state.slot_of_id[sender as usize];
             if other == slot || !self.in_radio_range(radio, slot, other) {
@@ -267,9 +269,9 @@ impl<T: BoxWord> CycleContext<'_, T> {
 
     /// Returns the center of a body in halves of a box, which are whole numbers for every size.
     fn center_half_boxes(&self, slot: Slot) -> (i64, i64) {
-        let cell = self.cell(slot);
-        let at = cell.position();
-        let (width, height) = self.type_of(cell).size;
+        let body = self.body(slot);
+        let at = body.position();
+        let (width, height) = self.type_of(body).size;
         (2 * i64::from(at.col()) + i64::from(width), 2 * i64::from(at.row()) + i64::from(height))
     }
 }
@@ -306,13 +308,13 @@ fn for_each_swept<T: BoxWord>(
 fn cast_beams<T: BoxWord>(
     cycle: &CycleContext<'_, T>,
     sensor: &MountedSensor,
-    cell: &BodyState,
+    body: &BodyState,
     truths: &mut Vec<RowIndex>,
 ) {
     let floor = cycle.floor;
     let state = cycle.state;
-    let base = cycle.base(cell);
-    let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
+    let base = cycle.base(body);
+    let boxes = &*sensor.boxes[usize::from(body.facing.get().heading())];
     truths.clear();
     let mut from = 0;
     truths.extend(sensor.ends.iter().map(|&end| {
@@ -363,11 +365,11 @@ fn sample_reports<'a>(
 }
 
 #[inline]
-pub(super) fn memory_of(cell: &BodyState) -> Memory {
-    Memory { words: std::array::from_fn(|k| cell.memory[k].get()) }
+pub(super) fn memory_of(body: &BodyState) -> Memory {
+    Memory { words: std::array::from_fn(|k| body.memory[k].get()) }
 }
 
 #[inline]
-fn store_memory(cell: &BodyState, memory: Memory) {
-    cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
+fn store_memory(body: &BodyState, memory: Memory) {
+    body.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
 }

@@ -221,9 +221,9 @@ impl RobotsState {
             (band, body.position().col(), body.id)
         });
         for slot in 0..self.bodies.len() {
-            let cell = &self.bodies[slot];
-            self.kinds[slot] = world.types[usize::from(cell.ty)].kind;
-            self.slot_of_id[cell.id as usize] = slot as Slot;
+            let body = &self.bodies[slot];
+            self.kinds[slot] = world.types[usize::from(body.ty)].kind;
+            self.slot_of_id[body.id as usize] = slot as Slot;
             if !self.is_open_door(world, slot as Slot) {
                 self.occupy(world, slot as Slot);
             }
@@ -232,8 +232,8 @@ impl RobotsState {
 
     /// Returns whether the body in a slot is a door that is open.
     pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
-        let cell = &self.bodies[slot as usize];
-        world.is_door(cell.id) && cell.facing.get().is_open()
+        let body = &self.bodies[slot as usize];
+        world.is_door(body.id) && body.facing.get().is_open()
     }
 
     /// Returns the state in the order of ids after `cycle` cycles.
@@ -348,7 +348,7 @@ impl Snapshot {
             words.for_each(|&w| hasher.write_u32(w));
         }
         hasher.write_bytes(&self.visited);
-        // A word of 0 and silence are told apart here, and nothing is added where no robot has spoken, so that
+        // A word of 0 and silence differ here, and nothing is added where no robot has spoken, so that
         // the digests of worlds without radio do not depend on it.
         let spoke = (0u32..).zip(&self.bodies).filter(|(_, body)| body.voice.is_some());
         spoke.for_each(|(id, _)| hasher.write_u32(id));

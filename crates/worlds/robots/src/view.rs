@@ -62,8 +62,8 @@ impl RobotsWorld {
     }
 
     /// Returns one body.
-    pub(super) fn visible_body(&self, id: EntityId, cell: &BodyState) -> Body {
-        BodyViewBuilder::new(self).body(id, cell)
+    pub(super) fn visible_body(&self, id: EntityId, body: &BodyState) -> Body {
+        BodyViewBuilder::new(self).body(id, body)
     }
 
     pub(super) fn visible_kind(&self, id: EntityId) -> BodyKind {
@@ -77,8 +77,8 @@ impl RobotsWorld {
     }
 
     /// Returns the middle of a body at a height, and its heading.
-    fn pose(&self, id: EntityId, cell: &BodyState, z_m: f64) -> Pose {
-        BodyViewBuilder::new(self).pose(self.type_of(id), cell, z_m)
+    fn pose(&self, id: EntityId, body: &BodyState, z_m: f64) -> Pose {
+        BodyViewBuilder::new(self).pose(self.type_of(id), body, z_m)
     }
 
     /// Returns the middle in the world of a body that has its lower-left box at `at`.
@@ -113,15 +113,15 @@ impl RobotsWorld {
         id: EntityId,
         scratch: &mut Scratch,
     ) -> Vec<Scan> {
-        let cell = state.body(id);
+        let body = state.body(id);
         let Role::Robot(model) = &self.type_of(id).role else { return Vec::new() };
         let true_ranges_m = with_cycle!(self, state, now, |cycle| {
-            cycle.sense(model, cell, scratch);
+            cycle.sense(model, body, scratch);
             let sensors = model.body.sensors.iter();
-            sensors.map(|sensor| self.true_ranges_m(cycle, sensor, cell)).collect::<Vec<_>>()
+            sensors.map(|sensor| self.true_ranges_m(cycle, sensor, body)).collect::<Vec<_>>()
         });
         let side_m = self.side_m(id);
-        let carrier = ScanCarrier { id, side_m, pose: self.pose(id, cell, 0.5 * side_m) };
+        let carrier = ScanCarrier { id, side_m, pose: self.pose(id, body, 0.5 * side_m) };
         let mut scans = Vec::with_capacity(model.body.sensors.len());
         let mut rest = &scratch.readings[..];
         for (sensor, true_m) in model.body.sensors.iter().zip(&true_ranges_m) {
@@ -138,10 +138,10 @@ impl RobotsWorld {
         &self,
         cycle: &CycleContext<'_, T>,
         sensor: &MountedSensor,
-        cell: &BodyState,
+        body: &BodyState,
     ) -> Vec<f64> {
         let mut ranges_m = Vec::with_capacity(sensor.ends.len());
-        for hit in cycle.beam_hits(sensor, cell) {
+        for hit in cycle.beam_hits(sensor, body) {
             let seen = hit.filter(|(word, _)| {
                 sensor.designated_observation(cycle.state.kind_of(*word)) != NOTHING
             });
@@ -202,11 +202,11 @@ impl<'a> BodyViewBuilder<'a> {
         Self { world, plane: world.map.plane.cached(), turns }
     }
 
-    fn body(&self, id: EntityId, cell: &BodyState) -> Body {
+    fn body(&self, id: EntityId, body: &BodyState) -> Body {
         let ty = self.world.type_of(id);
         let box_m = self.world.map.box_size_m;
         let kind = ty.visible_kind();
-        let is_open = kind == BodyKind::Door && cell.facing.get().is_open();
+        let is_open = kind == BodyKind::Door && body.facing.get().is_open();
         // The model is a plane; heights are chosen for the picture: robots below people and walls, and an open
         // door as a threshold.
         let (width, height) = ty.size;
@@ -217,16 +217,16 @@ impl<'a> BodyViewBuilder<'a> {
             _ => side_m,
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
-        Body::new(kind, id, self.pose(ty, cell, 0.5 * height_m), Shape::Cuboid { size_m })
-            .with_state_if(cell.contact.get() != LastContact::NONE, Condition::Touching)
+        Body::new(kind, id, self.pose(ty, body, 0.5 * height_m), Shape::Cuboid { size_m })
+            .with_state_if(body.contact.get() != LastContact::NONE, Condition::Touching)
             .with_state_if(is_open, Condition::Open)
     }
 
-    fn pose(&self, ty: &BodyType, cell: &BodyState, z_m: f64) -> Pose {
-        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(cell.position())));
+    fn pose(&self, ty: &BodyType, body: &BodyState, z_m: f64) -> Pose {
+        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(body.position())));
         let heading = match ty.role {
             Role::Door(_) => 0,
-            _ => cell.facing.get().heading(),
+            _ => body.facing.get().heading(),
         };
         Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(heading % 4)] }
     }

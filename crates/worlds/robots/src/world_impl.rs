@@ -1,4 +1,4 @@
-//! The hooks by which a run asks the world for more than its phases.
+//! The hooks of a run beside the phases: start, recording, checkpoints, frames, control and metrics.
 
 use super::metrics::Metrics;
 use super::rows::Collector;
@@ -43,7 +43,7 @@ impl Compiled {
         Run::new(self.world, start, &source.text, workers)
     }
 
-    /// Returns the plan that the scenario asks for.
+    /// Returns the settings of a run, as the scenario gives them.
     pub fn plan(&self) -> RunConfig {
         RunConfig {
             name: self.name.clone(),

@@ -19,7 +19,7 @@ const HAS_BROADCAST: u32 = 1 << 16;
 impl External {
     /// The order to try an action, by its number.
     pub const ACTION: &'static str = "action";
-    /// The order to mark the path: 0 none, 1 a trip has begun, 2 it is done.
+    /// The order to mark a trip: 0 none, 1 it has begun, 2 it is done.
     pub const TRIP: &'static str = "trip";
     /// The order to say a word over the radio.
     pub const BROADCAST: &'static str = "broadcast";

@@ -81,13 +81,13 @@ impl<T: BoxWord> Inspector<'_, T> {
     }
 
     fn body_in(&self, slot: Slot) -> view::BodyId {
-        self.cycle.world.body_id(self.cycle.cell(slot).id)
+        self.cycle.world.body_id(self.cycle.body(slot).id)
     }
 
     /// Returns the number of steps that are made of a transition.
     fn steps_made(&self, tried: &TransitionResult) -> usize {
-        let cell = self.cycle.cell(self.slot);
-        let is_mover = matches!(self.cycle.type_of(cell).role, Role::Mover(_));
+        let body = self.cycle.body(self.slot);
+        let is_mover = matches!(self.cycle.type_of(body).role, Role::Mover(_));
         let is_cut = self.cycle.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
         if tried.is_free() || is_cut { tried.walk.steps } else { 0 }
     }

@@ -24,10 +24,10 @@ struct BeamReading<'a, T> {
 impl<T: BoxWord> Inspector<'_, T> {
     /// Adds the percept and the decision of a robot; nothing of other bodies, which have neither.
     pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
-        let cell = self.cycle.cell(self.slot);
-        let Role::Robot(model) = &self.cycle.type_of(cell).role else { return };
+        let body = self.cycle.body(self.slot);
+        let Role::Robot(model) = &self.cycle.type_of(body).role else { return };
         let is_due = self.cycle.world.bodies[self.id as usize].is_due(self.cycle.now);
-        let before = super::super::perceive::memory_of(cell);
+        let before = super::super::perceive::memory_of(body);
         let (decision, after) = self.cycle.decision(model, self.slot, scratch);
         self.add_readings(model, &scratch.readings);
         self.add_messages(scratch);
@@ -57,7 +57,7 @@ impl<T: BoxWord> Inspector<'_, T> {
         ]);
         let mut k = 0;
         for sensor in &model.body.sensors {
-            let met = self.cycle.beam_hits(sensor, self.cycle.cell(self.slot));
+            let met = self.cycle.beam_hits(sensor, self.cycle.body(self.slot));
             for (&bearing_deg, met) in sensor.model.bearings_deg.iter().zip(met) {
                 let reported = readings[k];
                 let sector = model.body.sectors[k];
@@ -126,11 +126,11 @@ impl<T: BoxWord> Inspector<'_, T> {
     /// the sensor's range.
     fn beam_line(&self, beam: &BeamReading<'_, T>, beyond_m: f64) -> MarkShape {
         let world = self.cycle.world;
-        let cell = self.cycle.cell(self.slot);
+        let body = self.cycle.body(self.slot);
         let bearing_rad = beam.bearing_deg.to_radians();
         let to_boundary_m = center_to_boundary_m(world.side_m(self.id), bearing_rad);
         let reach_m = to_boundary_m + beyond_m.min(beam.sensor.model.range_m);
-        let toward_rad = world.heading_rad(cell.facing.get().heading()) + bearing_rad;
+        let toward_rad = world.heading_rad(body.facing.get().heading()) + bearing_rad;
         let [x_m, y_m, z_m] = self.position_m();
         let end_m = [x_m + reach_m * cos(toward_rad), y_m + reach_m * sin(toward_rad), z_m];
         MarkShape::Line { points_m: vec![[x_m, y_m, z_m], end_m] }

@@ -44,9 +44,9 @@ const BUMP_DECISIONS: u8 = 2;
 const KEEP_AWAY_DECISIONS: u8 = 1;
 /// Decisions to wait before something after which a robot with sensors that err tries to go on.
 const WAIT_TIMEOUT_DECISIONS: u8 = 5;
-/// Decisions since the last move after which a robot gives way no more to others that might step into
-/// the same place, because in a crowd there is always such a one.
-const GIVE_WAY_DECISIONS: u8 = 4;
+/// Decisions since the last move after which a robot no longer yields to others that might step into
+/// the same place, because in a crowd there is always one.
+const MAX_YIELD_DECISIONS: u8 = 4;
 /// Highest rank of a robot that has been at its last goal and was asked to leave it. Its rank grows
 /// with the time that it is away, but stays below the ranks of robots that still have a goal.
 const MAX_DONE_RANK: u8 = 63;
@@ -395,7 +395,7 @@ fn travel(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -
         let tries = has_waited && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }
-    if memory.waited < GIVE_WAY_DECISIONS && should_yield(view, direction, draws) {
+    if memory.waited < MAX_YIELD_DECISIONS && should_yield(view, direction, draws) {
         memory.waited += 1;
         return STAY;
     }

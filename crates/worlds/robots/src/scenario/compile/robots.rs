@@ -163,7 +163,7 @@ impl Compiler<'_> {
         let robot = BehaviourBuilder { compiler: self, section, size, body };
         let kind = section.get_ref().kind.get_ref().as_str();
         let behaviour = robot.build(kind)?;
-        // Planners see what blocks them, and have a way out of deadlocks.
+        // Planners need no contact: they see obstacles, and leave deadlocks by straying.
         let waits_for_contacts =
             ["wander", "shuttle", "goto"].contains(&kind) && !behaviour.has_requests();
         if waits_for_contacts {
@@ -173,8 +173,8 @@ impl Compiler<'_> {
         }
     }
 
-    /// Returns a behavior that turns on contact, with another way to notice that it is blocked where
-    /// there may be no contact.
+    /// Returns a behavior that turns on contact, which also notices that it is blocked where there may be no
+    /// contact.
     fn with_stall_detector(
         &self,
         inner: Arc<dyn Behaviour>,
@@ -184,7 +184,7 @@ impl Compiler<'_> {
     }
 
     /// Returns whether a step that is blocked may do nothing, without a contact. Behaviors that turn
-    /// on contact then need another way to notice it.
+    /// on contact then need a [`StallDetector`].
     fn has_no_contacts(&self, body: &RobotBody) -> bool {
         let is_reliable = self.file.regime.has_reliable_effectors();
         let steps = body.effector.transitions_of(FORWARD, is_reliable);
