@@ -55,8 +55,12 @@ mod world_impl;
 mod world_type;
 
 pub use deploy::Deployment;
-pub use motion::escape::{EscapeMethod, EscapePlan, EscapeReport, EscapeRules, Escaper};
-pub use motion::recovery::{RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation};
+pub use motion::escape::{
+    EscapeMethod, EscapePlan, EscapeReport, EscapeRules, EscapeTick, Escaper,
+};
+pub use motion::recovery::{
+    DirectMover, RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation,
+};
 pub use state::{Body, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};
