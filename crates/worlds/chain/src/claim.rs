@@ -8,16 +8,16 @@ use sidestep_kernel::{Cycle, PhaseContext, Slot};
 use sidestep_rods::geometry::{Bounds, with_dimensions};
 
 /// Makes the claim of one chain.
-pub(crate) fn claim<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
-    claim_box(turn, slot);
-    let &mut PhaseContext { world, state, now, .. } = turn;
-    let decision = Perceiver { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
+pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+    claim_box(phase, slot);
+    let &mut PhaseContext { world, state, now, .. } = phase;
+    let decision = Perceiver { world, state, now, scratch: phase.scratch }.decide(slot as Slot);
     state.set_decision(slot, decision);
 }
 
 /// Claims the box that a chain may enter.
-pub(crate) fn claim_box<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
-    let &mut PhaseContext { world, state, now, .. } = turn;
+pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+    let &mut PhaseContext { world, state, now, .. } = phase;
     // A chain alone is in no other's way, wherever it goes; and to read it would make a copy of it.
     if !world.is_open() {
         state.set_claim(slot, reach_box(world, &world.chains[slot], &state.body(slot), now));

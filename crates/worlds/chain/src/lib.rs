@@ -86,15 +86,15 @@ impl<const D: usize> Phases for ChainWorld<D> {
         state.len()
     }
 
-    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
-        bodies.for_each(|slot| claim::claim(turn, slot));
+    fn claim(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
+        bodies.for_each(|slot| claim::claim(phase, slot));
     }
 
-    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
-        join::join(turn, bodies, groups);
+    fn join(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
+        join::join(phase, bodies, groups);
     }
 
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
-        act::act(turn, group);
+    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+        act::act(phase, group);
     }
 }

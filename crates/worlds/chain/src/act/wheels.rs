@@ -12,7 +12,7 @@ use crate::swarm::leader::Decision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
 
-/// Time for which a leader stands and waits for a robot that is late, s.
+/// Time for which a leader stands and waits for a robot that is late, s: enough to turn around and drive half a meter.
 const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;
 /// Fraction of its speed at which it continues after that, because a robot that is blocked by another one may get
 /// free only once their connectors have moved.
