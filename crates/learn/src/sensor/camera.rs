@@ -3,8 +3,8 @@
 use super::detection::Detection;
 use super::options::{BEYOND, DistanceClasses, SensorOptions};
 use super::tables::{LANDMARK, NO_SUBJECT, ROBOT};
-use crate::CountTable;
 use crate::counts::{rounded, smooth};
+use crate::{CountTable, LowCountRow};
 use sidestep_error_models::sensor::SensorModel;
 
 /// The report when nothing is seen.
@@ -45,9 +45,6 @@ impl SensorProfile {
     /// # Panics
     /// When the profile's rows do not fit its observations and distance classes.
     pub fn model(&self, name: &str, kinds: &[String]) -> SensorModel {
-        let rows_of = |rows: &[NamedRow], names: &[String]| -> Vec<Vec<f64>> {
-            names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
-        };
         let classes = [&self.distance_classes[..], &[BEYOND.to_string()]].concat();
         let everywhere = rows_of(&self.confusion, &self.observations);
         let mut confusion = vec![everywhere; classes.len()];
@@ -82,6 +79,11 @@ impl SensorProfile {
     }
 }
 
+/// Returns the row of each name, see [`row_of`].
+fn rows_of(rows: &[NamedRow], names: &[String]) -> Vec<Vec<f64>> {
+    names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
+}
+
 /// Returns the row of a name, brought to sum to 1: printed digits may leave it short.
 fn row_of(rows: &[NamedRow], name: &str) -> Option<Vec<f64>> {
     let row = rows.iter().find(|row| row.name == name)?;
@@ -111,7 +113,7 @@ const RULE: &str = "P(nothing | subject) is 1 minus the detection rate of its ki
     nothing) is spurious readings per beam and bin without a subject; every count plus alpha";
 
 /// The counts that a camera's rows are computed from.
-pub(super) struct CameraCounts<'a> {
+pub(super) struct CameraCountTables<'a> {
     /// True kind against decoded kind.
     pub(super) kinds: &'a CountTable,
     /// Detection by kind and class.
@@ -124,25 +126,22 @@ pub(super) struct CameraCounts<'a> {
 
 /// Returns a camera that reports `nothing`, `robot` or `landmark`.
 pub(super) fn camera(
-    looks: &CameraCounts<'_>,
+    looks: &CameraCountTables<'_>,
     options: &SensorOptions,
     classes: &DistanceClasses,
 ) -> SensorProfile {
     let alpha = options.estimate.alpha;
+    let mut confusion = vec![NamedRow::new(NOTHING, &spurious_row(looks, options))];
+    confusion.extend(subject_rows(looks, None, alpha));
+    let mut confusion_by_class = Vec::new();
+    for (class, name) in classes.names.iter().enumerate() {
+        let rows = subject_rows(looks, Some(class), alpha).to_vec();
+        confusion_by_class.push((name.clone(), rows));
+    }
     let mut assumed = Vec::new();
-    let confusion = vec![
-        NamedRow::new(NOTHING, &spurious_row(looks, options)),
-        NamedRow::new("robot", &subject_row(looks, ROBOT, None, alpha)),
-        NamedRow::new("landmark", &subject_row(looks, LANDMARK, None, alpha)),
-    ];
-    let by_class = |(class, name): (usize, &String)| {
-        let row = |name, kind| NamedRow::new(name, &subject_row(looks, kind, Some(class), alpha));
-        (name.clone(), vec![row("robot", ROBOT), row("landmark", LANDMARK)])
-    };
     for (kind, name) in [(ROBOT, "robot"), (LANDMARK, "landmark")] {
         assumed.extend(assumed_detections(looks, kind, name));
     }
-    let confusion_by_class = classes.names.iter().enumerate().map(by_class).collect();
     let distance_confusion = distance_rows(looks.distance, looks.beyond, alpha, &mut assumed);
     SensorProfile {
         bearings_deg: options.bearings_deg.clone(),
@@ -163,18 +162,27 @@ pub(super) fn camera(
 }
 
 /// Returns the row of reports in a direction where nothing stands.
-fn spurious_row(looks: &CameraCounts<'_>, options: &SensorOptions) -> Vec<f64> {
+fn spurious_row(looks: &CameraCountTables<'_>, options: &SensorOptions) -> Vec<f64> {
     let beams = looks.detection.looks as f64 * options.bearings_deg.len() as f64;
     let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
     let spurious = looks.kinds.row(NO_SUBJECT);
     let robot_or_landmark = spurious[ROBOT] + spurious[LANDMARK];
+    // With more readings than beams nothing would be left; one keeps the row a distribution.
     let empty = (beams - in_view - robot_or_landmark).max(1.0);
     smooth(&[empty, spurious[ROBOT], spurious[LANDMARK]], options.estimate.alpha)
 }
 
+/// Returns the rows of robots and landmarks, in one class or in all.
+fn subject_rows(looks: &CameraCountTables<'_>, class: Option<usize>, alpha: f64) -> [NamedRow; 2] {
+    [
+        NamedRow::new("robot", &subject_row(looks, ROBOT, class, alpha)),
+        NamedRow::new("landmark", &subject_row(looks, LANDMARK, class, alpha)),
+    ]
+}
+
 /// Returns the row of reports in the direction of a robot or landmark, in one class or in all.
 fn subject_row(
-    looks: &CameraCounts<'_>,
+    looks: &CameraCountTables<'_>,
     kind: usize,
     class: Option<usize>,
     alpha: f64,
@@ -190,24 +198,31 @@ fn subject_row(
 }
 
 /// Returns the detection rate in a class; over all classes where none was in view in that one.
-fn detection_rate(looks: &CameraCounts<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
+fn detection_rate(
+    looks: &CameraCountTables<'_>,
+    kind: usize,
+    class: Option<usize>,
+    alpha: f64,
+) -> f64 {
     let table = detection_table(looks, kind);
     if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
         return row[0];
     }
-    let sum = |column: usize| table.cells().iter().map(|row| row[column]).sum::<f64>();
-    let pooled = [sum(0), sum(1)];
+    let pooled: [f64; 2] =
+        [0, 1].map(|column: usize| table.cells().iter().map(|row| row[column]).sum());
     if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
 }
 
-fn detection_table<'a>(looks: &CameraCounts<'a>, kind: usize) -> &'a CountTable {
+fn detection_table<'a>(looks: &CameraCountTables<'a>, kind: usize) -> &'a CountTable {
     if kind == ROBOT { &looks.detection.robots } else { &looks.detection.landmarks }
 }
 
-fn assumed_detections(looks: &CameraCounts<'_>, kind: usize, name: &str) -> Vec<String> {
-    let thin = detection_table(looks, kind).low_count_rows(1);
-    let assumed = |class: String| format!("detection of {name} in {class}: as over all classes");
-    thin.into_iter().map(|row| assumed(row.row)).collect()
+fn assumed_detections(looks: &CameraCountTables<'_>, kind: usize, name: &str) -> Vec<String> {
+    let mut assumed = Vec::new();
+    for LowCountRow { row: class, .. } in detection_table(looks, kind).low_count_rows(1) {
+        assumed.push(format!("detection of {name} in {class}: as over all classes"));
+    }
+    assumed
 }
 
 /// Returns the rows of the distance classes and of `beyond`. A class without counts is reported

@@ -229,9 +229,9 @@ fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]
 }
 
 /// Returns the metrics of a node.
-pub(super) fn node_metrics(agent: AgentName, status: &Status) -> String {
+pub(super) fn node_metrics(agent: &AgentName, status: &Status) -> String {
     let mut text = MetricsText::default();
-    let agent = format_label(agent.noun(), &agent.to_string());
+    let agent = format_label(&agent.noun, &agent.to_string());
     text.push_header("node_cycle", "gauge", "The cycle that a node is in.");
     text.push_sample("node_cycle", &agent, status.cycle as f64);
     text.push_header("packets_total", "counter", "Packets that a node has sent.");

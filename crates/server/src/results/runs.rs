@@ -21,14 +21,14 @@ pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
     let mut runs = Vec::new();
     for row in 0..all.min(MAX_RUNS) {
         let id = table.column("cell").and_then(|column| column.values.number(row));
-        let Some(cell) = id.and_then(|id| plan.cell_of(id as u64)) else { continue };
-        let Some(variant) = names.get(cell.variant as usize) else { continue };
+        let Some(trial) = id.and_then(|id| plan.trial_of(id as u64)) else { continue };
+        let Some(variant) = names.get(trial.variant as usize) else { continue };
         let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
         runs.push(SweepRun {
             variant: variant.clone(),
-            seed: cell.seed.to_string(),
+            seed: trial.seed.to_string(),
             failure,
-            replay: replay_target(&folder, cell.id, cell.variant),
+            replay: replay_target(&folder, trial.id, trial.variant),
         });
     }
     let left_out = all.saturating_sub(MAX_RUNS) as u64;
@@ -36,8 +36,8 @@ pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
 }
 
 /// Returns the target that shows a run: its recording, or its variant's scenario, to be run with its seed.
-fn replay_target(folder: &Folder, cell: u64, variant: u32) -> TargetRef {
-    let recording = folder.run_folder(cell);
+fn replay_target(folder: &Folder, trial: u64, variant: u32) -> TargetRef {
+    let recording = folder.run_folder(trial);
     let is_recorded = recording.join("run.json").is_file();
     let kind = if is_recorded { "recording" } else { "scenario" };
     let path = if is_recorded { recording } else { folder.scenario(variant) };
