@@ -61,14 +61,14 @@ pub enum ReachOutcome<const D: usize> {
 
 /// A connector that is held, its place before, and its constraint.
 #[derive(Debug, Clone, Copy)]
-struct HeldConnector<const D: usize> {
+struct ConstrainedConnector<const D: usize> {
     k: usize,
     home: Point<D>,
     mobility: Mobility<D>,
     failed: bool,
 }
 
-impl<const D: usize> HeldConnector<D> {
+impl<const D: usize> ConstrainedConnector<D> {
     /// Returns the place to which the connector is to return.
     fn home_position(&self, chain: &Chain<D>) -> Point<D> {
         if self.failed {
@@ -87,7 +87,7 @@ struct ReachPasses<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     request: &'a ReachRequest<D>,
-    held: &'a [HeldConnector<D>],
+    held: &'a [ConstrainedConnector<D>],
 }
 
 /// Moves a connector to a target while the base keeps its place, bit for bit, and all other held
@@ -131,7 +131,7 @@ pub fn reach<const D: usize>(
 fn held_connectors<const D: usize>(
     chain: &Chain<D>,
     request: &ReachRequest<D>,
-) -> Vec<HeldConnector<D>> {
+) -> Vec<ConstrainedConnector<D>> {
     let is_held = |k: usize| {
         let connector = &chain.connectors()[k];
         k != request.k
@@ -140,7 +140,7 @@ fn held_connectors<const D: usize>(
     let held = (0..chain.points().len()).filter(|&k| is_held(k)).map(|k| {
         let connector = &chain.connectors()[k];
         let home = chain.points()[k];
-        HeldConnector { k, home, mobility: connector.mobility, failed: connector.failed }
+        ConstrainedConnector { k, home, mobility: connector.mobility, failed: connector.failed }
     });
     held.collect()
 }

@@ -192,14 +192,14 @@ export class CanvasEditor {
     return this.draft.edit(() => this.#current(item)?.move(to) ?? []);
   }
 
-  async removeChosen(): Promise<void> {
+  async removeSelected(): Promise<void> {
     const item = this.selected;
     if (!item) return;
     this.choose(null);
     await this.draft.edit(() => this.#current(item)?.remove() ?? []);
   }
 
-  async turnChosen(): Promise<void> {
+  async rotateSelected(): Promise<void> {
     const item = this.selected;
     if (item?.turn) await this.draft.edit(() => this.#current(item)?.turn?.() ?? []);
   }

@@ -1,4 +1,4 @@
-/** Foreign files are named as the scenario's own folder sees them, in place of those before. */
+/** Paths of imported files are relative to the scenario's folder, and replace earlier ones. */
 
 import { expect, test } from "vitest";
 import { folderOf, importEdits, canImport, relativePath } from "../../src/edit/import";
@@ -15,7 +15,7 @@ test("paths are relative to the folder of the scenario", () => {
   expect([folderOf("x/y.toml", "z"), folderOf("y.toml", "z"), folderOf("/y.toml", "z")]).toEqual(["x", "z", "/"]);
 });
 
-test("worlds name what they read", () => {
+test("each world accepts its kinds of files", () => {
   const names = (world: string): string[] =>
     [
       entry("map", "a.yaml"),
@@ -31,7 +31,7 @@ test("worlds name what they read", () => {
   expect(names("airspace")).toEqual([]);
 });
 
-test("a map takes the place of another, and a profile stands beside others", () => {
+test("a map replaces the previous one, and a profile is added to others", () => {
   const keys = (edits: ReturnType<typeof importEdits>): string[] => edits.map(({ op, key }) => `${op} ${key}`);
   const drawn = { map: { ascii: "##", box_size_m: 0.5, resolution_m: 0.1 } };
   expect(keys(importEdits(drawn, "robots", entry("map", "a.yaml"), "a.yaml"))).toEqual([

@@ -28,7 +28,7 @@ describe("robots", () => {
   const items = robotItems(model, ground);
   const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
 
-  test("stand where the program puts them: around the middle of their boxes", () => {
+  test("are placed around the middle of their boxes", () => {
     expect(item("robots.0.at.0").at_m).toEqual([1, 1, 0]);
     expect(item("robots.0.at.0").outline_m).toEqual([
       [0.5, 0.5, 0],
@@ -41,7 +41,7 @@ describe("robots", () => {
     expect(items.length).toBe(5);
   });
 
-  test("are moved by whole boxes and keep their headings", () => {
+  test("move by whole boxes and keep their headings", () => {
     expect(item("robots.0.at.0").move([1.3, 1.2, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [2, 1] }]);
     expect(item("robots.0.at.0").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.0", value: [1, 1] }]);
     expect(item("robots.0.at.1").move([1, 1, 0])).toEqual([{ op: "set", key: "robots.0.at.1", value: [1, 1, 2] }]);
@@ -50,17 +50,17 @@ describe("robots", () => {
     ]);
   });
 
-  test("are turned by quarters, from east", () => {
+  test("rotate by 90 degrees, from east", () => {
     expect(item("robots.0.at.0").turn!()).toEqual([{ op: "set", key: "robots.0.at.0", value: [1, 1, 0] }]);
     expect(item("robots.0.at.1").turn!()).toEqual([{ op: "set", key: "robots.0.at.1", value: [3, 1, 3] }]);
   });
 
-  test("go alone, and the last of a section with it", () => {
+  test("are removed alone, and the last of a section with the section", () => {
     expect(item("robots.0.at.0").remove()).toEqual([{ op: "remove", key: "robots.0.at.0" }]);
     expect(item("people.at.0").remove()).toEqual([{ op: "remove", key: "people" }]);
   });
 
-  test("are put beside those that are chosen, never beside counted ones", () => {
+  test("are added to the section of the selected one, unless it is given by a count", () => {
     expect(putBody(model, "robots", [2, 2], null)).toEqual([
       { op: "insert", key: "robots.0.at", at: null, value: [2, 2] },
     ]);
@@ -70,7 +70,7 @@ describe("robots", () => {
     expect(lowerLeftAround([5, 5], 3)).toEqual([4, 4]);
   });
 
-  test("a door takes the wall away that it stands in, and joins those of its size", () => {
+  test("a door removes the wall that it is in, and joins the section of its size", () => {
     const rect = { column: 5, row: 1, width: 1, height: 2 };
     const [way, door] = putDoor(model, map, rect);
     expect(way).toEqual({
@@ -86,7 +86,7 @@ describe("robots", () => {
     expect(more[1]).toEqual({ op: "insert", key: "doors.at", at: null, value: [5, 1] });
   });
 
-  test("a way-point is added to the goals, or makes robots go somewhere", () => {
+  test("a way-point is added to the goals, or becomes the first goal", () => {
     expect(putGoal(model, [2, 1], null)).toEqual([
       { op: "insert", key: "robots.0.behaviour.goals", at: null, value: [2, 1] },
     ]);
@@ -121,7 +121,7 @@ describe("chains", () => {
   const items = chainItems(model, 0.01);
   const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
 
-  test("balls, walls, boxes, polygons, starts and targets can be touched", () => {
+  test("balls, walls, boxes, polygons, starts and targets can be picked", () => {
     expect(item("obstacles.0").at_m).toEqual([4, 1.5, 0]);
     expect(item("obstacles.1").at_m).toEqual([3.5, -1.5, 0]);
     expect(item("obstacles.1.ends_m.1").at_m).toEqual([5, -1, 0]);
@@ -131,7 +131,7 @@ describe("chains", () => {
     expect(item("chains.tasks.0.targets_m.0").at_m).toEqual([12, 0, 0]);
   });
 
-  test("a wall moves as a whole, an end alone", () => {
+  test("a wall moves as a whole, and an end moves alone", () => {
     expect(item("obstacles.1").move([4.5, -1.5, 0])).toEqual([
       {
         op: "set",
@@ -148,12 +148,12 @@ describe("chains", () => {
     expect(item("obstacles.0").move([1, 1, 0])).toEqual([{ op: "set", key: "obstacles.0.at_m", value: [1, 1] }]);
   });
 
-  test("a corner of a triangle takes the triangle with it", () => {
+  test("removing a corner of a triangle removes the triangle", () => {
     expect(item("obstacles.3.corners_m.0").remove()).toEqual([{ op: "remove", key: "obstacles.3" }]);
     expect(item("chains.tasks.0.targets_m.0").remove()).toEqual([{ op: "remove", key: "chains.tasks.0" }]);
   });
 
-  test("new ones are written as people write them", () => {
+  test("new obstacles are written with short numbers", () => {
     expect(putBall([1.23456, 2, 0], 0.5, 0.01)).toEqual([
       { op: "insert", key: "obstacles", at: null, value: { at_m: [1.23, 2], radius_m: 0.5 } },
     ]);
@@ -170,7 +170,7 @@ describe("chains", () => {
     expect(putWall([0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
   });
 
-  test("a polygon begins as a triangle, and gets its corners in the edge that is nearest", () => {
+  test("a polygon starts as a triangle, and a new corner splits the nearest edge", () => {
     const [triangle] = putPolygon(model, [0, 0, 0], [2, 0, 0], null, 0.01);
     expect(triangle).toEqual({
       op: "insert",
@@ -192,7 +192,7 @@ describe("chains", () => {
     expect(corner(-0.3, 0.5)).toMatchObject([{ at: 3 }]);
   });
 
-  test("a patrol begins where the obstacle is, goes on with each click, and takes the place of a straight way", () => {
+  test("a patrol starts at the obstacle, grows with each click, and replaces a velocity", () => {
     expect(putPatrol(model, [5, 2, 0], ["obstacles", 0], 0.01)).toEqual([
       {
         op: "set",
@@ -269,7 +269,7 @@ describe("chains in space", () => {
   const items = chainItems(model, 0.01, 3);
   const item = (key: string): (typeof items)[number] => items.find(({ path }) => path.join(".") === key)!;
 
-  test("all that has a place keeps its three numbers when it is moved", () => {
+  test("positions keep three coordinates when moved", () => {
     expect(item("obstacles.0").move([1.504, 2, 3.25])).toEqual([
       { op: "set", key: "obstacles.0.at_m", value: [1.5, 2, 3.25] },
     ]);
@@ -292,7 +292,7 @@ describe("chains in space", () => {
     ]);
   });
 
-  test("outlines hold the whole body, and places of the plane have none here", () => {
+  test("outlines enclose the body, and positions with two coordinates have none in space", () => {
     const reach = (key: string, k: number): number[] =>
       [Math.min, Math.max].map((most) => Number(most(...item(key).outline_m.map((p) => p[k]!)).toFixed(9)));
     expect([0, 1, 2].map((k) => reach("obstacles.0", k))).toEqual([
@@ -308,7 +308,7 @@ describe("chains in space", () => {
     expect(chainItems({ obstacles: [{ at_m: [1, 2], radius_m: 1 }] }, 0.01, 3)).toEqual([]);
   });
 
-  test("a handle moves its own number alone, as far as the pointer goes along it", () => {
+  test("a handle moves only its own coordinate, by the pointer's distance along the axis", () => {
     const camera = new SpaceCamera();
     camera.resize(800, 600);
     camera.fit({ low: [-2, -2, -2], high: [2, 2, 2] });
@@ -357,7 +357,7 @@ describe("airplanes", () => {
     expect(items[0]!.turn!()).toEqual([{ op: "set", key: "airplanes.0.heading_deg", value: 90 }]);
   });
 
-  test("fly from where the drag began to where it ended, counterclockwise from east", () => {
+  test("fly from the start of the drag to its end, with headings counterclockwise from east", () => {
     expect(headingTo([0, 0, 0], [0, 10, 0])).toBe(90);
     expect(headingTo([0, 0, 0], [-10, 0, 0])).toBe(180);
     expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([
@@ -365,7 +365,7 @@ describe("airplanes", () => {
     ]);
   });
 
-  test("a way-point goes to the chosen one, else to the last that is not recorded", () => {
+  test("a way-point is added to the selected airplane, else to the last that is not recorded", () => {
     expect(putWayPoint(model, [1, 2, 0], null, 1)).toEqual([
       { op: "insert", key: "airplanes.0.way_points_m", at: null, value: [1, 2] },
     ]);

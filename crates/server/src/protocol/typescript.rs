@@ -57,19 +57,11 @@ fn types() -> String {
         FrameText,
         Scan,
         RunEvent,
-        Inspection,
-        Section,
-        Fact,
-        Value,
-        Table,
-        Mark,
-        Role,
-        MarkShape,
     ];
     let version = format!(
         "/** Version of requests, replies, notifications and frames together. */\nexport const VERSION = {VERSION};\n"
     );
-    let lines = format!("{HEADER}\n{version}\n{}", types.join("\n"));
+    let lines = format!("{HEADER}\n{version}\n{}\n{}", types.join("\n"), inspection::TYPES);
     lines.lines().map(|line| line.trim_end().to_string() + "\n").collect()
 }
 
