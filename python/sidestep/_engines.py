@@ -16,15 +16,13 @@ from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ._errors import EngineError, SidestepError, input_error
 from ._native import run_task
 
 #: Engines that run the trials of a sweep.
 Engine: TypeAlias = Literal["local", "ray"] | Executor | Callable[[], Executor]
-#: Number, variant, replicate and seed of a trial.
-Trial: TypeAlias = tuple[int, int, int, int]
 #: The text of a scenario, and its files by name.
 Bundle: TypeAlias = tuple[str, list[tuple[str, bytes]]]
 #: Requests scenarios by the number of their variant, and yields outcomes.
@@ -43,6 +41,19 @@ MIN_SLOW_S = 2.0
 POLL_INTERVAL_S = 0.2
 #: Maximum number of cached scenarios.
 MAX_CACHED_SCENARIOS = 256
+
+
+class Trial(NamedTuple):
+    """A run of a sweep."""
+
+    #: Its number in the plan.
+    id: int
+    #: Number of its variant.
+    variant: int
+    #: Number of the run among those of its variant.
+    replicate: int
+    #: The seed of its scenario.
+    seed: int
 
 
 @dataclass
@@ -118,7 +129,7 @@ class TaskPool:
 
     def _send(self, build: str, task: _Task) -> Steps:
         scenarios = []
-        for variant in sorted({trial[1] for trial in task.trials}):
+        for variant in sorted({trial.variant for trial in task.trials}):
             if variant not in self._scenarios:
                 bundle = yield variant
                 assert bundle is not None

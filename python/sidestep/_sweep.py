@@ -149,9 +149,9 @@ def sweep(
         raise input_error("record", "there is no folder to record runs to", "give one as `out`")
     pool = _engines.task_pool(engine, workers)
     if pool is None:
-        return Sweep(*run_sweep(sweep, options, out, workers or 0, None))
+        return run_sweep(sweep, options, out, workers or 0, None)
     try:
-        return Sweep(*run_sweep(sweep, options, out, pool.at_once, pool.run))
+        return run_sweep(sweep, options, out, pool.at_once, pool.run)
     finally:
         pool.close()
 

@@ -159,10 +159,10 @@ impl Simulation {
     /// Returns the team of an agent; the first one for an agent that is in none, whose order the run then refuses with a
     /// reason.
     fn team_of(&self, agent: Option<EntityId>) -> PyResult<IndexedTeam> {
-        let has = |team: &Arc<control::Team>| {
-            agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
-        };
-        let number = self.teams.iter().position(has).unwrap_or(0);
+        let position = agent.and_then(|id| {
+            self.teams.iter().position(|team| team.agents.binary_search(&id).is_ok())
+        });
+        let number = position.unwrap_or(0);
         team_at(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
     }
 
@@ -183,12 +183,12 @@ impl Simulation {
     /// Gives an order to agents of a team.
     fn order_agents(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         agents: &[EntityId],
         team: &control::Team,
     ) -> PyResult<()> {
+        let py = values.py();
         let shape =
             team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
         let values = order_values(py, order, values, agents.len(), shape)?;
@@ -442,19 +442,18 @@ impl Simulation {
     #[pyo3(signature = (name, values, *, agents=None, team=None))]
     fn order(
         &self,
-        py: Python<'_>,
         name: &str,
         values: &Bound<'_, PyAny>,
         agents: Option<&Bound<'_, PyAny>>,
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let agents = agents.map(|agents| agent_ids(py, agents)).transpose()?;
+        let agents = agents.map(|agents| agent_ids(agents.py(), agents)).transpose()?;
         let (_, team) = match (team, &agents) {
             (None, Some(agents)) => self.team_of(agents.first().copied())?,
             (team, _) => self.find_team(team)?,
         };
         let agents = agents.as_deref().unwrap_or(&team.agents);
-        self.order_agents(py, name, values, agents, &team)
+        self.order_agents(name, values, agents, &team)
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold such checkpoints.
@@ -777,12 +776,11 @@ impl PolicyRun for Simulation {
 
     fn give_order(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         team: &control::Team,
     ) -> PyResult<()> {
-        self.order_agents(py, order, values, &team.agents, team)
+        self.order_agents(order, values, &team.agents, team)
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {

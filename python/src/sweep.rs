@@ -1,7 +1,9 @@
 //! Sweeps: the plan, the journal and the stopping rule of the command, with runs on threads or by an executor in Python.
 
+use crate::choice::choose;
 use crate::error::{self, argument_error};
 use crate::json::{to_python, to_toml};
+use crate::result::{Fields, ResultClass};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, run_polling};
@@ -10,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
-    BaselineSpec, Cell, Factor, Outcome, Plan, RunColumn, Setting, Sweep, SweepOverrides,
+    BaselineSpec, Cell, Factor, Outcome, Plan, Precision, RunColumn, Setting, Sweep, SweepOverrides,
 };
 use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
@@ -54,11 +56,21 @@ struct SweepRequest {
 
 fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
     let Some(mapping) = mapping else { return Ok(Vec::new()) };
-    let setting = |entry: Bound<'_, PyAny>| {
+    let mut settings = Vec::new();
+    for entry in mapping.items()?.iter() {
         let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
-        Ok(Setting { value: to_toml(&value, &key)?, key })
-    };
-    mapping.items()?.iter().map(setting).collect()
+        settings.push(Setting { value: to_toml(&value, &key)?, key });
+    }
+    Ok(settings)
+}
+
+/// Returns the precision that ends a sweep.
+fn parse_precision(text: &str) -> PyResult<Precision> {
+    text.parse().map_err(|cause: String| {
+        let remedy =
+            "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
+        argument_error("until", cause, remedy)
+    })
 }
 
 impl SweepOptions<'_> {
@@ -68,11 +80,6 @@ impl SweepOptions<'_> {
     }
 
     fn changes(&self) -> PyResult<SweepOverrides> {
-        let until = |text: &String| {
-            let remedy =
-                "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
-            text.parse().map_err(|cause: String| argument_error("until", cause, remedy))
-        };
         let has_baseline = self.baseline.is_some() || self.baseline_name.is_some();
         let baseline = BaselineSpec {
             name: self.baseline_name.clone(),
@@ -81,7 +88,7 @@ impl SweepOptions<'_> {
         Ok(SweepOverrides {
             fixed: parse_settings(self.set.as_ref())?,
             factors: self.factors()?,
-            until: self.until.as_ref().map(until).transpose()?,
+            until: self.until.as_deref().map(parse_precision).transpose()?,
             replicates: self.replicate,
             max_runs: self.max_runs,
             metrics: self.metrics.clone(),
@@ -169,10 +176,9 @@ fn sweep_result(
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
     let summary = plan.summary(&WORLDS, &done.table)?;
-    let cloned = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
-        results: cloned(done.table.results()),
-        timings: cloned(done.table.timings()),
+        results: done.table.results().into_iter().cloned().collect(),
+        timings: done.table.timings().into_iter().cloned().collect(),
         summary: done.to_json(plan, folder, &summary),
         world: plan.world.clone(),
     })
@@ -189,8 +195,18 @@ struct PyExecutor {
     raised: Mutex<Option<PyErr>>,
 }
 
-/// A cell in the form used in Python: its number, variant, replicate and seed.
-type CellTuple = (u64, u32, u32, u64);
+/// A run of a sweep in the form used in Python, a named tuple of these: its number, variant, replicate and seed.
+type Trial = (u64, u32, u32, u64);
+
+/// Returns a run of a sweep as `sidestep._engines.Trial`.
+fn to_trial<'py>(py: Python<'py>, cell: &Cell) -> PyResult<Bound<'py, PyAny>> {
+    Fields::new(py)
+        .with("id", cell.id)?
+        .with("variant", cell.variant)?
+        .with("replicate", cell.replicate)?
+        .with("seed", cell.seed)?
+        .build(ResultClass("sidestep._engines", "Trial"))
+}
 
 impl PyExecutor {
     /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes. Scenarios are
@@ -201,9 +217,9 @@ impl PyExecutor {
         batch: &CellBatch<'_>,
         store: &mut OutcomeSink<'_>,
     ) -> PyResult<()> {
-        let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
-        let cells: Vec<CellTuple> = batch.cells().iter().map(tuple).collect();
-        let generator = self.begin.bind(py).call1((WORLDS.build(), cells))?;
+        let trials = batch.cells().iter().map(|cell| to_trial(py, cell));
+        let trials = trials.collect::<PyResult<Vec<_>>>()?;
+        let generator = self.begin.bind(py).call1((WORLDS.build(), trials))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -246,20 +262,17 @@ impl CellExecutor for PyExecutor {
     }
 }
 
-/// Tables of results and of timings, and the summary.
-type SweepTables<'py> = (Table, Table, Bound<'py, PyAny>);
-
 /// Runs a sweep on threads, all processors if `workers` is 0, or by an executor: the native part of `sidestep.sweep`.
 #[pyfunction]
 #[pyo3(signature = (sweep, options, out, workers, begin))]
 pub(crate) fn run_sweep<'py>(
-    py: Python<'py>,
     sweep: &Bound<'py, PyAny>,
     options: SweepOptions<'py>,
     out: Option<PathBuf>,
     workers: usize,
     begin: Option<Py<PyAny>>,
-) -> PyResult<SweepTables<'py>> {
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = sweep.py();
     let workers = if workers == 0 { available_workers() } else { workers };
     let request = options.request(sweep)?;
     let sweep = &request.sweep;
@@ -281,7 +294,11 @@ pub(crate) fn run_sweep<'py>(
     let result = result.map_err(|e| error::session_error(&e))?;
     let results = Table::from_runs("results", result.results, &result.world)?;
     let timings = Table::from_runs("timings", result.timings, &result.world)?;
-    Ok((results, timings, to_python(py, &result.summary)?.into_bound(py)))
+    Fields::new(py)
+        .with("results", results)?
+        .with("timings", timings)?
+        .with("output", to_python(py, &result.summary)?)?
+        .build(ResultClass("sidestep._sweep", "Sweep"))
 }
 
 /// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: the function that
@@ -293,48 +310,54 @@ pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
-    trials: Vec<CellTuple>,
+    trials: Vec<Trial>,
 ) -> PyResult<Vec<String>> {
-    let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
-    let trial = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
-    let task = Task {
-        build,
-        scenarios: scenarios.into_iter().map(resolved).collect(),
-        cells: trials.into_iter().map(trial).collect(),
-    };
+    let scenarios = scenarios
+        .into_iter()
+        .map(|(variant, (text, files))| (variant, ResolvedScenario { text, files }))
+        .collect();
+    let cells = trials
+        .into_iter()
+        .map(|(id, variant, replicate, seed)| Cell { id, variant, replicate, seed })
+        .collect();
+    let task = Task { build, scenarios, cells };
     let outcomes = run_polling(py, |watcher| task.run(&WORLDS, watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
-    let text = |outcome: &Outcome| {
-        serde_json::to_string(outcome)
-            .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
-    };
-    outcomes.iter().map(text).collect()
+    outcomes.iter().map(outcome_text).collect()
+}
+
+/// Returns an outcome as JSON, for [`parse_outcome`].
+fn outcome_text(outcome: &Outcome) -> PyResult<String> {
+    serde_json::to_string(outcome)
+        .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
 }
 
 /// Returns the state of the sweep in a folder: the native part of `sidestep.sweep_status`.
 ///
 /// Raises InputError when there is no sweep, or something in it cannot be read.
 #[pyfunction]
-pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Py<PyAny>> {
+pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let status = py.detach(|| sweep::read_status(&Folder::open(&folder)?));
     let status = status.map_err(|e: InputError| error::input_error(&e))?;
-    to_python(py, &serde_json::to_value(&status).unwrap_or_default())
+    let status = serde_json::to_value(&status).unwrap_or_default();
+    Fields::from_json(py, &status)?.build(ResultClass("sidestep._status", "SweepStatus"))
 }
 
 /// Compares methods of collision avoidance on the same air traffic: the native part of `sidestep.compare`.
 #[pyfunction]
 pub(crate) fn compare_methods(
-    py: Python<'_>,
     scenario: &Bound<'_, PyAny>,
     methods: Vec<String>,
     runs: usize,
     seed: Option<u64>,
     workers: usize,
 ) -> PyResult<Py<PyAny>> {
+    let py = scenario.py();
     let loaded = load(scenario)?;
     let source = loaded.source()?;
-    let methods =
-        methods.iter().map(|name| find_method(name)).collect::<PyResult<Vec<Method>>>()?;
+    let known = Method::ALL.map(|method| (method.name(), method));
+    let methods = methods.iter().map(|name| choose("methods", name, &known));
+    let methods = methods.collect::<PyResult<Vec<Method>>>()?;
     let Some(compiled) = loaded.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
         let cause = "methods of collision avoidance are of the world `airspace` alone";
         return Err(argument_error("scenario", cause, "give a scenario with world = \"airspace\""));
@@ -343,25 +366,17 @@ pub(crate) fn compare_methods(
     let workers = if workers == 0 { available_workers() } else { workers };
     let results = run_polling(py, |watcher| {
         let interrupt = watcher.interrupt();
-        let run = || {
+        let compared = catch_unwind(AssertUnwindSafe(|| {
             let progress = &mut |_: &str, _: f64| ();
             methods::compare_with_interrupt(source, &methods, seeds, workers, progress, &interrupt)
-        };
-        catch_unwind(AssertUnwindSafe(run))
-            .unwrap_or_else(|payload| resume_unless(payload, &interrupt))
+        }));
+        compared.unwrap_or_else(|payload| resume_unless(payload, &interrupt))
     })?;
     let results = results.map_err(|e| error::input_error(&e))?;
     to_python(py, &json!({ "name": compiled.name, "seed": seeds.first, "methods": results }))
 }
 
-fn find_method(name: &str) -> PyResult<Method> {
-    Method::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
-        let known = Method::ALL.map(Method::name).join(", ");
-        argument_error("methods", format!("there is no method `{name}`"), known)
-    })
-}
-
-/// Goes on unwinding, unless the interrupt has caused it: then the caller raises the exception of the signal and uses no
+/// Resumes unwinding, unless the interrupt has caused it: then the caller raises the exception of the signal and uses no
 /// result.
 fn resume_unless<T>(
     payload: Box<dyn Any + Send>,
