@@ -88,7 +88,8 @@ def places(rows: Rows, kinds: Collection[str] = ("robot", "person")) -> Places:
     name = "chain" if "chain" in table else "airplane"
     agent = np.asarray(table[name], dtype=np.int64)
     part = np.asarray(table["connector"], dtype=np.int64) if name == "chain" else np.zeros_like(agent)
-    x_m, y_m = np.asarray(table["x_m"]), np.asarray(table["y_m"])
+    x_m = np.asarray(table["x_m"])
+    y_m = np.asarray(table["y_m"])
     # The first leg of a cycle starts with the cycle.
     first = np.unique(np.stack([cycle, agent, part]), axis=1, return_index=True)[1]
     return Places(cycle[first], agent[first], part[first], x_m[first], y_m[first])
@@ -103,7 +104,8 @@ def _of_boxes(table: Table, cycle: NDArray[np.int64], kinds: Collection[str]) ->
         if ids := about.get(f"ids_{kind}"):
             first, last = map(int, ids.split("-"))
             selected |= (first <= body) & (body <= last)
-    box_m, yaw_rad = float(about["box_m"]), float(about["yaw_rad"])
+    box_m = float(about["box_m"])
+    yaw_rad = float(about["yaw_rad"])
     east_m = np.asarray(table["col_boxes"], dtype=np.float64) * box_m
     north_m = np.asarray(table["row_boxes"], dtype=np.float64) * box_m
     x_m = float(about["origin_x_m"]) + np.cos(yaw_rad) * east_m - np.sin(yaw_rad) * north_m
