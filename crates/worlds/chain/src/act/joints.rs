@@ -14,7 +14,7 @@ use crate::scratch::PositionBuffer;
 use crate::state::Body;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::ConnectorTarget;
-use sidestep_arms::plan::JointSpace;
+use sidestep_arms::plan::{JointPosture, JointSpace};
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
@@ -268,7 +268,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         }
         let ChainContext { world, obstacles, .. } = self.context;
         let is_solid = world.rules.self_collision;
-        let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
+        let present = JointPosture { arm: self.arm, joints: self.joints };
+        let space = JointSpace::new(present, self.chain, obstacles, is_solid, k);
         let objection = space.find_veto(&posed.points);
         let tunnels = |(by, id)| Veto { obstacle: Some(id), ..veto(by, VetoReason::WouldTunnel) };
         objection.or_else(|| self.find_tunneling(from, posed).map(tunnels))
