@@ -67,10 +67,11 @@ fn decimate(points: impl Iterator<Item = (usize, Px)>) -> Vec<(usize, Px)> {
     let mut kept: Vec<(usize, Px)> = Vec::new();
     let mut last = None;
     for (shade, (x, y)) in points {
-        let is_apart =
-            |&(_, (a, b)): &(usize, Px)| (x - a).abs().max((y - b).abs()) >= MIN_POINT_DISTANCE_PX;
+        let is_apart = kept
+            .last()
+            .is_none_or(|&(_, (a, b))| (x - a).abs().max((y - b).abs()) >= MIN_POINT_DISTANCE_PX);
         last = Some((shade, (x, y)));
-        if kept.last().is_none_or(is_apart) {
+        if is_apart {
             kept.extend(last.take());
         }
     }
@@ -109,8 +110,7 @@ fn path_data(points: &[(usize, Px)]) -> [String; SHADES] {
 }
 
 fn hundredths((x, y): Px) -> CentiPxPoint {
-    let whole = |v: f64| (v * 100.0).round() as i64;
-    (whole(x), whole(y))
+    ((x * 100.0).round() as i64, (y * 100.0).round() as i64)
 }
 
 /// Leaves out points on the straight line between their neighbors.
