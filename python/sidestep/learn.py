@@ -101,16 +101,15 @@ def sensor(
 
 def _options(columns: Columns, known: Sequence[str], alpha: float, hold_out: int) -> dict[str, Any]:
     """Returns a table, as CSV text or as the folder that contains it, and how to learn from it."""
-    is_folder = isinstance(columns, str | os.PathLike)
-    return {
-        "text": None if is_folder else _csv(columns, known),
-        "run": os.fspath(columns) if is_folder else None,
-        "alpha": alpha,
-        "hold_out_every": hold_out,
-    }
+    options: dict[str, Any] = {"text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out}
+    if isinstance(columns, str | os.PathLike):
+        options["run"] = os.fspath(columns)
+    else:
+        options["text"] = _csv(columns, known)
+    return options
 
 
-def _csv(columns: Columns, known: Sequence[str]) -> str:
+def _csv(columns: Mapping[str, Any] | Any, known: Sequence[str]) -> str:
     """Returns the columns that are known as CSV text."""
     names = [name for name in known if _has(columns, name)]
     if not names:
