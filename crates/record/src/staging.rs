@@ -87,9 +87,9 @@ pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
     if !target.is_symlink() {
         return Ok(target);
     }
-    let to_nowhere =
-        |e: io::Error| io::Error::new(e.kind(), format!("a link to what is not there ({e})"));
-    target.canonicalize().map_err(to_nowhere)
+    target
+        .canonicalize()
+        .map_err(|e| io::Error::new(e.kind(), format!("a link to what is not there ({e})")))
 }
 
 /// Returns a hidden name in the same folder that no other process uses.
