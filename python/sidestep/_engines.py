@@ -28,18 +28,21 @@ Bundle: TypeAlias = tuple[str, list[tuple[str, bytes]]]
 #: Requests scenarios by the number of their variant, and yields outcomes.
 Steps: TypeAlias = Generator[int | list[str], Bundle | None, None]
 
-#: Target duration of a task in seconds.
+#: Target duration of a task in seconds: long beside the milliseconds that sending one takes on a cluster, and short
+#: enough that a lost worker costs little.
 TASK_S = 1.0
-#: Maximum number of trials of a task.
+#: Maximum number of trials of a task, so that the outcomes of very short trials are stored from time to time.
 MAX_TRIALS = 1000
-#: Times that a task, or a pool, may fail without any outcome in between.
+#: Times that a task, or a pool, may fail without any outcome in between: a worker that is lost once is normal on a
+#: cluster, and a trial that always ends its worker must not go on forever.
 MAX_ATTEMPTS = 3
-#: A task is slow when it takes this many times as long as expected, and at least `MIN_SLOW_S`.
+#: A task is slow when it takes this many times as long as expected, and at least `MIN_SLOW_S`: durations of trials
+#: differ, and those of short tasks are mostly the time of sending.
 SLOW_FACTOR = 3.0
 MIN_SLOW_S = 2.0
 #: Seconds between two checks for slow tasks.
 POLL_INTERVAL_S = 0.2
-#: Maximum number of cached scenarios.
+#: Maximum number of cached scenarios: each holds all its files.
 MAX_CACHED_SCENARIOS = 256
 
 

@@ -258,6 +258,10 @@ struct SliceOutcome {
     is_last: bool,
 }
 
+fn condition_name(body: &Body) -> String {
+    format!("{:?}", body.state).to_lowercase()
+}
+
 fn draw_error(error: &DrawError) -> PyErr {
     error::RecordError::new_err(error.to_string())
 }
@@ -529,8 +533,7 @@ impl Simulation {
         dict.set_item("at_m", body_rows(py, bodies, |body| body.pose.at_m)?)?;
         dict.set_item("turn", body_rows(py, bodies, |body| body.pose.turn)?)?;
         dict.set_item("velocity_m_s", body_rows(py, bodies, |body| body.velocity_m_s)?)?;
-        let condition = |body: &Body| format!("{:?}", body.state).to_lowercase();
-        dict.set_item("condition", body_texts(py, bodies, condition)?)?;
+        dict.set_item("condition", body_texts(py, bodies, condition_name)?)?;
         Ok(dict)
     }
 
