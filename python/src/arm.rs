@@ -12,7 +12,7 @@ use sidestep::arms::ik::Engine;
 use sidestep::arms::kinematics::{
     ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
 };
-use sidestep::experiment::sweep::scheduler::run_cells;
+use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::kernel::InputError;
 use std::path::PathBuf;
 
@@ -251,7 +251,7 @@ impl Arm {
         let numbers: Vec<usize> = (0..goals.len()).collect();
         let solved = run_polling(py, |watcher| {
             let mut solved: Vec<(usize, IkResult)> = Vec::with_capacity(goals.len());
-            run_cells(
+            run_trials(
                 &numbers,
                 options.workers.max(1),
                 |&k| {

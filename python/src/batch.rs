@@ -30,7 +30,7 @@ const MAX_WORKERS: usize = 1024;
 /// Each world has the bits of a `Simulation` with its seed, for any number of workers; nothing is recorded.
 ///
 /// Python's lock is released while worlds advance, and Ctrl-C stops them between two cycles, all at the same one. A world that
-/// breaks off (which is a bug) is named in the error, and the others go on once it has been reset.
+/// breaks off (which is a bug) is named in the error, and the others continue once it has been reset.
 ///
 /// Examples of its methods continue from here:
 ///
@@ -53,7 +53,7 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Works with the worlds while other threads of Python go on.
+    /// Works with the worlds while other threads of Python run.
     fn with_worlds<T: Send>(
         &self,
         py: Python<'_>,

@@ -176,7 +176,7 @@ impl Game for Objective {
     fn cost(&self, joint: &[usize]) -> f64 {
         self.evaluate(joint).unwrap_or_else(|error| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            // Unwinds out of the optimizer, whose games have no errors: there is no cost to go on with.
+            // Unwinds out of the optimizer, whose games have no errors: there is no cost to continue with.
             self.interrupt.raise();
             interrupt::check();
             f64::NAN

@@ -10,6 +10,7 @@ use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::space::{ObservationBuffers, Team, find_team, team_at};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, TimeSlice};
+use crate::worlds;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
@@ -18,7 +19,6 @@ use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep::worlds::WORLDS;
 use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
 use std::path::PathBuf;
@@ -61,7 +61,7 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// Starts a scenario while other threads of Python go on.
+    /// Starts a scenario while other threads of Python run.
     fn start(
         py: Python<'_>,
         scenario: Arc<LoadedScenario>,
@@ -78,8 +78,13 @@ impl Simulation {
                 Some(_) => scenario.source()?.clone(),
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
-            let run =
-                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, paths);
+            let run = ManagedRun::start(
+                worlds::list(),
+                scenario.compiled.as_ref(),
+                &source,
+                workers,
+                paths,
+            );
             run.map_err(|e| error::session_error(&e))
         })?;
         let teams = run.simulation().teams().iter().cloned().map(Arc::new).collect();
@@ -87,7 +92,7 @@ impl Simulation {
         Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
     }
 
-    /// Works with the run while other threads of Python go on.
+    /// Works with the run while other threads of Python run.
     fn with_run<T: Send>(
         &self,
         py: Python<'_>,
@@ -468,7 +473,7 @@ impl Simulation {
         Ok(PyBytes::new(py, &self.checkpoint_bytes(py)?))
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
+    /// Continues from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
     /// `tables` gives the rows of a run that never went there. Rows that `tables` has already given are up to you.
     ///
     /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. Recorded rows have one

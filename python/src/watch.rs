@@ -1,4 +1,4 @@
-//! Ctrl-C: between two slices of a run, or while work goes on in other threads, Python is checked for signals.
+//! Ctrl-C: between two slices of a run, or while other threads work, Python is checked for signals.
 
 use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;

@@ -216,19 +216,21 @@ impl<'a> PartReader<'a> {
         let bytes = File::open(path).map_err(|e| decode_error(path, e))?;
         let file = bytes.try_clone().map_err(|e| decode_error(path, e))?;
         let file = SerializedFileReader::new(file).map_err(|e| damaged(path, error_cause(e)))?;
-        let text = |key| required_value(path, file.metadata(), key);
-        let format: FormatVersion =
-            text(schema::FORMAT)?.parse().map_err(|e| decode_error(path, e))?;
+        // The format first: a file of another major version may have other keys.
+        let format = required_value(path, file.metadata(), schema::FORMAT)?;
+        let format: FormatVersion = format.parse().map_err(|e| decode_error(path, e))?;
         format.check_readable(path.display())?;
-        let columns = schema::columns_from_json(&text(schema::COLUMNS)?)
-            .map_err(|e| decode_error(path, e))?;
+        let columns = required_value(path, file.metadata(), schema::COLUMNS)?;
+        let columns = schema::columns_from_json(&columns).map_err(|e| decode_error(path, e))?;
+        let seed = required_value(path, file.metadata(), schema::SEED)?;
         let origin = Provenance {
-            program_version: text(schema::VERSION)?,
-            scenario: text(schema::SCENARIO)?,
-            seed: text(schema::SEED)?.parse().map_err(|e| decode_error(path, e))?,
+            program_version: required_value(path, file.metadata(), schema::VERSION)?,
+            scenario: required_value(path, file.metadata(), schema::SCENARIO)?,
+            seed: seed.parse().map_err(|e| decode_error(path, e))?,
         };
-        let checksums = schema::checksums_from_text(&text(schema::CHECKSUMS)?)
-            .map_err(|e| decode_error(path, e))?;
+        let checksums = required_value(path, file.metadata(), schema::CHECKSUMS)?;
+        let checksums =
+            schema::checksums_from_text(&checksums).map_err(|e| decode_error(path, e))?;
         let about = match schema::key_value(file.metadata(), schema::ABOUT) {
             Some(json) => schema::about_from_json(json).map_err(|e| decode_error(path, e))?,
             // Files of earlier versions have none.

@@ -477,7 +477,7 @@ impl<const D: usize> PlanarRod<'_, D> {
 
 /// An iterator over the free directions on both sides, the nearer one first.
 ///
-/// Only blocks that are met on the way are turned into arcs: a direction that is the first outside
+/// Only blocks that the rod meets while it turns become arcs: a direction that is the first outside
 /// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
 /// all blocks.
 struct FreeDirections<'a, const D: usize> {

@@ -50,7 +50,7 @@ fn sweep<const D: usize, const NEARLY: bool>(
     let from = std::mem::replace(&mut points[k], to);
     let mut sweeps = Direction::BOTH.map(|direction| OpenSweep::start(direction, k, from, to));
     let [up, down] = &mut sweeps;
-    // Both in turn as long as both go on, then the rest of the longer one.
+    // In turn until one has ended, then the rest of the other one.
     while up.advance::<NEARLY>(points, rods, min_move_m)
         && down.advance::<NEARLY>(points, rods, min_move_m)
     {}
@@ -116,7 +116,7 @@ fn advance_batch<const D: usize>(
 ) {
     let mut round = 0;
     let mut is_moving = true;
-    // No sweep has moved before its turn comes, so rounds go on until the last one has started.
+    // A sweep that has yet to start does not move, so rounds continue at least until the last one has started.
     while is_moving || round <= LANE_OFFSET * sweeps.len() {
         is_moving = false;
         for (j, sweep) in sweeps.iter_mut().enumerate() {

@@ -6,7 +6,7 @@
 //! independent, so the compiler vectorizes them, and each computes the same bits as the motions one
 //! after the other.
 //!
-//! [`DeferredMotions`] collects motions of a chain until they fill the lanes or somebody reads it.
+//! [`DeferredMotions`] collects motions of a chain until they fill the lanes or its points are read.
 
 #![expect(
     clippy::needless_range_loop,
@@ -80,8 +80,8 @@ pub struct WavefrontMeasures {
 
 /// Motions of connector 0 of a plain chain that the other connectors have yet to follow.
 ///
-/// Where nothing can object, a chain follows its initiator in one way only, so it does not matter when
-/// it does: to follow several motions at once gives the same bits, and is much faster. Until then only
+/// Where nothing can object, the motion of a chain follows from that of its initiator, so it does not matter when
+/// it moves: to follow several motions at once gives the same bits, and is much faster. Until then only
 /// connector 0 of the chain is where it should be.
 #[derive(Debug, Clone, Default)]
 pub struct DeferredMotions<const D: usize> {

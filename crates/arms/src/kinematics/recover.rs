@@ -204,7 +204,7 @@ impl JointSearch<'_> {
         false
     }
 
-    /// Decides the joints from `known` on, and goes on from there.
+    /// Decides the joints from `known` on, and continues with the next connector.
     fn try_values(
         &mut self,
         connector: usize,

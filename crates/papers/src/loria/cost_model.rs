@@ -25,7 +25,7 @@
 use super::LoriaConfig;
 use super::floor::Floor;
 use super::timing::Workload;
-use crate::cells::{figure, table};
+use crate::case_results::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;

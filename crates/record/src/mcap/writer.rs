@@ -75,15 +75,15 @@ impl McapRecorder {
     /// # Errors
     /// Something is there that may not be replaced, or that is not a file.
     pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
-        let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
-        match fs::metadata(path) {
-            Ok(found) if !found.is_file() => refuse("this is no file", "give a new file"),
+        let (cause, remedy) = match fs::metadata(path) {
+            Ok(found) if !found.is_file() => ("this is no file", "give a new file"),
             Ok(_) if existing == IfExists::Refuse => {
-                refuse("the file exists already", "give another file, or replace it (--replace)")
+                ("the file exists already", "give another file, or replace it (--replace)")
             }
-            _ if path.file_name().is_none() => refuse("this is no file name", "give a new file"),
-            _ => Ok(()),
-        }
+            _ if path.file_name().is_none() => ("this is no file name", "give a new file"),
+            _ => return Ok(()),
+        };
+        Err(InputError::new(path.display(), cause, remedy))
     }
 
     /// Starts the file that is called `path` once it is complete, with the scenario and everything

@@ -378,12 +378,15 @@ pub struct RobotMetrics {
 
 impl RobotMetrics {
     fn from_tally(tally: &RobotTally) -> Option<Self> {
-        let part = |count: u64| count as f64 / tally.steps as f64;
-        (tally.steps > 0).then(|| Self {
+        if tally.steps == 0 {
+            return None;
+        }
+        let steps = tally.steps as f64;
+        Some(Self {
             bumper_events: tally.bumper_events,
-            bumper_part: part(tally.bumper_steps),
-            held_part: part(tally.held_steps),
-            mean_lag_m: tally.lag_sum_m / tally.steps as f64,
+            bumper_part: tally.bumper_steps as f64 / steps,
+            held_part: tally.held_steps as f64 / steps,
+            mean_lag_m: tally.lag_sum_m / steps,
             max_lag_m: tally.max_lag_m,
             min_gap_m: tally.min_gap_m,
         })
@@ -425,45 +428,41 @@ impl Metrics {
         cpu_s: f64,
         timed_steps: u64,
     ) -> Self {
-        let sum = |count: fn(&ChainTally) -> u64| tallies.iter().map(count).sum::<u64>();
-        let most = |value: fn(&ChainTally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
-        let vetoes_of = |k: usize| tallies.iter().map(|t| t.vetoes[k]).sum::<u64>();
-        let least = |value: fn(&ChainTally) -> f64| {
-            let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
-            Some(least).filter(|m| m.is_finite())
-        };
-        let steps = sum(|t| t.steps);
+        let steps = sum(tallies, |t| t.steps);
         let robots = tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots));
-        let by_reason =
-            (0..VetoReason::ALL.len()).map(|k| (VetoReason::ALL[k].name(), vetoes_of(k)));
+        let mut vetoes_by_reason = BTreeMap::new();
+        for (k, reason) in VetoReason::ALL.iter().enumerate() {
+            let vetoes: u64 = tallies.iter().map(|t| t.vetoes[k]).sum();
+            vetoes_by_reason.insert(reason.name(), vetoes);
+        }
         Self {
             steps,
-            vetoes: (0..VetoReason::ALL.len()).map(vetoes_of).sum(),
-            penetrations: sum(|t| t.penetrations),
-            min_clearance_m: least(|t| t.min_clearance_m),
-            max_rod_violation_m: most(|t| t.max_rod_violation_m),
+            vetoes: vetoes_by_reason.values().sum(),
+            penetrations: sum(tallies, |t| t.penetrations),
+            min_clearance_m: least(tallies, |t| t.min_clearance_m),
+            max_rod_violation_m: greatest(tallies, |t| t.max_rod_violation_m),
             progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
             steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
-            vetoes_by_reason: by_reason.collect(),
-            rotations: sum(|t| t.rotations),
-            moved_per_step: sum(|t| t.moved) as f64 / steps.max(1) as f64,
-            max_slave_step_m: most(|t| t.max_slave_step_m),
-            max_speed_m_s: most(|t| t.max_speed_m_s),
+            vetoes_by_reason,
+            rotations: sum(tallies, |t| t.rotations),
+            moved_per_step: sum(tallies, |t| t.moved) as f64 / steps.max(1) as f64,
+            max_slave_step_m: greatest(tallies, |t| t.max_slave_step_m),
+            max_speed_m_s: greatest(tallies, |t| t.max_speed_m_s),
             longest_inside_steps: tallies.iter().map(|t| t.longest_inside_steps).max().unwrap_or(0),
-            min_own_gap_m: least(|t| t.min_own_gap_m),
-            done: sum(|t| t.done),
-            reformed: sum(|t| t.reformed),
-            not_reformed: sum(|t| t.not_reformed),
-            missing_parts: sum(|t| t.missing_parts),
+            min_own_gap_m: least(tallies, |t| t.min_own_gap_m),
+            done: sum(tallies, |t| t.done),
+            reformed: sum(tallies, |t| t.reformed),
+            not_reformed: sum(tallies, |t| t.not_reformed),
+            missing_parts: sum(tallies, |t| t.missing_parts),
             given_up: abandoned_parts(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
-            messages: sum(|t| t.messages),
-            bytes: sum(|t| t.bytes),
-            dropped: sum(|t| t.dropped),
-            contacts_lost: sum(|t| t.contacts_lost),
-            deadlines_missed: sum(|t| t.deadlines_missed),
-            stood: sum(|t| t.stood),
+            messages: sum(tallies, |t| t.messages),
+            bytes: sum(tallies, |t| t.bytes),
+            dropped: sum(tallies, |t| t.dropped),
+            contacts_lost: sum(tallies, |t| t.contacts_lost),
+            deadlines_missed: sum(tallies, |t| t.deadlines_missed),
+            stood: sum(tallies, |t| t.stood),
             robots: RobotMetrics::from_tally(&robots),
         }
     }
@@ -471,9 +470,25 @@ impl Metrics {
 
 /// Returns what the chains gave up.
 fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedPart> {
-    let of_one = |(chain, tally): (EntityId, &ChainTally)| {
-        let what = tally.given_up.clone().into_iter();
-        what.map(move |what| ChainAbandonedPart { chain, what })
-    };
-    (0..).zip(tallies).flat_map(of_one).collect()
+    let mut parts = Vec::new();
+    for (chain, tally) in (0..).zip(tallies) {
+        for what in tally.given_up.iter().cloned() {
+            parts.push(ChainAbandonedPart { chain, what });
+        }
+    }
+    parts
+}
+
+fn sum(tallies: &[ChainTally], count: fn(&ChainTally) -> u64) -> u64 {
+    tallies.iter().map(count).sum()
+}
+
+fn greatest(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> f64 {
+    tallies.iter().map(value).fold(0.0, f64::max)
+}
+
+/// Returns the least value; none if no chain has one, which is infinite then.
+fn least(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> Option<f64> {
+    let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
+    Some(least).filter(|m| m.is_finite())
 }

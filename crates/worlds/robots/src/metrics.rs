@@ -45,19 +45,24 @@ pub struct Metrics {
 impl RobotsWorld {
     /// Returns the counters of a robot after `cycle` cycles.
     pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counters {
-        let (i, kinds) = (id as usize, self.kinds.len());
-        let cell = state.body(id);
-        let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
-        let named = self.kinds.iter().cloned().zip(by_kind.clone());
-        let trips = u64::from(cell.trips.get());
+        let first_contact = id as usize * self.kinds.len();
+        let mut contacts = 0;
+        let mut contacts_by_kind = BTreeMap::new();
+        for (kind, name) in self.kinds.iter().enumerate() {
+            let count = u64::from(state.contacts.get(first_contact + kind));
+            contacts += count;
+            contacts_by_kind.insert(name.clone(), count);
+        }
+        let body = state.body(id);
+        let trips = u64::from(body.trips.get());
         Counters {
-            actions: self.bodies[i].actions_before(cycle),
-            contacts: by_kind.sum(),
-            contacts_by_kind: named.collect(),
-            distance_m: f64::from(cell.moves.get()) * self.map.box_size_m,
+            actions: self.bodies[id as usize].actions_before(cycle),
+            contacts,
+            contacts_by_kind,
+            distance_m: f64::from(body.moves.get()) * self.map.box_size_m,
             trips,
-            trip_cycles_mean: (trips > 0).then(|| cell.trip_cycles.get() as f64 / trips as f64),
-            first_visits: u64::from(cell.first_visits.get()),
+            trip_cycles_mean: (trips > 0).then(|| body.trip_cycles.get() as f64 / trips as f64),
+            first_visits: u64::from(body.first_visits.get()),
         }
     }
 
@@ -77,6 +82,7 @@ impl RobotsWorld {
                 *total.contacts_by_kind.entry(kind).or_default() += n;
             }
         }
+        // Over all trips, and not over the robots' means, which would count a slow robot's trips more.
         total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
         total
     }
@@ -85,6 +91,7 @@ impl RobotsWorld {
     pub fn metrics(&self, state: &RobotsState, cycle: Cycle, groups: &GroupSizes) -> Metrics {
         let total = self.totals(state, cycle);
         let free = self.map.count(Cell::Free).max(1);
+        // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
             coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
@@ -97,8 +104,7 @@ impl RobotsWorld {
 
     /// Returns the number of boxes under robots at the start, which do not count as first visits.
     fn boxes_covered_at_start(&self) -> u64 {
-        let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
-        self.robots.iter().map(boxes).sum()
+        self.robots.iter().map(|&id| self.type_of(id).own.len() as u64).sum()
     }
 }
 

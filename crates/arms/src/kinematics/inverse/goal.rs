@@ -125,7 +125,7 @@ pub struct ArmGoal {
     pub restarts: usize,
     /// Random seed of these postures.
     pub seed: u64,
-    /// Number of postures wanted. From 2 on, the search goes on from posture to posture until it has
+    /// Number of postures wanted. From 2 on, the search continues from posture to posture until it has
     /// found as many that are [distinct](ArmGoal::apart), and the answer is the nearest to the start
     /// of those.
     pub solutions: usize,
@@ -199,7 +199,7 @@ impl ArmGoal {
         self.check_spheres()
     }
 
-    /// Returns whether the search goes on from posture to posture, instead of ending at the first that
+    /// Returns whether the search continues from posture to posture, instead of ending at the first that
     /// meets the goal.
     pub(super) fn is_multi_solution(&self) -> bool {
         self.solutions > 1 || self.nearest

@@ -1,6 +1,6 @@
 //! Joint values for the places of connectors: the demands of a chain's motion on an arm's joints within one cycle.
 //!
-//! A chain of rods moves in more ways than most arms: its motion is a guide. First all connectors are brought as near
+//! A chain of rods has more degrees of freedom than most arms: its motion is a guide. First all connectors are brought as near
 //! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
 //! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
 

@@ -3,8 +3,8 @@
 use super::super::LoriaReport;
 use super::super::floor::AvoidancePolicy;
 use super::super::reliability::{
-    CONTACTS, CellKey, EFFECTORS, INCONCLUSIVE, LATERAL, ReliabilityResults, SENSORS, STRAIGHTNESS,
-    SweepCase, TRIP,
+    CONTACTS, EFFECTORS, INCONCLUSIVE, LATERAL, ReliabilityResults, SENSORS, STRAIGHTNESS,
+    SweepCase, TRIP, VariantKey,
 };
 use super::{Claim, ThresholdTest, Verdict, claim, judge_thresholds};
 use sidestep::worlds::robots::world::Regime::{self, Both, Effectors, Reliable, Sensors};
@@ -16,9 +16,9 @@ pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
 }
 
 fn zigzag(r: &ReliabilityResults) -> Claim {
-    let bent = r.difference(CellKey::BASE, [Both, Reliable], STRAIGHTNESS);
-    let lateral = r.difference(CellKey::BASE, [Both, Reliable], LATERAL);
-    let means = |measure| by_regime(|regime| r.estimate(CellKey::BASE, regime, measure));
+    let bent = r.difference(VariantKey::BASE, [Both, Reliable], STRAIGHTNESS);
+    let lateral = r.difference(VariantKey::BASE, [Both, Reliable], LATERAL);
+    let means = |measure| by_regime(|regime| r.estimate(VariantKey::BASE, regime, measure));
     claim(
         "E-8",
         judge_thresholds([ThresholdTest::below(&bent, 0.0), ThresholdTest::above(&lateral, 0.0)]),
@@ -39,7 +39,7 @@ fn by_regime(of: impl Fn(Regime) -> Estimate) -> String {
 fn collisions(r: &ReliabilityResults) -> Claim {
     let places = r.base_keys();
     let more = |key, pair| ThresholdTest::above(&r.difference(key, pair, CONTACTS), 0.0);
-    let orders = |&key: &CellKey<'static>| {
+    let orders = |&key: &VariantKey<'static>| {
         [[Sensors, Effectors], [Effectors, Reliable]].map(|p| more(key, p))
     };
     let at_places = places.iter().flat_map(orders);
@@ -47,7 +47,7 @@ fn collisions(r: &ReliabilityResults) -> Claim {
     let at_levels = larger.iter().map(|l| ThresholdTest::above(&l.sensors_less_effectors, 0.0));
     let count = |name| larger.iter().filter(|l| l.by == name).count();
     let above = |pair| {
-        let is = |key: &&CellKey<'static>| r.difference(**key, pair, CONTACTS).is_above(0.0);
+        let is = |key: &&VariantKey<'static>| r.difference(**key, pair, CONTACTS).is_above(0.0);
         places.iter().filter(is).count()
     };
     claim(
@@ -58,8 +58,8 @@ fn collisions(r: &ReliabilityResults) -> Claim {
              effectors at {} of {} places (floors, rules, behaviors), and effectors above \
              reliable at {}. At equal error level, of {} points: sensors more at {}, effectors at {}, \
              not to be told at {} (by Holm). {}",
-            by_regime(|regime| r.estimate(CellKey::BASE, regime, CONTACTS)),
-            r.difference(CellKey::BASE, [Sensors, Effectors], CONTACTS),
+            by_regime(|regime| r.estimate(VariantKey::BASE, regime, CONTACTS)),
+            r.difference(VariantKey::BASE, [Sensors, Effectors], CONTACTS),
             above([Sensors, Effectors]),
             places.len(),
             above([Effectors, Reliable]),
@@ -93,14 +93,14 @@ fn slowest_trips(r: &ReliabilityResults) -> Claim {
     let places = r.base_keys();
     let each = places.iter().flat_map(|&key| others.map(|other| longer(key, other)));
     let slowest =
-        |&key: &CellKey<'static>| others.iter().all(|other| longer(key, *other).is_above(0.0));
+        |&key: &VariantKey<'static>| others.iter().all(|other| longer(key, *other).is_above(0.0));
     let held = places.iter().filter(|key| slowest(key)).count();
     claim(
         "E-10a",
         judge_thresholds(each.map(|longer| ThresholdTest::above(&longer, 0.0))),
         format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
-            by_regime(|regime| r.estimate(CellKey::BASE, regime, TRIP)),
+            by_regime(|regime| r.estimate(VariantKey::BASE, regime, TRIP)),
             places.len()
         ),
     )
@@ -115,7 +115,7 @@ fn trip_ratios(r: &ReliabilityResults) -> Claim {
         [Both, Effectors],
     ];
     let ratio = |[a, b]: [Regime; 2]| {
-        format!("{} / {} {}", a.name(), b.name(), r.ratio(CellKey::BASE, [a, b], TRIP))
+        format!("{} / {} {}", a.name(), b.name(), r.ratio(VariantKey::BASE, [a, b], TRIP))
     };
     claim("E-10b", Verdict::Lost, format!("Seed by seed: {}.", pairs.map(ratio).join("; ")))
 }
@@ -146,7 +146,7 @@ fn behaviours(r: &ReliabilityResults) -> Claim {
 /// Returns the cycles that the filter saves under both errors, minus those that it saves without
 /// any.
 fn difference_of_savings(r: &ReliabilityResults) -> Estimate {
-    let of = |mind, regime| r.values(CellKey { mind, ..CellKey::BASE }, regime, TRIP);
+    let of = |mind, regime| r.values(VariantKey { mind, ..VariantKey::BASE }, regime, TRIP);
     let saved = |regime| -> Vec<Option<f64>> {
         let (plain, filtered) =
             (of(AvoidancePolicy::Avoid, regime), of(AvoidancePolicy::Filter, regime));

@@ -23,7 +23,7 @@ pub(super) fn judge(report: &LoriaReport) -> Vec<Claim> {
 
 /// The words of the report.
 pub(super) static CLAIMS: PaperClaims =
-    PaperClaims::new(|| ClaimsFile::read(include_str!("../report.toml")));
+    PaperClaims::new(|| ClaimsFile::read(include_str!("../../../claims/loria.toml")));
 
 /// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {

@@ -16,7 +16,8 @@ pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
 }
 
 fn suites(report: &LoriaReport) -> Claim {
-    let runs: usize = report.reliability.cells.iter().map(|cell| cell.outcomes.len()).sum();
+    let runs: usize =
+        report.reliability.variants.iter().map(|variant| variant.outcomes.len()).sum();
     let builds: usize = report.genericity.builds.iter().map(|b| b.outcomes.len()).sum();
     let timed = report.performance.timings.len() + report.strategies.trials.len();
     let fitted = report.cost_model.points.len();
@@ -110,7 +111,7 @@ fn regimes(report: &LoriaReport) -> Claim {
         Verdict::Setting,
         format!(
             "{} variants x {} seeds, four regimes at each of {} places.",
-            r.cells.len(),
+            r.variants.len(),
             report.plan.seeds,
             r.base_keys().len()
         ),
