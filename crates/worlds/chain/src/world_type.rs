@@ -40,7 +40,7 @@ impl WorldType for Chains {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
     }
 
     fn facts(&self) -> WorldFacts {

@@ -5,41 +5,46 @@ use super::world::RobotsWorld;
 use serde::Serialize;
 use sidestep_kernel::{Cycle, EntityId, GroupSizes, Run};
 use sidestep_map::Cell;
+use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
-/// Counters of one robot, or their sums over all robots.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Counters {
-    /// Number of actions started.
-    pub actions: u64,
-    /// Number of contacts in total.
-    pub contacts: u64,
-    /// Number of contacts by the kind touched; 0 for kinds that were never touched.
-    pub contacts_by_kind: BTreeMap<String, u64>,
-    /// Distance traveled, in meters.
-    pub distance_m: f64,
-    /// Number of trips completed.
-    pub trips: u64,
-    /// Mean number of cycles per completed trip; absent without trips.
-    pub trip_cycles_mean: Option<f64>,
-    /// Number of boxes that no robot had covered before.
-    pub first_visits: u64,
+metrics! {
+    /// Counters of one robot, or their sums over all robots.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize)]
+    pub struct Counters {
+        /// Actions started, of all robots.
+        pub actions: u64 => "actions",
+        /// Contacts.
+        pub contacts: u64 => "contacts",
+        /// Contacts by the kind touched; 0 for kinds never touched.
+        pub contacts_by_kind.*: BTreeMap<String, u64> => "contacts with *",
+        /// Way of all robots together. In meters.
+        pub distance_m: f64 => "way of all robots",
+        /// Trips completed.
+        pub trips: u64 => "trips completed",
+        /// Mean length of a completed trip; none without trips.
+        pub trip_cycles_mean: Option<f64> => "mean length of a trip" ("cycles"),
+        /// Boxes that no robot had covered before.
+        pub first_visits: u64 => "boxes covered for the first time",
+    }
 }
 
-/// Metrics of a run so far.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Metrics {
-    /// Sums over all robots.
-    #[serde(flatten)]
-    pub total: Counters,
-    /// Share of the free boxes that have been covered by a robot.
-    pub coverage: f64,
-    /// Share of actions that ended in a contact.
-    pub contacts_per_action: f64,
-    /// Number of conflict groups with 1, 2-3, 4-7, ... bodies, over all cycles.
-    pub group_sizes: Vec<u64>,
-    /// Number of bodies of the largest conflict group; 0 where no two bodies ever met.
-    pub largest_group: u64,
+metrics! {
+    /// Metrics of a run so far.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct Metrics {
+        /// Sums over all robots.
+        #[serde(flatten)]
+        pub total: Counters,
+        /// Share of the free boxes that a robot has covered, 0 to 1. Boxes that robots stand in at the start count.
+        pub coverage: f64 => "share of the floor covered",
+        /// Share of actions that ended in a contact, 0 to 1.
+        pub contacts_per_action: f64 => "contacts per action",
+        /// Conflict groups of 1, 2-3, 4-7, ... bodies, over all cycles.
+        pub group_sizes: Vec<u64> => "conflict groups by size",
+        /// Bodies of the largest conflict group; 0 where no two ever met.
+        pub largest_group: u64 => "largest conflict group" ("bodies"),
+    }
 }
 
 impl RobotsWorld {

@@ -72,7 +72,7 @@ impl WorldType for Robots {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
     }
 
     fn facts(&self) -> WorldFacts {
