@@ -2,6 +2,7 @@
 
 use super::{BodyTable, Fleet, Inspection, RunEvent, Scene, SessionId, Speed};
 use serde::Serialize;
+use sidestep_scenario::Editing;
 
 /// The reply to a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
