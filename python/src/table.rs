@@ -208,7 +208,7 @@ impl Table {
 /// Returns one sentence about a column of a table of runs.
 fn column_description(column: &RunColumn, infos: &[MetricInfo]) -> String {
     let description = match column.role {
-        Role::Cell => "Number of the run.",
+        Role::Trial => "Number of the run.",
         Role::Variant => "Number of its variant.",
         Role::Replicate => {
             "Number of the run among those of its variant; equal ones have the same seed."

@@ -37,6 +37,8 @@ pub use explain::suggestion;
 pub use facts::WorldFacts;
 pub use keys::Key;
 pub use metric_info::{MetricInfo, MetricLabel, metric_label};
+#[doc(hidden)]
+pub use metric_info::{phrase, phrase_len};
 pub use number::{
     AboveZero, AnyFinite, AtLeastZero, Closed, Fraction, Integer, Interval, LeftOpen, NonNegative,
     Number, NumberRange, Open, Point, Positive, RightOpen, Rule, invalid_value,

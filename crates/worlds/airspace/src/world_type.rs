@@ -42,7 +42,7 @@ impl WorldType for Airspace {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
     }
 
     fn facts(&self) -> WorldFacts {

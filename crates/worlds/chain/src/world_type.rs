@@ -40,7 +40,7 @@ impl WorldType for Chains {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
     }
 
     fn facts(&self) -> WorldFacts {
@@ -82,7 +82,7 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
 
     fn seed_effect(&self) -> SeedEffect {
         // Where the start does not follow from the seed, few parts draw, and only on occasion: a leader that
-        // wanders, a laser that errs, parts that are thrown about, a way that is planned.
+        // wanders, a laser that errs, parts that are thrown about, a path that is planned.
         match &self.recipe {
             Some(recipe) if !recipe.is_start_random() => SeedEffect::Perhaps,
             _ => SeedEffect::Decide,

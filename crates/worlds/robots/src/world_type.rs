@@ -72,7 +72,7 @@ impl WorldType for Robots {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
     }
 
     fn facts(&self) -> WorldFacts {
@@ -111,10 +111,11 @@ impl AnyCompiled for Compiled {
     }
 
     fn seed_effect(&self) -> SeedEffect {
-        match self.is_always_random() {
-            true => SeedEffect::Decide,
-            // Behaviors and conflicts may draw: runs show it.
-            false => SeedEffect::Perhaps,
+        if self.is_always_random() {
+            SeedEffect::Decide
+        } else {
+            // Behaviors and conflicts may draw, which only runs show.
+            SeedEffect::Perhaps
         }
     }
 
