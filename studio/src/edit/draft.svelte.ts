@@ -90,7 +90,9 @@ export class Draft {
       this.#running = this.session.run.text ?? answer.text;
       this.#history = new TextHistory(this.#running);
       this.#onTextChange(false);
-      await Promise.all([this.#loadSchema(), this.#checkNow()]);
+      // The schema brings the tools of the canvas: once a draft is checked, they are there.
+      await this.#loadSchema();
+      await this.#checkNow();
     } catch (error) {
       this.#onFailure(error);
     }
