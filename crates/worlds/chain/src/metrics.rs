@@ -9,7 +9,8 @@ use sidestep_kernel::EntityId;
 use sidestep_rods::{CompletedMotion, VetoReason};
 use std::collections::BTreeMap;
 
-/// Depth in an obstacle beyond which a part counts as a penetration, meters.
+/// Depth in an obstacle beyond which a part counts as a penetration, meters: far more than the tolerance of the rules,
+/// 1e-9, and far less than anything that a user would see.
 pub const PENETRATION_THRESHOLD_M: f64 = 1e-6;
 
 /// Counts for one chain that a run keeps beside its state.
@@ -91,7 +92,7 @@ pub struct RungTally {
     pub pulled_back: u64,
     /// Climbs that reached the end of the ladder without success.
     pub stuck: u64,
-    /// Ways that a planner found,
+    /// Paths that a planner found,
     pub planned: u64,
     /// and searches that found none.
     pub not_planned: u64,
@@ -312,7 +313,7 @@ pub struct Metrics {
     pub progress: f64,
     /// Steps per second of processor time, of this process's part of the run.
     pub steps_per_cpu_s: f64,
-    /// Vetoes by reason; those that did not occur are left out.
+    /// Vetoes by reason; 0 of those that did not occur.
     pub vetoes_by_reason: BTreeMap<&'static str, u64>,
     /// Rods turned to avoid something.
     pub rotations: u64,
