@@ -10,7 +10,7 @@ use sidestep::arms::ik::Engine;
 use sidestep::arms::kinematics::{
     ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
 };
-use sidestep::experiment::sweep::scheduler::run_cells;
+use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::kernel::InputError;
 use std::path::PathBuf;
 
@@ -213,7 +213,7 @@ impl Arm {
                 let result = || chain.solve(&goals[*k], start).map(|result| (*k, result));
                 watcher.should_continue().then(result)
             };
-            run_cells(&numbers, options.workers.max(1), solve, &mut |result| {
+            run_trials(&numbers, options.workers.max(1), solve, &mut |result| {
                 solved.push(result);
                 Ok::<_, InputError>(())
             })?;

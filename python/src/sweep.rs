@@ -5,22 +5,22 @@ use crate::json::{to_python, to_toml};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, run_polling};
+use crate::worlds;
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
-    BaselineSpec, Cell, Factor, Outcome, Plan, RunColumn, Setting, Sweep, SweepOverrides,
+    BaselineSpec, Factor, Outcome, Plan, RunColumn, Setting, Sweep, SweepOverrides, Trial,
 };
 use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::settings::Method;
 use sidestep_papers::methods;
 use sidestep_session::sweep::{
-    self, CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task,
+    self, Engine, Folder, OutcomeSink, SweepEnd, Task, TrialBatch, TrialExecutor,
 };
 use sidestep_session::{Error, Watcher};
 use std::any::Any;
@@ -153,12 +153,13 @@ fn run(
     watcher: &dyn Watcher,
 ) -> Result<Option<SweepResult>, Error> {
     let Some(out) = out else {
-        let (plan, end) = sweep::run_in_memory(&WORLDS, sweep, engine, watcher)?;
+        let (plan, end) = sweep::run_in_memory(worlds::list(), sweep, engine, watcher)?;
         let SweepEnd::Done(done) = end else { return Ok(None) };
         return Ok(Some(sweep_result(&plan, None, &done)?));
     };
-    let folder = sweep::open_or_create(&WORLDS, sweep, out, engine.planning_workers(), watcher)?;
-    let end = sweep::run_remaining(&WORLDS, &folder, engine, watcher)?;
+    let folder =
+        sweep::open_or_create(worlds::list(), sweep, out, engine.planning_workers(), watcher)?;
+    let end = sweep::run_remaining(worlds::list(), &folder, engine, watcher)?;
     let SweepEnd::Done(done) = end else { return Ok(None) };
     Ok(Some(sweep_result(folder.plan(), Some(&folder), &done)?))
 }
@@ -168,7 +169,7 @@ fn sweep_result(
     folder: Option<&Folder>,
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
-    let summary = plan.summary(&WORLDS, &done.table)?;
+    let summary = plan.summary(worlds::list(), &done.table)?;
     let cloned = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
         results: cloned(done.table.results()),
@@ -178,32 +179,32 @@ fn sweep_result(
     })
 }
 
-/// An executor of cells in Python (such as one for Dask or Ray): a generator that is driven from here, so that its code
+/// An executor of trials in Python (such as one for Dask or Ray): a generator that is driven from here, so that its code
 /// runs on the caller's thread and needs no callbacks into Rust.
 struct PyExecutor {
-    /// Called with the cells; returns a generator of requests and outcomes.
+    /// Called with the trials; returns a generator of requests and outcomes.
     begin: Py<PyAny>,
-    /// Number of cells that it runs at the same time.
+    /// Number of trials that it runs at the same time.
     parallelism: usize,
     /// The exception of the generator, which [`Error`] cannot carry.
     raised: Mutex<Option<PyErr>>,
 }
 
-/// A cell in the form used in Python: its number, variant, replicate and seed.
-type CellTuple = (u64, u32, u32, u64);
+/// A trial in the form used in Python: its number, variant, replicate and seed.
+type TrialTuple = (u64, u32, u32, u64);
 
 impl PyExecutor {
     /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes. Scenarios are
-    /// sent on request, since a resumed sweep may have no cells left of most variants.
+    /// sent on request, since a resumed sweep may have no trials left of most variants.
     fn drive(
         &self,
         py: Python<'_>,
-        batch: &CellBatch<'_>,
+        batch: &TrialBatch<'_>,
         store: &mut OutcomeSink<'_>,
     ) -> PyResult<()> {
-        let tuple = |cell: &Cell| (cell.id, cell.variant, cell.replicate, cell.seed);
-        let cells: Vec<CellTuple> = batch.cells().iter().map(tuple).collect();
-        let generator = self.begin.bind(py).call1((WORLDS.build(), cells))?;
+        let tuple = |trial: &Trial| (trial.id, trial.variant, trial.replicate, trial.seed);
+        let trials: Vec<TrialTuple> = batch.trials().iter().map(tuple).collect();
+        let generator = self.begin.bind(py).call1((worlds::list().build(), trials))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -232,8 +233,8 @@ fn parse_outcome(text: &str) -> PyResult<Outcome> {
     })
 }
 
-impl CellExecutor for PyExecutor {
-    fn run(&self, batch: &CellBatch<'_>, store: &mut OutcomeSink<'_>) -> Result<(), Error> {
+impl TrialExecutor for PyExecutor {
+    fn run(&self, batch: &TrialBatch<'_>, store: &mut OutcomeSink<'_>) -> Result<(), Error> {
         Python::attach(|py| self.drive(py, batch, store)).map_err(|raised| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
             // `run_sweep` raises the exception itself; this error only ends the sweep.
@@ -284,7 +285,7 @@ pub(crate) fn run_sweep<'py>(
     Ok((results, timings, to_python(py, &result.summary)?.into_bound(py)))
 }
 
-/// Runs some cells of a sweep that another process drives, and returns their outcomes as JSON: the function that
+/// Runs some trials of a sweep that another process drives, and returns their outcomes as JSON: the function that
 /// tasks of `sidestep.sweep` call, on any machine.
 ///
 /// Raises InputError when the sweep is of another build of sidestep.
@@ -293,16 +294,16 @@ pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
-    trials: Vec<CellTuple>,
+    trials: Vec<TrialTuple>,
 ) -> PyResult<Vec<String>> {
     let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
-    let trial = |(id, variant, replicate, seed)| Cell { id, variant, replicate, seed };
+    let trial = |(id, variant, replicate, seed)| Trial { id, variant, replicate, seed };
     let task = Task {
         build,
         scenarios: scenarios.into_iter().map(resolved).collect(),
-        cells: trials.into_iter().map(trial).collect(),
+        trials: trials.into_iter().map(trial).collect(),
     };
-    let outcomes = run_polling(py, |watcher| task.run(&WORLDS, watcher))?;
+    let outcomes = run_polling(py, |watcher| task.run(worlds::list(), watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
     let text = |outcome: &Outcome| {
         serde_json::to_string(outcome)
@@ -343,11 +344,14 @@ pub(crate) fn compare_methods(
     let workers = if workers == 0 { available_workers() } else { workers };
     let results = run_polling(py, |watcher| {
         let interrupt = watcher.interrupt();
-        let run = || {
-            let progress = &mut |_: &str, _: f64| ();
-            methods::compare_with_interrupt(source, &methods, seeds, workers, progress, &interrupt)
+        let comparison = methods::Comparison {
+            source,
+            methods: &methods,
+            seeds,
+            workers,
+            interrupt: interrupt.clone(),
         };
-        catch_unwind(AssertUnwindSafe(run))
+        catch_unwind(AssertUnwindSafe(|| comparison.run(&mut |_, _| ())))
             .unwrap_or_else(|payload| resume_unless(payload, &interrupt))
     })?;
     let results = results.map_err(|e| error::input_error(&e))?;

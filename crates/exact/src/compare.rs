@@ -45,8 +45,10 @@ impl Comparison {
         let poses: Vec<GridPose> = exact.keys().chain(unknown).copied().collect();
         let expected: Vec<f64> =
             poses.iter().map(|p| exact.get(p).copied().unwrap_or(0.0)).collect();
-        let share = |pose| f64::from(counts.get(pose).copied().unwrap_or(0)) / f64::from(runs);
-        let observed: Vec<f64> = poses.iter().map(share).collect();
+        let observed: Vec<f64> = poses
+            .iter()
+            .map(|pose| f64::from(counts.get(pose).copied().unwrap_or(0)) / f64::from(runs))
+            .collect();
         let total_variation = total_variation(&expected, &observed);
         let limit = sampling_limit(&expected, f64::from(runs), SIGNIFICANCE);
         // The limit falls with the square root of the number of runs.
@@ -64,7 +66,7 @@ impl Comparison {
 /// less changes the total variation by at most 1 / `samples`, so that McDiarmid's inequality
 /// bounds how far above its mean it lies.
 pub fn sampling_limit(distribution: &[f64], samples: f64, significance: f64) -> f64 {
-    let deviation = |p: &f64| (p * (1.0 - p).max(0.0) / samples).sqrt();
-    let mean = 0.5 * distribution.iter().map(deviation).sum::<f64>();
+    let deviations = distribution.iter().map(|p| (p * (1.0 - p).max(0.0) / samples).sqrt());
+    let mean = 0.5 * deviations.sum::<f64>();
     mean + (math::ln(1.0 / significance) / (2.0 * samples)).sqrt()
 }

@@ -1,7 +1,7 @@
 //! A model under a fixed policy: a Markov chain with its distributions over time and in the long
 //! run.
 
-use crate::model::{MarkovModel, ModelTransition};
+use crate::model::MarkovModel;
 use crate::obstacle::GridPose;
 use crate::sparse::SparseMatrix;
 use serde::Serialize;
@@ -49,13 +49,23 @@ impl From<&StationaryDistribution> for Convergence {
     }
 }
 
-/// Iterations stop when one changes the distribution by less than this (total variation).
+/// Iterations stop when one changes the distribution by less than this (total variation), about what rounding adds.
 const CONVERGENCE_TOLERANCE: f64 = 1e-13;
-/// Number of multiplications after which iterating stops without having converged.
+/// Number of multiplications after which iterating stops without having converged: some seconds.
 const MAX_MULTIPLICATIONS: usize = 5_000_000_000;
 
+impl MarkovModel {
+    /// Returns the Markov chain of the robot under a policy.
+    ///
+    /// # Errors
+    /// When the policy chooses an action that the robot does not have.
+    pub fn chain(&self, policy: &RandomPolicy) -> Result<MarkovChain, InputError> {
+        MarkovChain::new(self, policy)
+    }
+}
+
 impl MarkovChain {
-    pub(super) fn new(model: &MarkovModel, policy: &RandomPolicy) -> Result<Self, InputError> {
+    fn new(model: &MarkovModel, policy: &RandomPolicy) -> Result<Self, InputError> {
         check_actions(model, policy)?;
         let mut index_of = BTreeMap::from([((0, false), 0)]);
         let mut found = vec![(0, false)];
@@ -73,11 +83,11 @@ impl MarkovChain {
             }
             rows.push(row);
         }
-        let state = |&(pose, after_contact): &(u32, bool)| ChainState {
-            pose: model.poses[pose as usize],
-            after_contact,
-        };
-        Ok(Self { states: found.iter().map(state).collect(), rows })
+        let mut states = Vec::with_capacity(found.len());
+        for (pose, after_contact) in found {
+            states.push(ChainState { pose: model.poses[pose as usize], after_contact });
+        }
+        Ok(Self { states, rows })
     }
 
     /// Returns the states; the first is the start.
@@ -123,6 +133,7 @@ impl MarkovChain {
     /// not converge within the work allowed, [`StationaryDistribution::residual`] says how close it is.
     pub fn stationary(&self) -> StationaryDistribution {
         let mut distribution = self.start_distribution();
+        // At least 100 iterations, so that a chain of any size comes near; at most a million, so that a tiny one ends.
         let limit = (MAX_MULTIPLICATIONS / self.rows.len().max(1)).clamp(100, 1_000_000) as u32;
         for iteration in 1..=limit {
             let next = self.step(&distribution);
@@ -164,8 +175,8 @@ pub fn total_variation(p: &[f64], q: &[f64]) -> f64 {
 
 fn check_actions(model: &MarkovModel, policy: &RandomPolicy) -> Result<(), InputError> {
     let known = model.actions().len();
-    let unknown = |row: &[f64]| row.iter().skip(known).any(|&p| p > 0.0);
-    if !unknown(policy.probabilities(false)) && !unknown(policy.probabilities(true)) {
+    let mut rows = [policy.probabilities(false), policy.probabilities(true)].into_iter();
+    if rows.all(|row| row.iter().skip(known).all(|&p| p <= 0.0)) {
         return Ok(());
     }
     let cause = format!("the policy chooses an action beyond the robot's {known}");
@@ -179,11 +190,15 @@ fn successors<'a>(
     pose: u32,
     after_contact: bool,
 ) -> impl Iterator<Item = ((u32, bool), f64)> + 'a {
-    let minds = policy.depends_on_contact();
+    // States that differ only in a contact which the policy ignores would follow the same law, so they are one.
+    let depends_on_contact = policy.depends_on_contact();
     let chosen = policy.probabilities(after_contact).iter().enumerate().filter(|c| *c.1 > 0.0);
     chosen.flat_map(move |(action, &chance)| {
-        let state = move |a: &ModelTransition| ((a.to, minds && a.contact.is_some()), chance * a.p);
-        model.model_transitions(pose as usize, action).iter().map(state)
+        let arrivals = model.model_transitions(pose as usize, action).iter();
+        arrivals.map(move |arrival| {
+            let is_after_contact = depends_on_contact && arrival.contact.is_some();
+            ((arrival.to, is_after_contact), chance * arrival.p)
+        })
     })
 }
 

@@ -1,18 +1,15 @@
 //! Every pose that a robot can reach, with the outcomes of each action there.
 
-use crate::markov_chain::MarkovChain;
 use crate::obstacle::{ActionOutcome, GridPose, outcome_distribution};
-use crate::pomdp::{Pomdp, PomdpOptions};
 use crate::robot::SingleRobot;
 use crate::sparse::SparseMatrix;
-use sidestep_error_models::RandomPolicy;
 use sidestep_error_models::effector::{ActionId, Side, Transition};
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
 /// Largest number of poses of a model.
 pub const MAX_STATES: usize = 200_000;
-/// Largest number of outcomes over all poses and actions.
+/// Largest number of outcomes over all poses and actions; they take about 320 MB.
 const MAX_OUTCOMES: usize = 20_000_000;
 
 /// Every pose that a robot can reach from its start, with the outcomes of each action there.
@@ -54,24 +51,26 @@ impl MarkovModel {
         Ok(model)
     }
 
-    /// Follows every action from every pose found, until there is no new pose.
+    /// Follows every action from every pose found, until there is no new pose: a breadth-first search in which `poses`
+    /// is the queue as well.
     fn explore(&mut self) -> Result<(), InputError> {
         let mut index_of = BTreeMap::from([(self.robot.start, 0)]);
         let mut next = 0;
         while let Some(&pose) = self.poses.get(next) {
             next += 1;
             for action in 0..self.actions().len() {
-                let outcomes = self.outcome_distribution(pose, action as ActionId);
-                let poses = &mut self.poses;
-                let arrivals = outcomes.into_iter().map(|(ActionOutcome { pose, contact }, p)| {
+                let mut row = Vec::new();
+                for (outcome, p) in self.outcome_distribution(pose, action as ActionId) {
+                    let ActionOutcome { pose, contact } = outcome;
                     let to = *index_of.entry(pose).or_insert_with(|| {
-                        poses.push(pose);
-                        poses.len() as u32 - 1
+                        self.poses.push(pose);
+                        self.poses.len() as u32 - 1
                     });
-                    ModelTransition { to, contact, p }
-                });
-                self.outcomes.push(arrivals);
+                    row.push(ModelTransition { to, contact, p });
+                }
+                self.outcomes.push(row);
             }
+            // Checked at each pose, because a robot on a large map could fill the memory before the search ends.
             self.check_size()?;
         }
         Ok(())
@@ -99,8 +98,9 @@ impl MarkovModel {
     ) -> Vec<(ActionOutcome, f64)> {
         let robot = &self.robot;
         let transitions = &self.transitions[usize::from(action)];
-        let kind_at = |col, row| robot.kind_at(col, row);
-        outcome_distribution(transitions, robot.size, pose, robot.obstacle_rule, kind_at)
+        outcome_distribution(transitions, robot.size, pose, robot.obstacle_rule, |col, row| {
+            robot.kind_at(col, row)
+        })
     }
 
     /// Returns every pose that can be reached; the first is the start.
@@ -123,22 +123,6 @@ impl MarkovModel {
         let period = u64::from(self.robot.period);
         let phase = u64::from(self.robot.phase);
         (cycles + phase).div_ceil(period) - phase.div_ceil(period)
-    }
-
-    /// Returns the Markov chain of the robot under a policy.
-    ///
-    /// # Errors
-    /// When the policy chooses an action that the robot does not have.
-    pub fn chain(&self, policy: &RandomPolicy) -> Result<MarkovChain, InputError> {
-        MarkovChain::new(self, policy)
-    }
-
-    /// Returns the model with its observations, in the form that planners read.
-    ///
-    /// # Errors
-    /// When `options` do not fit the robot, or ask for too much.
-    pub fn pomdp(&self, options: &PomdpOptions) -> Result<Pomdp, InputError> {
-        Pomdp::new(self, options)
     }
 
     /// Returns the outcomes of an action at the pose with this index.

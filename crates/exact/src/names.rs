@@ -25,19 +25,22 @@ const RESERVED: [&str; 16] = [
 /// Returns valid names, all different, as close to the given ones as possible.
 pub(super) fn valid_names(names: impl IntoIterator<Item = String>) -> Vec<String> {
     let mut used = BTreeSet::new();
-    let unique = |name: String| {
+    let mut valid = Vec::new();
+    for name in names {
         let base = valid_name(&name);
-        let numbered = (2..).map(|k| format!("{base}-{k}"));
-        let free = std::iter::once(base.clone()).chain(numbered).find(|n| !used.contains(n));
-        let free = free.unwrap_or(base);
-        used.insert(free.clone());
-        free
-    };
-    names.into_iter().map(unique).collect()
+        let mut unique = base.clone();
+        let mut copies = 1;
+        while used.contains(&unique) {
+            copies += 1;
+            unique = format!("{base}-{copies}");
+        }
+        used.insert(unique.clone());
+        valid.push(unique);
+    }
+    valid
 }
 
 fn valid_name(name: &str) -> String {
-    let is_valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let mut valid: String = name.chars().map(|c| if is_valid(c) { c } else { '-' }).collect();
     if !valid.starts_with(|c: char| c.is_ascii_alphabetic()) {
         valid.insert(0, 'n');
@@ -46,6 +49,10 @@ fn valid_name(name: &str) -> String {
         valid.push('-');
     }
     valid
+}
+
+fn is_valid(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '-' || c == '_'
 }
 
 #[cfg(test)]

@@ -43,8 +43,7 @@ impl<'a> MountedBeam<'a> {
         Ok(Self { sensor, reliable: robot.has_reliable_sensors, crossed })
     }
 
-    /// Returns `P(reading
-    /// pose)`; readings of probability 0 are left out.
+    /// Returns `P(reading | pose)`; readings of probability 0 are left out.
     pub(super) fn readings(&self, robot: &SingleRobot, pose: GridPose) -> Vec<(Reading, f64)> {
         let mut row = self.sensor.reading_row(self.truth(robot, pose), self.reliable);
         row.retain(|reading| reading.1 > 0.0);
@@ -53,8 +52,8 @@ impl<'a> MountedBeam<'a> {
 
     /// Returns the beam's true reading.
     fn truth(&self, robot: &SingleRobot, pose: GridPose) -> Reading {
-        let kind_at = |c: &Crossing| robot.kind_at(pose.col + c.dx, pose.row + c.dy);
-        let mut met = self.crossed[usize::from(pose.heading)].iter().map(|c| (c, kind_at(c)));
+        let crossed = self.crossed[usize::from(pose.heading)].iter();
+        let mut met = crossed.map(|c| (c, robot.kind_at(pose.col + c.dx, pose.row + c.dy)));
         let first = met.find(|(_, kind)| *kind != FREE);
         let Some((crossing, kind)) = first else { return self.sensor.nothing() };
         match self.sensor.designates[usize::from(kind)] {
@@ -77,9 +76,12 @@ fn unknown_sensor(name: &str, sensors: &[SensorModel]) -> InputError {
 /// Returns the beam of the first sensor that points most nearly ahead, if there is a sensor.
 pub(super) fn forward_beam(model: &MarkovModel) -> Option<Beam> {
     let sensor = model.robot.sensors.first()?;
-    let off_ahead = |deg: f64| (deg - 360.0 * (deg / 360.0).round()).abs();
-    let by_bearing =
-        |a: &(usize, &f64), b: &(usize, &f64)| off_ahead(*a.1).total_cmp(&off_ahead(*b.1));
-    let (index, _) = sensor.bearings_deg.iter().enumerate().min_by(by_bearing)?;
+    let off_ahead_deg = sensor.bearings_deg.iter().map(|deg| off_ahead_deg(*deg));
+    let (index, _) = off_ahead_deg.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(Beam { sensor: sensor.name.clone(), index })
+}
+
+/// Returns the angle between a bearing and straight ahead, from 0 to 180 degrees.
+fn off_ahead_deg(bearing_deg: f64) -> f64 {
+    (bearing_deg - 360.0 * (bearing_deg / 360.0).round()).abs()
 }

@@ -98,10 +98,10 @@ fn walk(
 
 /// Removes the blocked outcomes and rescales the rest; keeps the first contact when none is left.
 fn renormalised(walked: Vec<(ActionOutcome, f64)>) -> Vec<(ActionOutcome, f64)> {
-    let free = |w: &&(ActionOutcome, f64)| w.0.contact.is_none();
-    let left: f64 = walked.iter().filter(free).map(|w| w.1).sum();
+    let free = walked.iter().filter(|(outcome, _)| outcome.contact.is_none());
+    let left: f64 = free.clone().map(|(_, p)| p).sum();
     if left > 0.0 {
-        return merged(walked.iter().filter(free).map(|&(o, p)| (o, p / left)).collect());
+        return merged(free.map(|&(outcome, p)| (outcome, p / left)).collect());
     }
     walked.first().map(|&(outcome, _)| vec![(outcome, 1.0)]).unwrap_or_default()
 }

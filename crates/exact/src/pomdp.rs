@@ -35,9 +35,9 @@ pub struct PomdpOptions {
     pub beams: Option<Vec<Beam>>,
 }
 
-/// Largest number of beams that are observed together.
+/// Largest number of beams that are observed together: observations multiply with each beam.
 pub const MAX_BEAMS: usize = 3;
-/// Largest number of lines of a file.
+/// Largest number of lines of a file: it has several hundred megabytes.
 const MAX_LINES: usize = 10_000_000;
 
 impl Default for PomdpOptions {
@@ -83,8 +83,18 @@ type Observation = (PomdpContact, Vec<(u8, u8)>);
 /// Index of a pose, and the contact in which the last action ended there.
 type PomdpState = (u32, PomdpContact);
 
+impl MarkovModel {
+    /// Returns the model with its observations, in the form that planners read.
+    ///
+    /// # Errors
+    /// When `options` do not fit the robot, or ask for too much.
+    pub fn pomdp(&self, options: &PomdpOptions) -> Result<Pomdp, InputError> {
+        Pomdp::new(self, options)
+    }
+}
+
 impl Pomdp {
-    pub(super) fn new(model: &MarkovModel, options: &PomdpOptions) -> Result<Self, InputError> {
+    fn new(model: &MarkovModel, options: &PomdpOptions) -> Result<Self, InputError> {
         check_discount(options.discount)?;
         let beams = beams(model, options)?;
         let (states, order) = states(model, options.contacts);
@@ -151,7 +161,8 @@ fn beams<'a>(
 /// Returns the number of each state, and the states in that order; the start is the first.
 fn states(model: &MarkovModel, contacts: bool) -> (BTreeMap<PomdpState, u32>, Vec<PomdpState>) {
     let start = (0, None);
-    let (mut numbers, mut order) = (BTreeMap::from([(start, 0)]), vec![start]);
+    let mut numbers = BTreeMap::from([(start, 0)]);
+    let mut order = vec![start];
     for arrival in model.outcomes.rows().flatten() {
         let state = state_after(arrival, contacts);
         numbers.entry(state).or_insert_with(|| {
@@ -222,13 +233,15 @@ fn joint_readings(
     let mut joint = vec![(Vec::new(), 1.0)];
     for beam in beams {
         let readings = beam.readings(&model.robot, pose);
-        let extended = |(before, p): &(Vec<(u8, u8)>, f64)| {
-            let with = |&(r, q): &(Reading, f64)| {
-                ([&before[..], &[(r.observation, r.class)]].concat(), p * q)
-            };
-            readings.iter().map(with).collect::<Vec<_>>()
-        };
-        joint = joint.iter().flat_map(extended).collect();
+        let mut extended = Vec::with_capacity(joint.len() * readings.len());
+        for (before, p) in &joint {
+            for (reading, q) in &readings {
+                let mut all = before.clone();
+                all.push((reading.observation, reading.class));
+                extended.push((all, p * q));
+            }
+        }
+        joint = extended;
     }
     joint
 }
@@ -239,12 +252,13 @@ fn goal_states(
     order: &[PomdpState],
 ) -> Result<Vec<u32>, InputError> {
     let Some((col, row)) = goal else { return Ok(Vec::new()) };
-    let is_there = |state: &PomdpState| {
-        let pose = model.poses[state.0 as usize];
-        (i64::from(pose.col), i64::from(pose.row)) == (i64::from(col), i64::from(row))
-    };
-    let states = (0..order.len() as u32).filter(|&s| is_there(&order[s as usize]));
-    let states: Vec<u32> = states.collect();
+    let mut states = Vec::new();
+    for (number, (pose, _)) in order.iter().enumerate() {
+        let pose = model.poses[*pose as usize];
+        if i64::from(pose.col) == i64::from(col) && i64::from(pose.row) == i64::from(row) {
+            states.push(number as u32);
+        }
+    }
     if states.is_empty() {
         let cause = format!("the robot never reaches [{col}, {row}]");
         let remedy = "name a free box that its lower-left box can come to";
@@ -257,9 +271,11 @@ fn state_name(model: &MarkovModel, state: &PomdpState) -> String {
     let &(pose, contact) = state;
     let pose = model.poses[pose as usize];
     let heading = HEADING_NAMES[usize::from(pose.heading)];
-    let contact = contact.map(|(kind, side)| format!("-{}", contact_name(model, kind, side)));
-    let contact = contact.unwrap_or_default();
-    format!("c{}r{}-{heading}{contact}", pose.col, pose.row)
+    let place = format!("c{}r{}-{heading}", pose.col, pose.row);
+    match contact {
+        Some((kind, side)) => format!("{place}-{}", contact_name(model, kind, side)),
+        None => place,
+    }
 }
 
 fn contact_name(model: &MarkovModel, kind: u8, side: Side) -> String {
@@ -273,14 +289,18 @@ fn observation_name(
     observation: &Observation,
 ) -> String {
     let (contact, readings) = observation;
-    let felt = contact.map_or("free".into(), |(kind, side)| contact_name(model, kind, side));
-    let readings = readings.iter().zip(beams).map(|(&(observation, class), beam)| {
-        let reading = Reading { observation, class };
-        match beam.sensor.names_of(reading) {
-            (seen, _) if observation == 0 => seen.to_string(),
-            (seen, class) => format!("{seen}-{class}"),
-        }
-    });
-    let parts: Vec<String> = contacts.then_some(felt).into_iter().chain(readings).collect();
+    let mut parts = Vec::new();
+    if contacts {
+        parts.push(match *contact {
+            Some((kind, side)) => contact_name(model, kind, side),
+            None => "free".to_string(),
+        });
+    }
+    for (&(observation, class), beam) in readings.iter().zip(beams) {
+        let (seen, class) = beam.sensor.names_of(Reading { observation, class });
+        // The report `nothing` has no distance.
+        let is_nothing = observation == 0;
+        parts.push(if is_nothing { seen.to_string() } else { format!("{seen}-{class}") });
+    }
     if parts.is_empty() { "nothing".into() } else { parts.join("_") }
 }

@@ -63,17 +63,18 @@ impl SingleRobot {
 
     /// Checks what a scenario's compiler has checked, for robots that are made by hand.
     pub(crate) fn check(&self) -> Result<(), InputError> {
-        let refuse = |cause: String, remedy: &str| Err(InputError::new(&self.place, cause, remedy));
         if self.size == 0 || self.period == 0 {
             let cause =
                 format!("a robot of {} boxes that acts every {}th cycle", self.size, self.period);
-            return refuse(cause, "give a size and a period of 1 or more");
+            let remedy = "give a size and a period of 1 or more";
+            return Err(InputError::new(&self.place, cause, remedy));
         }
         for (action, transitions) in self.effector.actions.iter().zip(&self.effector.transitions) {
             let row: Vec<f64> = transitions.iter().map(|transition| transition.p).collect();
             if let Err(error) = check_row(&row) {
+                let cause = format!("action `{action}`: {error}");
                 let remedy = "make the probabilities `p` of its transitions sum to 1";
-                return refuse(format!("action `{action}`: {error}"), remedy);
+                return Err(InputError::new(&self.place, cause, remedy));
             }
         }
         Ok(())
@@ -89,6 +90,7 @@ impl SingleRobot {
     /// Returns the kind of a box's occupant.
     pub(crate) fn kind_at(&self, col: i32, row: i32) -> u8 {
         let (Ok(c), Ok(r)) = (u32::try_from(col), u32::try_from(row)) else { return WALL };
+        // As in the world of robots, there are walls all around the map.
         if c >= self.map.width() || r >= self.map.height() || self.map.cell(c, r) != Cell::Free {
             return WALL;
         }

@@ -109,7 +109,8 @@ impl CountTable {
     }
 
     fn estimate(&self, row: usize, column: usize) -> Estimate {
-        let (count, of) = (self.cells[row][column], self.total(row));
+        let count = self.cells[row][column];
+        let of = self.total(row);
         Estimate {
             table: self.name.clone(),
             row: self.rows[row].clone(),
@@ -123,10 +124,14 @@ impl CountTable {
 
     /// Returns the rows with fewer than `below` counts, including those with none.
     pub fn low_count_rows(&self, below: u32) -> Vec<LowCountRow> {
-        let totals = self.rows.iter().enumerate().map(|(i, row)| (row, self.total(i)));
-        let thin = totals.filter(|(_, total)| *total < f64::from(below));
-        thin.map(|(row, count)| LowCountRow { table: self.name.clone(), row: row.clone(), count })
-            .collect()
+        let mut thin = Vec::new();
+        for (index, row) in self.rows.iter().enumerate() {
+            let count = self.total(index);
+            if count < f64::from(below) {
+                thin.push(LowCountRow { table: self.name.clone(), row: row.clone(), count });
+            }
+        }
+        thin
     }
 }
 
@@ -140,19 +145,22 @@ pub(crate) fn smooth(counts: &[f64], alpha: f64) -> Vec<f64> {
 }
 
 /// Returns probabilities with nine decimals that sum to 1: the rounding error is given to the
-/// greatest.
+/// greatest, where it is the smallest in proportion and cannot make a probability negative.
 pub(crate) fn rounded(probabilities: &[f64]) -> Vec<f64> {
-    let nine = |p: f64| (p * 1e9).round() / 1e9;
-    let mut row: Vec<f64> = probabilities.iter().map(|p| nine(*p)).collect();
+    let mut row: Vec<f64> = probabilities.iter().map(|p| round_to_nine(*p)).collect();
     let greatest = (0..row.len()).max_by(|a, b| row[*a].total_cmp(&row[*b]));
     if let Some(greatest) = greatest {
         let others: f64 = (0..row.len()).filter(|i| *i != greatest).map(|i| row[i]).sum();
-        row[greatest] = nine(1.0 - others);
+        row[greatest] = round_to_nine(1.0 - others);
     }
     row
 }
 
-/// A count, written as an integer where it is one.
+fn round_to_nine(p: f64) -> f64 {
+    (p * 1e9).round() / 1e9
+}
+
+/// A count, written as an integer where it is one: only phase averaging makes fractions.
 struct Count(f64);
 
 impl Serialize for Count {

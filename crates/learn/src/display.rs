@@ -63,10 +63,11 @@ pub(super) fn write_estimates(
         if estimate.table != table {
             table = &estimate.table;
             writeln!(f, "\n{table}")?;
-            let (row, column) = (heading.row, heading.column);
-            let heads = ["count", "of", "probability", "95 % interval"];
-            let [count, of, probability, interval] = heads;
-            writeln!(f, "  {row:12} {column:13} {count:>10} {of:>7}  {probability}  {interval}")?;
+            writeln!(
+                f,
+                "  {:12} {:13} {:>10} {:>7}  probability  95 % interval",
+                heading.row, heading.column, "count", "of"
+            )?;
         }
         write_estimate(f, estimate)?;
     }
@@ -93,39 +94,53 @@ pub(super) fn write_low_count_rows(
         return writeln!(f, "\nEvery row has at least {below} counts.");
     }
     writeln!(f, "\nRows with fewer than {below} counts")?;
-    let decimals = |count: f64| if (count - count.round()).abs() < 0.005 { 0 } else { 2 };
-    thin.iter().try_for_each(|row| {
-        writeln!(f, "  {} {}: {:.*}", row.table, row.row, decimals(row.count), row.count)
-    })
+    for row in thin {
+        // Two decimals would print such a count as a whole one.
+        let is_whole = (row.count - row.count.round()).abs() < 0.005;
+        let decimals = if is_whole { 0 } else { 2 };
+        writeln!(f, "  {} {}: {:.decimals$}", row.table, row.row, row.count)?;
+    }
+    Ok(())
 }
 
 /// Writes how well a part of the events predicts the rest.
 pub(super) fn write_holdout_tests(f: &mut Formatter<'_>, fits: &[HoldoutTest]) -> Result {
     writeln!(f, "\nHold-out fit (same law in both parts? log-loss in nat per event)")?;
-    let heads = ["table", "learned", "held out", "chi2", "df", "p", "log-loss", "floor"];
-    let [table, learned, held, chi2, df, p, loss, floor] = heads;
     writeln!(
         f,
-        "  {table:18} {learned:>8} {held:>8} {chi2:>8} {df:>4} {p:>7} {loss:>9} {floor:>9}"
+        "  {:18} {:>8} {:>8} {:>8} {:>4} {:>7} {:>9} {:>9}",
+        "table", "learned", "held out", "chi2", "df", "p", "log-loss", "floor"
     )?;
     for fit in fits {
-        // Without degrees of freedom nothing was tested.
-        let tested = |number: String| if fit.degrees_of_freedom == 0 { "-".into() } else { number };
-        let shown = |loss: Option<f64>| loss.map_or("-".to_string(), |loss| format!("{loss:.5}"));
-        writeln!(
-            f,
-            "  {:18} {:>8.0} {:>8.0} {:>8} {:>4} {:>7} {:>9} {:>9}",
-            fit.table,
-            fit.trained_on,
-            fit.held_out,
-            tested(format!("{:.2}", fit.chi_square)),
-            fit.degrees_of_freedom,
-            tested(format_p_column(fit.p_value)),
-            shown(fit.log_loss),
-            shown(fit.log_loss_floor)
-        )?;
+        write_holdout_test(f, fit)?;
     }
     verdicts(fits).iter().try_for_each(|words| writeln!(f, "{words}"))
+}
+
+fn write_holdout_test(f: &mut Formatter<'_>, fit: &HoldoutTest) -> Result {
+    let mut chi_square = format!("{:.2}", fit.chi_square);
+    let mut p_value = format_p_column(fit.p_value);
+    // Without degrees of freedom nothing was tested.
+    if fit.degrees_of_freedom == 0 {
+        chi_square = "-".to_string();
+        p_value = "-".to_string();
+    }
+    writeln!(
+        f,
+        "  {:18} {:>8.0} {:>8.0} {:>8} {:>4} {:>7} {:>9} {:>9}",
+        fit.table,
+        fit.trained_on,
+        fit.held_out,
+        chi_square,
+        fit.degrees_of_freedom,
+        p_value,
+        format_loss(fit.log_loss),
+        format_loss(fit.log_loss_floor)
+    )
+}
+
+fn format_loss(loss: Option<f64>) -> String {
+    loss.map_or("-".to_string(), |loss| format!("{loss:.5}"))
 }
 
 /// Largest probability, over all tables together, at which a difference is not taken for chance.
@@ -134,6 +149,7 @@ const SIGNIFICANCE_LEVEL: f64 = 0.05;
 /// Returns the verdicts of the tests: a line for each table with parts that differ, or one for all.
 fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
     let tested: Vec<&HoldoutTest> = fits.iter().filter(|fit| fit.degrees_of_freedom > 0).collect();
+    // One of many tables differs by chance alone; Holm's adjustment keeps the level over all of them.
     let adjusted = holm(&tested.iter().map(|fit| Some(fit.p_value)).collect::<Vec<_>>());
     let differs =
         tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < SIGNIFICANCE_LEVEL));

@@ -6,7 +6,8 @@ use super::counts::{CountTable, smooth};
 use sidestep_kernel::math::ln;
 use sidestep_statistics::chi_square_p_value;
 
-/// Cells expected to hold fewer counts than this are pooled before a chi-square test.
+/// Cells expected to hold fewer counts than this are pooled before a chi-square test, because the statistic follows
+/// the chi-square distribution only where expected counts are not small; 5 is the customary bound (Cochran 1954).
 const MIN_EXPECTED_COUNT: f64 = 5.0;
 
 /// The agreement of held-out events with the table learned from the others.
@@ -35,12 +36,16 @@ pub struct HoldoutTest {
 
 /// Splits events into those for learning and every `every`-th, which is held out.
 pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
-    let held = |index: usize| index % every == every - 1;
-    let part = |wanted: bool| {
-        let indexed = events.iter().enumerate();
-        indexed.filter(|(i, _)| held(*i) == wanted).map(|(_, event)| event).collect()
-    };
-    (part(false), part(true))
+    let mut train = Vec::new();
+    let mut held = Vec::new();
+    for (index, event) in events.iter().enumerate() {
+        if index % every == every - 1 {
+            held.push(event);
+        } else {
+            train.push(event);
+        }
+    }
+    (train, held)
 }
 
 /// Compares two tables of the same shape.
@@ -50,11 +55,10 @@ pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> Hold
         (0..n_rows).map(|row| homogeneity(trained.row(row), held.row(row))).collect();
     let chi_square = tests.iter().map(|test| test.0).sum();
     let degrees_of_freedom = tests.iter().map(|test| test.1).sum();
-    let total = |counts: &CountTable| (0..n_rows).map(|row| counts.total(row)).sum();
     HoldoutTest {
         table: trained.name().to_owned(),
-        trained_on: total(trained),
-        held_out: total(held),
+        trained_on: (0..n_rows).map(|row| trained.total(row)).sum(),
+        held_out: (0..n_rows).map(|row| held.total(row)).sum(),
         chi_square,
         degrees_of_freedom,
         p_value: chi_square_p_value(chi_square, degrees_of_freedom),
@@ -63,21 +67,26 @@ pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> Hold
     }
 }
 
-/// Returns chi-square statistic and degrees of freedom of "two samples, one law".
+/// Returns chi-square statistic and degrees of freedom of Pearson's test of homogeneity: "two samples, one law".
 fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
-    let (n_a, n_b): (f64, f64) = (a.iter().sum(), b.iter().sum());
+    let n_a: f64 = a.iter().sum();
+    let n_b: f64 = b.iter().sum();
     if n_a <= 0.0 || n_b <= 0.0 {
         return (0.0, 0);
     }
+    // A cell's expected count is least in the smaller sample, so that one decides what is pooled.
     let share_of_smaller = n_a.min(n_b) / (n_a + n_b);
     let cells = pool_rare(a, b, MIN_EXPECTED_COUNT / share_of_smaller);
-    let deviation =
-        |observed: f64, expected: f64| (observed - expected) * (observed - expected) / expected;
     let statistic = cells.iter().map(|&(in_a, in_b)| {
         let share = (in_a + in_b) / (n_a + n_b);
-        deviation(in_a, n_a * share) + deviation(in_b, n_b * share)
+        relative_deviation(in_a, n_a * share) + relative_deviation(in_b, n_b * share)
     });
     (statistic.sum(), cells.len() - 1)
+}
+
+/// Returns a cell's part of Pearson's statistic.
+fn relative_deviation(observed: f64, expected: f64) -> f64 {
+    (observed - expected) * (observed - expected) / expected
 }
 
 /// Returns the cells of two samples, the rarest joined until each holds `least` counts.
@@ -93,6 +102,7 @@ fn pool_rare(a: &[f64], b: &[f64], least: f64) -> Vec<(f64, f64)> {
             open = (0.0, 0.0);
         }
     }
+    // What is left over holds too few counts for a cell of its own, so it joins the last one.
     match pooled.last_mut() {
         Some(last) => *last = (last.0 + open.0, last.1 + open.1),
         None => pooled.push(open),
@@ -101,7 +111,8 @@ fn pool_rare(a: &[f64], b: &[f64], least: f64) -> Vec<(f64, f64)> {
 }
 
 fn log_loss(trained: &CountTable, held: &CountTable, alpha: f64) -> Option<f64> {
-    let (mut loss, mut events) = (0.0, 0.0);
+    let mut loss = 0.0;
+    let mut events = 0.0;
     for row in 0..held.rows().len() {
         let probabilities = smooth(trained.row(row), alpha);
         for (count, p) in held.row(row).iter().zip(probabilities) {

@@ -3,7 +3,7 @@
 use sidestep_import::mrclam::StampedPose2;
 use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 
-/// Motion capture with a wider gap than this says nothing about the time between.
+/// Motion capture with a wider gap than this says nothing about the time between: a robot may turn and come back.
 const MAX_INTERPOLATION_SECS: f64 = 0.5;
 
 /// A pose in the plane.
@@ -85,11 +85,11 @@ pub(crate) fn pose_at(track: &[StampedPose2], t_secs: f64) -> Option<Pose2> {
 }
 
 fn interpolate(start: &StampedPose2, end: &StampedPose2, fraction: f64) -> Pose2 {
-    let mix = |a: f64, b: f64| a + fraction * (b - a);
+    let [x_m, y_m] = start.position_m;
     let arc_rad = wrap_angle(end.heading_rad - start.heading_rad);
     Pose2 {
-        x_m: mix(start.position_m[0], end.position_m[0]),
-        y_m: mix(start.position_m[1], end.position_m[1]),
+        x_m: x_m + fraction * (end.position_m[0] - x_m),
+        y_m: y_m + fraction * (end.position_m[1] - y_m),
         heading_rad: wrap_angle(start.heading_rad + fraction * arc_rad),
     }
 }

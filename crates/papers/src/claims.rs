@@ -1,6 +1,6 @@
 //! Claims and experiments as the reports print them, shared by all papers, and verdicts over several results.
 
-use crate::cells::{CaseResults, Proportion};
+use crate::case_results::{CaseResults, Proportion};
 use serde::Deserialize;
 use sidestep::statistics::{Interval, holm, proportion_p_value};
 use sidestep_document::claim::{Claim, Verdict};
@@ -9,7 +9,7 @@ use sidestep_document::document::{Experiment, Picture};
 use sidestep_document::{Document, Estimate, Figure, Table};
 use std::sync::LazyLock;
 
-/// The claims of a paper, read from a file beside its experiments.
+/// The claims of a paper, read from its file in `claims/` when they are first needed.
 pub(crate) type PaperClaims = LazyLock<ClaimsFile>;
 
 /// A file of claims.
@@ -43,9 +43,10 @@ struct ClaimText {
     id: String,
     paper: String,
     papers_figure: Option<String>,
-    /// The rule by which it is judged; if empty, the judgment itself states it.
-    #[serde(default)]
+    /// The rule by which it is judged.
     rule: String,
+    /// The number with which the rule compares: a factor, a share, a percentage or a tolerance.
+    threshold: Option<f64>,
 }
 
 impl ClaimsFile {
@@ -87,10 +88,23 @@ impl ClaimsFile {
         document
     }
 
+    /// Returns the number with which the rule of a claim compares.
+    ///
+    /// # Panics
+    /// If the file has no such claim, or the claim has no such number.
+    pub(crate) fn threshold(&self, id: &str) -> f64 {
+        let threshold = self.text(id).threshold;
+        threshold.unwrap_or_else(|| panic!("claim `{id}` has no threshold"))
+    }
+
+    fn text(&self, id: &str) -> &ClaimText {
+        let text = self.claim.iter().find(|claim| claim.id == id);
+        text.unwrap_or_else(|| panic!("there is no claim `{id}`"))
+    }
+
     /// Returns a claim by its number, its verdict, and our figures.
     pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
-        let text = self.claim.iter().find(|claim| claim.id == id);
-        let text = text.unwrap_or_else(|| panic!("there is no claim `{id}`"));
+        let text = self.text(id);
         Claim {
             id: &text.id,
             paper: &text.paper,
@@ -133,9 +147,7 @@ impl ThresholdTest {
         let p = estimate.p_value(threshold).filter(|_| estimate.n >= MIN_RUNS);
         // Values that all equal the threshold, but for rounding, have no spread, so a test of the mean is undefined; and they
         // are certainly not on the side of the claim.
-        let is_threshold =
-            |i: &Interval| i.low == i.high && (i.low - threshold).abs() <= 1e-12 * threshold.abs();
-        if p.is_some() && estimate.interval.as_ref().is_some_and(is_threshold) {
+        if p.is_some() && estimate.interval.is_some_and(|all| is_exactly(all, threshold)) {
             return Self { agrees: false, p: Some(0.0) };
         }
         Self { agrees: estimate.mean.is_some_and(agrees), p }
@@ -150,9 +162,25 @@ impl ThresholdTest {
 
     /// Compares a claim's "more than" by a 95 % interval of any kind.
     pub(crate) fn interval_above(interval: Option<Interval>, threshold: f64) -> Self {
+        // An interval of a fit comes without a p-value. All that the verdict asks of one is whether it is below 0.05, which
+        // is whether the interval leaves the threshold out: 0 stands for yes, 1 for no.
         let p = interval.map(|i| f64::from(i.contains(threshold)));
         Self { agrees: interval.is_some_and(|i| i.low > threshold), p }
     }
+
+    /// Returns whether the test tells the quantity from its threshold.
+    fn is_significant(self) -> bool {
+        is_significant(self.p)
+    }
+}
+
+fn is_significant(p: Option<f64>) -> bool {
+    p.is_some_and(|p| p < SIGNIFICANCE_LEVEL)
+}
+
+/// Returns whether an interval is one number, and that number is the threshold but for rounding.
+fn is_exactly(interval: Interval, threshold: f64) -> bool {
+    interval.low == interval.high && (interval.low - threshold).abs() <= 1e-12 * threshold.abs()
 }
 
 /// Judges a claim by all of its comparisons.
@@ -162,12 +190,11 @@ impl ThresholdTest {
 /// there are: that is by Holm's correction.
 pub(crate) fn judge_thresholds(family: impl IntoIterator<Item = ThresholdTest>) -> Verdict {
     let family: Vec<ThresholdTest> = family.into_iter().collect();
-    let p_values: Vec<Option<f64>> = family.iter().map(|c| c.p).collect();
-    let is_sure = |p: Option<f64>| p.is_some_and(|p| p < SIGNIFICANCE_LEVEL);
-    let contradicts = |(c, p): (&ThresholdTest, Option<f64>)| !c.agrees && is_sure(p);
-    if family.iter().zip(holm(&p_values)).any(contradicts) {
+    let p_values: Vec<Option<f64>> = family.iter().map(|test| test.p).collect();
+    let mut corrected = family.iter().zip(holm(&p_values));
+    if corrected.any(|(test, p)| !test.agrees && is_significant(p)) {
         Verdict::Refuted
-    } else if !family.is_empty() && family.iter().all(|c| c.agrees && is_sure(c.p)) {
+    } else if !family.is_empty() && family.iter().all(|test| test.agrees && test.is_significant()) {
         Verdict::Held
     } else {
         Verdict::Undecided
@@ -185,16 +212,16 @@ pub(crate) fn judge_every_run(runs: usize, holds: bool) -> Verdict {
     }
 }
 
-/// Judges a rule for every run of every cell.
+/// Judges a rule for every run of every case.
 pub(crate) fn judge_all_runs<'a>(
-    cells: impl IntoIterator<Item = &'a CaseResults>,
+    cases: impl IntoIterator<Item = &'a CaseResults>,
     holds: impl Fn(&CaseResults) -> bool,
 ) -> Verdict {
     let mut runs = 0;
     let mut holds_always = true;
-    for cell in cells {
-        runs += cell.runs();
-        holds_always &= holds(cell);
+    for case in cases {
+        runs += case.runs();
+        holds_always &= holds(case);
     }
     judge_every_run(runs, holds_always)
 }
@@ -233,6 +260,40 @@ pub(crate) fn join_texts<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const FILE: &str = "title = \"t\"\n[[experiment]]\ntitle = \"e\"\nabout = \"a\"\n\
+                        [[claim]]\nid = \"A-1\"\npaper = \"more\"\nrule = \"above 2\"\nthreshold = 2.0\n";
+
+    #[test]
+    fn a_file_has_the_words_and_the_threshold_of_each_claim() {
+        let file: &'static ClaimsFile = Box::leak(Box::new(ClaimsFile::read(FILE)));
+        let claim = file.claim("A-1", Verdict::Held, "3".into());
+        assert_eq!((claim.id, claim.paper, claim.papers_figure), ("A-1", "more", None));
+        assert_eq!((claim.ours.as_str(), claim.reason.as_str()), ("3", "above 2"));
+        assert_eq!(file.threshold("A-1"), 2.0);
+        let experiments = file.experiments([(Vec::new(), Vec::new())]);
+        assert_eq!((experiments[0].title, experiments[0].about), ("e", "a"));
+    }
+
+    #[test]
+    #[should_panic(expected = "unknown field `treshold`")]
+    fn a_misspelled_key_of_a_claim_is_refused() {
+        ClaimsFile::read(&FILE.replace("threshold", "treshold"));
+    }
+
+    #[test]
+    fn the_claims_of_the_papers_have_different_numbers() {
+        let files = [
+            include_str!("../claims/agentfly.toml"),
+            include_str!("../claims/loria.toml"),
+            include_str!("../claims/serpentine.toml"),
+        ];
+        for file in files.map(ClaimsFile::read) {
+            let ids: Vec<&str> = file.claim.iter().map(|claim| claim.id.as_str()).collect();
+            let different: std::collections::BTreeSet<&str> = ids.iter().copied().collect();
+            assert_eq!(ids.len(), different.len(), "{ids:?}");
+        }
+    }
 
     fn values(center: f64, spread: f64, n: usize) -> Estimate {
         let value = |k: usize| Some(center + if k.is_multiple_of(2) { spread } else { -spread });

@@ -7,14 +7,14 @@
 //! methods.rs    methods of the airspace world on the same traffic
 //! study.rs      a sweep file and its scenario -> the table of its runs
 //! scene.rs      the content of a picture
-//! cells.rs      the table of runs -> results of every case: as JSON, a table, points of figures
+//! case_results.rs the table of runs -> results of every case: as JSON, a table, points of figures
 //! claims.rs     verdicts over results
 //! ```
 //!
 //! Nothing here draws a figure or writes a file: results are data, reports are documents.
 
 pub mod agentfly;
-mod cells;
+mod case_results;
 mod claims;
 
 pub mod loria;

@@ -1,6 +1,6 @@
 //! Methods of collision avoidance, compared on the same traffic.
 
-use crate::cells;
+use crate::case_results;
 use crate::study::{Progress, run_all, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::plan::check_seeds;
@@ -56,49 +56,44 @@ pub struct SeedSpan {
     pub runs: usize,
 }
 
-/// Runs `source` with each method and each seed, until all airplanes have
-/// arrived or its cycles are over; once where no random number is drawn, and where two runs with
-/// different seeds end in the same state.
-///
-/// # Errors
-/// When the scenario is wrong.
-pub fn compare(
-    source: &Source,
-    methods: &[Method],
-    seeds: SeedSpan,
-    workers: usize,
-    progress: &mut Progress<'_>,
-) -> Result<Vec<MethodResult>, InputError> {
-    compare_with_interrupt(source, methods, seeds, workers, progress, &Interrupt::default())
+/// Methods to compare on the traffic of one scenario.
+#[derive(Debug)]
+pub struct Comparison<'a> {
+    /// The scenario, of the airspace world; its own method is not used.
+    pub source: &'a Source,
+    /// The methods.
+    pub methods: &'a [Method],
+    /// The runs of each method.
+    pub seeds: SeedSpan,
+    /// Number of runs at the same time; only the time depends on it.
+    pub workers: usize,
+    /// Ends the comparison by unwinding when it is raised.
+    pub interrupt: Interrupt,
 }
 
-/// Compares methods like [`compare`], and unwinds when the interrupt is raised.
-///
-/// # Errors
-/// When the scenario is wrong.
-pub fn compare_with_interrupt(
-    source: &Source,
-    methods: &[Method],
-    seeds: SeedSpan,
-    workers: usize,
-    progress: &mut Progress<'_>,
-    interrupt: &Interrupt,
-) -> Result<Vec<MethodResult>, InputError> {
-    check_seeds(seeds.first, seeds.runs as u64).map_err(|cause| {
-        let remedy = "begin with a smaller seed, or run less often";
-        InputError::new(source.file_place(), cause, remedy)
-    })?;
-    let mut results = Vec::new();
-    for method in methods {
-        let source = source
-            .clone()
-            .with_overrides(&[setting("airspace.method", method.name()).to_override()])?;
-        let report = |share| progress(method.name(), share);
-        let runs = MethodRuns { source: &source, workers, interrupt };
-        let (effect, metrics) = runs.run_seeds(seeds, report)?;
-        results.push(method_result(method.name(), effect, &metrics));
+impl Comparison<'_> {
+    /// Runs the scenario with each method and each seed, until all airplanes have arrived or its cycles are over; once
+    /// where no random number is drawn, and where two runs with different seeds end in the same state.
+    ///
+    /// # Errors
+    /// When the scenario is wrong.
+    pub fn run(&self, progress: &mut Progress<'_>) -> Result<Vec<MethodResult>, InputError> {
+        check_seeds(self.seeds.first, self.seeds.runs as u64).map_err(|cause| {
+            let remedy = "begin with a smaller seed, or run less often";
+            InputError::new(self.source.file_place(), cause, remedy)
+        })?;
+        let mut results = Vec::new();
+        for method in self.methods {
+            let overrides = [setting("airspace.method", method.name()).to_override()];
+            let source = self.source.clone().with_overrides(&overrides)?;
+            let runs =
+                MethodRuns { source: &source, workers: self.workers, interrupt: &self.interrupt };
+            let report = |share| progress(method.name(), share);
+            let (effect, metrics) = runs.run_seeds(self.seeds, report)?;
+            results.push(method_result(method.name(), effect, &metrics));
+        }
+        Ok(results)
     }
-    Ok(results)
 }
 
 /// The runs of a scenario with several seeds.
@@ -108,7 +103,8 @@ struct MethodRuns<'a> {
     interrupt: &'a Interrupt,
 }
 
-/// Number of runs that show whether seeds change anything, where the world does not know it.
+/// Number of runs that show whether seeds change anything, where the world does not know it: two final states that are equal
+/// to the bit, though their seeds differ, do not come about by chance.
 const PILOT_RUNS: usize = 2;
 
 impl MethodRuns<'_> {
@@ -142,13 +138,10 @@ impl MethodRuns<'_> {
         seeds: &[u64],
         report: impl FnMut(f64),
     ) -> Result<Vec<(Metrics, Digest)>, InputError> {
-        let run = |seed: &u64| {
-            run_to_end(
-                &self.source.clone().with_overrides(&[format!("seed={seed}")])?,
-                self.interrupt,
-            )
-        };
-        run_all(seeds, self.workers, report, run)
+        run_all(seeds, self.workers, report, |seed| {
+            let source = self.source.clone().with_overrides(&[format!("seed={seed}")])?;
+            run_to_end(&source, self.interrupt)
+        })
     }
 }
 
@@ -168,29 +161,34 @@ fn run_to_end(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest
 }
 
 fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> MethodResult {
-    let of = |value: fn(&Metrics) -> Option<f64>| Estimate::from_values(all.iter().map(value));
     let loss_free = all.iter().filter(|m| m.losses_of_separation == 0).count();
+    // Where seeds change nothing there is one run, of which an interval would claim that it is a sample of others.
+    let loss_free_interval =
+        (seeds == SeedEffect::Decide).then(|| wilson(loss_free as f64, all.len() as f64));
     MethodResult {
         method,
         runs: all.len(),
         seeds,
         loss_free,
-        loss_free_interval: (seeds == SeedEffect::Decide)
-            .then(|| wilson(loss_free as f64, all.len() as f64)),
-        losses: of(|m| Some(m.losses_of_separation as f64)),
+        loss_free_interval,
+        losses: mean(all, |m| Some(m.losses_of_separation as f64)),
         min_separation_m: all.iter().filter_map(|m| m.min_separation_m).reduce(f64::min),
-        arrived: of(|m| Some(m.arrived as f64 / m.airplanes.max(1) as f64)),
-        delay_percent: of(|m| m.mean_delay_percent),
-        optimize_cpu_s: of(|m| Some(m.optimize_cpu_s)),
-        messages: of(|m| Some(m.messages as f64)),
-        bytes: of(|m| Some(m.bytes as f64)),
-        shield_overrides: of(|m| Some(m.shield_overrides as f64)),
+        arrived: mean(all, |m| Some(m.arrived as f64 / m.airplanes.max(1) as f64)),
+        delay_percent: mean(all, |m| m.mean_delay_percent),
+        optimize_cpu_s: mean(all, |m| Some(m.optimize_cpu_s)),
+        messages: mean(all, |m| Some(m.messages as f64)),
+        bytes: mean(all, |m| Some(m.bytes as f64)),
+        shield_overrides: mean(all, |m| Some(m.shield_overrides as f64)),
     }
+}
+
+fn mean(all: &[Metrics], value: fn(&Metrics) -> Option<f64>) -> Estimate {
+    Estimate::from_values(all.iter().map(value))
 }
 
 /// Returns a table of the results side by side.
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
-    cells::table(
+    case_results::table(
         title,
         table_note(results),
         results,
@@ -229,36 +227,38 @@ fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
 
 /// Returns the sentence without which the actions of the shield would pass for those of a method.
 fn shield_note(results: &[MethodResult]) -> Option<String> {
-    let changed = |r: &&MethodResult| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0);
-    let names: Vec<_> = results.iter().filter(changed).map(|r| r.method).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "The shield changed commands of {}: there it is the shield that keeps airplanes apart, in part \
-             or in whole. Fly the methods bare with --set airspace.shield=off.",
-            names.join(", ")
-        )
-    })
+    let names = method_names(results, |r| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0))?;
+    Some(format!(
+        "The shield changed commands of {names}: there it is the shield that keeps airplanes apart, in part \
+         or in whole. Fly the methods bare with --set airspace.shield=off."
+    ))
+}
+
+/// Returns the names of the methods for which this holds, if there are any.
+fn method_names(results: &[MethodResult], holds: impl Fn(&MethodResult) -> bool) -> Option<String> {
+    let mut names = Vec::new();
+    for result in results {
+        if holds(result) {
+            names.push(result.method);
+        }
+    }
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 /// Returns the note that a reader must know about the runs.
 fn table_note(results: &[MethodResult]) -> String {
-    let of = |seeds: SeedEffect| -> Option<String> {
-        let names = results.iter().filter(|r| r.seeds == seeds).map(|r| r.method);
-        let names = names.collect::<Vec<_>>().join(", ");
-        (!names.is_empty()).then_some(names)
-    };
     let mut sentences = vec!["Every method flies the same traffic.".to_string()];
     sentences.extend(shield_note(results));
-    if of(SeedEffect::Decide).is_some() {
+    if results.iter().any(|result| result.seeds == SeedEffect::Decide) {
         sentences.push("Means over runs, with their 95 % intervals.".into());
     }
-    if let Some(names) = of(SeedEffect::Nothing) {
+    if let Some(names) = method_names(results, |r| r.seeds == SeedEffect::Nothing) {
         sentences.push(format!(
             "Seeds change nothing with {names}: no random number is drawn. So there is one run, and \
              no interval."
         ));
     }
-    if let Some(names) = of(SeedEffect::Perhaps) {
+    if let Some(names) = method_names(results, |r| r.seeds == SeedEffect::Perhaps) {
         sentences.push(format!(
             "Seeds are taken to change nothing with {names}: two runs with different seeds ended in \
              the same state, to the bit. So there is no interval."
@@ -274,8 +274,11 @@ fn table_note(results: &[MethodResult]) -> String {
 mod tests {
     use super::*;
 
-    fn seeds(runs: usize) -> SeedSpan {
-        SeedSpan { first: 1, runs }
+    fn compare(source: &Source, methods: &[Method], runs: usize) -> Vec<MethodResult> {
+        let seeds = SeedSpan { first: 1, runs };
+        let interrupt = Interrupt::default();
+        let comparison = Comparison { source, methods, seeds, workers: 2, interrupt };
+        comparison.run(&mut |_, _| ()).expect("valid")
     }
 
     #[test]
@@ -284,7 +287,7 @@ mod tests {
                     [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
                     [[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\nway_points_m = [[0, 500]]\n";
         let source = Source::new("two", text, "");
-        let results = compare(&source, &Method::ALL, seeds(5), 2, &mut |_, _| ()).expect("valid");
+        let results = compare(&source, &Method::ALL, 5);
         let table = table("t", &results);
         for (result, row) in results.iter().zip(&table.rows) {
             assert_eq!((result.runs, result.losses.n), (1, 1), "{}", result.method);
@@ -303,7 +306,7 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
         let methods = [Method::Pc, Method::None];
-        let results = compare(&source, &methods, seeds(3), 2, &mut |_, _| ()).expect("valid");
+        let results = compare(&source, &methods, 3);
         assert_eq!((results[0].loss_free, results[1].loss_free), (3, 0));
         assert_eq!(results[0].arrived.mean, Some(1.0));
         let table = table("t", &results);
@@ -318,8 +321,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
-        let results =
-            compare(&source, &[Method::None], seeds(2), 2, &mut |_, _| ()).expect("valid");
+        let results = compare(&source, &[Method::None], 2);
         assert_eq!(results[0].loss_free, 2);
         let note = table("t", &results).note;
         assert!(note.contains("The shield changed commands of none:"), "{note}");

@@ -5,10 +5,10 @@
 //! longer.
 
 use serde_json::{Map, Value};
-use sidestep::experiment::sweep::scheduler::run_cells;
+use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::experiment::sweep::{
-    BaseScenario, Cell, Outcome, Plan, RunTable, RunTableBuilder, Setting, Shard, Sweep, Variant,
-    start_cell,
+    BaseScenario, Outcome, Plan, RunTable, RunTableBuilder, Setting, Shard, Sweep, Trial, Variant,
+    start_trial,
 };
 use sidestep::kernel::{Cycle, InputError, Simulation};
 use sidestep::scenario::Source;
@@ -43,13 +43,18 @@ pub(crate) fn run_all<C: Sync, T: Send, E: Send>(
     let numbers: Vec<usize> = (0..items.len()).collect();
     let mut results: Vec<(usize, T)> = Vec::with_capacity(items.len());
     for batch in numbers.chunks(workers.max(1) * BATCH_RUNS) {
-        let run = |k: &usize| Some(run(&items[*k]).map(|result| (*k, result)));
-        run_cells(batch, workers, run, &mut |result| {
-            results.push(result);
-            Ok(())
-        })?;
+        run_trials(
+            batch,
+            workers,
+            |k| Some(run(&items[*k]).map(|result| (*k, result))),
+            &mut |result| {
+                results.push(result);
+                Ok(())
+            },
+        )?;
         report(results.len() as f64 / items.len() as f64);
     }
+    // Results come in the order in which runs end, which differs from call to call.
     results.sort_by_key(|(k, _)| *k);
     Ok(results.into_iter().map(|(_, result)| result).collect())
 }
@@ -99,8 +104,8 @@ impl Study {
         self.sweep.replicates = seeds as u32;
         self.sweep.first_seed = Some(1);
         // A variant that sets its own number of cycles keeps it.
-        let is_open = |v: &Variant| v.value("cycles").is_none();
-        if let Some(cycles) = cycles.filter(|_| self.variants.iter().all(is_open)) {
+        let is_open = self.variants.iter().all(|variant| variant.value("cycles").is_none());
+        if let (Some(cycles), true) = (cycles, is_open) {
             self.sweep.fixed.push(setting("cycles", cycles as i64));
         }
         self
@@ -133,28 +138,18 @@ impl Study {
         what: &str,
         progress: &mut Progress<'_>,
     ) -> Result<StudyResults, InputError> {
-        self.run_by(workers, what, progress, |scenario, _, cell| {
-            let run = start_cell(&WORLDS, *cell, &scenario()?, 1)?;
+        self.run_by(workers, what, progress, |scenario, _, trial| {
+            let run = start_trial(&WORLDS, *trial, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
         })
     }
 
-    /// Runs every variant by `run`, where a case and its seed give the settings of the scenario.
+    /// Returns the scenario with settings that a case and its seed give, in place of those of its variant.
     ///
     /// # Errors
-    /// The first error that `run` returns.
-    pub(crate) fn run_with(
-        &self,
-        workers: usize,
-        what: &str,
-        progress: &mut Progress<'_>,
-        settings: impl Fn(&Variant, u64) -> Vec<Setting> + Sync,
-        run: impl Fn(&Source, &Cell) -> Result<Outcome, InputError> + Sync,
-    ) -> Result<StudyResults, InputError> {
-        self.run_by(workers, what, progress, |_, variant, cell| {
-            let all = [&self.sweep.fixed[..], &settings(variant, cell.seed)].concat();
-            run(&source(self.scenario, &all)?, cell)
-        })
+    /// When a setting does not fit.
+    pub(crate) fn scenario_with(&self, settings: &[Setting]) -> Result<Source, InputError> {
+        source(self.scenario, &[&self.sweep.fixed[..], settings].concat())
     }
 
     /// Runs every variant by `run`, seed by seed, so that other load on the machine affects all
@@ -167,47 +162,47 @@ impl Study {
         workers: usize,
         what: &str,
         progress: &mut Progress<'_>,
-        run: impl Fn(&ScenarioFn<'_>, &Variant, &Cell) -> Result<Outcome, InputError> + Sync,
+        run: impl Fn(&ScenarioFn<'_>, &Variant, &Trial) -> Result<Outcome, InputError> + Sync,
     ) -> Result<StudyResults, InputError> {
         let base = source(self.scenario, &self.sweep.fixed)?;
         let own = BaseScenario { world: "", seed: 1, source: &base };
         let plan = Plan::new(&self.sweep, self.variants.clone(), own)?;
-        let cells: Vec<Cell> = plan.shard_cells(Shard::ALL).collect();
+        let trials: Vec<Trial> = plan.shard_trials(Shard::ALL).collect();
         let outcomes = run_all(
-            &cells,
+            &trials,
             workers,
             |share| progress(what, share),
-            |cell| {
-                let variant = &plan.variants[cell.variant as usize];
-                let overrides: Vec<String> =
-                    variant.settings.iter().map(Setting::to_override).collect();
-                let seed = format!("seed={}", cell.seed);
-                let scenario = || {
-                    base.clone()
-                        .with_overrides(&overrides)?
-                        .with_overrides(std::slice::from_ref(&seed))
-                };
-                run(&scenario, variant, cell)
+            |trial| {
+                let variant = &plan.variants[trial.variant as usize];
+                // Made on demand, because an experiment without a world has no scenario that its settings would fit.
+                run(&|| scenario_of(&base, variant, trial.seed), variant, trial)
             },
         )?;
         let mut rows = RunTableBuilder::default();
-        outcomes.iter().for_each(|outcome| rows.push(outcome));
+        for outcome in &outcomes {
+            rows.push(outcome);
+        }
         let table = rows.build(&plan)?;
         Ok(StudyResults { table, variants: plan.variants })
     }
 }
 
-/// Makes the scenario of a cell.
+fn scenario_of(base: &Source, variant: &Variant, seed: u64) -> Result<Source, InputError> {
+    let overrides: Vec<String> = variant.settings.iter().map(Setting::to_override).collect();
+    base.clone().with_overrides(&overrides)?.with_overrides(&[format!("seed={seed}")])
+}
+
+/// Makes the scenario of a trial.
 pub(crate) type ScenarioFn<'a> = dyn Fn() -> Result<Source, InputError> + 'a;
 
 /// Returns the outcome of an experiment that is no run of a scenario: its values by name.
-pub(crate) fn outcome_from_values(cell: &Cell, values: Value) -> Outcome {
+pub(crate) fn outcome_from_values(trial: &Trial, values: Value) -> Outcome {
     let metrics = match values {
         Value::Object(metrics) => metrics,
         _ => Map::new(),
     };
     Outcome {
-        cell: cell.id,
+        trial: trial.id,
         cycles: 0,
         digest: String::new(),
         failure: None,
@@ -244,11 +239,16 @@ pub(crate) struct StudyResults {
 /// Returns the value that a variant sets a key to, as a number; for a list its first; NaN if it is
 /// none.
 pub(crate) fn setting_number(variant: &Variant, key: &str) -> f64 {
-    fn of(value: &toml::Value) -> Option<f64> {
-        let first = || value.as_array().and_then(|all| all.first()).and_then(of);
-        value.as_float().or(value.as_integer().map(|n| n as f64)).or_else(first)
+    variant.value(key).and_then(first_number).unwrap_or(f64::NAN)
+}
+
+fn first_number(value: &toml::Value) -> Option<f64> {
+    match value {
+        toml::Value::Float(x) => Some(*x),
+        toml::Value::Integer(n) => Some(*n as f64),
+        toml::Value::Array(all) => first_number(all.first()?),
+        _ => None,
     }
-    variant.value(key).and_then(of).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -274,10 +274,10 @@ mod tests {
         let study = Study::from_variants("", variants)
             .with_size(2, None)
             .filtered(|v| setting_number(v, "n") > 1.0);
-        let run = |_: &ScenarioFn<'_>, v: &Variant, cell: &Cell| {
+        let run = |_: &ScenarioFn<'_>, v: &Variant, trial: &Trial| {
             Ok(outcome_from_values(
-                cell,
-                json!({ "x": 10.0 * setting_number(v, "n") + cell.seed as f64 }),
+                trial,
+                json!({ "x": 10.0 * setting_number(v, "n") + trial.seed as f64 }),
             ))
         };
         let results = study.run_by(2, "", &mut |_, _| (), run).expect("valid");

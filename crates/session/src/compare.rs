@@ -32,25 +32,24 @@ pub(crate) fn compare_poses(
     if recorded.is_empty() {
         return Ok(0);
     }
-    let rejected = |e: sidestep_kernel::checkpoint::CheckpointError| {
+    again.restore(&run.checkpoint()).map_err(|e| {
         InputError::new(folder.display(), e.to_string(), "this is a bug: please report it")
-    };
-    again.restore(&run.checkpoint()).map_err(rejected)?;
+    })?;
     again.start_recording();
     let mut memory = MemoryRecorder::new(&again.schemas());
     again.advance(1);
     again.record(&mut memory)?;
     let mut different = Vec::new();
     for (rows, table) in &recorded {
-        let now = |name: &str| memory.column(rows.table, name);
-        different.extend(differing_bodies(rows, table, now));
+        different.extend(differing_bodies(rows, table, &memory));
     }
+    // A body may have rows in several tables.
     different.sort_unstable();
     different.dedup();
-    match different.first() {
-        None => Ok(recorded.iter().map(|(rows, table)| count_bodies(rows, table)).sum()),
-        Some(&first) => Err(pose_mismatch(cycle, different.len(), first)),
+    if let Some(&first) = different.first() {
+        return Err(pose_mismatch(cycle, different.len(), first));
     }
+    Ok(recorded.iter().map(|(rows, table)| count_bodies(rows, table)).sum())
 }
 
 fn pose_mismatch(cycle: u64, bodies: usize, first: BodyId) -> Error {
@@ -62,17 +61,21 @@ fn pose_mismatch(cycle: u64, bodies: usize, first: BodyId) -> Error {
 }
 
 /// Returns the bodies with recorded rows that differ from the present ones.
-fn differing_bodies<'a>(
+fn differing_bodies(
     rows: &PositionColumns,
     table: &Table,
-    now: impl Fn(&str) -> Option<&'a Values>,
+    present: &MemoryRecorder,
 ) -> Vec<BodyId> {
     let names: Vec<&str> = table.schema.columns.iter().map(|c| c.name.as_str()).collect();
     let recorded = bits_by_body(rows, &names, |name| table.column(name));
-    let present = bits_by_body(rows, &names, now);
-    let differs =
-        |(of, cells): (&BodyId, &Vec<u64>)| (present.get(of) != Some(cells)).then_some(*of);
-    recorded.iter().filter_map(differs).collect()
+    let present = bits_by_body(rows, &names, |name| present.column(rows.table, name));
+    let mut differing = Vec::new();
+    for (body, bits) in recorded {
+        if present.get(&body) != Some(&bits) {
+            differing.push(body);
+        }
+    }
+    differing
 }
 
 /// Returns the number of bodies that have rows.
@@ -86,19 +89,21 @@ fn bits_by_body<'a>(
     names: &[&str],
     column: impl Fn(&str) -> Option<&'a Values>,
 ) -> BTreeMap<BodyId, Vec<u64>> {
-    let word = |name: &str, row| column(name).map(|values| bits(values, row) as u32);
     let columns: Vec<Option<&Values>> = names.iter().map(|name| column(name)).collect();
-    let count = column(rows.number).map_or(0, Values::len);
+    let Some(numbers) = column(rows.number) else { return BTreeMap::new() };
+    let parts = rows.part.and_then(&column);
     let mut all: BTreeMap<BodyId, Vec<u64>> = BTreeMap::new();
-    for row in 0..count {
-        let number = word(rows.number, row).unwrap_or(u32::MAX);
-        let of = BodyId::new(rows.kind, number, rows.part.and_then(|part| word(part, row)));
-        // A missing value has bits that differ from those of every other value.
-        let cells = columns.iter().flat_map(|values| match values {
-            Some(values) if !values.is_missing(row) => [1, bits(values, row)],
-            _ => [0, 0],
-        });
-        all.entry(of).or_default().extend(cells);
+    for row in 0..numbers.len() {
+        let number = bits(numbers, row) as u32;
+        let part = parts.map(|parts| bits(parts, row) as u32);
+        let body_bits = all.entry(BodyId::new(rows.kind, number, part)).or_default();
+        for values in &columns {
+            // A missing value has bits that differ from those of every other value.
+            body_bits.extend(match values {
+                Some(values) if !values.is_missing(row) => [1, bits(values, row)],
+                _ => [0, 0],
+            });
+        }
     }
     all
 }

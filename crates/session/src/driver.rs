@@ -12,7 +12,7 @@ use sidestep_kernel::ports::Recorder;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::{Duration, Instant};
 
-/// Duration of a slice, and so the longest wait for a stop.
+/// Duration of a slice, and so the longest wait for a stop: short enough that a key press seems to act at once.
 const SLICE_DURATION: Duration = Duration::from_millis(20);
 
 /// The cycles and the time of a stretch of a run in this process.
@@ -48,7 +48,7 @@ pub struct Sinks<'a> {
 }
 
 /// Drives the run up to cycle `until`, or until the watcher asks to stop; the run's cycle shows
-/// whether it reached the end. A film starts with the present state of the run.
+/// whether it reached the end. The first frame is of the present state of the run.
 ///
 /// # Errors
 /// When rows, checkpoints or frames cannot be stored; [`Error::InterruptedInCycle`] when the watcher's
@@ -73,11 +73,14 @@ pub(crate) fn with_interrupt<T>(
 ) -> Result<T, Error> {
     let interrupt = watcher.interrupt();
     run.set_interrupt(interrupt.clone());
-    let worked = catch_unwind(AssertUnwindSafe(|| work(&mut *run)));
-    worked.unwrap_or_else(|payload| match interrupt.caused(payload.as_ref()) {
-        true => Err(Error::InterruptedInCycle(run.cycle())),
-        false => resume_unwind(payload),
-    })
+    // An interrupt leaves the cycle by unwinding, because it may be raised deep in a search that returns no errors.
+    match catch_unwind(AssertUnwindSafe(|| work(&mut *run))) {
+        Ok(result) => result,
+        Err(payload) if interrupt.caused(payload.as_ref()) => {
+            Err(Error::InterruptedInCycle(run.cycle()))
+        }
+        Err(payload) => resume_unwind(payload),
+    }
 }
 
 fn drive_slices(
@@ -86,18 +89,25 @@ fn drive_slices(
     mut sinks: Sinks<'_>,
     watcher: &dyn Watcher,
 ) -> Result<RunTiming, Error> {
-    let (from, wall, cpu) = (run.cycle(), Instant::now(), ProcessTime::now());
+    let from = run.cycle();
+    let wall = Instant::now();
+    let cpu = ProcessTime::now();
     let watched = ProgressGuard(watcher);
-    let mut pace = SliceSize::default();
-    if let Some(film) = &mut sinks.frames {
-        film.capture(run)?;
+    let mut slice_size = SliceSize::default();
+    if let Some(frames) = &mut sinks.frames {
+        frames.capture(run)?;
     }
     watched.report(Progress::Cycles { from, done: from, until });
     while run.cycle() < until && !run.is_over() && watcher.should_continue() {
-        let allowed = sinks.viewers.as_mut().map_or(until, |viewers| viewers.next_target(run));
-        let allowed = allowed.saturating_sub(run.cycle());
+        let target = match &mut sinks.viewers {
+            Some(viewers) => viewers.next_target(run),
+            None => until,
+        };
+        // Viewers that pause the run give its present cycle, after a short wait: there is no slice then, but the
+        // watcher is still asked whether to stop.
+        let allowed = target.saturating_sub(run.cycle());
         if allowed > 0 {
-            drive_slice(run, until, &mut sinks, &mut pace, allowed)?;
+            drive_slice(run, until, &mut sinks, &mut slice_size, allowed)?;
         }
         watched.report(Progress::Cycles { from, done: run.cycle(), until });
     }
@@ -112,47 +122,59 @@ fn drive_slice(
     run: &mut dyn Simulation,
     until: Cycle,
     sinks: &mut Sinks<'_>,
-    pace: &mut SliceSize,
+    size: &mut SliceSize,
     allowed: Cycle,
 ) -> Result<(), Error> {
-    let rows_due = sinks.recording.as_ref().map_or(until, |r| r.next_flush(run.cycle()).min(until));
-    let frame_due = sinks
-        .frames
-        .as_ref()
-        .map_or(until, |f| next_multiple(f.interval(), run.cycle()).min(until));
-    let asked = pace.cycles().min(allowed).min(rows_due.min(frame_due) - run.cycle());
+    let mut rows_due = until;
+    if let Some(recording) = &sinks.recording {
+        rows_due = recording.next_flush(run.cycle()).min(until);
+    }
+    let mut frame_due = until;
+    if let Some(frames) = &sinks.frames {
+        frame_due = next_multiple(frames.interval(), run.cycle()).min(until);
+    }
+    let until_due = rows_due.min(frame_due) - run.cycle();
+    let asked = size.cycles().min(allowed).min(until_due);
     let started = Instant::now();
-    let done = match sinks.frames.as_mut().and_then(|film| Some((film.sample_interval()?, film))) {
-        Some((step, film)) => advance_sampling(run, asked, step, &mut **film),
-        None => run.advance(asked),
-    };
-    pace.adapt(done, started.elapsed());
-    // A run may be over exactly at the end of a slice: then there is no further slice.
-    let is_due = |due: Cycle, run: &dyn Simulation| run.cycle() == due || run.is_over();
+    let done = advance(run, asked, sinks);
+    size.adapt(done, started.elapsed());
+    // The run hands over rows early when its buffers are full (`done < asked`). It may also be over exactly at the
+    // end of a slice: then there is no further slice, and everything is due now.
+    let are_buffers_full = done < asked;
     if let Some(recording) = &mut sinks.recording
-        && (done < asked || is_due(rows_due, run))
+        && (are_buffers_full || run.cycle() == rows_due || run.is_over())
     {
         recording.record(run)?;
     }
     if let Some(rows) = &mut sinks.rows
-        && (done < asked || is_due(until, run))
+        && (are_buffers_full || run.cycle() == until || run.is_over())
     {
         run.record(&mut **rows)?;
     }
-    if let Some(film) = &mut sinks.frames
-        && is_due(frame_due, run)
+    if let Some(frames) = &mut sinks.frames
+        && (run.cycle() == frame_due || run.is_over())
     {
-        film.capture(run)?;
+        frames.capture(run)?;
     }
     Ok(())
 }
 
-/// Advances by at most `asked` cycles, and lets a film look at every `step`-th of them.
+/// Advances by at most `asked` cycles; returns the number of cycles done.
+fn advance(run: &mut dyn Simulation, asked: Cycle, sinks: &mut Sinks<'_>) -> Cycle {
+    if let Some(frames) = &mut sinks.frames
+        && let Some(step) = frames.sample_interval()
+    {
+        return advance_sampling(run, asked, step, &mut **frames);
+    }
+    run.advance(asked)
+}
+
+/// Advances by at most `asked` cycles, and lets a sink of frames see every `step`-th of them.
 fn advance_sampling(
     run: &mut dyn Simulation,
     asked: Cycle,
     step: Cycle,
-    film: &mut dyn FrameSink,
+    frames: &mut dyn FrameSink,
 ) -> Cycle {
     let from = run.cycle();
     while run.cycle() - from < asked && !run.is_over() {
@@ -160,7 +182,7 @@ fn advance_sampling(
         if run.advance(left.min(step)) == 0 {
             break;
         }
-        film.sample(run);
+        frames.sample(run);
     }
     run.cycle() - from
 }
@@ -180,7 +202,8 @@ impl SliceSize {
         self.0
     }
 
-    /// Adapts the number of cycles to [`SLICE_DURATION`]; it grows at most fourfold at a time.
+    /// Adapts the number of cycles to [`SLICE_DURATION`]. It grows at most fourfold at a time, because a first cycle in
+    /// which nothing happens says little about the next thousand.
     fn adapt(&mut self, cycles: u64, took: Duration) {
         let per_cycle_s = took.as_secs_f64() / cycles.max(1) as f64;
         let fitting = (SLICE_DURATION.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;

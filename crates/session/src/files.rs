@@ -14,12 +14,15 @@ pub fn display_path(path: impl AsRef<Path>) -> String {
 /// Returns the target of a path, links resolved as far as it exists: two paths to one place are equal.
 pub(crate) fn resolve_path(path: &Path) -> PathBuf {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let real = |above: &Path| {
-        let rest = whole.strip_prefix(above).ok()?;
-        // Part by part: joined to nothing, a path would end in `/`.
-        Some(above.canonicalize().ok()?.components().chain(rest.components()).collect())
-    };
-    whole.ancestors().find_map(real).unwrap_or_else(|| whole.clone())
+    for ancestor in whole.ancestors() {
+        if let Ok(existing) = ancestor.canonicalize()
+            && let Ok(rest) = whole.strip_prefix(ancestor)
+        {
+            // Part by part: joined to nothing, a path would end in `/`.
+            return existing.components().chain(rest.components()).collect();
+        }
+    }
+    whole
 }
 
 /// Replaces the file at `path` by the output of `write`: an earlier file stays until the new one is
@@ -31,13 +34,16 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> std::result::Result<(), Error> {
-    let mut growing = path.as_os_str().to_owned();
-    growing.push(format!(".{}.partial", std::process::id()));
-    let growing = Path::new(&growing);
-    write_file(growing, write)
-        .and_then(|()| std::fs::rename(growing, path))
-        .inspect_err(|_| drop(std::fs::remove_file(growing)))
-        .map_err(|e| Error::cannot_write(path, &e))
+    // Beside the target, because a file is renamed in one step only within its file system; with the process id,
+    // because two processes may write the same file at once.
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(format!(".{}.partial", std::process::id()));
+    let partial = Path::new(&partial);
+    let written = write_file(partial, write).and_then(|()| std::fs::rename(partial, path));
+    if written.is_err() {
+        let _ = std::fs::remove_file(partial);
+    }
+    written.map_err(|e| Error::cannot_write(path, &e))
 }
 
 /// Fills a file, in a folder that is created if there is none.
@@ -48,6 +54,7 @@ fn write_file(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()
     let mut file = BufWriter::new(File::create(path)?);
     write(&mut file)?;
     file.flush()?;
+    // Before the rename: after a power failure the new name could otherwise stand for an empty file.
     file.get_ref().sync_all()
 }
 

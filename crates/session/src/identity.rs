@@ -20,8 +20,8 @@ impl Producer {
     /// results may change between them. The noun `what` names the work, at `place`; `remedy` gets
     /// the name of the build that made it.
     ///
-    ///  # Errors
-    /// When the makers differ.
+    /// # Errors
+    /// When the builds differ.
     pub(crate) fn check(
         &self,
         own: &str,
@@ -30,7 +30,7 @@ impl Producer {
         remedy: impl FnOnce(&str) -> String,
     ) -> Result<(), InputError> {
         let (wrote, reads) = match &self.build {
-            Some(made) => (made.as_str(), own),
+            Some(build) => (build.as_str(), own),
             None => (self.version.as_str(), VERSION),
         };
         if wrote == reads {

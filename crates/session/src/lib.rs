@@ -54,7 +54,7 @@ pub use error::Error;
 pub use files::{display_path, write_atomically};
 pub use frame_sink::{EndReason, FrameSink, McapSink, frame_rows};
 pub use identity::VERSION;
-pub use live::{LiveControl, ViewerAddress, ViewerServer, next_free_port};
+pub use live::{LiveControl, ViewerAddress, ViewerOptions, ViewerServer, next_free_port};
 pub use managed_run::{ManagedRun, OutputPaths, RestoreError};
 pub use pacer::Pacer;
 pub use picture::write_png;

@@ -27,7 +27,7 @@ pub use restore::RestoreError;
 pub struct ManagedRun {
     run: Box<dyn Simulation>,
     recording: Option<RunRecorder>,
-    film: Option<McapSink>,
+    mcap: Option<McapSink>,
     /// Rows and frames that are kept in memory.
     rows: Option<RowStore>,
     frames: Option<FrameRows>,
@@ -36,9 +36,9 @@ pub struct ManagedRun {
     /// The cycle to stop at, if before the planned end.
     until: Option<Cycle>,
     /// The report about the file that the scenario was made from.
-    told: Option<ImportedScenario>,
-    /// Its cost so far.
-    effort: RunTiming,
+    import: Option<ImportedScenario>,
+    /// Cycles and time so far.
+    timing: RunTiming,
     /// The last cycle for which [`Self::order`] gave an order.
     ordered_at: Option<Cycle>,
 }
@@ -88,10 +88,12 @@ impl OutputPaths<'_> {
     ) -> Result<(Option<RunRecorder>, Option<McapSink>), Error> {
         if self.is_mcap_in_folder() {
             let recording = self.create_folder(resolved, run, build)?;
-            return Ok((recording, self.create_mcap(resolved, run, build)?));
+            let mcap = self.create_mcap(resolved, run, build)?;
+            return Ok((recording, mcap));
         }
-        let film = self.create_mcap(resolved, run, build)?;
-        Ok((self.create_folder(resolved, run, build)?, film))
+        let mcap = self.create_mcap(resolved, run, build)?;
+        let recording = self.create_folder(resolved, run, build)?;
+        Ok((recording, mcap))
     }
 
     fn create_mcap(
@@ -116,9 +118,8 @@ impl OutputPaths<'_> {
 
     /// Returns whether the MCAP file is to be in the folder.
     fn is_mcap_in_folder(&self) -> bool {
-        self.mcap
-            .zip(self.folder)
-            .is_some_and(|((file, _), folder)| resolve_path(file).starts_with(resolve_path(folder)))
+        let (Some((file, _)), Some(folder)) = (self.mcap, self.folder) else { return false };
+        resolve_path(file).starts_with(resolve_path(folder))
     }
 }
 
@@ -132,23 +133,24 @@ impl ManagedRun {
         compiled: &dyn CompiledScenario,
         source: &Source,
         workers: usize,
-        keep: OutputPaths<'_>,
+        outputs: OutputPaths<'_>,
     ) -> Result<Self, Error> {
-        keep.check()?;
-        if keep.folder.is_none() && keep.mcap.is_none() {
+        outputs.check()?;
+        if outputs.folder.is_none() && outputs.mcap.is_none() {
             let run = compiled.start(source, workers);
             return Ok(Self::new(run, None, None, workers));
         }
         let resolved = compiled.resolve(source)?;
-        let mut run = match keep.folder {
+        let mut run = match outputs.folder {
             None => compiled.start(source, workers),
             Some(folder) => {
-                let itself = Source::new("scenario.toml", &*resolved.text, folder);
-                compiled.start(&itself, workers)
+                // A run with a folder is of the text in that folder, so that resuming it starts from the same text.
+                let in_folder = Source::new("scenario.toml", &*resolved.text, folder);
+                compiled.start(&in_folder, workers)
             }
         };
-        let (recording, film) = keep.create(&resolved, run.as_mut(), worlds.build())?;
-        Ok(Self::new(run, recording, film, workers))
+        let (recording, mcap) = outputs.create(&resolved, run.as_mut(), worlds.build())?;
+        Ok(Self::new(run, recording, mcap, workers))
     }
 
     /// Returns a stopped run at the point from which its folder can continue, to go on to its end
@@ -165,9 +167,9 @@ impl ManagedRun {
     ) -> Result<Self, Error> {
         let (folder, point) = RunFolder::resume(path)?;
         let manifest = folder.manifest();
-        let maker =
+        let producer =
             Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-        maker.check(worlds.build(), path, "run", |wrote| {
+        producer.check(worlds.build(), path, "run", |wrote| {
             format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
         })?;
         let place = path.join("scenario.toml").display().to_string();
@@ -183,29 +185,28 @@ impl ManagedRun {
     fn new(
         run: Box<dyn Simulation>,
         recording: Option<RunRecorder>,
-        film: Option<McapSink>,
+        mcap: Option<McapSink>,
         workers: usize,
     ) -> Self {
-        let effort = RunTiming::default();
         Self {
             run,
             recording,
-            film,
+            mcap,
             rows: None,
             frames: None,
             viewers: None,
             workers,
             until: None,
-            told: None,
-            effort,
+            import: None,
+            timing: RunTiming::default(),
             ordered_at: None,
         }
     }
 
     /// Returns the run with the report about the file of another program that its scenario was made from.
     #[must_use]
-    pub fn with_import_report(self, told: Option<ImportedScenario>) -> Self {
-        Self { told, ..self }
+    pub fn with_import_report(self, import: Option<ImportedScenario>) -> Self {
+        Self { import, ..self }
     }
 
     /// The run.
@@ -218,7 +219,7 @@ impl ManagedRun {
         self.run.as_mut()
     }
 
-    /// Shows the run to viewers while it goes on.
+    /// Shows the run to viewers while it advances.
     ///
     /// # Errors
     /// When the address cannot be taken.
@@ -244,10 +245,10 @@ impl ManagedRun {
             return Err(InputError::new(folder, "the rows of this run go to a folder", remedy));
         }
         if self.rows.is_some() {
-            let remedy = "say which tables are wanted when you begin";
+            let remedy = "select the tables when you begin";
             return Err(InputError::new("record", "the rows of this run are kept already", remedy));
         }
-        if wanted.frames.is_some() && self.film.is_some() {
+        if wanted.frames.is_some() && self.mcap.is_some() {
             let remedy = "read them from there, or leave one of both out";
             let cause = "the frames of this run go to an MCAP file";
             return Err(InputError::new("frames", cause, remedy));
@@ -257,8 +258,8 @@ impl ManagedRun {
             return Err(InputError::new("frames", "0 cycles cannot lie between frames", remedy));
         }
         self.run.start_recording();
-        let (schemas, from) = (self.run.schemas(), self.run.cycle());
-        self.rows = Some(RowStore::new(&schemas, wanted.tables.as_deref(), from)?);
+        let schemas = self.run.schemas();
+        self.rows = Some(RowStore::new(&schemas, wanted.tables.as_deref(), self.run.cycle())?);
         self.frames = wanted.frames.map(FrameRows::new);
         Ok(())
     }
@@ -295,17 +296,18 @@ impl ManagedRun {
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
     pub fn advance_to(&mut self, until: Cycle, watcher: &dyn Watcher) -> Result<(), Error> {
-        let Self { run, recording, film, rows, frames, viewers, effort, .. } = self;
-        // Only a caller that keeps rows keeps frames, and such a run has no other film.
-        let frames = frames.as_mut().map(|frames| frames as &mut dyn FrameSink);
+        let Self { run, recording, mcap, rows, frames, viewers, timing, .. } = self;
+        // Frames go to one sink: `keep_rows` refuses to keep those of a run with an MCAP file.
+        let kept_frames = frames.as_mut().map(|frames| frames as &mut dyn FrameSink);
+        let mcap = mcap.as_mut().map(|mcap| mcap as &mut dyn FrameSink);
         let sinks = Sinks {
             recording: recording.as_mut(),
             rows: rows.as_mut().map(|rows| rows as &mut dyn Recorder),
-            frames: film.as_mut().map(|film| film as &mut dyn FrameSink).or(frames),
+            frames: mcap.or(kept_frames),
             viewers: viewers.as_mut(),
         };
         let driven = drive_guarded(run.as_mut(), until, sinks, watcher);
-        *effort +=
+        *timing +=
             driven.map_err(|e| explain_storage_error(e, run.as_ref(), recording.as_ref()))?;
         Ok(())
     }
@@ -315,23 +317,24 @@ impl ManagedRun {
     /// # Errors
     /// When something cannot be stored.
     pub fn finish(self, watcher: &dyn Watcher) -> Result<Summary, Error> {
-        let Self { mut run, recording, film, workers, told, effort, .. } = self;
+        let Self { mut run, recording, mcap, workers, import, timing, .. } = self;
         let folder = recording.as_ref().map(|r| r.folder().path().to_path_buf());
-        let took = recording.as_ref().map_or(Duration::ZERO, RunRecorder::elapsed)
-            + film.as_ref().map_or(Duration::ZERO, McapSink::elapsed);
-        let cost = RunCost { workers, effort, recording: took };
+        let recording_time = recording.as_ref().map_or(Duration::ZERO, RunRecorder::elapsed)
+            + mcap.as_ref().map_or(Duration::ZERO, McapSink::elapsed);
+        let cost = RunCost { workers, timing, recording: recording_time };
         let mut summary = Summary::new(run.as_ref(), cost, folder.as_deref());
-        if let Some(told) = told {
-            summary.set_import_report(told);
+        if let Some(import) = import {
+            summary.set_import_report(import);
         }
-        if let Some(film) = film {
+        // The MCAP file before the folder: the summary in the folder has the path of the finished file.
+        if let Some(mcap) = mcap {
             let ending = match summary.status {
                 RunStatus::Complete => EndReason::Complete,
                 RunStatus::Incomplete => EndReason::Stopped,
             };
-            let path = film.finish(run.as_ref(), ending);
-            let path =
-                path.map_err(|e| explain_storage_error(e, run.as_ref(), recording.as_ref()))?;
+            let path = mcap
+                .finish(run.as_ref(), ending)
+                .map_err(|e| explain_storage_error(e, run.as_ref(), recording.as_ref()))?;
             summary.set_mcap_path(path);
         }
         if let Some(recording) = recording {
@@ -341,7 +344,7 @@ impl ManagedRun {
     }
 }
 
-/// Refuses to go on with a run of agents that had orders: they would get no more orders.
+/// Refuses to continue a run whose agents had orders: they would get no more orders.
 fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), InputError> {
     if !has_orders(folder)? {
         return Ok(());
@@ -353,7 +356,10 @@ fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), Inpu
 }
 
 fn check_end(asked: Option<Cycle>, now: Cycle, planned: Cycle) -> Result<(), InputError> {
-    let Some(end) = asked.filter(|end| !(now..=planned).contains(end)) else { return Ok(()) };
+    let Some(end) = asked else { return Ok(()) };
+    if (now..=planned).contains(&end) {
+        return Ok(());
+    }
     let cause = format!("the run stands at cycle {now} and was planned for {planned} cycles");
     let remedy = format!(
         "give {now} to {planned}; for a longer run: \
@@ -374,15 +380,16 @@ pub(crate) fn record_to_end(
 ) -> Result<bool, Error> {
     let until = run.config().cycles;
     let sinks = Sinks { recording: Some(&mut recording), ..Sinks::default() };
-    let effort = drive_guarded(run, until, sinks, watcher)?;
+    let timing = drive_guarded(run, until, sinks, watcher)?;
     let folder = recording.folder().path().to_path_buf();
-    let cost = RunCost { workers, effort, recording: recording.elapsed() };
+    let cost = RunCost { workers, timing, recording: recording.elapsed() };
     let summary = Summary::new(run, cost, Some(&folder));
     store(run, recording, &summary, watcher)?;
     Ok(summary.status == RunStatus::Complete)
 }
 
-/// Completes the folder: with complete tables and pictures, or with a checkpoint to resume from.
+/// Completes the folder: with complete tables and pictures, or with a checkpoint to resume from. The folder is marked
+/// complete last, so that a process that is killed before leaves one that is resumed, never one that is taken for whole.
 fn store(
     run: &mut dyn Simulation,
     mut recording: RunRecorder,
@@ -395,10 +402,12 @@ fn store(
     };
     closed.map_err(|e| storage_error(run, Some(&recording), &e))?;
     let folder = recording.into_folder();
+    // The results are worth more than their picture, so its failure is a warning.
     if let Err(error) = picture::draw_run(run, &folder) {
         watcher.warn(&error);
     }
-    let (per_agent, per_pair) = (run.agent_metrics(), run.pair_metrics());
+    let per_agent = run.agent_metrics();
+    let per_pair = run.pair_metrics();
     folder.write_summary(&SummaryFile { summary, per_agent, per_pair })?;
     match summary.status {
         RunStatus::Complete => folder.complete(run.cycle(), &summary.digest)?,
@@ -414,8 +423,10 @@ fn drive_guarded(
     sinks: Sinks<'_>,
     watcher: &dyn Watcher,
 ) -> Result<RunTiming, Error> {
-    let driven = catch_unwind(AssertUnwindSafe(|| drive(run, until, sinks, watcher)));
-    driven.unwrap_or_else(|_| Err(internal_error(run)))
+    match catch_unwind(AssertUnwindSafe(|| drive(run, until, sinks, watcher))) {
+        Ok(result) => result,
+        Err(_) => Err(internal_error(run)),
+    }
 }
 
 /// Adds words for continuing the run, if something could not be stored.
@@ -432,10 +443,14 @@ fn explain_storage_error(
 
 /// Returns the facts for replaying a run up to the cycle at which it failed.
 fn replay_hint(run: &dyn Simulation) -> String {
-    let plan = run.config();
-    let (cycle, version) = (run.cycle(), VERSION);
-    let (name, seed, cycles) = (&plan.name, plan.seed, plan.cycles);
-    format!("at cycle {cycle} of {cycles} of `{name}`, seed {seed}, sidestep {version}")
+    let config = run.config();
+    format!(
+        "at cycle {} of {} of `{}`, seed {}, sidestep {VERSION}",
+        run.cycle(),
+        config.cycles,
+        config.name,
+        config.seed
+    )
 }
 
 /// Returns the error of a recording that failed, with words for continuing the run.

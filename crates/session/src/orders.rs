@@ -54,8 +54,8 @@ pub(crate) fn has_orders(folder: &Path) -> Result<bool, InputError> {
     if !tables(folder)?.iter().any(|name| name == OrderReader::TABLE) {
         return Ok(false);
     }
+    // An error is the only way to stop reading at the first row; the rest may be gigabytes.
     let found = for_each_block(folder, OrderReader::TABLE, .., |block| {
-        // The first row settles it.
         if block.rows() > 0 { Err(ReadStop::Found) } else { Ok(()) }
     });
     match found {

@@ -3,7 +3,7 @@
 use sidestep_kernel::Cycle;
 use std::time::{Duration, Instant};
 
-/// The delay beyond which a run does not rush to catch up.
+/// The delay beyond which a run does not rush to catch up: a viewer would see a jump.
 const MAX_LAG: Duration = Duration::from_millis(250);
 
 /// The clock of a run that is played at a speed.
@@ -20,12 +20,14 @@ impl Pacer {
         Self { start: now, from, cycles_per_s }
     }
 
-    /// Returns the cycle at which a run that is now at `cycle` should be; the clock waits for one that is too late.
+    /// Returns the cycle at which a run that is now at `cycle` should be; the clock starts again at one that is too
+    /// late.
     pub fn target(&mut self, now: Instant, cycle: Cycle) -> Cycle {
         let due = self.due_cycle(now);
-        let late = due.saturating_sub(cycle) as f64 / self.cycles_per_s;
-        if late > MAX_LAG.as_secs_f64() {
-            (self.start, self.from) = (now, cycle);
+        let lag_s = due.saturating_sub(cycle) as f64 / self.cycles_per_s;
+        if lag_s > MAX_LAG.as_secs_f64() {
+            self.start = now;
+            self.from = cycle;
             return cycle + 1;
         }
         due
@@ -40,7 +42,8 @@ impl Pacer {
     /// Returns the time at which the cycle after this one is due.
     pub fn next_due(&self, cycle: Cycle) -> Instant {
         let cycles = (cycle + 1).saturating_sub(self.from) as f64;
-        // No wait is longer than an hour; the caller asks again then.
+        // No wait is longer than an hour, because a tiny speed would give more seconds than a duration holds; the
+        // caller asks again then.
         self.start + Duration::from_secs_f64((cycles / self.cycles_per_s).min(3600.0))
     }
 }

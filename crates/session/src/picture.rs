@@ -19,13 +19,11 @@ const PNG_WIDTH_PX: u32 = 1600;
 /// # Errors
 /// When it cannot be drawn or written.
 pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(), Error> {
-    let plan = run.config();
-    let origin = match run.cycle() < plan.cycles && !run.is_over() {
-        true => {
-            format!("{} INCOMPLETE: {} of {} cycles.", footnote(run), run.cycle(), plan.cycles)
-        }
-        false => footnote(run),
-    };
+    let planned = run.config().cycles;
+    let mut origin = footnote(run);
+    if run.cycle() < planned && !run.is_over() {
+        origin = format!("{origin} INCOMPLETE: {} of {planned} cycles.", run.cycle());
+    }
     let svg = draw_svg(run, Some(folder.path()), &origin)?;
     write_bytes(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
     write_png(&folder.path().join("trajectories.png"), &svg)
@@ -41,7 +39,8 @@ pub(crate) fn draw_svg(
     folder: Option<&Path>,
     origin: &str,
 ) -> Result<String, Error> {
-    let (scenery, frame) = (run.scenery(), run.frame(FrameOptions::WITHOUT_SCANS));
+    let scenery = run.scenery();
+    let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let trails = match folder {
         Some(folder) => read_trails(&run.position_columns(), folder, &scenery, &frame)?,
         None => Vec::new(),

@@ -1,16 +1,16 @@
-//! Work that a caller attends: it runs on a thread of its own, while the caller checks for signals again and again.
+//! Work on a thread of its own, while its caller checks for signals at intervals.
 
 use std::panic::resume_unwind;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two looks.
+/// Time between two polls.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Does `work` on a thread of its own and calls `look` on this one every 20 ms until it is done: for callers on the
-/// only thread that hears of signals.
-pub fn run_polling<T: Send>(work: impl FnOnce() -> T + Send, mut look: impl FnMut()) -> T {
+/// Does `work` on a thread of its own and calls `poll` on this one every 20 ms until it is done: for callers on the
+/// only thread that receives signals, as Python's main thread.
+pub fn run_polling<T: Send>(work: impl FnOnce() -> T + Send, mut poll: impl FnMut()) -> T {
     thread::scope(|scope| {
         let (done, wait) = channel();
         let worker = scope.spawn(move || {
@@ -20,7 +20,7 @@ pub fn run_polling<T: Send>(work: impl FnOnce() -> T + Send, mut look: impl FnMu
             result
         });
         while let Err(RecvTimeoutError::Timeout) = wait.recv_timeout(POLL_INTERVAL) {
-            look();
+            poll();
         }
         worker.join().unwrap_or_else(|payload| resume_unwind(payload))
     })

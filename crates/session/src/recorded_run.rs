@@ -18,7 +18,7 @@ pub struct RecordedRun {
     /// The folder or file.
     pub path: PathBuf,
     worlds: Worlds,
-    maker: Producer,
+    producer: Producer,
     /// Whether the run reached its end.
     pub is_complete: bool,
     /// Number of cycles that are certainly done.
@@ -56,7 +56,10 @@ impl RecordedRun {
         Ok(Self {
             path: path.to_path_buf(),
             worlds: worlds.clone(),
-            maker: Producer { version: view.manifest.program_version, build: view.manifest.build },
+            producer: Producer {
+                version: view.manifest.program_version,
+                build: view.manifest.build,
+            },
             is_complete: view.manifest.status == Status::Complete,
             cycles_done: view.manifest.cycles_done,
             digest: view.manifest.digest,
@@ -76,7 +79,7 @@ impl RecordedRun {
         Ok(Self {
             path: path.to_path_buf(),
             worlds: worlds.clone(),
-            maker: Producer { version: run.program_version, build: run.build },
+            producer: Producer { version: run.program_version, build: run.build },
             is_complete: run.status == Status::Complete,
             cycles_done: run.cycles_done,
             digest: Some(run.digest),
@@ -93,18 +96,10 @@ impl RecordedRun {
     /// When a file can no longer be read.
     pub fn resolved_scenario(&self) -> Result<ResolvedScenario, InputError> {
         let folder = self.base.join(INPUTS);
-        let mut files = Vec::new();
-        if folder.is_dir() {
-            let unreadable = |e: std::io::Error| {
-                let remedy = "make the folder readable, or run the scenario again";
-                InputError::new(folder.display(), e.to_string(), remedy)
-            };
-            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
-                let entry = entry.map_err(unreadable)?;
-                let name = format!("{INPUTS}/{}", entry.file_name().display());
-                files.push((name, std::fs::read(entry.path()).map_err(unreadable)?));
-            }
-        }
+        let files = read_inputs(&folder).map_err(|e| {
+            let remedy = "make the folder readable, or run the scenario again";
+            InputError::new(folder.display(), e.to_string(), remedy)
+        })?;
         Ok(ResolvedScenario { text: self.source.text.clone(), files })
     }
 
@@ -128,7 +123,7 @@ impl RecordedRun {
     /// the scenario is no longer valid.
     pub fn start(&self, workers: usize) -> Result<Box<dyn Simulation>, InputError> {
         let compiled = self.worlds.compile(&self.source)?;
-        self.maker.check(self.worlds.build(), &self.path, "run", |wrote| {
+        self.producer.check(self.worlds.build(), &self.path, "run", |wrote| {
             format!("use sidestep {wrote}, or run its scenario again")
         })?;
         let mut run = compiled.start(&self.source, workers);
@@ -152,9 +147,10 @@ impl RecordedRun {
 
     /// Returns the build that made the recording, if it is another one: then it is not computed again.
     pub fn other_build(&self) -> Option<&str> {
-        let other =
-            self.maker.check(self.worlds.build(), &self.path, "run", |_| String::new()).is_err();
-        other.then(|| self.maker.build.as_deref().unwrap_or(&self.maker.version))
+        let Producer { version, build } = &self.producer;
+        let own = self.worlds.build();
+        let is_other = self.producer.check(own, &self.path, "run", |_| String::new()).is_err();
+        is_other.then(|| build.as_deref().unwrap_or(version))
     }
 
     /// Returns the run at its start, for watching: computed again, or from its own tables or messages if another
@@ -166,13 +162,14 @@ impl RecordedRun {
         if self.other_build().is_none() {
             return self.start(workers);
         }
+        // One worker is enough for a run that never advances: it only knows the scenery and the start.
         let start = self.worlds.compile(&self.source)?.start(&self.source, 1);
         self.check_end(start.config().cycles)?;
-        let played = match &self.folder {
-            Some(folder) => RecordedPlayback::from_tables(start, folder, self.cycles_done),
-            None => RecordedPlayback::from_messages(start, &self.path, self.cycles_done),
+        let playback = match &self.folder {
+            Some(folder) => RecordedPlayback::from_tables(start, folder, self.cycles_done)?,
+            None => RecordedPlayback::from_messages(start, &self.path, self.cycles_done)?,
         };
-        Ok(Box::new(played?))
+        Ok(Box::new(playback))
     }
 
     /// Returns the run at its last checkpoint, if that is before `cycle`; otherwise at its start.
@@ -200,10 +197,10 @@ impl RecordedRun {
     /// # Errors
     /// When they differ.
     pub fn verify_digest(&self, run: &dyn Simulation) -> Result<bool, Error> {
-        let Some(recorded) = self.digest.as_ref().filter(|_| run.cycle() == self.cycles_done)
-        else {
+        let Some(recorded) = &self.digest else { return Ok(false) };
+        if run.cycle() != self.cycles_done {
             return Ok(false);
-        };
+        }
         let digest = run.digest().to_string();
         if *recorded == digest {
             return Ok(true);
@@ -216,4 +213,17 @@ impl RecordedRun {
             "the recording was changed, or this is a bug: please report it with the recording";
         Err(Error::other(format!("{}: {cause}", self.path.display()), remedy))
     }
+}
+
+/// Returns the files of a folder of inputs, by their names relative to the scenario; none without such a folder.
+fn read_inputs(folder: &Path) -> std::io::Result<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    if folder.is_dir() {
+        for entry in std::fs::read_dir(folder)? {
+            let entry = entry?;
+            let name = format!("{INPUTS}/{}", entry.file_name().display());
+            files.push((name, std::fs::read(entry.path())?));
+        }
+    }
+    Ok(files)
 }

@@ -63,10 +63,10 @@ pub fn replay_to(
     check_cycle(cycle, run.config().cycles)?;
     let effort = drive(run.as_mut(), cycle, Sinks::default(), watcher)?;
     if run.cycle() < cycle {
-        return Err(match run.is_over() {
-            true => no_such_cycle(cycle, run.cycle()).into(),
-            false => Error::Interrupted,
-        });
+        if run.is_over() {
+            return Err(no_such_cycle(cycle, run.cycle()).into());
+        }
+        return Err(Error::Interrupted);
     }
     let compared_poses = match &recorded.folder {
         Some(folder) => compare_poses(run.as_ref(), recorded.start(workers)?, folder)?,

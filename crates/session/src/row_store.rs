@@ -41,22 +41,19 @@ impl RowStore {
         wanted: Option<&[String]>,
         begin: Cycle,
     ) -> Result<Self, InputError> {
-        let is_known = |name: &&String| schemas.iter().any(|schema| schema.name == **name);
-        if let Some(unknown) = wanted.into_iter().flatten().find(|name| !is_known(name)) {
-            let names: Vec<_> = schemas.iter().map(|schema| schema.name.as_str()).collect();
-            let cause = format!("there is no table `{unknown}`");
-            let remedy = match names.is_empty() {
-                true => "the scenario records none: see its section [record]".to_string(),
-                false => format!("give some of {}", names.join(", ")),
-            };
-            return Err(InputError::new("record", cause, remedy));
+        for name in wanted.into_iter().flatten() {
+            if !schemas.iter().any(|schema| schema.name == *name) {
+                return Err(unknown_table(name, schemas));
+            }
         }
-        let is_wanted = |schema: &TableSchema| wanted.is_none_or(|all| all.contains(&schema.name));
-        let (mut tables, mut places) = (Vec::new(), Vec::new());
+        let mut tables = Vec::new();
+        let mut places = Vec::new();
         for schema in schemas {
-            places.push(is_wanted(schema).then_some(tables.len()));
-            if is_wanted(schema) {
+            if wanted.is_none_or(|wanted| wanted.contains(&schema.name)) {
+                places.push(Some(tables.len()));
                 tables.push(schema.clone());
+            } else {
+                places.push(None);
             }
         }
         let tables = MemoryRecorder::new(&tables);
@@ -76,18 +73,20 @@ impl RowStore {
         self.tables.take()
     }
 
-    /// Notes a checkpoint of cycle `now`, the present one. Existing rows of this cycle come back with it.
+    /// Remembers a checkpoint of cycle `now`, the present one. Existing rows of this cycle come back with it.
     pub(crate) fn add_checkpoint(&mut self, checkpoint: &[u8], now: Cycle) {
-        let ahead = |(table, (schema, columns)): (usize, (&TableSchema, &[Values]))| {
+        let mut pending = Vec::new();
+        for (table, (schema, columns)) in self.tables.tables().enumerate() {
+            let Some(cycles) = cycle_column(schema, columns) else { continue };
             // Rows of the present cycle come after all others, in whichever order those are.
-            let cycles = cycle_column(schema, columns)?;
             let count = cycles.iter().rev().take_while(|&&cycle| cycle >= now).count();
-            let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
-            let picked = || columns.iter().map(|column| column.pick(&rows)).collect();
-            (count > 0).then(|| (table, picked()))
-        };
-        let ahead = self.tables.tables().enumerate().filter_map(ahead).collect();
-        self.known.insert(checkpoint_key(checkpoint, now), ahead);
+            if count > 0 {
+                let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
+                let block = columns.iter().map(|column| column.pick(&rows)).collect();
+                pending.push((table, block));
+            }
+        }
+        self.known.insert(checkpoint_key(checkpoint, now), pending);
     }
 
     /// Returns whether all remaining rows belong to the past of this checkpoint of cycle `of`, for a run at
@@ -98,14 +97,14 @@ impl RowStore {
     }
 
     /// Drops the rows of cycle `now` and of later ones, except those that came before this checkpoint of `now`, which
-    /// [fits](Self::fits); returns whether there are such rows.
+    /// is [consistent](Self::is_consistent_with) with the kept rows; returns whether there are such rows.
     ///
     /// # Errors
     /// None: rows go back to the tables that they are from.
     pub(crate) fn rewind(&mut self, checkpoint: &[u8], now: Cycle) -> Result<bool, RecordError> {
-        let mark = checkpoint_key(checkpoint, now);
-        let is_known = self.known.contains_key(&mark);
-        self.begin = if is_known { self.begin.min(now) } else { now };
+        let key = checkpoint_key(checkpoint, now);
+        // Rows before an unknown checkpoint may be of another past, so none are kept then.
+        self.begin = if self.known.contains_key(&key) { self.begin.min(now) } else { now };
         let kept = self.begin..now;
         self.tables.retain_rows(|schema, columns| {
             let cycles = cycle_column(schema, columns)?;
@@ -113,10 +112,23 @@ impl RowStore {
         });
         // Later ones belong to an abandoned past.
         self.known.retain(|(cycle, _), _| *cycle <= now);
-        let ahead = self.known.get(&mark).map(Vec::as_slice).unwrap_or_default();
-        ahead.iter().try_for_each(|(table, block)| self.tables.append(*table, block))?;
-        Ok(!ahead.is_empty())
+        let pending = self.known.get(&key).map(Vec::as_slice).unwrap_or_default();
+        for (table, block) in pending {
+            self.tables.append(*table, block)?;
+        }
+        Ok(!pending.is_empty())
     }
+}
+
+fn unknown_table(name: &str, schemas: &[TableSchema]) -> InputError {
+    let names: Vec<_> = schemas.iter().map(|schema| schema.name.as_str()).collect();
+    let cause = format!("there is no table `{name}`");
+    let remedy = if names.is_empty() {
+        "the scenario records none: see its section [record]".to_string()
+    } else {
+        format!("give some of {}", names.join(", "))
+    };
+    InputError::new("record", cause, remedy)
 }
 
 fn checkpoint_key(checkpoint: &[u8], cycle: Cycle) -> CheckpointKey {
@@ -132,9 +144,12 @@ fn cycle_column<'a>(schema: &TableSchema, columns: &'a [Values]) -> Option<&'a [
 
 impl Recorder for RowStore {
     fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
-        let place =
-            self.places.get(table).ok_or_else(|| RecordError::new(table, "no such table"))?;
-        place.map_or(Ok(()), |place| self.tables.append(place, block))
+        match self.places.get(table) {
+            Some(Some(place)) => self.tables.append(*place, block),
+            // A table that is not wanted.
+            Some(None) => Ok(()),
+            None => Err(RecordError::new(table, "no such table")),
+        }
     }
 
     fn finish(&mut self) -> Result<(), RecordError> {

@@ -11,7 +11,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Rows are passed on at multiples of this many cycles (and when buffers are full, and at
-/// checkpoints), never by the clock, so that their order is a function of the scenario alone.
+/// checkpoints), never by the clock, so that their order, and the blocks of the files, are a function of the scenario
+/// alone.
 const BLOCK_CYCLES: Cycle = 1024;
 
 /// A folder, its recorder, and the times of its checkpoints.
@@ -20,7 +21,7 @@ pub struct RunRecorder {
     recorder: ParquetRecorder,
     checkpoint_every: Cycle,
     /// Time spent on recording.
-    took: Duration,
+    elapsed: Duration,
 }
 
 impl RunRecorder {
@@ -59,7 +60,7 @@ impl RunRecorder {
         run.start_recording();
         let recorder = folder.recorder(&run.schemas(), run.cycle())?;
         let checkpoint_every = run.config().checkpoint_interval();
-        Ok(Self { folder, recorder, checkpoint_every, took: Duration::ZERO })
+        Ok(Self { folder, recorder, checkpoint_every, elapsed: Duration::ZERO })
     }
 
     /// Returns the first cycle after `cycle` at which rows must be passed on.
@@ -77,11 +78,12 @@ impl RunRecorder {
         if run.cycle().is_multiple_of(self.checkpoint_every) {
             self.save_checkpoint(run)?;
         }
-        self.took += started.elapsed();
+        self.elapsed += started.elapsed();
         Ok(())
     }
 
-    /// Makes everything recorded so far durable.
+    /// Makes everything recorded so far durable. The tables are sealed first: a checkpoint that is newer than the rows
+    /// before it could not be resumed from.
     fn save_checkpoint(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
         self.recorder.seal(run.cycle())?;
         self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
@@ -116,7 +118,7 @@ impl RunRecorder {
 
     /// Returns the time spent on recording so far.
     pub(crate) fn elapsed(&self) -> Duration {
-        self.took
+        self.elapsed
     }
 }
 

@@ -8,7 +8,7 @@ use sidestep_kernel::view::{Frame, PositionColumns, Scenery, Trail};
 use sidestep_record::{Table, read_table};
 use std::path::Path;
 
-/// Largest number of recorded poses that are read for trails; longer runs use the last ones.
+/// Largest number of recorded poses that are read for trails, some hundred megabytes; longer runs use the last ones.
 const MAX_TRAIL_ROWS: u64 = 4_000_000;
 
 /// Returns the tracks that led to a cycle, as far as they are recorded and worth showing.
@@ -24,13 +24,14 @@ pub(crate) fn read_trails(
     let whose = bodies_with_trails(scenery, frame);
     let mut trails = Vec::new();
     for rows in tables.iter().filter(|rows| has_rows(folder, rows.table)) {
+        // Tables have rows of all bodies of a kind, also of those without a trail.
         let here = frame.bodies.iter().filter(|body| body.kind == rows.kind).count();
         let moments = (MAX_TRAIL_ROWS / here.max(whose.len()).max(1) as u64).max(1);
         let cycles = moments.saturating_mul(rows.interval).min(rows.history);
         let from = frame.cycle.saturating_sub(cycles);
         let table = read_table(folder, rows.table, from..frame.cycle)?;
-        let ways = rows.trails(scenery, frame, &whose, |name| table.column(name));
-        trails.extend(ways.unwrap_or_default());
+        let of_table = rows.trails(scenery, frame, &whose, |name| table.column(name));
+        trails.extend(of_table.unwrap_or_default());
     }
     Ok(trails)
 }
@@ -42,8 +43,11 @@ pub(crate) fn read_trails(
 /// When the run has no such table, or it is damaged.
 pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
     let table = read_table(folder, name, ..).map_err(|e| {
+        if folder.join(name).exists() {
+            return e;
+        }
         let remedy = "record the run with --set record.calibration=true";
-        if folder.join(name).exists() { e } else { InputError::new(e.place(), e.cause(), remedy) }
+        InputError::new(e.place(), e.cause(), remedy)
     })?;
     CsvTable::parse(&folder.join(name).display(), &to_csv(&table))
 }
@@ -67,11 +71,14 @@ fn to_csv(table: &Table) -> String {
 
 /// Returns whether some part of the table is complete: a run that was killed early has none.
 pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
-    let is_part = |name: &std::ffi::OsStr| Path::new(name).extension() == Some("parquet".as_ref());
-    [table.to_string(), format!("{table}.partial")].iter().any(|table| {
-        let entries = std::fs::read_dir(folder.join(table));
-        entries.is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| is_part(&e.file_name()))))
-    })
+    has_parquet_file(&folder.join(table))
+        || has_parquet_file(&folder.join(format!("{table}.partial")))
+}
+
+fn has_parquet_file(folder: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    let mut names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
+    names.any(|name| Path::new(&name).extension() == Some("parquet".as_ref()))
 }
 
 /// Returns the content of `summary.json`, which a run writes at its end, if it exists.
@@ -81,9 +88,8 @@ pub(crate) fn has_rows(folder: &Path, table: &str) -> bool {
 pub fn read_summary(folder: &Path) -> Result<Option<Value>, InputError> {
     let path = folder.join("summary.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
-    let damaged = |e: serde_json::Error| {
+    serde_json::from_str(&text).map(Some).map_err(|e| {
         let remedy = "restore the file, or run the scenario again in a new folder";
         InputError::new(path.display(), format!("this is no summary: {e}"), remedy)
-    };
-    serde_json::from_str(&text).map(Some).map_err(damaged)
+    })
 }

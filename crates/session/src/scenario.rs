@@ -123,20 +123,37 @@ impl GivenScenario {
             let source = self.source.clone().with_overrides(&overrides[..count])?;
             earlier.push(experiment::problems(worlds, &source));
         }
-        let explained = |error: InputError| {
-            if error.place() != source.place {
-                return error;
-            }
-            let is_same =
-                |one: &&InputError| (one.cause(), one.key()) == (error.cause(), error.key());
-            let first = earlier.iter().position(|errors| errors.iter().any(|one| is_same(&one)));
-            match first {
-                Some(0) => earlier[0].iter().find(is_same).cloned().unwrap_or(error),
-                Some(count) => self.override_error(&overrides[count - 1], &error),
-                None => self.override_error(&overrides[overrides.len() - 1], &error),
-            }
-        };
-        Ok(found.into_iter().map(explained).collect())
+        let mut explained = Vec::with_capacity(found.len());
+        for error in found {
+            let is_in_text = error.place() == source.place;
+            explained.push(if is_in_text {
+                self.explain_problem(error, overrides, &earlier)
+            } else {
+                error
+            });
+        }
+        Ok(explained)
+    }
+
+    /// Returns a problem of the text with all overrides as one of the text as given, or of the override that caused
+    /// it. `earlier` has the problems of the text with none of the overrides, with the first, and so on.
+    fn explain_problem(
+        &self,
+        error: InputError,
+        overrides: &[String],
+        earlier: &[Vec<InputError>],
+    ) -> InputError {
+        for (count, errors) in earlier.iter().enumerate() {
+            let Some(same) = errors.iter().find(|one| is_same_problem(one, &error)) else {
+                continue;
+            };
+            return match count {
+                // Its position is that in the text which its author sees.
+                0 => same.clone(),
+                _ => self.override_error(&overrides[count - 1], &error),
+            };
+        }
+        self.override_error(&overrides[overrides.len() - 1], &error)
     }
 
     /// Returns the same error with its position in the text as given, or with the override that caused it: users
@@ -174,6 +191,11 @@ impl GivenScenario {
         let place = format!("the scenario made from {}", self.source.place);
         with_key(InputError::new(place, error.cause(), error.remedy()), error.key())
     }
+}
+
+/// Returns whether two errors are of one problem, wherever in the text they stand: overrides move lines.
+fn is_same_problem(a: &InputError, b: &InputError) -> bool {
+    a.cause() == b.cause() && a.key() == b.key()
 }
 
 fn with_key(error: InputError, key: Option<&str>) -> InputError {

@@ -82,7 +82,7 @@ pub struct Summary {
     pub outcome: KeyValues,
 }
 
-/// Writes a path as [`display_path`]: serde's own way would fail on a name that is no text, at the end of a run.
+/// Writes a path as [`display_path`]: serde itself would fail on a name that is no text, at the end of a run.
 fn as_shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
     path.as_ref().map(display_path).serialize(to)
 }
@@ -129,7 +129,7 @@ impl Phases {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunCost {
     pub(crate) workers: usize,
-    pub(crate) effort: RunTiming,
+    pub(crate) timing: RunTiming,
     /// Time spent on recording.
     pub(crate) recording: Duration,
 }
@@ -137,29 +137,30 @@ pub(crate) struct RunCost {
 impl Summary {
     /// Returns the summary of the present state of a run.
     pub(crate) fn new(run: &dyn Simulation, cost: RunCost, folder: Option<&Path>) -> Self {
-        let plan = run.config();
-        let (cycles, agents, effort) = (run.cycle(), run.agents(), cost.effort);
-        let cpu_s = effort.cpu.as_secs_f64();
-        let agent_cycles_per_cpu_s = agents as f64 * effort.cycles as f64 / cpu_s.max(1e-9);
-        let status = match cycles < plan.cycles && !run.is_over() {
-            true => RunStatus::Incomplete,
-            false => RunStatus::Complete,
-        };
+        let config = run.config();
+        let cycles = run.cycle();
+        let agents = run.agents();
+        let timing = cost.timing;
+        let cpu_s = timing.cpu.as_secs_f64();
+        // The CPU clock may not have moved in a run of a few cycles; JSON has no infinity.
+        let agent_cycles_per_cpu_s = agents as f64 * timing.cycles as f64 / cpu_s.max(1e-9);
+        let is_incomplete = cycles < config.cycles && !run.is_over();
+        let status = if is_incomplete { RunStatus::Incomplete } else { RunStatus::Complete };
         Self {
             version: VERSION,
             world: run.world(),
             agent: run.agent(),
-            name: plan.name.clone(),
+            name: config.name.clone(),
             status,
-            seed: plan.seed,
+            seed: config.seed,
             digest: run.digest().to_string(),
             cycles,
-            cycles_planned: plan.cycles,
+            cycles_planned: config.cycles,
             agents,
             robots: agents,
             workers: cost.workers,
-            cycles_timed: effort.cycles,
-            wall_s: effort.wall.as_secs_f64(),
+            cycles_timed: timing.cycles,
+            wall_s: timing.wall.as_secs_f64(),
             cpu_s,
             agent_cycles_per_cpu_s,
             robot_cycles_per_cpu_s: agent_cycles_per_cpu_s,

@@ -38,18 +38,18 @@ pub enum Progress<'a> {
 /// A terminal, a server or a program in another language that observes work. Runs of a sweep call
 /// it from several threads, so it takes `&self`.
 pub trait Watcher: Sync {
-    /// Takes note of progress: at irregular times, at least every 30 ms of a run.
+    /// Called with progress, at irregular intervals but at least every 30 ms of a run.
     fn on_progress(&self, _: Progress<'_>) {}
 
-    /// Takes note of a failure that stops nothing, e.g. of the picture of a run.
+    /// Called with a failure that stops nothing, e.g. of the picture of a run.
     fn warn(&self, _: &Error) {}
 
-    /// Returns whether to go on; asked between slices of a run.
+    /// Returns whether work shall continue; asked between slices of a run.
     fn should_continue(&self) -> bool {
         true
     }
 
-    /// Returns the interrupt at which a run looks within its cycles. A watcher raises it when the
+    /// Returns the interrupt that a run checks within its cycles. A watcher raises it when the
     /// run has not reached its next slice some time after it was asked to stop.
     fn interrupt(&self) -> Interrupt {
         Interrupt::default()

@@ -6,10 +6,11 @@ use crate::progress::StageProgress;
 use crate::scenario_args::{ScenarioArgs, WorkersArg, downcast_scenario};
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use sidestep::kernel::Interrupt;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::settings::Method;
 use sidestep_document::Table;
-use sidestep_papers::methods::{SeedSpan, compare as run_all, table};
+use sidestep_papers::methods::{Comparison, SeedSpan, table};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -68,10 +69,14 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     let compiled: &CompiledAirspace = downcast_scenario(compiled.as_ref(), &source, "airspace")?;
     let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
     let stages = StageProgress::new(console);
-    let seeds = SeedSpan { first: compiled.seed, runs: args.runs as usize };
-    let workers = args.workers.count();
-    let results =
-        run_all(&source, &methods, seeds, workers, &mut |what, share| stages.set(what, share));
+    let comparison = Comparison {
+        source: &source,
+        methods: &methods,
+        seeds: SeedSpan { first: compiled.seed, runs: args.runs as usize },
+        workers: args.workers.count(),
+        interrupt: Interrupt::default(),
+    };
+    let results = comparison.run(&mut |what, share| stages.set(what, share));
     stages.clear();
     let results = results?;
     let json = json!({ "name": compiled.name, "seed": compiled.seed, "methods": results });

@@ -19,7 +19,7 @@ pub(crate) use output::{SweepOutput, print_results, print_share};
 use sidestep_session::sweep::{self, Folder};
 pub(crate) use status::print_status;
 
-/// Runs all cells of a sweep's folder that are not finished.
+/// Runs all trials of a sweep's folder that are not finished.
 ///
 /// # Errors
 /// When runs cannot be read or stored.

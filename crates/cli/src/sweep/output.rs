@@ -172,21 +172,21 @@ fn omitted_text(reason: &str, metrics: &[&str]) -> String {
 /// Prints the first failed runs and how to run them again, and returns the number of all.
 fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
     let SweepOutput { plan, folder, console } = output;
-    let cell = table.column("cell");
-    let cell_of = |row: usize| {
-        let id = cell.and_then(|c| c.values.number(row)).map(|id| id as u64);
-        id.and_then(|id| plan.cell_of(id))
+    let trial = table.column("cell");
+    let trial_of = |row: usize| {
+        let id = trial.and_then(|c| c.values.number(row)).map(|id| id as u64);
+        id.and_then(|id| plan.trial_of(id))
     };
     let failed: Vec<usize> = sweep::failed_rows(table).collect();
     for &row in failed.iter().take(MAX_LISTED_FAILURES) {
-        let Some(cell) = cell_of(row) else { continue };
+        let Some(trial) = trial_of(row) else { continue };
         let again = folder.map_or_else(String::new, |folder| {
-            let scenario = folder.scenario(cell.variant);
-            format!("\n  again: sidestep run {} --seed {}", scenario.display(), cell.seed)
+            let scenario = folder.scenario(trial.variant);
+            format!("\n  again: sidestep run {} --seed {}", scenario.display(), trial.seed)
         });
-        let variant = &plan.variants[cell.variant as usize];
+        let variant = &plan.variants[trial.variant as usize];
         let cause = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
-        console.warn(format!("a run failed: {variant}, seed {}: {cause}{again}", cell.seed));
+        console.warn(format!("a run failed: {variant}, seed {}: {cause}{again}", trial.seed));
     }
     if failed.len() > MAX_LISTED_FAILURES {
         console.warn(format!("{} more runs failed", failed.len() - MAX_LISTED_FAILURES));

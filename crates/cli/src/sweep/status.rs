@@ -56,7 +56,7 @@ fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
     if status.is_complete {
         line("view it", format!("sidestep report {path}"));
     } else if status.is_active {
-        // No advice: a second process would run the same cells again.
+        // No advice: a second process would run the same trials again.
     } else if status.runs == status.total {
         line("join them", format!("sidestep sweep collect {path}"));
     } else {

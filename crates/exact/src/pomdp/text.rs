@@ -30,7 +30,7 @@ impl fmt::Display for Pomdp {
     }
 }
 
-/// Number of digits after the decimal point.
+/// Number of digits after the decimal point: no probability changes by more than 1e-12, and more make larger files.
 const DIGITS: u32 = 12;
 const UNITS: u64 = 10u64.pow(DIGITS);
 
@@ -42,7 +42,8 @@ fn write_row(
 ) -> fmt::Result {
     let units = in_units(row.iter().map(|entry| entry.1));
     for (&(to, _), units) in row.iter().zip(units).filter(|(_, units)| *units > 0) {
-        let (whole, rest) = (units / UNITS, units % UNITS);
+        let whole = units / UNITS;
+        let rest = units % UNITS;
         let digits = format!("{whole}.{rest:0width$}", width = DIGITS as usize);
         let digits = digits.trim_end_matches('0').trim_end_matches('.');
         writeln!(f, "{of} : {} {digits}", names[to as usize])?;

@@ -3,8 +3,8 @@
 //! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be
 //! no whole number, in the last run.
 
-use super::cell::Outcome;
 use super::table::Role;
+use super::trial::Outcome;
 use serde_json::Value;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
@@ -26,11 +26,11 @@ struct ColumnStats {
     first: ColumnOrder,
 }
 
-/// The first cell in which a column has a value, and its place there: the order of columns, whoever ran what. Columns
+/// The first trial in which a column has a value, and its place there: the order of columns, whoever ran what. Columns
 /// without any value come last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct ColumnOrder {
-    pub(super) cell: u64,
+    pub(super) trial: u64,
     pub(super) place: usize,
 }
 
@@ -38,8 +38,8 @@ impl ColumnSchema {
     /// Takes note of an outcome.
     pub fn add(&mut self, outcome: &Outcome) {
         for_each_field(outcome, |role, name, value, place| {
-            let cell = if value.is_null() { u64::MAX } else { outcome.cell };
-            self.add_column(role, name, type_of(value), ColumnOrder { cell, place });
+            let trial = if value.is_null() { u64::MAX } else { outcome.trial };
+            self.add_column(role, name, type_of(value), ColumnOrder { trial, place });
         });
     }
 

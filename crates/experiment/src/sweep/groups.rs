@@ -206,11 +206,11 @@ fn proportion(values: &[Option<f64>], seedless: bool) -> Estimate {
     share
 }
 
-/// Returns the rows in the order of their cells.
+/// Returns the rows in the order of their trials.
 fn row_order(table: &RunTable) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..table.runs()).collect();
-    if let Some(cell) = table.columns_with_role(Role::Cell).next() {
-        match &cell.values {
+    if let Some(trial) = table.columns_with_role(Role::Trial).next() {
+        match &trial.values {
             Values::I64(numbers) => rows.sort_by_key(|&run| numbers.get(run)),
             values => rows.sort_by_key(|&run| values.text(run)),
         }

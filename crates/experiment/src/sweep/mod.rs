@@ -6,11 +6,11 @@
 //! variant.rs   a scenario and a variant of it: settings, and perhaps a name
 //! design.rs    the variants: a full grid, a list, a Latin hypercube, or products of them
 //! baseline.rs  the variant that each is compared with, within the other factors
-//! plan.rs      variants x replicates -> cells, and shares of them
-//! cell.rs      one cell -> one outcome: a deterministic run, so a lost one is simply run again
+//! plan.rs      variants x replicates -> trials, and shares of them
+//! trial.rs     one trial -> one outcome: a deterministic run, so a lost one is simply run again
 //! seeds.rs     variants in which seeds change nothing
-//! scheduler.rs cells -> results, many at once
-//! rounds.rs    the next cells, if a requested precision decides when to stop
+//! scheduler.rs trials -> results, many at once
+//! rounds.rs    the next trials, if a requested precision decides when to stop
 //! rows.rs      outcomes -> a table of runs, the same for any order of arrival
 //! column_schema.rs  the columns of that table, for writing it block by block
 //!
@@ -26,13 +26,12 @@
 //! charts.rs    the summary as figures
 //! ```
 //!
-//! The unit of work is a *cell*: a variant and a seed. Replicate `k` of every variant has the same
+//! The unit of work is a *trial*: a variant and a seed. Replicate `k` of every variant has the same
 //! seed (common random numbers), so that differences between variants are compared pair by pair.
-//! Nothing here writes files or starts processes: a row is a function of its cell alone,
+//! Nothing here writes files or starts processes: a row is a function of its trial alone,
 //! regardless of the process that computes it, the place and the order.
 
 pub mod baseline;
-pub mod cell;
 mod charts;
 pub mod column_schema;
 pub mod compare;
@@ -52,10 +51,10 @@ mod summarize;
 pub mod summary;
 pub mod table;
 mod text;
+pub mod trial;
 pub mod variant;
 
 pub use baseline::{Baseline, BaselineSpec};
-pub use cell::{CellRun, Outcome, start_cell};
 pub use column_schema::ColumnSchema;
 pub use compare::Comparison;
 pub use design::{Design, Factor, LatinHypercube, ParameterRange};
@@ -64,10 +63,11 @@ pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use options::{BaselineChoice, SummaryOptions};
 pub use overrides::SweepOverrides;
-pub use plan::{Cell, Plan, Shard};
+pub use plan::{Plan, Shard, Trial};
 pub use rows::RunTableBuilder;
 pub use summary::{OmittedMetric, Summary};
 pub use table::{Role, RunColumn, RunTable};
+pub use trial::{Outcome, TrialRun, start_trial};
 pub use variant::{BaseScenario, Setting, Variant};
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The cells of a sweep, and their shares.
+//! The trials of a sweep, and their shares.
 
 use super::baseline::{Baseline, BaselineMatcher};
 use super::file::{Precision, Sweep};
@@ -13,8 +13,8 @@ use std::str::FromStr;
 
 /// All runs of a sweep: variants times replicates.
 ///
-/// A cell has the number `variant * replicates + replicate`, so rows sorted by cell are sorted by
-/// variant. Cells are run replicate by replicate, so that the first results are a small complete
+/// A trial has the number `variant * replicates + replicate`, so rows sorted by trial are sorted by
+/// variant. Trials are run replicate by replicate, so that the first results are a small complete
 /// experiment.
 ///
 /// A plan that is read back is checked ([`Plan::check`]): all other code may trust it.
@@ -62,9 +62,9 @@ impl<'de> Deserialize<'de> for Plan {
     }
 }
 
-/// The unit of work: a variant with a seed.
+/// The unit of work: a variant with a seed. Files and `--json` call it `cell`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Cell {
+pub struct Trial {
     /// Its number.
     pub id: u64,
     /// Number of its variant.
@@ -194,19 +194,19 @@ impl Plan {
         (0..self.variants.len() as u32).map(|v| u64::from(self.runs_of(v))).sum()
     }
 
-    /// Returns the number of cells; not all are run where seeds change nothing.
+    /// Returns the number of trials; not all are run where seeds change nothing.
     pub fn len(&self) -> u64 {
         self.variants.len() as u64 * u64::from(self.replicates)
     }
 
-    /// Returns whether there are no cells; a plan always has some.
+    /// Returns whether there are no trials; a plan always has some.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Returns the cell of a variant and a replicate.
-    pub fn cell(&self, variant: u32, replicate: u32) -> Cell {
-        Cell {
+    /// Returns the trial of a variant and a replicate.
+    pub fn trial(&self, variant: u32, replicate: u32) -> Trial {
+        Trial {
             id: u64::from(variant) * u64::from(self.replicates) + u64::from(replicate),
             variant,
             replicate,
@@ -214,23 +214,25 @@ impl Plan {
         }
     }
 
-    /// Returns the cell with this number, if it exists.
-    pub fn cell_of(&self, id: u64) -> Option<Cell> {
+    /// Returns the trial with this number, if it exists.
+    pub fn trial_of(&self, id: u64) -> Option<Trial> {
         let replicates = u64::from(self.replicates);
-        let cell = || self.cell((id / replicates) as u32, (id % replicates) as u32);
-        (id < self.len()).then(cell)
+        let trial = || self.trial((id / replicates) as u32, (id % replicates) as u32);
+        (id < self.len()).then(trial)
     }
 
-    /// Returns the cells of a share, in the order in which they are run: every `count`-th cell,
+    /// Returns the trials of a share, in the order in which they are run: every `count`-th trial,
     /// counted over variants and replicates alike, so that no share gets all the expensive
     /// variants.
-    pub fn shard_cells(&self, shard: Shard) -> impl Iterator<Item = Cell> + '_ {
+    pub fn shard_trials(&self, shard: Shard) -> impl Iterator<Item = Trial> + '_ {
         let (index, count) = (u64::from(shard.index), u64::from(shard.count));
         let variants = self.variants.len() as u32;
-        let cells = (0..self.replicates)
-            .flat_map(move |replicate| (0..variants).map(move |v| self.cell(v, replicate)));
-        let cells = cells.filter(|c| c.replicate < self.runs_of(c.variant));
-        cells.filter(move |c| (u64::from(c.variant) + u64::from(c.replicate)) % count == index)
+        let trials = (0..self.replicates)
+            .flat_map(move |replicate| (0..variants).map(move |v| self.trial(v, replicate)));
+        let trials = trials.filter(|trial| trial.replicate < self.runs_of(trial.variant));
+        trials.filter(move |trial| {
+            (u64::from(trial.variant) + u64::from(trial.replicate)) % count == index
+        })
     }
 }
 
@@ -257,7 +259,7 @@ fn number_duplicates(names: &mut [String]) {
     }
 }
 
-/// A share of the cells: number `index` of `count`, from 0.
+/// A share of the trials: number `index` of `count`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shard {
     /// Its number.
@@ -267,7 +269,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// The share of all cells.
+    /// The share of all trials.
     pub const ALL: Self = Self { index: 0, count: 1 };
 }
 
@@ -311,37 +313,38 @@ mod tests {
 
     proptest! {
         #[test]
-        fn shares_are_disjoint_and_together_are_all_cells(
+        fn shares_are_disjoint_and_together_are_all_trials(
             variants in 1usize..12, replicates in 1u32..12, count in 1u32..9,
         ) {
             let plan = plan(variants, replicates);
             let mut seen = BTreeSet::new();
             for index in 0..count {
-                for cell in plan.shard_cells(Shard { index, count }) {
-                    prop_assert_eq!(plan.cell_of(cell.id), Some(cell));
-                    prop_assert!(seen.insert(cell.id), "cell {} is in two shares", cell.id);
+                for trial in plan.shard_trials(Shard { index, count }) {
+                    prop_assert_eq!(plan.trial_of(trial.id), Some(trial));
+                    prop_assert!(seen.insert(trial.id), "trial {} is in two shares", trial.id);
                 }
             }
             prop_assert_eq!(seen.len() as u64, plan.len());
-            prop_assert_eq!(plan.cell_of(plan.len()), None);
+            prop_assert_eq!(plan.trial_of(plan.len()), None);
         }
     }
 
     #[test]
     fn replicates_of_all_variants_have_the_same_seeds() {
         let plan = plan(3, 4);
-        for cell in plan.shard_cells(Shard::ALL) {
-            assert_eq!(cell.seed, 7 + u64::from(cell.replicate));
+        for trial in plan.shard_trials(Shard::ALL) {
+            assert_eq!(trial.seed, 7 + u64::from(trial.replicate));
         }
-        let first: Vec<u32> = plan.shard_cells(Shard::ALL).take(3).map(|c| c.replicate).collect();
+        let first: Vec<u32> =
+            plan.shard_trials(Shard::ALL).take(3).map(|trial| trial.replicate).collect();
         assert_eq!(first, [0, 0, 0], "the first replicate of every variant comes first");
     }
 
     #[test]
     fn a_share_has_variants_and_replicates_of_all_kinds() {
         let plan = plan(2, 6);
-        let half: Vec<Cell> = plan.shard_cells(Shard { index: 0, count: 2 }).collect();
-        assert_eq!(half.iter().filter(|c| c.variant == 0).count(), 3);
+        let half: Vec<Trial> = plan.shard_trials(Shard { index: 0, count: 2 }).collect();
+        assert_eq!(half.iter().filter(|trial| trial.variant == 0).count(), 3);
         assert_eq!(half.len(), 6);
     }
 

@@ -1,9 +1,9 @@
-//! The next cells to run, if a requested precision decides when a variant has had enough runs.
+//! The next trials to run, if a requested precision decides when a variant has had enough runs.
 
-use super::cell::Outcome;
 use super::file::Precision;
-use super::plan::{Cell, Plan};
+use super::plan::{Plan, Trial};
 use super::table::RunTable;
+use super::trial::Outcome;
 use serde::Serialize;
 use sidestep_statistics::{StopDecision, StopReason, StoppingRule};
 use std::collections::{BTreeMap, BTreeSet};
@@ -53,31 +53,31 @@ impl<'a> Rounds<'a> {
 
     /// Adds an outcome.
     pub fn add(&mut self, outcome: &Outcome) {
-        let Some(cell) = self.plan.cell_of(outcome.cell) else { return };
-        let variant = cell.variant as usize;
-        self.done[variant].insert(cell.replicate);
+        let Some(trial) = self.plan.trial_of(outcome.trial) else { return };
+        let variant = trial.variant as usize;
+        self.done[variant].insert(trial.replicate);
         for (name, value) in &outcome.metrics {
             if self.until.metrics.is_empty() || self.until.metrics.contains(name) {
                 let number = value.as_f64().or_else(|| value.as_bool().map(f64::from));
                 let of_metric = self.values[variant].entry(name.clone()).or_default();
-                of_metric.insert(cell.replicate, number);
+                of_metric.insert(trial.replicate, number);
             }
         }
     }
 
-    /// Returns the cells of the next round that have no outcome yet; empty if all variants are
+    /// Returns the trials of the next round that have no outcome yet; empty if all variants are
     /// done.
-    pub fn next_cells(&self) -> Vec<Cell> {
-        let mut cells = Vec::new();
+    pub fn next_trials(&self) -> Vec<Trial> {
+        let mut trials = Vec::new();
         for variant in 0..self.plan.variants.len() as u32 {
             if let StopDecision::Run(total) = self.decide(variant) {
                 let done = &self.done[variant as usize];
                 let open = (0..total as u32).filter(|replicate| !done.contains(replicate));
-                cells.extend(open.map(|replicate| self.plan.cell(variant, replicate)));
+                trials.extend(open.map(|replicate| self.plan.trial(variant, replicate)));
             }
         }
-        cells.sort_by_key(|c| (c.replicate, c.variant));
-        cells
+        trials.sort_by_key(|trial| (trial.replicate, trial.variant));
+        trials
     }
 
     /// Returns the reasons why variants are done.
@@ -169,10 +169,10 @@ mod tests {
     }
 
     /// Variant 0 is sure at once, variant 1 varies a lot.
-    fn outcome(cell: Cell) -> Outcome {
-        let wave = f64::from(cell.replicate * 7 % 10) - 4.5;
-        let value = 100.0 + if cell.variant == 0 { 0.1 } else { 10.0 } * wave;
-        let mut outcome = Outcome::from_failure(cell, "");
+    fn outcome(trial: Trial) -> Outcome {
+        let wave = f64::from(trial.replicate * 7 % 10) - 4.5;
+        let value = 100.0 + if trial.variant == 0 { 0.1 } else { 10.0 } * wave;
+        let mut outcome = Outcome::from_failure(trial, "");
         outcome.metrics.insert("m".into(), json!(value));
         outcome.metrics.insert("constant".into(), json!(3));
         outcome
@@ -184,17 +184,17 @@ mod tests {
     }
 
     /// Runs rounds until none is left; how many runs each variant had.
-    fn all(plan: &Plan, until: &Precision, order: impl Fn(&mut Vec<Cell>)) -> [usize; 2] {
+    fn all(plan: &Plan, until: &Precision, order: impl Fn(&mut Vec<Trial>)) -> [usize; 2] {
         let mut rounds = Rounds::new(plan, until);
         loop {
-            let mut cells = rounds.next_cells();
-            if cells.is_empty() {
+            let mut trials = rounds.next_trials();
+            if trials.is_empty() {
                 let stopped = rounds.variant_stops();
                 assert_eq!(stopped.len(), 2);
                 return [stopped[0].runs, stopped[1].runs];
             }
-            order(&mut cells);
-            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
+            order(&mut trials);
+            trials.iter().for_each(|trial| rounds.add(&outcome(*trial)));
         }
     }
 
@@ -211,12 +211,12 @@ mod tests {
         let plan = plan(1000);
         let until = Precision { half_width: 0.3, ..until(&[]) };
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next_cells()
-            && !cells.is_empty()
+        while let trials = rounds.next_trials()
+            && !trials.is_empty()
         {
-            for cell in cells {
-                let rare = u32::from(cell.variant == 1 && cell.replicate % 2 == 0);
-                let mut outcome = Outcome::from_failure(cell, "");
+            for trial in trials {
+                let rare = u32::from(trial.variant == 1 && trial.replicate % 2 == 0);
+                let mut outcome = Outcome::from_failure(trial, "");
                 outcome.metrics.insert("rare".into(), json!(rare));
                 rounds.add(&outcome);
             }
@@ -231,10 +231,10 @@ mod tests {
         let plan = plan(1000);
         let until = until(&[]);
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next_cells()
-            && !cells.is_empty()
+        while let trials = rounds.next_trials()
+            && !trials.is_empty()
         {
-            cells.iter().for_each(|c| rounds.add(&Outcome::from_failure(*c, "no start")));
+            trials.iter().for_each(|trial| rounds.add(&Outcome::from_failure(*trial, "no start")));
         }
         let told = rounds.variant_stops();
         assert_eq!((told[0].runs, told[0].reason), (MIN_RUNS, StopReason::NoValues));
@@ -244,12 +244,12 @@ mod tests {
     fn order_and_interruptions_change_no_decision() {
         let plan = plan(1000);
         let straight = all(&plan, &until(&[]), |_| ());
-        assert_eq!(straight, all(&plan, &until(&[]), |cells| cells.reverse()));
-        // Killed in the middle of every round: only some cells of it are done.
-        let some = |cells: &mut Vec<Cell>| {
-            let n = cells.len().div_ceil(2);
-            cells.reverse();
-            cells.truncate(n);
+        assert_eq!(straight, all(&plan, &until(&[]), |trials| trials.reverse()));
+        // Killed in the middle of every round: only some trials of it are done.
+        let some = |trials: &mut Vec<Trial>| {
+            let n = trials.len().div_ceil(2);
+            trials.reverse();
+            trials.truncate(n);
         };
         assert_eq!(straight, all(&plan, &until(&[]), some));
     }
@@ -259,10 +259,10 @@ mod tests {
         let plan = plan(20);
         let until = until(&["m"]);
         let mut rounds = Rounds::new(&plan, &until);
-        while let cells = rounds.next_cells()
-            && !cells.is_empty()
+        while let trials = rounds.next_trials()
+            && !trials.is_empty()
         {
-            cells.iter().for_each(|c| rounds.add(&outcome(*c)));
+            trials.iter().for_each(|trial| rounds.add(&outcome(*trial)));
         }
         let told = rounds.variant_stops();
         assert_eq!((told[1].runs, told[1].reason), (20, StopReason::Maximum));

@@ -1,6 +1,5 @@
 //! Outcomes -> a table of runs, the same for any order of arrival.
 
-use super::cell::Outcome;
 use super::column_schema::{
     CYCLES, ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text,
     widened,
@@ -8,6 +7,7 @@ use super::column_schema::{
 use super::plan::{Plan, Shard};
 use super::seeds::PilotRuns;
 use super::table::{Role, RunColumn, RunTable};
+use super::trial::Outcome;
 use super::variant::Variant;
 use serde_json::Value;
 use sidestep_kernel::InputError;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 /// into less than half a gigabyte.
 #[derive(Debug, Default)]
 pub struct RunTableBuilder {
-    cells: Vec<u64>,
+    trials: Vec<u64>,
     columns: Vec<ColumnBuilder>,
     /// Indices of the columns, by role and name.
     index: BTreeMap<(Role, String), usize>,
@@ -34,53 +34,53 @@ struct ColumnBuilder {
 impl RunTableBuilder {
     /// Returns the number of outcomes.
     pub fn len(&self) -> usize {
-        self.cells.len()
+        self.trials.len()
     }
 
     /// Returns whether there are no outcomes.
     pub fn is_empty(&self) -> bool {
-        self.cells.is_empty()
+        self.trials.is_empty()
     }
 
     /// Adds an outcome.
     pub fn push(&mut self, outcome: &Outcome) {
-        self.cells.push(outcome.cell);
+        self.trials.push(outcome.trial);
         for_each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
     }
 
     /// Sets a field of the last row.
     fn set(&mut self, role: Role, name: &str, value: &Value, place: usize) {
-        let row = self.cells.len() - 1;
-        let cell = self.cells[row];
+        let row = self.trials.len() - 1;
+        let trial = self.trials[row];
         let key = (role, name.to_string());
         let k = *self.index.entry(key).or_insert_with(|| {
             let values = Values::empty(ColumnType::F64);
             let column = RunColumn { name: name.into(), role, values };
-            let first = ColumnOrder { cell: u64::MAX, place: usize::MAX };
+            let first = ColumnOrder { trial: u64::MAX, place: usize::MAX };
             self.columns.push(ColumnBuilder { column, first });
             self.columns.len() - 1
         });
         let growing = &mut self.columns[k];
-        let cell = if value.is_null() { u64::MAX } else { cell };
-        growing.first = growing.first.min(ColumnOrder { cell, place });
+        let trial = if value.is_null() { u64::MAX } else { trial };
+        growing.first = growing.first.min(ColumnOrder { trial, place });
         growing.column.values.resize(row);
         push_value(&mut growing.column.values, value);
     }
 
-    /// Returns the table of all runs, sorted by cell: numbers of cell, variant and replicate, seed,
-    /// parameters, metrics, digest, costs. Outcomes of cells that are not in the plan are left out.
+    /// Returns the table of all runs, sorted by trial: numbers of trial, variant and replicate, seed,
+    /// parameters, metrics, digest, costs. Outcomes of trials that are not in the plan are left out.
     ///
     /// # Errors
-    /// When a cell has two outcomes that differ, because they come from different programs or
+    /// When a trial has two outcomes that differ, because they come from different programs or
     /// machines.
     pub fn build(self, plan: &Plan) -> Result<RunTable, InputError> {
-        let (shape, mut trials) = (self.schema(), PilotRuns::new(plan));
+        let (shape, mut pilots) = (self.schema(), PilotRuns::new(plan));
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
-        for (row, cell) in self.cells.iter().enumerate() {
+        for (row, trial) in self.trials.iter().enumerate() {
             let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
-            trials.add_digest(Some(*cell), end);
+            pilots.add_digest(Some(*trial), end);
         }
-        self.build_block(plan, &shape, &trials)
+        self.build_block(plan, &shape, &pilots)
     }
 
     /// Returns the columns of these outcomes alone.
@@ -94,8 +94,8 @@ impl RunTableBuilder {
         shape
     }
 
-    /// Returns a part of the table of all runs: the rows of these outcomes, sorted by cell, in the columns of all
-    /// outcomes. Outcomes of cells that are not in the plan are left out, and runs beyond trials that settle their
+    /// Returns a part of the table of all runs: the rows of these outcomes, sorted by trial, in the columns of all
+    /// outcomes. Outcomes of trials that are not in the plan are left out, and runs beyond pilots that settle their
     /// variant.
     ///
     /// # Errors
@@ -104,17 +104,19 @@ impl RunTableBuilder {
         mut self,
         plan: &Plan,
         shape: &ColumnSchema,
-        trials: &PilotRuns<'_>,
+        pilots: &PilotRuns<'_>,
     ) -> Result<RunTable, InputError> {
-        let rows = self.cells.len();
+        let rows = self.trials.len();
         self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
         let mut order: Vec<usize> = (0..rows).collect();
-        order.retain(|&row| plan.cell_of(self.cells[row]).is_some());
-        order.sort_by_key(|&row| (self.cells[row], row));
+        order.retain(|&row| plan.trial_of(self.trials[row]).is_some());
+        order.sort_by_key(|&row| (self.trials[row], row));
         self.check_duplicates(&order)?;
-        order.dedup_by_key(|row| self.cells[*row]);
-        order.retain(|&row| plan.cell_of(self.cells[row]).is_some_and(|c| trials.needs(&c)));
-        let mut columns = identity_columns(plan, order.iter().map(|&row| self.cells[row]));
+        order.dedup_by_key(|row| self.trials[*row]);
+        order.retain(|&row| {
+            plan.trial_of(self.trials[row]).is_some_and(|trial| pilots.needs(&trial))
+        });
+        let mut columns = identity_columns(plan, order.iter().map(|&row| self.trials[row]));
         for (role, name, ty) in shape.columns() {
             let mut values = match self.index.get(&(role, name.to_string())) {
                 // Let go of at once, so that no value stands in the memory twice.
@@ -131,15 +133,15 @@ impl RunTableBuilder {
         Ok(RunTable { columns })
     }
 
-    /// Checks that cells that were run twice have the same outcome.
+    /// Checks that trials that were run twice have the same outcome.
     fn check_duplicates(&self, order: &[usize]) -> Result<(), InputError> {
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         let Some(digest) = digest else { return Ok(()) };
         let text = |row: usize| digest.column.values.text(row);
         for pair in order.windows(2) {
-            let cell = self.cells[pair[0]];
-            if cell == self.cells[pair[1]] && text(pair[0]) != text(pair[1]) {
-                let cause = format!("two runs of cell {cell} differ");
+            let trial = self.trials[pair[0]];
+            if trial == self.trials[pair[1]] && text(pair[0]) != text(pair[1]) {
+                let cause = format!("two runs of trial {trial} differ");
                 let remedy = "run all shares with the same build of the program";
                 return Err(InputError::new("the shares", cause, remedy));
             }
@@ -156,7 +158,7 @@ impl RunTable {
 
     /// Returns the times that each run took.
     pub fn timings(&self) -> Vec<&RunColumn> {
-        self.columns.iter().filter(|c| matches!(c.role, Role::Cell | Role::Cost)).collect()
+        self.columns.iter().filter(|c| matches!(c.role, Role::Trial | Role::Cost)).collect()
     }
 
     /// Passes on the outcomes that the rows of a share's table stand for.
@@ -165,18 +167,18 @@ impl RunTable {
             Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
             _ => None,
         };
-        let cell = self.columns_with_role(Role::Cell).next();
+        let trial = self.columns_with_role(Role::Trial).next();
         let digest = self.columns_with_role(Role::Digest).next();
         let failure = self.column(FAILURE);
         for row in 0..self.runs() {
-            let Some(cell) = number(row, cell) else { continue };
+            let Some(trial) = number(row, trial) else { continue };
             let fields = |role: Role| {
                 let own = |c: &&RunColumn| ![CYCLES, FAILURE].contains(&c.name.as_str());
                 let columns = self.columns_with_role(role).filter(own);
                 columns.map(|c| (c.name.clone(), c.values.json(row))).collect()
             };
             each(Outcome {
-                cell,
+                trial,
                 cycles: number(row, self.column(CYCLES)).unwrap_or(0),
                 digest: digest.map_or_else(String::new, |c| c.values.text(row)),
                 failure: failure.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
@@ -187,32 +189,32 @@ impl RunTable {
     }
 }
 
-/// Returns the table of all cells of a plan: one row for each future run.
-pub fn cell_table(plan: &Plan) -> RunTable {
-    let mut cells: Vec<u64> = plan.shard_cells(Shard::ALL).map(|cell| cell.id).collect();
-    cells.sort_unstable();
-    RunTable { columns: identity_columns(plan, cells.into_iter()) }
+/// Returns the table of all trials of a plan: one row for each future run.
+pub fn trial_table(plan: &Plan) -> RunTable {
+    let mut trials: Vec<u64> = plan.shard_trials(Shard::ALL).map(|trial| trial.id).collect();
+    trials.sort_unstable();
+    RunTable { columns: identity_columns(plan, trials.into_iter()) }
 }
 
-/// Returns the identity of runs: the columns that follow from their cells.
-fn identity_columns(plan: &Plan, cells: impl Iterator<Item = u64>) -> Vec<RunColumn> {
-    let cells: Vec<_> = cells.filter_map(|id| plan.cell_of(id)).collect();
-    let ints = |name: &str, role, value: fn(&super::Cell) -> u64| RunColumn {
+/// Returns the identity of runs: the columns that follow from their trials.
+fn identity_columns(plan: &Plan, trials: impl Iterator<Item = u64>) -> Vec<RunColumn> {
+    let trials: Vec<_> = trials.filter_map(|id| plan.trial_of(id)).collect();
+    let ints = |name: &str, role, value: fn(&super::Trial) -> u64| RunColumn {
         name: name.into(),
         role,
-        values: Values::I64(cells.iter().map(|c| value(c) as i64).collect()),
+        values: Values::I64(trials.iter().map(|trial| value(trial) as i64).collect()),
     };
     let mut columns = vec![
-        ints("cell", Role::Cell, |c| c.id),
-        ints("variant", Role::Variant, |c| c.variant.into()),
-        ints("replicate", Role::Replicate, |c| c.replicate.into()),
+        ints("cell", Role::Trial, |trial| trial.id),
+        ints("variant", Role::Variant, |trial| trial.variant.into()),
+        ints("replicate", Role::Replicate, |trial| trial.replicate.into()),
         ints("seed", Role::Seed, |c| c.seed),
     ];
     for name in &plan.parameters {
         let levels = levels(plan, name);
         let ty = levels.iter().map(type_of).fold(None, common_type).unwrap_or(ColumnType::F64);
         let mut values = Values::empty(ColumnType::F64);
-        cells.iter().for_each(|cell| push_value(&mut values, &levels[cell.variant as usize]));
+        trials.iter().for_each(|trial| push_value(&mut values, &levels[trial.variant as usize]));
         let values = widened(values, ty);
         columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
     }
@@ -285,23 +287,23 @@ mod tests {
         Plan::new(&sweep, variants, base).expect("valid")
     }
 
-    /// Outcomes with fields that differ in number and type from cell to cell.
-    fn outcome(cell: u64) -> Outcome {
+    /// Outcomes with fields that differ in number and type from trial to trial.
+    fn outcome(trial: u64) -> Outcome {
         let mut metrics = serde_json::Map::new();
-        metrics.insert("always".into(), json!(cell));
-        metrics.insert("wider".into(), if cell == 5 { json!(0.5) } else { json!(cell) });
-        if cell % 2 == 1 {
-            metrics.insert("sometimes".into(), json!(cell > 4));
+        metrics.insert("always".into(), json!(trial));
+        metrics.insert("wider".into(), if trial == 5 { json!(0.5) } else { json!(trial) });
+        if trial % 2 == 1 {
+            metrics.insert("sometimes".into(), json!(trial > 4));
         }
         metrics.insert("none".into(), Value::Null);
         let costs = [("run_wall_s".to_string(), json!(0.25))].into_iter().collect();
-        let digest = format!("digest {cell}");
-        Outcome { cell, cycles: 10, digest, failure: None, metrics, costs }
+        let digest = format!("digest {trial}");
+        Outcome { trial, cycles: 10, digest, failure: None, metrics, costs }
     }
 
-    fn table(cells: impl IntoIterator<Item = u64>) -> RunTable {
+    fn table(trials: impl IntoIterator<Item = u64>) -> RunTable {
         let mut rows = RunTableBuilder::default();
-        cells.into_iter().for_each(|cell| rows.push(&outcome(cell)));
+        trials.into_iter().for_each(|trial| rows.push(&outcome(trial)));
         rows.build(&plan()).expect("no twins that differ")
     }
 
@@ -337,11 +339,11 @@ mod tests {
     proptest! {
         #[test]
         fn the_order_in_which_outcomes_come_does_not_matter(
-            cells in proptest::sample::subsequence((0..12u64).collect::<Vec<_>>(), 0..12).prop_shuffle(),
+            trials in proptest::sample::subsequence((0..12u64).collect::<Vec<_>>(), 0..12).prop_shuffle(),
         ) {
-            let mut sorted = cells.clone();
+            let mut sorted = trials.clone();
             sorted.sort_unstable();
-            prop_assert_eq!(table(cells), table(sorted));
+            prop_assert_eq!(table(trials), table(sorted));
         }
     }
 
@@ -358,7 +360,7 @@ mod tests {
         fn shares_join_to_the_table_of_one_process(count in 1u64..7) {
             let mut rows = RunTableBuilder::default();
             for index in (0..count).rev() {
-                let share = table((0..12).filter(|cell| cell % count == index));
+                let share = table((0..12).filter(|trial| trial % count == index));
                 share.for_each_outcome(|outcome| rows.push(&outcome));
             }
             prop_assert_eq!(rows.build(&plan()), Ok(table(0..12)));
@@ -370,16 +372,16 @@ mod tests {
         fn blocks_one_below_the_other_are_the_table(size in 1u64..9, step in 1u64..12) {
             let (plan, mut shape) = (plan(), ColumnSchema::default());
             let arrived: Vec<Outcome> = (0..12).map(|k| outcome((k * step + k / 3) % 12)).collect();
-            let mut trials = PilotRuns::new(&plan);
+            let mut pilots = PilotRuns::new(&plan);
             for outcome in &arrived {
                 shape.add(outcome);
-                trials.add(outcome);
+                pilots.add(outcome);
             }
             let mut joined: Option<RunTable> = None;
             for first in (0..12).step_by(size as usize) {
                 let mut rows = RunTableBuilder::default();
-                arrived.iter().filter(|o| (first..first + size).contains(&o.cell)).for_each(|o| rows.push(o));
-                let block = rows.build_block(&plan, &shape, &trials).expect("no twins that differ");
+                arrived.iter().filter(|o| (first..first + size).contains(&o.trial)).for_each(|o| rows.push(o));
+                let block = rows.build_block(&plan, &shape, &pilots).expect("no twins that differ");
                 match &mut joined {
                     None => joined = Some(block),
                     Some(table) => for (column, more) in table.columns.iter_mut().zip(&block.columns) {
@@ -388,24 +390,24 @@ mod tests {
                     }
                 }
             }
-            prop_assert_eq!(joined, Some(table(arrived.iter().map(|o| o.cell))));
+            prop_assert_eq!(joined, Some(table(arrived.iter().map(|o| o.trial))));
         }
     }
 
     #[test]
-    fn a_cell_that_was_run_twice_counts_once_and_must_agree() {
+    fn a_trial_that_was_run_twice_counts_once_and_must_agree() {
         assert_eq!(table([3, 1, 3]), table([1, 3]));
         let mut rows = RunTableBuilder::default();
         rows.push(&outcome(3));
         rows.push(&Outcome { digest: "another".into(), ..outcome(3) });
-        assert!(rows.build(&plan()).expect_err("they differ").cause().contains("cell 3"));
+        assert!(rows.build(&plan()).expect_err("they differ").cause().contains("trial 3"));
     }
 
     #[test]
     fn a_failed_run_has_a_row_that_says_why() {
         let mut rows = RunTableBuilder::default();
         rows.push(&outcome(0));
-        rows.push(&Outcome::from_failure(plan().cell(0, 1), "index out of bounds"));
+        rows.push(&Outcome::from_failure(plan().trial(0, 1), "index out of bounds"));
         let table = rows.build(&plan()).expect("no twins");
         let text = |name: &str, row| table.column(name).expect(name).values.text(row);
         assert_eq!(

@@ -1,10 +1,10 @@
-//! Cells -> results, many at once: the one scheduler of sweeps.
+//! Trials -> results, many at once: the one scheduler of sweeps.
 
 use sidestep_kernel::workers;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Takes a result: once it returns, the cell is finished.
+/// Takes a result: once it returns, the trial is finished.
 pub type ResultSink<'a, T, E> = dyn FnMut(T) -> Result<(), E> + Send + 'a;
 
 /// The state that all workers share.
@@ -13,13 +13,13 @@ struct SharedState<'a, 'b, T, E> {
     failure: Option<E>,
 }
 
-/// Runs the cells, `at_once` at a time and as far as possible in order, and passes every result on
-/// as it arrives. `run` returns `None` if a cell was interrupted.
+/// Runs the trials, `at_once` at a time and as far as possible in order, and passes every result on
+/// as it arrives. `run` returns `None` if a trial was interrupted.
 ///
 /// # Errors
-/// The first error of `run` or `take`; no cell starts after that.
-pub fn run_cells<C: Sync, T: Send, E: Send>(
-    cells: &[C],
+/// The first error of `run` or `take`; no trial starts after that.
+pub fn run_trials<C: Sync, T: Send, E: Send>(
+    trials: &[C],
     at_once: usize,
     run: impl Fn(&C) -> Option<Result<T, E>> + Sync,
     take: &mut ResultSink<'_, T, E>,
@@ -28,12 +28,12 @@ pub fn run_cells<C: Sync, T: Send, E: Send>(
     let shared = Mutex::new(SharedState { take, failure: None });
     // A worker that panicked outside of a run has left the values intact.
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut crew = vec![(); at_once.clamp(1, cells.len().max(1))];
+    let mut crew = vec![(); at_once.clamp(1, trials.len().max(1))];
     workers::run(&mut crew, |_, ()| {
-        while let Some(cell) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
+        while let Some(trial) = trials.get(next.fetch_add(1, Ordering::Relaxed)) {
             // No thread holds the lock while a run is in progress.
             let is_broken = lock().failure.is_some();
-            let result = if is_broken { None } else { run(cell) };
+            let result = if is_broken { None } else { run(trial) };
             let Some(result) = result else { return };
             let mut shared = lock();
             if let Err(failure) = result.and_then(|result| (shared.take)(result)) {
@@ -51,34 +51,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_cell_is_run_once_for_any_number_of_workers() {
+    fn every_trial_is_run_once_for_any_number_of_workers() {
         for at_once in [0, 1, 2, 5] {
             for count in [0, 1, 3, 100] {
-                let cells: Vec<u32> = (0..count).collect();
+                let trials: Vec<u32> = (0..count).collect();
                 let mut done = Vec::new();
-                let run = |cell: &u32| Some(Ok::<_, ()>(cell * cell));
-                let ended = run_cells(&cells, at_once, run, &mut |result| {
+                let run = |trial: &u32| Some(Ok::<_, ()>(trial * trial));
+                let ended = run_trials(&trials, at_once, run, &mut |result| {
                     done.push(result);
                     Ok(())
                 });
                 done.sort_unstable();
-                assert_eq!((ended, done), (Ok(()), cells.iter().map(|n| n * n).collect()));
+                assert_eq!((ended, done), (Ok(()), trials.iter().map(|n| n * n).collect()));
             }
         }
     }
 
     #[test]
-    fn the_first_failure_ends_all_and_a_cell_that_is_broken_off_ends_its_worker() {
-        let cells: Vec<u32> = (0..100).collect();
+    fn the_first_failure_ends_all_and_a_trial_that_is_broken_off_ends_its_worker() {
+        let trials: Vec<u32> = (0..100).collect();
         let mut taken = 0;
         let mut take = |_| {
             taken += 1;
             Ok(())
         };
-        let fails = |cell: &u32| Some(if *cell == 3 { Err("full") } else { Ok(*cell) });
-        assert_eq!(run_cells(&cells, 1, fails, &mut take), Err("full"));
-        let stops = |cell: &u32| (*cell < 2).then_some(Ok::<_, &str>(*cell));
-        assert_eq!(run_cells(&cells, 1, stops, &mut take), Ok(()));
+        let fails = |trial: &u32| Some(if *trial == 3 { Err("full") } else { Ok(*trial) });
+        assert_eq!(run_trials(&trials, 1, fails, &mut take), Err("full"));
+        let stops = |trial: &u32| (*trial < 2).then_some(Ok::<_, &str>(*trial));
+        assert_eq!(run_trials(&trials, 1, stops, &mut take), Ok(()));
         assert_eq!(taken, 3 + 2);
     }
 }

@@ -4,9 +4,9 @@
 //! only guide a search, the first two runs decide: if they end in the same state to the bit, with
 //! the same cycles, seeds are taken to change nothing, and there are no more runs.
 
-use super::cell::Outcome;
-use super::plan::{Cell, Plan};
+use super::plan::{Plan, Trial};
 use super::table::{Role, RunTable};
+use super::trial::Outcome;
 use sidestep_scenario::{SeedEffect, WorldType};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,45 +17,46 @@ const PILOT_RUNS: u32 = 2;
 #[derive(Debug)]
 pub struct PilotRuns<'a> {
     plan: &'a Plan,
-    /// The ends of trials, by variant.
+    /// The ends of pilots, by variant.
     ends: BTreeMap<u32, BTreeMap<u32, String>>,
 }
 
 impl<'a> PilotRuns<'a> {
-    /// Returns the trials before any run.
+    /// Returns the pilots before any run.
     pub fn new(plan: &'a Plan) -> Self {
         Self { plan, ends: BTreeMap::new() }
     }
 
-    /// Returns the trials of a table of runs.
+    /// Returns the pilots of a table of runs.
     pub(super) fn from_table(plan: &'a Plan, runs: &RunTable) -> Self {
-        let mut trials = Self::new(plan);
-        if let (Some(cells), Some(digests)) =
-            (runs.columns_with_role(Role::Cell).next(), runs.columns_with_role(Role::Digest).next())
-        {
+        let mut pilots = Self::new(plan);
+        if let (Some(trials), Some(digests)) = (
+            runs.columns_with_role(Role::Trial).next(),
+            runs.columns_with_role(Role::Digest).next(),
+        ) {
             for row in 0..runs.runs() {
-                let cell = cells.values.number(row).map(|id| id as u64);
-                trials.add_digest(cell, digests.values.text(row));
+                let trial = trials.values.number(row).map(|id| id as u64);
+                pilots.add_digest(trial, digests.values.text(row));
             }
         }
-        trials
+        pilots
     }
 
     /// Adds an outcome.
     pub fn add(&mut self, outcome: &Outcome) {
-        self.add_digest(Some(outcome.cell), outcome.digest.clone());
+        self.add_digest(Some(outcome.trial), outcome.digest.clone());
     }
 
-    pub(super) fn add_digest(&mut self, cell: Option<u64>, digest: String) {
-        let Some(cell) = cell.and_then(|id| self.plan.cell_of(id)) else { return };
+    pub(super) fn add_digest(&mut self, trial: Option<u64>, digest: String) {
+        let Some(trial) = trial.and_then(|id| self.plan.trial_of(id)) else { return };
         let asks =
-            self.plan.until.is_none() && self.plan.seeds(cell.variant) == SeedEffect::Perhaps;
-        if asks && cell.replicate < PILOT_RUNS && !digest.is_empty() {
-            self.ends.entry(cell.variant).or_default().insert(cell.replicate, digest);
+            self.plan.until.is_none() && self.plan.seeds(trial.variant) == SeedEffect::Perhaps;
+        if asks && trial.replicate < PILOT_RUNS && !digest.is_empty() {
+            self.ends.entry(trial.variant).or_default().insert(trial.replicate, digest);
         }
     }
 
-    /// Returns whether all trials of a variant ended alike.
+    /// Returns whether all pilots of a variant ended alike.
     pub fn is_settled(&self, variant: u32) -> bool {
         let Some(ends) = self.ends.get(&variant) else { return false };
         let mut ends = ends.values();
@@ -63,25 +64,25 @@ impl<'a> PilotRuns<'a> {
         ends.len() + 1 == PILOT_RUNS as usize && ends.all(|end| Some(end) == first)
     }
 
-    /// Returns whether a cell is of use: it is not where its variant is settled without it.
-    pub fn needs(&self, cell: &Cell) -> bool {
-        cell.replicate < PILOT_RUNS || !self.is_settled(cell.variant)
+    /// Returns whether a trial is of use: it is not where its variant is settled without it.
+    pub fn needs(&self, trial: &Trial) -> bool {
+        trial.replicate < PILOT_RUNS || !self.is_settled(trial.variant)
     }
 
-    /// Returns the cells to run next: those of which the others may depend, if there are any.
-    pub fn next_cells(&self, open: Vec<Cell>) -> Vec<Cell> {
+    /// Returns the trials to run next: those of which the others may depend, if there are any.
+    pub fn next_trials(&self, open: Vec<Trial>) -> Vec<Trial> {
         let cannot_tell = |v: u32| self.plan.seeds(v) == SeedEffect::Perhaps;
-        if !open.iter().any(|c| c.replicate < PILOT_RUNS && cannot_tell(c.variant)) {
-            return open.into_iter().filter(|c| self.needs(c)).collect();
+        if !open.iter().any(|trial| trial.replicate < PILOT_RUNS && cannot_tell(trial.variant)) {
+            return open.into_iter().filter(|trial| self.needs(trial)).collect();
         }
-        open.into_iter().filter(|c| c.replicate < PILOT_RUNS).collect()
+        open.into_iter().filter(|trial| trial.replicate < PILOT_RUNS).collect()
     }
 }
 
 /// Returns for each variant whether seeds change nothing in it.
 pub(super) fn seedless_variants(plan: &Plan, runs: &RunTable) -> Vec<bool> {
-    let trials = PilotRuns::from_table(plan, runs);
-    let is_same = |v: u32| plan.seeds(v) == SeedEffect::Nothing || trials.is_settled(v);
+    let pilots = PilotRuns::from_table(plan, runs);
+    let is_same = |v: u32| plan.seeds(v) == SeedEffect::Nothing || pilots.is_settled(v);
     (0..plan.variants.len() as u32).map(is_same).collect()
 }
 
@@ -91,7 +92,7 @@ pub(super) fn seed_notes(
     runs: &RunTable,
     world: Option<&dyn WorldType>,
 ) -> Vec<String> {
-    let trials = PilotRuns::from_table(plan, runs);
+    let pilots = PilotRuns::from_table(plan, runs);
     let all = plan.variants.len() as u32;
     let count = |holds: &dyn Fn(u32) -> bool| (0..all).filter(|v| holds(*v)).count();
     let of_all = |n: usize| match n == all as usize {
@@ -107,7 +108,7 @@ pub(super) fn seed_notes(
             of_all(undrawn)
         ));
     }
-    let settled = count(&|v| trials.is_settled(v));
+    let settled = count(&|v| pilots.is_settled(v));
     if settled > 0 {
         let seeds = [plan.first_seed, plan.first_seed + 1];
         notes.push(format!(
@@ -141,19 +142,19 @@ pub fn seed_remedy(world: &dyn WorldType) -> Option<String> {
 
 /// Returns the number of variants of which all runs ended alike, although seeds might decide.
 fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
-    let (Some(cells), Some(digests)) =
-        (runs.columns_with_role(Role::Cell).next(), runs.columns_with_role(Role::Digest).next())
+    let (Some(trials), Some(digests)) =
+        (runs.columns_with_role(Role::Trial).next(), runs.columns_with_role(Role::Digest).next())
     else {
         return 0;
     };
     let mut ends: BTreeMap<u32, (BTreeSet<String>, usize)> = BTreeMap::new();
     for row in 0..runs.runs() {
-        let cell = cells.values.number(row).and_then(|id| plan.cell_of(id as u64));
-        let decided = |cell: &Cell| plan.seeds(cell.variant) == SeedEffect::Decide;
+        let trial = trials.values.number(row).and_then(|id| plan.trial_of(id as u64));
+        let decided = |trial: &Trial| plan.seeds(trial.variant) == SeedEffect::Decide;
         let digest = digests.values.text(row);
         // A failed run has no end.
-        if let Some(cell) = cell.filter(decided).filter(|_| !digest.is_empty()) {
-            let (different, count) = ends.entry(cell.variant).or_default();
+        if let Some(trial) = trial.filter(decided).filter(|_| !digest.is_empty()) {
+            let (different, count) = ends.entry(trial.variant).or_default();
             different.insert(digest);
             *count += 1;
         }
@@ -180,34 +181,34 @@ mod tests {
             .expect("valid")
     }
 
-    fn outcome(cell: Cell, digest: &str) -> Outcome {
-        Outcome { digest: digest.into(), failure: None, ..Outcome::from_failure(cell, "") }
+    fn outcome(trial: Trial, digest: &str) -> Outcome {
+        Outcome { digest: digest.into(), failure: None, ..Outcome::from_failure(trial, "") }
     }
 
     #[test]
     fn what_draws_nothing_is_planned_once() {
         let plan = plan([SeedEffect::Nothing, SeedEffect::Decide]);
-        let cells: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
-        assert_eq!((plan.runs(), cells.len()), (5, 5));
-        assert_eq!(cells.iter().filter(|c| c.variant == 0).count(), 1);
+        let trials: Vec<Trial> = plan.shard_trials(crate::sweep::Shard::ALL).collect();
+        assert_eq!((plan.runs(), trials.len()), (5, 5));
+        assert_eq!(trials.iter().filter(|trial| trial.variant == 0).count(), 1);
     }
 
     #[test]
     fn two_equal_ends_settle_a_variant_whose_world_cannot_tell_and_no_other() {
         for (digests, settled) in [(["a", "a"], true), (["a", "b"], false), (["", ""], false)] {
             let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
-            let mut trials = PilotRuns::new(&plan);
-            let open: Vec<Cell> = plan.shard_cells(crate::sweep::Shard::ALL).collect();
-            let first = trials.next_cells(open.clone());
+            let mut pilots = PilotRuns::new(&plan);
+            let open: Vec<Trial> = plan.shard_trials(crate::sweep::Shard::ALL).collect();
+            let first = pilots.next_trials(open.clone());
             assert!(
-                first.len() == 4 && first.iter().all(|c| c.replicate < PILOT_RUNS),
+                first.len() == 4 && first.iter().all(|trial| trial.replicate < PILOT_RUNS),
                 "{first:?}"
             );
             for (replicate, digest) in (0..).zip(digests) {
-                (0..2).for_each(|v| trials.add(&outcome(plan.cell(v, replicate), digest)));
+                (0..2).for_each(|v| pilots.add(&outcome(plan.trial(v, replicate), digest)));
             }
-            assert_eq!([trials.is_settled(0), trials.is_settled(1)], [settled, false]);
-            assert_eq!(trials.needs(&plan.cell(0, 2)), !settled);
+            assert_eq!([pilots.is_settled(0), pilots.is_settled(1)], [settled, false]);
+            assert_eq!(pilots.needs(&plan.trial(0, 2)), !settled);
         }
     }
 
@@ -215,8 +216,8 @@ mod tests {
     fn the_table_has_no_runs_beyond_trials_that_settle_and_readers_are_told() {
         let plan = plan([SeedEffect::Perhaps, SeedEffect::Decide]);
         let mut rows = RunTableBuilder::default();
-        for cell in plan.shard_cells(crate::sweep::Shard::ALL) {
-            rows.push(&outcome(cell, "the same"));
+        for trial in plan.shard_trials(crate::sweep::Shard::ALL) {
+            rows.push(&outcome(trial, "the same"));
         }
         let table = rows.build(&plan).expect("no twins");
         assert_eq!(table.runs(), 2 + 4);
@@ -237,8 +238,8 @@ mod tests {
     fn where_seeds_decide_nothing_is_said_of_what_they_could_change() {
         let plan = plan([SeedEffect::Decide, SeedEffect::Decide]);
         let mut rows = RunTableBuilder::default();
-        for (k, cell) in plan.shard_cells(crate::sweep::Shard::ALL).enumerate() {
-            rows.push(&outcome(cell, &format!("end {k}")));
+        for (k, trial) in plan.shard_trials(crate::sweep::Shard::ALL).enumerate() {
+            rows.push(&outcome(trial, &format!("end {k}")));
         }
         let table = rows.build(&plan).expect("no twins");
         assert!(seed_notes(&plan, &table, worlds().find("chain")).is_empty());

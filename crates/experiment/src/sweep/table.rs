@@ -8,8 +8,9 @@ use sidestep_kernel::ports::RoleColumn;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
-    /// Number of the cell; runs are in its order.
-    Cell,
+    /// Number of the trial (the column `cell` of files); runs are in its order.
+    #[serde(rename = "cell")]
+    Trial,
     /// Name of the variant: runs that differ by their seeds alone.
     Variant,
     /// Number of the replicate: equal ones have the same seed in all variants.

@@ -45,7 +45,7 @@ fn grid() -> RunTable {
     let floats = |purpose| numbers((0..rows.len()).map(|i| noise(i, purpose)));
     let metric = |name, values| column(name, Role::Metric, values);
     let columns = vec![
-        column("cell", Role::Cell, Values::I64((0..rows.len() as i64).map(Some).collect())),
+        column("cell", Role::Trial, Values::I64((0..rows.len() as i64).map(Some).collect())),
         column("variant", Role::Variant, text(&|r| format!("{} {}", r.0, r.1))),
         column("replicate", Role::Replicate, int(|r| r.2)),
         column("seed", Role::Seed, int(|r| r.2 + 100)),
@@ -322,7 +322,7 @@ proptest! {
             (0_i64..4, 0_i64..3, prop::option::of(prop::num::f64::ANY), prop::option::of(prop::bool::ANY)),
             0..24,
         ),
-        cell: bool, variant: bool, replicate: bool,
+        trial: bool, variant: bool, replicate: bool,
     ) {
         let mut columns = vec![
             column("p", Role::Parameter, Values::I64(rows.iter().map(|r| Some(r.0)).collect())),
@@ -332,7 +332,7 @@ proptest! {
         ];
         let int = |numbers: Vec<i64>| Values::I64(numbers.into_iter().map(Some).collect());
         let (first, second) = (rows.iter().map(|r| r.0), rows.iter().map(|r| r.1));
-        if cell { columns.push(column("cell", Role::Cell, int(second.clone().collect()))); }
+        if trial { columns.push(column("cell", Role::Trial, int(second.clone().collect()))); }
         if variant { columns.push(column("variant", Role::Variant, int(first.collect()))); }
         if replicate { columns.push(column("replicate", Role::Replicate, int(second.collect()))); }
         let bootstrap = Bootstrap { resamples: 60, ..Bootstrap::default() };

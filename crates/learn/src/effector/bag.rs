@@ -14,7 +14,8 @@ use sidestep_kernel::math::hypot;
 const WINDOW_TURN_RAD: f64 = 0.5;
 /// A claimed path this much shorter than a box is one: poses are rounded.
 const PATH_TOLERANCE: f64 = 1e-6;
-/// The least move and the longest path of a turn, as a share of a box.
+/// The least move and the longest path of a turn, as a share of a box: 0.3 m of the meter after which programs that
+/// correct CARMEN logs take a scan (rule L6).
 const PATH_FRACTION: f64 = 0.3;
 
 /// The rule by which events become transitions.
@@ -35,7 +36,8 @@ pub(super) fn learn(
         remedy: "choose a smaller box, or a bag in which the robot drives",
     };
     let mut model = learn_with_rule(&rule, source, &windows(log, box_m), options)?;
-    (model.report.box_m, model.profile.box_m) = (Some(box_m), Some(box_m));
+    model.report.box_m = Some(box_m);
+    model.profile.box_m = Some(box_m);
     Ok(model)
 }
 
@@ -54,9 +56,8 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
             continue;
         };
         if window.extend(&believed, box_m) {
-            scans.extend(
-                open.replace(OdometryWindow::new(truth, believed, stretch)).map(|done| done.scan),
-            );
+            let done = open.replace(OdometryWindow::new(truth, believed, stretch));
+            scans.extend(done.map(|done| done.scan));
         }
     }
     scans.extend(open.map(|last| last.scan));
@@ -82,9 +83,10 @@ impl OdometryWindow {
     /// Adds the next pose that odometry claims; returns whether the window ends there.
     fn extend(&mut self, believed: &Pose2, box_m: f64) -> bool {
         let claimed = self.start.motion_to(believed);
+        // A CARMEN scan lists odometry in the frame of its corrected pose, so the claims are put into that frame.
         self.scan.odometry.push(Pose2::from(self.scan.pose).compose(&claimed).into());
-        hypot(claimed.ahead_m, claimed.left_m) >= box_m * (1.0 - PATH_TOLERANCE)
-            || claimed.turn_rad.abs() >= WINDOW_TURN_RAD
+        let path_m = hypot(claimed.ahead_m, claimed.left_m);
+        path_m >= box_m * (1.0 - PATH_TOLERANCE) || claimed.turn_rad.abs() >= WINDOW_TURN_RAD
     }
 
     /// Returns a scan that begins no pair.

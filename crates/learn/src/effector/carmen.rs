@@ -16,12 +16,12 @@ use sidestep_statistics::{Moments, percentile};
 const MAX_FORWARD_TURN_DEG: f64 = 10.0;
 /// A smaller turn does not count as a turn.
 const MIN_TURN_DEG: f64 = 20.0;
-/// A shorter step of odometry is too short to show its slip.
+/// A shorter step of odometry is too short to show its slip: logs give centimeters, so rounding would look like it.
 const MIN_SLIP_STEP_M: f64 = 0.03;
 /// A step of odometry as long as this, or a turn as wide, is none: the pose has jumped.
 const MIN_JUMP_M: f64 = 1.0;
 const MIN_JUMP_RAD: f64 = 0.3;
-/// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
+/// Factor that makes the median absolute deviation of a normal distribution its standard deviation, 1 / Phi^-1(3/4).
 const MAD_TO_SD: f64 = 1.4826;
 /// Real wheels slip sideways by less than 1 % of their way; the particles of a SLAM program, logged
 /// in place of odometry, by 3 % to 13 %.
@@ -72,15 +72,25 @@ pub(super) fn learn_with_rule(
     }
     let mut report = events.report(source, options);
     add_slip(&mut report, &odometry_steps(log));
-    let of = |value: fn(&&ScanPair) -> f64| Moments::from_values(ahead.iter().map(value));
-    let moments = [
-        ("odometry_forward_m", of(|pair| pair.claimed.ahead_m)),
-        ("error_ahead_m", of(|pair| pair.corrected.ahead_m - pair.claimed.ahead_m)),
-        ("error_left_m", of(|pair| pair.corrected.left_m)),
-    ];
-    let known = moments.into_iter().filter_map(|(name, m)| Some((name.to_string(), m?)));
-    report.moments.extend(known);
+    add_moments(&mut report, &ahead);
     Ok(LearnedEffector { report, profile: events.profile(rule.words, options) })
+}
+
+/// Adds the moments in meters, which only logs with two poses per move have.
+fn add_moments(report: &mut EffectorReport, ahead: &[&ScanPair]) {
+    let claimed_m = ahead.iter().map(|pair| pair.claimed.ahead_m);
+    let error_ahead_m = ahead.iter().map(|pair| pair.corrected.ahead_m - pair.claimed.ahead_m);
+    let error_left_m = ahead.iter().map(|pair| pair.corrected.left_m);
+    let moments = [
+        ("odometry_forward_m", Moments::from_values(claimed_m)),
+        ("error_ahead_m", Moments::from_values(error_ahead_m)),
+        ("error_left_m", Moments::from_values(error_left_m)),
+    ];
+    for (name, moments) in moments {
+        if let Some(moments) = moments {
+            report.moments.insert(name.to_string(), moments);
+        }
+    }
 }
 
 /// Adds the slip that the steps of odometry show, and the warning where it is too large.
@@ -132,8 +142,8 @@ impl ScanPair {
     fn as_turn(&self, path_max_m: f64) -> Option<TurnEvent> {
         let path_m = hypot(self.claimed.ahead_m, self.claimed.left_m);
         let is_turn = self.claimed.turn_rad.abs() >= MIN_TURN_DEG.to_radians();
-        let (claimed, corrected) = (self.claimed.turn_rad, self.corrected.turn_rad);
-        let turn = TurnEvent::new(claimed, corrected, Some(self.duration_s));
+        let turn =
+            TurnEvent::new(self.claimed.turn_rad, self.corrected.turn_rad, Some(self.duration_s));
         (is_turn && path_m <= path_max_m).then_some(turn)
     }
 }

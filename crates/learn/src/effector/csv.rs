@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use super::LearnedEffector;
 use super::events::{Events, MoveEvent, TurnEvent, nearest_turn};
 use super::grid_displacement::{
-    FORWARD_CLASSES, GridDisplacement, forward_class, grid_displacements,
+    FORWARD_CLASSES, GridDisplacement, OTHER_CLASS, forward_class, grid_displacements,
 };
 use super::report::{EffectorReport, ForwardShares};
 use super::transitions::{
     EffectorProfile, ProfileTransition, certain_transition, from_outcomes, intended_displacement,
     label,
 };
-use crate::holdout::{holdout_test, split};
+use crate::holdout::{HoldoutTest, holdout_test, split};
 use crate::{CountTable, EstimateOptions};
 use sidestep_error_models::effector::STANDARD_ACTIONS;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
@@ -42,6 +42,7 @@ impl MeasuredDisplacement {
     fn outcomes(&self) -> Vec<(GridDisplacement, f64)> {
         let mut ends = grid_displacements(self.ahead_boxes, self.left_boxes, self.turn_deg / 90.0);
         for (outcome, _) in &mut ends {
+            // Quarters -1 (right), 0, 1 (left) and 2 (back).
             outcome.quarters = (outcome.quarters + 1).rem_euclid(4) - 1;
         }
         ends
@@ -116,6 +117,13 @@ impl ActionLog {
         counts
     }
 
+    fn holdout_test(&self, options: &EstimateOptions) -> HoldoutTest {
+        let (train, held) = split(&self.events, options.hold_out_every);
+        let mut fit = holdout_test(&self.counts(train), &self.counts(held), options.alpha);
+        fit.table = self.action.to_string();
+        fit
+    }
+
     fn transitions(&self, alpha: f64, assumed: &mut Vec<String>) -> Vec<ProfileTransition> {
         if self.events.is_empty() {
             assumed.push(format!("{}: never fails", self.action));
@@ -128,8 +136,11 @@ impl ActionLog {
     fn forward_shares(&self) -> Option<ForwardShares> {
         let mut shares = vec![0.0; FORWARD_CLASSES.len()];
         for (outcome, weight) in self.events.iter().flat_map(MeasuredDisplacement::outcomes) {
-            let straight = outcome.quarters == 0;
-            let class = if straight { forward_class(outcome.ahead, outcome.left) } else { 5 };
+            let class = if outcome.quarters == 0 {
+                forward_class(outcome.ahead, outcome.left)
+            } else {
+                OTHER_CLASS
+            };
             shares[class] += weight;
         }
         ForwardShares::from_counts(&shares)
@@ -144,18 +155,12 @@ fn report(source: &str, logs: &[ActionLog], options: &EstimateOptions) -> Effect
     };
     let seen: Vec<&ActionLog> = logs.iter().filter(|log| !log.events.is_empty()).collect();
     let tables: Vec<CountTable> = seen.iter().map(|log| log.counts(&log.events)).collect();
-    let fits = seen.iter().map(|log| {
-        let (train, held) = split(&log.events, options.hold_out_every);
-        let mut fit = holdout_test(&log.counts(train), &log.counts(held), options.alpha);
-        fit.table = log.action.to_string();
-        fit
-    });
     EffectorReport {
         transitions: forward.forward_shares(),
         actions: tables.iter().map(by_name).collect(),
         probabilities: tables.iter().flat_map(CountTable::estimates).collect(),
         thin: tables.iter().flat_map(|table| table.low_count_rows(options.thin_below)).collect(),
-        hold_out: fits.collect(),
+        hold_out: seen.iter().map(|log| log.holdout_test(options)).collect(),
         ..events.report(source, options)
     }
 }
@@ -168,19 +173,24 @@ fn by_name(table: &CountTable) -> (String, BTreeMap<String, f64>) {
 
 fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
     let mut assumed = Vec::new();
-    let learned = |log: &&ActionLog| log.action != "stay" || !log.events.is_empty();
-    let actions = logs
-        .iter()
-        .filter(learned)
-        .map(|log| (log.action.to_string(), log.transitions(options.alpha, &mut assumed)));
-    EffectorProfile { box_m: None, actions: actions.collect(), assumed, rule: RULE.to_string() }
+    let mut actions = Vec::new();
+    for log in logs {
+        // Few logs have the action `stay`; a profile without it stands still without error, so it is not assumed.
+        if log.action == "stay" && log.events.is_empty() {
+            continue;
+        }
+        let transitions = log.transitions(options.alpha, &mut assumed);
+        actions.push((log.action.to_string(), transitions));
+    }
+    EffectorProfile { box_m: None, actions, assumed, rule: RULE.to_string() }
 }
 
 /// Returns the rows without contact, and the number of those with contact.
 fn parse(table: &CsvTable) -> Result<(Vec<MeasuredDisplacement>, u64), InputError> {
     let place = table.place();
     let columns = DisplacementColumns::find(table)?;
-    let (mut free, mut n_cut) = (Vec::new(), 0);
+    let mut free = Vec::new();
+    let mut n_cut = 0;
     for row in table.rows() {
         let displacement = columns.displacement(place, row)?;
         if columns.has_contact(place, row)? {
@@ -237,21 +247,25 @@ impl DisplacementColumns {
 
 /// Returns an action by its name, or by the number that a recording gives it.
 fn action(place: &str, word: Token<'_>) -> Result<usize, InputError> {
-    let by_name = STANDARD_ACTIONS.iter().position(|name| *name == word.text);
-    let by_number = || word.text.parse().ok().filter(|number| *number < STANDARD_ACTIONS.len());
-    by_name.or_else(by_number).ok_or_else(|| {
-        let cause = format!("`{}` is not an action", word.text);
-        word.error(&place, cause, &format!("use one of {}", STANDARD_ACTIONS.join(", ")))
-    })
+    if let Some(id) = STANDARD_ACTIONS.iter().position(|name| *name == word.text) {
+        return Ok(id);
+    }
+    if let Ok(id) = word.text.parse()
+        && id < STANDARD_ACTIONS.len()
+    {
+        return Ok(id);
+    }
+    let cause = format!("`{}` is not an action", word.text);
+    Err(word.error(&place, cause, &format!("use one of {}", STANDARD_ACTIONS.join(", "))))
 }
 
-fn parse_limited(place: &str, word: Token<'_>, most: f64) -> Result<f64, InputError> {
+fn parse_limited(place: &str, word: Token<'_>, max: f64) -> Result<f64, InputError> {
     let value = word.number(&place)?;
-    if value.abs() <= most {
+    if value.abs() <= max {
         return Ok(value);
     }
     let cause = format!("{value} is more than one action moves");
-    Err(word.error(&place, cause, &format!("give a number from -{most} to {most}")))
+    Err(word.error(&place, cause, &format!("give a number from -{max} to {max}")))
 }
 
 #[cfg(test)]

@@ -62,11 +62,8 @@ impl TurnEvent {
 /// headings only: a commanded turn of -90 degrees that ends at 180 has overshot.
 pub(super) fn nearest_turn(commanded_rad: f64, true_rad: f64) -> f64 {
     let error_rad = true_rad - commanded_rad;
-    // Half a turn off is ambiguous, so the log's own sign stays.
-    match error_rad.abs() <= PI + 1e-9 {
-        true => true_rad,
-        false => true_rad - TAU * error_rad.signum(),
-    }
+    // Half a turn off is ambiguous, so the log's own sign stays; the tolerance is for angles converted from degrees.
+    if error_rad.abs() <= PI + 1e-9 { true_rad } else { true_rad - TAU * error_rad.signum() }
 }
 
 /// All moves and turns of a robot's log.
@@ -80,7 +77,8 @@ impl Events {
     /// Returns the parts of a report that follow from moves and turns; the rest is left empty.
     pub(super) fn report(&self, source: &str, options: &EstimateOptions) -> EffectorReport {
         let all: Vec<&MoveEvent> = self.moves.iter().collect();
-        let (forward, turns) = (forward_counts(&all), self.turn_counts());
+        let forward = forward_counts(&all);
+        let turns = self.turn_counts();
         let tables = [&forward, &turns];
         EffectorReport {
             source: source.to_owned(),
@@ -122,12 +120,12 @@ impl Events {
     }
 
     fn moments(&self) -> BTreeMap<String, Moments> {
-        let of = |value: fn(&MoveEvent) -> f64| Moments::from_values(self.moves.iter().map(value));
+        let moves = self.moves.iter();
         let named = [
-            ("ahead_boxes", of(|m| m.ahead_boxes)),
-            ("left_boxes", of(|m| m.left_boxes)),
-            ("dtheta_minus_cmd_rad", of(|m| m.turn_error_rad)),
-            ("duration_s", Moments::from_values(self.moves.iter().filter_map(|m| m.duration_s))),
+            ("ahead_boxes", Moments::from_values(moves.clone().map(|m| m.ahead_boxes))),
+            ("left_boxes", Moments::from_values(moves.clone().map(|m| m.left_boxes))),
+            ("dtheta_minus_cmd_rad", Moments::from_values(moves.clone().map(|m| m.turn_error_rad))),
+            ("duration_s", Moments::from_values(moves.filter_map(|m| m.duration_s))),
         ];
         named.into_iter().filter_map(|(name, moments)| Some((name.to_string(), moments?))).collect()
     }
@@ -136,8 +134,9 @@ impl Events {
         let (train, held) = split(&self.moves, options.hold_out_every);
         let moves = holdout_test(&forward_counts(&train), &forward_counts(&held), options.alpha);
         let (train, held) = split(&self.turns, options.hold_out_every);
-        let part = |turns: Vec<&TurnEvent>| turn_counts(turns.into_iter());
-        vec![moves, holdout_test(&part(train), &part(held), options.alpha)]
+        let train = turn_counts(train.into_iter());
+        let held = turn_counts(held.into_iter());
+        vec![moves, holdout_test(&train, &held, options.alpha)]
     }
 
     fn turn_counts(&self) -> CountTable {
@@ -167,14 +166,16 @@ impl Events {
 
     fn turn_report(&self) -> Option<TurnReport> {
         let turns = &self.turns;
+        if turns.is_empty() {
+            return None;
+        }
         let n_left = turns.iter().filter(|turn| turn.is_left()).count();
-        let of = |value: fn(&TurnEvent) -> f64| Moments::from_values(turns.iter().map(value));
-        (!turns.is_empty()).then(|| TurnReport {
+        Some(TurnReport {
             n: turns.len(),
             n_left,
             n_right: turns.len() - n_left,
-            true_over_commanded: of(TurnEvent::ratio),
-            error_deg_along_turn: of(TurnEvent::error_deg),
+            true_over_commanded: Moments::from_values(turns.iter().map(TurnEvent::ratio)),
+            error_deg_along_turn: Moments::from_values(turns.iter().map(TurnEvent::error_deg)),
             duration_s: Moments::from_values(turns.iter().filter_map(|turn| turn.duration_s)),
             hist_15deg: histogram(turns.iter().map(TurnEvent::along_deg), 15),
             error_hist_5deg: histogram(turns.iter().map(TurnEvent::error_deg), 5),
@@ -197,11 +198,9 @@ fn forward_counts(moves: &[&MoveEvent]) -> CountTable {
 fn rounded_counts(moves: &[&MoveEvent]) -> CountTable {
     let mut counts = empty_forward_counts();
     for m in moves {
-        counts.add(
-            0,
-            forward_class(round_half_up(m.ahead_boxes), round_half_up(m.left_boxes)),
-            1.0,
-        );
+        let ahead = round_half_up(m.ahead_boxes);
+        let left = round_half_up(m.left_boxes);
+        counts.add(0, forward_class(ahead, left), 1.0);
     }
     counts
 }

@@ -34,7 +34,8 @@ pub fn phase_average(x: f64) -> Vec<(i32, f64)> {
     if (x - whole).abs() <= INTEGER_TOLERANCE {
         return vec![(whole as i32, 1.0)];
     }
-    let (below, fraction) = (x.floor(), x - x.floor());
+    let below = x.floor();
+    let fraction = x - below;
     vec![(below as i32, 1.0 - fraction), (below as i32 + 1, fraction)]
 }
 
@@ -58,9 +59,12 @@ pub fn round_half_up(x: f64) -> i32 {
     (x + 0.5).floor() as i32
 }
 
-/// The possible results of one box ahead: the classes of the paper.
+/// The possible results of one box ahead: the five transitions of the paper's action "go one box ahead", and all others.
 pub const FORWARD_CLASSES: [&str; 6] =
     ["stay", "ahead", "ahead2", "ahead_left", "ahead_right", "other"];
+
+/// Index in [`FORWARD_CLASSES`] of all results that the paper does not have.
+pub(super) const OTHER_CLASS: usize = 5;
 
 /// Returns the index of the class of a move in [`FORWARD_CLASSES`].
 pub fn forward_class(ahead: i32, left: i32) -> usize {
@@ -70,7 +74,7 @@ pub fn forward_class(ahead: i32, left: i32) -> usize {
         (2, 0) => 2,
         (1, 1) => 3,
         (1, -1) => 4,
-        _ => 5,
+        _ => OTHER_CLASS,
     }
 }
 

@@ -103,12 +103,8 @@ pub fn from_bag(
     options: &EstimateOptions,
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
-    bag::learn(
-        &path.display().to_string(),
-        &sidestep_import::bag::read(path, wanted)?,
-        box_m,
-        options,
-    )
+    let log = sidestep_import::bag::read(path, wanted)?;
+    bag::learn(&path.display().to_string(), &log, box_m, options)
 }
 
 /// Learns any actions from a CSV file.

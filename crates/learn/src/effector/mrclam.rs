@@ -14,9 +14,9 @@ use sidestep_kernel::math::wrap_angle;
 const MAX_STEP_SECS: f64 = 1.5;
 /// A move with more commanded turn than this is not a move ahead.
 const MAX_FORWARD_TURN_DEG: f64 = 10.0;
-/// A slower command is not a turn.
+/// A slower command is not a turn: it corrects the direction of a drive.
 const MIN_TURN_RATE_RADPS: f64 = 0.1;
-/// A turn ends when this much is commanded.
+/// A turn ends when this much is commanded; its ratio of true to commanded turn is taken for that of 90 degrees.
 const TURN_DEG: f64 = 45.0;
 
 /// The rule by which events become transitions.
@@ -85,29 +85,32 @@ fn is_gap(step_secs: f64) -> bool {
 fn moves(robot: &RobotLog, box_m: f64, rejected: &mut BTreeMap<String, u64>) -> Vec<MoveEvent> {
     let Some(first) = robot.commands.first() else { return Vec::new() };
     let mut moves = Vec::new();
-    let mut reject = |cause: &str| *rejected.entry(cause.to_string()).or_insert(0) += 1;
     let mut window = CommandWindow::from(first);
     for pair in robot.commands.windows(2) {
         let [command, next] = pair else { continue };
         let step_secs = next.t_secs - command.t_secs;
         if is_gap(step_secs) {
-            reject("gap");
+            reject(rejected, "gap");
             window = CommandWindow::from(next);
             continue;
         }
         window.add_command(command, step_secs);
         if window.turn_rad.abs() > MAX_FORWARD_TURN_DEG.to_radians() {
-            reject("turn");
+            reject(rejected, "turn");
         } else if window.path_m < box_m {
             continue;
         } else if let Some(motion) = window.motion(robot, next.t_secs) {
             moves.push(as_move(&window, &motion, next.t_secs, box_m));
         } else {
-            reject("no_ground_truth");
+            reject(rejected, "no_ground_truth");
         }
         window = CommandWindow::from(next);
     }
     moves
+}
+
+fn reject(rejected: &mut BTreeMap<String, u64>, cause: &str) {
+    *rejected.entry(cause.to_string()).or_insert(0) += 1;
 }
 
 fn as_move(window: &CommandWindow, motion: &Displacement2, end_secs: f64, box_m: f64) -> MoveEvent {

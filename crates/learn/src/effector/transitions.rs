@@ -59,10 +59,13 @@ pub struct ProfileTransition {
 
 impl ProfileTransition {
     fn transition(&self) -> Transition {
-        let side = |letter| Side::from_letter(letter).expect("a path of F, B, L and R");
+        let sides = self
+            .path
+            .chars()
+            .map(|letter| Side::from_letter(letter).expect("a path of F, B, L and R"));
         Transition {
             p: self.p,
-            path: self.path.chars().map(side).collect(),
+            path: sides.collect(),
             turn: (self.turn_deg / 90).rem_euclid(4) as u8,
         }
     }
@@ -70,10 +73,9 @@ impl ProfileTransition {
 
 /// Returns the path to an outcome: ahead first, then sideways.
 fn path(ahead: i32, left: i32) -> String {
-    let steps = |n: i32, plus: &str, minus: &str| {
-        if n < 0 { minus } else { plus }.repeat(n.unsigned_abs() as usize)
-    };
-    steps(ahead, "F", "B") + &steps(left, "L", "R")
+    let along = if ahead < 0 { "B" } else { "F" };
+    let sideways = if left < 0 { "R" } else { "L" };
+    along.repeat(ahead.unsigned_abs() as usize) + &sideways.repeat(left.unsigned_abs() as usize)
 }
 
 /// Returns the name of an outcome in tables.
@@ -93,18 +95,21 @@ pub(super) fn from_outcomes(
     weights: &[f64],
     alpha: f64,
 ) -> Vec<ProfileTransition> {
-    let probabilities = rounded(&smooth(weights, alpha));
-    let transition = |(outcome, p): (&GridDisplacement, f64)| ProfileTransition {
-        p,
-        path: path(outcome.ahead, outcome.left),
-        turn_deg: 90 * outcome.quarters,
-    };
-    outcomes.iter().zip(probabilities).map(transition).collect()
+    let mut transitions = Vec::new();
+    for (outcome, p) in outcomes.iter().zip(rounded(&smooth(weights, alpha))) {
+        transitions.push(ProfileTransition {
+            p,
+            path: path(outcome.ahead, outcome.left),
+            turn_deg: 90 * outcome.quarters,
+        });
+    }
+    transitions
 }
 
 /// Returns the transitions of one box ahead by the paper's classes; `counts` has one row and a
 /// column per class. Counts outside the first five classes are spread over them in proportion.
 pub(super) fn forward_transitions(counts: &CountTable, alpha: f64) -> Vec<ProfileTransition> {
+    // A profile's first transition is the intended one.
     let order = [1, 0, 2, 3, 4];
     debug_assert_eq!(FORWARD_CLASSES[order[0]], "ahead");
     let ends = [(1, 0), (0, 0), (2, 0), (1, 1), (1, -1)];

@@ -52,8 +52,9 @@ pub fn with_effector(
 
 /// Returns whether the profile `text` has a section `name` among the `group` "sensors" or "effectors".
 pub fn has_section(text: &str, group: &str, name: &str) -> bool {
-    let section = |document: DocumentMut| document.get(group)?.get(name).map(|_| ());
-    text.parse().ok().and_then(section).is_some()
+    let Ok(document) = text.parse::<DocumentMut>() else { return false };
+    let sections = document.get(group);
+    sections.is_some_and(|sections| sections.get(name).is_some())
 }
 
 fn with_section(

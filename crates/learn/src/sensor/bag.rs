@@ -21,9 +21,11 @@ const OBSERVATIONS: [&str; 2] = [NOTHING, WALL];
 const WALL: &str = "wall";
 /// Most beams of a profile, unless others are asked for; a scan has hundreds, a simulated robot few.
 const MAX_BEAMS: usize = 16;
-/// The longest way in meters that odometry alone measures since the last true pose.
+/// The longest distance in meters that odometry alone measures since the last true pose: programs that correct logs
+/// take a true pose about every meter, and the errors of odometry grow with the distance.
 const MAX_DEAD_RECKONING_M: f64 = 1.0;
-/// A scanner with this share of its beams ending before the wall sees things that are not on the map.
+/// A scanner with this share of its beams ending before the wall sees things that are not on the map; wrong readings
+/// of the scanner itself are far rarer.
 const MAX_IN_FRONT_FRACTION: f64 = 0.1;
 
 /// The rule by which counts become rows.
@@ -53,7 +55,8 @@ pub(super) fn learn(
     let log_of = ReadingLog { observations, classes, readings: judged.readings, rule: RULE };
     let mut model = log_of.model(source, options);
     let report = &mut model.report;
-    (report.measurements, report.skipped) = (report.sightings + n_skipped, n_skipped);
+    report.measurements = report.sightings + n_skipped;
+    report.skipped = n_skipped;
     report.skipped_by_cause = judged.skipped;
     report.warnings.extend(against.warning(MAX_IN_FRONT_FRACTION));
     report.warnings.extend(mount_warning(log));
@@ -69,13 +72,14 @@ fn with_walls_only(profile: SensorProfile) -> SensorProfile {
 }
 
 fn mount_warning(log: &BagLog) -> Option<String> {
+    if log.mount.is_some() {
+        return None;
+    }
     let frame = &log.scans.first()?.header.frame_id;
-    log.mount.is_none().then(|| {
-        format!(
-            "no static transform places the frame `{frame}` of the scans on the robot (/tf_static): the scanner \
-             is taken to sit in its middle and to look ahead"
-        )
-    })
+    Some(format!(
+        "no static transform places the frame `{frame}` of the scans on the robot (/tf_static): the scanner \
+         is taken to sit in its middle and to look ahead"
+    ))
 }
 
 /// Returns the options with the fan and the range of the scans, where no others are asked for.
@@ -85,16 +89,18 @@ pub(super) fn scan_options(
     range_m: Option<f64>,
     bearings_deg: Option<&[f64]>,
 ) -> SensorOptions {
-    let step = scan.ranges_m.len().div_ceil(MAX_BEAMS).max(1);
-    let own = || {
-        let beams = (step / 2..scan.ranges_m.len()).step_by(step);
-        beams.map(|beam| rounded_deg(bearing_rad(scan, beam))).collect()
-    };
     SensorOptions {
         range_m: range_m.unwrap_or(f64::from(scan.range_max_m)),
-        bearings_deg: bearings_deg.map_or_else(own, <[f64]>::to_vec),
+        bearings_deg: bearings_deg.map_or_else(|| thinned_bearings_deg(scan), <[f64]>::to_vec),
         ..options.clone()
     }
+}
+
+/// Returns at most [`MAX_BEAMS`] bearings of a scan: the fan cut into equal sectors, the middle beam of each.
+fn thinned_bearings_deg(scan: &LaserScan) -> Vec<f64> {
+    let step = scan.ranges_m.len().div_ceil(MAX_BEAMS).max(1);
+    let beams = (step / 2..scan.ranges_m.len()).step_by(step);
+    beams.map(|beam| rounded_deg(bearing_rad(scan, beam))).collect()
 }
 
 /// Returns an angle in degrees from -180 to 180, to a hundredth.
@@ -111,6 +117,12 @@ fn bearing_rad(scan: &LaserScan, beam: usize) -> f64 {
 struct EvaluatedBeams {
     readings: Vec<LabeledReading>,
     skipped: BTreeMap<String, u64>,
+}
+
+impl EvaluatedBeams {
+    fn skip(&mut self, cause: &str, n: usize) {
+        *self.skipped.entry(cause.to_string()).or_insert(0) += n as u64;
+    }
 }
 
 /// Compares scans with the ranges expected from a map.
@@ -134,17 +146,14 @@ impl<'a> BeamEvaluator<'a> {
     fn evaluate_all(&self) -> EvaluatedBeams {
         let mut judged = EvaluatedBeams::default();
         for scan in &self.log.scans {
-            let mut skip = |cause: &str, n: usize| {
-                *judged.skipped.entry(cause.to_string()).or_insert(0) += n as u64;
-            };
             let Some(pose) = self.pose_at(scan.header.stamp.secs()) else {
-                skip("no_true_pose", scan.ranges_m.len());
+                judged.skip("no_true_pose", scan.ranges_m.len());
                 continue;
             };
             for beam in 0..scan.ranges_m.len() {
                 match self.evaluate_beam(scan, beam, &pose) {
                     Ok(reading) => judged.readings.push(reading),
-                    Err(cause) => skip(cause, 1),
+                    Err(cause) => judged.skip(cause, 1),
                 }
             }
         }
@@ -153,15 +162,17 @@ impl<'a> BeamEvaluator<'a> {
 
     /// Returns the pose at a time: between true poses, else from the last one on by odometry.
     fn pose_at(&self, t_secs: f64) -> Option<Pose2> {
+        pose_at(&self.log.truth, t_secs).or_else(|| self.dead_reckoned_pose(t_secs))
+    }
+
+    fn dead_reckoned_pose(&self, t_secs: f64) -> Option<Pose2> {
         let BagLog { truth, odometry, .. } = self.log;
-        pose_at(truth, t_secs).or_else(|| {
-            let known = truth.get(truth.partition_point(|p| p.t_secs <= t_secs).checked_sub(1)?)?;
-            let motion = pose_at(odometry, known.t_secs)?.motion_to(&pose_at(odometry, t_secs)?);
-            let is_unbroken =
-                self.gaps.count_before(known.t_secs) == self.gaps.count_before(t_secs);
-            (is_unbroken && hypot(motion.ahead_m, motion.left_m) <= MAX_DEAD_RECKONING_M)
-                .then(|| Pose2::from(*known).compose(&motion))
-        })
+        let n_before = truth.partition_point(|p| p.t_secs <= t_secs);
+        let known = truth.get(n_before.checked_sub(1)?)?;
+        let motion = pose_at(odometry, known.t_secs)?.motion_to(&pose_at(odometry, t_secs)?);
+        let is_unbroken = self.gaps.count_before(known.t_secs) == self.gaps.count_before(t_secs);
+        let is_short = hypot(motion.ahead_m, motion.left_m) <= MAX_DEAD_RECKONING_M;
+        (is_unbroken && is_short).then(|| Pose2::from(*known).compose(&motion))
     }
 
     /// Compares a beam with the map; `Err` says why it cannot be judged.
@@ -171,38 +182,39 @@ impl<'a> BeamEvaluator<'a> {
         beam: usize,
         pose: &Pose2,
     ) -> Result<LabeledReading, &'static str> {
-        let (least_m, most_m) = (f64::from(scan.range_min_m), f64::from(scan.range_max_m));
+        let min_m = f64::from(scan.range_min_m);
+        let max_m = f64::from(scan.range_max_m);
         let measured_m = f64::from(scan.ranges_m[beam]);
         if measured_m.is_nan() {
             return Err("no_number");
         }
-        if measured_m < least_m {
+        if measured_m < min_m {
             return Err("nearer_than_measured");
         }
         let (from_m, direction_rad) = self.mount.beam(pose, bearing_rad(scan, beam));
-        let limit_m = self.range_m.min(most_m);
+        let limit_m = self.range_m.min(max_m);
         let expected_m = match self.map.cast_ray(from_m, direction_rad, limit_m) {
             RayHit::Unknown => return Err("unmapped"),
-            RayHit::Wall(range_m) if range_m <= least_m => return Err("nearer_than_measured"),
+            RayHit::Wall(range_m) if range_m <= min_m => return Err("nearer_than_measured"),
             RayHit::Wall(range_m) => Some(range_m),
             RayHit::Nothing => None,
         };
-        // Many drivers say the greatest range where nothing answers.
-        let reported_m = (measured_m < most_m && measured_m <= limit_m).then_some(measured_m);
+        // Many drivers report the greatest range where nothing answers.
+        let reported_m = (measured_m < max_m && measured_m <= limit_m).then_some(measured_m);
         Ok(self.reading(expected_m, reported_m))
     }
 
     fn reading(&self, expected_m: Option<f64>, reported_m: Option<f64>) -> LabeledReading {
-        let at = |range_m: f64| Distance {
-            class: self.classes.class_of(range_m),
-            range_m: Some(range_m),
-        };
         LabeledReading {
             truth: usize::from(expected_m.is_some()),
             reported: usize::from(reported_m.is_some()),
-            true_at: expected_m.map(at),
-            reported_at: reported_m.map(at),
+            true_at: expected_m.map(|range_m| self.distance(range_m)),
+            reported_at: reported_m.map(|range_m| self.distance(range_m)),
         }
+    }
+
+    fn distance(&self, range_m: f64) -> Distance {
+        Distance { class: self.classes.class_of(range_m), range_m: Some(range_m) }
     }
 }
 
@@ -215,7 +227,8 @@ struct ScannerMount {
 
 impl ScannerMount {
     fn from_pose(pose: view::Pose) -> Self {
-        let (ahead, up) = (pose.rotate([1.0, 0.0, 0.0]), pose.rotate([0.0, 0.0, 1.0]));
+        let ahead = pose.rotate([1.0, 0.0, 0.0]);
+        let up = pose.rotate([0.0, 0.0, 1.0]);
         let [x_m, y_m, _] = pose.at_m;
         let place = Pose2 { x_m, y_m, heading_rad: atan2(ahead[1], ahead[0]) };
         Self { place, side: if up[2] < 0.0 { -1.0 } else { 1.0 } }

@@ -3,8 +3,8 @@
 use super::detection::Detection;
 use super::options::{BEYOND, DistanceClasses, SensorOptions};
 use super::tables::{LANDMARK, NO_SUBJECT, ROBOT};
-use crate::CountTable;
 use crate::counts::{rounded, smooth};
+use crate::{CountTable, LowCountRow};
 use sidestep_error_models::sensor::SensorModel;
 
 /// The report when nothing is seen.
@@ -45,9 +45,6 @@ impl SensorProfile {
     /// # Panics
     /// When the profile's rows do not fit its observations and distance classes.
     pub fn model(&self, name: &str, kinds: &[String]) -> SensorModel {
-        let rows_of = |rows: &[NamedRow], names: &[String]| -> Vec<Vec<f64>> {
-            names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
-        };
         let classes = [&self.distance_classes[..], &[BEYOND.to_string()]].concat();
         let everywhere = rows_of(&self.confusion, &self.observations);
         let mut confusion = vec![everywhere; classes.len()];
@@ -80,6 +77,11 @@ impl SensorProfile {
         let index = self.observations.iter().position(|known| known == designated);
         index.unwrap_or_default() as u8
     }
+}
+
+/// Returns the row of each name, see [`row_of`].
+fn rows_of(rows: &[NamedRow], names: &[String]) -> Vec<Vec<f64>> {
+    names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
 }
 
 /// Returns the row of a name, brought to sum to 1: printed digits may leave it short.
@@ -129,20 +131,17 @@ pub(super) fn camera(
     classes: &DistanceClasses,
 ) -> SensorProfile {
     let alpha = options.estimate.alpha;
+    let mut confusion = vec![NamedRow::new(NOTHING, &spurious_row(looks, options))];
+    confusion.extend(subject_rows(looks, None, alpha));
+    let mut confusion_by_class = Vec::new();
+    for (class, name) in classes.names.iter().enumerate() {
+        let rows = subject_rows(looks, Some(class), alpha).to_vec();
+        confusion_by_class.push((name.clone(), rows));
+    }
     let mut assumed = Vec::new();
-    let confusion = vec![
-        NamedRow::new(NOTHING, &spurious_row(looks, options)),
-        NamedRow::new("robot", &subject_row(looks, ROBOT, None, alpha)),
-        NamedRow::new("landmark", &subject_row(looks, LANDMARK, None, alpha)),
-    ];
-    let by_class = |(class, name): (usize, &String)| {
-        let row = |name, kind| NamedRow::new(name, &subject_row(looks, kind, Some(class), alpha));
-        (name.clone(), vec![row("robot", ROBOT), row("landmark", LANDMARK)])
-    };
     for (kind, name) in [(ROBOT, "robot"), (LANDMARK, "landmark")] {
         assumed.extend(assumed_detections(looks, kind, name));
     }
-    let confusion_by_class = classes.names.iter().enumerate().map(by_class).collect();
     let distance_confusion = distance_rows(looks.distance, looks.beyond, alpha, &mut assumed);
     SensorProfile {
         bearings_deg: options.bearings_deg.clone(),
@@ -168,8 +167,17 @@ fn spurious_row(looks: &CameraCounts<'_>, options: &SensorOptions) -> Vec<f64> {
     let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
     let spurious = looks.kinds.row(NO_SUBJECT);
     let robot_or_landmark = spurious[ROBOT] + spurious[LANDMARK];
+    // With more readings than beams nothing would be left; one keeps the row a distribution.
     let empty = (beams - in_view - robot_or_landmark).max(1.0);
     smooth(&[empty, spurious[ROBOT], spurious[LANDMARK]], options.estimate.alpha)
+}
+
+/// Returns the rows of robots and landmarks, in one class or in all.
+fn subject_rows(looks: &CameraCounts<'_>, class: Option<usize>, alpha: f64) -> [NamedRow; 2] {
+    [
+        NamedRow::new("robot", &subject_row(looks, ROBOT, class, alpha)),
+        NamedRow::new("landmark", &subject_row(looks, LANDMARK, class, alpha)),
+    ]
 }
 
 /// Returns the row of reports in the direction of a robot or landmark, in one class or in all.
@@ -195,8 +203,8 @@ fn detection_rate(looks: &CameraCounts<'_>, kind: usize, class: Option<usize>, a
     if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
         return row[0];
     }
-    let sum = |column: usize| table.cells().iter().map(|row| row[column]).sum::<f64>();
-    let pooled = [sum(0), sum(1)];
+    let pooled: [f64; 2] =
+        [0, 1].map(|column: usize| table.cells().iter().map(|row| row[column]).sum());
     if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
 }
 
@@ -205,9 +213,11 @@ fn detection_table<'a>(looks: &CameraCounts<'a>, kind: usize) -> &'a CountTable 
 }
 
 fn assumed_detections(looks: &CameraCounts<'_>, kind: usize, name: &str) -> Vec<String> {
-    let thin = detection_table(looks, kind).low_count_rows(1);
-    let assumed = |class: String| format!("detection of {name} in {class}: as over all classes");
-    thin.into_iter().map(|row| assumed(row.row)).collect()
+    let mut assumed = Vec::new();
+    for LowCountRow { row: class, .. } in detection_table(looks, kind).low_count_rows(1) {
+        assumed.push(format!("detection of {name} in {class}: as over all classes"));
+    }
+    assumed
 }
 
 /// Returns the rows of the distance classes and of `beyond`. A class without counts is reported

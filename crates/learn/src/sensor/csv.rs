@@ -45,7 +45,8 @@ impl ReadingLog<'_> {
     fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
         let n = self.readings.len() as u64;
         let all: Vec<&LabeledReading> = self.readings.iter().collect();
-        let (confusion, distance) = (self.confusion(&all), self.distance(&all, self.classes));
+        let confusion = self.confusion(&all);
+        let distance = self.distance(&all);
         let by_class = self.by_class();
         let tables: Vec<&CountTable> =
             [&confusion, &distance].into_iter().chain(&by_class).collect();
@@ -90,14 +91,11 @@ impl ReadingLog<'_> {
 
     /// Counts the confusion of objects in each distance class; `nothing` has none.
     fn by_class(&self) -> Vec<CountTable> {
-        let table = |class: &String| {
-            CountTable::new(
-                &format!("confusion_{class}"),
-                &self.observations[1..],
-                &self.observations,
-            )
-        };
-        let mut tables: Vec<CountTable> = self.classes.names.iter().map(table).collect();
+        let mut tables = Vec::new();
+        for class in &self.classes.names {
+            let name = format!("confusion_{class}");
+            tables.push(CountTable::new(&name, &self.observations[1..], &self.observations));
+        }
         for reading in &self.readings {
             if let Some(distance) = reading.true_at {
                 tables[distance.class].add(reading.truth - 1, reading.reported, 1.0);
@@ -106,8 +104,9 @@ impl ReadingLog<'_> {
         tables
     }
 
-    fn distance(&self, readings: &[&LabeledReading], classes: &DistanceClasses) -> CountTable {
-        let mut counts = CountTable::new("distance", &classes.names, &classes.names);
+    fn distance(&self, readings: &[&LabeledReading]) -> CountTable {
+        let names = &self.classes.names;
+        let mut counts = CountTable::new("distance", names, names);
         for (truth, reported) in readings.iter().filter_map(|r| r.correct_distances()) {
             counts.add(truth.class, reported.class, 1.0);
         }
@@ -129,16 +128,20 @@ impl ReadingLog<'_> {
     }
 
     fn errors(&self) -> ErrorMoments {
-        let in_class = |class: usize| {
-            let ranges =
-                self.correct_ranges_m().filter(move |r| self.classes.class_of(r.0) == class);
-            Moments::from_values(ranges.map(|(truth_m, reported_m)| reported_m - truth_m))
-        };
+        let errors_m = self.correct_ranges_m().map(|(truth_m, reported_m)| reported_m - truth_m);
+        let classes = 0..self.classes.len();
         ErrorMoments {
-            range_error_m: Moments::from_values(self.correct_ranges_m().map(|(t, r)| r - t)),
-            range_error_by_true_class: (0..self.classes.len()).map(in_class).collect(),
+            range_error_m: Moments::from_values(errors_m),
+            range_error_by_true_class: classes.map(|class| self.errors_in_class(class)).collect(),
             bearing_error_rad: None,
         }
+    }
+
+    /// Returns the errors of ranges whose true value is in a class.
+    fn errors_in_class(&self, class: usize) -> Option<Moments> {
+        let ranges = self.correct_ranges_m();
+        let in_class = ranges.filter(|(truth_m, _)| self.classes.class_of(*truth_m) == class);
+        Moments::from_values(in_class.map(|(truth_m, reported_m)| reported_m - truth_m))
     }
 
     /// Counts the classes of reports where nothing was.
@@ -152,10 +155,9 @@ impl ReadingLog<'_> {
     fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
         let alpha = options.estimate.alpha;
         let (train, held) = split(&self.readings, options.estimate.hold_out_every);
-        let distance = |part: &[&LabeledReading]| self.distance(part, self.classes);
         vec![
             holdout_test(&self.confusion(&train), &self.confusion(&held), alpha),
-            holdout_test(&distance(&train), &distance(&held), alpha),
+            holdout_test(&self.distance(&train), &self.distance(&held), alpha),
         ]
     }
 
@@ -164,7 +166,7 @@ impl ReadingLog<'_> {
         let mut assumed = Vec::new();
         let all: Vec<&LabeledReading> = self.readings.iter().collect();
         let confusion = self.confusion_rows(&self.confusion(&all), alpha, &mut assumed);
-        let distance = self.distance(&all, self.classes);
+        let distance = self.distance(&all);
         SensorProfile {
             bearings_deg: options.bearings_deg.clone(),
             range_m: options.range_m,
@@ -182,10 +184,13 @@ impl ReadingLog<'_> {
 
     /// Returns the standard kinds that the sensor was never shown: it takes them for nothing.
     fn unseen_kinds(&self) -> Vec<(String, String)> {
-        let known = |kind: &&str| self.observations.iter().any(|name| name == kind);
-        let kinds = ["wall", "door", "person", "robot"].into_iter();
-        let unseen = kinds.filter(|kind| !known(kind));
-        unseen.map(|kind| (kind.to_string(), NOTHING.to_string())).collect()
+        let mut unseen = Vec::new();
+        for kind in ["wall", "door", "person", "robot"] {
+            if !self.observations.iter().any(|name| name == kind) {
+                unseen.push((kind.to_string(), NOTHING.to_string()));
+            }
+        }
+        unseen
     }
 
     fn confusion_rows(
@@ -194,14 +199,15 @@ impl ReadingLog<'_> {
         alpha: f64,
         assumed: &mut Vec<String>,
     ) -> Vec<NamedRow> {
-        let row = |(index, name): (usize, &String)| {
+        let mut rows = Vec::new();
+        for (index, name) in self.observations.iter().enumerate() {
             let row = counts.smoothed(index, alpha).unwrap_or_else(|| {
                 assumed.push(format!("confusion of {name}: reported truly"));
                 certain_row(self.observations.len(), index)
             });
-            NamedRow::new(name, &row)
-        };
-        self.observations.iter().enumerate().map(row).collect()
+            rows.push(NamedRow::new(name, &row));
+        }
+        rows
     }
 
     /// Returns the rows for each class; without counts in a class, that of all classes. `pooled`
@@ -210,14 +216,19 @@ impl ReadingLog<'_> {
         if self.readings.iter().all(|reading| reading.true_at.is_none()) {
             return Vec::new();
         }
-        let rows = |counts: &CountTable| {
-            let row = |index: usize| match counts.smoothed(index, alpha) {
-                Some(row) => NamedRow::new(&counts.rows()[index], &row),
-                None => pooled[index + 1].clone(),
-            };
-            (0..counts.rows().len()).map(row).collect()
-        };
-        self.classes.names.iter().cloned().zip(self.by_class().iter().map(rows)).collect()
+        let mut by_class = Vec::new();
+        for (class, counts) in self.classes.names.iter().zip(self.by_class()) {
+            let mut rows = Vec::new();
+            for (index, name) in counts.rows().iter().enumerate() {
+                rows.push(match counts.smoothed(index, alpha) {
+                    Some(row) => NamedRow::new(name, &row),
+                    // The table has no row for `nothing`, the first of `pooled`.
+                    None => pooled[index + 1].clone(),
+                });
+            }
+            by_class.push((class.clone(), rows));
+        }
+        by_class
     }
 }
 

@@ -8,9 +8,10 @@ use crate::CountTable;
 use crate::track::pose_at;
 use sidestep_import::mrclam::{Dataset, RobotLog};
 
-/// Half of the angle within which a subject is surely in view.
+/// Half of the angle within which a subject is surely in view: 23 of the camera's 30 degrees to each side, so that
+/// a subject that leaves the view within the bin does not count as missed.
 const HALF_FIELD_OF_VIEW_RAD: f64 = 0.40;
-/// Length of a bin in seconds.
+/// Length of a bin in seconds; one cycle of a simulation stands for one bin.
 const BIN_SECS: f64 = 1.0;
 /// Largest number of bins; a longer log (eleven days) is taken for damaged time stamps.
 const MAX_BINS: f64 = 1e6;
@@ -45,12 +46,11 @@ impl Detection {
         classes: &DistanceClasses,
     ) -> Self {
         let columns = ["seen", "missed"].map(String::from);
-        let table = |name: &str| CountTable::new(name, &classes.names, &columns);
         let mut detection = Self {
             looks,
-            all: table("detection"),
-            robots: table("detection_robot"),
-            landmarks: table("detection_landmark"),
+            all: CountTable::new("detection", &classes.names, &columns),
+            robots: CountTable::new("detection_robot", &classes.names, &columns),
+            landmarks: CountTable::new("detection_landmark", &classes.names, &columns),
         };
         for view in views {
             let by_kind =
@@ -93,9 +93,12 @@ fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     let truth = robot.truth.iter().map(|sample| sample.t_secs);
     let commands = robot.commands.iter().map(|command| command.t_secs);
     let readings = robot.measurements.iter().map(|reading| reading.t_secs);
-    let (a, b, c) = (first_and_last(truth)?, first_and_last(commands)?, first_and_last(readings)?);
-    let start_secs = a.0.max(b.0).max(c.0);
-    let n_bins = ((a.1.min(b.1).min(c.1) - start_secs) / BIN_SECS).floor();
+    let truth = first_and_last(truth)?;
+    let commands = first_and_last(commands)?;
+    let readings = first_and_last(readings)?;
+    let start_secs = truth.0.max(commands.0).max(readings.0);
+    let end_secs = truth.1.min(commands.1).min(readings.1);
+    let n_bins = ((end_secs - start_secs) / BIN_SECS).floor();
     (1.0..=MAX_BINS).contains(&n_bins).then_some((start_secs, n_bins as usize))
 }
 
@@ -115,8 +118,10 @@ fn codes_by_bin(
     let mut read = vec![Vec::new(); n_bins];
     for reading in &robot.measurements {
         let bin = ((reading.t_secs - start_secs) / BIN_SECS).floor();
-        let subject = dataset.subject_of_barcode.get(&reading.barcode);
-        if let (Some(subject), true) = (subject, bin >= 0.0 && bin < n_bins as f64) {
+        let is_in_bins = bin >= 0.0 && bin < n_bins as f64;
+        if let Some(subject) = dataset.subject_of_barcode.get(&reading.barcode)
+            && is_in_bins
+        {
             read[bin as usize].push(*subject);
         }
     }

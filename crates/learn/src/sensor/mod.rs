@@ -70,7 +70,7 @@ pub struct Scanner<'a> {
 /// Learns a scanner from the scans and true poses in a ROS 2 bag.
 ///
 /// A beam is expected to end at the first wall of the map, from the true pose at its time (L1; where true poses are
-/// farther apart, odometry gives the way since the last one, up to a meter). Beams that run into unmapped places
+/// farther apart, odometry gives the motion since the last one, up to a meter). Beams that run into unmapped places
 /// are skipped, and so are ranges below the least that the scanner measures.
 ///
 /// # Errors
@@ -86,7 +86,8 @@ pub fn from_bag(
         let remedy = "give the .yaml file of a ROS map";
         InputError::new(scanner.map.display(), "this is no map of pixels", remedy)
     })?;
-    let (source, log) = (path.display().to_string(), sidestep_import::bag::read(path, wanted)?);
+    let source = path.display().to_string();
+    let log = sidestep_import::bag::read(path, wanted)?;
     let Some(scan) = log.scans.first() else {
         return Err(InputError::new(source, "no scans were read", "give the topic of the scans"));
     };

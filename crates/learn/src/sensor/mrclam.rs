@@ -139,16 +139,20 @@ impl<'a> AssociatedLog<'a> {
     }
 
     fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
-        let (every, alpha) = (options.estimate.hold_out_every, options.estimate.alpha);
+        let every = options.estimate.hold_out_every;
+        let alpha = options.estimate.alpha;
         let (train, held) = split(&self.sightings, every);
-        let kinds = |part: &[&Sighting]| self.labels.kinds(part.iter().copied());
-        let far = |part: &[&Sighting]| distance("distance", part.iter().copied(), self.classes);
+        let train_kinds = self.labels.kinds(train.iter().copied());
+        let held_kinds = self.labels.kinds(held.iter().copied());
+        let train_distances = distance("distance", train, self.classes);
+        let held_distances = distance("distance", held, self.classes);
         let (train_views, held_views) = split(&self.views, every);
-        let seen = |part: &[&_]| Detection::from_views(part.iter().copied(), 0, self.classes).all;
+        let train_detection = Detection::from_views(train_views, 0, self.classes);
+        let held_detection = Detection::from_views(held_views, 0, self.classes);
         vec![
-            holdout_test(&kinds(&train), &kinds(&held), alpha),
-            holdout_test(&far(&train), &far(&held), alpha),
-            holdout_test(&seen(&train_views), &seen(&held_views), alpha),
+            holdout_test(&train_kinds, &held_kinds, alpha),
+            holdout_test(&train_distances, &held_distances, alpha),
+            holdout_test(&train_detection.all, &held_detection.all, alpha),
         ]
     }
 }
@@ -171,22 +175,37 @@ fn errors<'s>(
     sightings: impl IntoIterator<Item = &'s Sighting>,
     classes: Option<&DistanceClasses>,
 ) -> ErrorMoments {
-    let correct: Vec<(f64, f64, f64)> = sightings
-        .into_iter()
-        .filter_map(|s| {
-            let truth = s.correct_candidate()?;
-            let off_rad = wrap_angle(s.bearing_rad - truth.bearing_rad);
-            Some((truth.range_m, s.range_m - truth.range_m, off_rad))
-        })
-        .collect();
-    let in_class = |class: usize, classes: &DistanceClasses| {
-        Moments::from_values(correct.iter().filter(|c| classes.class_of(c.0) == class).map(|c| c.1))
-    };
+    let correct: Vec<MeasurementError> =
+        sightings.into_iter().filter_map(MeasurementError::of_correct).collect();
+    let mut by_class = Vec::new();
+    if let Some(classes) = classes {
+        for class in 0..classes.len() {
+            let in_class = correct.iter().filter(|e| classes.class_of(e.true_range_m) == class);
+            by_class.push(Moments::from_values(in_class.map(|e| e.range_m)));
+        }
+    }
     ErrorMoments {
-        range_error_m: Moments::from_values(correct.iter().map(|c| c.1)),
-        range_error_by_true_class: classes.map_or(Vec::new(), |classes| {
-            (0..classes.len()).map(|i| in_class(i, classes)).collect()
-        }),
-        bearing_error_rad: Moments::from_values(correct.iter().map(|c| c.2)),
+        range_error_m: Moments::from_values(correct.iter().map(|e| e.range_m)),
+        range_error_by_true_class: by_class,
+        bearing_error_rad: Moments::from_values(correct.iter().map(|e| e.bearing_rad)),
+    }
+}
+
+/// The errors of one correct reading, measured minus true.
+struct MeasurementError {
+    true_range_m: f64,
+    range_m: f64,
+    bearing_rad: f64,
+}
+
+impl MeasurementError {
+    /// Returns the errors; `None` where the reading is not correct.
+    fn of_correct(sighting: &Sighting) -> Option<Self> {
+        let truth = sighting.correct_candidate()?;
+        Some(Self {
+            true_range_m: truth.range_m,
+            range_m: sighting.range_m - truth.range_m,
+            bearing_rad: wrap_angle(sighting.bearing_rad - truth.bearing_rad),
+        })
     }
 }

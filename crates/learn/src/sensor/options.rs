@@ -3,7 +3,7 @@
 use crate::EstimateOptions;
 use sidestep_kernel::InputError;
 
-/// Largest number of distance classes; more are taken for a mistake.
+/// Largest number of distance classes; more are taken for a mistake: each has a row and a column of every table.
 const MAX_CLASSES: usize = 64;
 
 /// Options of learning a sensor.
@@ -66,9 +66,9 @@ pub(super) struct DistanceClasses {
 impl DistanceClasses {
     pub(super) fn new(edges_m: &[f64], names: &[String]) -> Result<Self, InputError> {
         let edges_m = edges_m.strip_prefix(&[0.0]).unwrap_or(edges_m).to_vec();
-        let increasing = edges_m.windows(2).all(|pair| pair[0] < pair[1]);
-        let positive = edges_m.iter().all(|edge| edge.is_finite() && *edge > 0.0);
-        if !increasing || !positive || edges_m.len() >= MAX_CLASSES {
+        let are_increasing = edges_m.windows(2).all(|pair| pair[0] < pair[1]);
+        let are_positive = edges_m.iter().all(|edge| edge.is_finite() && *edge > 0.0);
+        if !are_increasing || !are_positive || edges_m.len() >= MAX_CLASSES {
             let cause = format!("{edges_m:?} do not cut distances into classes");
             let remedy = "give fewer than 64 increasing, positive distances in m";
             return Err(InputError::new("distance edges", cause, remedy));
@@ -84,11 +84,9 @@ impl DistanceClasses {
         let mut distinct: Vec<&String> = self.names.iter().collect();
         distinct.sort();
         distinct.dedup();
-        let reserved = self.names.iter().any(|name| name.is_empty() || name == BEYOND);
-        if distinct.len() != self.edges_m.len() + 1
-            || distinct.len() != self.names.len()
-            || reserved
-        {
+        let has_repeated = distinct.len() != self.names.len();
+        let has_reserved = self.names.iter().any(|name| name.is_empty() || name == BEYOND);
+        if self.names.len() != self.edges_m.len() + 1 || has_repeated || has_reserved {
             let cause = format!("{} edges and the classes {:?}", self.edges_m.len(), self.names);
             let remedy = "give one class more than there are edges, all different, none `beyond`";
             return Err(InputError::new("distance classes", cause, remedy));
@@ -119,7 +117,7 @@ impl DistanceClasses {
     }
 }
 
-/// Lower edges in meters of very near, near and far.
+/// Lower edges in meters of very near, near and far: fixed, so that reports of different sensors can be compared.
 pub(super) const THREE_EDGES_M: [f64; 3] = [0.0, 2.0, 4.0];
 
 /// Name of the distance class where there is nothing.

@@ -31,8 +31,9 @@ impl LabeledReading {
 
     /// Returns true and reported range in meters, where there was something.
     pub(super) fn ranges_m(&self) -> (Option<f64>, Option<f64>) {
-        let range_m = |at: Option<Distance>| at.and_then(|distance| distance.range_m);
-        (range_m(self.true_at), range_m(self.reported_at))
+        let true_m = self.true_at.and_then(|distance| distance.range_m);
+        let reported_m = self.reported_at.and_then(|distance| distance.range_m);
+        (true_m, reported_m)
     }
 }
 
@@ -89,23 +90,30 @@ fn rows_of_sensor<'t>(
     wanted: Option<&str>,
 ) -> Result<Vec<CsvRow<'t>>, InputError> {
     let column = table.find("sensor");
-    let name = |row: &CsvRow<'t>| column.map_or("", |column| row.field(column).text);
-    let names: BTreeSet<&str> = table.rows().map(|row| name(&row)).collect();
+    let names: BTreeSet<&str> = table.rows().map(|row| sensor_name(&row, column)).collect();
     let listed = names.iter().copied().collect::<Vec<_>>().join(", ");
     if wanted.is_none() && names.len() > 1 {
         let cause = format!("the file has readings of several sensors: {listed}");
         return Err(InputError::new(table.place(), cause, "choose one of them"));
     }
-    let rows: Vec<CsvRow> =
-        table.rows().filter(|row| wanted.is_none_or(|wanted| name(row) == wanted)).collect();
+    let rows: Vec<CsvRow> = table
+        .rows()
+        .filter(|row| wanted.is_none_or(|wanted| sensor_name(row, column) == wanted))
+        .collect();
     if rows.is_empty() {
-        let cause = wanted.map_or("the file has no readings".to_string(), |wanted| {
-            format!("no readings of the sensor `{wanted}`")
-        });
+        let cause = match wanted {
+            Some(wanted) => format!("no readings of the sensor `{wanted}`"),
+            None => "the file has no readings".to_string(),
+        };
         let remedy = format!("sensors in the file: {listed}");
         return Err(InputError::new(table.place(), cause, remedy));
     }
     Ok(rows)
+}
+
+/// Returns the sensor of a row; without a column of sensors, all rows are of one that has no name.
+fn sensor_name<'t>(row: &CsvRow<'t>, column: Option<usize>) -> &'t str {
+    column.map_or("", |column| row.field(column).text)
 }
 
 /// Returns `nothing`, then every other observation of the file by name.

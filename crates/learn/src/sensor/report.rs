@@ -105,17 +105,15 @@ impl MapComparison {
     pub(super) fn from_ranges(ranges_m: impl Iterator<Item = (Option<f64>, Option<f64>)>) -> Self {
         let mut counts = Self::default();
         for pair in ranges_m {
-            *match pair {
+            let count = match pair {
                 (Some(_), None) => &mut counts.missed,
                 (None, Some(_)) => &mut counts.not_there,
-                (Some(wall_m), Some(met_m)) if !is_consistent(wall_m, met_m) => {
-                    match met_m < wall_m {
-                        true => &mut counts.in_front,
-                        false => &mut counts.seen_through,
-                    }
-                }
-                _ => &mut counts.agreeing,
-            } += 1;
+                (Some(wall_m), Some(met_m)) if is_consistent(wall_m, met_m) => &mut counts.agreeing,
+                (Some(wall_m), Some(met_m)) if met_m < wall_m => &mut counts.in_front,
+                (Some(_), Some(_)) => &mut counts.seen_through,
+                (None, None) => &mut counts.agreeing,
+            };
+            *count += 1;
         }
         counts
     }
@@ -125,9 +123,9 @@ impl MapComparison {
     }
 
     /// Returns a warning where more than a share of beams ends before the walls.
-    pub(super) fn warning(&self, most: f64) -> Option<String> {
+    pub(super) fn warning(&self, max_fraction: f64) -> Option<String> {
         let share = self.in_front as f64 / self.total().max(1) as f64;
-        (share > most).then(|| {
+        (share > max_fraction).then(|| {
             format!(
                 "{:.1} % of the beams end far before the wall of the map: people, or things that are not on \
                  it, are learned as errors of the sensor; record in the building as it was mapped, and check \
@@ -147,8 +145,12 @@ impl fmt::Display for MapComparison {
             (self.in_front, "something far before the wall"),
             (self.not_there, "something where nothing is"),
         ];
-        let share = |n: u64| 100.0 * n as f64 / self.total().max(1) as f64;
-        rows.iter().try_for_each(|(n, what)| writeln!(f, "  {n:>9} {:>6.2} %  {what}", share(*n)))
+        let total = self.total().max(1) as f64;
+        for (n, what) in rows {
+            let percent = 100.0 * n as f64 / total;
+            writeln!(f, "  {n:>9} {percent:>6.2} %  {what}")?;
+        }
+        Ok(())
     }
 }
 

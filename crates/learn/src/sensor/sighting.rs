@@ -6,6 +6,9 @@ use crate::track::{Pose2, pose_at};
 use sidestep_import::mrclam::{Dataset, Measurement};
 use sidestep_kernel::math::wrap_angle;
 
+// The tolerances and spreads of rule L2 (see the module `sensor`): tolerances are several spreads wide, so that a
+// reading with an error of the usual size is never taken for a false one.
+
 /// A subject is consistent with a reading when the bearing differs by no more than this ...
 const BEARING_TOLERANCE_RAD: f64 = 0.15;
 /// ... and the range by no more than the greater of this ...
@@ -101,8 +104,10 @@ fn associate(
     let candidates = consistent_candidates(dataset, observer, &pose, reading);
     let nearest = candidates.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit)).copied();
     let as_decoded = candidates.iter().find(|c| Some(c.subject) == decoded).copied();
-    let lost = |subject| position_of(dataset, subject, reading.t_secs).is_none();
-    if as_decoded.is_none() && decoded.is_some_and(lost) {
+    let is_decoded_lost =
+        decoded.is_some_and(|subject| position_of(dataset, subject, reading.t_secs).is_none());
+    // The decoded robot may well have stood there; counting a misreading would blame the sensor for motion capture.
+    if as_decoded.is_none() && is_decoded_lost {
         return Err(SkipReason::SubjectLost);
     }
     Ok(Sighting {
@@ -146,7 +151,8 @@ fn weighted_candidate(
 ) -> Option<Candidate> {
     let off_rad = wrap_angle(reading.bearing_rad - bearing_rad).abs();
     let off_m = (reading.range_m - range_m).abs();
-    let (u, v) = (off_rad / BEARING_SPREAD_RAD, off_m / (RANGE_SPREAD_FRACTION * range_m));
+    let u = off_rad / BEARING_SPREAD_RAD;
+    let v = off_m / (RANGE_SPREAD_FRACTION * range_m);
     let is_near = off_rad <= BEARING_TOLERANCE_RAD && is_consistent(range_m, reading.range_m);
     is_near.then_some(Candidate { subject, range_m, bearing_rad, misfit: u * u + v * v })
 }

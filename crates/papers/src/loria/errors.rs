@@ -105,24 +105,20 @@ fn outcomes(n: usize, e: f64) -> Vec<f64> {
 /// Returns settings of the sonar ring `equal-ring` and the effector `equal-wheels` of the scenario,
 /// so that they err at level `e`.
 pub(super) fn settings(e: f64, spread: ErrorSpread, beams: BeamCount) -> Vec<Setting> {
-    let list = |row: &[f64]| Value::from(row.to_vec());
-    let under = |section: &str, key: &str, value: Value| setting(&[section, key].join("."), value);
-    let mut all = vec![under("sensors.equal-ring", "bearings_deg", list(&beams.bearings_deg()))];
+    let mut all = vec![setting("sensors.equal-ring.bearings_deg", beams.bearings_deg())];
     for (name, row) in OBSERVATIONS.iter().zip(spread.confusion(e)) {
-        all.push(under("sensors.equal-ring.confusion", name, list(&row)));
+        all.push(setting(&format!("sensors.equal-ring.confusion.{name}"), row.to_vec()));
     }
     for (action, transitions) in ACTIONS {
-        let entry = |((path, turn), p): (&(&str, i64), f64)| -> Value {
-            let entries = [("p", p.into()), ("path", (*path).into()), ("turn", (*turn).into())];
-            entries
-                .map(|(key, value): (&str, Value)| (key.to_string(), value))
-                .into_iter()
-                .collect::<toml::Table>()
-                .into()
-        };
-        let row: Vec<Value> =
-            transitions.iter().zip(outcomes(transitions.len(), e)).map(entry).collect();
-        all.push(under("effectors.equal-wheels", action, row.into()));
+        let mut row: Vec<Value> = Vec::new();
+        for ((path, turn), p) in transitions.iter().zip(outcomes(transitions.len(), e)) {
+            let mut transition = toml::Table::new();
+            transition.insert("p".into(), p.into());
+            transition.insert("path".into(), (*path).into());
+            transition.insert("turn".into(), (*turn).into());
+            row.push(transition.into());
+        }
+        all.push(setting(&format!("effectors.equal-wheels.{action}"), row));
     }
     all
 }

@@ -129,9 +129,9 @@ impl Floor {
 /// Returns the west and the east end of a corridor as regions of a scenario, for bodies of `size` x
 /// `size` boxes.
 pub(super) fn ends(corridor: &Rect, size: u32) -> [[u32; 4]; 2] {
+    // Regions are of places of a body's corner box, the last of which leaves room for the body before the east wall.
     let last = corridor.col + corridor.width - size;
-    let end = |col| [col, corridor.row, END_BOXES, corridor.height];
-    [end(corridor.col), end(last + 1 - END_BOXES)]
+    [corridor.col, last + 1 - END_BOXES].map(|col| [col, corridor.row, END_BOXES, corridor.height])
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@
 
 use super::LoriaConfig;
 use super::floor::Floor;
-use super::measure::{LoriaVariant, RunMeasures, measure_all, values};
+use super::measure::{LoriaVariant, Measure, RunMeasures, measure_all, values};
 use super::reliability::{CONTACTS, TRIP};
-use crate::cells::{figure, table};
+use crate::case_results::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::worlds::robots::world::Regime;
@@ -28,6 +28,12 @@ pub(super) struct BuildOutcomes {
     pub(super) outcomes: Vec<RunMeasures>,
 }
 
+impl BuildOutcomes {
+    fn mean(&self, measure: Measure) -> Estimate {
+        Estimate::from_values(values(&self.outcomes, measure))
+    }
+}
+
 /// The genericity experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct GenericityResults {
@@ -41,36 +47,45 @@ impl GenericityResults {
     /// Runs the experiment: both sensors and effectors unreliable, medium floor.
     pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let floor = Arc::new(Floor::medium());
-        let build = |(camera, size)| LoriaVariant {
-            size,
-            camera,
-            ..LoriaVariant::new(&floor, Regime::Both)
-        };
-        let builds = [false, true].into_iter().flat_map(|camera| SIZES.map(|size| (camera, size)));
-        let variants: Vec<LoriaVariant> = builds.map(build).collect();
+        let mut variants = Vec::new();
+        for camera in [false, true] {
+            for size in SIZES {
+                variants.push(LoriaVariant {
+                    size,
+                    camera,
+                    ..LoriaVariant::new(&floor, Regime::Both)
+                });
+            }
+        }
         let outcomes = measure_all(&variants, plan, "genericity", report);
-        let builds = variants.iter().zip(outcomes);
-        let builds =
-            builds.map(|(v, outcomes)| BuildOutcomes { size: v.size, camera: v.camera, outcomes });
-        Self { builds: builds.collect(), cycles: plan.cycles }
+        let mut builds = Vec::new();
+        for (variant, outcomes) in variants.iter().zip(outcomes) {
+            builds.push(BuildOutcomes { size: variant.size, camera: variant.camera, outcomes });
+        }
+        Self { builds, cycles: plan.cycles }
+    }
+
+    fn builds_with_camera(&self, camera: bool) -> impl Iterator<Item = &BuildOutcomes> {
+        self.builds.iter().filter(move |build| build.camera == camera)
     }
 
     /// Returns, of the runs with or without a camera, how many kept the laws, in how many trips
     /// were completed, and how many there are.
     pub(super) fn runs(&self, camera: bool) -> [usize; 3] {
-        let runs = || self.builds.iter().filter(|b| b.camera == camera).flat_map(|b| &b.outcomes);
-        let lawful = runs().filter(|outcome| outcome.lawful).count();
-        let with_trips = runs().filter(|outcome| outcome.trip_cycles.is_some()).count();
-        [lawful, with_trips, runs().count()]
+        let runs: Vec<&RunMeasures> =
+            self.builds_with_camera(camera).flat_map(|build| &build.outcomes).collect();
+        let lawful = runs.iter().filter(|outcome| outcome.lawful).count();
+        let with_trips = runs.iter().filter(|outcome| outcome.trip_cycles.is_some()).count();
+        [lawful, with_trips, runs.len()]
     }
 
     /// Returns contacts with a camera minus those without, over all sizes and seeds.
     pub(super) fn camera_effect(&self) -> Estimate {
-        let contacts = |camera| {
-            let builds = self.builds.iter().filter(move |b| b.camera == camera);
-            builds.flat_map(|b| values(&b.outcomes, CONTACTS)).collect::<Vec<_>>()
-        };
-        Estimate::paired_difference(&contacts(true), &contacts(false))
+        let [with_camera, without] = [true, false].map(|camera| -> Vec<Option<f64>> {
+            let builds = self.builds_with_camera(camera);
+            builds.flat_map(|build| values(&build.outcomes, CONTACTS)).collect()
+        });
+        Estimate::paired_difference(&with_camera, &without)
     }
 
     /// Returns contacts and trips by size and sensors.
@@ -82,9 +97,6 @@ impl GenericityResults {
              boxes jam in corridors of 12 boxes.",
             self.cycles
         );
-        let estimate = |b: &BuildOutcomes, measure| {
-            Estimate::from_values(values(&b.outcomes, measure)).to_string()
-        };
         table(
             "Body sizes and an added camera",
             note,
@@ -92,10 +104,10 @@ impl GenericityResults {
             &[
                 ("body, boxes", &|b| format!("{0} x {0}", b.size)),
                 ("sensors", &|b| sensors(b.camera).into()),
-                ("contacts / 1000 actions", &|b| estimate(b, CONTACTS)),
-                ("trip, cycles", &|b| estimate(b, TRIP)),
-                ("trips per robot", &|b| estimate(b, |o| o.trips)),
-                ("straightness", &|b| estimate(b, |o| o.straightness)),
+                ("contacts / 1000 actions", &|b| b.mean(CONTACTS).to_string()),
+                ("trip, cycles", &|b| b.mean(TRIP).to_string()),
+                ("trips per robot", &|b| b.mean(|o| o.trips).to_string()),
+                ("straightness", &|b| b.mean(|o| o.straightness).to_string()),
             ],
         )
     }
@@ -103,11 +115,9 @@ impl GenericityResults {
     /// Returns contacts over body size.
     pub(super) fn figure(&self) -> Figure {
         let series = [false, true].map(|camera| {
-            let builds = self.builds.iter().filter(|b| b.camera == camera);
-            let point = |b: &BuildOutcomes| {
-                Estimate::from_values(values(&b.outcomes, CONTACTS)).point(f64::from(b.size))
-            };
-            Series { name: sensors(camera).into(), points: builds.filter_map(point).collect() }
+            let builds = self.builds_with_camera(camera);
+            let points = builds.filter_map(|b| b.mean(CONTACTS).point(f64::from(b.size)));
+            Series { name: sensors(camera).into(), points: points.collect() }
         });
         figure(
             "Contacts by body size and sensors",

@@ -73,18 +73,21 @@ impl LoriaVariant {
         let mut text = self.floor.scenario;
         let mut sensors = vec!["sonar-ring"];
         if let ErrorTables::Equal(e, spread, beams) = self.tables {
-            (text, sensors) = (EQUAL_ERRORS, vec!["equal-ring"]);
+            text = EQUAL_ERRORS;
+            sensors = vec!["equal-ring"];
             settings.extend(errors::settings(e, spread, beams));
         }
-        sensors.extend(self.camera.then_some("camera"));
+        if self.camera {
+            sensors.push("camera");
+        }
         for (k, corridor) in self.floor.corridors().enumerate() {
-            let key = |name: &str| ["robots", &k.to_string(), name].join(".");
             let [a, b] = ends(corridor, self.size).map(|end| end.to_vec());
-            settings.push(setting(&key("size"), self.size));
-            settings.push(setting(&key("sensors"), sensors.clone()));
-            settings.push(setting(&key("behaviour.a"), a));
-            settings.push(setting(&key("behaviour.b"), b));
-            settings.push(setting(&key("behaviour.avoidance"), self.mind.name()));
+            settings.push(setting(&format!("robots.{k}.size"), self.size));
+            settings.push(setting(&format!("robots.{k}.sensors"), sensors.clone()));
+            settings.push(setting(&format!("robots.{k}.behaviour.a"), a));
+            settings.push(setting(&format!("robots.{k}.behaviour.b"), b));
+            let avoidance = self.mind.name();
+            settings.push(setting(&format!("robots.{k}.behaviour.avoidance"), avoidance));
         }
         source(text, &settings).expect("the experiments' scenarios are valid")
     }
@@ -120,10 +123,12 @@ pub(super) fn values(outcomes: &[RunMeasures], measure: Measure) -> Vec<Option<f
     outcomes.iter().map(measure).collect()
 }
 
-/// Length of the windows in which straightness is measured, in cycles.
+/// Length of the windows in which straightness is measured, in cycles: long enough for a zigzag of single steps, short beside
+/// a trip along a corridor, of which the turns are no zigzag.
 pub(super) const WINDOW_CYCLES: usize = 20;
 
-/// Shortest path of a window that has a meaningful shape, in boxes.
+/// Shortest path of a window that has a meaningful shape, in boxes: a robot that hardly moves goes two or three boxes, which
+/// are straight by chance.
 const MIN_PATH_BOXES: f64 = 10.0;
 
 /// Runs every variant with the seeds of a plan, from 1 on; the outcomes are by variant, then by seed.
@@ -136,14 +141,19 @@ pub(super) fn measure_all(
     what: &str,
     report: &mut Progress<'_>,
 ) -> Vec<Vec<RunMeasures>> {
-    let &LoriaConfig { seeds, cycles, workers, .. } = plan;
-    let run = |i: &usize| {
-        let (v, seed) = (i / seeds, (i % seeds) as u64 + 1);
-        Ok::<_, Infallible>(measure(&variants[v], seed, cycles))
-    };
-    let numbers: Vec<usize> = (0..variants.len() * seeds).collect();
-    let Ok(outcomes) = run_all(&numbers, workers, |share| report(what, share), run);
-    outcomes.chunks(seeds).map(<[RunMeasures]>::to_vec).collect()
+    let mut runs: Vec<(&LoriaVariant, u64)> = Vec::new();
+    for variant in variants {
+        for seed in 1..=plan.seeds as u64 {
+            runs.push((variant, seed));
+        }
+    }
+    let Ok(outcomes) = run_all(
+        &runs,
+        plan.workers,
+        |share| report(what, share),
+        |(variant, seed)| Ok::<_, Infallible>(measure(variant, *seed, plan.cycles)),
+    );
+    outcomes.chunks(plan.seeds).map(<[RunMeasures]>::to_vec).collect()
 }
 
 /// Runs one variant once, on one worker.
@@ -184,33 +194,45 @@ fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
 }
 
 fn append_poses(tracks: &mut [Track], recorder: &MemoryRecorder) {
-    let column = |name| match recorder.column("trajectories", name) {
+    let bodies = trajectory_column(recorder, "body");
+    let cols = trajectory_column(recorder, "col_boxes");
+    let rows = trajectory_column(recorder, "row_boxes");
+    let headings = trajectory_column(recorder, "heading");
+    for (row, &body) in bodies.iter().enumerate() {
+        // Robots have the first ids; people have no track.
+        if let Some(track) = tracks.get_mut(body as usize) {
+            track.push((cols[row], rows[row], headings[row] as u8));
+        }
+    }
+}
+
+fn trajectory_column<'a>(recorder: &'a MemoryRecorder, name: &str) -> &'a [u32] {
+    match recorder.column("trajectories", name) {
         Some(Values::U32(values) | Values::Label(values)) => &values[..],
         _ => &[],
-    };
-    let places = column("col_boxes").iter().zip(column("row_boxes")).zip(column("heading"));
-    for (&body, ((&col, &row), &heading)) in column("body").iter().zip(places) {
-        if let Some(track) = tracks.get_mut(body as usize) {
-            track.push((col, row, heading as u8));
-        }
     }
 }
 
 fn run_measures(simulation: &RobotsRun, tracks: &[Track]) -> RunMeasures {
     let total = simulation.metrics().total;
-    let per_1000 = |n: u64| (total.actions > 0).then(|| 1e3 * n as f64 / total.actions as f64);
-    let of_kind = |kind: &str| per_1000(total.contacts_by_kind.get(kind).copied().unwrap_or(0));
+    let wall_contacts = total.contacts_by_kind.get("wall").copied().unwrap_or(0);
+    let robot_contacts = total.contacts_by_kind.get("robot").copied().unwrap_or(0);
+    let lateral_moves = tracks.iter().map(|track| lateral_moves(track)).sum();
     RunMeasures {
-        contacts: per_1000(total.contacts),
-        wall_contacts: of_kind("wall"),
-        robot_contacts: of_kind("robot"),
+        contacts: per_1000(total.contacts, total.actions),
+        wall_contacts: per_1000(wall_contacts, total.actions),
+        robot_contacts: per_1000(robot_contacts, total.actions),
         trip_cycles: total.trip_cycles_mean,
         trips: Some(total.trips as f64 / tracks.len() as f64),
         straightness: straightness(tracks),
-        lateral_moves: per_1000(tracks.iter().map(|track| lateral_moves(track)).sum()),
+        lateral_moves: per_1000(lateral_moves, total.actions),
         lawful: total.actions == simulation.cycle() * simulation.agents() as u64
             && find_violation(simulation.world(), &simulation.snapshot()).is_none(),
     }
+}
+
+fn per_1000(n: u64, actions: u64) -> Option<f64> {
+    (actions > 0).then(|| 1e3 * n as f64 / actions as f64)
 }
 
 /// Returns the mean over all windows of all tracks of net displacement divided by path length: 1
@@ -222,22 +244,28 @@ fn straightness(tracks: &[Track]) -> Option<f64> {
 }
 
 fn straightness_of(window: &[(u32, u32, u8)]) -> Option<f64> {
-    let distance = |a: (u32, u32, u8), b: (u32, u32, u8)| {
-        let (dx, dy) = (f64::from(b.0.abs_diff(a.0)), f64::from(b.1.abs_diff(a.1)));
-        (dx * dx + dy * dy).sqrt()
-    };
-    let path: f64 = window.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
-    let net = distance(*window.first()?, *window.last()?);
+    let path: f64 = window.windows(2).map(|pair| distance_boxes(pair[0], pair[1])).sum();
+    let net = distance_boxes(*window.first()?, *window.last()?);
     (path >= MIN_PATH_BOXES).then(|| net / path)
+}
+
+fn distance_boxes(a: (u32, u32, u8), b: (u32, u32, u8)) -> f64 {
+    let dx = f64::from(b.0.abs_diff(a.0));
+    let dy = f64::from(b.1.abs_diff(a.1));
+    (dx * dx + dy * dy).sqrt()
 }
 
 /// Returns the number of moves between two cycles that lead aside from the heading before.
 fn lateral_moves(track: &[(u32, u32, u8)]) -> u64 {
-    let aside = |pair: &&[(u32, u32, u8)]| {
-        let ((x, y, heading), (u, v, _)) = (pair[0], pair[1]);
-        if heading % 2 == 0 { v != y } else { u != x }
-    };
-    track.windows(2).filter(aside).count() as u64
+    track.windows(2).filter(|pair| is_lateral(pair[0], pair[1])).count() as u64
+}
+
+fn is_lateral(
+    (col, row, heading): (u32, u32, u8),
+    (next_col, next_row, _): (u32, u32, u8),
+) -> bool {
+    // Headings are east, north, west, south: an even one is along a row.
+    if heading.is_multiple_of(2) { next_row != row } else { next_col != col }
 }
 
 #[cfg(test)]

@@ -73,6 +73,7 @@ impl Default for LoriaConfig {
             cycles: 4000,
             error_levels: vec![0.02, 0.05, 0.1, 0.2, 0.3, 0.4],
             workers: available_workers(),
+            // The paper went to sixteen processors.
             most_workers: available_workers().min(16),
             repeats: 9,
             robots: vec![250, 1500],
@@ -104,39 +105,34 @@ impl LoriaConfig {
     }
 
     fn check(&self) -> Result<(), InputError> {
-        let refuse = |key: &str, is_wrong: bool, remedy: &str| {
-            let cause = "out of range for the experiment";
-            if is_wrong {
-                Err(InputError::new(format!("plan.{key}"), cause, remedy))
-            } else {
-                Ok(())
-            }
-        };
-        let outside = |value: u64, min: u64, max: u64| !(min..=max).contains(&value);
         let levels = &self.error_levels;
-        let bad_level = levels.is_empty() || levels.iter().any(|&e| !(e > 0.0 && e < 1.0));
-        let count = |n: usize| n as u64;
-        refuse("seeds", outside(count(self.seeds), 2, 100_000), "give 2 to 100000 seeds")?;
-        refuse(
-            "cycles",
-            outside(self.cycles, 100, 10 * MAX_AMOUNT),
-            "give 100 to 10000000 cycles",
-        )?;
-        refuse("error_levels", bad_level, "give levels above 0 and below 1")?;
-        refuse("workers", outside(count(self.workers), 1, 1024), "give 1 to 1024 workers")?;
-        refuse(
-            "most_workers",
-            outside(count(self.most_workers), 1, 1024),
-            "give 1 to 1024 workers",
-        )?;
-        refuse("repeats", outside(count(self.repeats), 2, 10_000), "give 2 to 10000 repeats")?;
-        let bad_robots = |&n: &u32| outside(u64::from(n), 1, 3000);
-        let none_or = |bad: bool, empty: bool| bad || empty;
-        let robots = none_or(self.robots.iter().any(bad_robots), self.robots.is_empty());
-        refuse("robots", robots, "give numbers from 1 to 3000: more do not fit the floor")?;
-        refuse("operations", self.operations.is_empty(), "give at least one cost, e.g. 0")?;
-        let decisions = outside(self.timed_robot_cycles, 100, 1000 * MAX_AMOUNT);
-        refuse("timed_robot_cycles", decisions, "give 100 to 1000000000")
+        let levels_are_right = !levels.is_empty() && levels.iter().all(|&e| e > 0.0 && e < 1.0);
+        let robots_are_right =
+            !self.robots.is_empty() && self.robots.iter().all(|n| (1..=3000).contains(n));
+        let max_cycles = 10 * MAX_AMOUNT;
+        let max_decisions = 1000 * MAX_AMOUNT;
+        let rules = [
+            ("seeds", (2..=100_000).contains(&self.seeds), "give 2 to 100000 seeds"),
+            ("cycles", (100..=max_cycles).contains(&self.cycles), "give 100 to 10000000 cycles"),
+            ("error_levels", levels_are_right, "give levels above 0 and below 1"),
+            ("workers", (1..=1024).contains(&self.workers), "give 1 to 1024 workers"),
+            ("most_workers", (1..=1024).contains(&self.most_workers), "give 1 to 1024 workers"),
+            ("repeats", (2..=10_000).contains(&self.repeats), "give 2 to 10000 repeats"),
+            ("robots", robots_are_right, "give numbers from 1 to 3000: more do not fit the floor"),
+            ("operations", !self.operations.is_empty(), "give at least one cost, e.g. 0"),
+            (
+                "timed_robot_cycles",
+                (100..=max_decisions).contains(&self.timed_robot_cycles),
+                "give 100 to 1000000000",
+            ),
+        ];
+        for (key, is_right, remedy) in rules {
+            if !is_right {
+                let cause = "out of range for the experiment";
+                return Err(InputError::new(format!("plan.{key}"), cause, remedy));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -6,9 +6,12 @@
 //! speed-up is the most that the machine could give at that moment.
 
 use super::floor::Floor;
-use super::timing::{SEGMENTS, TimedRun, Workload, arithmetic, time_interleaved, time_s};
+use super::timing::{
+    SEGMENTS, TimedRun, Workload, arithmetic, mean_cycle_ms, speed_ups, time_interleaved, time_s,
+    times_of,
+};
 use super::{LoriaConfig, NewRecorder};
-use crate::cells::{figure, median, table};
+use crate::case_results::{figure, median, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
@@ -33,6 +36,13 @@ pub(super) struct LoadTiming {
     pub(super) ratios: Vec<Option<f64>>,
     /// Speed-up of plain arithmetic with as many workers, timed in turn with this.
     pub(super) machine: Estimate,
+}
+
+impl LoadTiming {
+    /// Returns the speed-up divided by a number of workers or by another speed-up, for a table.
+    fn speed_up_per(&self, divisor: f64) -> String {
+        format!("{:.2}", self.speed_up.mean_or_zero() / divisor)
+    }
 }
 
 /// The cost of a run before its first cycle.
@@ -74,18 +84,23 @@ pub(super) struct PerformanceResults {
 /// Returns the loads of the experiment: sparse and dense, each at every cost of a decision.
 pub(super) fn loads(plan: &LoriaConfig) -> Vec<Workload> {
     let floor = Arc::new(Floor::large());
-    let load = |&(robots, operations): &(u32, u32)| Workload {
-        robots,
-        people: robots / 5,
-        size: 2,
-        operations,
-        floor: Arc::clone(&floor),
-    };
-    let costs = |robots| plan.operations.iter().map(move |&operations| (robots, operations));
-    plan.robots.iter().copied().flat_map(costs).collect::<Vec<_>>().iter().map(load).collect()
+    let mut loads = Vec::new();
+    for &robots in &plan.robots {
+        for &operations in &plan.operations {
+            loads.push(Workload {
+                robots,
+                people: robots / 5,
+                size: 2,
+                operations,
+                floor: Arc::clone(&floor),
+            });
+        }
+    }
+    loads
 }
 
-/// Returns worker counts from 1 to `max`: all up to 4, then larger and larger steps.
+/// Returns worker counts from 1 to `max`: all up to 4, then larger and larger steps, because on a large machine timings of all
+/// would take hours.
 pub(super) fn worker_counts(max: usize) -> Vec<usize> {
     let mut counts: Vec<usize> = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64]
         .into_iter()
@@ -155,26 +170,25 @@ impl PerformanceResults {
         let workers = self.max_workers() as f64;
         let loads: Vec<&LoadTiming> = self.at_max_workers(false).collect();
         let repeats = loads.iter().map(|t| t.ratios.len()).min().unwrap_or(0);
-        let mean = |k: usize| {
-            let of_repeat: Option<Vec<f64>> = loads.iter().map(|t| t.ratios[k]).collect();
-            Some(sidestep::statistics::mean(&of_repeat?)? / workers)
-        };
-        Estimate::from_factors((0..repeats).map(mean))
+        Estimate::from_factors((0..repeats).map(|repeat| {
+            let speed_ups: Option<Vec<f64>> = loads.iter().map(|t| t.ratios[repeat]).collect();
+            Some(sidestep::statistics::mean(&speed_ups?)? / workers)
+        }))
     }
 
     /// Returns the speed-up of the costliest decisions minus that of the cheapest, same robots,
     /// unrecorded, with the most workers; one value per repeat and number of robots.
     pub(super) fn gain_by_cost(&self) -> Estimate {
-        let (mut cheap, mut costly) = (Vec::new(), Vec::new());
-        let cost = |timing: &LoadTiming| self.loads[timing.load].operations;
-        let extremes = [
-            self.loads.iter().map(|l| l.operations).min(),
-            self.loads.iter().map(|l| l.operations).max(),
-        ];
+        let least = self.loads.iter().map(|load| load.operations).min();
+        let most = self.loads.iter().map(|load| load.operations).max();
+        let mut cheap = Vec::new();
+        let mut costly = Vec::new();
+        // Loads are by number of robots, so that both lists have the same numbers in the same order.
         for timing in self.at_max_workers(false) {
-            if Some(cost(timing)) == extremes[0] {
+            let operations = Some(self.loads[timing.load].operations);
+            if operations == least {
                 cheap.extend(timing.ratios.iter().copied());
-            } else if Some(cost(timing)) == extremes[1] {
+            } else if operations == most {
                 costly.extend(timing.ratios.iter().copied());
             }
         }
@@ -196,8 +210,6 @@ impl PerformanceResults {
              to the faster.",
             self.processors
         );
-        let per =
-            |timing: &LoadTiming, of: f64| format!("{:.2}", timing.speed_up.mean_or_zero() / of);
         table(
             "Execution time, speed-up and efficiency",
             note,
@@ -208,10 +220,10 @@ impl PerformanceResults {
                 ("recorded", &|timing| if timing.recorded { "yes" } else { "no" }.into()),
                 ("ms per cycle", &|timing| timing.cycle_ms.to_string()),
                 ("speed-up", &|timing| timing.speed_up.to_string()),
-                ("efficiency", &|timing| per(timing, timing.workers as f64)),
+                ("efficiency", &|timing| timing.speed_up_per(timing.workers as f64)),
                 ("the machine's speed-up", &|timing| timing.machine.to_string()),
                 ("share of it", &|timing| {
-                    per(timing, timing.machine.mean_or_zero().max(f64::MIN_POSITIVE))
+                    timing.speed_up_per(timing.machine.mean_or_zero().max(f64::MIN_POSITIVE))
                 }),
             ],
         )
@@ -250,12 +262,10 @@ impl PerformanceResults {
 
     /// Returns the figures of this experiment: speed-up and time over workers.
     pub(super) fn figures(&self) -> Vec<Figure> {
-        let speed_up: fn(&LoadTiming) -> &Estimate = |t| &t.speed_up;
-        let cycle_ms: fn(&LoadTiming) -> &Estimate = |t| &t.cycle_ms;
         vec![
-            self.figure("Speed-up", "time of 1 worker / time", false, speed_up),
-            self.figure("Speed-up, recorded", "time of 1 worker / time", true, speed_up),
-            self.figure("Execution time", "ms per cycle", false, cycle_ms),
+            self.figure("Speed-up", "time of 1 worker / time", false, |t| &t.speed_up),
+            self.figure("Speed-up, recorded", "time of 1 worker / time", true, |t| &t.speed_up),
+            self.figure("Execution time", "ms per cycle", false, |t| &t.cycle_ms),
         ]
     }
 
@@ -266,23 +276,32 @@ impl PerformanceResults {
         recorded: bool,
         quantity: fn(&LoadTiming) -> &Estimate,
     ) -> Figure {
-        let line = |(index, load): (usize, &Workload)| {
+        let mut lines = Vec::new();
+        for (index, load) in self.loads.iter().enumerate() {
             let timings = self.timings.iter().filter(|t| t.load == index && t.recorded == recorded);
             let points = timings.filter_map(|t| quantity(t).point(t.workers as f64)).collect();
-            Series { name: load.name(), points }
-        };
-        figure(
-            title,
-            ["workers", y_label],
-            self.loads.iter().enumerate().map(line).collect::<Vec<_>>(),
-        )
+            lines.push(Series { name: load.name(), points });
+        }
+        figure(title, ["workers", y_label], lines)
     }
 }
 
 /// A participant of the timings, which take turns.
 enum TimedCandidate {
+    /// A run with a number of workers, recorded or not.
     Run(Box<TimedRun>, usize, bool),
+    /// Arithmetic with a number of workers.
     Arithmetic(usize),
+}
+
+impl TimedCandidate {
+    fn is_run(&self, workers: usize, recorded: bool) -> bool {
+        matches!(self, Self::Run(_, own, is_recorded) if (*own, *is_recorded) == (workers, recorded))
+    }
+
+    fn is_arithmetic(&self, workers: usize) -> bool {
+        matches!(self, Self::Arithmetic(own) if *own == workers)
+    }
 }
 
 /// Returns all candidates of a load: unrecorded, recorded, and arithmetic, each with every number
@@ -319,34 +338,23 @@ fn time_load(
         TimedCandidate::Run(run, ..) => run.run(cycles),
         TimedCandidate::Arithmetic(workers) => Ok(arithmetic(*workers, plan.timed_robot_cycles)),
     })?;
-    let times_of = |is_it: &dyn Fn(&TimedCandidate) -> bool| {
-        all.iter().position(is_it).map_or(&[][..], |k| &times_s[k][..])
-    };
-    let machine = |count: usize| {
-        times_of(&|c| matches!(c, TimedCandidate::Arithmetic(workers) if *workers == count))
-    };
-    let alone = |recorded: bool| {
-        times_of(
-            &|c| matches!(c, TimedCandidate::Run(_, 1, is_recorded) if *is_recorded == recorded),
-        )
-    };
-    let timing = |(candidate, times_s): (&TimedCandidate, &Vec<Option<f64>>)| {
-        let &TimedCandidate::Run(_, workers, recorded) = candidate else { return None };
-        let ratio = |(a, b): (&Option<f64>, &Option<f64>)| Some((*a)? / (*b)?);
-        let ratios: Vec<Option<f64>> = alone(recorded).iter().zip(times_s).map(ratio).collect();
-        Some(LoadTiming {
+    let mut timings = Vec::new();
+    for (candidate, own_s) in all.iter().zip(&times_s) {
+        let &TimedCandidate::Run(_, workers, recorded) = candidate else { continue };
+        let alone_s = times_of(&all, &times_s, |other| other.is_run(1, recorded));
+        let ratios = speed_ups(alone_s, own_s);
+        let machine_alone_s = times_of(&all, &times_s, |other| other.is_arithmetic(1));
+        let machine_s = times_of(&all, &times_s, |other| other.is_arithmetic(workers));
+        timings.push(LoadTiming {
             load: 0,
             workers,
             recorded,
-            cycle_ms: Estimate::from_values(
-                times_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64)),
-            ),
+            cycle_ms: mean_cycle_ms(own_s, cycles),
             speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::geometric_ratio(machine(1), machine(workers)),
-        })
-    };
-    let mut timings: Vec<LoadTiming> = all.iter().zip(&times_s).filter_map(timing).collect();
+            machine: Estimate::geometric_ratio(machine_alone_s, machine_s),
+        });
+    }
     timings.sort_by_key(|timing| (timing.recorded, timing.workers));
     for candidate in all {
         if let TimedCandidate::Run(run, ..) = candidate {
@@ -363,18 +371,23 @@ fn initialize(
     repeats: usize,
 ) -> InitializationCost {
     let times_s: Vec<f64> = (0..repeats).map(|_| time_s(|| load.simulation(1)).0).collect();
-    let unrecorded = || timings.iter().filter(|t| !t.recorded);
-    let share = |timing: Option<&LoadTiming>| {
-        let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.mean_or_zero()) * 1e-3;
-        let of = |s: &f64| Some(s / (s + cycle_s * REFERENCE_CYCLES as f64));
-        Estimate::from_values(times_s.iter().map(of))
-    };
+    // Timings are by number of workers: the first is that of one, the last that of the most.
+    let mut unrecorded = timings.iter().filter(|t| !t.recorded);
+    let alone = unrecorded.clone().next();
+    let together = unrecorded.next_back();
     InitializationCost {
         load: index,
         seconds: median(times_s.iter().copied()),
-        share_alone: share(unrecorded().next()),
-        share_together: share(unrecorded().next_back()),
+        share_alone: initialization_share(&times_s, alone),
+        share_together: initialization_share(&times_s, together),
     }
+}
+
+/// Returns the share that initialization has of a whole run of [`REFERENCE_CYCLES`], over repeats.
+fn initialization_share(times_s: &[f64], timing: Option<&LoadTiming>) -> Estimate {
+    let cycle_s = timing.map_or(0.0, |t| t.cycle_ms.mean_or_zero()) * 1e-3;
+    let shares = times_s.iter().map(|s| Some(s / (s + cycle_s * REFERENCE_CYCLES as f64)));
+    Estimate::from_values(shares)
 }
 
 /// Returns the digests of one run by number of workers, and of the recorded run.

@@ -5,7 +5,7 @@ use super::LoriaConfig;
 use super::errors::{BeamCount, ErrorSpread};
 use super::floor::{AvoidancePolicy, Floor};
 use super::measure::{ErrorTables, LoriaVariant, Measure, RunMeasures, measure_all, values};
-use crate::cells::figure;
+use crate::case_results::figure;
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::statistics::holm;
@@ -25,20 +25,36 @@ pub(super) struct VariantOutcomes {
     pub(super) outcomes: Vec<RunMeasures>,
 }
 
+impl VariantOutcomes {
+    fn new(variant: LoriaVariant, outcomes: Vec<RunMeasures>) -> Self {
+        Self { floor: variant.floor.name.into(), variant, outcomes }
+    }
+
+    fn is_selected(&self, key: VariantKey<'_>, regime: Regime) -> bool {
+        let variant = &self.variant;
+        self.floor == key.floor
+            && variant.obstacle_rule == key.rule
+            && variant.mind == key.mind
+            && variant.regime == regime
+            && same_errors(variant.tables, key.tables, regime)
+    }
+}
+
 /// All runs of the reliability experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct ReliabilityResults {
     /// The floors, in words.
     pub(super) floors: Vec<String>,
     /// Every variant with its outcomes.
-    pub(super) cells: Vec<VariantOutcomes>,
+    #[serde(rename = "cells")]
+    pub(super) variants: Vec<VariantOutcomes>,
     /// Error levels of the sweep.
     pub(super) levels: Vec<f64>,
 }
 
-/// The selection of a cell.
+/// The selection of a variant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CellKey<'a> {
+pub(super) struct VariantKey<'a> {
     /// Name of the floor.
     pub(super) floor: &'a str,
     /// Law for blocked paths.
@@ -49,9 +65,9 @@ pub(super) struct CellKey<'a> {
     pub(super) tables: ErrorTables,
 }
 
-impl CellKey<'_> {
+impl VariantKey<'_> {
     /// The medium floor, rule `cut`, avoiding robots, presets.
-    pub(super) const BASE: CellKey<'static> = CellKey {
+    pub(super) const BASE: VariantKey<'static> = VariantKey {
         floor: "medium",
         rule: ObstacleRule::Cut,
         mind: AvoidancePolicy::Avoid,
@@ -84,14 +100,10 @@ impl ReliabilityResults {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
         let outcomes = measure_all(&variants, plan, "reliability", report);
-        let cell = |(variant, outcomes): (LoriaVariant, _)| VariantOutcomes {
-            floor: variant.floor.name.into(),
-            variant,
-            outcomes,
-        };
+        let measured = variants.into_iter().zip(outcomes);
         Self {
             floors: floors.iter().map(|floor| floor.describe()).collect(),
-            cells: variants.into_iter().zip(outcomes).map(cell).collect(),
+            variants: measured.map(|(v, outcomes)| VariantOutcomes::new(v, outcomes)).collect(),
             levels: plan.error_levels.clone(),
         }
     }
@@ -103,42 +115,39 @@ impl ReliabilityResults {
         of: impl Fn(&LoriaVariant, usize) -> RunMeasures,
     ) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
-        let cell = |variant: LoriaVariant| VariantOutcomes {
-            floor: variant.floor.name.into(),
-            outcomes: (1..=plan.seeds).map(|seed| of(&variant, seed)).collect(),
-            variant,
-        };
-        let cells = variants(&floors, plan).into_iter().map(cell).collect();
-        Self { floors: Vec::new(), cells, levels: plan.error_levels.clone() }
+        let variants = variants(&floors, plan).into_iter().map(|variant| {
+            let outcomes = (1..=plan.seeds).map(|seed| of(&variant, seed)).collect();
+            VariantOutcomes::new(variant, outcomes)
+        });
+        let variants = variants.collect();
+        Self { floors: Vec::new(), variants, levels: plan.error_levels.clone() }
     }
 
-    /// Returns the values by seed of one measure in one cell; empty for a cell that was not run.
+    /// Returns the values by seed of one measure in one variant; empty for a variant that was not run.
     pub(super) fn values(
         &self,
-        key: CellKey<'_>,
+        key: VariantKey<'_>,
         regime: Regime,
         measure: Measure,
     ) -> Vec<Option<f64>> {
-        // A regime that switches an error off does not depend on that error's table, so those cells
-        // are run for one table only.
-        let is_cell = |cell: &&VariantOutcomes| {
-            let v = &cell.variant;
-            (cell.floor.as_str(), v.obstacle_rule, v.mind, v.regime)
-                == (key.floor, key.rule, key.mind, regime)
-                && same_errors(v.tables, key.tables, regime)
-        };
-        self.cells.iter().find(is_cell).map_or_else(Vec::new, |c| values(&c.outcomes, measure))
+        let selected = self.variants.iter().find(|variant| variant.is_selected(key, regime));
+        selected.map_or_else(Vec::new, |variant| values(&variant.outcomes, measure))
     }
 
-    /// Returns the mean of a measure in one cell.
-    pub(super) fn estimate(&self, key: CellKey<'_>, regime: Regime, measure: Measure) -> Estimate {
+    /// Returns the mean of a measure in one variant.
+    pub(super) fn estimate(
+        &self,
+        key: VariantKey<'_>,
+        regime: Regime,
+        measure: Measure,
+    ) -> Estimate {
         Estimate::from_values(self.values(key, regime, measure))
     }
 
     /// Returns the paired difference of a measure between two regimes, `a - b`.
     pub(super) fn difference(
         &self,
-        key: CellKey<'_>,
+        key: VariantKey<'_>,
         [a, b]: [Regime; 2],
         measure: Measure,
     ) -> Estimate {
@@ -148,7 +157,7 @@ impl ReliabilityResults {
     /// Returns the ratio of a measure between two regimes seed by seed, `a / b`.
     pub(super) fn ratio(
         &self,
-        key: CellKey<'_>,
+        key: VariantKey<'_>,
         [a, b]: [Regime; 2],
         measure: Measure,
     ) -> Estimate {
@@ -162,38 +171,40 @@ impl ReliabilityResults {
         regime: Regime,
         measure: Measure,
     ) -> Estimate {
-        let of = |mind| self.values(CellKey { mind, ..CellKey::BASE }, regime, measure);
-        Estimate::paired_difference(&of(a), &of(b))
+        let [a, b] = [a, b]
+            .map(|mind| self.values(VariantKey { mind, ..VariantKey::BASE }, regime, measure));
+        Estimate::paired_difference(&a, &b)
     }
 
     /// Returns keys of the places where the four regimes were run under the presets.
-    pub(super) fn base_keys(&self) -> Vec<CellKey<'static>> {
-        let rules = ObstacleRule::ALL.map(|rule| CellKey { rule, ..CellKey::BASE });
-        let floors = ["small", "large"].map(|floor| CellKey { floor, ..CellKey::BASE });
+    pub(super) fn base_keys(&self) -> Vec<VariantKey<'static>> {
+        let rules = ObstacleRule::ALL.map(|rule| VariantKey { rule, ..VariantKey::BASE });
+        let floors = ["small", "large"].map(|floor| VariantKey { floor, ..VariantKey::BASE });
         let minds = [AvoidancePolicy::Touch, AvoidancePolicy::Filter]
-            .map(|mind| CellKey { mind, ..CellKey::BASE });
+            .map(|mind| VariantKey { mind, ..VariantKey::BASE });
         rules.into_iter().chain(floors).chain(minds).collect()
     }
 
     /// Returns the errors that cause more contacts, at every point of the sweep over equal error levels.
     pub(super) fn dominant_errors(&self) -> Vec<DominantError> {
-        let points = SweepCase::all().flat_map(|case| self.levels.iter().map(move |&e| (case, e)));
         let pair = [Regime::Sensors, Regime::Effectors];
-        let difference = |case: SweepCase, e| self.difference(case.key(e), pair, CONTACTS);
-        let all: Vec<_> = points.map(|(case, e)| (case, e, difference(case, e))).collect();
-        let p_values: Vec<_> = all.iter().map(|(.., difference)| difference.p_value(0.0)).collect();
-        let named =
-            |((case, level, of), p): ((SweepCase, f64, Estimate), Option<f64>)| DominantError {
-                case,
-                level,
-                by: match (p.is_some_and(|p| p < 0.05), of.mean_or_zero() > 0.0) {
-                    (false, _) => INCONCLUSIVE,
-                    (true, true) => SENSORS,
-                    (true, false) => EFFECTORS,
-                },
-                sensors_less_effectors: of,
-            };
-        all.into_iter().zip(holm(&p_values)).map(named).collect()
+        let mut all = Vec::new();
+        for case in SweepCase::all() {
+            for &level in &self.levels {
+                let sensors_less_effectors = self.difference(case.key(level), pair, CONTACTS);
+                all.push(DominantError { case, level, sensors_less_effectors, by: INCONCLUSIVE });
+            }
+        }
+        // Of so many points some would differ by chance: Holm's correction is over all of them.
+        let p_values: Vec<Option<f64>> =
+            all.iter().map(|point| point.sensors_less_effectors.p_value(0.0)).collect();
+        for (point, p) in all.iter_mut().zip(holm(&p_values)) {
+            if p.is_some_and(|p| p < 0.05) {
+                let sensors_more = point.sensors_less_effectors.mean_or_zero() > 0.0;
+                point.by = if sensors_more { SENSORS } else { EFFECTORS };
+            }
+        }
+        all
     }
 
     /// Returns the tables of this experiment.
@@ -207,10 +218,8 @@ impl ReliabilityResults {
     }
 
     fn regimes_table(&self) -> Table {
-        let columns: Vec<&str> = ["floor", "rule", "behaviour", "errors"]
-            .into_iter()
-            .chain(MEASURES.map(|m| m.0))
-            .collect();
+        let mut columns = vec!["floor", "rule", "behaviour", "errors"];
+        columns.extend(MEASURES.map(|(name, _)| name));
         let note = format!(
             "Mean [95 % interval by Student's t] over seeds. Floors: {}.",
             self.floors.join("; ")
@@ -218,10 +227,10 @@ impl ReliabilityResults {
         let mut table = Table::new("Four regimes", note, &columns);
         for key in self.base_keys() {
             for regime in Regime::ALL {
-                let estimates = MEASURES.map(|(_, m)| self.estimate(key, regime, m).to_string());
-                table.push_row(
-                    names(key).into_iter().chain([regime.name().into()]).chain(estimates),
-                );
+                let mut row = names(key).to_vec();
+                row.push(regime.name().into());
+                row.extend(MEASURES.map(|(_, m)| self.estimate(key, regime, m).to_string()));
+                table.push_row(row);
             }
         }
         table
@@ -274,11 +283,14 @@ impl ReliabilityResults {
         let title = "Sensors against effectors at equal error level e";
         let mut table = Table::new(title, note, &columns);
         for DominantError { case, level, sensors_less_effectors, by } in self.dominant_errors() {
-            let of = |regime| self.estimate(case.key(level), regime, CONTACTS).to_string();
-            let contacts = [of(Regime::Effectors), of(Regime::Sensors)];
-            let names = case.names().into_iter().chain([format!("{level}")]);
-            let told = [sensors_less_effectors.to_string(), by.into()];
-            table.push_row(names.chain(contacts).chain(told));
+            let mut row = case.names().to_vec();
+            row.push(level.to_string());
+            for regime in [Regime::Effectors, Regime::Sensors] {
+                row.push(self.estimate(case.key(level), regime, CONTACTS).to_string());
+            }
+            row.push(sensors_less_effectors.to_string());
+            row.push(by.into());
+            table.push_row(row);
         }
         table
     }
@@ -329,10 +341,11 @@ impl ReliabilityResults {
     /// Returns one bar per regime, one series per obstacle rule.
     fn regime_bars(&self, title: &str, y_label: &str, measure: Measure) -> Figure {
         let series = ObstacleRule::ALL.map(|rule| {
-            let at = |(x, &regime): (usize, &Regime)| {
-                self.estimate(CellKey { rule, ..CellKey::BASE }, regime, measure).point(x as f64)
-            };
-            let points = Regime::ALL.iter().enumerate().filter_map(at).collect();
+            let key = VariantKey { rule, ..VariantKey::BASE };
+            let mut points = Vec::new();
+            for (x, regime) in Regime::ALL.into_iter().enumerate() {
+                points.extend(self.estimate(key, regime, measure).point(x as f64));
+            }
             Series { name: format!("rule {}", rule.name()), points }
         });
         let categories = Regime::ALL.map(|regime| regime.name().to_string()).to_vec();
@@ -343,21 +356,29 @@ impl ReliabilityResults {
     }
 
     fn sweep_figure(&self, mind: AvoidancePolicy, beams: BeamCount) -> Figure {
-        let line = |name: &str, regime, spread| {
-            let case = SweepCase { mind, beams, spread };
-            let at = |&e: &f64| self.estimate(case.key(e), regime, CONTACTS).point(e);
-            Series { name: name.into(), points: self.levels.iter().filter_map(at).collect() }
-        };
+        // Errors of effectors alone do not depend on how those of sensors are spread.
+        let lines = [
+            ("effectors only", Regime::Effectors, ErrorSpread::Even),
+            ("sensors only, even", Regime::Sensors, ErrorSpread::Even),
+            ("sensors only, blind", Regime::Sensors, ErrorSpread::Blind),
+        ];
+        let series = lines.map(|(name, regime, spread)| {
+            self.contacts_by_level(name, SweepCase { mind, beams, spread }, regime)
+        });
         let n = beams.bearings_deg().len();
         figure(
             &format!("Contacts at equal error level: {}, {n} beams", mind.name()),
             ["error level e", "contacts per 1000 actions"],
-            vec![
-                line("effectors only", Regime::Effectors, ErrorSpread::Even),
-                line("sensors only, even", Regime::Sensors, ErrorSpread::Even),
-                line("sensors only, blind", Regime::Sensors, ErrorSpread::Blind),
-            ],
+            series,
         )
+    }
+
+    fn contacts_by_level(&self, name: &str, case: SweepCase, regime: Regime) -> Series {
+        let mut points = Vec::new();
+        for &level in &self.levels {
+            points.extend(self.estimate(case.key(level), regime, CONTACTS).point(level));
+        }
+        Series { name: name.into(), points }
     }
 }
 
@@ -381,13 +402,14 @@ impl SweepCase {
 
     /// Returns all cases of the sweep.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let case = |(mind, beams)| ErrorSpread::ALL.map(|spread| Self { mind, beams, spread });
-        Self::POLICIES.into_iter().flat_map(case)
+        Self::POLICIES
+            .into_iter()
+            .flat_map(|(mind, beams)| ErrorSpread::ALL.map(|spread| Self { mind, beams, spread }))
     }
 
-    fn key(self, e: f64) -> CellKey<'static> {
+    fn key(self, e: f64) -> VariantKey<'static> {
         let tables = ErrorTables::Equal(e, self.spread, self.beams);
-        CellKey { mind: self.mind, tables, ..CellKey::BASE }
+        VariantKey { mind: self.mind, tables, ..VariantKey::BASE }
     }
 
     /// Returns behavior, number of beams and recipe, for tables.
@@ -415,11 +437,12 @@ pub(super) struct DominantError {
     pub(super) by: &'static str,
 }
 
-fn names(key: CellKey<'_>) -> [String; 3] {
+fn names(key: VariantKey<'_>) -> [String; 3] {
     [key.floor.into(), key.rule.name().into(), key.mind.name().into()]
 }
 
-/// Returns whether two tables err alike under a regime.
+/// Returns whether two tables err alike under a regime. A regime that switches an error off does not depend on that error's
+/// table, so that each of those variants is run for one table only.
 fn same_errors(a: ErrorTables, b: ErrorTables, regime: Regime) -> bool {
     match (a, b, regime) {
         (ErrorTables::Equal(e, _, m), ErrorTables::Equal(f, _, n), Regime::Effectors) => {
@@ -431,29 +454,33 @@ fn same_errors(a: ErrorTables, b: ErrorTables, regime: Regime) -> bool {
 
 fn variants(floors: &[Arc<Floor>; 3], plan: &LoriaConfig) -> Vec<LoriaVariant> {
     let [medium, small, large] = floors;
-    let base = |floor, regime| LoriaVariant::new(floor, regime);
     let mut variants = Vec::new();
     for regime in Regime::ALL {
-        let rules = ObstacleRule::ALL;
-        variants.extend(
-            rules.map(|obstacle_rule| LoriaVariant { obstacle_rule, ..base(medium, regime) }),
-        );
-        variants.extend([small, large].map(|floor| base(floor, regime)));
-        variants.extend(
-            [AvoidancePolicy::Touch, AvoidancePolicy::Filter]
-                .map(|mind| LoriaVariant { mind, ..base(medium, regime) }),
-        );
+        let base = LoriaVariant::new(medium, regime);
+        for obstacle_rule in ObstacleRule::ALL {
+            variants.push(LoriaVariant { obstacle_rule, ..base.clone() });
+        }
+        for floor in [small, large] {
+            variants.push(LoriaVariant::new(floor, regime));
+        }
+        for mind in [AvoidancePolicy::Touch, AvoidancePolicy::Filter] {
+            variants.push(LoriaVariant { mind, ..base.clone() });
+        }
     }
     for (mind, beams) in SweepCase::POLICIES {
         for &e in &plan.error_levels {
-            let at = |regime, spread| LoriaVariant {
-                mind,
-                tables: ErrorTables::Equal(e, spread, beams),
-                size: beams.size(),
-                ..base(medium, regime)
-            };
-            variants.push(at(Regime::Effectors, ErrorSpread::Even));
-            variants.extend(ErrorSpread::ALL.map(|spread| at(Regime::Sensors, spread)));
+            for (regime, spread) in [
+                (Regime::Effectors, ErrorSpread::Even),
+                (Regime::Sensors, ErrorSpread::Even),
+                (Regime::Sensors, ErrorSpread::Blind),
+            ] {
+                variants.push(LoriaVariant {
+                    mind,
+                    tables: ErrorTables::Equal(e, spread, beams),
+                    size: beams.size(),
+                    ..LoriaVariant::new(medium, regime)
+                });
+            }
         }
     }
     variants

@@ -2,8 +2,10 @@
 
 use super::LoriaConfig;
 use super::performance::{loads, worker_counts};
-use super::timing::{SEGMENTS, Workload, arithmetic, time_interleaved, time_s};
-use crate::cells::{figure, table};
+use super::timing::{
+    SEGMENTS, Workload, arithmetic, mean_cycle_ms, speed_ups, time_interleaved, time_s, times_of,
+};
+use crate::case_results::{figure, table};
 use crate::study::Progress;
 use serde::Serialize;
 use sidestep::kernel::Simulation;
@@ -83,6 +85,10 @@ impl StrategyRun {
 }
 
 impl StrategyCandidate {
+    fn is(&self, strategy: &str, workers: usize) -> bool {
+        self.strategy == strategy && self.workers == workers
+    }
+
     fn seconds(&mut self, cycles: u64, robot_cycles: u64) -> f64 {
         match self.run {
             StrategyRun::Arithmetic => arithmetic(self.workers, robot_cycles),
@@ -95,6 +101,7 @@ impl StrategyResults {
     /// Runs the comparison.
     pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let mut loads = loads(plan);
+        // Three strategies take three times as long: the costs between show nothing that their ends do not.
         let extremes = [plan.operations.iter().min(), plan.operations.iter().max()];
         loads.retain(|load| extremes.contains(&Some(&load.operations)));
         let mut trials = Vec::new();
@@ -114,17 +121,20 @@ impl StrategyResults {
     /// Returns the speed-up of the double pool minus that of another strategy, with the most
     /// workers, one estimate per load.
     pub(super) fn lead_over(&self, strategy: Strategy) -> Vec<Estimate> {
+        let mut leads = Vec::new();
+        for load in 0..self.loads.len() {
+            let own = self.ratios_with_most_workers(load, DOUBLE_POOL);
+            let other = self.ratios_with_most_workers(load, strategy.name());
+            leads.push(Estimate::paired_difference(own, other));
+        }
+        leads
+    }
+
+    fn ratios_with_most_workers(&self, load: usize, strategy: &str) -> &[Option<f64>] {
         let max_workers = self.trials.iter().map(|t| t.workers).max().unwrap_or(1);
-        let ratios = |load: usize, name: &str| {
-            let is_it = |t: &&StrategyTiming| {
-                (t.load, t.workers, t.strategy.as_str()) == (load, max_workers, name)
-            };
-            self.trials.iter().find(is_it).map_or(&[][..], |t| &t.ratios[..])
-        };
-        let lead = |load| {
-            Estimate::paired_difference(ratios(load, DOUBLE_POOL), ratios(load, strategy.name()))
-        };
-        (0..self.loads.len()).map(lead).collect()
+        let of_strategy = self.trials.iter().filter(|t| t.load == load && t.strategy == strategy);
+        let mut with_most = of_strategy.filter(|t| t.workers == max_workers);
+        with_most.next().map_or(&[], |t| &t.ratios[..])
     }
 
     /// Returns the comparison as a table.
@@ -160,14 +170,14 @@ impl StrategyResults {
 
     /// Returns speed-up over workers, one figure per load.
     pub(super) fn figures(&self) -> Vec<Figure> {
-        let figure = |(index, load): (usize, &Workload)| {
-            figure(
-                &format!("Strategies: {}", load.name()),
-                ["workers", "speed-up over the double pool with 1 worker"],
-                names().iter().map(|name| self.series(index, name)).collect::<Vec<_>>(),
-            )
-        };
-        self.loads.iter().enumerate().map(figure).collect()
+        let labels = ["workers", "speed-up over the double pool with 1 worker"];
+        let mut figures = Vec::new();
+        for (index, load) in self.loads.iter().enumerate() {
+            let title = format!("Strategies: {}", load.name());
+            let lines = names().map(|name| self.series(index, name));
+            figures.push(figure(&title, labels, lines));
+        }
+        figures
     }
 
     fn series(&self, load: usize, name: &str) -> Series {
@@ -184,64 +194,72 @@ fn names() -> [&'static str; 3] {
 fn time_load(plan: &LoriaConfig, index: usize, load: &Workload) -> Vec<StrategyTiming> {
     let cycles = load.cycles(plan.timed_robot_cycles);
     let mut all = strategy_candidates(plan, load);
-    all.iter_mut().for_each(|candidate| candidate.run.advance(cycles));
+    // A first stretch that is not timed: it starts threads and fills buffers, which later ones do not.
+    for candidate in &mut all {
+        candidate.run.advance(cycles);
+    }
     let Ok(times_s) = time_interleaved(&mut all, plan.repeats, |candidate| {
         Ok::<_, Infallible>(candidate.seconds(cycles, plan.timed_robot_cycles))
     });
-    let times_of = |strategy: &str, workers: usize| {
-        let is = |c: &StrategyCandidate| (c.strategy, c.workers) == (strategy, workers);
-        all.iter().position(is).map_or(&[][..], |k| &times_s[k][..])
-    };
-    let trial = |(c, own_s): (&StrategyCandidate, &Vec<Option<f64>>)| {
-        let (contacts, serial_share, valid, complete) = contact_stats(load, &c.run)?;
-        let reference = times_of(DOUBLE_POOL, 1).iter().zip(own_s);
-        let ratios: Vec<Option<f64>> = reference.map(|(a, b)| Some((*a)? / (*b)?)).collect();
-        Some(StrategyTiming {
+    let reference_s = times_of(&all, &times_s, |c| c.is(DOUBLE_POOL, 1));
+    let machine_alone_s = times_of(&all, &times_s, |c| c.is(ARITHMETIC, 1));
+    let mut trials = Vec::new();
+    for (candidate, own_s) in all.iter().zip(&times_s) {
+        let Some(stats) = contact_stats(load, &candidate.run) else { continue };
+        let machine_s = times_of(&all, &times_s, |c| c.is(ARITHMETIC, candidate.workers));
+        let ratios = speed_ups(reference_s, own_s);
+        trials.push(StrategyTiming {
             load: index,
-            strategy: c.strategy.into(),
-            workers: c.workers,
-            cycle_ms: Estimate::from_values(
-                own_s.iter().map(|t| t.map(|t| 1e3 * t / cycles as f64)),
-            ),
+            strategy: candidate.strategy.into(),
+            workers: candidate.workers,
+            cycle_ms: mean_cycle_ms(own_s, cycles),
             speed_up: Estimate::from_factors(ratios.iter().copied()),
             ratios,
-            machine: Estimate::geometric_ratio(
-                times_of(ARITHMETIC, 1),
-                times_of(ARITHMETIC, c.workers),
-            ),
-            contacts,
-            serial_share,
-            valid,
-            complete,
-        })
-    };
-    all.iter().zip(&times_s).filter_map(trial).collect()
+            machine: Estimate::geometric_ratio(machine_alone_s, machine_s),
+            contacts: stats.contacts,
+            serial_share: stats.serial_share,
+            valid: stats.valid,
+            complete: stats.complete,
+        });
+    }
+    trials
 }
 
 /// Returns every strategy with every number of workers, and arithmetic.
 fn strategy_candidates(plan: &LoriaConfig, load: &Workload) -> Vec<StrategyCandidate> {
     let mut all = Vec::new();
     for workers in worker_counts(plan.most_workers) {
-        let mut add = |strategy, run| all.push(StrategyCandidate { strategy, workers, run });
-        add(DOUBLE_POOL, StrategyRun::DoublePool(Box::new(load.simulation(workers))));
+        let run = StrategyRun::DoublePool(Box::new(load.simulation(workers)));
+        all.push(StrategyCandidate { strategy: DOUBLE_POOL, workers, run });
         for strategy in Strategy::ALL {
             let run = BaselineRun::new(load.compiled(), strategy, workers);
-            add(strategy.name(), StrategyRun::Baseline(Box::new(run)));
+            let run = StrategyRun::Baseline(Box::new(run));
+            all.push(StrategyCandidate { strategy: strategy.name(), workers, run });
         }
-        add(ARITHMETIC, StrategyRun::Arithmetic);
+        all.push(StrategyCandidate { strategy: ARITHMETIC, workers, run: StrategyRun::Arithmetic });
     }
     all
 }
 
-/// Returns contacts per 1000 actions, the serial share, and whether laws and counts were kept.
-/// `None` for arithmetic.
-fn contact_stats(load: &Workload, run: &StrategyRun) -> Option<(f64, f64, bool, bool)> {
-    let (metrics, snapshot, share) = match run {
+/// Contacts of a run, and whether it kept the laws; see [`StrategyTiming`].
+struct ContactStats {
+    contacts: f64,
+    serial_share: f64,
+    valid: bool,
+    complete: bool,
+}
+
+/// Returns the contacts of a run; `None` for arithmetic.
+fn contact_stats(load: &Workload, run: &StrategyRun) -> Option<ContactStats> {
+    let (metrics, snapshot, serial_share) = match run {
         StrategyRun::DoublePool(run) => (run.metrics(), run.snapshot(), 0.0),
         StrategyRun::Baseline(run) => (run.metrics(), run.snapshot(), run.serial_fraction()),
         StrategyRun::Arithmetic => return None,
     };
-    let valid = find_violation(&load.compiled().world, &snapshot).is_none();
-    let complete = metrics.total.actions == u64::from(load.robots) * snapshot.cycle;
-    Some((1e3 * metrics.contacts_per_action, share, valid, complete))
+    Some(ContactStats {
+        contacts: 1e3 * metrics.contacts_per_action,
+        serial_share,
+        valid: find_violation(&load.compiled().world, &snapshot).is_none(),
+        complete: metrics.total.actions == u64::from(load.robots) * snapshot.cycle,
+    })
 }

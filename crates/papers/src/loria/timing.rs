@@ -12,11 +12,15 @@ use sidestep::scenario::Source;
 use sidestep::worlds::robots::RobotsRun;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Wander};
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
+use sidestep_document::Estimate;
 use std::hint::black_box;
 use std::sync::Arc;
 
 const SMALL: &str = include_str!("../../scenarios/loria/wander-small.toml");
 const LARGE: &str = include_str!("../../scenarios/loria/wander-large.toml");
+
+/// Number of operations that take about as long as a decision with its sensing.
+const DECISION_OPERATIONS: u32 = 500;
 
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]
@@ -43,16 +47,19 @@ impl Workload {
 
     /// Returns its name in tables.
     pub(super) fn name(&self) -> String {
-        let (robots, operations) = (self.robots, self.operations);
-        format!("{robots} robots, {:.0} % covered, {operations} operations", 100.0 * self.density())
+        format!(
+            "{} robots, {:.0} % covered, {} operations",
+            self.robots,
+            100.0 * self.density(),
+            self.operations
+        )
     }
 
     /// Returns the number of cycles that take about as long as `robot_cycles` decisions without
     /// extra cost.
     pub(super) fn cycles(&self, robot_cycles: u64) -> u64 {
         let bodies = u64::from(self.robots + self.people).max(1);
-        // A decision with its sensing takes about as long as 500 operations.
-        (robot_cycles / (bodies * (1 + u64::from(self.operations) / 500))).max(10)
+        (robot_cycles / (bodies * (1 + u64::from(self.operations / DECISION_OPERATIONS)))).max(10)
     }
 
     /// Returns the scenario.
@@ -100,7 +107,8 @@ impl Behaviour for CostlyBehaviour {
     }
 }
 
-/// Does `operations` dependent multiply-and-adds, only to spend time.
+/// Does `operations` dependent multiply-and-adds, only to spend time: each needs the one before, so that neither the compiler
+/// nor the processor does several at once.
 fn spend_time(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -137,7 +145,9 @@ pub(super) fn time_interleaved<C, E>(
                 *best_s = best_s.min(run(candidate)?);
             }
         }
-        times_s.iter_mut().zip(best_s).for_each(|(all, best)| all.push(Some(best)));
+        for (all, best_s) in times_s.iter_mut().zip(best_s) {
+            all.push(Some(best_s));
+        }
     }
     Ok(times_s)
 }
@@ -145,13 +155,38 @@ pub(super) fn time_interleaved<C, E>(
 /// Returns the seconds that arithmetic without any world takes, shared among workers: the most that
 /// the machine itself can give at the moment.
 pub(super) fn arithmetic(workers: usize, robot_cycles: u64) -> f64 {
-    const OPERATIONS: u32 = 500;
-    let work = |worker: &workers::Worker<'_>, (): &mut ()| {
-        worker.for_each_chunk(0, robot_cycles as usize, |tasks| {
-            tasks.for_each(|task| spend_time(task as u64, OPERATIONS));
+    let (took_s, ()) = time_s(|| {
+        workers::run(&mut vec![(); workers], |worker, (): &mut ()| {
+            worker.for_each_chunk(0, robot_cycles as usize, |tasks| {
+                tasks.for_each(|task| spend_time(task as u64, DECISION_OPERATIONS));
+            });
         });
-    };
-    time_s(|| workers::run(&mut vec![(); workers], work)).0
+    });
+    took_s
+}
+
+/// Returns the times of the first candidate for which this holds; none if there is no such candidate.
+pub(super) fn times_of<'a, C>(
+    candidates: &[C],
+    times_s: &'a [Vec<Option<f64>>],
+    holds: impl Fn(&C) -> bool,
+) -> &'a [Option<f64>] {
+    let position = candidates.iter().position(holds);
+    position.map_or(&[], |k| &times_s[k][..])
+}
+
+/// Returns the reference's time divided by the own, repeat by repeat.
+pub(super) fn speed_ups(reference_s: &[Option<f64>], own_s: &[Option<f64>]) -> Vec<Option<f64>> {
+    let mut ratios = Vec::with_capacity(own_s.len());
+    for (reference_s, own_s) in reference_s.iter().zip(own_s) {
+        ratios.push(reference_s.zip(*own_s).map(|(reference_s, own_s)| reference_s / own_s));
+    }
+    ratios
+}
+
+/// Returns the mean time of a cycle, ms, from times of so many cycles.
+pub(super) fn mean_cycle_ms(times_s: &[Option<f64>], cycles: u64) -> Estimate {
+    Estimate::from_values(times_s.iter().map(|time_s| time_s.map(|s| 1e3 * s / cycles as f64)))
 }
 
 /// A run, with the destination of its rows if it is recorded.

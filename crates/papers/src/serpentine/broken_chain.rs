@@ -2,7 +2,7 @@
 //! two whole ends (slide F3).
 
 use super::{SerpentineConfig, draws};
-use crate::cells::{CaseResults, Columns, Value, column};
+use crate::case_results::{CaseResults, CaseRuns, Columns, Format, Summary, Value, column};
 use crate::study::{Progress, Study, outcome_from_values, setting, setting_number};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
@@ -24,26 +24,31 @@ const BEND_RAD: f64 = 0.3;
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("scattered", "scattered", |r| r.setting("scattered")),
-        column("by_m", "by, m", |r| r.setting("by_m")),
-        column("gone", "gone", |r| r.setting("gone")),
-        column("may_come", "an end may come", |r| r.setting("may_come")),
+        column("scattered", "scattered", Summary::Setting("scattered")),
+        column("by_m", "by, m", Summary::Setting("by_m")),
+        column("gone", "gone", Summary::Setting("gone")),
+        column("may_come", "an end may come", Summary::Setting("may_come")),
     ],
     results: &[
-        column("can", "parts reach", |r| r.proportion(|run| run.is_true("can"))),
-        column("whole", "whole again", |r| r.proportion(|run| run.is_true("whole"))),
-        column("too_long", "refused", |r| r.count(|run| run.is_true("too_long"))),
-        column("median_passes", "passes there and back, median (most)", |r| {
-            Value::Number(r.median("passes"))
-        })
-        .with_format(|c| {
-            format!("{} ({})", format_short(c.number("median_passes")), c.count("most_passes"))
-        }),
-        column("most_passes", "", |r| Value::Count(r.max_value("passes") as u64)),
-        column("ends_kept", "ends kept", |r| r.proportion(|run| run.is_true("ends_kept"))),
-        column("rod_violation_m", "", |r| Value::Number(r.max_value("rod_violation_m"))),
+        column("can", "parts reach", Summary::Share("can")),
+        column("whole", "whole again", Summary::Share("whole")),
+        column("too_long", "refused", Summary::Count("too_long")),
+        column("median_passes", "passes there and back, median (most)", Summary::Median("passes"))
+            .with_format(Format::Computed(format_passes)),
+        column("most_passes", "", Summary::Computed(most_passes)),
+        column("ends_kept", "ends kept", Summary::Share("ends_kept")),
+        column("rod_violation_m", "", Summary::Max("rod_violation_m")),
     ],
 };
+
+fn most_passes(case: &CaseRuns<'_>) -> Value {
+    Value::Count(case.max_value("passes") as u64)
+}
+
+fn format_passes(case: &CaseResults) -> String {
+    let median = format_short(case.number("median_passes"));
+    format!("{median} ({})", case.count("most_passes"))
+}
 
 /// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
@@ -69,10 +74,12 @@ impl BreakCase {
     }
 
     fn from_variant(variant: &Variant) -> Self {
-        let [scattered, gone] =
-            ["scattered", "gone"].map(|key| setting_number(variant, key) as usize);
-        let may_come = variant.value("may_come").and_then(toml::Value::as_bool) == Some(true);
-        Self { scattered, by_m: setting_number(variant, "by_m"), gone, may_come }
+        Self {
+            scattered: setting_number(variant, "scattered") as usize,
+            by_m: setting_number(variant, "by_m"),
+            gone: setting_number(variant, "gone") as usize,
+            may_come: variant.value("may_come").and_then(toml::Value::as_bool) == Some(true),
+        }
     }
 }
 
@@ -80,12 +87,14 @@ impl BreakCase {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct BreakResults {
     /// Results by case.
-    pub(super) cells: Vec<CaseResults>,
+    #[serde(rename = "cells")]
+    pub(super) cases: Vec<CaseResults>,
 }
 
 /// Returns a chain that bends a little at every connector.
 fn intact_points(draws: &mut Draws) -> Vec<Point<2>> {
-    let (mut at, mut heading_rad) = ([0.0, 0.0], 0.0);
+    let mut at = [0.0, 0.0];
+    let mut heading_rad = 0.0;
     let mut points = vec![at];
     for _ in 1..CONNECTORS {
         heading_rad += BEND_RAD * normal(draws);
@@ -106,7 +115,9 @@ fn broken_chain(
     points.drain(first..first + case.gone);
     let last = first + case.scattered - case.gone - 1;
     for point in &mut points[first..=last] {
-        point.iter_mut().for_each(|x| *x += case.by_m * normal(draws));
+        for x in point {
+            *x += case.by_m * normal(draws);
+        }
     }
     let n = points.len();
     let chain = Chain::new_broken(points, vec![Connector::free(0.05); n], vec![ROD; n - 1])?;
@@ -129,18 +140,20 @@ fn rejoin(case: &BreakCase, seed: u64) -> Result<Json, InputError> {
     let can = distance(before[low], before[high]) <= ROD.max_m * (high - low) as f64;
     let may_come = if case.may_come { MovableEnd::Last } else { MovableEnd::Nobody };
     let came = reform(&mut chain, scattered, may_come)?;
-    let kept = |range: std::ops::Range<usize>| chain.points()[range.clone()] == before[range];
     let passes = match came {
         ReformResult::Whole { double_passes } => Some(double_passes),
         _ => None,
     };
+    let after = chain.points();
+    let first_end_kept = after[..=low] == before[..=low];
+    // An end that may come need not keep its place if the gap is too long.
+    let last_end_kept = (case.may_come && !can) || after[high..] == before[high..];
     Ok(json!({
         "can": can,
         "whole": passes.is_some(),
         "too_long": matches!(came, ReformResult::GapTooLong { .. }),
         "passes": passes,
-        // An end that may come need not keep its place if the gap is too long.
-        "ends_kept": kept(0..low + 1) && ((case.may_come && !can) || kept(high..before.len())),
+        "ends_kept": first_end_kept && last_end_kept,
         "rod_violation_m": passes.map(|_| chain.max_rod_violation_m()),
     }))
 }
@@ -152,23 +165,27 @@ impl BreakResults {
     ) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for scattered in [4, 10, 20] {
-            let case =
-                |by_m, gone, may_come| BreakCase { scattered, by_m, gone, may_come }.settings();
-            cases.extend([1.0, 10.0, 100.0].map(|by_m| case(by_m, 0, false)));
-            cases.extend([false, true].map(|may_come| case(10.0, 2, may_come)));
+            for by_m in [1.0, 10.0, 100.0] {
+                cases.push(BreakCase { scattered, by_m, gone: 0, may_come: false });
+            }
+            // With fewer parts (slide F3) the gap may be too wide for the rods that are left.
+            for may_come in [false, true] {
+                cases.push(BreakCase { scattered, by_m: 10.0, gone: 2, may_come });
+            }
         }
-        let study = Study::from_variants("", cases).with_size(plan.breaks, None);
+        let variants = cases.into_iter().map(BreakCase::settings).collect();
+        let study = Study::from_variants("", variants).with_size(plan.breaks, None);
         let what = "broken chains";
-        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
-            Ok(outcome_from_values(cell, rejoin(&BreakCase::from_variant(case), cell.seed)?))
+        let results = study.run_by(plan.workers, what, progress, |_, case, trial| {
+            Ok(outcome_from_values(trial, rejoin(&BreakCase::from_variant(case), trial.seed)?))
         })?;
-        Ok(Self { cells: COLUMNS.cells(&results) })
+        Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
     pub(super) fn table(&self) -> Table {
         let note = "40 connectors 1 m apart (rods of 0.9 to 1.1 m), bent at random; of the middle \
                     ones so many are thrown about, two of them are gone where it says so. A gap \
                     that the parts left cannot reach across is refused, or one end comes.";
-        COLUMNS.table("Broken chains", note, &self.cells)
+        COLUMNS.table("Broken chains", note, &self.cases)
     }
 }

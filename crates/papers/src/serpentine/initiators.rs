@@ -2,7 +2,7 @@
 //! whether bends keep their limits (slide F1).
 
 use super::{SerpentineConfig, draws};
-use crate::cells::{Proportion, table};
+use crate::case_results::{Proportion, table};
 use crate::study::{Progress, downcast, run_all, run_to_end, setting, source};
 use serde::Serialize;
 use sidestep::kernel::InputError;
@@ -18,12 +18,15 @@ use sidestep_document::Table;
 
 const FAILING: &str = include_str!("../../scenarios/serpentine/failing.toml");
 
-/// Connectors of the chain: an arm as redundant as the slides' snake of 25 degrees of freedom.
+/// Connectors of the chain: an arm as redundant as the snake robot of 25 degrees of freedom that the slides cite (Overgaard).
 const CONNECTORS: usize = 26;
 /// Length of an initiator's step.
 const STEP_M: f64 = 0.05;
 /// Motions of each chain with bend limits.
 const MOTIONS: usize = 400;
+/// Bend limits in degrees, and whether in space.
+const BEND_LIMITS: [(f64, bool); 5] =
+    [(90.0, false), (60.0, false), (30.0, false), (60.0, true), (30.0, true)];
 
 /// Every connector as initiator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -112,8 +115,10 @@ fn count_motions(seed: u64) -> Result<InitiatorCounts, InputError> {
         let to = add_scaled(free.points()[k], direction(draws), STEP_M);
         let mut moved = free.clone();
         seen.moved.push(propagate(&mut moved, k, to)?.motion().is_some());
+        // The chain is two sub-chains from its initiator on; at an end one of them is the whole.
         if (1..CONNECTORS - 1).contains(&k) {
-            let (mut low, mut high) = (part(&free, 0..=k)?, part(&free, k..=CONNECTORS - 1)?);
+            let mut low = part(&free, 0..=k)?;
+            let mut high = part(&free, k..=CONNECTORS - 1)?;
             propagate(&mut low, k, to)?;
             propagate(&mut high, 0, to)?;
             let alike =
@@ -169,12 +174,11 @@ fn veto_names_failed(seed: u64) -> Result<bool, InputError> {
     let mut run = chain_run(&source, 1)?;
     run_to_end(&mut *run, |_| ());
     let metrics = downcast::<ChainRun<2>>(&*run).metrics();
-    let by_it = metrics.given_up.iter().map(|given_up| {
+    let names_it = metrics.given_up.iter().all(|given_up| {
         let what = &given_up.what;
         what.by == Some(failing as u32) && what.reason.as_deref() == Some(VetoReason::Failed.name())
     });
-    let told: Vec<bool> = by_it.collect();
-    Ok(!told.is_empty() && told.iter().all(|&it| it))
+    Ok(!metrics.given_up.is_empty() && names_it)
 }
 
 /// Results of a wandering head with a bend limit.
@@ -188,7 +192,8 @@ struct BendLimitRun {
 fn wander<const D: usize>(limit_rad: f64, seed: u64) -> Result<BendLimitRun, InputError> {
     let draws = &mut draws(seed);
     let mut chain = chain::<D>(draws, limit_rad)?;
-    let (mut propagator, nothing) = (Propagator::default(), Obstacles::default());
+    let mut propagator = Propagator::default();
+    let nothing = Obstacles::default();
     let mut u: Point<D> = direction(draws);
     let mut came =
         BendLimitRun { moved: Vec::new(), other_vetoes: 0, exceeded: 0, sharpest_rad: 0.0 };
@@ -217,16 +222,13 @@ impl InitiatorResults {
         let all = run_all(&seeds, plan.workers, &mut report, |seed| count_motions(*seed))?;
         let all = InitiatorCounts::total(all);
         let told = run_all(&seeds, plan.workers, &mut report, |seed| veto_names_failed(*seed))?;
-        let limits = [(90.0, false), (60.0, false), (30.0, false), (60.0, true), (30.0, true)];
-        let bends = limits.iter().map(|&(limit_deg, in_space): &(f64, bool)| {
-            let limit_rad = limit_deg.to_radians();
-            let runs = run_all(&seeds, plan.workers, &mut report, |&seed| match in_space {
-                true => wander::<3>(limit_rad, seed),
-                false => wander::<2>(limit_rad, seed),
-            })?;
-            Ok(bend_limit_result(limit_deg, in_space, &runs))
-        });
-        let bends: Vec<BendLimitResult> = bends.collect::<Result<_, InputError>>()?;
+        let mut bends = Vec::new();
+        for (limit_deg, in_space) in BEND_LIMITS {
+            let limit_rad = f64::to_radians(limit_deg);
+            let wander = if in_space { wander::<3> } else { wander::<2> };
+            let runs = run_all(&seeds, plan.workers, &mut report, |&seed| wander(limit_rad, seed))?;
+            bends.push(bend_limit_result(limit_deg, in_space, &runs));
+        }
         Ok(Self {
             moved: Proportion::from_flags(all.moved),
             halves_alike: Proportion::from_flags(all.halves_alike),

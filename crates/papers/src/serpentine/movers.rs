@@ -3,7 +3,9 @@
 
 use super::corridor::{MAX_SPEED, OWN_GAP, ROD_VIOLATION};
 use super::{SPEED_M_S, SerpentineConfig};
-use crate::cells::{CaseResults, Columns, Value, column, figure, series};
+use crate::case_results::{
+    CaseResults, CaseRuns, Columns, Format, Summary, Value, column, figure, series,
+};
 use crate::study::{Progress, Study, setting_number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
@@ -22,26 +24,43 @@ pub(super) const ESCAPES: [&str; 4] = ["off", "touch", "look-ahead", "look-ahead
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("moves", "leader", |r| Value::Yes(moves(r.variant())))
-            .with_format(|c| if c.is_true("moves") { "wanders" } else { "rests" }.into()),
-        column("escape", "reaction", |r| match r.variant().value("chain.self_collision") {
-            Some(_) => Value::Word(ESCAPES[3].into()),
-            None => r.setting("chain.escape"),
-        }),
-        column("discs", "discs", |r| r.setting(DISCS)),
-        column("speed_ratio", "disc / leader speed", |r| Value::Number(ratio(r.variant()))),
+        column("moves", "leader", Summary::Computed(leader_moves))
+            .with_format(Format::Computed(format_leader)),
+        column("escape", "reaction", Summary::Computed(escape)),
+        column("discs", "discs", Summary::Setting(DISCS)),
+        column("speed_ratio", "disc / leader speed", Summary::Computed(speed_ratio)),
     ],
     results: &[
-        column("inside_percent", "steps inside, %", |r| {
-            r.mean_proportion(|run| run.percent_of_steps("penetrations"))
-        }),
-        column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
-        column("stuck_percent", "no way out, %", |r| r.mean_rate("escapes.vetoes")),
+        column("inside_percent", "steps inside, %", Summary::SharePercent("penetrations")),
+        column("veto_percent", "vetoes, %", Summary::RatePercent("vetoes")),
+        column("stuck_percent", "no way out, %", Summary::RatePercent("escapes.vetoes")),
         MAX_SPEED,
         OWN_GAP,
         ROD_VIOLATION,
     ],
 };
+
+fn leader_moves(case: &CaseRuns<'_>) -> Value {
+    Value::Yes(moves(case.variant()))
+}
+
+fn format_leader(case: &CaseResults) -> String {
+    let word = if case.is_true("moves") { "wanders" } else { "rests" };
+    word.into()
+}
+
+fn escape(case: &CaseRuns<'_>) -> Value {
+    // Of the sweep's variants only those without limits set this key.
+    if case.variant().value("chain.self_collision").is_some() {
+        Value::Word(ESCAPES[3].into())
+    } else {
+        case.setting("chain.escape")
+    }
+}
+
+fn speed_ratio(case: &CaseRuns<'_>) -> Value {
+    Value::Number(ratio(case.variant()))
+}
 
 /// Returns whether the leader wanders, or rests.
 fn moves(case: &Variant) -> bool {
@@ -58,7 +77,8 @@ fn ratio(case: &Variant) -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct MoverResults {
     /// Results by case.
-    pub(super) cells: Vec<CaseResults>,
+    #[serde(rename = "cells")]
+    pub(super) cases: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
@@ -75,15 +95,15 @@ impl MoverResults {
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let results = study(plan)?.run(plan.workers, "discs that move", progress)?;
-        Ok(Self { cells: COLUMNS.cells(&results) })
+        Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cells of a way to react.
-    pub(super) fn cells_with_escape<'a>(
+    /// Returns the cases of a way to react.
+    pub(super) fn cases_with_escape<'a>(
         &'a self,
         escape: &'a str,
     ) -> impl Iterator<Item = &'a CaseResults> {
-        self.cells.iter().filter(move |c| c.has_text("escape", escape))
+        self.cases.iter().filter(move |c| c.has_text("escape", escape))
     }
 
     pub(super) fn table(&self) -> Table {
@@ -92,18 +112,18 @@ impl MoverResults {
                     rests. A part counts as inside from 1 um on. Parts that get out of the way \
                     do so at most twice as fast as the faster of leader and discs, but for `no \
                     limits`, where the chain may also pass through itself.";
-        COLUMNS.table("Discs that run into a chain", note, &self.cells)
+        COLUMNS.table("Discs that run into a chain", note, &self.cases)
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let most_discs = self.cells.iter().map(|c| c.count("discs")).max();
+        let most_discs = self.cases.iter().map(|c| c.count("discs")).max();
         let mut lines = Vec::new();
         for (moves, word) in [(true, "leader wanders"), (false, "leader rests")] {
             for escape in ESCAPES {
-                let cells = self.cells_with_escape(escape).filter(|c| c.is_true("moves") == moves);
-                let cells = cells.filter(|c| Some(c.count("discs")) == most_discs);
+                let cases = self.cases_with_escape(escape).filter(|c| c.is_true("moves") == moves);
+                let cases = cases.filter(|c| Some(c.count("discs")) == most_discs);
                 let name = format!("{escape}, {word}");
-                lines.push(series(name, cells, ["speed_ratio", "inside_percent"]));
+                lines.push(series(name, cases, ["speed_ratio", "inside_percent"]));
             }
         }
         let labels = ["speed of the discs over the leader's", "steps inside, %"];

@@ -2,7 +2,7 @@
 //! the base objects, while it is free, and there and back; and damped least squares beside it.
 
 use super::{SerpentineConfig, draws};
-use crate::cells::{CaseResults, Columns, Value, bars, column, figure};
+use crate::case_results::{CaseResults, Columns, Format, Summary, bars, column, figure};
 use crate::study::{Progress, Study, outcome_from_values, setting, setting_number};
 use cpu_time::ThreadTime;
 use serde::Serialize;
@@ -18,10 +18,13 @@ use sidestep::rods::{Chain, Connector, Mobility, Obstacles, Propagator, Request,
 use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, FigureKind, Table};
 
-/// Part of the reach within which targets lie.
+/// Part of the reach within which targets lie: near its whole, a chain is stretched out, and any method converges slowly.
 const TARGET_REACH_FRACTION: f64 = 0.9;
 /// Distance at which a target counts as reached, in parts of the reach.
 const TOLERANCE_FRACTION: f64 = 1e-4;
+/// Largest relative deviations of a rod's length from the mean: rods of the arms with revolute joints, which have one
+/// length, and rods like prismatic joints, which slide.
+const SLACKS: [f64; 2] = [0.0, 0.1];
 
 /// Ways to bring a tip to a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,20 +63,27 @@ impl IkMethod {
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("links", "links", |r| r.setting("links")),
-        column("slack", "slack", |r| r.setting("slack"))
-            .with_format(|c| format!("{} %", 100.0 * c.number("slack"))),
-        column("way", "way", |r| r.setting("way"))
-            .with_format(|c| IkMethod::from_key(&c.value("way").to_string()).name().into()),
+        column("links", "links", Summary::Setting("links")),
+        column("slack", "slack", Summary::Setting("slack"))
+            .with_format(Format::Computed(format_slack)),
+        column("way", "way", Summary::Setting("way")).with_format(Format::Computed(format_method)),
     ],
     results: &[
-        column("reached", "reached", |r| r.proportion(|run| run.is_true("reached"))),
-        column("finished", "finished", |r| r.count(|run| run.is_true("finished"))),
-        column("median_us", "median, us", |r| Value::Number(r.median("us")))
-            .with_format(|c| format!("{:.1}", c.number("median_us"))),
-        column("median_iterations", "passes or steps", |r| Value::Number(r.median("iterations"))),
+        column("reached", "reached", Summary::Share("reached")),
+        column("finished", "finished", Summary::Count("finished")),
+        column("median_us", "median, us", Summary::Median("us")).with_format(Format::Decimals(1)),
+        column("median_iterations", "passes or steps", Summary::Median("iterations")),
     ],
 };
+
+fn format_slack(case: &CaseResults) -> String {
+    format!("{} %", 100.0 * case.number("slack"))
+}
+
+fn format_method(case: &CaseResults) -> String {
+    let method = IkMethod::from_key(&case.value("way").to_string());
+    method.name().into()
+}
 
 /// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
@@ -88,16 +98,17 @@ struct PostureCase {
 
 impl PostureCase {
     fn settings(self) -> Vec<Setting> {
-        let Self { way, links, slack } = self;
-        vec![setting("links", links as i64), setting("slack", slack), setting("way", way.key())]
+        vec![
+            setting("links", self.links as i64),
+            setting("slack", self.slack),
+            setting("way", self.way.key()),
+        ]
     }
 
     fn from_variant(variant: &Variant) -> Self {
-        let way = IkMethod::from_key(
-            variant.value("way").and_then(toml::Value::as_str).unwrap_or_default(),
-        );
+        let way = variant.value("way").and_then(toml::Value::as_str).unwrap_or_default();
         Self {
-            way,
+            way: IkMethod::from_key(way),
             links: setting_number(variant, "links") as usize,
             slack: setting_number(variant, "slack"),
         }
@@ -108,7 +119,8 @@ impl PostureCase {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct PostureResults {
     /// Results by case.
-    pub(super) cells: Vec<CaseResults>,
+    #[serde(rename = "cells")]
+    pub(super) cases: Vec<CaseResults>,
 }
 
 fn direction(draws: &mut Draws) -> Point<3> {
@@ -117,34 +129,39 @@ fn direction(draws: &mut Draws) -> Point<3> {
 
 /// Returns a random chain of rods that are as long as on average.
 fn chain(case: &PostureCase, draws: &mut Draws) -> Result<Chain<3>, InputError> {
-    let (slack, n) = (case.slack, case.links);
-    let rod = Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 };
     let mut points = vec![[0.0; 3]];
     let mut u = direction(draws);
-    for i in 0..n {
+    for i in 0..case.links {
         let turned = add_scaled(u, direction(draws), 0.5);
         u = normalized(turned).unwrap_or(u);
         points.push(add_scaled(points[i], u, 1.0));
     }
-    let mut connectors = vec![Connector::free(0.02); n + 1];
+    let mut connectors = vec![Connector::free(0.02); case.links + 1];
     if case.way == IkMethod::Veto {
         connectors[0].mobility = Mobility::Fixed;
     }
-    // Rods of fixed length take exactly the lengths that the points gave, to the bit.
-    let rods = points.windows(2).map(|ends| match slack {
-        0.0 => Rod::fixed(distance(ends[0], ends[1]), 0.01),
-        _ => rod,
-    });
-    let rods = rods.collect();
+    let rods = points.windows(2).map(|ends| rod(case.slack, ends)).collect();
     Chain::new(points, connectors, rods)
+}
+
+fn rod(slack: f64, ends: &[Point<3>]) -> Rod {
+    if slack == 0.0 {
+        // Rods of fixed length take exactly the lengths that the points gave, to the bit.
+        Rod::fixed(distance(ends[0], ends[1]), 0.01)
+    } else {
+        Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 }
+    }
 }
 
 fn solve(case: &PostureCase, seed: u64) -> Result<Json, InputError> {
     let draws = &mut draws(seed);
     let mut chain = chain(case, draws)?;
-    let (tip, reach_m) = (case.links, case.links as f64);
-    let part = powf(draws.uniform(), 1.0 / 3.0);
-    let target = scaled(direction(draws), TARGET_REACH_FRACTION * reach_m * part);
+    let tip = case.links;
+    // Rods are 1 m long on average.
+    let reach_m = case.links as f64;
+    // The volume of a ball grows with the third power of its radius, so that targets are uniform in it.
+    let radius_fraction = powf(draws.uniform(), 1.0 / 3.0);
+    let target = scaled(direction(draws), TARGET_REACH_FRACTION * reach_m * radius_fraction);
     let engine = match case.way {
         IkMethod::Veto | IkMethod::FreeBase => return pull(&mut chain, tip, target),
         IkMethod::ThereAndBack => Engine::Chain,
@@ -159,9 +176,12 @@ fn solve(case: &PostureCase, seed: u64) -> Result<Json, InputError> {
     let began = ThreadTime::now();
     let answer = solver.solve(&chain, &Obstacles::default(), &goal)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
-    let finished = answer.engine == Engine::Direct;
-    let (reached, iterations) = (answer.reached, answer.iterations);
-    Ok(json!({ "reached": reached, "finished": finished, "us": us, "iterations": iterations }))
+    Ok(json!({
+        "reached": answer.reached,
+        "finished": answer.engine == Engine::Direct,
+        "us": us,
+        "iterations": answer.iterations,
+    }))
 }
 
 fn pull(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
@@ -180,46 +200,49 @@ impl PostureResults {
     ) -> Result<Self, InputError> {
         let mut cases = Vec::new();
         for &links in &plan.ik_links {
-            for slack in [0.0, 0.1] {
+            for slack in SLACKS {
                 cases.extend(IkMethod::ALL.map(|way| PostureCase { way, links, slack }.settings()));
             }
         }
         let study = Study::from_variants("", cases).with_size(plan.ik_targets, None);
         let what = "targets of tips";
-        let results = study.run_by(plan.workers, what, progress, |_, case, cell| {
-            Ok(outcome_from_values(cell, solve(&PostureCase::from_variant(case), cell.seed)?))
+        let results = study.run_by(plan.workers, what, progress, |_, case, trial| {
+            Ok(outcome_from_values(trial, solve(&PostureCase::from_variant(case), trial.seed)?))
         })?;
-        Ok(Self { cells: COLUMNS.cells(&results) })
+        Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cells of a way.
-    pub(super) fn cells_with_method(&self, way: IkMethod) -> impl Iterator<Item = &CaseResults> {
-        self.cells.iter().filter(move |c| c.has_text("way", way.key()))
+    /// Returns the cases of a way.
+    pub(super) fn cases_with_method(&self, way: IkMethod) -> impl Iterator<Item = &CaseResults> {
+        self.cases.iter().filter(move |c| c.has_text("way", way.key()))
     }
 
     pub(super) fn table(&self) -> Table {
         let note = "Targets uniform within 0.9 of the reach in space, to 1e-4 of it, from a posture at \
                     random; nothing in the way. `finished`: not reached by the way itself, but in \
                     closed form. With a free base one motion always is enough.";
-        COLUMNS.table("Inverse kinematics", note, &self.cells)
+        COLUMNS.table("Inverse kinematics", note, &self.cases)
     }
 
     pub(super) fn figure(&self) -> Figure {
         let mut links: Vec<String> =
-            self.cells.iter().map(|c| c.value("links").to_string()).collect();
+            self.cases.iter().map(|c| c.value("links").to_string()).collect();
         links.dedup();
-        let series = |(way, slack): (IkMethod, f64)| {
-            let cells = self.cells_with_method(way).filter(|c| c.number("slack") == slack);
-            let rods = match slack {
-                0.0 => "fixed rods".into(),
-                _ => format!("\u{b1}{} %", 100.0 * slack),
-            };
-            bars(format!("{}, {rods}", way.name()), cells, "median_us")
-        };
-        let (back, squares) = (IkMethod::ThereAndBack, IkMethod::LeastSquares);
-        let all = [(back, 0.0), (back, 0.1), (squares, 0.0), (squares, 0.1)].map(series);
+        let mut series = Vec::new();
+        // One pull of the tip is one motion, the time of which is shown with the cost of a motion.
+        for way in [IkMethod::ThereAndBack, IkMethod::LeastSquares] {
+            for slack in SLACKS {
+                let cases = self.cases_with_method(way).filter(|c| c.number("slack") == slack);
+                let rods = if slack == 0.0 {
+                    "fixed rods".into()
+                } else {
+                    format!("\u{b1}{} %", 100.0 * slack)
+                };
+                series.push(bars(format!("{}, {rods}", way.name()), cases, "median_us"));
+            }
+        }
         let labels = ["links", "median, microseconds"];
-        let figure = figure("Time to bring a tip to its target", labels, all);
+        let figure = figure("Time to bring a tip to its target", labels, series);
         Figure { y_scale: Scale::Log, kind: FigureKind::Bars { categories: links }, ..figure }
     }
 }

@@ -2,7 +2,7 @@
 //! reaches, and by the number of obstacles that are far away.
 
 use super::{SerpentineConfig, draws};
-use crate::cells::{figure, median, table};
+use crate::case_results::{figure, median, table};
 use crate::study::Progress;
 use cpu_time::ThreadTime;
 use serde::Serialize;
@@ -13,13 +13,13 @@ use sidestep::rods::{Chain, Connector, Obstacle, Obstacles, Propagator, Request,
 use sidestep_document::figure::{Point as FigurePoint, Scale};
 use sidestep_document::{Estimate, Figure, Series, Table};
 
-/// Repeats of each timing.
+/// Repeats of each timing: the fewest that decide a claim.
 const REPEATS: usize = 5;
 /// Length of a rod.
 const ROD_M: f64 = 0.1;
 /// Length of the head's step in a motion.
 const STEP_M: f64 = 0.01;
-/// Connectors of the chain among obstacles.
+/// Connectors of the chain among obstacles: as many as the slides' snake has agents.
 const CLUTTERED_CONNECTORS: usize = 450;
 
 /// One chain that is led through the open.
@@ -39,6 +39,14 @@ pub(super) struct OpenTiming {
     pub(super) slack_moved: f64,
 }
 
+impl OpenTiming {
+    /// Returns the time of a motion of fixed rods per connector that it moves, by repeat.
+    fn us_per_moved(&self) -> Vec<Option<f64>> {
+        let moved = self.fixed_moved.max(1.0);
+        self.fixed_us_by_repeat.iter().map(|us| Some(us / moved)).collect()
+    }
+}
+
 /// One chain among balls, with others far away.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct FarObstacleTiming {
@@ -50,6 +58,13 @@ pub(super) struct FarObstacleTiming {
     pub(super) us_by_repeat: Vec<f64>,
     /// Whether the chain ends where it does without them, to the bit.
     pub(super) same: bool,
+}
+
+impl FarObstacleTiming {
+    /// Returns the time of a motion, by repeat.
+    fn us(&self) -> Vec<Option<f64>> {
+        self.us_by_repeat.iter().map(|us| Some(*us)).collect()
+    }
 }
 
 /// All timings.
@@ -88,7 +103,8 @@ fn lead(
     motions: std::ops::Range<usize>,
 ) -> Result<(f64, f64), InputError> {
     let mut propagator = Propagator::default();
-    let (count, mut moved) = (motions.len() as f64, 0);
+    let count = motions.len() as f64;
+    let mut moved = 0;
     let began = ThreadTime::now();
     for k in motions {
         let outcome = propagator.propagate(chain, obstacles, &Request::exact(0, head(k)))?;
@@ -100,7 +116,9 @@ fn lead(
 /// Returns times by repeat, and connectors of a motion of a chain in the open.
 fn time_in_open(n: usize, max_m: f64, motions: usize) -> Result<(Vec<f64>, f64), InputError> {
     let mut chain = snake(n, max_m)?;
-    let (nothing, mut times_us, mut moved) = (Obstacles::default(), Vec::new(), 0.0);
+    let nothing = Obstacles::default();
+    let mut times_us = Vec::new();
+    let mut moved = 0.0;
     for repeat in 0..REPEATS {
         let from = 1 + repeat * motions;
         let (us, touched) = lead(&mut chain, &nothing, from..from + motions)?;
@@ -113,15 +131,32 @@ fn time_in_open(n: usize, max_m: f64, motions: usize) -> Result<(Vec<f64>, f64),
 /// Returns balls beside the way of the head, which rods turn from, and `far` ones that nothing
 /// meets.
 fn balls(far: usize) -> Result<Obstacles<3>, InputError> {
-    let beside = (0..60).map(|k| [0.5 * f64::from(k), 0.12, 0.0]);
-    let mut all: Vec<_> = (0..).zip(beside).map(|(id, at)| Obstacle::ball(id, at, 0.05)).collect();
+    let mut all = Vec::new();
+    for id in 0..60_u32 {
+        let at = [0.5 * f64::from(id), 0.12, 0.0];
+        all.push(Obstacle::ball(id, at, 0.05));
+    }
     let draws = &mut draws(1);
     for id in 0..far {
         let at: [f64; 3] = [0; 3].map(|_: u8| 2.0 * draws.uniform() - 1.0);
+        // The chain stays within some tens of meters of the origin, 400 m away from all of these.
         let at = add_scaled([0.0, 0.0, 500.0], at, 100.0);
         all.push(Obstacle::ball(1000 + id as u32, at, 0.2));
     }
     Obstacles::new(all, ROD_M + 0.1)
+}
+
+/// Returns times by repeat of a motion of the chain beside balls, and the digest of its end.
+fn time_among_balls(far: usize, motions: usize) -> Result<(Vec<f64>, Option<Digest>), InputError> {
+    let obstacles = balls(far)?;
+    let mut times_us = Vec::new();
+    let mut end = None;
+    for _ in 0..REPEATS {
+        let mut chain = snake(CLUTTERED_CONNECTORS, ROD_M)?;
+        times_us.push(lead(&mut chain, &obstacles, 1..motions)?.0);
+        end = Some(chain_digest(&chain));
+    }
+    Ok((times_us, end))
 }
 
 fn chain_digest(chain: &Chain<3>) -> Digest {
@@ -138,6 +173,7 @@ impl ScalingResults {
         let mut sizes = Vec::new();
         for (k, &connectors) in plan.sizes.iter().enumerate() {
             progress("cost of a motion", k as f64 / plan.sizes.len() as f64);
+            // A motion of a chain twice as long takes twice the time, so that all timings take the same.
             let motions = (plan.timed_motions / connectors).max(4);
             let (fixed_us_by_repeat, fixed_moved) = time_in_open(connectors, ROD_M, motions)?;
             let (slack_us, slack_moved) = time_in_open(connectors, 1.5 * ROD_M, motions)?;
@@ -150,26 +186,15 @@ impl ScalingResults {
                 slack_moved,
             });
         }
-        let mut alone = None;
         let motions = (plan.timed_motions / CLUTTERED_CONNECTORS).max(50);
         let mut far = Vec::new();
-        for &count in &plan.far_balls {
-            let obstacles = balls(count)?;
-            let mut times_us = Vec::new();
-            let mut end = None;
-            for _ in 0..REPEATS {
-                let mut chain = snake(CLUTTERED_CONNECTORS, ROD_M)?;
-                times_us.push(lead(&mut chain, &obstacles, 1..motions)?.0);
-                end = Some(chain_digest(&chain));
-            }
-            let alone = *alone.get_or_insert(end);
-            let us = median(times_us.iter().copied());
-            far.push(FarObstacleTiming {
-                balls: count,
-                us,
-                us_by_repeat: times_us,
-                same: end == alone,
-            });
+        let mut first_end = None;
+        for &balls in &plan.far_balls {
+            let (us_by_repeat, end) = time_among_balls(balls, motions)?;
+            // The first number of far balls is none.
+            let without = *first_end.get_or_insert(end);
+            let us = median(us_by_repeat.iter().copied());
+            far.push(FarObstacleTiming { balls, us, us_by_repeat, same: end == without });
         }
         progress("cost of a motion", 1.0);
         Ok(Self { sizes, far })
@@ -177,21 +202,16 @@ impl ScalingResults {
 
     /// Returns the time per moved connector of the longest chain divided by that of the shortest.
     pub(super) fn growth(&self) -> Estimate {
-        let each = |size: Option<&OpenTiming>| -> Vec<Option<f64>> {
-            let per_moved = |s: &OpenTiming, us: &f64| Some(us / s.fixed_moved.max(1.0));
-            size.iter()
-                .flat_map(|s| s.fixed_us_by_repeat.iter().map(|us| per_moved(s, us)))
-                .collect()
-        };
-        Estimate::geometric_ratio(&each(self.sizes.last()), &each(self.sizes.first()))
+        let longest = self.sizes.last().map_or_else(Vec::new, OpenTiming::us_per_moved);
+        let shortest = self.sizes.first().map_or_else(Vec::new, OpenTiming::us_per_moved);
+        Estimate::geometric_ratio(&longest, &shortest)
     }
 
     /// Returns the time of a motion with the most far balls divided by that with the fewest.
     pub(super) fn far_growth(&self) -> Estimate {
-        let each = |far: Option<&FarObstacleTiming>| -> Vec<Option<f64>> {
-            far.iter().flat_map(|f| f.us_by_repeat.iter().map(|us| Some(*us))).collect()
-        };
-        Estimate::geometric_ratio(&each(self.far.last()), &each(self.far.first()))
+        let most = self.far.last().map_or_else(Vec::new, FarObstacleTiming::us);
+        let fewest = self.far.first().map_or_else(Vec::new, FarObstacleTiming::us);
+        Estimate::geometric_ratio(&most, &fewest)
     }
 
     pub(super) fn tables(&self) -> [Table; 2] {
@@ -222,20 +242,17 @@ impl ScalingResults {
     }
 
     pub(super) fn figure(&self) -> Figure {
-        let series = |name: &str, ns: fn(&OpenTiming) -> f64| Series {
-            name: name.into(),
-            points: self
-                .sizes
-                .iter()
-                .map(|s| FigurePoint::new(s.connectors as f64, ns(s)))
-                .collect(),
-        };
         let all = [
-            series("fixed rods: all move", |s| s.fixed_us),
-            series("slack rods: it soon ends", |s| s.slack_us),
+            self.series("fixed rods: all move", |s| s.fixed_us),
+            self.series("slack rods: it soon ends", |s| s.slack_us),
         ];
         let title = "Time of a motion by the length of the chain";
         let figure = figure(title, ["connectors", "microseconds"], all);
         Figure { x_scale: Scale::Log, y_scale: Scale::Log, ..figure }
+    }
+
+    fn series(&self, name: &str, us: fn(&OpenTiming) -> f64) -> Series {
+        let points = self.sizes.iter().map(|s| FigurePoint::new(s.connectors as f64, us(s)));
+        Series { name: name.into(), points: points.collect() }
     }
 }

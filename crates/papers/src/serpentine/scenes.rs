@@ -9,12 +9,13 @@ use sidestep::kernel::view::{
     Body, BodyId, BodyKind, Frame, FrameOptions, Pose, Scenery, Shape, Trail, Vec3,
 };
 use sidestep::kernel::{InputError, Simulation};
-use sidestep::rods::geometry::Point;
+use sidestep::rods::geometry::{Point, distance};
 use sidestep::worlds::chain::{ChainRun, chain_run};
 
-/// Number of cycles from one point of a trail to the next.
+/// Number of cycles from one point of a trail to the next: 10 cm at the leader's 0.5 m/s.
 const TRAIL_INTERVAL_CYCLES: u64 = 10;
-/// Balls farther than this from every connector are left out of the picture in space, meters.
+/// Balls farther than this from every connector are left out of the picture in space, meters: all of them would hide the
+/// snake.
 const MAX_BALL_DISTANCE_M: f64 = 0.7;
 
 /// Returns all pictures.
@@ -35,9 +36,7 @@ fn trace_ends<const D: usize>(
 ) -> Result<TracedRun, InputError> {
     let mut run = chain_run(&source(text, settings)?, 1)?;
     let last = run.agents() as u32 - 1;
-    let trail =
-        |part| Trail { of: BodyId::new(BodyKind::Connector, 0, Some(part)), points: Vec::new() };
-    let mut trails: Vec<Trail> = [0, last].map(trail).to_vec();
+    let mut trails = vec![empty_trail(0), empty_trail(last)];
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle().is_multiple_of(TRAIL_INTERVAL_CYCLES) {
             let body = downcast::<ChainRun<D>>(&*run).state().body(0);
@@ -49,6 +48,10 @@ fn trace_ends<const D: usize>(
         run.advance(1);
     }
     Ok((run, trails))
+}
+
+fn empty_trail(connector: u32) -> Trail {
+    Trail { of: BodyId::new(BodyKind::Connector, 0, Some(connector)), points: Vec::new() }
 }
 
 fn swarm(plan: &SerpentineConfig) -> Result<Scene, InputError> {
@@ -67,7 +70,8 @@ fn swarm(plan: &SerpentineConfig) -> Result<Scene, InputError> {
 fn creeping(plan: &SerpentineConfig) -> Result<Scene, InputError> {
     let cycles = setting("cycles", plan.snake_cycles as i64);
     let (mut run, trails) = trace_ends::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
-    let (mut scenery, frame) = (run.scenery(), run.frame(FrameOptions::WITHOUT_SCANS));
+    let mut scenery = run.scenery();
+    let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let connectors = frame.bodies.iter().filter(|body| body.kind == BodyKind::Connector);
     let snake: Vec<Vec3> = connectors.map(|body| body.pose.at_m).collect();
     scenery.bodies.retain(|body| is_near(body, &snake));
@@ -88,15 +92,19 @@ fn is_near(body: &Body, places: &[Vec3]) -> bool {
     let (BodyKind::Obstacle, Shape::Sphere { radius_m }) = (body.kind, &body.shape) else {
         return true;
     };
-    let apart_m = |p: &Vec3| -> f64 {
-        (0..3).map(|k| (p[k] - body.pose.at_m[k]) * (p[k] - body.pose.at_m[k])).sum::<f64>().sqrt()
-    };
-    places.iter().any(|p| apart_m(p) - radius_m < MAX_BALL_DISTANCE_M)
+    places.iter().any(|p| distance(*p, body.pose.at_m) - radius_m < MAX_BALL_DISTANCE_M)
 }
 
 fn broken_chain() -> Result<[Scene; 2], InputError> {
     let [before, after] = broken_chain::before_and_after(1)?;
-    let scene = |title: &str, points: Vec<Point<2>>| Scene {
+    Ok([
+        scene_of_chain("A broken chain", before),
+        scene_of_chain("The same joined again with fewer parts: its end has come", after),
+    ])
+}
+
+fn scene_of_chain(title: &str, points: Vec<Point<2>>) -> Scene {
+    Scene {
         title: title.into(),
         caption: "Seed 1; of 40 connectors two are gone and 18 thrown about by 5 m.".into(),
         scenery: Scenery {
@@ -109,31 +117,22 @@ fn broken_chain() -> Result<[Scene; 2], InputError> {
         },
         frame: Frame { bodies: chain(points), ..Frame::default() },
         trails: Vec::new(),
-    };
-    Ok([
-        scene("A broken chain", before),
-        scene("The same joined again with fewer parts: its end has come", after),
-    ])
+    }
 }
 
-/// Returns a chain as drawn bodies.
+/// Returns a chain as drawn bodies: rods first, so that connectors cover their ends.
 fn chain(points: Vec<Point<2>>) -> Vec<Body> {
     let points_m: Vec<Vec3> = points.into_iter().map(in_space).collect();
-    let ball = |(part, at_m): (u32, &Vec3)| {
-        Body::new(
-            BodyKind::Connector,
-            0,
-            Pose::from_position(*at_m),
-            Shape::Sphere { radius_m: 0.2 },
-        )
-        .with_part(part)
-    };
-    let balls: Vec<Body> = (0..).zip(&points_m).map(ball).collect();
+    let mut balls = Vec::with_capacity(points_m.len());
+    for (part, at_m) in (0..).zip(&points_m) {
+        let ball = Shape::Sphere { radius_m: 0.2 };
+        let at = Pose::from_position(*at_m);
+        balls.push(Body::new(BodyKind::Connector, 0, at, ball).with_part(part));
+    }
     let rods = Shape::Line { points_m, thickness_m: 0.1 };
-    [Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rods)]
-        .into_iter()
-        .chain(balls)
-        .collect()
+    let mut bodies = vec![Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rods)];
+    bodies.append(&mut balls);
+    bodies
 }
 
 fn in_space<const D: usize>(at: Point<D>) -> Vec3 {

@@ -3,7 +3,7 @@
 
 use super::corridor::{CLEARANCE, MAX_SPEED, OWN_GAP, ROD_VIOLATION};
 use super::{DT_S, SerpentineConfig};
-use crate::cells::{CaseResults, Columns, Value, column};
+use crate::case_results::{CaseResults, CaseRuns, Columns, Format, Summary, Value, column};
 use crate::study::{Progress, Study, setting_number};
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
@@ -17,42 +17,66 @@ const CONNECTORS: &str = "chains.connectors";
 
 const COLUMNS: Columns = Columns {
     case: &[
-        column("connectors", "connectors", |r| r.setting(CONNECTORS)),
-        column("filled", "filled, %", |r| Value::Number(of_fields(r.variant(), "part")))
-            .with_format(|c| (100.0 * c.number("filled")).to_string()),
-        column("movers", "flying balls", |r| Value::Count(of_fields(r.variant(), "n") as u64)),
+        column("connectors", "connectors", Summary::Setting(CONNECTORS)),
+        column("filled", "filled, %", Summary::Computed(filled))
+            .with_format(Format::Computed(format_filled)),
+        column("movers", "flying balls", Summary::Computed(movers)),
     ],
     results: &[
-        column("steps_per_s", "steps / CPU s", |r| r.mean("steps_per_cpu_s")),
-        column("real_time", "times real time", |r| {
-            r.mean_of(|run| run.number_or_zero("steps_per_cpu_s") * DT_S)
-        }),
-        column("veto_percent", "vetoes, %", |r| r.mean_rate("vetoes")),
-        column("penetrations", "steps inside", |r| r.sum("penetrations")),
-        column("steps", "steps", |r| r.sum("steps")),
+        column("steps_per_s", "steps / CPU s", Summary::Mean("steps_per_cpu_s")),
+        column("real_time", "times real time", Summary::Computed(mean_real_time)),
+        column("veto_percent", "vetoes, %", Summary::RatePercent("vetoes")),
+        column("penetrations", "steps inside", Summary::Sum("penetrations")),
+        column("steps", "steps", Summary::Sum("steps")),
         CLEARANCE,
         OWN_GAP,
         MAX_SPEED,
-        column("way_percent", "way, %", |r| {
-            r.mean_proportion(|run| 100.0 * run.number_or_zero("progress"))
-        }),
+        column("way_percent", "way, %", Summary::Computed(mean_way_percent)),
         ROD_VIOLATION,
     ],
 };
 
+fn filled(case: &CaseRuns<'_>) -> Value {
+    Value::Number(of_fields(case.variant(), "part"))
+}
+
+fn format_filled(case: &CaseResults) -> String {
+    (100.0 * case.number("filled")).to_string()
+}
+
+/// Returns the number of balls that fly: fields of those that stand give a share to fill, and no number.
+fn movers(case: &CaseRuns<'_>) -> Value {
+    Value::Count(of_fields(case.variant(), "n") as u64)
+}
+
+fn mean_real_time(case: &CaseRuns<'_>) -> Value {
+    case.mean_of(|run| run.number_or_zero("steps_per_cpu_s") * DT_S)
+}
+
+fn mean_way_percent(case: &CaseRuns<'_>) -> Value {
+    case.mean_proportion(|run| 100.0 * run.number_or_zero("progress"))
+}
+
 /// Returns the total of a key over the fields of a case.
 fn of_fields(case: &Variant, key: &str) -> f64 {
-    let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|n| n as f64));
-    let fields = case.value("fields").and_then(toml::Value::as_array).into_iter().flatten();
     // From 0, because the sum of none is -0.
-    fields.filter_map(|field| number(field.get(key)?)).fold(0.0, |all, of_one| all + of_one)
+    let mut total = 0.0;
+    for field in case.value("fields").and_then(toml::Value::as_array).into_iter().flatten() {
+        total += match field.get(key) {
+            Some(toml::Value::Float(x)) => *x,
+            Some(toml::Value::Integer(n)) => *n as f64,
+            _ => continue,
+        };
+    }
+    total
 }
 
 /// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct SnakeResults {
     /// Results by case.
-    pub(super) cells: Vec<CaseResults>,
+    #[serde(rename = "cells")]
+    pub(super) cases: Vec<CaseResults>,
 }
 
 /// Returns the sweep of a plan.
@@ -69,19 +93,19 @@ impl SnakeResults {
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
         let results = study(plan)?.run(plan.workers, "snake in space", progress)?;
-        Ok(Self { cells: COLUMNS.cells(&results) })
+        Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns cells among balls that all stand.
+    /// Returns cases among balls that all stand.
     pub(super) fn at_rest(&self) -> impl Iterator<Item = &CaseResults> {
-        self.cells.iter().filter(|c| c.count("movers") == 0 && c.number("filled") > 0.0)
+        self.cases.iter().filter(|c| c.count("movers") == 0 && c.number("filled") > 0.0)
     }
 
     pub(super) fn table(&self) -> Table {
         let note = "Rods of 0.1 m, balls of 0.4 m in a room of 16 m, in which the snake lies in folds at \
                     the start, with balls between them; steps of 1 cm; a step includes looking for the least distance of every part. Real time is 50 steps \
                     a second.";
-        COLUMNS.table("A snake in space", note, &self.cells)
+        COLUMNS.table("A snake in space", note, &self.cases)
     }
 }
 

@@ -19,18 +19,18 @@ pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
     let names = plan.names();
     let number = |name: &str, row: usize| table.column(name)?.values.number(row);
     let run = |row: usize| {
-        let cell = plan.cell_of(number("cell", row)? as u64)?;
+        let trial = plan.trial_of(number("cell", row)? as u64)?;
         let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
-        let recording = folder.run_folder(cell.id);
+        let recording = folder.run_folder(trial.id);
         // A run that is not recorded is its variant's scenario run with its seed.
         let (kind, replay) = if recording.join("run.json").is_file() {
             ("recording", recording)
         } else {
-            ("scenario", folder.scenario(cell.variant))
+            ("scenario", folder.scenario(trial.variant))
         };
         Some(SweepRun {
-            variant: names.get(cell.variant as usize)?.clone(),
-            seed: cell.seed.to_string(),
+            variant: names.get(trial.variant as usize)?.clone(),
+            seed: trial.seed.to_string(),
             failure,
             replay: TargetRef { kind: kind.into(), path: replay.display().to_string() },
         })

@@ -5,7 +5,7 @@ use crate::protocol::SessionId;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::Scenery;
 use sidestep_session::{
-    Error, Playback, PlaybackPhase, PlaybackRequest, ViewerAddress, ViewerServer,
+    Error, Playback, PlaybackPhase, PlaybackRequest, ViewerAddress, ViewerOptions, ViewerServer,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -78,7 +78,8 @@ impl FoxgloveLease {
             speed: 1.0,
             did_seek: false,
         };
-        let viewers = ViewerServer::start(&host.address, run, scenery, end_s, true, playback)?;
+        let options = ViewerOptions { end_s, can_seek: true, playback };
+        let viewers = ViewerServer::start(&host.address, run, scenery, options)?;
         *current = Some((self.session, viewers));
         Ok(())
     }

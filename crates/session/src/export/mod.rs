@@ -107,8 +107,8 @@ pub fn export(
         Format::RosBag => export_bag(&job),
         Format::Svg => pictures::export_svg(&job),
         Format::Png { width_px } => pictures::export_png(&job, *width_px),
-        Format::Gif(film) => pictures::export_gif(&job, *film),
-        Format::Frames(film) => pictures::export_frames(&job, *film),
+        Format::Gif(options) => pictures::export_gif(&job, *options),
+        Format::Frames(options) => pictures::export_frames(&job, *options),
     }
 }
 
@@ -133,17 +133,17 @@ impl CycleRange {
         recorded: &RecordedRun,
     ) -> Result<Self, InputError> {
         let done = recorded.cycles_done;
-        let (from, until) = (wanted.from.unwrap_or(0), wanted.until.unwrap_or(done));
-        let wrong = |option: &str, cycle: Cycle, cause: String, remedy: String| {
-            Err(InputError::new(format!("{option} {cycle}"), cause, remedy))
-        };
+        let from = wanted.from.unwrap_or(0);
+        let until = wanted.until.unwrap_or(done);
         if from > done {
             let cause = format!("{done} cycles are recorded");
-            return wrong("--from", from, cause, format!("give 0 to {done}"));
+            let remedy = format!("give 0 to {done}");
+            return Err(InputError::new(format!("--from {from}"), cause, remedy));
         }
         if until < from || until > done {
             let cause = format!("the part begins at cycle {from}, {done} cycles are recorded");
-            return wrong("--until", until, cause, format!("give {from} to {done}"));
+            let remedy = format!("give {from} to {done}");
+            return Err(InputError::new(format!("--until {until}"), cause, remedy));
         }
         Ok(Self { from, until })
     }
@@ -160,10 +160,10 @@ impl ExportContext<'_> {
     /// Drives the run to a cycle, or to its end if that comes first.
     fn drive(&self, run: &mut dyn Simulation, until: Cycle, sinks: Sinks<'_>) -> Result<(), Error> {
         drive(run, until, sinks, self.watcher)?;
-        match run.cycle() < until && !run.is_over() {
-            true => Err(Error::Interrupted),
-            false => Ok(()),
+        if run.cycle() < until && !run.is_over() {
+            return Err(Error::Interrupted);
         }
+        Ok(())
     }
 }
 
@@ -173,12 +173,13 @@ fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let resolved = recorded.resolved_scenario()?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
-    let mut film = McapSink::start(target.path(), every, resolved, run.as_mut(), recorded.build())?;
-    job.drive(run.as_mut(), span.until, Sinks { frames: Some(&mut film), ..Sinks::default() })?;
+    let mut sink = McapSink::start(target.path(), every, resolved, run.as_mut(), recorded.build())?;
+    job.drive(run.as_mut(), span.until, Sinks { frames: Some(&mut sink), ..Sinks::default() })?;
     let is_confirmed = recorded.verify_digest(run.as_ref())?;
+    // A part of a run must not be taken for a complete one.
     let is_whole = span.from == 0 && is_confirmed && recorded.is_complete;
     let ending = if is_whole { EndReason::Complete } else { EndReason::Extract };
-    Ok(ExportResult::single_file(film.finish(run.as_ref(), ending)?, is_confirmed))
+    Ok(ExportResult::single_file(sink.finish(run.as_ref(), ending)?, is_confirmed))
 }
 
 fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
@@ -187,10 +188,10 @@ fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
     let is_confirmed = target.write_folder(|folder| {
-        let mut film = BagSink::start(folder, every, run.as_mut())?;
-        let sinks = Sinks { frames: Some(&mut film), ..Sinks::default() };
+        let mut sink = BagSink::start(folder, every, run.as_mut())?;
+        let sinks = Sinks { frames: Some(&mut sink), ..Sinks::default() };
         job.drive(run.as_mut(), span.until, sinks)?;
-        film.finish()?;
+        sink.finish()?;
         recorded.verify_digest(run.as_ref())
     })?;
     Ok(ExportResult::single_file(target.path(), is_confirmed))

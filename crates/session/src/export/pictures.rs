@@ -13,7 +13,7 @@ use sidestep_kernel::Cycle;
 use std::io::Write;
 use std::path::Path;
 
-/// Largest number of frames of an animation, unless more are requested.
+/// Largest number of frames of an animation, unless more are requested: ten seconds at [`DEFAULT_FPS`].
 const MAX_FRAMES: Cycle = 150;
 /// Frames per second.
 const DEFAULT_FPS: u16 = 15;
@@ -54,8 +54,8 @@ fn export_picture(
 /// Exports an animation as GIF.
 pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<ExportResult, Error> {
     let target = Target::for_file(job, ".gif")?;
-    export_animation(job, options, &target, |film| {
-        film.write_gif(options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX), target.path())
+    export_animation(job, options, &target, |animation| {
+        animation.write_gif(options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX), target.path())
     })
 }
 
@@ -65,9 +65,9 @@ pub(super) fn export_frames(
     options: Options,
 ) -> Result<ExportResult, Error> {
     let target = Target::for_folder(job, "-frames", &["png"])?;
-    export_animation(job, options, &target, |film| {
+    export_animation(job, options, &target, |animation| {
         let width_px = options.width_px.unwrap_or(DEFAULT_FRAME_WIDTH_PX);
-        target.write_folder(|folder| film.write_frames(width_px, folder))
+        target.write_folder(|folder| animation.write_frames(width_px, folder))
     })
 }
 
@@ -79,23 +79,23 @@ fn export_animation(
 ) -> Result<ExportResult, Error> {
     let span = job.span;
     let mut run = job.run_up_to(span.from)?;
-    let usual = (span.until - span.from).div_ceil(MAX_FRAMES - 1).max(1);
-    let mut pictures = AnimationFrames::new(
-        run.as_ref(),
-        job.wanted.every.unwrap_or(usual),
-        span.until - span.from,
-    );
+    let cycles = span.until - span.from;
+    // One frame is of the start, before the first interval.
+    let default_every = cycles.div_ceil(MAX_FRAMES - 1).max(1);
+    let every = job.wanted.every.unwrap_or(default_every);
+    let mut pictures = AnimationFrames::new(run.as_ref(), every, cycles);
     let sinks = Sinks { frames: Some(&mut pictures), ..Sinks::default() };
     job.drive(run.as_mut(), span.until, sinks)?;
     let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
-    let film =
-        Animation { pictures, fps: options.fps.unwrap_or(DEFAULT_FPS), watcher: job.watcher };
-    let written = write(&film);
+    let fps = options.fps.unwrap_or(DEFAULT_FPS);
+    let animation = Animation { pictures, fps, watcher: job.watcher };
+    let written = write(&animation);
+    // The interrupt of a GIF comes back inside an I/O error, as a file that could not be written.
     if written.is_err() && !job.watcher.should_continue() {
         return Err(Error::Interrupted);
     }
     written?;
-    let shown = (film.pictures.len(), film.fps);
+    let shown = (animation.pictures.len(), animation.fps);
     Ok(ExportResult { film: Some(shown), ..ExportResult::single_file(target.path(), is_confirmed) })
 }
 

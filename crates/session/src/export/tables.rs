@@ -47,10 +47,11 @@ pub(super) fn export(
         None => {
             let names = tables(folder)?;
             let target = Target::for_folder(job, &format!("-{ending}"), &[ending])?;
-            target.write_folder(|growing| {
-                names.iter().try_for_each(|name| {
-                    source.write(name, &growing.join(format!("{name}.{ending}")))
-                })
+            target.write_folder(|partial| {
+                for name in &names {
+                    source.write(name, &partial.join(format!("{name}.{ending}")))?;
+                }
+                Ok(())
             })?;
             names.iter().map(|name| target.path().join(format!("{name}.{ending}"))).collect()
         }
@@ -91,15 +92,15 @@ impl TableExport<'_> {
     ) -> Result<(), Error> {
         let ExportContext { wanted, span, .. } = self.job;
         let every = if name == EVENTS { 1 } else { wanted.every.unwrap_or(1) };
-        let thinned = |mut block: Table| {
+        let each_downsampled = |mut block: Table| {
             downsample(&mut block, every);
             each(block)
         };
-        // Without a range all rows are read, because the table may have no cycles.
-        match wanted.from.is_some() || wanted.until.is_some() {
-            true => for_each_block(self.folder, name, span.from..=span.until, thinned),
-            false => for_each_block(self.folder, name, .., thinned),
+        if wanted.from.is_some() || wanted.until.is_some() {
+            return for_each_block(self.folder, name, span.from..=span.until, each_downsampled);
         }
+        // Without a range all rows are read, because the table may have no cycles.
+        for_each_block(self.folder, name, .., each_downsampled)
     }
 
     fn write_parquet(&self, name: &str, to: &Path) -> Result<(), Error> {
@@ -107,6 +108,7 @@ impl TableExport<'_> {
         self.for_each_block_of(name, |block| {
             let file = match &mut file {
                 Some(file) => file,
+                // The schema is known from the first block on.
                 None => file.insert(TableFileWriter::create(to, &block.schema, &block.origin)?),
             };
             Ok(file.append(&block.columns)?)
@@ -115,29 +117,45 @@ impl TableExport<'_> {
     }
 
     fn write_csv(&self, name: &str, to: &Path) -> Result<(), Error> {
-        let growing = partial_path(to);
+        let partial = partial_path(to);
         let written = self
-            .fill_csv(name, &growing)
-            .and_then(|()| std::fs::rename(&growing, to).map_err(|e| Error::cannot_write(to, &e)));
-        written.inspect_err(|_| drop(std::fs::remove_file(&growing)))
+            .fill_csv(name, &partial)
+            .and_then(|()| std::fs::rename(&partial, to).map_err(|e| Error::cannot_write(to, &e)));
+        if written.is_err() {
+            let _ = std::fs::remove_file(&partial);
+        }
+        written
     }
 
-    fn fill_csv(&self, name: &str, growing: &Path) -> Result<(), Error> {
-        let failed = |e: std::io::Error| Error::cannot_write(growing, &e);
-        let mut csv =
-            csv::Writer::from_writer(BufWriter::new(File::create(growing).map_err(failed)?));
-        let mut is_begun = false;
+    fn fill_csv(&self, name: &str, partial: &Path) -> Result<(), Error> {
+        let file = File::create(partial).map_err(|e| Error::cannot_write(partial, &e))?;
+        let mut csv = csv::Writer::from_writer(BufWriter::new(file));
+        let mut has_heading = false;
         self.for_each_block_of(name, |block| {
-            if !is_begun {
-                csv.write_record(heading(&block.schema)).map_err(|e| failed(e.into()))?;
-                is_begun = true;
-            }
-            write_rows(&mut csv, &block).map_err(|e| failed(e.into()))
+            let written = append_block(&mut csv, &block, !has_heading);
+            has_heading = true;
+            written.map_err(|e| Error::cannot_write(partial, &io::Error::from(e)))
         })?;
-        let file = csv.into_inner().map_err(|e| failed(e.into_error()))?;
-        let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
-        file.sync_all().map_err(failed)
+        close(csv).map_err(|e| Error::cannot_write(partial, &e))
     }
+}
+
+fn append_block(
+    csv: &mut csv::Writer<impl Write>,
+    block: &Table,
+    with_heading: bool,
+) -> Result<(), csv::Error> {
+    if with_heading {
+        csv.write_record(heading(&block.schema))?;
+    }
+    write_rows(csv, block)
+}
+
+/// Flushes all buffers, and waits until the file is on the disk.
+fn close(csv: csv::Writer<BufWriter<File>>) -> io::Result<()> {
+    let buffer = csv.into_inner().map_err(|e| e.into_error())?;
+    let file = buffer.into_inner().map_err(|e| e.into_error())?;
+    file.sync_all()
 }
 
 fn partial_path(path: &Path) -> PathBuf {
@@ -158,7 +176,9 @@ fn heading(schema: &TableSchema) -> impl Iterator<Item = &str> {
 }
 
 fn write_rows(csv: &mut csv::Writer<impl Write>, block: &Table) -> Result<(), csv::Error> {
-    let (mut record, mut field) = (ByteRecord::new(), String::new());
+    // Reused for all rows, because tables have millions of them.
+    let mut record = ByteRecord::new();
+    let mut field = String::new();
     for row in 0..block.rows() {
         record.clear();
         for (column, values) in block.schema.columns.iter().zip(&block.columns) {

@@ -54,21 +54,16 @@ impl Target {
     ) -> Result<Self, InputError> {
         let target = Self::resolve(job, ending)?;
         let Ok(mut entries) = std::fs::read_dir(&target.path) else {
-            return match target.path.exists() {
-                true => Err(target.error("this is no folder", "give a new folder")),
-                false => Ok(target),
-            };
-        };
-        let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry.is_ok_and(|e| {
-                let path = e.path();
-                path.is_file() && holds.iter().any(|end| path.extension() == Some(OsStr::new(end)))
-            })
+            if target.path.exists() {
+                return Err(target.error("this is no folder", "give a new folder"));
+            }
+            return Ok(target);
         };
         if !job.wanted.replace {
             return Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY));
         }
-        if !entries.all(is_ours) {
+        // A mistyped --out must not cost a folder of somebody's own files.
+        if !entries.all(|entry| entry.is_ok_and(|entry| has_extension(&entry.path(), holds))) {
             let listed = holds.join(", .");
             let cause = format!("the folder holds something else than .{listed} files");
             return Err(target.error(&cause, "give a new folder"));
@@ -94,20 +89,29 @@ impl Target {
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let failed = |e: std::io::Error| Error::cannot_write(&self.path, &e);
-        let path = resolve_link(&self.path).map_err(failed)?;
-        let mut growing = path.as_os_str().to_owned();
-        growing.push(".partial");
-        let growing = PathBuf::from(growing);
+        let cannot_write = |e: std::io::Error| Error::cannot_write(&self.path, &e);
+        // A link stays: the folder that it leads to is replaced.
+        let path = resolve_link(&self.path).map_err(cannot_write)?;
+        let mut partial = path.as_os_str().to_owned();
+        partial.push(".partial");
+        let partial = PathBuf::from(partial);
         // Remains of a process that was killed.
-        remove(&growing).map_err(failed)?;
-        std::fs::create_dir_all(&growing).map_err(failed)?;
-        let filled = fill(&growing).and_then(|done| {
-            remove(&path).and_then(|()| std::fs::rename(&growing, &path)).map_err(failed)?;
-            Ok(done)
+        remove(&partial).map_err(cannot_write)?;
+        std::fs::create_dir_all(&partial).map_err(cannot_write)?;
+        let filled = fill(&partial).and_then(|filled| {
+            remove(&path).and_then(|()| std::fs::rename(&partial, &path)).map_err(cannot_write)?;
+            Ok(filled)
         });
-        filled.inspect_err(|_| drop(remove(&growing)))
+        if filled.is_err() {
+            let _ = remove(&partial);
+        }
+        filled
     }
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let extension = path.extension();
+    path.is_file() && extensions.iter().any(|one| extension == Some(OsStr::new(one)))
 }
 
 const EXISTS_CAUSE: &str = "is there already";

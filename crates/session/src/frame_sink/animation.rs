@@ -6,7 +6,9 @@ use crate::Error;
 use sidestep_draw::{AnimationFrame, AnimationRenderer as View, bodies_with_trails};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::text::group_thousands;
-use sidestep_kernel::view::{Body, BodyId, Frame, FrameOptions, Scenery, Trail, Vec3, corner};
+use sidestep_kernel::view::{
+    Body, BodyId, Frame, FrameOptions, Isometry2, Scenery, Trail, Vec3, corner,
+};
 use sidestep_kernel::{Cycle, InputError};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,9 +25,9 @@ pub(crate) struct AnimationFrames {
     every: Cycle,
     frames: Vec<Frame>,
     bodies: usize,
-    /// Cycles between places of tracks: one, unless a film is very long.
+    /// Cycles between places of tracks: one, unless the animation is very long.
     step: Cycle,
-    ways: BTreeMap<BodyId, Track>,
+    tracks: BTreeMap<BodyId, Track>,
 }
 
 /// The places of a body, and its last heading in quarter turns.
@@ -38,26 +40,33 @@ struct Track {
 impl AnimationFrames {
     /// Returns an animation of a run with a frame every `every` cycles, `cycles` long.
     pub(crate) fn new(run: &dyn Simulation, every: Cycle, cycles: Cycle) -> Self {
-        let step = cycles.div_ceil(MAX_TRACK_CYCLES).clamp(1, every.max(1));
-        let (scenery, frames, ways) = (run.scenery(), Vec::new(), BTreeMap::new());
-        Self { scenery, every, frames, bodies: 0, step, ways }
+        Self {
+            scenery: run.scenery(),
+            every,
+            frames: Vec::new(),
+            bodies: 0,
+            // At most the interval of frames: tracks have a place in each of them.
+            step: cycles.div_ceil(MAX_TRACK_CYCLES).clamp(1, every.max(1)),
+            tracks: BTreeMap::new(),
+        }
     }
 
-    /// Notes the places of the bodies with tracks to show.
+    /// Adds the places of the bodies with tracks to show.
     fn add_positions(&mut self, frame: &Frame) {
         let whose: BTreeSet<BodyId> =
             bodies_with_trails(&self.scenery, frame).into_iter().collect();
         for body in frame.bodies.iter().filter(|body| whose.contains(&body.id())) {
-            let way = self.ways.entry(body.id()).or_default();
-            if way.places.last().is_some_and(|(cycle, _)| *cycle >= frame.cycle) {
-                continue;
+            let track = self.tracks.entry(body.id()).or_default();
+            if let Some(&(cycle, at_m)) = track.places.last() {
+                // A cycle may be both sampled and captured as a frame.
+                if cycle >= frame.cycle {
+                    continue;
+                }
+                let corner = corner_before_slip(&self.scenery, body, at_m, track.heading);
+                track.places.extend(corner.map(|at_m| (frame.cycle, at_m)));
             }
-            let from = way.places.last().map(|(_, at)| (*at, way.heading));
-            let between =
-                from.and_then(|(at, heading)| corner_before_slip(&self.scenery, body, at, heading));
-            way.places.extend(between.map(|at| (frame.cycle, at)));
-            way.places.push((frame.cycle, body.pose.at_m));
-            way.heading = quarter_turns(&self.scenery, body);
+            track.places.push((frame.cycle, body.pose.at_m));
+            track.heading = quarter_turns(&self.scenery, body);
         }
     }
 
@@ -66,7 +75,10 @@ impl AnimationFrames {
         let frame = &self.frames[index];
         let from = self.frames[index.saturating_sub(TRAIL_FRAMES)].cycle;
         let is_here = frame.bodies.iter().any(|body| body.id() == of);
-        let places = self.ways.get(&of).filter(|_| is_here).map_or(&[][..], |way| &way.places);
+        let places = match self.tracks.get(&of) {
+            Some(track) if is_here => &track.places[..],
+            _ => &[],
+        };
         let begin = places.partition_point(|(cycle, _)| *cycle < from);
         let end = places.partition_point(|(cycle, _)| *cycle <= frame.cycle);
         Trail { of, points: places[begin..end.max(begin)].to_vec() }
@@ -137,29 +149,32 @@ impl FrameSink for AnimationFrames {
     }
 }
 
-/// Returns the place where a body was if it went ahead before it slipped to a side: it left `from` with a heading
-/// of so many quarter turns. `None` for a straight way, and for bodies that do not stand on boxes.
+/// Returns the place where a body was if it went ahead before it slipped to a side: it left `from` with a heading in
+/// quarter turns. `None` for a straight motion, and for bodies that do not stand on boxes.
 fn corner_before_slip(scenery: &Scenery, body: &Body, from: Vec3, quarters: u32) -> Option<Vec3> {
     let plane = &scenery.floor.as_ref()?.plane;
-    let flat = |[x, y, z]: Vec3| {
-        let [x, y] = plane.inverse_transform_point([x, y]);
-        [x, y, z]
-    };
-    let (was, is) = (flat(from), flat(body.pose.at_m));
-    let moved = |k: usize| (was[k] - is[k]).abs() > 1e-9;
-    let [x, y, z] = corner(was, quarters, is);
+    // In the frame of the floor, where motions are along the axes.
+    let from = to_floor(plane, from);
+    let to = to_floor(plane, body.pose.at_m);
+    let has_moved_x = (from[0] - to[0]).abs() > 1e-9;
+    let has_moved_y = (from[1] - to[1]).abs() > 1e-9;
+    let [x, y, z] = corner(from, quarters, to);
     let [x, y] = plane.transform_point([x, y]);
-    (moved(0) && moved(1)).then_some([x, y, z])
+    (has_moved_x && has_moved_y).then_some([x, y, z])
+}
+
+fn to_floor(plane: &Isometry2, [x, y, z]: Vec3) -> Vec3 {
+    let [x, y] = plane.inverse_transform_point([x, y]);
+    [x, y, z]
 }
 
 /// Returns the heading of a body in quarter turns from the floor's first axis.
 fn quarter_turns(scenery: &Scenery, body: &Body) -> u32 {
     let Some(floor) = &scenery.floor else { return 0 };
     let [x, y, _] = body.pose.rotate([1.0, 0.0, 0.0]);
-    let ([x0, y0], [x1, y1]) = (
-        floor.plane.inverse_transform_point([0.0; 2]),
-        floor.plane.inverse_transform_point([x, y]),
-    );
+    let [x0, y0] = floor.plane.inverse_transform_point([0.0; 2]);
+    let [x1, y1] = floor.plane.inverse_transform_point([x, y]);
+    // Opposite headings have the same corner, so 0 and 1 are enough.
     u32::from((y1 - y0).abs() > (x1 - x0).abs())
 }
 

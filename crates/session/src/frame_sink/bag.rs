@@ -88,13 +88,15 @@ impl BagSink {
             covariance: [0.0; 36],
         };
         let Some((time_s, odometry)) = &self.before else { return twist };
-        let before = odometry.iter().find(|(other, _)| *other == who);
-        if let (Some((_, before)), true) = (before, frame.time_s > *time_s) {
-            let step_s = frame.time_s - time_s;
-            let way: [f64; 3] = std::array::from_fn(|i| claimed.at_m[i] - before.at_m[i]);
+        let Some((_, before)) = odometry.iter().find(|(other, _)| *other == who) else {
+            return twist;
+        };
+        let step_s = frame.time_s - time_s;
+        if step_s > 0.0 {
+            let moved: [f64; 3] = std::array::from_fn(|i| claimed.at_m[i] - before.at_m[i]);
             let [x, y, z, w] = before.turn;
-            let back = Pose { at_m: [0.0; 3], turn: [-x, -y, -z, w] };
-            twist.linear_mps = back.rotate(way).map(|along| along / step_s);
+            let inverse = Pose { at_m: [0.0; 3], turn: [-x, -y, -z, w] };
+            twist.linear_mps = inverse.rotate(moved).map(|along| along / step_s);
             twist.angular_radps[2] = wrap_angle(yaw_rad(claimed) - yaw_rad(before)) / step_s;
         }
         twist
@@ -126,11 +128,8 @@ impl BagSink {
 
     fn write_scans(&mut self, frame: &Frame) -> Result<(), Error> {
         for scan in &frame.scans {
-            self.write(
-                &format!("/{}", scan_frame(scan)),
-                frame.time_s,
-                &laser_scan(frame.time_s, scan),
-            )?;
+            let topic = format!("/{}", scan_frame(scan));
+            self.write(&topic, frame.time_s, &laser_scan(frame.time_s, scan))?;
         }
         Ok(())
     }
@@ -161,16 +160,17 @@ impl FrameSink for BagSink {
 
 /// Returns the map with a wall around it, because nothing leaves the floor, not even a beam.
 fn map_files_with_border(floor: &OccupancyGrid) -> [(&'static str, Vec<u8>); 2] {
-    let cell = |occupancy: &Occupancy| match occupancy {
-        Occupancy::Free => Cell::Free,
-        Occupancy::Wall => Cell::Wall,
-        Occupancy::Unknown => Cell::Unknown,
-    };
     let [width, height] = [floor.width + 2, floor.height + 2];
     let mut cells = vec![Cell::Wall; width as usize * height as usize];
     let inside = cells.chunks_exact_mut(width as usize).skip(1);
     for (row, boxes) in inside.zip(floor.boxes.chunks_exact(floor.width.max(1) as usize)) {
-        row.iter_mut().skip(1).zip(boxes).for_each(|(to, from)| *to = cell(from));
+        for (cell, occupancy) in row[1..].iter_mut().zip(boxes) {
+            *cell = match occupancy {
+                Occupancy::Free => Cell::Free,
+                Occupancy::Wall => Cell::Wall,
+                Occupancy::Unknown => Cell::Unknown,
+            };
+        }
     }
     let origin_m = floor.plane.transform_point([-floor.box_m; 2]);
     map_files([width, height], floor.box_m, Isometry2 { origin_m, ..floor.plane }, &cells)

@@ -9,11 +9,13 @@ use std::io::{Error, Result, Write};
 
 /// The palette entry for "same as before".
 const UNCHANGED: u8 = 255;
+// A GIF has 256 colors. These numbers are such that the colors of all drawings and their blends fit.
+
 /// Number of steps between a color and the color beneath it, for edges and transparent areas.
 const BLEND_STEPS: u32 = 7;
 /// Number of grays for text.
 const GRAYS: u32 = 16;
-/// Bits of each color component by which palette entries are looked up.
+/// Bits of each color component by which palette entries are looked up: 32768 entries, searched once.
 const COLOR_BITS: u32 = 5;
 
 /// Writes frames of one size, with four bytes per pixel, at a number of frames per second.
@@ -26,18 +28,19 @@ pub(crate) fn write_gif(
     per_second: f64,
     pictures: impl Iterator<Item = Result<Vec<u8>>>,
 ) -> Result<()> {
-    let too_large = |_| Error::other("a GIF has at most 65535 pixels a side");
-    let size =
-        (u16::try_from(width).map_err(too_large)?, u16::try_from(height).map_err(too_large)?);
+    let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
+        return Err(Error::other("a GIF has at most 65535 pixels a side"));
+    };
     let palette = Palette::new();
     let bytes: Vec<u8> = palette.colors.concat();
-    let mut encoder = Encoder::new(to, size.0, size.1, &bytes).map_err(Error::other)?;
+    let mut encoder = Encoder::new(to, width, height, &bytes).map_err(Error::other)?;
     encoder.set_repeat(Repeat::Infinite).map_err(Error::other)?;
+    // In hundredths of a second; browsers take a delay below 2 for 10.
     let delay = (100.0 / per_second).round().clamp(2.0, 6000.0) as u16;
     let mut before: Option<Vec<u8>> = None;
     for picture in pictures {
         let pixels = palette.indices(&picture?);
-        let frame = changed_area(before.as_deref(), &pixels, size);
+        let frame = changed_area(before.as_deref(), &pixels, (width, height));
         encoder.write_frame(&Frame { delay, ..frame }).map_err(Error::other)?;
         before = Some(pixels);
     }
@@ -50,18 +53,24 @@ fn changed_area(before: Option<&[u8]>, now: &[u8], (width, height): (u16, u16)) 
     let Some(before) = before else {
         return Frame { width, height, buffer: Cow::Owned(now.to_vec()), ..plain() };
     };
-    let (mut left, mut right, mut top, mut bottom) = (row, 0, usize::from(height), 0);
+    let mut left = row;
+    let mut right = 0;
+    let mut top = usize::from(height);
+    let mut bottom = 0;
     for (y, (was, is)) in before.chunks(row).zip(now.chunks(row)).enumerate() {
-        let differs = |x: &usize| was[*x] != is[*x];
-        if let Some(first) = (0..row).find(differs) {
-            let last = (first..row).rev().find(differs).unwrap_or(first);
-            (left, right) = (left.min(first), right.max(last + 1));
-            (top, bottom) = (top.min(y), y + 1);
-        }
+        let Some(first) = (0..row).find(|&x| was[x] != is[x]) else { continue };
+        let last = (first..row).rfind(|&x| was[x] != is[x]).unwrap_or(first);
+        left = left.min(first);
+        right = right.max(last + 1);
+        top = top.min(y);
+        bottom = y + 1;
     }
     if bottom == 0 {
         // A frame of one pixel, so that its time passes.
-        (left, right, top, bottom) = (0, 1, 0, 1);
+        left = 0;
+        right = 1;
+        top = 0;
+        bottom = 1;
     }
     let part = (top..bottom).flat_map(|y| (left..right).map(move |x| y * row + x));
     let pixels = part.map(|at| if before[at] == now[at] { UNCHANGED } else { now[at] });
@@ -90,8 +99,8 @@ struct Palette {
 impl Palette {
     fn new() -> Self {
         let white = [255; 3];
-        let gray = |k: u32| [(255 * k / (GRAYS - 1)) as u8; 3];
-        let mut colors: Vec<[u8; 3]> = (0..GRAYS).map(gray).collect();
+        let mut colors: Vec<[u8; 3]> =
+            (0..GRAYS).map(|k| [(255 * k / (GRAYS - 1)) as u8; 3]).collect();
         let drawn = BODY_COLORS.iter().chain([
             &ALERT_COLOR,
             &DOOR_COLOR,
@@ -112,45 +121,50 @@ impl Palette {
         colors.dedup();
         colors.truncate(usize::from(UNCHANGED));
         let known = colors.len();
+        // A palette has a power of two of entries; the rest stays unused.
         colors.resize(256, white);
-        let place = |index: u32| {
-            let part = |shift: u32| {
-                (index >> shift & ((1 << COLOR_BITS) - 1)) << (8 - COLOR_BITS)
-                    | 1 << (7 - COLOR_BITS)
-            };
-            [part(2 * COLOR_BITS), part(COLOR_BITS), part(0)].map(|part| part as u8)
-        };
-        let nearest = |index: u32| nearest(&colors[..known], place(index));
-        Self { nearest: (0..1 << (3 * COLOR_BITS)).map(nearest).collect(), colors }
+        let nearest = (0..1 << (3 * COLOR_BITS))
+            .map(|key| nearest(&colors[..known], color_of_key(key)))
+            .collect();
+        Self { nearest, colors }
     }
 
     fn indices(&self, rgba: &[u8]) -> Vec<u8> {
-        let index = |pixel: &[u8]| {
-            let part = |i: usize| usize::from(pixel[i] >> (8 - COLOR_BITS));
-            self.nearest[part(0) << (2 * COLOR_BITS) | part(1) << COLOR_BITS | part(2)]
-        };
-        rgba.chunks_exact(4).map(index).collect()
+        rgba.chunks_exact(4).map(|pixel| self.nearest[color_key(pixel)]).collect()
     }
+}
+
+/// Returns the upper bits of red, green and blue, one after the other.
+fn color_key(pixel: &[u8]) -> usize {
+    let [red, green, blue] =
+        [pixel[0], pixel[1], pixel[2]].map(|component| usize::from(component >> (8 - COLOR_BITS)));
+    red << (2 * COLOR_BITS) | green << COLOR_BITS | blue
+}
+
+/// Returns the color in the middle of those with a key.
+fn color_of_key(key: u32) -> [u8; 3] {
+    [2 * COLOR_BITS, COLOR_BITS, 0].map(|shift| {
+        let upper = key >> shift & ((1 << COLOR_BITS) - 1);
+        (upper << (8 - COLOR_BITS) | 1 << (7 - COLOR_BITS)) as u8
+    })
 }
 
 /// Returns the color that is `k` of [`BLEND_STEPS`] steps from a color to the one beneath it.
 fn blend(color: [u8; 3], under: [u8; 3], k: u32) -> [u8; 3] {
-    let part = |i: usize| {
-        (u32::from(color[i]) * (BLEND_STEPS - k) + u32::from(under[i]) * k) / BLEND_STEPS
-    };
-    std::array::from_fn(|i| part(i) as u8)
+    std::array::from_fn(|i| {
+        let sum = u32::from(color[i]) * (BLEND_STEPS - k) + u32::from(under[i]) * k;
+        (sum / BLEND_STEPS) as u8
+    })
 }
 
 fn nearest(colors: &[[u8; 3]], to: [u8; 3]) -> u8 {
-    let apart = |color: &[u8; 3]| -> i32 {
-        color
-            .iter()
-            .zip(to)
-            .map(|(&a, b)| (i32::from(a) - i32::from(b)) * (i32::from(a) - i32::from(b)))
-            .sum()
-    };
-    let found = colors.iter().enumerate().min_by_key(|(_, color)| apart(color));
+    let found = colors.iter().enumerate().min_by_key(|(_, color)| squared_distance(**color, to));
     found.map_or(0, |(index, _)| index as u8)
+}
+
+fn squared_distance(a: [u8; 3], b: [u8; 3]) -> i32 {
+    let differences = a.iter().zip(b).map(|(&a, b)| i32::from(a) - i32::from(b));
+    differences.map(|difference| difference * difference).sum()
 }
 
 #[cfg(test)]

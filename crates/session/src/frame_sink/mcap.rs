@@ -30,7 +30,7 @@ pub enum EndReason {
 pub struct McapSink {
     recorder: McapRecorder,
     every: Cycle,
-    took: Duration,
+    elapsed: Duration,
 }
 
 impl McapSink {
@@ -46,6 +46,7 @@ impl McapSink {
         build: &str,
     ) -> Result<Self, Error> {
         let plan = run.config();
+        // Sorted, so that the same run gives the same bytes.
         let mut files = resolved.files;
         files.sort();
         let about = McapProvenance {
@@ -62,7 +63,7 @@ impl McapSink {
         };
         let recorder = McapRecorder::create(path, about, &run.scenery())?;
         run.enable_events();
-        Ok(Self { recorder, every, took: Duration::ZERO })
+        Ok(Self { recorder, every, elapsed: Duration::ZERO })
     }
 
     /// Finishes the file and returns its name.
@@ -74,8 +75,7 @@ impl McapSink {
             EndReason::Complete => Status::Complete,
             EndReason::Extract | EndReason::Stopped => Status::Incomplete,
         };
-        let (cycles_done, digest) = (run.cycle(), run.digest().to_string());
-        let end = McapFooter { status, cycles_done, digest };
+        let end = McapFooter { status, cycles_done: run.cycle(), digest: run.digest().to_string() };
         Ok(match ending {
             EndReason::Stopped => self.recorder.stop(&end)?,
             EndReason::Complete | EndReason::Extract => self.recorder.finish(&end)?,
@@ -84,7 +84,7 @@ impl McapSink {
 
     /// Returns the time spent so far.
     pub fn elapsed(&self) -> Duration {
-        self.took
+        self.elapsed
     }
 }
 
@@ -96,7 +96,7 @@ impl FrameSink for McapSink {
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
         let started = Instant::now();
         self.recorder.write_frame(&run.frame(FRAME_OPTIONS))?;
-        self.took += started.elapsed();
+        self.elapsed += started.elapsed();
         Ok(())
     }
 }

@@ -30,12 +30,11 @@ pub trait FrameSink {
     /// When it cannot be stored.
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error>;
 
-    /// Returns the number of cycles between looks at the run by [`FrameSink::sample`]; `None` if nothing
-    /// between frames matters.
+    /// Returns the number of cycles between calls of [`FrameSink::sample`]; `None` if nothing between frames matters.
     fn sample_interval(&self) -> Option<Cycle> {
         None
     }
 
-    /// Looks at the run between two frames.
+    /// Called with the run between two frames.
     fn sample(&mut self, _run: &mut dyn Simulation) {}
 }

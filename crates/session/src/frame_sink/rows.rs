@@ -18,11 +18,11 @@ struct Row {
     body: Body,
 }
 
-/// Frames kept in memory: one when the run is first looked at, then those at multiples of a number of
-/// cycles, and the last one of a run that is over.
+/// Frames kept in memory: the first one, then those at multiples of a number of cycles, and the last one of a run that
+/// is over.
 pub(crate) struct FrameRows {
     every: Cycle,
-    /// The cycle at which the run was first looked at.
+    /// The cycle of the first frame.
     first: Option<Cycle>,
     /// The cycle of the last frame.
     last: Option<Cycle>,
@@ -37,7 +37,8 @@ impl FrameRows {
 
     /// Takes the rows that were kept so far.
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
-        let (table, rows) = (frames_table(), std::mem::take(&mut self.rows));
+        let table = frames_table();
+        let rows = std::mem::take(&mut self.rows);
         (table.schema(), table.block(&rows))
     }
 
@@ -62,7 +63,8 @@ impl FrameSink for FrameRows {
     }
 
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
-        // A caller that advances a run in small steps looks at it more often than frames are due.
+        // Each call that advances a run begins with a frame, so one that advances it in small steps gives more frames
+        // than are due.
         if self.is_due(run) {
             self.last = Some(run.cycle());
             self.first = self.first.or(self.last);
@@ -74,8 +76,8 @@ impl FrameSink for FrameRows {
 
 /// Returns the present frame of a run as a table.
 pub fn frame_rows(run: &mut dyn Simulation) -> (TableSchema, Vec<Values>) {
-    let (table, rows) =
-        (frames_table(), body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect::<Vec<_>>());
+    let table = frames_table();
+    let rows: Vec<Row> = body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect();
     (table.schema(), table.block(&rows))
 }
 
@@ -85,9 +87,6 @@ fn body_rows(frame: Frame) -> impl Iterator<Item = Row> {
 }
 
 fn frames_table() -> Table<Row> {
-    let at = |k: usize| move |row: &Row| row.body.pose.at_m[k];
-    let turn = |k: usize| move |row: &Row| row.body.pose.turn[k];
-    let velocity = |k: usize| move |row: &Row| row.body.velocity_m_s[k];
     Table::new(FRAMES_TABLE)
         .u64("cycle", "cycles done: the frame shows the start of this cycle", |row: &Row| row.cycle)
         .f64("time_s", "simulated time since the start", |row| row.time_s)
@@ -96,20 +95,18 @@ fn frames_table() -> Table<Row> {
         })
         .u32("number", "its number among the bodies of its kind", |row| row.body.number)
         .u32("part", "its part, where the thing has parts", |row| row.body.part)
-        .f64("x_m", "its place, east", at(0))
-        .f64("y_m", "its place, north", at(1))
-        .f64("z_m", "its place, up", at(2))
-        .f64("turn_x", "its orientation, a unit quaternion: x", turn(0))
-        .f64("turn_y", "its orientation: y", turn(1))
-        .f64("turn_z", "its orientation: z", turn(2))
-        .f64("turn_w", "its orientation: w", turn(3))
-        .f64(
-            "velocity_x_m_s",
-            "velocity, east, of a thing that is moved without acting",
-            velocity(0),
-        )
-        .f64("velocity_y_m_s", "the same, north", velocity(1))
-        .f64("velocity_z_m_s", "the same, up", velocity(2))
+        .f64("x_m", "its place, east", |row| row.body.pose.at_m[0])
+        .f64("y_m", "its place, north", |row| row.body.pose.at_m[1])
+        .f64("z_m", "its place, up", |row| row.body.pose.at_m[2])
+        .f64("turn_x", "its orientation, a unit quaternion: x", |row| row.body.pose.turn[0])
+        .f64("turn_y", "its orientation: y", |row| row.body.pose.turn[1])
+        .f64("turn_z", "its orientation: z", |row| row.body.pose.turn[2])
+        .f64("turn_w", "its orientation: w", |row| row.body.pose.turn[3])
+        .f64("velocity_x_m_s", "velocity, east, of a thing that is moved without acting", |row| {
+            row.body.velocity_m_s[0]
+        })
+        .f64("velocity_y_m_s", "the same, north", |row| row.body.velocity_m_s[1])
+        .f64("velocity_z_m_s", "the same, up", |row| row.body.velocity_m_s[2])
         .label("condition", "its condition", Condition::ALL.map(Condition::name), |row| {
             label_index(&Condition::ALL, &row.body.state)
         })

@@ -21,19 +21,26 @@ impl FromStr for ViewerAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no HOST:PORT; give 127.0.0.1:{DEFAULT_PORT}, for example");
-        let number = |port: &str| port.parse::<u16>().map_err(|_| wrong());
-        let (host, port) = match text.rsplit_once(':') {
-            // Addresses of IPv6 without brackets have colons of their own.
-            _ if text.parse::<IpAddr>().is_ok() || text.ends_with(']') => (text, DEFAULT_PORT),
-            Some((host, port)) => (host, number(port)?),
-            None if text.parse::<u16>().is_ok() => ("127.0.0.1", number(text)?),
-            None => (text, DEFAULT_PORT),
-        };
-        let host = host.trim_start_matches('[').trim_end_matches(']').to_string();
-        if host.is_empty() { Err(wrong()) } else { Ok(Self { host, port }) }
+        parse_host_and_port(text).ok_or_else(|| {
+            format!("`{text}` is no HOST:PORT; give 127.0.0.1:{DEFAULT_PORT}, for example")
+        })
     }
+}
+
+fn parse_host_and_port(text: &str) -> Option<ViewerAddress> {
+    // Addresses of IPv6 without brackets have colons of their own.
+    let is_host_alone = text.parse::<IpAddr>().is_ok() || text.ends_with(']');
+    let (host, port) = if is_host_alone {
+        (text, DEFAULT_PORT)
+    } else if let Some((host, port)) = text.rsplit_once(':') {
+        (host, port.parse().ok()?)
+    } else if let Ok(port) = text.parse() {
+        ("127.0.0.1", port)
+    } else {
+        (text, DEFAULT_PORT)
+    };
+    let host = host.trim_start_matches('[').trim_end_matches(']').to_string();
+    (!host.is_empty()).then_some(ViewerAddress { host, port })
 }
 
 impl ViewerAddress {
@@ -55,11 +62,14 @@ impl ViewerAddress {
     /// Returns the address with a port that is free now, if any port will do.
     ///
     /// # Errors
-    /// When it does not belong to this machine, or the port is in use; the error then names the next free one.
+    /// When it does not belong to this machine, or the port is in use; the error then reports the next free one.
     pub fn with_free_port(&self) -> Result<Self, InputError> {
-        let bound = self.resolve_ip().and_then(|ip| TcpListener::bind((ip, self.port)));
-        let port =
-            bound.and_then(|bound| bound.local_addr()).map_err(|e| self.bind_error(&e))?.port();
+        // Taken for a moment, and free again when the listener is dropped: the server takes the port by its number.
+        let bound = self
+            .resolve_ip()
+            .and_then(|ip| TcpListener::bind((ip, self.port)))
+            .and_then(|listener| listener.local_addr());
+        let port = bound.map_err(|e| self.bind_error(&e))?.port();
         Ok(Self { port, ..self.clone() })
     }
 
@@ -77,8 +87,8 @@ impl ViewerAddress {
     /// Returns the error of an address that could not be taken.
     pub(crate) fn bind_error(&self, error: &io::Error) -> InputError {
         let place = format!("--foxglove {}:{}", self.host(), self.port);
-        let in_use = error.kind() == io::ErrorKind::AddrInUse;
-        let Some(ip) = self.resolve_ip().ok().filter(|_| in_use) else {
+        let is_in_use = error.kind() == io::ErrorKind::AddrInUse;
+        let Some(ip) = self.resolve_ip().ok().filter(|_| is_in_use) else {
             let remedy = "give an address of this machine, such as 127.0.0.1:8765";
             return InputError::new(place, error.to_string(), remedy);
         };

@@ -1,60 +1,68 @@
-//! A run that viewers may hold, continue and slow down.
+//! A run that viewers may pause, continue and slow down.
 
-use super::{FRAME_OPTIONS, ViewerAddress, ViewerServer};
+use super::{FRAME_OPTIONS, ViewerAddress, ViewerOptions, ViewerServer};
 use crate::Error;
 use crate::pacer::Pacer;
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 use std::time::{Duration, Instant};
 
-/// The longest wait of a held run, after which it looks around again.
+/// The longest wait of a paused run, after which it checks for requests again; as long as a slice of a running one.
 const MAX_WAIT: Duration = Duration::from_millis(20);
 
-/// The viewers of a run, and their wishes. Until they have any, it goes as fast as it can.
+/// The viewers of a run, and their last request. Before the first one, it runs as fast as it can.
 pub struct LiveControl {
     viewers: ViewerServer,
     cycle_s: f64,
     playing: PlaybackPhase,
     speed: f64,
-    beat: Option<Pacer>,
+    /// `None` for a run as fast as it can, and for a paused one.
+    pacer: Option<Pacer>,
 }
 
 impl LiveControl {
-    /// Starts to serve viewers of a run that goes on.
+    /// Starts to serve viewers of a run that advances.
     ///
     /// # Errors
     /// When the address cannot be taken.
     pub(crate) fn start(at: &ViewerAddress, run: &mut dyn Simulation) -> Result<Self, Error> {
         let scenery = run.scenery();
         let cycle_s = scenery.cycle_s;
-        let (playing, speed) = (PlaybackPhase::Playing, 1.0);
-        let now = Playback { playing, time_s: time_s(run, cycle_s), speed, did_seek: false };
+        let playing = PlaybackPhase::Playing;
+        let speed = 1.0;
+        let playback = Playback { playing, time_s: time_s(run, cycle_s), speed, did_seek: false };
         let end_s = run.config().cycles as f64 * cycle_s;
         run.enable_events();
-        let viewers = ViewerServer::start(at, run, &scenery, end_s, false, now)?;
-        Ok(Self { viewers, cycle_s, playing, speed, beat: None })
+        // A run that is recorded cannot go back, so viewers may not seek.
+        let options = ViewerOptions { end_s, can_seek: false, playback };
+        let viewers = ViewerServer::start(at, run, &scenery, options)?;
+        Ok(Self { viewers, cycle_s, playing, speed, pacer: None })
     }
 
-    /// Shows the run, and returns the cycle up to which it may go now; waits a little if it may not go on.
+    /// Shows the run, and returns the cycle up to which it may advance now; waits a little if it may not advance.
     pub(crate) fn next_target(&mut self, run: &mut dyn Simulation) -> Cycle {
         let now = Instant::now();
-        if let Some(wish) = self.viewers.take_request() {
-            self.apply(wish, now, run.cycle());
+        if let Some(request) = self.viewers.take_request() {
+            self.apply(request, now, run.cycle());
         }
-        // Viewers that have gone do not hold the run.
+        // A run that was paused by viewers who have left would stand still for ever.
         if !self.viewers.has_viewers() {
-            (self.playing, self.beat) = (PlaybackPhase::Playing, None);
+            self.playing = PlaybackPhase::Playing;
+            self.pacer = None;
         }
         self.send_updates(run, now);
         let cycle = run.cycle();
-        let target = match (self.playing, &mut self.beat) {
+        let target = match (self.playing, &mut self.pacer) {
             (PlaybackPhase::Playing, None) => return Cycle::MAX,
-            (PlaybackPhase::Playing, Some(beat)) => beat.target(now, cycle),
+            (PlaybackPhase::Playing, Some(pacer)) => pacer.target(now, cycle),
             _ => cycle,
         };
         if target <= cycle {
-            let due = self.beat.as_ref().map(|beat| beat.next_due(cycle) - now).unwrap_or(MAX_WAIT);
-            std::thread::sleep(due.min(MAX_WAIT));
+            let wait = match &self.pacer {
+                Some(pacer) => pacer.next_due(cycle) - now,
+                None => MAX_WAIT,
+            };
+            std::thread::sleep(wait.min(MAX_WAIT));
         }
         target
     }
@@ -65,10 +73,15 @@ impl LiveControl {
         self.send_updates(run, Instant::now());
     }
 
-    fn apply(&mut self, wish: PlaybackRequest, now: Instant, cycle: Cycle) {
-        self.speed = wish.speed;
-        self.playing = if wish.play { PlaybackPhase::Playing } else { PlaybackPhase::Paused };
-        self.beat = wish.play.then(|| Pacer::new(wish.speed / self.cycle_s, now, cycle));
+    fn apply(&mut self, request: PlaybackRequest, now: Instant, cycle: Cycle) {
+        self.speed = request.speed;
+        if request.play {
+            self.playing = PlaybackPhase::Playing;
+            self.pacer = Some(Pacer::new(request.speed / self.cycle_s, now, cycle));
+        } else {
+            self.playing = PlaybackPhase::Paused;
+            self.pacer = None;
+        }
     }
 
     fn send_updates(&mut self, run: &mut dyn Simulation, now: Instant) {
@@ -76,8 +89,9 @@ impl LiveControl {
         if self.viewers.is_frame_due(time_s, now) {
             self.viewers.send_frame(run.frame(FRAME_OPTIONS), now);
         }
-        let (playing, speed) = (self.playing, self.speed);
-        self.viewers.send_playback(Playback { playing, time_s, speed, did_seek: false }, now);
+        let playback =
+            Playback { playing: self.playing, time_s, speed: self.speed, did_seek: false };
+        self.viewers.send_playback(playback, now);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Runs that are watched live, by viewers of Foxglove's protocol.
 //!
 //! A frame is made if there are viewers and the one before is encoded, which happens on a thread of its own: frames
-//! that no viewer could take in time are not made, and the run goes on meanwhile.
+//! that no viewer could take in time are not made, and the run does not wait for them.
 
 mod address;
 mod control;
@@ -24,10 +24,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// The time between two frames.
+/// The time between two frames: 30 a second, as viewers draw them.
 const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-/// The time between two states of a run that goes on.
+/// The time between two playback states of a run that advances; viewers move their clock by themselves in between.
 const PLAYBACK_INTERVAL: Duration = Duration::from_millis(100);
+/// Half a second in all, in which a server that ends gives its port back.
 const MAX_BIND_ATTEMPTS: u32 = 50;
 const BIND_RETRY_DELAY: Duration = Duration::from_millis(10);
 /// The speeds that viewers can ask for.
@@ -36,7 +37,7 @@ const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 /// The viewers of one run. They are disconnected when this is dropped.
 pub struct ViewerServer {
     server: LiveServer,
-    wishes: Arc<PlaybackRequests>,
+    requests: Arc<PlaybackRequests>,
     /// `None` after the last frame.
     frames: Option<SyncSender<Frame>>,
     is_encoding: Arc<AtomicBool>,
@@ -44,21 +45,33 @@ pub struct ViewerServer {
     /// The time that the last frame shows.
     shown_s: f64,
     frame_due: Instant,
-    told_due: Instant,
+    playback_due: Instant,
 }
 
-/// The wishes of viewers, and the answers to them.
+/// Properties of a run that viewers may watch.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewerOptions {
+    /// The end of the run, in simulated seconds.
+    pub end_s: f64,
+    /// Whether viewers may ask for times.
+    pub can_seek: bool,
+    /// The state of the run.
+    pub playback: Playback,
+}
+
+/// The requests of viewers, and the playback state that they were sent last. The server's threads accept requests, and
+/// the run's thread takes them.
 struct PlaybackRequests {
     can_seek: bool,
-    told: Mutex<Playback>,
-    wish: Mutex<Option<PlaybackRequest>>,
+    sent: Mutex<Playback>,
+    waiting: Mutex<Option<PlaybackRequest>>,
 }
 
 impl ViewerServer {
     /// The options of frames for viewers.
     pub const FRAME_OPTIONS: FrameOptions = FRAME_OPTIONS;
 
-    /// Starts to serve viewers of a run, up to `end_s` of simulated time. With `can_seek`, they may ask for times.
+    /// Starts to serve viewers of a run.
     ///
     /// # Errors
     /// When the address cannot be taken.
@@ -66,35 +79,40 @@ impl ViewerServer {
         at: &ViewerAddress,
         run: &mut dyn Simulation,
         scenery: &Scenery,
-        end_s: f64,
-        can_seek: bool,
-        now: Playback,
+        options: ViewerOptions,
     ) -> Result<Self, Error> {
-        let told = Mutex::new(now);
-        let wishes = Arc::new(PlaybackRequests { can_seek, told, wish: Mutex::default() });
-        let heard = wishes.clone();
+        let requests = Arc::new(PlaybackRequests {
+            can_seek: options.can_seek,
+            sent: Mutex::new(options.playback),
+            waiting: Mutex::default(),
+        });
         let first = run.frame(FRAME_OPTIONS);
-        let (host, port) = (at.host(), at.port());
-        let steer = move |wish| heard.accept(wish);
-        let served_run = ServedRun { scenery, first: &first, end_s };
-        let served = retry_bind(|| start_live_server(&host, port, &served_run, steer.clone()));
+        let served_run = ServedRun { scenery, first: &first, end_s: options.end_s };
+        let host = at.host();
+        let served = retry_bind(|| {
+            let requests = requests.clone();
+            start_live_server(&host, at.port(), &served_run, move |one| requests.accept(one))
+        });
         let (server, encoder) = served.map_err(|e| at.bind_error(&e))?;
-        let (frames, taken) = sync_channel(1);
+        // One frame, so that the run never gets ahead of the encoder.
+        let (frames, received) = sync_channel(1);
         let is_encoding = Arc::new(AtomicBool::new(false));
-        let busy = is_encoding.clone();
-        let thread = Builder::new().name("viewers".into());
-        let thread = thread.spawn(move || encode_frames(encoder, &taken, &busy)).map_err(|e| {
-            Error::other(format!("no thread for viewers: {e}"), "end other programs")
-        })?;
+        let encoder_state = is_encoding.clone();
+        let thread = Builder::new()
+            .name("viewers".into())
+            .spawn(move || encode_frames(encoder, &received, &encoder_state))
+            .map_err(|e| {
+                Error::other(format!("no thread for viewers: {e}"), "end other programs")
+            })?;
         Ok(Self {
             server,
-            wishes,
+            requests,
             frames: Some(frames),
             is_encoding,
             thread: Some(thread),
             shown_s: first.time_s,
             frame_due: Instant::now(),
-            told_due: Instant::now(),
+            playback_due: Instant::now(),
         })
     }
 
@@ -103,9 +121,9 @@ impl ViewerServer {
         self.server.has_viewers()
     }
 
-    /// Returns the wish of viewers since the last call.
+    /// Returns the request of viewers since the last call.
     pub fn take_request(&self) -> Option<PlaybackRequest> {
-        lock(&self.wishes.wish).take()
+        lock(&self.requests.waiting).take()
     }
 
     /// Returns whether a frame of this time is due for them now.
@@ -118,7 +136,8 @@ impl ViewerServer {
 
     /// Shows a frame that was due.
     pub fn send_frame(&mut self, frame: Frame, now: Instant) {
-        (self.shown_s, self.frame_due) = (frame.time_s, (self.frame_due + FRAME_INTERVAL).max(now));
+        self.shown_s = frame.time_s;
+        self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
         self.is_encoding.store(true, Ordering::Release);
         if let Some(frames) = &self.frames {
             // It is taken, because the one before is encoded.
@@ -126,17 +145,17 @@ impl ViewerServer {
         }
     }
 
-    /// Tells them the state of the run: at once if its activity changes or its time has jumped, otherwise now and
-    /// then.
+    /// Sends them the state of the run: at once if its activity changes or its time has jumped, otherwise at intervals.
     pub fn send_playback(&mut self, playback: Playback, now: Instant) {
-        let mut told = lock(&self.wishes.told);
-        let did_seek = playback.did_seek || playback.time_s < told.time_s;
-        let is_other = told.playing != playback.playing || told.speed != playback.speed || did_seek;
-        let is_later = told.time_s != playback.time_s && now >= self.told_due;
+        let mut sent = lock(&self.requests.sent);
+        let did_seek = playback.did_seek || playback.time_s < sent.time_s;
+        let is_other = sent.playing != playback.playing || sent.speed != playback.speed || did_seek;
+        let is_later = sent.time_s != playback.time_s && now >= self.playback_due;
         if is_other || is_later {
-            *told = Playback { did_seek: false, ..playback };
-            drop(told);
-            self.told_due = now + PLAYBACK_INTERVAL;
+            *sent = Playback { did_seek: false, ..playback };
+            // Not held while it is sent: a thread of the server may be about to accept a request.
+            drop(sent);
+            self.playback_due = now + PLAYBACK_INTERVAL;
             self.server.broadcast(Playback { did_seek, ..playback });
         }
     }
@@ -144,6 +163,7 @@ impl ViewerServer {
 
 impl Drop for ViewerServer {
     fn drop(&mut self) {
+        // Ends the loop of the thread.
         self.frames = None;
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -152,31 +172,31 @@ impl Drop for ViewerServer {
 }
 
 impl PlaybackRequests {
-    /// Takes a wish, and returns the resulting playback.
-    fn accept(&self, wish: PlaybackRequest) -> Playback {
-        let told = *lock(&self.told);
-        let speed = match wish.speed {
-            speed if speed.is_finite() && speed > 0.0 => {
-                speed.clamp(*SPEED_RANGE.start(), *SPEED_RANGE.end())
-            }
-            _ => told.speed,
-        };
-        let seek_s = wish.seek_s.filter(|_| self.can_seek);
-        let mut waiting = lock(&self.wish);
+    /// Accepts a request, and returns the resulting playback.
+    fn accept(&self, request: PlaybackRequest) -> Playback {
+        let sent = *lock(&self.sent);
+        let mut speed = sent.speed;
+        // Any number may come from outside.
+        if request.speed.is_finite() && request.speed > 0.0 {
+            speed = request.speed.clamp(*SPEED_RANGE.start(), *SPEED_RANGE.end());
+        }
+        let seek_s = request.seek_s.filter(|_| self.can_seek);
+        let mut waiting = lock(&self.waiting);
         // A viewer that asks for a time, and then to play, means both.
-        let before_s = waiting.as_ref().and_then(|before| before.seek_s);
-        *waiting = Some(PlaybackRequest { speed, seek_s: seek_s.or(before_s), ..wish });
-        let playing = if wish.play { PlaybackPhase::Playing } else { PlaybackPhase::Paused };
-        let time_s = seek_s.unwrap_or(told.time_s);
+        let earlier_s = waiting.as_ref().and_then(|earlier| earlier.seek_s);
+        *waiting = Some(PlaybackRequest { speed, seek_s: seek_s.or(earlier_s), ..request });
+        let playing = if request.play { PlaybackPhase::Playing } else { PlaybackPhase::Paused };
+        let time_s = seek_s.unwrap_or(sent.time_s);
         Playback { playing, time_s, speed, did_seek: seek_s.is_some() }
     }
 }
 
+/// Locks, also after a thread has panicked with the lock: each value is written in one step, so it is whole.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Tries to get a port for a moment: the server that had it before may be about to end.
+/// Tries to get a port several times: the server that had it before may be about to end.
 fn retry_bind<T>(start: impl Fn() -> io::Result<T>) -> io::Result<T> {
     for _ in 0..MAX_BIND_ATTEMPTS {
         match start() {
@@ -206,7 +226,7 @@ mod tests {
         Playback { playing: PlaybackPhase::Playing, time_s: 5.0, speed: 2.0, did_seek: false };
 
     fn wishes(can_seek: bool) -> PlaybackRequests {
-        PlaybackRequests { can_seek, told: Mutex::new(TOLD), wish: Mutex::default() }
+        PlaybackRequests { can_seek, sent: Mutex::new(TOLD), waiting: Mutex::default() }
     }
 
     fn wish(play: bool, speed: f64, seek_s: Option<f64>) -> PlaybackRequest {
@@ -219,7 +239,7 @@ mod tests {
         let came = wishes.accept(wish(false, 1.0, Some(7.0)));
         assert_eq!((came.playing, came.time_s, came.did_seek), (PlaybackPhase::Paused, 7.0, true));
         wishes.accept(wish(true, 4.0, None));
-        assert_eq!(lock(&wishes.wish).take(), Some(wish(true, 4.0, Some(7.0))));
+        assert_eq!(lock(&wishes.waiting).take(), Some(wish(true, 4.0, Some(7.0))));
     }
 
     #[test]
@@ -227,7 +247,7 @@ mod tests {
         let wishes = wishes(false);
         let came = wishes.accept(wish(true, 1.0, Some(7.0)));
         assert_eq!((came.time_s, came.did_seek), (5.0, false));
-        assert_eq!(lock(&wishes.wish).take().and_then(|wish| wish.seek_s), None);
+        assert_eq!(lock(&wishes.waiting).take().and_then(|wish| wish.seek_s), None);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The way back of a run: checkpoints, and the rows recorded on a branch that it finally did not take.
+//! A run taken back to a checkpoint, and the rows recorded on the branch that is thereby abandoned.
 
 use super::ManagedRun;
 use sidestep_kernel::Cycle;
@@ -6,7 +6,7 @@ use sidestep_kernel::checkpoint::{CheckpointError, decode_header};
 use sidestep_kernel::control::{OrderError, Orders};
 use sidestep_kernel::ports::RecordError;
 
-/// The reason why a run does not go on from a checkpoint.
+/// The reason why a run cannot continue from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {
@@ -64,7 +64,7 @@ impl ManagedRun {
         Ok(bytes)
     }
 
-    /// Notes a checkpoint of the present state: rows kept in memory may go back to it.
+    /// Remembers a checkpoint of the present state: rows kept in memory may go back to it.
     fn record_checkpoint(&mut self, checkpoint: &[u8]) -> Result<(), RecordError> {
         let Some(rows) = &mut self.rows else { return Ok(()) };
         let now = self.run.cycle();
@@ -76,16 +76,17 @@ impl ManagedRun {
         Ok(())
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows and frames kept in memory lose those of its cycle and of
+    /// Continues from a checkpoint of the same scenario. Rows and frames kept in memory lose those of its cycle and of
     /// later ones, as if the run had never gone there; those taken before are up to the caller. While there are
-    /// some of earlier cycles, it must be a checkpoint that this run made on its way, or the present state.
+    /// some of earlier cycles, it must be a checkpoint that this run made before, or the present state.
     ///
     /// # Errors
     /// When the checkpoint is damaged or belongs to another world, scenario or version; when rows of another past are
     /// kept; when the run is stored in a folder or file and the checkpoint is not its present state. The run then
     /// stays as it is.
     pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), RestoreError> {
-        if self.rows.is_some() || self.recording.is_some() || self.film.is_some() {
+        // All checks come before the first change, so that a run that is refused stays as it is.
+        if self.rows.is_some() || self.recording.is_some() || self.mcap.is_some() {
             let present = self.run.checkpoint();
             if present == checkpoint {
                 return Ok(self.record_checkpoint(checkpoint)?);
@@ -105,26 +106,27 @@ impl ManagedRun {
 
     /// Refuses a different state of a stored run: its rows would be stored after those of an abandoned past.
     fn check_not_stored(&self, of: Cycle) -> Result<(), RestoreError> {
-        let folder = self.recording.as_ref();
-        let folder = folder.map(|it| format!("the folder {}", it.folder().path().display()));
-        let film = self.film.as_ref().map(|_| "an MCAP file".to_string());
-        let Some(place) = folder.or(film) else { return Ok(()) };
-        let now = self.run.cycle();
-        let state = match of == now {
-            true => "another state there".to_string(),
-            false => format!("cycle {of}"),
+        let place = if let Some(recording) = &self.recording {
+            format!("the folder {}", recording.folder().path().display())
+        } else if self.mcap.is_some() {
+            "an MCAP file".to_string()
+        } else {
+            return Ok(());
         };
+        let now = self.run.cycle();
+        let state =
+            if of == now { "another state there".to_string() } else { format!("cycle {of}") };
         Err(RestoreError::AlreadyStored { place, now, state })
     }
 
     /// Refuses a checkpoint with a different past from the kept rows: they would be rows of two pasts.
     fn check_history(&self, checkpoint: &[u8], of: Cycle) -> Result<(), RestoreError> {
         let Some(rows) = &self.rows else { return Ok(()) };
-        let (from, now) = (rows.first_cycle(), self.run.cycle());
-        match rows.is_consistent_with(checkpoint, of, now) {
-            true => Ok(()),
-            false => Err(RestoreError::UnknownHistory { from, now, of }),
+        let now = self.run.cycle();
+        if rows.is_consistent_with(checkpoint, of, now) {
+            return Ok(());
         }
+        Err(RestoreError::UnknownHistory { from: rows.first_cycle(), now, of })
     }
 
     /// Drops the rows and frames from the present cycle on, after a checkpoint was restored.

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// The table of events.
 const EVENTS_TABLE: &str = "events";
-/// The largest number of events; further ones are left out.
+/// The largest number of events; further ones are left out, because all are kept in memory.
 const MAX_EVENTS: usize = 200_000;
 
 /// Returns the recorded events by cycle, about bodies with the numbers that they have in the tables of places.
@@ -24,9 +24,10 @@ pub(super) fn read_events(
     places: &[PositionColumns],
     first: &[Body],
 ) -> Result<Vec<LogEvent>, InputError> {
-    let (Some(place), true) = (places.first(), has_rows(folder, EVENTS_TABLE)) else {
+    let Some(place) = places.first() else { return Ok(Vec::new()) };
+    if !has_rows(folder, EVENTS_TABLE) {
         return Ok(Vec::new());
-    };
+    }
     let table = read_table(folder, EVENTS_TABLE, ..)?;
     let rows = 0..table.rows().min(MAX_EVENTS);
     let mut events = EventRows { table: &table, place, first }.events(rows).unwrap_or_default();
@@ -53,39 +54,36 @@ impl EventRows<'_> {
         let known = LogEventKind::ALL.iter().find(|kind| kind.name() == event);
         let number = self.number(self.place.number, row)?;
         let part = self.place.part.and_then(|part| self.number(part, row));
-        let kind = self.kind_of(number);
-        let words = self.words(row);
-        let value = self.quantity(row);
+        let is_contact = known == Some(&LogEventKind::Contact);
         Some(LogEvent {
             cycle,
-            level: if known == Some(&LogEventKind::Contact) {
-                Severity::Warning
-            } else {
-                Severity::Info
-            },
+            level: if is_contact { Severity::Warning } else { Severity::Info },
             // An event without a name here is shown with its own words.
             kind: known.copied().unwrap_or(LogEventKind::Changed),
-            who: BodyId { kind, number, part },
+            who: BodyId { kind: self.kind_of(number), number, part },
             with: self.number("other", row).map(|other| BodyId::new(self.place.kind, other, None)),
             at_m: None,
-            value,
-            words,
+            value: self.quantity(row),
+            words: self.words(row),
         })
     }
 
-    /// Returns the kind of a body, by a number that counts on through all kinds.
+    /// Returns the kind of a body, by its number, which counts on through all kinds.
     fn kind_of(&self, number: u32) -> BodyKind {
-        let is_one =
-            |kind: BodyKind| self.first.iter().any(|b| (b.kind, b.number) == (kind, number));
-        let others = [BodyKind::Person, BodyKind::Door].into_iter().find(|kind| is_one(*kind));
-        if is_one(self.place.kind) { self.place.kind } else { others.unwrap_or(self.place.kind) }
+        let kinds = [self.place.kind, BodyKind::Person, BodyKind::Door];
+        for kind in kinds {
+            if self.first.iter().any(|body| body.kind == kind && body.number == number) {
+                return kind;
+            }
+        }
+        self.place.kind
     }
 
-    /// Returns everything that the table says of an event, in words.
+    /// Returns all texts that the table has of an event.
     fn words(&self, row: usize) -> String {
         let columns = self.table.schema.columns.iter().map(|column| column.name.as_str());
-        let told = columns.filter_map(|name| self.text(name, row));
-        told.map(|text| text.replace('_', " ")).collect::<Vec<_>>().join(" ")
+        let texts = columns.filter_map(|name| self.text(name, row));
+        texts.map(|text| text.replace('_', " ")).collect::<Vec<_>>().join(" ")
     }
 
     /// Returns the measure of an event: the first of its floats that is not missing.
@@ -107,7 +105,8 @@ impl EventRows<'_> {
     /// Returns a text that is not empty.
     fn text(&self, column: &str, row: usize) -> Option<String> {
         let at = self.table.schema.columns.iter().position(|own| own.name == column)?;
-        let (column, values) = (&self.table.schema.columns[at], &self.table.columns[at]);
+        let column = &self.table.schema.columns[at];
+        let values = &self.table.columns[at];
         if !matches!(values, Values::Label(_)) {
             return None;
         }

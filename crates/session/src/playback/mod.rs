@@ -44,7 +44,8 @@ impl BodySource {
     fn bodies_at(&mut self, cycle: Cycle) -> Vec<Body> {
         match self {
             Self::Tables(places) => places.bodies_at(cycle),
-            // The file could be read when it was opened. Parts that cannot be read now are not shown.
+            // The file could be read when it was opened. Parts that cannot be read now are not shown, because a frame
+            // cannot fail.
             Self::Messages(scenes) => scenes.bodies(cycle).unwrap_or_default(),
         }
     }
@@ -62,6 +63,7 @@ impl RecordedPlayback {
     ) -> Result<Self, InputError> {
         let mut scenes = McapSceneReader::open(file)?;
         let events = scenes.events()?;
+        // Read once to report damage now.
         scenes.bodies(until)?;
         Ok(Self::new(start, BodySource::Messages(scenes), events, until))
     }
@@ -94,8 +96,9 @@ impl RecordedPlayback {
 
     /// Returns the events since the last frame; none if the time went back.
     fn new_events(&mut self) -> Vec<LogEvent> {
-        let at = |cycle: Cycle| self.events.partition_point(|event| event.cycle < cycle);
-        let (from, to) = (at(self.shown.min(self.cycle)), at(self.cycle));
+        let shown = self.shown.min(self.cycle);
+        let from = self.events.partition_point(|event| event.cycle < shown);
+        let to = self.events.partition_point(|event| event.cycle < self.cycle);
         self.shown = self.cycle;
         self.events[from..to].to_vec()
     }
@@ -153,7 +156,8 @@ impl Simulation for RecordedPlayback {
         if cycle > self.until {
             return Err(CheckpointError::Damaged);
         }
-        (self.cycle, self.shown) = (cycle, cycle);
+        self.cycle = cycle;
+        self.shown = cycle;
         Ok(())
     }
 

@@ -3,15 +3,16 @@
 use crate::run_tables::has_rows;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Frame, Pose, PositionColumns, Scenery, Shape, Vec3,
+    Body, BodyId, BodyKind, Frame, Pose, PositionColumns, Scenery, Shape, Trail, Vec3,
 };
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, read_table};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// The approximate number of rows held at a time.
+/// The approximate number of rows held at a time: some megabytes, and some seconds of playback.
 const WINDOW_ROWS: u64 = 200_000;
 
 /// The bodies of a recording.
@@ -22,7 +23,8 @@ pub(super) struct PoseReader {
     /// The bodies at the start, for their appearance.
     first: Vec<Body>,
     until: Cycle,
-    window: Vec<Window>,
+    /// The rows of each table around the last cycle.
+    windows: Vec<Window>,
 }
 
 /// The rows of some cycles of a table.
@@ -43,33 +45,33 @@ impl PoseReader {
         first: Vec<Body>,
         until: Cycle,
     ) -> Result<Self, InputError> {
-        let folder = folder.to_path_buf();
-        let window = Vec::new();
-        let mut places = Self { folder, rows, scenery, first, until, window };
-        for k in 0..places.rows.len() {
-            let window = places.read(k, 0)?;
-            places.window.push(window);
+        let mut reader =
+            Self { folder: folder.to_path_buf(), rows, scenery, first, until, windows: Vec::new() };
+        for k in 0..reader.rows.len() {
+            let window = reader.read(k, 0)?;
+            reader.windows.push(window);
         }
-        Ok(places)
+        Ok(reader)
     }
 
-    /// Returns the number of cycles of a window, and its first cycle.
-    fn window_range(&self, rows: &PositionColumns, cycle: Cycle) -> (Cycle, Cycle) {
+    /// Returns the cycles of the window around a cycle.
+    fn window_range(&self, rows: &PositionColumns, cycle: Cycle) -> Range<Cycle> {
         let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();
         let cycles = (WINDOW_ROWS / bodies.max(1) as u64).max(1) * rows.interval;
-        (cycle / cycles * cycles, cycles)
+        let from = cycle / cycles * cycles;
+        from..from + cycles
     }
 
     /// Reads the rows around a cycle, and one moment before them, for directions.
     fn read(&self, k: usize, cycle: Cycle) -> Result<Window, InputError> {
         let rows = &self.rows[k];
-        let (from, cycles) = self.window_range(rows, cycle);
+        let range = self.window_range(rows, cycle);
         if !has_rows(&self.folder, rows.table) {
-            return Ok(Window { from, table: None });
+            return Ok(Window { from: range.start, table: None });
         }
-        let before = from.saturating_sub(2 * rows.interval);
-        let table = read_table(&self.folder, rows.table, before..from + cycles)?;
-        Ok(Window { from, table: Some(table) })
+        let before = range.start.saturating_sub(2 * rows.interval);
+        let table = read_table(&self.folder, rows.table, before..range.end)?;
+        Ok(Window { from: range.start, table: Some(table) })
     }
 
     /// Returns the bodies of a cycle. Bodies that are gone are left out, and so are all that move but have no rows.
@@ -78,12 +80,12 @@ impl PoseReader {
         let cycle = cycle.min(self.until.saturating_sub(1));
         let mut poses = BTreeMap::new();
         for k in 0..self.rows.len() {
-            if self.window_range(&self.rows[k], cycle).0 != self.window[k].from {
+            let from = self.window_range(&self.rows[k], cycle).start;
+            if self.windows[k].from != from {
                 // It could be read at the start. Rows that cannot be read now are not shown.
-                let (from, _) = self.window_range(&self.rows[k], cycle);
-                self.window[k] = self.read(k, cycle).unwrap_or(Window { from, table: None });
+                self.windows[k] = self.read(k, cycle).unwrap_or(Window { from, table: None });
             }
-            if let Some(table) = &self.window[k].table {
+            if let Some(table) = &self.windows[k].table {
                 poses.extend(self.poses(&self.rows[k], table, cycle));
             }
         }
@@ -94,23 +96,21 @@ impl PoseReader {
     fn poses(&self, rows: &PositionColumns, table: &Table, cycle: Cycle) -> Vec<(BodyId, Pose)> {
         let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
         let whose: Vec<BodyId> = headings.keys().copied().collect();
-        // The numbers of people follow those of robots, in one table.
-        let like = |body: &Body| Body { kind: rows.kind, ..body.clone() };
-        let bodies = self.first.iter().filter(|body| has_rows_in(rows, body)).map(like).collect();
+        let mut bodies = Vec::new();
+        for body in self.first.iter().filter(|body| has_rows_in(rows, body)) {
+            // The numbers of people follow those of robots, in one table.
+            bodies.push(Body { kind: rows.kind, ..body.clone() });
+        }
+        // Trails end before the cycle of a frame, so the next cycle includes the rows of this one.
         let frame = Frame { cycle: cycle + 1, bodies, ..Frame::default() };
         let trails = rows.trails(&self.scenery, &frame, &whose, |name| table.column(name));
-        let pose = |who: BodyId, way: &[(Cycle, Vec3)]| {
-            let known: Vec<_> = way.iter().filter(|(at, _)| *at <= cycle).collect();
-            let (last, at_m) = **known.last()?;
-            let before = known.iter().rev().find(|(_, before)| *before != at_m);
-            let ahead = before.map(|(_, [x, y, _])| (at_m[1] - y).atan2(at_m[0] - x));
-            let yaw_rad = rows.plane.map_or(0.0, |plane| plane.yaw_rad);
-            let quarters = headings[&who].map(|quarters| f64::from(quarters) * FRAC_PI_2 + yaw_rad);
-            let is_here = last + rows.interval > cycle;
-            is_here.then(|| (who, Pose::from_heading(at_m, quarters.or(ahead).unwrap_or(0.0))))
-        };
-        let trails = trails.unwrap_or_default();
-        trails.iter().filter_map(|trail| pose(trail.of, &trail.points)).collect()
+        let mut poses = Vec::new();
+        for Trail { of, points } in trails.unwrap_or_default() {
+            if let Some(pose) = last_pose(rows, &points, headings[&of], cycle) {
+                poses.push((of, pose));
+            }
+        }
+        poses
     }
 
     /// Returns the bodies at their places, the known ones in the order of the start.
@@ -119,27 +119,34 @@ impl PoseReader {
         let mut joints: BTreeMap<u32, u32> = BTreeMap::new();
         let mut bodies = Vec::new();
         for body in &self.first {
-            let who = self.recorded_id(body);
-            let followed = match body.kind {
+            let recorded_id = self.recorded_id(body);
+            let moved = match body.kind {
+                // Rods have no rows of their own: they are lines through the connectors' places.
                 BodyKind::Rods => rods_body(body, poses, joints.entry(body.number).or_default()),
+                // A zone is centered at its airplane.
                 BodyKind::Zone => poses
                     .get(&BodyId::new(BodyKind::Airplane, body.number, None))
                     .map(|pose| Body { pose: Pose::from_position(pose.at_m), ..body.clone() }),
-                _ => who.and_then(|who| poses.get(&who)).map(|pose| {
-                    used.extend(who);
+                _ => recorded_id.and_then(|id| poses.get(&id)).map(|pose| {
+                    used.extend(recorded_id);
                     Body { pose: *pose, ..body.clone() }
                 }),
             };
-            let stays = who.is_none()
+            // What has no rows in any table does not move, such as a door or an obstacle.
+            let stays = recorded_id.is_none()
                 && !matches!(body.kind, BodyKind::Rods | BodyKind::Zone | BodyKind::Robot);
-            bodies.extend(followed.or_else(|| stays.then(|| body.clone())));
+            match moved {
+                Some(moved) => bodies.push(moved),
+                None if stays => bodies.push(body.clone()),
+                None => {}
+            }
         }
         let late = poses.iter().filter(|(who, _)| !used.contains(*who));
         bodies.extend(late.map(|(who, pose)| self.new_body(*who, *pose)));
         bodies
     }
 
-    /// Returns the name of a body in the tables, if it has rows there.
+    /// Returns the id of a body in the tables, if it has rows there.
     fn recorded_id(&self, body: &Body) -> Option<BodyId> {
         let rows = self.rows.iter().find(|rows| has_rows_in(rows, body))?;
         Some(BodyId::new(rows.kind, body.number, body.part))
@@ -148,10 +155,30 @@ impl PoseReader {
     /// Returns a body that was not there at the start; it looks like the others of its kind.
     fn new_body(&self, who: BodyId, pose: Pose) -> Body {
         let BodyId { kind, number, part } = who;
-        let like = self.first.iter().find(|body| body.kind == kind);
-        let shape = like.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
+        let other = self.first.iter().find(|body| body.kind == kind);
+        let shape = other.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
         Body { part, ..Body::new(kind, number, pose, shape) }
     }
+}
+
+/// Returns the pose of a body at a cycle, from its recorded points: with its recorded heading in quarter turns, or in
+/// the direction of its last motion. `None` if its last point is older than the interval of rows: it is gone.
+fn last_pose(
+    rows: &PositionColumns,
+    points: &[(Cycle, Vec3)],
+    heading: Option<u32>,
+    cycle: Cycle,
+) -> Option<Pose> {
+    let known: Vec<_> = points.iter().filter(|(at, _)| *at <= cycle).collect();
+    let (last, at_m) = **known.last()?;
+    if last + rows.interval <= cycle {
+        return None;
+    }
+    let yaw_rad = rows.plane.map_or(0.0, |plane| plane.yaw_rad);
+    let recorded_rad = heading.map(|quarters| f64::from(quarters) * FRAC_PI_2 + yaw_rad);
+    let before = known.iter().rev().find(|(_, before)| *before != at_m);
+    let motion_rad = before.map(|(_, [x, y, _])| (at_m[1] - y).atan2(at_m[0] - x));
+    Some(Pose::from_heading(at_m, recorded_rad.or(motion_rad).unwrap_or(0.0)))
 }
 
 /// Returns whether a body may have rows.
@@ -166,10 +193,12 @@ fn rods_body(body: &Body, poses: &BTreeMap<BodyId, Pose>, joint: &mut u32) -> Op
     let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
     let from = *joint;
     *joint += points_m.len() as u32;
-    let place =
-        |part| Some(poses.get(&BodyId::new(BodyKind::Connector, body.number, Some(part)))?.at_m);
-    let points_m = (from..*joint).map(place).collect::<Option<Vec<_>>>()?;
-    let shape = Shape::Line { points_m, thickness_m: *thickness_m };
+    let mut joints_m = Vec::with_capacity(points_m.len());
+    for part in from..*joint {
+        let id = BodyId::new(BodyKind::Connector, body.number, Some(part));
+        joints_m.push(poses.get(&id)?.at_m);
+    }
+    let shape = Shape::Line { points_m: joints_m, thickness_m: *thickness_m };
     Some(Body { shape, ..body.clone() })
 }
 
@@ -180,15 +209,18 @@ fn last_headings(
     cycle: Cycle,
 ) -> Option<BTreeMap<BodyId, Option<u32>>> {
     let Values::U64(cycles) = table.column("cycle")? else { return None };
-    let whole = |name: &str, row| table.column(name)?.number(row).map(|number| number as u32);
     let mut found: BTreeMap<BodyId, (Cycle, Option<u32>)> = BTreeMap::new();
     for (row, &at) in cycles.iter().enumerate().filter(|(_, at)| **at <= cycle) {
-        let part = rows.part.and_then(|part| whole(part, row));
-        let who = BodyId::new(rows.kind, whole(rows.number, row)?, part);
-        let last = found.entry(who).or_default();
+        let number = whole_number(table, rows.number, row)?;
+        let part = rows.part.and_then(|part| whole_number(table, part, row));
+        let last = found.entry(BodyId::new(rows.kind, number, part)).or_default();
         if at >= last.0 {
-            *last = (at, rows.heading.and_then(|ahead| whole(ahead, row)));
+            *last = (at, rows.heading.and_then(|heading| whole_number(table, heading, row)));
         }
     }
     Some(found.into_iter().map(|(who, (_, heading))| (who, heading)).collect())
+}
+
+fn whole_number(table: &Table, column: &str, row: usize) -> Option<u32> {
+    table.column(column)?.number(row).map(|number| number as u32)
 }

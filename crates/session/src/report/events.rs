@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Largest number of events that are listed one by one.
 const MAX_ROWS: usize = 100;
-/// Number of stretches of cycles over which events are counted.
+/// Number of intervals of cycles over which events are counted: as many points as a line of the figure shows apart.
 const BINS: u64 = 50;
 /// Largest number of kinds of events with a line of their own; palettes are limited to as many colors.
 const MAX_KINDS: usize = 7;
@@ -29,9 +29,9 @@ fn column_label(name: &str) -> String {
 /// # Errors
 /// When the table is damaged.
 pub(super) fn append(document: &mut Document, folder: &Path, name: &str) -> Result<(), InputError> {
-    let first = read_table(folder, name, ..1);
-    let is_of_events = |t: &Recorded| t.column("event").is_some() && t.column("cycle").is_some();
-    if !first.is_ok_and(|table| is_of_events(&table)) {
+    // The rows of the first cycle are enough to see the columns; the whole table may be large.
+    let Ok(first) = read_table(folder, name, ..1) else { return Ok(()) };
+    if first.column("event").is_none() || first.column("cycle").is_none() {
         return Ok(());
     }
     let table = read_table(folder, name, ..)?;
@@ -69,8 +69,8 @@ impl<'a> Events<'a> {
 
     /// Returns the cycles of the events of a kind.
     fn cycles_of_kind(&self, kind: usize) -> impl Iterator<Item = u64> {
-        let is_its = move |(_, k): &(&u64, &u32)| **k as usize == kind;
-        self.cycles.iter().zip(self.kinds).filter(is_its).map(|(cycle, _)| *cycle)
+        let events = self.cycles.iter().zip(self.kinds);
+        events.filter(move |(_, k)| **k as usize == kind).map(|(cycle, _)| *cycle)
     }
 
     /// Returns the kinds that occur and their numbers, most frequent first.
@@ -99,44 +99,53 @@ impl<'a> Events<'a> {
             table.columns.extend([format!("least {head}"), format!("greatest {head}")]);
         }
         for (kind, count) in self.kinds_by_count() {
-            let end = |cycle: Option<u64>| cycle.map_or("-".into(), |c| c.to_string());
-            let (first, last) = (self.cycles_of_kind(kind).min(), self.cycles_of_kind(kind).max());
-            let head = [self.names[kind].clone(), count.to_string(), end(first), end(last)];
-            let ends = floats.iter().flat_map(|(_, values)| self.value_range(kind, values));
-            table.push_row(head.into_iter().chain(ends));
+            let first = self.cycles_of_kind(kind).min().unwrap_or_default();
+            let last = self.cycles_of_kind(kind).max().unwrap_or_default();
+            let mut row = vec![
+                self.names[kind].clone(),
+                count.to_string(),
+                first.to_string(),
+                last.to_string(),
+            ];
+            for (_, values) in &floats {
+                row.extend(self.value_range(kind, values));
+            }
+            table.push_row(row);
         }
         table
     }
 
     /// Returns the smallest and the largest value of a kind.
     fn value_range(&self, kind: usize, values: &[f64]) -> [String; 2] {
-        let its = || {
-            let all = values.iter().zip(self.kinds);
-            all.filter(|(v, k)| **k as usize == kind && v.is_finite()).map(|(v, _)| *v)
-        };
-        [its().reduce(f64::min), its().reduce(f64::max)]
-            .map(|end| end.map_or("-".into(), format_digits))
+        let values = values.iter().zip(self.kinds);
+        let of_kind =
+            values.filter(|(v, k)| **k as usize == kind && v.is_finite()).map(|(v, _)| *v);
+        let min = of_kind.clone().reduce(f64::min);
+        let max = of_kind.reduce(f64::max);
+        [min, max].map(|value| value.map_or("-".into(), format_digits))
     }
 
-    /// Returns the number of events of each kind in each stretch of cycles; `None` for one stretch.
+    /// Returns the number of events of each kind in each interval of cycles; `None` for one interval.
     fn timeline(&self) -> Option<Figure> {
-        let last = self.cycles.iter().max()? + 1;
-        let length = last.div_ceil(BINS);
-        let stretches = last.div_ceil(length);
-        if stretches < 2 {
+        let cycles = self.cycles.iter().max()? + 1;
+        let length = cycles.div_ceil(BINS);
+        let intervals = cycles.div_ceil(length);
+        if intervals < 2 {
             return None;
         }
         let frequent = self.kinds_by_count();
-        let mut series: Vec<Series> = frequent[..frequent.len().min(MAX_KINDS)]
-            .iter()
-            .map(|(kind, _)| Series { name: self.names[*kind].clone(), points: Vec::new() })
-            .collect();
-        for (line, (kind, _)) in series.iter_mut().zip(&frequent) {
-            let mut counts = vec![0_u64; stretches as usize];
-            self.cycles_of_kind(*kind).for_each(|cycle| counts[(cycle / length) as usize] += 1);
-            let middle = |k: usize| (k as f64 + 0.5) * length as f64;
-            let point = |(k, count): (usize, &u64)| Point::new(middle(k), *count as f64);
-            line.points = counts.iter().enumerate().map(point).collect();
+        let mut series = Vec::new();
+        for (kind, _) in frequent.iter().take(MAX_KINDS) {
+            let mut counts = vec![0_u64; intervals as usize];
+            for cycle in self.cycles_of_kind(*kind) {
+                counts[(cycle / length) as usize] += 1;
+            }
+            let mut points = Vec::new();
+            for (k, count) in counts.into_iter().enumerate() {
+                let middle = (k as f64 + 0.5) * length as f64;
+                points.push(Point::new(middle, count as f64));
+            }
+            series.push(Series { name: self.names[*kind].clone(), points });
         }
         let left_out = match frequent.len().saturating_sub(MAX_KINDS) {
             0 => String::new(),

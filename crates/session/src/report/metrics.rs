@@ -21,16 +21,16 @@ pub(super) fn unit_of(name: &str) -> String {
 pub(super) fn tree_tables(title: &str, tree: &Value, meanings: &[MetricInfo]) -> Vec<Table> {
     let columns = ["metric", "value", "unit", "meaning", "name in summary.json"];
     let note = "Counts that stayed 0, and what has no value.";
-    let mut telling = Table::new(title, "", &columns);
-    let mut silent = Table::new(format!("{title} that stayed 0"), note, &columns).folded();
+    let mut informative = Table::new(title, "", &columns);
+    let mut zero = Table::new(format!("{title} that stayed 0"), note, &columns).folded();
     for (path, value) in leaves(tree) {
         let MetricLabel { words, unit, meaning } = metric_label(meanings, &path);
-        let is_silent = ["0", "-", "none", "false"].contains(&value.as_str());
+        let is_zero = ["0", "-", "none", "false"].contains(&value.as_str());
         let unit = unit.unwrap_or_default().to_string();
-        let table = if is_silent { &mut silent } else { &mut telling };
+        let table = if is_zero { &mut zero } else { &mut informative };
         table.push_row([capitalize(&words), value, unit, meaning.to_string(), path]);
     }
-    [telling, silent].into_iter().filter(|table| !table.rows.is_empty()).collect()
+    [informative, zero].into_iter().filter(|table| !table.rows.is_empty()).collect()
 }
 
 /// Returns words with a capital first letter, as at the beginning of a sentence.
@@ -58,12 +58,15 @@ pub(super) fn list_table(title: &str, list: &Value, meanings: &[MetricInfo]) -> 
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let mut table = Table::new(title, note, &heads).folded();
     for row in shown {
-        let cell = |column: &&str| row.iter().find(|(path, _)| path == column);
-        table.push_row(
-            columns.iter().map(|c| cell(c).map_or("-".into(), |(_, value)| value.clone())),
-        );
+        table.push_row(columns.iter().map(|column| value_at(row, column)));
     }
     Some(table)
+}
+
+/// Returns the value at a path among the leaves of a tree; a dash if there is none.
+fn value_at(leaves: &[(String, String)], path: &str) -> String {
+    let leaf = leaves.iter().find(|(own, _)| own == path);
+    leaf.map_or("-".into(), |(_, value)| value.clone())
 }
 
 /// Returns the head of a column: the metric in words, with its unit.

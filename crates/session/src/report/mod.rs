@@ -28,8 +28,9 @@ pub use text::format_duration;
 /// # Errors
 /// When the folder holds nothing to report, or something in it is damaged.
 pub fn document(worlds: &Worlds, folder: &Path, watcher: &dyn Watcher) -> Result<Document, Error> {
-    match Folder::is_at(folder) {
-        true => sweep::document(worlds, &Folder::open(folder)?, watcher),
-        false => Ok(run::document(worlds, folder)?),
+    if Folder::is_at(folder) {
+        sweep::document(worlds, &Folder::open(folder)?, watcher)
+    } else {
+        Ok(run::document(worlds, folder)?)
     }
 }

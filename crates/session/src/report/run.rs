@@ -59,11 +59,14 @@ fn name(view: &RunReader, summary: Option<&Value>) -> String {
 fn lead(view: &RunReader) -> Text {
     let Manifest { world, status, cycles_done, cycles_planned, program_version, .. } =
         &view.manifest;
-    let (done, planned) = (format_count(*cycles_done), format_count(*cycles_planned));
-    let cycles = match (cycles_done == cycles_planned, status) {
-        (true, _) => format!("{done} cycles"),
-        (false, Status::Complete) => format!("over after {done} of at most {planned} cycles"),
-        (false, _) => format!("{done} of {planned} cycles"),
+    let done = format_count(*cycles_done);
+    let planned = format_count(*cycles_planned);
+    let cycles = if cycles_done == cycles_planned {
+        format!("{done} cycles")
+    } else if *status == Status::Complete {
+        format!("over after {done} of at most {planned} cycles")
+    } else {
+        format!("{done} of {planned} cycles")
     };
     let text = format!("A run of the world `{world}` by sidestep {program_version}, {cycles}.");
     Text::from_markup(&text)
@@ -101,16 +104,25 @@ fn facts(view: &RunReader, summary: Option<&Value>) -> Vec<(String, Text)> {
         ("Cycles planned".into(), format_count(manifest.cycles_planned).into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
     ];
-    let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
-    let mut fact = |name: &str, value: Option<String>| {
-        facts.extend(value.map(|value| (name.to_string(), Text::from(value))));
-    };
-    fact("Agents", number("agents").or(number("robots")).map(|n| format_count(n as u64)));
-    fact("Took", number("wall_s").map(format_duration));
-    fact("Workers", number("workers").map(|n| n.to_string()));
-    let digest = manifest.digest.clone();
-    facts.extend(digest.map(|digest| ("Digest of the last state".into(), Text::code(digest))));
+    // Early summaries have `robots` in place of `agents`.
+    let agents = summary_number(summary, "agents").or(summary_number(summary, "robots"));
+    if let Some(agents) = agents {
+        facts.push(("Agents".into(), format_count(agents as u64).into()));
+    }
+    if let Some(wall_s) = summary_number(summary, "wall_s") {
+        facts.push(("Took".into(), format_duration(wall_s).into()));
+    }
+    if let Some(workers) = summary_number(summary, "workers") {
+        facts.push(("Workers".into(), workers.to_string().into()));
+    }
+    if let Some(digest) = manifest.digest.clone() {
+        facts.push(("Digest of the last state".into(), Text::code(digest)));
+    }
     facts
+}
+
+fn summary_number(summary: Option<&Value>, key: &str) -> Option<f64> {
+    summary?.get(key)?.as_f64()
 }
 
 /// Returns the commands that reproduce the run.
@@ -127,8 +139,9 @@ fn reproduction_commands(view: &RunReader) -> String {
 
 /// Returns a path quoted for a shell.
 pub(super) fn shell_quote(path: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
-    if !path.is_empty() && path.chars().all(is_plain) {
+    let has_special =
+        path.contains(|c: char| !c.is_ascii_alphanumeric() && !"/._-+=:,@%".contains(c));
+    if !path.is_empty() && !has_special {
         return path.into();
     }
     format!("'{}'", path.replace('\'', "'\\''"))
@@ -143,10 +156,13 @@ fn append_metrics(
     let cycles = summary.get("cycles").and_then(Value::as_u64).unwrap_or(manifest.cycles_done);
     let of = format!(" After {} cycles.", format_count(cycles));
     document.section("Results").paragraph(Text::from_markup(&format!("{ONE_RUN}{of}")));
-    let get = |key| summary.get(key).unwrap_or(&Value::Null);
-    document.tables(metrics::tree_tables("Metrics", get("metrics"), meanings));
-    document.tables(metrics::list_table("Metrics of every agent", get("per_agent"), meanings));
-    document.tables(metrics::list_table("Metrics of pairs of agents", get("per_pair"), meanings));
+    // Indexing gives null where a summary has no such key.
+    let all = &summary["metrics"];
+    let per_agent = &summary["per_agent"];
+    let per_pair = &summary["per_pair"];
+    document.tables(metrics::tree_tables("Metrics", all, meanings));
+    document.tables(metrics::list_table("Metrics of every agent", per_agent, meanings));
+    document.tables(metrics::list_table("Metrics of pairs of agents", per_pair, meanings));
 }
 
 /// Returns the picture in the run folder.

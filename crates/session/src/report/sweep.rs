@@ -7,13 +7,13 @@ use crate::{Error, Watcher};
 use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
-use sidestep_experiment::sweep::{Cell, Plan, Role, RunTable, Summary};
+use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial, Variant};
 use sidestep_kernel::ports::Values;
 use sidestep_scenario::Worlds;
 
-/// Number of variants for which a run is drawn.
+/// Number of variants for which a run is drawn: some examples; the figures are about all variants.
 const MAX_PICTURES: usize = 4;
-/// Longest time in seconds of a run that is repeated for its picture.
+/// Longest time in seconds of a run that is repeated for its picture, so that a report takes a minute or two at most.
 const MAX_REPEATED_RUN_S: f64 = 20.0;
 /// Largest number of failed runs that are listed.
 const MAX_LISTED_FAILURES: usize = 20;
@@ -44,54 +44,59 @@ pub(super) fn document(
 }
 
 fn name(plan: &Plan) -> String {
-    match plan.name.is_empty() {
-        true => format!("A sweep of the world {}", plan.world),
-        false => plan.name.clone(),
+    if plan.name.is_empty() {
+        return format!("A sweep of the world {}", plan.world);
     }
+    plan.name.clone()
 }
 
 fn lead(plan: &Plan, table: &RunTable) -> Text {
-    let (runs, variants) = (table.runs() as u64, plan.variants.len() as u64);
+    let runs = table.runs() as u64;
+    let variants = plan.variants.len() as u64;
+    // A single run has no interval, whether another seed would change it or not.
+    let intervals = if runs > variants {
+        "Intervals are 95 %."
+    } else {
+        "No variant has two runs, so there are no intervals."
+    };
     Text::from_markup(&format!(
         "{} runs of {} variants in the world `{}`. Replicate k of every variant has seed \
-         {}\u{a0}+\u{a0}k, so variants are compared seed by seed. {}",
+         {}\u{a0}+\u{a0}k, so variants are compared seed by seed. {intervals}",
         format_count(runs),
         format_count(variants),
         plan.world,
         plan.first_seed,
-        // A single run has no interval, whether another seed would change it or not.
-        match runs > variants {
-            true => "Intervals are 95 %.",
-            false => "No variant has two runs, so there are no intervals.",
-        },
     ))
 }
 
 fn unfinished(folder: &Folder, table: &RunTable) -> Text {
-    let (done, all) = (format_count(table.runs() as u64), format_count(folder.plan().runs()));
+    let done = format_count(table.runs() as u64);
+    let all = format_count(folder.plan().runs());
     let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
     let resume = format!("sidestep resume {}", shell_quote(&folder.path().display().to_string()));
     Text::from_markup(&text).append(Text::code(resume)).append(" continues it.")
 }
 
 fn facts(folder: &Folder, table: &RunTable) -> Vec<(String, Text)> {
-    let (plan, manifest) = (folder.plan(), folder.manifest());
+    let plan = folder.plan();
+    let version = &folder.manifest().program_version;
     let mut facts: Vec<(String, Text)> = vec![
         ("World".into(), Text::code(&*plan.world)),
         ("Runs".into(), format_count(table.runs() as u64).into()),
         ("Variants".into(), format_count(plan.variants.len() as u64).into()),
         ("First seed".into(), plan.first_seed.to_string().into()),
-        ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
+        ("Version".into(), format!("sidestep {version}").into()),
         ("Fingerprint of all scenarios".into(), Text::code(folder.fingerprint())),
     ];
     if let Some(until) = &plan.until {
         let unit = if until.is_relative { "of the mean" } else { "in the metric's unit" };
-        let of = match until.metrics.is_empty() {
-            true => "every metric that varies".to_string(),
-            false => until.metrics.join(", "),
+        let metrics = if until.metrics.is_empty() {
+            "every metric that varies".to_string()
+        } else {
+            until.metrics.join(", ")
         };
         let words = format!(
-            "until half the interval is at most {} {unit}: {of}; at most {} runs a variant",
+            "until half the interval is at most {} {unit}: {metrics}; at most {} runs a variant",
             until.half_width, plan.replicates
         );
         facts.push(("Runs of a variant".into(), words.into()));
@@ -114,22 +119,28 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     }
     let mut runs = vec![0u64; plan.variants.len()];
     if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
-        let numbers = of.options().flatten().filter_map(|v| usize::try_from(*v).ok());
-        numbers.for_each(|v| runs.get_mut(v).into_iter().for_each(|runs| *runs += 1));
+        for variant in of.options().flatten() {
+            // A damaged table may have numbers of no variant.
+            if let Some(runs) = usize::try_from(*variant).ok().and_then(|v| runs.get_mut(v)) {
+                *runs += 1;
+            }
+        }
     }
     let mut columns = vec!["variant", "runs"];
     columns.extend(plan.parameters.iter().map(String::as_str));
     let note = "`variants/NNNN/scenario.toml` is the whole scenario of variant NNNN.";
     let mut rows = Table::new("Variants", note, &columns);
     for (k, variant) in plan.variants.iter().enumerate() {
-        let value = |key: &String| match variant.value(key) {
-            None => "as in the scenario".to_string(),
-            Some(value) => value.as_str().map_or_else(|| value.to_string(), str::to_string),
-        };
-        let first = [format!("{k:04}"), runs[k].to_string()];
-        rows.push_row(first.into_iter().chain(plan.parameters.iter().map(value)));
+        let mut row = vec![format!("{k:04}"), runs[k].to_string()];
+        row.extend(plan.parameters.iter().map(|key| setting_text(variant, key)));
+        rows.push_row(row);
     }
     Some(rows)
+}
+
+fn setting_text(variant: &Variant, key: &str) -> String {
+    let Some(value) = variant.value(key) else { return "as in the scenario".to_string() };
+    value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
 /// Returns the reasons why variants stopped, if a precision ends them.
@@ -146,13 +157,13 @@ fn stop_reasons_table(plan: &Plan, table: &RunTable) -> Option<Table> {
 
 /// Returns the commands that reproduce the sweep.
 fn reproduction_commands(folder: &Folder) -> String {
-    let at = |rest: &str| shell_quote(&folder.path().join(rest).display().to_string());
+    let scenario = folder.path().join("variants/0000/scenario.toml");
     format!(
         "# one run of the table: the scenario of its variant, and its seed\n\
          sidestep run {} --seed {}\n\
          # all runs as one table: a row a run, parameters and metrics in typed columns\n\
          python3 -c 'import polars, sys; print(polars.read_parquet(sys.argv[1]))' {}\n",
-        at("variants/0000/scenario.toml"),
+        shell_quote(&scenario.display().to_string()),
         folder.plan().first_seed,
         shell_quote(&folder.results_file().display().to_string()),
     )
@@ -162,9 +173,9 @@ fn reproduction_commands(folder: &Folder) -> String {
 /// folded.
 fn append_results(document: &mut Document, summary: &Summary) {
     document.section("Results").tables([summary.overview()]);
-    summary.notes.iter().for_each(|note| {
+    for note in &summary.notes {
         document.paragraph(note.as_str());
-    });
+    }
     for section in summary.sections() {
         document.section(section.title);
         let name = Text::code(section.name);
@@ -179,9 +190,9 @@ fn append_results(document: &mut Document, summary: &Summary) {
 /// Appends the notes common to all tables, and the metrics that are not shown.
 fn append_methods(document: &mut Document, summary: &Summary) {
     document.section("How the numbers were made");
-    summary.footnotes().into_iter().for_each(|note| {
+    for note in summary.footnotes() {
         document.paragraph(Text::from_markup(note));
-    });
+    }
     document.tables(summary.omitted_metrics().map(Table::folded));
 }
 
@@ -205,9 +216,9 @@ fn append_pictures(document: &mut Document, RunPictures { all, remarks }: RunPic
     }
     document.section("Where everybody went");
     document.paragraph("The run of the first seed, of the first variants.").pictures(all);
-    remarks.into_iter().for_each(|remark| {
+    for remark in remarks {
         document.warning(remark);
-    });
+    }
 }
 
 fn append_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
@@ -223,9 +234,9 @@ fn append_failures(document: &mut Document, plan: &Plan, table: &RunTable) {
     let mut rows = Table::new("Failures", note, &["variant", "seed", "why"]);
     let names = plan.names();
     for &row in failed.iter().take(MAX_LISTED_FAILURES) {
-        let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
-        let variant = number("variant").and_then(|v| names.get(v as usize).cloned());
-        let seed = number("seed").map_or_else(String::new, |s| s.to_string());
+        let variant = number_at(table, "variant", row);
+        let variant = variant.and_then(|variant| names.get(variant as usize).cloned());
+        let seed = number_at(table, "seed", row).map_or_else(String::new, |s| s.to_string());
         rows.push_row([variant.unwrap_or_default(), seed, column.values.text(row)]);
     }
     document.tables([rows]);
@@ -249,18 +260,18 @@ fn pictures(
     let digests = table.columns_with_role(Role::Digest).next();
     let mut pictures = RunPictures::default();
     for (variant, title) in (0u32..).zip(plan.names()).take(MAX_PICTURES) {
-        let cell = plan.cell(variant, 0);
-        let Some(row) = row_of(table, cell.id).filter(|row| is_short(table, *row)) else {
+        let trial = plan.trial(variant, 0);
+        let Some(row) = row_of(table, trial.id).filter(|row| is_short(table, *row)) else {
             continue;
         };
         let digest = digests.map_or_else(String::new, |c| c.values.text(row));
-        match run_picture(worlds, folder, cell, &digest, watcher)? {
+        match run_picture(worlds, folder, trial, &digest, watcher)? {
             Ok(svg) => {
-                let caption = caption(folder, cell, row);
+                let caption = caption(folder, trial, row);
                 pictures.all.push(Picture { title, caption, svg });
             }
             Err(why) => {
-                let seed = cell.seed;
+                let seed = trial.seed;
                 let remark = format!("There is no picture of {title}, seed {seed}: {why}.");
                 pictures.remarks.push(remark);
             }
@@ -269,23 +280,27 @@ fn pictures(
     Ok(pictures)
 }
 
-fn caption(folder: &Folder, cell: Cell, row: usize) -> String {
-    let (seed, id) = (cell.seed, cell.id);
-    match folder.is_complete() {
-        true => format!("Seed {seed}; its digest and metrics are in row {row} of results.parquet."),
-        false => format!("Seed {seed}; its cell has the number {id}."),
+fn caption(folder: &Folder, trial: Trial, row: usize) -> String {
+    let seed = trial.seed;
+    if folder.is_complete() {
+        return format!("Seed {seed}; its digest and metrics are in row {row} of results.parquet.");
     }
+    format!("Seed {seed}; its trial has the number {}.", trial.id)
 }
 
-/// Returns the row of a cell, counted from 0.
-fn row_of(table: &RunTable, cell: u64) -> Option<usize> {
-    let cells = table.column("cell")?;
-    (0..table.runs()).find(|&row| cells.values.number(row) == Some(cell as f64))
+/// Returns the row of a trial, counted from 0.
+fn row_of(table: &RunTable, trial: u64) -> Option<usize> {
+    let trials = table.column("cell")?;
+    (0..table.runs()).find(|&row| trials.values.number(row) == Some(trial as f64))
 }
 
 /// Returns whether a run did not fail, and is quick to repeat.
 fn is_short(table: &RunTable, row: usize) -> bool {
-    let number = |name: &str| table.column(name).and_then(|c| c.values.number(row));
-    let failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());
-    !failed && number("run_wall_s").is_some_and(|took_s| took_s <= MAX_REPEATED_RUN_S)
+    let has_failed = table.column("failure").is_some_and(|c| !c.values.text(row).is_empty());
+    let took_s = number_at(table, "run_wall_s", row);
+    !has_failed && took_s.is_some_and(|took_s| took_s <= MAX_REPEATED_RUN_S)
+}
+
+fn number_at(table: &RunTable, column: &str, row: usize) -> Option<f64> {
+    table.column(column)?.values.number(row)
 }

@@ -13,19 +13,22 @@ use std::path::Path;
 /// # Errors
 /// When the folder cannot be read.
 pub(super) fn table_names(folder: &Path) -> Result<Vec<String>, InputError> {
-    let cannot = |e: std::io::Error| {
+    let mut names = entry_names(folder).map_err(|e| {
         InputError::new(folder.display(), e.to_string(), "make the folder readable")
-    };
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(cannot)? {
-        let name = entry.map_err(cannot)?.file_name().to_string_lossy().into_owned();
-        let name = name.strip_suffix(".partial").unwrap_or(&name).to_string();
-        if has_rows(folder, &name) {
-            names.push(name);
-        }
-    }
+    })?;
+    names.retain(|name| has_rows(folder, name));
     names.sort();
     names.dedup();
+    Ok(names)
+}
+
+/// Returns the names of the entries of a folder; a table that is being written has the name of its finished folder.
+fn entry_names(folder: &Path) -> std::io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        names.push(name.strip_suffix(".partial").unwrap_or(&name).to_string());
+    }
     Ok(names)
 }
 

@@ -1,7 +1,7 @@
 //! Finished runs in any order -> the table of runs, block by block, within a bounded memory.
 //!
-//! Each outcome is put on the pile of its cell: [`BUCKET_CELLS`] consecutive cells. A sweep of one pile is joined in memory;
-//! with more, piles are files, read one by one, and one below the other they form the table.
+//! Each outcome is put into the bucket of its trial: [`BUCKET_TRIALS`] consecutive trials. A sweep of one bucket is joined
+//! in memory; with more, buckets are files, read one by one, and one below the other they form the table.
 
 use super::folder::Folder;
 use crate::Error;
@@ -13,75 +13,75 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::PathBuf;
 
-/// Number of cells of a pile: with 40 metrics, 100 MB while it is sorted.
-pub(super) const BUCKET_CELLS: u64 = 1 << 18;
+/// Number of trials of a bucket: with 40 metrics, 100 MB while it is sorted.
+pub(super) const BUCKET_TRIALS: u64 = 1 << 18;
 
 /// Outcomes that wait to be joined.
 pub(super) struct OutcomeBuckets<'a> {
     plan: &'a Plan,
-    shape: ColumnSchema,
-    trials: PilotRuns<'a>,
-    cells: u64,
-    kept: BucketStorage,
+    /// The columns of all outcomes so far: every block has those of the whole table.
+    schema: ColumnSchema,
+    pilots: PilotRuns<'a>,
+    /// Trials of a bucket.
+    trials: u64,
+    storage: BucketStorage,
+    /// The first error of a file; reported at the end, because readers of journals pass outcomes on without errors.
     failure: Option<Error>,
 }
 
-/// The place of the piles.
+/// The place of the buckets.
 enum BucketStorage {
-    /// Rows in memory: there is one pile.
+    /// Rows in memory: there is one bucket.
     Memory(RunTableBuilder),
     /// Files of a folder.
     Files(TempFolder, Vec<BufWriter<File>>),
 }
 
 impl<'a> OutcomeBuckets<'a> {
-    /// Makes room for all runs of a sweep, in piles of a number of cells.
+    /// Makes room for all runs of a sweep, in buckets of a number of trials.
     ///
     /// # Errors
     /// When files cannot be made.
-    pub(super) fn new(folder: &'a Folder, cells: u64) -> Result<Self, Error> {
+    pub(super) fn new(folder: &'a Folder, trials: u64) -> Result<Self, Error> {
         let plan = folder.plan();
-        let count = plan.len().div_ceil(cells);
-        let kept = match count {
-            0 | 1 => BucketStorage::Memory(RunTableBuilder::default()),
-            _ => {
-                let scratch = folder.temp_folder()?;
-                let create = |k| {
-                    let path = bucket_path(&scratch, k);
-                    File::create(&path)
-                        .map(BufWriter::new)
-                        .map_err(|e| Error::cannot_write(&path, &e))
-                };
-                let files = (0..count).map(create).collect::<Result<_, _>>()?;
-                BucketStorage::Files(scratch, files)
-            }
+        let count = plan.len().div_ceil(trials);
+        let storage = if count <= 1 {
+            BucketStorage::Memory(RunTableBuilder::default())
+        } else {
+            BucketStorage::create_files(folder.temp_folder()?, count)?
         };
-        let (shape, trials) = (ColumnSchema::default(), PilotRuns::new(plan));
-        Ok(Self { plan, shape, trials, cells, kept, failure: None })
+        Ok(Self {
+            plan,
+            schema: ColumnSchema::default(),
+            pilots: PilotRuns::new(plan),
+            trials,
+            storage,
+            failure: None,
+        })
     }
 
-    /// Puts an outcome on its pile, unless it is not in the plan.
+    /// Puts an outcome into its bucket, unless it is not in the plan.
     pub(super) fn push(&mut self, outcome: &Outcome) {
-        if self.failure.is_some() || self.plan.cell_of(outcome.cell).is_none() {
+        if self.failure.is_some() || self.plan.trial_of(outcome.trial).is_none() {
             return;
         }
-        self.shape.add(outcome);
-        self.trials.add(outcome);
-        match &mut self.kept {
+        self.schema.add(outcome);
+        self.pilots.add(outcome);
+        match &mut self.storage {
             BucketStorage::Memory(rows) => rows.push(outcome),
-            BucketStorage::Files(scratch, files) => {
-                let k = outcome.cell / self.cells;
+            BucketStorage::Files(folder, files) => {
+                let k = outcome.trial / self.trials;
                 if let Err(error) = write_line(&mut files[k as usize], outcome) {
-                    self.failure = Some(Error::cannot_write(&bucket_path(scratch, k), &error));
+                    self.failure = Some(Error::cannot_write(&bucket_path(folder, k), &error));
                 }
             }
         }
     }
 
-    /// Passes on the blocks of the table, from the first cells to the last: at least one, even if it has no rows.
+    /// Passes on the blocks of the table, from the first trials to the last: at least one, even if it has no rows.
     ///
     /// # Errors
-    /// When piles cannot be written or read, two runs of a cell differ, or `each` fails.
+    /// When buckets cannot be written or read, two runs of a trial differ, or `each` fails.
     pub(super) fn for_each_block(
         self,
         mut each: impl FnMut(RunTable) -> Result<(), Error>,
@@ -89,30 +89,43 @@ impl<'a> OutcomeBuckets<'a> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
-        let (scratch, files) = match self.kept {
+        let (folder, files) = match self.storage {
             BucketStorage::Memory(rows) => {
-                return each(rows.build_block(self.plan, &self.shape, &self.trials)?);
+                return each(rows.build_block(self.plan, &self.schema, &self.pilots)?);
             }
-            BucketStorage::Files(scratch, files) => (scratch, files),
+            BucketStorage::Files(folder, files) => (folder, files),
         };
         let count = files.len() as u64;
         for (k, file) in (0..).zip(files) {
+            // Flushes the buffer and closes the file.
             file.into_inner()
-                .map_err(|e| Error::cannot_write(&bucket_path(&scratch, k), e.error()))?;
+                .map_err(|e| Error::cannot_write(&bucket_path(&folder, k), e.error()))?;
         }
         for k in 0..count {
-            let rows = read_bucket(&bucket_path(&scratch, k))
-                .map_err(|e| Error::cannot_write(scratch.path(), &e))?;
+            let rows = read_bucket(&bucket_path(&folder, k))
+                .map_err(|e| Error::cannot_write(folder.path(), &e))?;
             if k == 0 || !rows.is_empty() {
-                each(rows.build_block(self.plan, &self.shape, &self.trials)?)?;
+                each(rows.build_block(self.plan, &self.schema, &self.pilots)?)?;
             }
         }
         Ok(())
     }
 }
 
-fn bucket_path(scratch: &TempFolder, k: u64) -> PathBuf {
-    scratch.path().join(format!("{k:04}.jsonl"))
+impl BucketStorage {
+    fn create_files(folder: TempFolder, count: u64) -> Result<Self, Error> {
+        let mut files = Vec::new();
+        for k in 0..count {
+            let path = bucket_path(&folder, k);
+            let file = File::create(&path).map_err(|e| Error::cannot_write(&path, &e))?;
+            files.push(BufWriter::new(file));
+        }
+        Ok(Self::Files(folder, files))
+    }
+}
+
+fn bucket_path(folder: &TempFolder, k: u64) -> PathBuf {
+    folder.path().join(format!("{k:04}.jsonl"))
 }
 
 fn write_line(file: &mut BufWriter<File>, outcome: &Outcome) -> std::io::Result<()> {
@@ -120,7 +133,7 @@ fn write_line(file: &mut BufWriter<File>, outcome: &Outcome) -> std::io::Result<
     file.write_all(b"\n")
 }
 
-/// Reads a pile that this process has written.
+/// Reads a bucket that this process has written, and removes its file, so that the disk holds no more than it must.
 fn read_bucket(path: &std::path::Path) -> std::io::Result<RunTableBuilder> {
     let mut rows = RunTableBuilder::default();
     for line in BufReader::new(File::open(path)?).lines() {

@@ -1,36 +1,36 @@
-//! Runners of cells outside of this process: other processes, nodes of a cluster.
+//! Runners of trials outside of this process: other processes, nodes of a cluster.
 //!
-//! The plan, the journal and the stopping rule stay with the process that drives the sweep. A crew gets cells and
-//! self-contained scenarios, and gives outcomes back, in any order: no common file system is needed.
+//! The plan, the journal and the stopping rule stay with the process that drives the sweep. An executor gets trials and
+//! self-contained scenarios, and returns outcomes, in any order: no common file system is needed.
 
 use crate::Error;
-use sidestep_experiment::sweep::{Cell, Outcome};
+use sidestep_experiment::sweep::{Outcome, Trial};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 
 /// Takes an outcome; `Ok` once it is safe.
 pub type OutcomeSink<'a> = dyn FnMut(Outcome) -> Result<(), Error> + Send + 'a;
 
-/// A runner of cells.
-pub trait CellExecutor: Sync {
-    /// Runs all dealt cells, in any order, and passes each outcome on; an outcome that comes a second time is
-    /// ignored. Cells that it does not finish are dealt again by the next call.
+/// A runner of trials.
+pub trait TrialExecutor: Sync {
+    /// Runs all trials of a batch, in any order, and passes each outcome on; a second outcome of a trial is ignored.
+    /// Trials that it does not finish are in the batch of the next call.
     ///
     /// # Errors
     /// Those of `take`; any error that ends the sweep.
-    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error>;
+    fn run(&self, batch: &TrialBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error>;
 
     /// Returns the number of runs in progress at once.
     fn parallelism(&self) -> usize;
 }
 
-/// The runner of a sweep's cells.
+/// The runner of a sweep's trials.
 #[derive(Clone, Copy)]
 pub enum Engine<'a> {
     /// This many threads of this process.
     Workers(usize),
-    /// A crew outside of this process.
-    Executor(&'a dyn CellExecutor),
+    /// An executor outside of this process.
+    Executor(&'a dyn TrialExecutor),
 }
 
 impl From<usize> for Engine<'_> {
@@ -49,18 +49,18 @@ impl Engine<'_> {
     }
 }
 
-/// Cells that a crew is to run, with their scenarios.
-pub struct CellBatch<'a> {
-    pub(super) cells: &'a [Cell],
+/// Trials that an executor is to run, with their scenarios.
+pub struct TrialBatch<'a> {
+    pub(super) trials: &'a [Trial],
     pub(super) worlds: &'a Worlds,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
 }
 
-impl CellBatch<'_> {
-    /// Returns the cells, first those on which others may depend.
-    pub fn cells(&self) -> &[Cell] {
-        self.cells
+impl TrialBatch<'_> {
+    /// Returns the trials, first those on which others may depend.
+    pub fn trials(&self) -> &[Trial] {
+        self.trials
     }
 
     /// Returns the scenario of a variant, with all its files.

@@ -1,10 +1,10 @@
 //! The parts of a sweep that a report needs: its finished runs, and pictures of some.
 
-use super::cell_runner::run_recorded;
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table};
+use super::trial_runner::RecordedTrial;
 use crate::watcher::NestedWatcher;
 use crate::{Error, Watcher};
-use sidestep_experiment::sweep::{Cell, RunTable, RunTableBuilder};
+use sidestep_experiment::sweep::{RunTable, RunTableBuilder, Trial};
 use sidestep_kernel::InputError;
 use sidestep_record::RunReader;
 use sidestep_scenario::{Source, Worlds};
@@ -26,9 +26,12 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
     if folder.is_complete() {
         let mut table = to_run_table(folder.results()?);
         let costs = to_run_table(folder.timings()?).columns;
-        let has = |name: &str| table.columns.iter().any(|c| c.name == name);
-        let costs: Vec<_> = costs.into_iter().filter(|c| !has(&c.name)).collect();
-        table.columns.extend(costs);
+        // Both tables identify a run by the same columns.
+        for cost in costs {
+            if table.column(&cost.name).is_none() {
+                table.columns.push(cost);
+            }
+        }
         return Ok(FinishedRuns { table, is_complete: true });
     }
     let mut rows = RunTableBuilder::default();
@@ -40,7 +43,7 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
     Ok(FinishedRuns { table: rows.build(folder.plan())?, is_complete: false })
 }
 
-/// Returns the picture of the run of a cell that ended with `digest`, as SVG: from its run folder, or from a repeated
+/// Returns the picture of the run of a trial that ended with `digest`, as SVG: from its run folder, or from a repeated
 /// run. If there is none of that very run, returns the reason.
 ///
 /// # Errors
@@ -48,26 +51,29 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
 pub(crate) fn run_picture(
     worlds: &Worlds,
     folder: &Folder,
-    cell: Cell,
+    trial: Trial,
     digest: &str,
     watcher: &dyn Watcher,
 ) -> Result<Result<String, String>, Error> {
-    let kept = folder.run_folder(cell.id);
-    if let Some(svg) = stored_picture(&kept) {
-        let made = RunReader::open(&kept).ok().and_then(|view| view.manifest.digest);
-        let other = || format!("the run in {} is another one", kept.display());
-        return Ok(if made.as_deref() == Some(digest) { Ok(svg) } else { Err(other()) });
+    let recorded = folder.run_folder(trial.id);
+    if let Some(svg) = stored_picture(&recorded) {
+        let made = RunReader::open(&recorded).ok().and_then(|view| view.manifest.digest);
+        if made.as_deref() == Some(digest) {
+            return Ok(Ok(svg));
+        }
+        return Ok(Err(format!("the run in {} is another one", recorded.display())));
     }
     // Another build or another scenario makes another run.
-    if let Err(e) = check_build(worlds, folder).and_then(|()| folder.check_variant(cell.variant)) {
+    if let Err(e) = check_build(worlds, folder).and_then(|()| folder.check_variant(trial.variant)) {
         return Ok(Err(e.cause().to_string()));
     }
     let place = tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
     let again = place.path().join("run");
-    let source = Source::read(&folder.scenario(cell.variant), &[])?;
-    let outcome = match run_recorded(worlds, cell, source, 1, &again, &NestedWatcher(watcher)) {
+    let source = Source::read(&folder.scenario(trial.variant), &[])?;
+    let repeated = RecordedTrial { trial, source, workers: 1, folder: &again };
+    let outcome = match repeated.run(worlds, &NestedWatcher(watcher)) {
         Err(Error::Input(e)) => return Ok(Err(e.cause().to_string())),
-        made => made?.ok_or(Error::Interrupted)?,
+        result => result?.ok_or(Error::Interrupted)?,
     };
     if outcome.digest != digest {
         return Ok(Err(format!("run again, it gives the digest {}", outcome.digest)));

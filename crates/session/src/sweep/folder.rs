@@ -23,9 +23,9 @@ pub(super) fn to_share(shard: Shard) -> Share {
 /// Refuses another build: results may change between builds, so a single one makes all runs.
 pub(super) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputError> {
     let manifest = folder.manifest();
-    let maker =
+    let producer =
         Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-    maker.check(worlds.build(), folder.path(), "sweep", |wrote| {
+    producer.check(worlds.build(), folder.path(), "sweep", |wrote| {
         format!("continue with sidestep {wrote}, or sweep into a new folder")
     })
 }
@@ -33,11 +33,12 @@ pub(super) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputE
 /// Refuses a folder that has more or fewer scenarios than its plan has variants: the runs of a variant would be taken for
 /// those of another.
 pub(super) fn check_variants(folder: &Folder) -> Result<(), InputError> {
-    let (planned, there) = (folder.plan().variants.len(), folder.manifest().fingerprints.len());
-    if planned == there {
+    let planned = folder.plan().variants.len();
+    let existing = folder.manifest().fingerprints.len();
+    if planned == existing {
         return Ok(());
     }
-    let cause = format!("its plan has {planned} variants, and there are {there} scenarios");
+    let cause = format!("its plan has {planned} variants, and there are {existing} scenarios");
     let remedy = "`sweep.json` was changed: put it back as it was, or sweep into a new folder";
     Err(InputError::new(folder.path().display(), cause, remedy))
 }

@@ -31,8 +31,8 @@ impl SweepResult {
 /// Returns the rows of runs that failed.
 pub fn failed_rows(table: &RunTable) -> impl Iterator<Item = usize> {
     let column = table.column("failure");
-    let is_told = move |row: &usize| column.is_some_and(|c| !c.values.text(*row).is_empty());
-    (0..table.runs()).filter(is_told)
+    (0..table.runs())
+        .filter(move |row| column.is_some_and(|column| !column.values.text(*row).is_empty()))
 }
 
 impl SweepTiming {

@@ -1,10 +1,10 @@
-//! Many runs: a sweep -> cells -> one table.
+//! Many runs: a sweep -> trials -> one table.
 //!
 //! ```text
-//! prepare.rs        every variant compiled, a plan  cell_runner.rs  cells -> outcomes, many at once
+//! prepare.rs        every variant compiled, a plan  trial_runner.rs  trials -> outcomes, many at once
 //! run.rs            from the plan to the table      timing.rs       the time of all runs
 //! folder.rs         the folder, and the finished runs in it
-//! executor.rs       runners in other processes      task.rs         cells that another process sends
+//! executor.rs       runners in other processes      task.rs         trials that another process sends
 //! buckets.rs        finished runs -> the table, in blocks
 //! json.rs           the results, for programs
 //! finished_runs.rs  finished runs, for reports      journal.rs      lines of a journal
@@ -12,7 +12,6 @@
 //! ```
 
 mod buckets;
-mod cell_runner;
 mod executor;
 mod finished_runs;
 mod folder;
@@ -23,8 +22,9 @@ mod run;
 mod status;
 mod task;
 mod timing;
+mod trial_runner;
 
-pub use executor::{CellBatch, CellExecutor, Engine, OutcomeSink};
+pub use executor::{Engine, OutcomeSink, TrialBatch, TrialExecutor};
 pub(crate) use finished_runs::run_picture;
 pub use finished_runs::{FinishedRuns, read_finished};
 pub use folder::Folder;

@@ -4,8 +4,8 @@
 use crate::scenario::{read_scenario, read_source};
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep_experiment::sweep::cell::metric_names;
-use sidestep_experiment::sweep::scheduler::run_cells;
+use sidestep_experiment::sweep::scheduler::run_trials;
+use sidestep_experiment::sweep::trial::metric_names;
 use sidestep_experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
@@ -30,39 +30,85 @@ pub(super) fn prepare<T: Send>(
     watcher: &dyn Watcher,
     make: VariantFn<'_, T>,
 ) -> Result<PreparedPlan<T>, Error> {
-    let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
-    let base = base_source(worlds, sweep, &fixed)?;
+    let base = BaseSource::read(worlds, sweep)?;
     let mut variants = sweep.design.variants(&sweep.place)?;
+    // Before anything is compiled: a design may ask for millions of variants.
     Plan::check_size(variants.len(), sweep.replicates, &sweep.place)?;
-    let checked = |wanted: &Variant| {
-        compile_variant(worlds, &base, wanted).map_err(|e| {
-            let plain = match sweep.given {
-                Some(_) => worlds.compile(&base).err(),
-                None => read_scenario(worlds, &sweep.scenario, &fixed).err(),
-            };
-            variant_error(wanted, &base, plain, e)
-        })
-    };
-    let (source, first) = checked(&variants[0])?;
+    let (source, first) = base.compile(&variants[0])?;
     check_metrics(sweep, &source, first.as_ref())?;
-    let one = |k: u32, wanted: &Variant| -> Result<CompiledVariant<T>, Error> {
-        let (source, compiled) = checked(wanted)?;
-        let (seeds, agents) = (compiled.seed_effect(), compiled.body_count() as u64);
-        Ok(CompiledVariant { seeds, agents, made: make(k, &source, compiled.as_ref())? })
-    };
-    let all = for_each_variant(&variants, workers, watcher, &one)?;
+    let all = for_each_variant(&variants, workers, watcher, &|k, variant| {
+        let (source, compiled) = base.compile(variant)?;
+        Ok(CompiledVariant {
+            seeds: compiled.seed_effect(),
+            agents: compiled.body_count() as u64,
+            made: make(k, &source, compiled.as_ref())?,
+        })
+    })?;
     let agents = all.iter().map(|one| one.agents).max().unwrap_or(0);
     let mut made = Vec::with_capacity(all.len());
     for (variant, one) in variants.iter_mut().zip(all) {
         variant.seeds = one.seeds;
         made.push(one.made);
     }
-    let plain = first.plan();
-    let base = BaseScenario { world: first.world(), seed: plain.seed, source: &base };
+    let config = first.plan();
+    let base = BaseScenario { world: first.world(), seed: config.seed, source: &base.source };
     let plan = Plan::new(sweep, variants, base)?;
     // A sweep without a name of its own has that of its scenario.
-    let name = if plan.name.is_empty() { plain.name } else { plan.name };
+    let name = if plan.name.is_empty() { config.name } else { plan.name };
     Ok((Plan { agents, name, ..plan }, made))
+}
+
+/// The scenario of a sweep, with the settings that all variants share.
+struct BaseSource<'a> {
+    worlds: &'a Worlds,
+    sweep: &'a Sweep,
+    /// The shared settings.
+    fixed: Vec<String>,
+    source: Source,
+}
+
+impl<'a> BaseSource<'a> {
+    fn read(worlds: &'a Worlds, sweep: &'a Sweep) -> Result<Self, InputError> {
+        let fixed: Vec<String> = sweep.fixed.iter().map(Setting::to_override).collect();
+        let source = match &sweep.given {
+            Some(source) => source.clone().with_overrides(&fixed)?,
+            None => read_source(worlds, &sweep.scenario, &fixed)?,
+        };
+        Ok(Self { worlds, sweep, fixed, source })
+    }
+
+    /// Returns a variant's scenario.
+    fn compile(
+        &self,
+        variant: &Variant,
+    ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
+        let overrides: Vec<String> = variant.settings.iter().map(Setting::to_override).collect();
+        let source = self.source.clone().with_overrides(&overrides)?;
+        match self.worlds.compile(&source) {
+            Ok(compiled) => Ok((source, compiled)),
+            Err(error) => Err(self.variant_error(variant, error)),
+        }
+    }
+
+    /// Returns the error of a variant, which names the variant unless all have it: users do not see the
+    /// lines of the text that its settings have edited.
+    fn variant_error(&self, variant: &Variant, error: InputError) -> InputError {
+        let base_error = match self.sweep.given {
+            Some(_) => self.worlds.compile(&self.source).err(),
+            None => read_scenario(self.worlds, &self.sweep.scenario, &self.fixed).err(),
+        };
+        if let Some(base_error) = base_error
+            && base_error.cause() == error.cause()
+        {
+            return base_error;
+        }
+        // An error in another file, e.g. in a profile, has its own place.
+        if !error.place().starts_with(self.source.file_place()) {
+            return error;
+        }
+        let place = format!("{}, where {variant}", self.source.file_place());
+        InputError::new(place, error.cause(), error.remedy())
+    }
 }
 
 /// The findings of compiling a variant, and the thing made of it.
@@ -82,22 +128,22 @@ fn for_each_variant<T: Send>(
     watcher: &dyn Watcher,
     work: &(dyn Fn(u32, &Variant) -> Result<T, Error> + Sync),
 ) -> Result<Vec<T>, Error> {
-    let cells: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
+    let numbered: Vec<(u32, &Variant)> = (0..).zip(variants).collect();
     // Variants before a wrong one are completed, because one of them may be wrong, too.
     let wrong_at = AtomicU32::new(u32::MAX);
-    let run = |(k, variant): &(u32, &Variant)| {
-        let is_wanted = watcher.should_continue() && *k < wrong_at.load(Ordering::Relaxed);
-        is_wanted.then(|| {
-            let result = work(*k, variant);
-            if result.is_err() {
-                wrong_at.fetch_min(*k, Ordering::Relaxed);
-            }
-            Ok::<_, Error>((*k, result))
-        })
+    let run_one = |(k, variant): &(u32, &Variant)| {
+        if !watcher.should_continue() || *k >= wrong_at.load(Ordering::Relaxed) {
+            return None;
+        }
+        let result = work(*k, variant);
+        if result.is_err() {
+            wrong_at.fetch_min(*k, Ordering::Relaxed);
+        }
+        Some(Ok::<_, Error>((*k, result)))
     };
     let watched = ProgressGuard(watcher);
     let mut results: Vec<(u32, Result<T, Error>)> = Vec::with_capacity(variants.len());
-    run_cells(&cells, workers, run, &mut |result| {
+    run_trials(&numbered, workers, run_one, &mut |result| {
         results.push(result);
         let share = results.len() as f64 / variants.len() as f64;
         watched.report(Progress::Stage { what: "checking variants", share });
@@ -106,14 +152,6 @@ fn for_each_variant<T: Send>(
     results.sort_by_key(|(k, _)| *k);
     let found: Vec<T> = results.into_iter().map(|(_, result)| result).collect::<Result<_, _>>()?;
     if found.len() < variants.len() { Err(Error::Interrupted) } else { Ok(found) }
-}
-
-/// Returns the scenario with the settings that all variants share.
-fn base_source(worlds: &Worlds, sweep: &Sweep, fixed: &[String]) -> Result<Source, InputError> {
-    match &sweep.given {
-        Some(source) => source.clone().with_overrides(fixed),
-        None => read_source(worlds, &sweep.scenario, fixed),
-    }
 }
 
 /// Checks that the requested metrics exist: it is better to know before all runs than after them.
@@ -128,41 +166,11 @@ fn check_metrics(
         return Ok(());
     }
     let mut simulation = compiled.start(source, 1);
-    // Some metrics appear only after something has happened.
+    // Some metrics appear only after the first cycle.
     simulation.advance(1);
     let known = metric_names(simulation.as_ref());
     let Some(unknown) = wanted.find(|name| !known.contains(name)) else { return Ok(()) };
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());
     Err(InputError::new(&sweep.place, cause, suggestion(unknown, &known)))
-}
-
-/// Returns a variant's scenario.
-fn compile_variant(
-    worlds: &Worlds,
-    base: &Source,
-    wanted: &Variant,
-) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
-    let overrides: Vec<String> = wanted.settings.iter().map(Setting::to_override).collect();
-    let source = base.clone().with_overrides(&overrides)?;
-    let compiled = worlds.compile(&source)?;
-    Ok((source, compiled))
-}
-
-/// Returns the error of a variant, which names the variant unless all have it: users do not see the
-/// lines of the text that its settings have edited.
-fn variant_error(
-    wanted: &Variant,
-    base: &Source,
-    plain: Option<InputError>,
-    e: InputError,
-) -> InputError {
-    match plain.filter(|plain| plain.cause() == e.cause()) {
-        Some(plain) => plain,
-        None if !e.place().starts_with(base.file_place()) => e,
-        None => {
-            let place = format!("{}, where {wanted}", base.file_place());
-            InputError::new(place, e.cause(), e.remedy())
-        }
-    }
 }

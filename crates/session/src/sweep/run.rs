@@ -1,20 +1,20 @@
 //! The path from a sweep to the table of its runs: in memory, in a folder, or share by share.
 
-use super::buckets::{BUCKET_CELLS, OutcomeBuckets};
-use super::cell_runner::{CellRunner, OutcomeHandler};
+use super::buckets::{BUCKET_TRIALS, OutcomeBuckets};
 use super::executor::Engine;
 use super::finished_runs::read_finished;
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table, to_share};
 use super::journal::TimestampedOutcome;
 use super::prepare::{VariantFn, prepare};
 use super::timing::SweepTiming;
+use super::trial_runner::{OutcomeHandler, TrialRunner};
 use crate::VERSION;
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use sidestep_experiment::sweep::rounds::Rounds;
 use sidestep_experiment::sweep::seeds::PilotRuns;
 use sidestep_experiment::sweep::{
-    Cell, Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, rows::cell_table,
+    Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, Trial, rows::trial_table,
 };
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::{ResultsWriter, fingerprint};
@@ -70,17 +70,19 @@ pub fn run_in_memory<'a>(
     let (plan, sources) = prepare(worlds, sweep, engine.planning_workers(), watcher, make)?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
     let agents = plan.agents;
-    let work = CellRunner { worlds, agents, source: &source, record: None, engine, watcher };
-    let (mut log, mut rows) = (CellScheduler::new(&plan), RunTableBuilder::default());
-    let effort = log.run_all(&work, &mut |outcome| {
+    let runner = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
+    let mut scheduler = TrialScheduler::new(&plan);
+    let mut rows = RunTableBuilder::default();
+    let effort = scheduler.run_all(&runner, &mut |outcome| {
         rows.push(outcome);
         Ok(())
     })?;
-    let ended = match watcher.should_continue() {
-        true => SweepResult::complete(rows.build(&plan)?, effort),
-        false => SweepEnd::Interrupted(log.finished.len()),
+    let end = if watcher.should_continue() {
+        SweepResult::complete(rows.build(&plan)?, effort)
+    } else {
+        SweepEnd::Interrupted(scheduler.finished.len())
     };
-    Ok((plan, ended))
+    Ok((plan, end))
 }
 
 /// Plans a sweep into a folder, on a number of workers: completely or not at all.
@@ -101,8 +103,8 @@ pub fn create(
                 Folder::write_variant(staging, k, &text, &files)?;
                 Ok(fingerprint(text.as_bytes(), &files))
             })?;
-        let cells = cell_table(&plan).columns;
-        Ok::<_, Error>((plan, fingerprints, cells))
+        let trials = trial_table(&plan).columns;
+        Ok::<_, Error>((plan, fingerprints, trials))
     })
 }
 
@@ -117,9 +119,10 @@ pub fn open_or_create(
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
-    match Folder::is_at(out) {
-        false => create(worlds, sweep, out, workers, watcher),
-        true => open_same(worlds, sweep, out, workers, watcher),
+    if Folder::is_at(out) {
+        open_same(worlds, sweep, out, workers, watcher)
+    } else {
+        create(worlds, sweep, out, workers, watcher)
     }
 }
 
@@ -147,7 +150,7 @@ fn open_same(
     Err(InputError::new(there, "the folder holds another sweep", remedy).into())
 }
 
-/// Runs all cells that are not finished, and joins all runs into one table.
+/// Runs all trials that are not finished, and joins all runs into one table.
 ///
 /// # Errors
 /// When runs cannot be read or stored.
@@ -161,65 +164,74 @@ pub fn run_remaining<'a>(
         return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
     }
     check_build(worlds, folder)?;
-    let mut log = CellScheduler::new(folder.plan());
-    for_each_outcome(folder, Some(Shard::ALL), |outcome| log.record(&outcome))?;
+    let mut scheduler = TrialScheduler::new(folder.plan());
+    // The journal of this share is read when it is locked, below: until then another process may append to it.
+    for_each_outcome(folder, Some(Shard::ALL), |outcome| scheduler.record(&outcome))?;
     let mut effort = SweepTiming::default();
     // Locked until everything is joined, so that no other process begins to join.
-    let mut journal = folder.journal(to_share(Shard::ALL), |o: Outcome| log.record(&o))?;
+    let mut journal = folder.journal(to_share(Shard::ALL), |outcome: Outcome| {
+        scheduler.record(&outcome);
+    })?;
     if let Some(journal) = &mut journal {
-        with_cell_runner(worlds, folder, engine.into(), watcher, |work| {
-            let mut keep =
-                |outcome: &Outcome| Ok(journal.append(&TimestampedOutcome::now(outcome))?);
-            effort =
-                log.run_all(work, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+        with_trial_runner(worlds, folder, engine.into(), watcher, |runner| {
+            effort = scheduler
+                .run_all(runner, &mut |outcome| {
+                    Ok(journal.append(&TimestampedOutcome::now(outcome))?)
+                })
+                .map_err(|e| with_resume_hint(e, folder.path()))?;
             Ok(())
         })?;
         journal.sync()?;
     }
     if !watcher.should_continue() {
-        return Ok(SweepEnd::Interrupted(log.finished.len()));
+        return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
     }
-    join_runs(folder, BUCKET_CELLS, effort, watcher)
+    join_runs(folder, BUCKET_TRIALS, effort, watcher)
 }
 
-/// Joins all runs into the sweep's tables, in blocks of a number of cells: only one block is in memory at a time.
+/// Joins all runs into the sweep's tables, in blocks of a number of trials: only one block is in memory at a time.
 fn join_runs(
     folder: &Folder,
-    cells: u64,
+    trials: u64,
     effort: SweepTiming,
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
     let watched = ProgressGuard(watcher);
     watched.report(Progress::Stage { what: "joining the runs", share: 0.0 });
-    let mut piles = OutcomeBuckets::new(folder, cells)?;
-    for_each_outcome(folder, None, |outcome| piles.push(&outcome))?;
+    let mut buckets = OutcomeBuckets::new(folder, trials)?;
+    for_each_outcome(folder, None, |outcome| buckets.push(&outcome))?;
     watched.report(Progress::Stage { what: "writing the results", share: 0.5 });
-    let (mut completion, mut only) = (None::<ResultsWriter>, None);
-    let of = folder.plan().len().max(1) as f64;
+    let mut writer: Option<ResultsWriter> = None;
+    let mut only_block = None;
+    let planned = folder.plan().len().max(1) as f64;
     let mut written = 0;
-    piles.for_each_block(|block| {
-        let (results, timings) = (block.results(), block.timings());
-        let completion = match &mut completion {
-            Some(completion) => completion,
-            begun => begun.insert(folder.results_writer(&results, &timings)?),
+    buckets.for_each_block(|block| {
+        let results = block.results();
+        let timings = block.timings();
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            // All blocks have the columns of the first one, so they are known from it.
+            None => writer.insert(folder.results_writer(&results, &timings)?),
         };
-        completion.append(&results, &timings)?;
+        writer.append(&results, &timings)?;
         written += block.runs();
-        let share = 0.5 + 0.5 * (written as f64 / of).min(1.0);
+        let share = 0.5 + 0.5 * (written as f64 / planned).min(1.0);
         watched.report(Progress::Stage { what: "writing the results", share });
-        only = (written == block.runs()).then_some(block);
+        only_block = (written == block.runs()).then_some(block);
         Ok(())
     })?;
-    completion.map_or(Ok(()), ResultsWriter::finish)?;
+    if let Some(writer) = writer {
+        writer.finish()?;
+    }
     // A table of several blocks is read again once the data that joined them is out of memory.
-    let table = match only {
+    let table = match only_block {
         Some(table) => table,
         None => read_finished(folder)?.table,
     };
     Ok(SweepResult::complete(table, effort))
 }
 
-/// Runs one share of the cells and writes its part.
+/// Runs one share of the trials and writes its part.
 ///
 /// # Errors
 /// When the sweep stops at a precision or is of another build, or runs cannot be read or stored.
@@ -231,63 +243,70 @@ pub fn run_share(
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
     check_build(worlds, folder)?;
+    refuse_precision(folder)?;
     let plan = folder.plan();
-    if plan.until.is_some() {
-        let cause =
-            "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
-        let remedy =
-            "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
-        return Err(InputError::new(folder.path().display(), cause, remedy).into());
+    if folder.is_complete() {
+        return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
     }
-    let (mut log, mut rows) = (CellScheduler::new(plan), RunTableBuilder::default());
-    let mut note = |outcome: Outcome| {
-        log.record(&outcome);
+    let mut scheduler = TrialScheduler::new(plan);
+    let mut rows = RunTableBuilder::default();
+    let journal = folder.journal(to_share(shard), |outcome: Outcome| {
+        scheduler.record(&outcome);
         rows.push(&outcome);
-    };
-    let journal = match folder.is_complete() {
-        true => None,
-        false => folder.journal(to_share(shard), &mut note)?,
-    };
+    })?;
+    // A share that is done has no journal.
     let Some(mut journal) = journal else {
         return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
     };
     // Shares of another count, or a sweep that continued here, may have finished some of these
     // runs.
     let mut elsewhere = BTreeSet::new();
-    for_each_outcome(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.cell))?;
-    let cells: Vec<Cell> = plan.shard_cells(shard).filter(|c| !elsewhere.contains(&c.id)).collect();
+    for_each_outcome(folder, Some(shard), |outcome| _ = elsewhere.insert(outcome.trial))?;
+    let trials: Vec<Trial> =
+        plan.shard_trials(shard).filter(|trial| !elsewhere.contains(&trial.id)).collect();
     let mut effort = SweepTiming::default();
-    with_cell_runner(worlds, folder, workers.into(), watcher, |work| {
-        let mut keep = |outcome: &Outcome| {
-            journal.append(&TimestampedOutcome::now(outcome))?;
-            rows.push(outcome);
-            Ok(())
-        };
-        effort =
-            log.run(work, &cells, &mut keep).map_err(|e| with_resume_hint(e, folder.path()))?;
+    with_trial_runner(worlds, folder, workers.into(), watcher, |runner| {
+        effort = scheduler
+            .run(runner, &trials, &mut |outcome| {
+                journal.append(&TimestampedOutcome::now(outcome))?;
+                rows.push(outcome);
+                Ok(())
+            })
+            .map_err(|e| with_resume_hint(e, folder.path()))?;
         Ok(())
     })?;
     journal.sync()?;
     if !watcher.should_continue() {
-        return Ok(SweepEnd::Interrupted(log.finished.len()));
+        return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
     }
     let table = rows.build(plan)?;
     folder.finish_share(to_share(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
     Ok(SweepResult::complete(table, effort))
 }
 
-/// Returns the finished runs of the cells of a share, regardless of their maker.
+fn refuse_precision(folder: &Folder) -> Result<(), InputError> {
+    if folder.plan().until.is_none() {
+        return Ok(());
+    }
+    let cause =
+        "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
+    let remedy = "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
+    Err(InputError::new(folder.path().display(), cause, remedy))
+}
+
+/// Returns the finished runs of the trials of a share, whichever process finished them.
 fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
-    let own: BTreeSet<u64> = folder.plan().shard_cells(shard).map(|c| c.id).collect();
+    let own: BTreeSet<u64> = folder.plan().shard_trials(shard).map(|trial| trial.id).collect();
     let mut rows = RunTableBuilder::default();
-    let mut take = |outcome: Outcome| {
-        if own.contains(&outcome.cell) {
+    let push_own = |outcome: Outcome| {
+        if own.contains(&outcome.trial) {
             rows.push(&outcome);
         }
     };
-    match folder.is_complete() {
-        true => to_run_table(folder.results()?).for_each_outcome(&mut take),
-        false => for_each_outcome(folder, None, &mut take)?,
+    if folder.is_complete() {
+        to_run_table(folder.results()?).for_each_outcome(push_own);
+    } else {
+        for_each_outcome(folder, None, push_own)?;
     }
     Ok(rows.build(folder.plan())?)
 }
@@ -302,25 +321,30 @@ pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Resul
     }
     check_build(worlds, folder)?;
     let plan = folder.plan();
-    let mut log = CellScheduler::new(plan);
-    for_each_outcome(folder, None, |outcome| log.record(&outcome))?;
-    let missing = if log.rounds.is_some() { log.next_cells() } else { log.missing_cells() }.len();
+    let mut scheduler = TrialScheduler::new(plan);
+    for_each_outcome(folder, None, |outcome| scheduler.record(&outcome))?;
+    // Where a precision ends the sweep, how many runs come after the next round is not known.
+    let missing = if scheduler.rounds.is_some() {
+        scheduler.next_trials().len()
+    } else {
+        scheduler.missing_trials().len()
+    };
     if missing > 0 {
         let cause = format!("{missing} of {} runs are missing", plan.runs());
         let remedy = "run the shares that are not finished (finished ones are not run again), or \
                       run the rest here: sidestep resume DIR";
         return Err(Error::other(cause, remedy));
     }
-    join_runs(folder, BUCKET_CELLS, SweepTiming::default(), watcher)
+    join_runs(folder, BUCKET_TRIALS, SweepTiming::default(), watcher)
 }
 
-/// Passes on everything needed to run the cells of a folder.
-fn with_cell_runner(
+/// Passes on everything needed to run the trials of a folder.
+fn with_trial_runner(
     worlds: &Worlds,
     folder: &Folder,
     engine: Engine<'_>,
     watcher: &dyn Watcher,
-    run: impl FnOnce(&CellRunner<'_>) -> Result<(), Error>,
+    run: impl FnOnce(&TrialRunner<'_>) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let plan = folder.plan();
     if plan.record && matches!(engine, Engine::Executor(_)) {
@@ -329,19 +353,25 @@ fn with_cell_runner(
         return Err(InputError::new(folder.path().display(), cause, remedy).into());
     }
     let checked: Vec<AtomicBool> = plan.variants.iter().map(|_| AtomicBool::new(false)).collect();
-    let source = |variant: u32| {
-        // A scenario that was edited in between would make runs of another sweep.
-        let checked = &checked[variant as usize];
-        if !checked.load(Ordering::Relaxed) {
-            folder.check_variant(variant)?;
-            checked.store(true, Ordering::Relaxed);
-        }
-        Source::read(&folder.scenario(variant), &[])
-    };
-    let place = |cell: u64| -> PathBuf { folder.run_folder(cell) };
+    let source = |variant: u32| read_checked_variant(folder, variant, &checked[variant as usize]);
+    let run_folder = |trial: u64| -> PathBuf { folder.run_folder(trial) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
-        if plan.record { Some(&place) } else { None };
-    run(&CellRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+        if plan.record { Some(&run_folder) } else { None };
+    run(&TrialRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+}
+
+/// Reads the scenario of a variant, checked when it is read for the first time: one that was edited since the plan was
+/// made would make runs of another sweep. Two threads may both check it, which does no harm.
+fn read_checked_variant(
+    folder: &Folder,
+    variant: u32,
+    is_checked: &AtomicBool,
+) -> Result<Source, InputError> {
+    if !is_checked.load(Ordering::Relaxed) {
+        folder.check_variant(variant)?;
+        is_checked.store(true, Ordering::Relaxed);
+    }
+    Source::read(&folder.scenario(variant), &[])
 }
 
 /// Adds to a storage error the runs that are saved, and words for continuing.
@@ -357,86 +387,86 @@ fn with_resume_hint(error: Error, folder: &Path) -> Error {
 }
 
 /// The finished runs, as far as needed to choose the next ones: a number for each.
-struct CellScheduler<'a> {
+struct TrialScheduler<'a> {
     plan: &'a Plan,
     finished: Vec<u64>,
     rounds: Option<Rounds<'a>>,
-    trials: PilotRuns<'a>,
+    pilots: PilotRuns<'a>,
 }
 
 /// Stores an outcome, if there is a place for it.
 type OutcomeWriter<'a> = dyn FnMut(&Outcome) -> Result<(), Error> + Send + 'a;
 
-impl<'a> CellScheduler<'a> {
+impl<'a> TrialScheduler<'a> {
     fn new(plan: &'a Plan) -> Self {
         let rounds = plan.until.as_ref().map(|until| Rounds::new(plan, until));
-        Self { plan, finished: Vec::new(), rounds, trials: PilotRuns::new(plan) }
+        Self { plan, finished: Vec::new(), rounds, pilots: PilotRuns::new(plan) }
     }
 
     fn record(&mut self, outcome: &Outcome) {
         if let Some(rounds) = &mut self.rounds {
             rounds.add(outcome);
         }
-        self.trials.add(outcome);
-        self.finished.push(outcome.cell);
+        self.pilots.add(outcome);
+        self.finished.push(outcome.trial);
     }
 
-    /// Returns the cells to run next: of the next round, or all, trials first.
-    fn next_cells(&self) -> Vec<Cell> {
+    /// Returns the trials to run next: of the next round, or all, pilots first.
+    fn next_trials(&self) -> Vec<Trial> {
         match &self.rounds {
-            Some(rounds) => rounds.next_cells(),
-            None => self.trials.next_cells(self.missing_cells()),
+            Some(rounds) => rounds.next_trials(),
+            None => self.pilots.next_trials(self.missing_trials()),
         }
     }
 
-    /// Returns the cells of a fixed number of runs that are not finished.
-    fn missing_cells(&self) -> Vec<Cell> {
-        let cells = self.plan.shard_cells(Shard::ALL);
-        self.unfinished_of(cells.filter(|cell| self.trials.needs(cell)))
+    /// Returns the trials of a fixed number of runs that are not finished.
+    fn missing_trials(&self) -> Vec<Trial> {
+        let trials = self.plan.shard_trials(Shard::ALL);
+        self.unfinished_of(trials.filter(|trial| self.pilots.needs(trial)))
     }
 
-    fn unfinished_of(&self, cells: impl Iterator<Item = Cell>) -> Vec<Cell> {
+    fn unfinished_of(&self, trials: impl Iterator<Item = Trial>) -> Vec<Trial> {
         let mut finished = self.finished.clone();
         finished.sort_unstable();
-        cells.filter(|cell| finished.binary_search(&cell.id).is_err()).collect()
+        trials.filter(|trial| finished.binary_search(&trial.id).is_err()).collect()
     }
 
-    /// Runs all open cells, round by round if a precision ends the sweep.
+    /// Runs all open trials, round by round if a precision ends the sweep.
     fn run_all(
         &mut self,
-        work: &CellRunner<'_>,
+        runner: &TrialRunner<'_>,
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
         let mut effort = SweepTiming::default();
         loop {
-            let open = self.next_cells();
-            if open.is_empty() || !work.watcher.should_continue() {
+            let open = self.next_trials();
+            if open.is_empty() || !runner.watcher.should_continue() {
                 return Ok(effort);
             }
-            effort.add(self.run(work, &open, keep)?);
+            effort.add(self.run(runner, &open, keep)?);
         }
     }
 
-    /// Runs the cells that are not finished.
+    /// Runs the trials that are not finished.
     fn run(
         &mut self,
-        work: &CellRunner<'_>,
-        cells: &[Cell],
+        runner: &TrialRunner<'_>,
+        trials: &[Trial],
         keep: &mut OutcomeWriter<'_>,
     ) -> Result<SweepTiming, Error> {
-        let open = self.unfinished_of(cells.iter().copied());
+        let open = self.unfinished_of(trials.iter().copied());
         let before = self.finished.len() as u64;
         let mut effort = SweepTiming::start();
-        let mut take = |outcome: Outcome| {
+        let accept: &mut OutcomeHandler<'_> = &mut |outcome: Outcome| {
+            // Stored first: an outcome that could not be stored does not count as finished.
             keep(&outcome)?;
             effort.record(&outcome);
             self.record(&outcome);
             Ok(())
         };
-        let take: &mut OutcomeHandler<'_> = &mut take;
-        let ran = work.run(&open, before, before + open.len() as u64, take);
-        effort.stop(work.parallelism(open.len()));
-        ran.map(|()| effort)
+        runner.run(&open, before, before + open.len() as u64, accept)?;
+        effort.stop(runner.parallelism(open.len()));
+        Ok(effort)
     }
 }
 
@@ -457,54 +487,54 @@ mod tests {
         sweep.design.factors = vec![Factor::parse("airspace.generator.n=2,3").expect("valid")];
         sweep.replicates = 300;
         let folder = create(&WORLDS, &sweep, &place.join("sweep"), 2, &NoWatcher).expect("planned");
-        let mut cells: Vec<Cell> = folder.plan().shard_cells(Shard::ALL).collect();
-        cells.sort_by_key(|cell| cell.id.wrapping_mul(2_654_435_761) % 1009);
+        let mut trials: Vec<Trial> = folder.plan().shard_trials(Shard::ALL).collect();
+        trials.sort_by_key(|trial| trial.id.wrapping_mul(2_654_435_761) % 1009);
         for index in 0..2 {
             let share = Share { index, count: 2 };
             let mut journal =
                 folder.journal(share, |_: Outcome| ()).expect("opened").expect("open");
-            for cell in cells.iter().filter(|cell| cell.id % 2 == u64::from(index)) {
-                journal.append(&outcome(*cell)).expect("written");
+            for trial in trials.iter().filter(|trial| trial.id % 2 == u64::from(index)) {
+                journal.append(&outcome(*trial)).expect("written");
             }
         }
         folder
     }
 
-    /// Columns that come and go, and one with a type that only a late cell reveals.
-    fn outcome(cell: Cell) -> Outcome {
-        let value = if cell.id == 555 { json!(0.5) } else { json!(cell.id) };
+    /// Columns that come and go, and one with a type that only a late trial reveals.
+    fn outcome(trial: Trial) -> Outcome {
+        let value = if trial.id == 555 { json!(0.5) } else { json!(trial.id) };
         let mut metrics = serde_json::Map::from_iter([("wide".to_string(), value)]);
-        if cell.id > 400 {
-            metrics.insert("late".into(), json!(cell.id.is_multiple_of(3)));
+        if trial.id > 400 {
+            metrics.insert("late".into(), json!(trial.id.is_multiple_of(3)));
         }
         let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
-        let (digest, failure) = (format!("end {}", cell.id), None);
-        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(cell, "") }
+        let (digest, failure) = (format!("end {}", trial.id), None);
+        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(trial, "") }
     }
 
     #[test]
     fn runs_joined_in_blocks_give_the_files_that_all_at_once_give() {
         let place = tempfile::tempdir().expect("a folder");
         let folder = folder(place.path());
-        let tables = |cells| {
+        let tables = |trials| {
             let ended =
-                join_runs(&folder, cells, SweepTiming::default(), &NoWatcher).expect("joined");
+                join_runs(&folder, trials, SweepTiming::default(), &NoWatcher).expect("joined");
             let SweepEnd::Done(done) = ended else { panic!("nobody interrupts") };
             let file = read_finished(&folder).expect("it is done");
             std::fs::remove_file(folder.results_file()).expect("there");
-            assert_eq!(done.table, file.table, "{cells} cells at a time");
+            assert_eq!(done.table, file.table, "{trials} trials at a time");
             file.table
         };
-        let whole = tables(BUCKET_CELLS);
+        let whole = tables(BUCKET_TRIALS);
         assert_eq!(whole.runs(), 600);
-        for cells in [1000, 600, 599, 64, 7] {
-            assert_eq!(tables(cells), whole, "{cells} cells at a time");
+        for trials in [1000, 600, 599, 64, 7] {
+            assert_eq!(tables(trials), whole, "{trials} trials at a time");
         }
         assert!(!folder.path().join("joining.partial").exists());
     }
 
     #[test]
-    fn no_more_rows_are_in_memory_than_a_block_has_cells() {
+    fn no_more_rows_are_in_memory_than_a_block_has_trials() {
         let place = tempfile::tempdir().expect("a folder");
         let folder = folder(place.path());
         let mut piles = OutcomeBuckets::new(&folder, 50).expect("room");

@@ -9,11 +9,12 @@ use sidestep_kernel::InputError;
 use sidestep_record::sweep::Share;
 use std::collections::BTreeSet;
 
-/// The span in seconds before the last run from which runs give the rate.
+/// The span in seconds before the last run from which runs give the rate: a sweep that was stopped overnight and
+/// resumed has the rate of this morning.
 const RATE_WINDOW_S: f64 = 600.0;
-/// The idle time, in usual times between two runs, after which a sweep counts as abandoned,
+/// The idle time, in usual times between two runs, after which a sweep counts as abandoned, ...
 const IDLE_TIMEOUT_RUNS: f64 = 10.0;
-/// but not before this many seconds.
+/// ... but not before this many seconds.
 const MIN_IDLE_TIMEOUT_S: f64 = 60.0;
 /// Largest number of failed runs that are listed one by one.
 const MAX_LISTED_FAILURES: usize = 100;
@@ -62,8 +63,9 @@ impl SweepStatus {
 /// A run that failed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FailedRun {
-    /// Number of its trial.
-    pub cell: u64,
+    /// Number of its trial; `--json` calls it `cell`.
+    #[serde(rename = "cell")]
+    pub trial: u64,
     /// Name of its variant.
     pub variant: String,
     /// Its seed.
@@ -90,7 +92,7 @@ pub struct ShareStatus {
 /// What a scan of the folder finds.
 #[derive(Default)]
 struct FolderScan {
-    cells: BTreeSet<u64>,
+    trials: BTreeSet<u64>,
     failed: Vec<(u64, String)>,
     /// The times at which runs of shares in progress finished.
     stamps: Vec<f64>,
@@ -98,9 +100,9 @@ struct FolderScan {
 
 impl FolderScan {
     fn add(&mut self, outcome: Outcome) {
-        let is_new = self.cells.insert(outcome.cell);
+        let is_new = self.trials.insert(outcome.trial);
         if let Some(why) = outcome.failure.filter(|_| is_new) {
-            self.failed.push((outcome.cell, why));
+            self.failed.push((outcome.trial, why));
         }
     }
 }
@@ -110,8 +112,10 @@ impl FolderScan {
 /// # Errors
 /// When something in it cannot be read.
 pub fn read_status(folder: &Folder) -> Result<SweepStatus, InputError> {
-    let (plan, now_s) = (folder.plan(), now_unix_s());
-    let (mut found, mut shares) = (FolderScan::default(), Vec::new());
+    let plan = folder.plan();
+    let now_s = now_unix_s();
+    let mut found = FolderScan::default();
+    let mut shares = Vec::new();
     check_variants(folder)?;
     let is_complete = folder.is_complete();
     if is_complete {
@@ -122,7 +126,8 @@ pub fn read_status(folder: &Folder) -> Result<SweepStatus, InputError> {
             shares.push(share_status(folder, share, is_done, &mut found, now_s)?);
         }
     }
-    let (runs, until_precise) = (found.cells.len() as u64, plan.until.is_some());
+    let runs = found.trials.len() as u64;
+    let until_precise = plan.until.is_some();
     let total = if is_complete { runs } else { plan.runs() };
     let newest_s = found.stamps.iter().copied().reduce(f64::max);
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
@@ -154,60 +159,70 @@ fn share_status(
     now_s: f64,
 ) -> Result<ShareStatus, InputError> {
     let shard = Shard { index: share.index, count: share.count };
-    let of = folder.plan().shard_cells(shard).count() as u64;
-    let done =
-        || ShareStatus { share: shard.to_string(), runs: of, of, is_done: true, idle_s: None };
+    let of = folder.plan().shard_trials(shard).count() as u64;
+    let share_name = shard.to_string();
     if is_done {
-        return Ok(done());
+        return Ok(ShareStatus { share: share_name, runs: of, of, is_done, idle_s: None });
     }
-    let (mut runs, mut newest_s) = (0, None::<f64>);
+    let mut runs = 0;
+    let mut newest_s: Option<f64> = None;
     let read = folder.journal_of(share, |StoredOutcome { outcome, ended_unix_s }| {
         runs += 1;
         found.add(outcome);
-        found.stamps.extend(ended_unix_s);
-        newest_s =
-            ended_unix_s.map(|s| newest_s.map_or(s, |newest_s| newest_s.max(s))).or(newest_s);
+        if let Some(ended_s) = ended_unix_s {
+            found.stamps.push(ended_s);
+            newest_s = Some(newest_s.map_or(ended_s, |newest_s| newest_s.max(ended_s)));
+        }
     });
     if let Err(error) = read {
         // A share that has ended meanwhile no longer has a journal.
-        return match folder.shares()?.contains(&(share, true)) {
-            true => Ok(done()),
-            false => Err(error),
-        };
+        let is_done = folder.shares()?.contains(&(share, true));
+        if !is_done {
+            return Err(error);
+        }
+        return Ok(ShareStatus { share: share_name, runs: of, of, is_done, idle_s: None });
     }
+    // Clocks of other machines may be ahead.
     let idle_s = newest_s.map(|newest_s| (now_s - newest_s).max(0.0));
-    Ok(ShareStatus { share: shard.to_string(), runs, of, is_done: false, idle_s })
+    Ok(ShareStatus { share: share_name, runs, of, is_done, idle_s })
 }
 
 /// Returns the recent rate of runs per second.
 fn rate(stamps: &[f64], newest_s: f64) -> Option<f64> {
-    let late: Vec<f64> = stamps.iter().copied().filter(|s| newest_s - s <= RATE_WINDOW_S).collect();
-    let oldest_s = late.iter().copied().fold(newest_s, f64::min);
-    let (spaces, span_s) = (late.len() - 1, newest_s - oldest_s);
-    (spaces > 0 && span_s > 0.0).then(|| spaces as f64 / span_s)
+    let recent: Vec<f64> =
+        stamps.iter().copied().filter(|s| newest_s - s <= RATE_WINDOW_S).collect();
+    let oldest_s = recent.iter().copied().fold(newest_s, f64::min);
+    // N runs have N - 1 intervals between them.
+    let intervals = recent.len() - 1;
+    let span_s = newest_s - oldest_s;
+    (intervals > 0 && span_s > 0.0).then(|| intervals as f64 / span_s)
 }
 
+/// Returns the estimated seconds left; none without a rate, and if no process seems to be running.
 fn eta_s(remaining: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option<f64> {
-    let (runs_per_s, idle_s) = (runs_per_s?, idle_s?);
-    (!is_stalled(idle_s, Some(runs_per_s))).then(|| remaining as f64 / runs_per_s)
+    let runs_per_s = runs_per_s?;
+    if is_stalled(idle_s?, Some(runs_per_s)) {
+        return None;
+    }
+    Some(remaining as f64 / runs_per_s)
 }
 
 /// Returns whether no run has finished for longer than a sweep in progress would take.
 fn is_stalled(idle_s: f64, runs_per_s: Option<f64>) -> bool {
-    idle_s
-        > runs_per_s.map_or(MIN_IDLE_TIMEOUT_S, |runs_per_s| {
-            MIN_IDLE_TIMEOUT_S.max(IDLE_TIMEOUT_RUNS / runs_per_s)
-        })
+    let usual_s = runs_per_s.map_or(0.0, |runs_per_s| IDLE_TIMEOUT_RUNS / runs_per_s);
+    idle_s > MIN_IDLE_TIMEOUT_S.max(usual_s)
 }
 
 /// Returns whether a process is running one of the shares that are started and not done.
 fn is_active(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -> bool {
     shares.iter().filter(|share| !share.is_done).any(|share| {
         let shard: Option<Shard> = share.share.parse().ok();
-        let locked = shard.and_then(|shard| folder.is_locked(to_share(shard)));
-        // A share without a finished run may take any time for its first one.
-        let may_be = || share.idle_s.is_none_or(|idle_s| !is_stalled(idle_s, runs_per_s));
-        locked.unwrap_or_else(may_be)
+        if let Some(is_locked) = shard.and_then(|shard| folder.is_locked(to_share(shard))) {
+            return is_locked;
+        }
+        // Without locks, as on some network file systems, the time since the last run decides. A share without a
+        // finished run may take any time for its first one.
+        share.idle_s.is_none_or(|idle_s| !is_stalled(idle_s, runs_per_s))
     })
 }
 
@@ -215,12 +230,17 @@ fn is_active(folder: &Folder, shares: &[ShareStatus], runs_per_s: Option<f64>) -
 fn failures(plan: &Plan, failed: &mut [(u64, String)]) -> Vec<FailedRun> {
     failed.sort();
     let names = plan.names();
-    let told = |(cell, why): &(u64, String)| {
-        let its = plan.cell_of(*cell)?;
-        let variant = names[its.variant as usize].clone();
-        Some(FailedRun { cell: *cell, variant, seed: its.seed, why: why.clone() })
-    };
-    failed.iter().take(MAX_LISTED_FAILURES).filter_map(told).collect()
+    let mut failures = Vec::new();
+    for (id, why) in failed.iter().take(MAX_LISTED_FAILURES) {
+        let Some(trial) = plan.trial_of(*id) else { continue };
+        failures.push(FailedRun {
+            trial: *id,
+            variant: names[trial.variant as usize].clone(),
+            seed: trial.seed,
+            why: why.clone(),
+        });
+    }
+    failures
 }
 
 #[cfg(test)]

@@ -1,26 +1,26 @@
-//! Cells that another process sends: run here, without its files.
+//! Trials that another process sends: run here, without its files.
 
-use super::cell_runner::CellRunner;
 use super::executor::Engine;
+use super::trial_runner::TrialRunner;
 use crate::{Error, Watcher};
-use sidestep_experiment::sweep::{Cell, Outcome};
+use sidestep_experiment::sweep::{Outcome, Trial};
 use sidestep_kernel::InputError;
 use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 use std::path::Path;
 
-/// Some cells of a sweep that another process drives.
+/// Some trials of a sweep that another process drives.
 #[derive(Debug, Clone)]
 pub struct Task {
     /// The build that drives the sweep.
     pub build: String,
-    /// The scenarios of the cells, by variant.
+    /// The scenarios of the trials, by variant.
     pub scenarios: Vec<(u32, ResolvedScenario)>,
-    /// The cells, in the order in which they are run.
-    pub cells: Vec<Cell>,
+    /// The trials, in the order in which they are run.
+    pub trials: Vec<Trial>,
 }
 
 impl Task {
-    /// Runs the cells, one after another, and returns their outcomes: those of all, unless the watcher asks to stop.
+    /// Runs the trials, one after another, and returns their outcomes: those of all, unless the watcher asks to stop.
     ///
     /// # Errors
     /// When another build drives the sweep, or files cannot be unpacked.
@@ -40,20 +40,27 @@ impl Task {
             let source = Source::new("scenario.toml", scenario.text.clone(), folder);
             sources.push((*variant, source));
         }
-        let source = |variant: u32| {
-            let found = sources.iter().find(|(k, _)| *k == variant).map(|(_, source)| source);
-            let cause = format!("the scenario of variant {variant} is missing");
-            let missing = || InputError::new("a task of a sweep", cause, "send it along");
-            found.cloned().ok_or_else(missing)
-        };
+        let source = |variant: u32| find_source(&sources, variant);
+        // One worker, because the cluster runs as many tasks on a node as it has cores.
         let engine = Engine::Workers(1);
-        let work = CellRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };
-        let mut outcomes = Vec::with_capacity(self.cells.len());
-        work.run(&self.cells, 0, self.cells.len() as u64, &mut |outcome| {
+        let runner =
+            TrialRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };
+        let mut outcomes = Vec::with_capacity(self.trials.len());
+        runner.run(&self.trials, 0, self.trials.len() as u64, &mut |outcome| {
             outcomes.push(outcome);
             Ok(())
         })?;
         Ok(outcomes)
+    }
+}
+
+fn find_source(sources: &[(u32, Source)], variant: u32) -> Result<Source, InputError> {
+    match sources.iter().find(|(own, _)| *own == variant) {
+        Some((_, source)) => Ok(source.clone()),
+        None => {
+            let cause = format!("the scenario of variant {variant} is missing");
+            Err(InputError::new("a task of a sweep", cause, "send it along"))
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 /// The time that runs took in this process, in seconds.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SweepTiming {
-    begun: Option<Instant>,
+    started_at: Option<Instant>,
     /// Elapsed time in seconds.
     pub wall_s: f64,
     /// Elapsed time of all workers in seconds.
@@ -22,7 +22,7 @@ pub struct SweepTiming {
 impl SweepTiming {
     /// Starts the measurement.
     pub(super) fn start() -> Self {
-        Self { begun: Some(Instant::now()), ..Self::default() }
+        Self { started_at: Some(Instant::now()), ..Self::default() }
     }
 
     /// Adds a finished run.
@@ -33,12 +33,12 @@ impl SweepTiming {
 
     /// Ends the measurement, with the number of runs in progress at once.
     pub(super) fn stop(&mut self, at_once: usize) {
-        self.wall_s = self.begun.map_or(0.0, |begun| begun.elapsed().as_secs_f64());
+        self.wall_s = self.started_at.map_or(0.0, |at| at.elapsed().as_secs_f64());
         self.worked_s = self.wall_s * at_once as f64;
         self.at_once = at_once;
     }
 
-    /// Adds the effort of a later stretch.
+    /// Adds the times of later runs.
     pub(super) fn add(&mut self, later: Self) {
         self.wall_s += later.wall_s;
         self.worked_s += later.worked_s;

@@ -125,8 +125,8 @@ fn a_report_finds_the_rows_of_variants_with_different_numbers_of_runs() {
     let SweepEnd::Done(done) = run_remaining(&WORLDS, &folder, 2, &NoWatcher).expect("run") else {
         panic!("interrupted")
     };
-    let cells = done.table.column("cell").expect("a column");
-    let row = (0..done.table.runs()).find(|row| cells.values.number(*row) == Some(40.0));
+    let trials = done.table.column("cell").expect("a column");
+    let row = (0..done.table.runs()).find(|row| trials.values.number(*row) == Some(40.0));
     let row = row.expect("the first run of the second variant");
     assert!(row < 40, "the first variant has fewer runs than it may have");
     let document = document(&WORLDS, &path, &NoWatcher).expect("a document");

@@ -1,10 +1,10 @@
 //! Many runs of one scenario.
 
 use crate::support::{BUILD, TestFolder, WORLDS};
-use sidestep_experiment::sweep::{Cell, Outcome, RunTable, Shard, Sweep};
+use sidestep_experiment::sweep::{Outcome, RunTable, Shard, Sweep, Trial};
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
-    CellBatch, CellExecutor, Engine, Folder, OutcomeSink, SweepEnd, Task, collect, create,
+    Engine, Folder, OutcomeSink, SweepEnd, Task, TrialBatch, TrialExecutor, collect, create,
     read_status, run_in_memory, run_remaining, run_share,
 };
 use sidestep_session::{Error, NoWatcher};
@@ -59,14 +59,16 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     run_share(&WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
     // A run of that share again, from another division into shares, and one that failed.
     let journal = place.path("s/shares/0-of-1.journal");
-    let outcome =
-        |cell: u64| Outcome::from_failure(folder.plan().cell_of(cell).expect("a cell"), "no frogs");
-    let is_in_share = |cell: &u64| folder.plan().shard_cells(shard).any(|other| other.id == *cell);
-    let (own, other) = ((0..6).find(is_in_share), (0..6).find(|cell| !is_in_share(cell)));
+    let outcome = |trial: u64| {
+        Outcome::from_failure(folder.plan().trial_of(trial).expect("a trial"), "no frogs")
+    };
+    let is_in_share =
+        |trial: &u64| folder.plan().shard_trials(shard).any(|other| other.id == *trial);
+    let (own, other) = ((0..6).find(is_in_share), (0..6).find(|trial| !is_in_share(trial)));
     let all = sidestep_record::sweep::Share { index: 0, count: 1 };
     let mut writing = folder.journal(all, |_: Outcome| ()).expect("a journal").expect("not done");
-    for cell in [own, other].map(|cell| cell.expect("a cell")) {
-        writing.append(&outcome(cell)).expect("written");
+    for trial in [own, other].map(|trial| trial.expect("a trial")) {
+        writing.append(&outcome(trial)).expect("written");
     }
     let found = read_status(&folder).expect("read");
     assert!(found.is_active && found.eta_s.is_none(), "before the second run, too");
@@ -75,7 +77,7 @@ fn the_status_counts_each_run_once_and_tells_those_that_failed() {
     assert_eq!((found.runs, found.total, found.failed, found.is_complete), (4, 6, 1, false));
     assert!(!found.is_active, "no process has the lock of its journal");
     assert_eq!(found.failures[0].why, "no frogs");
-    assert_eq!(found.failures[0].cell, other.expect("a cell"));
+    assert_eq!(found.failures[0].trial, other.expect("a trial"));
     // Lines of early journals have no times.
     assert_eq!((found.runs_per_s, found.idle_s, found.eta_s), (None, None, None));
     let shares: Vec<_> =
@@ -105,30 +107,30 @@ fn runs_of_a_sweep_are_recorded_and_reported() {
     }
 }
 
-/// A crew outside that gets tasks, the last cells first, and does only some of them in a call.
+/// A crew outside that gets tasks, the last trials first, and does only some of them in a call.
 struct ExternalExecutor {
     in_a_call: usize,
 }
 
 impl ExternalExecutor {
-    fn task(deal: &CellBatch<'_>, cells: &[Cell]) -> Task {
-        let mut variants: Vec<u32> = cells.iter().map(|cell| cell.variant).collect();
+    fn task(deal: &TrialBatch<'_>, trials: &[Trial]) -> Task {
+        let mut variants: Vec<u32> = trials.iter().map(|trial| trial.variant).collect();
         variants.sort_unstable();
         variants.dedup();
         let scenario = |variant: u32| (variant, deal.scenario(variant).expect("there"));
         let scenarios = variants.into_iter().map(scenario).collect();
-        Task { build: BUILD.into(), scenarios, cells: cells.to_vec() }
+        Task { build: BUILD.into(), scenarios, trials: trials.to_vec() }
     }
 
-    fn outcomes(deal: &CellBatch<'_>, cells: &[Cell]) -> Vec<Outcome> {
-        Self::task(deal, cells).run(&WORLDS, &NoWatcher).expect("run")
+    fn outcomes(deal: &TrialBatch<'_>, trials: &[Trial]) -> Vec<Outcome> {
+        Self::task(deal, trials).run(&WORLDS, &NoWatcher).expect("run")
     }
 }
 
-impl CellExecutor for ExternalExecutor {
-    fn run(&self, deal: &CellBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error> {
-        for cells in deal.cells().chunks(2).rev().take(self.in_a_call) {
-            for outcome in Self::outcomes(deal, cells) {
+impl TrialExecutor for ExternalExecutor {
+    fn run(&self, deal: &TrialBatch<'_>, take: &mut OutcomeSink<'_>) -> Result<(), Error> {
+        for trials in deal.trials().chunks(2).rev().take(self.in_a_call) {
+            for outcome in Self::outcomes(deal, trials) {
                 take(outcome.clone())?;
                 // A task that was sent twice comes twice.
                 take(outcome)?;
@@ -143,7 +145,7 @@ impl CellExecutor for ExternalExecutor {
 }
 
 #[test]
-fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_of_calls() {
+fn others_who_run_the_trials_come_to_the_same_table_in_any_order_and_any_number_of_calls() {
     let place = TestFolder::new();
     let sweep = sweep(&place);
     let (_, ended) = run_in_memory(&WORLDS, &sweep, 2, &NoWatcher).expect("run");
@@ -163,7 +165,7 @@ fn others_who_run_the_cells_come_to_the_same_table_in_any_order_and_any_number_o
 
 #[test]
 fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
-    let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), cells: Vec::new() };
+    let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), trials: Vec::new() };
     let told = task.run(&WORLDS, &NoWatcher).expect_err("another build").to_string();
     assert!(told.contains("0.0.1+0") && told.contains(BUILD), "{told}");
 

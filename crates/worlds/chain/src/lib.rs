@@ -26,6 +26,7 @@ mod deploy;
 mod driver;
 mod events;
 mod external;
+mod facts;
 #[cfg(test)]
 mod fixtures;
 mod formation;

@@ -10,18 +10,10 @@ use super::super::rotation::{RULES, RotationResults};
 use super::super::scaling::ScalingResults;
 use super::super::snake::SnakeResults;
 use super::{
-    Claim, ThresholdTest, claim, combined_verdict, join_texts, judge_all_runs, judge_all_trials,
-    judge_every_run, judge_thresholds,
+    CLAIMS, Claim, ThresholdTest, claim, combined_verdict, join_texts, judge_all_runs,
+    judge_all_trials, judge_every_run, judge_thresholds,
 };
-use crate::cells::{CaseResults, format_mm, max_value, min_value};
-
-/// Tolerance of the rods' limits, meters.
-const ROD_TOLERANCE_M: f64 = 1e-9;
-/// Largest growth of the time per moved connector from the shortest chain to the longest, as a
-/// factor.
-const GROWTH: f64 = 2.0;
-/// Largest growth of the time of a motion with any number of far obstacles, as a factor.
-const FAR_GROWTH: f64 = 2.0;
+use crate::case_results::{CaseResults, format_mm, max_value, min_value};
 
 pub(super) fn claims(report: &SerpentineReport) -> Vec<Claim> {
     vec![
@@ -45,25 +37,25 @@ pub(super) fn claims(report: &SerpentineReport) -> Vec<Claim> {
 }
 
 fn moving_obstacles(movers: &MoverResults) -> Claim {
-    let told = |escape: &'static str| {
-        let cells: Vec<_> = movers.cells_with_escape(escape).collect();
-        let worst = cells.iter().map(|c| c.number("inside_percent")).fold(0.0, f64::max);
+    let ours = join_texts(ESCAPES, |escape| {
+        let cases = movers.cases_with_escape(escape);
+        let worst = cases.map(|c| c.number("inside_percent")).fold(0.0, f64::max);
         format!("{escape}: up to {worst:.2} % of steps inside")
-    };
-    claim(
-        "P2",
-        judge_all_runs(movers.cells_with_escape(ESCAPES[2]), |c| c.number("inside_percent") == 0.0),
-        join_texts(ESCAPES, told),
-    )
+    });
+    let looking_ahead = movers.cases_with_escape(ESCAPES[2]);
+    let verdict = judge_all_runs(looking_ahead, |c| c.number("inside_percent") == 0.0);
+    claim("P2", verdict, ours)
 }
 
 fn local_cost(scaling: &ScalingResults) -> Claim {
-    let (growth, far) = (scaling.growth(), scaling.far_growth());
+    let growth = scaling.growth();
+    let far = scaling.far_growth();
+    let max_growth = CLAIMS.threshold("P5, E4");
     let repeats = scaling.far.iter().map(|f| f.us_by_repeat.len()).sum();
     let verdict = combined_verdict(&[
         judge_thresholds([
-            ThresholdTest::below(&growth, GROWTH),
-            ThresholdTest::below(&far, FAR_GROWTH),
+            ThresholdTest::below(&growth, max_growth),
+            ThresholdTest::below(&far, max_growth),
         ]),
         judge_every_run(repeats, scaling.far.iter().all(|f| f.same)),
     ]);
@@ -79,7 +71,7 @@ fn local_cost(scaling: &ScalingResults) -> Claim {
 const MANY: usize = 1000;
 
 fn few_and_many(report: &SerpentineReport) -> Claim {
-    let links: Vec<_> = report.postures.cells_with_method(IkMethod::ThereAndBack).collect();
+    let links: Vec<_> = report.postures.cases_with_method(IkMethod::ThereAndBack).collect();
     let few = links.iter().map(|c| c.count("links")).min();
     let many = report.scaling.sizes.iter().max_by_key(|s| s.connectors);
     let ours = format!(
@@ -89,9 +81,10 @@ fn few_and_many(report: &SerpentineReport) -> Claim {
         many.map_or("-".into(), |s| s.connectors.to_string()),
         many.map_or("-".into(), |s| format!("{:.0}", s.fixed_moved)),
     );
-    let large = || report.scaling.sizes.iter().filter(|s| s.connectors >= MANY);
-    let repeats = large().map(|s| s.fixed_us_by_repeat.len()).sum();
-    let all_move = large().all(|s| s.fixed_moved > 0.99 * (s.connectors - 1) as f64);
+    let min_moved = CLAIMS.threshold("P6");
+    let large: Vec<_> = report.scaling.sizes.iter().filter(|s| s.connectors >= MANY).collect();
+    let repeats = large.iter().map(|s| s.fixed_us_by_repeat.len()).sum();
+    let all_move = large.iter().all(|s| s.fixed_moved > min_moved * (s.connectors - 1) as f64);
     let verdict = combined_verdict(&[
         judge_all_trials(links.iter().map(|c| c.proportion("reached"))),
         judge_every_run(repeats, all_move),
@@ -101,42 +94,44 @@ fn few_and_many(report: &SerpentineReport) -> Claim {
 
 fn joints(arms: &ArmResults) -> Claim {
     let ours = join_texts(PLANNERS, |planner| {
-        let told = |c: &CaseResults| {
-            format!(
-                "{} pillars: {} runs reach all, fastest joint at {:.3} of its limit",
-                c.count("pillars"),
-                c.proportion("reached"),
-                c.number("fastest")
-            )
-        };
-        format!("planner {planner}: {}", join_texts(arms.cells_with_planner(planner), told))
+        let cases = join_texts(arms.cases_with_planner(planner), arm_text);
+        format!("planner {planner}: {cases}")
     });
-    let is_kept = |c: &CaseResults| {
+    let tolerance_m = CLAIMS.threshold("K1, K4");
+    let cases = PLANNERS.into_iter().flat_map(|planner| arms.cases_with_planner(planner));
+    let limits_kept = judge_all_runs(cases, |c| {
         let broken = ["outside", "too_fast", "penetrations"].map(|name| c.count(name));
-        broken == [0; 3] && c.number("off_m") <= ROD_TOLERANCE_M
-    };
-    let verdict = combined_verdict(&[
-        judge_all_runs(
-            PLANNERS.into_iter().flat_map(|planner| arms.cells_with_planner(planner)),
-            is_kept,
-        ),
-        judge_all_trials(arms.cells_with_planner(PLANNERS[1]).map(|c| c.proportion("reached"))),
-    ]);
-    claim("K1, K4", verdict, ours)
+        broken == [0; 3] && c.number("off_m") <= tolerance_m
+    });
+    // Local rules alone get stuck before pillars, which the slides leave to a planner.
+    let planned = arms.cases_with_planner(PLANNERS[1]);
+    let reached = judge_all_trials(planned.map(|c| c.proportion("reached")));
+    claim("K1, K4", combined_verdict(&[limits_kept, reached]), ours)
+}
+
+fn arm_text(case: &CaseResults) -> String {
+    format!(
+        "{} pillars: {} runs reach all, fastest joint at {:.3} of its limit",
+        case.count("pillars"),
+        case.proportion("reached"),
+        case.number("fastest")
+    )
 }
 
 fn structure_kept(report: &SerpentineReport) -> Claim {
-    let all_cells = [
-        &report.corridor.cells,
-        &report.rotations.cells,
-        &report.movers.cells,
-        &report.snakes.cells,
-        &report.pushing.cells,
+    let all_cases = [
+        &report.corridor.cases,
+        &report.rotations.cases,
+        &report.movers.cases,
+        &report.snakes.cases,
+        &report.pushing.cases,
     ];
-    let cells = || all_cells.into_iter().flatten();
-    let worst = max_value(cells().map(|c| c.number("rod_violation_m")));
+    let cases: Vec<&CaseResults> = all_cases.into_iter().flatten().collect();
+    let worst = max_value(cases.iter().map(|c| c.number("rod_violation_m")));
     let ours = format!("rods outside their limits by {worst:.1e} m at most");
-    claim("V5", judge_all_runs(cells(), |c| c.number("rod_violation_m") <= ROD_TOLERANCE_M), ours)
+    let tolerance_m = CLAIMS.threshold("V5");
+    let verdict = judge_all_runs(cases, |c| c.number("rod_violation_m") <= tolerance_m);
+    claim("V5", verdict, ours)
 }
 
 fn creeps(snakes: &SnakeResults) -> Claim {
@@ -150,9 +145,10 @@ fn creeps(snakes: &SnakeResults) -> Claim {
             c.count("steps")
         )
     });
-    let on_the_way = |c: &CaseResults| ThresholdTest::above(c.estimate("way_percent"), 90.0);
+    let min_percent = CLAIMS.threshold("V6");
+    let ways = snakes.at_rest().map(|c| c.estimate("way_percent"));
     let verdict = combined_verdict(&[
-        judge_thresholds(snakes.at_rest().map(on_the_way)),
+        judge_thresholds(ways.map(|way| ThresholdTest::above(way, min_percent))),
         judge_all_runs(snakes.at_rest(), |c| c.count("penetrations") == 0),
     ]);
     claim("V6", verdict, ours)
@@ -190,17 +186,14 @@ fn failed_parts(initiators: &InitiatorResults) -> Claim {
 
 fn one_turn(rotations: &RotationResults) -> Claim {
     let ours = join_texts(RULES, |rule| {
-        let cells: Vec<_> = rotations.cells_with_rule(rule).collect();
-        let inside: u64 = cells.iter().map(|c| c.count("penetrations")).sum();
-        let steps: u64 = cells.iter().map(|c| c.count("steps")).sum();
-        let clearance_m = min_value(cells.iter().map(|c| c.optional_number("min_clearance_m")));
+        let cases: Vec<_> = rotations.cases_with_rule(rule).collect();
+        let inside: u64 = cases.iter().map(|c| c.count("penetrations")).sum();
+        let steps: u64 = cases.iter().map(|c| c.count("steps")).sum();
+        let clearance_m = min_value(cases.iter().map(|c| c.optional_number("min_clearance_m")));
         format!("{rule}: {inside} of {steps} steps inside, clearance {} mm", format_mm(clearance_m))
     });
-    claim(
-        "A7, A8",
-        judge_all_runs(rotations.cells_with_rule(RULES[1]), |c| c.count("penetrations") == 0),
-        ours,
-    )
+    let literally = rotations.cases_with_rule(RULES[1]);
+    claim("A7, A8", judge_all_runs(literally, |c| c.count("penetrations") == 0), ours)
 }
 
 fn bend_limits(initiators: &InitiatorResults) -> Claim {
@@ -217,36 +210,31 @@ fn bend_limits(initiators: &InitiatorResults) -> Claim {
 }
 
 fn posture_by_veto(postures: &PostureResults) -> Claim {
+    let cases: Vec<&CaseResults> = postures.cases_with_method(IkMethod::Veto).collect();
+    let fixed = cases.iter().filter(|c| c.number("slack") == 0.0);
+    let fixed_percent = max_value(fixed.map(|c| c.number("reached")));
+    let min_share = CLAIMS.threshold("F2a");
+    let mut tests = Vec::new();
+    let mut texts = Vec::new();
     // A motion of fixed rods always displaces the base, which objects: there is nothing to judge.
-    let slack = || postures.cells_with_method(IkMethod::Veto).filter(|c| c.number("slack") > 0.0);
-    let fixed = max_value(
-        postures
-            .cells_with_method(IkMethod::Veto)
-            .filter(|c| c.number("slack") == 0.0)
-            .map(|c| c.number("reached")),
+    for case in cases.iter().filter(|c| c.number("slack") > 0.0) {
+        let reached = case.proportion("reached");
+        tests.push(ThresholdTest::proportion_above(reached, min_share));
+        texts.push(format!("{} links: {reached}", case.count("links")));
+    }
+    let ours = format!(
+        "with 10 % of slack, {}; rods of fixed length: at most {fixed_percent:.1} %",
+        join_texts(texts, |text| text)
     );
-    claim(
-        "F2a",
-        judge_thresholds(
-            slack().map(|c| ThresholdTest::proportion_above(c.proportion("reached"), 0.99)),
-        ),
-        format!(
-            "with 10 % of slack, {}; rods of fixed length: at most {fixed:.1} %",
-            join_texts(slack(), |c| format!(
-                "{} links: {}",
-                c.count("links"),
-                c.proportion("reached")
-            ))
-        ),
-    )
+    claim("F2a", judge_thresholds(tests), ours)
 }
 
 fn posture_there_and_back(postures: &PostureResults) -> Claim {
     let [free, back] = [IkMethod::FreeBase, IkMethod::ThereAndBack].map(|way| {
-        judge_all_trials(postures.cells_with_method(way).map(|c| c.proportion("reached")))
+        judge_all_trials(postures.cases_with_method(way).map(|c| c.proportion("reached")))
     });
     let ours = join_texts(
-        postures.cells_with_method(IkMethod::ThereAndBack).filter(|c| c.number("slack") == 0.0),
+        postures.cases_with_method(IkMethod::ThereAndBack).filter(|c| c.number("slack") == 0.0),
         |c| {
             format!(
                 "{} links: {}, {:.0} us",
@@ -260,8 +248,8 @@ fn posture_there_and_back(postures: &PostureResults) -> Claim {
 }
 
 fn rejoined(broken: &BreakResults) -> Claim {
-    let none_gone = || broken.cells.iter().filter(|c| c.count("gone") == 0);
-    let ours = join_texts(none_gone(), |c| {
+    let none_gone: Vec<_> = broken.cases.iter().filter(|c| c.count("gone") == 0).collect();
+    let ours = join_texts(&none_gone, |c| {
         format!(
             "{} thrown by {} m: {}",
             c.count("scattered"),
@@ -269,18 +257,15 @@ fn rejoined(broken: &BreakResults) -> Claim {
             c.proportion("whole")
         )
     });
-    claim(
-        "F3a",
-        judge_all_runs(none_gone(), |c| {
-            c.is_true_in_all_runs("whole") && c.is_true_in_all_runs("ends_kept")
-        }),
-        ours,
-    )
+    let verdict = judge_all_runs(none_gone, |c| {
+        c.is_true_in_all_runs("whole") && c.is_true_in_all_runs("ends_kept")
+    });
+    claim("F3a", verdict, ours)
 }
 
 fn rejoined_with_fewer(broken: &BreakResults) -> Claim {
-    let gone = || broken.cells.iter().filter(|c| c.count("gone") > 0);
-    let ours = join_texts(gone(), |c| {
+    let gone: Vec<_> = broken.cases.iter().filter(|c| c.count("gone") > 0).collect();
+    let ours = join_texts(&gone, |c| {
         let who = if c.is_true("may_come") { "an end may come" } else { "nobody may come" };
         format!(
             "{} less {}, {who}: {} whole, {} refused",
@@ -290,12 +275,13 @@ fn rejoined_with_fewer(broken: &BreakResults) -> Claim {
             c.count("too_long")
         )
     });
-    let as_can = |c: &CaseResults| {
-        let whole =
+    let verdict = judge_all_runs(gone, |c| {
+        // An end that may come closes every gap; otherwise the rods that are left must reach across.
+        let possible =
             if c.is_true("may_come") { c.proportion("whole").n } else { c.proportion("can").hits };
-        c.proportion("whole").hits == whole && c.is_true_in_all_runs("ends_kept")
-    };
-    claim("F3b", judge_all_runs(gone(), as_can), ours)
+        c.proportion("whole").hits == possible && c.is_true_in_all_runs("ends_kept")
+    });
+    claim("F3b", verdict, ours)
 }
 
 fn in_space(snakes: &SnakeResults) -> Claim {

@@ -25,7 +25,7 @@ pub(super) fn judge(report: &SerpentineReport) -> Vec<Claim> {
 
 /// The words of the report.
 pub(super) static CLAIMS: PaperClaims =
-    PaperClaims::new(|| ClaimsFile::read(include_str!("../report.toml")));
+    PaperClaims::new(|| ClaimsFile::read(include_str!("../../../claims/serpentine.toml")));
 
 /// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {

@@ -2,8 +2,8 @@
 
 use super::super::*;
 use super::*;
-use crate::cells::Value::{Count, Maybe, Number, Word, Yes};
-use crate::cells::{CaseResults, Proportion, Value};
+use crate::case_results::Value::{Count, Maybe, Number, Word, Yes};
+use crate::case_results::{CaseResults, Proportion, Value};
 use sidestep_document::Estimate;
 
 fn yes(n: usize) -> Value {
@@ -33,7 +33,7 @@ fn word(text: &str) -> Value {
     Word(text.into())
 }
 
-/// Values of any cell of a run, if all is well.
+/// Values of any case of a run, if all is well.
 fn clean() -> Vec<(&'static str, Value)> {
     let counts = ["vetoes", "penetrations", "bumper_events", "too_long", "outside", "too_fast"];
     let shares = ["arrived", "untouched", "reached", "whole", "can", "ends_kept"];
@@ -58,7 +58,7 @@ fn clean() -> Vec<(&'static str, Value)> {
     all
 }
 
-/// A minimal report that satisfies the slides: one cell of each kind.
+/// A minimal report that satisfies the slides: one case of each kind.
 fn ideal() -> SerpentineReport {
     let ride = |leaving| {
         let case = [("width_m", Number(2.0)), ("followers", Count(15)), ("leaving", word(leaving))];
@@ -113,18 +113,18 @@ fn ideal() -> SerpentineReport {
     SerpentineReport {
         plan: SerpentineConfig::quick(),
         program_version: "0".into(),
-        corridor: corridor::CorridorResults { cells: vec![ride("latched"), ride("level")] },
-        rotations: rotation::RotationResults { cells: vec![turned("union"), turned("literal")] },
+        corridor: corridor::CorridorResults { cases: vec![ride("latched"), ride("level")] },
+        rotations: rotation::RotationResults { cases: vec![turned("union"), turned("literal")] },
         fields: field::FieldResults {
-            cells: vec![
+            cases: vec![
                 crossed("latched", true, 0.0),
                 crossed("level", false, 0.0),
                 crossed("latched", true, 1.0),
             ],
         },
-        pushing: pushing::PushingResults { cells: Vec::new() },
-        movers: movers::MoverResults { cells: vec![met("off"), met("look-ahead")] },
-        snakes: snake::SnakeResults { cells: vec![snake] },
+        pushing: pushing::PushingResults { cases: Vec::new() },
+        movers: movers::MoverResults { cases: vec![met("off"), met("look-ahead")] },
+        snakes: snake::SnakeResults { cases: vec![snake] },
         scaling: scaling::ScalingResults {
             sizes: vec![size(50), size(1000)],
             far: vec![scaling::FarObstacleTiming {
@@ -134,9 +134,9 @@ fn ideal() -> SerpentineReport {
                 same: true,
             }],
         },
-        broken: broken_chain::BreakResults { cells: vec![joined(0), joined(2)] },
+        broken: broken_chain::BreakResults { cases: vec![joined(0), joined(2)] },
         postures: postures::PostureResults {
-            cells: [Veto, FreeBase, ThereAndBack, LeastSquares].map(solved).into(),
+            cases: [Veto, FreeBase, ThereAndBack, LeastSquares].map(solved).into(),
         },
         initiators: initiators::InitiatorResults {
             moved: all,
@@ -147,7 +147,7 @@ fn ideal() -> SerpentineReport {
             told: all,
             bends: vec![bend],
         },
-        arms: arm::ArmResults { cells: arm::PLANNERS.map(reached).into() },
+        arms: arm::ArmResults { cases: arm::PLANNERS.map(reached).into() },
         claims: Vec::new(),
         scenes: Vec::new(),
     }
@@ -169,9 +169,9 @@ fn ideal_numbers_hold_all_claims_but_the_one_without_a_measure() {
 #[test]
 fn nothing_measured_is_undecided() {
     let mut report = ideal();
-    report.corridor.cells.clear();
-    report.fields.cells.clear();
-    report.snakes.cells.clear();
+    report.corridor.cases.clear();
+    report.fields.cases.clear();
+    report.snakes.cases.clear();
     report.scaling.sizes.clear();
     let undecided = ids(&report, Verdict::Undecided);
     for id in ["P5, E4", "P6", "V6", "F4", "N3", "N5a", "N5b", "N6a", "N6b", "E1", "E2", "E3"] {
@@ -185,29 +185,29 @@ fn nothing_measured_is_undecided() {
 fn each_claim_has_a_number_that_refutes_it() {
     type Spoil = fn(&mut SerpentineReport);
     let cases: [(Spoil, &[&str]); 27] = [
-        (|r| r.corridor.cells[0].set_value("bumper_events", Count(1)), &["E2"]),
-        (|r| r.corridor.cells[0].set_value("vetoes", Count(1)), &["E3"]),
-        (|r| r.corridor.cells[0].set_value("penetrations", Count(1)), &["N6a", "E2"]),
-        (|r| r.corridor.cells[0].set_value("in_band_percent", sure(50.0)), &["N3"]),
-        (|r| r.corridor.cells[1].set_value("rod_violation_m", Number(1e-6)), &["V5"]),
-        (|r| r.rotations.cells[1].set_value("penetrations", Count(1)), &["A7, A8"]),
-        (|r| r.fields.cells[0].set_value("untouched", no()), &["N5b"]),
-        (|r| r.fields.cells[1].set_value("arrived", no()), &["N5a"]),
-        (|r| r.fields.cells[2].set_value("arrived", no()), &["N6b"]),
-        (|r| r.movers.cells[1].set_value("inside_percent", sure(0.1)), &["P2"]),
-        (|r| r.arms.cells[0].set_value("too_fast", Count(1)), &["K1, K4"]),
-        (|r| r.arms.cells[1].set_value("outside", Count(1)), &["K1, K4"]),
-        (|r| r.arms.cells[1].set_value("reached", no()), &["K1, K4"]),
-        (|r| r.snakes.cells[0].set_value("real_time", sure(0.9)), &["E1"]),
-        (|r| r.snakes.cells[0].set_value("penetrations", Count(1)), &["V6", "F4"]),
-        (|r| r.snakes.cells[0].set_value("way_percent", sure(50.0)), &["V6"]),
+        (|r| r.corridor.cases[0].set_value("bumper_events", Count(1)), &["E2"]),
+        (|r| r.corridor.cases[0].set_value("vetoes", Count(1)), &["E3"]),
+        (|r| r.corridor.cases[0].set_value("penetrations", Count(1)), &["N6a", "E2"]),
+        (|r| r.corridor.cases[0].set_value("in_band_percent", sure(50.0)), &["N3"]),
+        (|r| r.corridor.cases[1].set_value("rod_violation_m", Number(1e-6)), &["V5"]),
+        (|r| r.rotations.cases[1].set_value("penetrations", Count(1)), &["A7, A8"]),
+        (|r| r.fields.cases[0].set_value("untouched", no()), &["N5b"]),
+        (|r| r.fields.cases[1].set_value("arrived", no()), &["N5a"]),
+        (|r| r.fields.cases[2].set_value("arrived", no()), &["N6b"]),
+        (|r| r.movers.cases[1].set_value("inside_percent", sure(0.1)), &["P2"]),
+        (|r| r.arms.cases[0].set_value("too_fast", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cases[1].set_value("outside", Count(1)), &["K1, K4"]),
+        (|r| r.arms.cases[1].set_value("reached", no()), &["K1, K4"]),
+        (|r| r.snakes.cases[0].set_value("real_time", sure(0.9)), &["E1"]),
+        (|r| r.snakes.cases[0].set_value("penetrations", Count(1)), &["V6", "F4"]),
+        (|r| r.snakes.cases[0].set_value("way_percent", sure(50.0)), &["V6"]),
         (|r| r.scaling.sizes[1].fixed_us_by_repeat = vec![3e3; 5], &["P5, E4"]),
         (|r| r.scaling.sizes[1].fixed_moved = 600.0, &["P6"]),
         (|r| r.scaling.far[0].same = false, &["P5, E4"]),
-        (|r| r.broken.cells[0].set_value("ends_kept", no()), &["F3a"]),
-        (|r| r.broken.cells[1].set_value("whole", no()), &["F3b"]),
-        (|r| r.postures.cells[0].set_value("reached", no_target()), &["F2a"]),
-        (|r| r.postures.cells[2].set_value("reached", no_target()), &["P6", "F2b"]),
+        (|r| r.broken.cases[0].set_value("ends_kept", no()), &["F3a"]),
+        (|r| r.broken.cases[1].set_value("whole", no()), &["F3b"]),
+        (|r| r.postures.cases[0].set_value("reached", no_target()), &["F2a"]),
+        (|r| r.postures.cases[2].set_value("reached", no_target()), &["P6", "F2b"]),
         (|r| r.initiators.bends[0].exceeded = 1, &["F1"]),
         (|r| r.initiators.moved = half(), &["R4, R5"]),
         (|r| r.initiators.kept = half(), &["R7"]),
@@ -234,7 +234,7 @@ fn a_full_plan_has_runs_enough_to_decide() {
 #[test]
 fn discs_that_only_touching_chains_run_into_say_nothing_of_those_that_look_ahead() {
     let mut report = ideal();
-    report.movers.cells[0].set_value("inside_percent", sure(30.0));
+    report.movers.cases[0].set_value("inside_percent", sure(30.0));
     let claims = judge(&report);
     assert_eq!(claims[0].verdict, Verdict::Held);
     assert!(claims[0].ours.contains("off: up to 30.00 %"), "{}", claims[0].ours);

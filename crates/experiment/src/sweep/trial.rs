@@ -1,6 +1,6 @@
-//! One cell -> one row.
+//! One trial -> one row.
 
-use super::plan::Cell;
+use super::plan::Trial;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
@@ -10,14 +10,15 @@ use sidestep_scenario::{Source, Worlds};
 const INTERRUPT_CHECK_CYCLES: Cycle = 256;
 
 /// Endings of the names of metrics that a clock measured: they are kept beside the results, because
-/// they differ when the cell is run again.
+/// they differ when the trial is run again.
 const CLOCK_METRIC_SUFFIXES: [&str; 2] = ["cpu_s", "wall_s"];
 
-/// The outcome of a cell.
+/// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// Number of the cell.
-    pub cell: u64,
+    /// Number of the trial; files call it `cell`.
+    #[serde(rename = "cell")]
+    pub trial: u64,
     /// Cycles that were run.
     pub cycles: Cycle,
     /// Digest of the last state, in hexadecimal; empty if the run failed.
@@ -31,27 +32,27 @@ pub struct Outcome {
     pub costs: Map<String, Value>,
 }
 
-/// The simulation of a cell, at its start.
-pub struct CellRun {
-    cell: Cell,
+/// The simulation of a trial, at its start.
+pub struct TrialRun {
+    trial: Trial,
     simulation: Box<dyn Simulation>,
     until: Cycle,
 }
 
-/// Returns the simulation of a cell of the variant `source`, of one of `worlds`, at its start.
+/// Returns the simulation of a trial of the variant `source`, of one of `worlds`, at its start.
 ///
 /// # Errors
 /// When the scenario is wrong with this seed.
-pub fn start_cell(
+pub fn start_trial(
     worlds: &Worlds,
-    cell: Cell,
+    trial: Trial,
     source: &Source,
     workers: usize,
-) -> Result<CellRun, InputError> {
-    let source = source.clone().with_overrides(&[format!("seed={}", cell.seed)])?;
+) -> Result<TrialRun, InputError> {
+    let source = source.clone().with_overrides(&[format!("seed={}", trial.seed)])?;
     let compiled = worlds.compile(&source)?;
     let until = compiled.plan().cycles;
-    Ok(CellRun { cell, simulation: compiled.start(&source, workers), until })
+    Ok(TrialRun { trial, simulation: compiled.start(&source, workers), until })
 }
 
 /// Returns the names of the metrics that runs of a scenario have, in order.
@@ -65,7 +66,7 @@ fn is_clock_metric(name: &str) -> bool {
     CLOCK_METRIC_SUFFIXES.iter().any(|end| name.ends_with(end))
 }
 
-impl CellRun {
+impl TrialRun {
     /// Returns the same simulation, which unwinds within a cycle when `interrupt` is raised.
     #[must_use]
     pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
@@ -82,18 +83,18 @@ impl CellRun {
             }
             simulation.advance(INTERRUPT_CHECK_CYCLES.min(self.until - simulation.cycle()));
         }
-        Some(Outcome::from_simulation(self.cell, simulation))
+        Some(Outcome::from_simulation(self.trial, simulation))
     }
 }
 
 impl Outcome {
     /// Returns the outcome of a simulation that has ended.
-    pub fn from_simulation(cell: Cell, simulation: &dyn Simulation) -> Self {
+    pub fn from_simulation(trial: Trial, simulation: &dyn Simulation) -> Self {
         let (costs, metrics) = flattened(&simulation.metrics())
             .into_iter()
             .partition(|(name, _)| is_clock_metric(name));
         Self {
-            cell: cell.id,
+            trial: trial.id,
             cycles: simulation.cycle(),
             digest: simulation.digest().to_string(),
             failure: None,
@@ -102,10 +103,10 @@ impl Outcome {
         }
     }
 
-    /// Returns the outcome of a cell in which the simulation broke one of its own rules.
-    pub fn from_failure(cell: Cell, why: impl Into<String>) -> Self {
+    /// Returns the outcome of a trial in which the simulation broke one of its own rules.
+    pub fn from_failure(trial: Trial, why: impl Into<String>) -> Self {
         Self {
-            cell: cell.id,
+            trial: trial.id,
             cycles: 0,
             digest: String::new(),
             failure: Some(why.into()),
@@ -153,18 +154,18 @@ mod tests {
     const AIRSPACE: &str = "format = 1\nworld = \"airspace\"\n[airspace.generator]\n\
                             kind = \"superconflict\"\nn = 3\n";
 
-    fn cell(seed: u64) -> Cell {
-        Cell { id: 5, variant: 0, replicate: 0, seed }
+    fn trial(seed: u64) -> Trial {
+        Trial { id: 5, variant: 0, replicate: 0, seed }
     }
 
     fn outcome(text: &str, seed: u64, workers: usize) -> Outcome {
         let source = Source::new("s.toml", text, "");
-        let started = start_cell(&worlds(), cell(seed), &source, workers).expect("valid");
+        let started = start_trial(&worlds(), trial(seed), &source, workers).expect("valid");
         started.run(&|| true).expect("not stopped")
     }
 
     #[test]
-    fn a_row_is_a_function_of_its_cell_alone() {
+    fn a_row_is_a_function_of_its_trial_alone() {
         for text in [ROBOTS, AIRSPACE] {
             let one = outcome(text, 3, 1);
             let again = outcome(text, 3, 2);
@@ -184,7 +185,10 @@ mod tests {
     #[test]
     fn a_run_that_is_to_stop_is_no_row() {
         let source = Source::new("s.toml", ROBOTS, "");
-        assert_eq!(start_cell(&worlds(), cell(1), &source, 1).expect("valid").run(&|| false), None);
+        assert_eq!(
+            start_trial(&worlds(), trial(1), &source, 1).expect("valid").run(&|| false),
+            None
+        );
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use crate::study::{StudyResults, setting_number};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
-use sidestep::experiment::sweep::Variant;
+use sidestep::experiment::sweep::{RunTable, Variant};
 use sidestep::statistics::{Interval, clopper_pearson, percentile};
 use sidestep_document::figure::Point;
 use sidestep_document::{Estimate, Figure, Series, Table};
@@ -132,29 +132,95 @@ impl CaseRuns<'_> {
     }
 }
 
+/// How the runs of a case are summed up in one value.
+#[derive(Clone, Copy)]
+pub(crate) enum Summary {
+    /// The value that the case sets this key to.
+    Setting(&'static str),
+    /// The mean of a metric over the runs.
+    Mean(&'static str),
+    /// The mean of a count of steps in percent of all steps; a step may have several, so that it may exceed 100.
+    RatePercent(&'static str),
+    /// The same of a count that a step adds to at most once: neither the mean nor its interval leaves 0 to 100.
+    SharePercent(&'static str),
+    /// The sum of a count over all runs.
+    Sum(&'static str),
+    /// The median of a metric; 0 if no run has it.
+    Median(&'static str),
+    /// The greatest value of a metric; 0 if no run has it.
+    Max(&'static str),
+    /// The smallest value of the runs that have it.
+    Min(&'static str),
+    /// The runs in which a metric is true, or above 0, out of all.
+    Share(&'static str),
+    /// The number of runs in which a metric is true, or above 0.
+    Count(&'static str),
+    /// A value that only this experiment computes.
+    Computed(fn(&CaseRuns<'_>) -> Value),
+}
+
+impl Summary {
+    fn of(self, runs: &CaseRuns<'_>) -> Value {
+        match self {
+            Self::Setting(key) => runs.setting(key),
+            Self::Mean(metric) => runs.mean(metric),
+            Self::RatePercent(metric) => runs.mean_rate(metric),
+            Self::SharePercent(metric) => runs.mean_proportion(|run| run.percent_of_steps(metric)),
+            Self::Sum(metric) => runs.sum(metric),
+            Self::Median(metric) => Value::Number(runs.median(metric)),
+            Self::Max(metric) => Value::Number(runs.max_value(metric)),
+            Self::Min(metric) => Value::Maybe(runs.min_value(metric)),
+            Self::Share(metric) => runs.proportion(|run| run.is_true(metric)),
+            Self::Count(metric) => runs.count(|run| run.is_true(metric)),
+            Self::Computed(value) => value(runs),
+        }
+    }
+}
+
+/// How a table shows the value of a column.
+#[derive(Clone, Copy)]
+pub(crate) enum Format {
+    /// As the value prints.
+    Plain,
+    /// A number with this many decimals.
+    Decimals(usize),
+    /// A number with this many decimals and an exponent.
+    Exponent(usize),
+    /// A length in meters as millimeters, or `far`.
+    Millimeters,
+    /// A text that only this experiment makes, from any of the case's values.
+    Computed(fn(&CaseResults) -> String),
+}
+
 /// A column: how the runs of a case are summed up, and shown.
 pub(crate) struct Column {
     /// Its name in JSON, and for claims.
     name: &'static str,
     /// Its head in the table; a column without one is not shown there.
     head: &'static str,
-    of: fn(&CaseRuns<'_>) -> Value,
-    show: Option<fn(&CaseResults) -> String>,
+    summary: Summary,
+    format: Format,
 }
 
 /// Returns a column that is shown as its value prints.
-pub(crate) const fn column(
-    name: &'static str,
-    head: &'static str,
-    of: fn(&CaseRuns<'_>) -> Value,
-) -> Column {
-    Column { name, head, of, show: None }
+pub(crate) const fn column(name: &'static str, head: &'static str, summary: Summary) -> Column {
+    Column { name, head, summary, format: Format::Plain }
 }
 
 impl Column {
     /// Sets how the column is shown.
-    pub(crate) const fn with_format(self, show: fn(&CaseResults) -> String) -> Self {
-        Self { show: Some(show), ..self }
+    pub(crate) const fn with_format(self, format: Format) -> Self {
+        Self { format, ..self }
+    }
+
+    fn text(&self, case: &CaseResults) -> String {
+        match self.format {
+            Format::Plain => case.value(self.name).to_string(),
+            Format::Decimals(decimals) => format!("{:.*}", decimals, case.number(self.name)),
+            Format::Exponent(decimals) => format!("{:.*e}", decimals, case.number(self.name)),
+            Format::Millimeters => case.format_mm(self.name),
+            Format::Computed(text) => text(case),
+        }
     }
 }
 
@@ -165,49 +231,52 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Returns a cell for every case.
-    pub(crate) fn cells(&self, results: &StudyResults) -> Vec<CaseResults> {
-        let named = |columns: &[Column], runs: &CaseRuns<'_>| {
-            columns.iter().map(|c| (c.name, (c.of)(runs))).collect()
-        };
+    /// Returns the results of every case.
+    pub(crate) fn cases(&self, results: &StudyResults) -> Vec<CaseResults> {
         case_runs(results)
-            .map(|r| CaseResults {
-                case: named(self.case, &r),
-                results: named(self.results, &r),
-                runs: r.rows.len(),
+            .map(|runs| CaseResults {
+                case: named_values(self.case, &runs),
+                results: named_values(self.results, &runs),
+                runs: runs.rows.len(),
             })
             .collect()
     }
 
-    /// Returns the cells as a table.
-    pub(crate) fn table(&self, title: &str, note: &str, cells: &[CaseResults]) -> Table {
+    /// Returns the cases as a table.
+    pub(crate) fn table(&self, title: &str, note: &str, cases: &[CaseResults]) -> Table {
         let columns: Vec<&Column> =
             self.case.iter().chain(self.results).filter(|c| !c.head.is_empty()).collect();
         let heads: Vec<&str> = columns.iter().map(|c| c.head).collect();
         let mut table = Table::new(title, note, &heads);
-        for cell in cells {
-            let text = |c: &&Column| match c.show {
-                Some(show) => show(cell),
-                None => cell.value(c.name).to_string(),
-            };
-            table.push_row(columns.iter().map(text));
+        for case in cases {
+            table.push_row(columns.iter().map(|column| column.text(case)));
         }
         table
     }
 }
 
+fn named_values(columns: &[Column], runs: &CaseRuns<'_>) -> Vec<(&'static str, Value)> {
+    columns.iter().map(|column| (column.name, column.summary.of(runs))).collect()
+}
+
 /// Returns the runs of every case.
 pub(crate) fn case_runs(results: &StudyResults) -> impl Iterator<Item = CaseRuns<'_>> {
-    let variants = results.table.column("variant");
-    (0u32..).zip(&results.variants).map(move |(k, variant)| {
-        let is_its =
-            |row: &usize| variants.and_then(|c| c.values.number(*row)) == Some(f64::from(k));
-        let rows = (0..results.table.runs()).filter(is_its).collect();
-        CaseRuns { results, variant, rows }
+    let variants = (0..).zip(&results.variants);
+    variants.map(|(number, variant)| CaseRuns {
+        results,
+        variant,
+        rows: rows_of_variant(&results.table, number),
     })
 }
 
-/// A value of a cell.
+fn rows_of_variant(table: &RunTable, number: u32) -> Vec<usize> {
+    let Some(variants) = table.column("variant") else { return Vec::new() };
+    (0..table.runs())
+        .filter(|row| variants.values.number(*row) == Some(f64::from(number)))
+        .collect()
+}
+
+/// A value of the results of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Value {
@@ -225,13 +294,14 @@ pub(crate) enum Value {
 }
 
 /// Numbers by name.
-type NamedNumbers = Vec<(&'static str, f64)>;
+pub(crate) type NamedNumbers = Vec<(&'static str, f64)>;
 
 fn of_runs<S: Serializer>(runs: &[NamedNumbers], serializer: S) -> Result<S::Ok, S::Error> {
-    let map = |run: &NamedNumbers| -> serde_json::Map<String, serde_json::Value> {
-        run.iter().map(|(name, x)| ((*name).into(), (*x).into())).collect()
-    };
-    serializer.collect_seq(runs.iter().map(map))
+    serializer.collect_seq(runs.iter().map(json_object))
+}
+
+fn json_object(numbers: &NamedNumbers) -> serde_json::Map<String, serde_json::Value> {
+    numbers.iter().map(|(name, x)| ((*name).into(), (*x).into())).collect()
 }
 
 impl fmt::Display for Value {
@@ -259,7 +329,7 @@ pub(crate) struct CaseResults {
 }
 
 impl CaseResults {
-    /// Returns a made-up cell of 10 runs.
+    /// Returns made-up results of 10 runs.
     #[cfg(test)]
     pub(crate) fn new(
         case: impl IntoIterator<Item = (&'static str, Value)>,
@@ -353,8 +423,11 @@ impl CaseResults {
     /// Returns results of runs, one by one.
     pub(crate) fn by_seed(&self, column: &str, name: &str) -> Vec<Option<f64>> {
         let Value::BySeed(runs) = self.value(column) else { return Vec::new() };
-        let of = |run: &NamedNumbers| run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x);
-        runs.iter().map(of).collect()
+        let mut values = Vec::with_capacity(runs.len());
+        for run in runs {
+            values.push(run.iter().find(|(own, _)| *own == name).map(|(_, x)| *x));
+        }
+        values
     }
 
     /// Returns a length, in millimeters.
@@ -403,28 +476,28 @@ pub(crate) fn table<T>(
     let heads: Vec<&str> = columns.iter().map(|(head, _)| *head).collect();
     let mut table = Table::new(title, note, &heads);
     for item in items {
-        table.push_row(columns.iter().map(|(_, cell)| cell(&item)));
+        table.push_row(columns.iter().map(|(_, text)| text(&item)));
     }
     table
 }
 
-/// Returns a series of cells: column `y` over column `x`.
+/// Returns a series of cases: column `y` over column `x`.
 pub(crate) fn series<'a>(
     name: impl Into<String>,
-    cells: impl IntoIterator<Item = &'a CaseResults>,
+    cases: impl IntoIterator<Item = &'a CaseResults>,
     [x, y]: [&str; 2],
 ) -> Series {
-    let points = cells.into_iter().filter_map(|c| c.point(c.number(x), y)).collect();
+    let points = cases.into_iter().filter_map(|c| c.point(c.number(x), y)).collect();
     Series { name: name.into(), points }
 }
 
 /// Returns a series over the numbers of categories.
 pub(crate) fn bars<'a>(
     name: impl Into<String>,
-    cells: impl IntoIterator<Item = &'a CaseResults>,
+    cases: impl IntoIterator<Item = &'a CaseResults>,
     y: &str,
 ) -> Series {
-    let points = (0..).zip(cells).filter_map(|(k, c)| c.point(f64::from(k), y)).collect();
+    let points = (0..).zip(cases).filter_map(|(k, c)| c.point(f64::from(k), y)).collect();
     Series { name: name.into(), points }
 }
 
@@ -454,7 +527,8 @@ pub(crate) struct Proportion {
 impl Proportion {
     /// Returns the share of those that are true.
     pub(crate) fn from_flags(all: impl IntoIterator<Item = bool>) -> Self {
-        let (mut hits, mut n) = (0, 0);
+        let mut hits = 0;
+        let mut n = 0;
         for hit in all {
             hits += u64::from(hit);
             n += 1;
@@ -486,9 +560,9 @@ impl Proportion {
 
 impl fmt::Display for Proportion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Interval { low, high } = self.interval;
-        let percent = |x: f64| (100.0 * x).round();
-        write!(f, "{}/{} [{}, {}] %", self.hits, self.n, percent(low), percent(high))
+        let low_percent = (100.0 * self.interval.low).round();
+        let high_percent = (100.0 * self.interval.high).round();
+        write!(f, "{}/{} [{low_percent}, {high_percent}] %", self.hits, self.n)
     }
 }
 
@@ -513,6 +587,7 @@ pub(crate) fn max_value(values: impl IntoIterator<Item = f64>) -> f64 {
 pub(crate) fn format_mm(value_m: Option<f64>) -> String {
     match value_m {
         None => "far".into(),
+        // Less than the last digit shown is rounding, and would print as -0.000 or 0.001.
         Some(m) if m.abs() < 1e-6 => "0.000".into(),
         Some(m) => format!("{:.3}", 1e3 * m),
     }
