@@ -522,13 +522,7 @@ impl<const D: usize> Compiler<'_, D> {
         of: &str,
         at: Range<usize>,
     ) -> Result<(), InputError> {
-        for &(key, is_given, has_effect) in keys {
-            if is_given && !has_effect {
-                let remedy = "leave it out, or give what it belongs to";
-                let at = self.source.key_span(at, &[key]);
-                return Err(self.source.error(at, format!("`{key}` does nothing {of}"), remedy));
-            }
-        }
-        Ok(())
+        let keys = keys.iter().map(|&(key, is_given, has_effect)| (key, is_given && !has_effect));
+        self.source.refuse_unused_keys(at, &keys.collect::<Vec<_>>(), of)
     }
 }

@@ -438,7 +438,7 @@ impl<const D: usize> Compiler<'_, D> {
         let arm = self.arm(arm, to_dimensions(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(LINK_RADIUS_FACTOR * radius_m));
         let solid = solid.map_err(|error| self.source.error_from(arm_span, &error))?;
-        // D is 3 here, but only the types of `D` dimensions tell the compiler so.
+        // `D` is three here, which the compiler cannot know.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let mut connectors: Vec<_> = solid.connectors().iter().map(arm_connector).collect();
         for limit in &s.limits.0 {
