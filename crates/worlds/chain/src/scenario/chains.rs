@@ -548,7 +548,7 @@ impl<const D: usize> Compiler<'_, D> {
                 ("along", s.along.is_some(), false),
                 ("heading_deg", s.heading_deg.is_some(), false),
             ];
-            self.check_unused_key(&keys, "beside points_m", at.clone())?;
+            self.source.refuse_unused_keys(at.clone(), &keys, "beside points_m")?;
             if given.is_empty() {
                 let at = self.source.key_span(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));
