@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._errors import input_error
-from ._native import Simulation, Table, read
+from ._native import Simulation, Table, read, table_names, world_facts, worlds
 
 __all__ = ["Places", "groups", "places", "separation", "tracks"]
 
@@ -37,9 +37,9 @@ class Places(NamedTuple):
 
     #: The cycle at whose start it was measured.
     cycle: NDArray[np.int64]
-    #: Number of the agent: of the robot, person, airplane or chain.
+    #: Number of the agent.
     agent: NDArray[np.int64]
-    #: Number of the connector of a chain; 0 for other agents.
+    #: Number of the agent's part, e.g. of the connector of a chain; 0 for agents without parts.
     part: NDArray[np.int64]
     #: Position in m; of a body on a grid, the lower-left corner of its box.
     x_m: NDArray[np.float64]
@@ -67,10 +67,11 @@ def _table(rows: Rows, name: str) -> Table:
     return tables[name]
 
 
-def places(rows: Rows, kinds: Collection[str] = ("robot", "person")) -> Places:
+def places(rows: Rows, kinds: Collection[str] | None = None) -> Places:
     """Returns the positions of agents in m, from the table ``trajectories`` of any world.
 
-    In a world on a grid, ``kinds`` selects bodies: ``"robot"``, ``"person"``, ``"door"``.
+    In a world whose table has bodies of several kinds, ``kinds`` selects some of them: ``"robot"``, ``"person"``,
+    ``"door"``; by default those that are agents.
 
     Raises InputError when the run has recorded no positions.
 
@@ -82,21 +83,35 @@ def places(rows: Rows, kinds: Collection[str] = ("robot", "person")) -> Places:
     [0, 1, 2, 3, 4]
     """
     table = _table(rows, "trajectories")
+    columns = _columns_of(table)
     cycle = np.asarray(table["cycle"], dtype=np.int64)
-    if "col_boxes" in table:
-        return _of_boxes(table, cycle, kinds)
-    name = "chain" if "chain" in table else "airplane"
-    agent = np.asarray(table[name], dtype=np.int64)
-    part = np.asarray(table["connector"], dtype=np.int64) if name == "chain" else np.zeros_like(agent)
-    x_m, y_m = np.asarray(table["x_m"]), np.asarray(table["y_m"])
+    if columns["unit"] == "boxes":
+        return _of_boxes(table, columns, cycle, columns["kinds"] if kinds is None else kinds)
+    agent = np.asarray(table[columns["agent"]], dtype=np.int64)
+    part = np.zeros_like(agent)
+    if columns["part"] is not None:
+        part = np.asarray(table[columns["part"]], dtype=np.int64)
+    x_m, y_m = (np.asarray(table[axis]) for axis in columns["axes"])
     # The first leg of a cycle starts with the cycle.
     first = np.unique(np.stack([cycle, agent, part]), axis=1, return_index=True)[1]
     return Places(cycle[first], agent[first], part[first], x_m[first], y_m[first])
 
 
-def _of_boxes(table: Table, cycle: NDArray[np.int64], kinds: Collection[str]) -> Places:
+def _columns_of(table: Table) -> dict[str, Any]:
+    """Returns the columns with positions as the world declares them whose columns the table has."""
+    for world in worlds():
+        columns = world_facts(world)["positions"]
+        if columns is None:
+            continue
+        names = [columns["agent"], *columns["axes"], *([columns["part"]] if columns["part"] else [])]
+        if all(name in table for name in names):
+            return dict(columns)
+    raise input_error("rows", f"the table `{table.name}` has no positions", "give the table `trajectories` of a run")
+
+
+def _of_boxes(table: Table, columns: dict[str, Any], cycle: NDArray[np.int64], kinds: Collection[str]) -> Places:
     about = table.about
-    body = np.asarray(table["body"], dtype=np.int64)
+    body = np.asarray(table[columns["agent"]], dtype=np.int64)
     selected = np.zeros(len(body), dtype=bool)
     for kind in kinds:
         # Bodies of one kind have consecutive ids, such as 0-7.
@@ -104,8 +119,7 @@ def _of_boxes(table: Table, cycle: NDArray[np.int64], kinds: Collection[str]) ->
             first, last = map(int, ids.split("-"))
             selected |= (first <= body) & (body <= last)
     box_m, yaw_rad = float(about["box_m"]), float(about["yaw_rad"])
-    east_m = np.asarray(table["col_boxes"], dtype=np.float64) * box_m
-    north_m = np.asarray(table["row_boxes"], dtype=np.float64) * box_m
+    east_m, north_m = (np.asarray(table[axis], dtype=np.float64) * box_m for axis in columns["axes"])
     x_m = float(about["origin_x_m"]) + np.cos(yaw_rad) * east_m - np.sin(yaw_rad) * north_m
     y_m = float(about["origin_y_m"]) + np.sin(yaw_rad) * east_m + np.cos(yaw_rad) * north_m
     part = np.zeros_like(body)
@@ -190,7 +204,8 @@ def _nearest(agent: NDArray[Any], x_m: NDArray[Any], y_m: NDArray[Any]) -> float
 def groups(run: Simulation | Mapping[str, Any] | str | os.PathLike[str], *, ax: Any = None) -> Any:
     """Plots the distribution of conflict-group sizes.
 
-    ``run`` is a simulation, its metrics, or, for airplanes, its folder or tables with the table ``optimizations``.
+    ``run`` is a simulation, or its metrics, if its world measures the sizes; else the folder or the tables of a run that
+    records a row for each group, as airplanes do in the table ``optimizations``.
 
     Raises InputError when there are no sizes.
 
@@ -202,14 +217,15 @@ def groups(run: Simulation | Mapping[str, Any] | str | os.PathLike[str], *, ax: 
     'bodies of a group'
     """
     source = run.metrics() if isinstance(run, Simulation) else run
-    if isinstance(source, Mapping) and "group_sizes" in source:
-        counts = list(source["group_sizes"])
+    declared = [facts for world in worlds() if (facts := world_facts(world)["group_sizes"])]
+    metrics = [facts["metric"] for facts in declared if facts["kind"] == "metric"]
+    measured = [source[metric] for metric in metrics if isinstance(source, Mapping) and metric in source]
+    if measured:
+        counts = list(measured[0])
         ends = [(2**k, 2 ** (k + 1) - 1) for k in range(len(counts))]
         labels = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
-    elif isinstance(source, Mapping) and "optimizations" in source and not isinstance(source["optimizations"], Table):
-        raise input_error("run", "metrics of airplanes have no group sizes", "give the run's folder or tables")
     else:
-        sizes, numbers = np.unique(_table(source, "optimizations")["airplanes"], return_counts=True)
+        sizes, numbers = np.unique(_sizes(source, declared), return_counts=True)
         labels, counts = [str(size) for size in sizes], numbers.tolist()
     axes = _axes(ax)
     axes.bar(labels, counts)
@@ -217,3 +233,16 @@ def groups(run: Simulation | Mapping[str, Any] | str | os.PathLike[str], *, ax: 
     axes.set_xlabel("bodies of a group")
     axes.set_ylabel("groups, over all cycles")
     return axes
+
+
+def _sizes(source: Rows, declared: list[dict[str, str]]) -> Any:
+    """Returns the size of each group from the table that a world declares."""
+    tables = [facts for facts in declared if facts["kind"] == "column"]
+    names = list(source) if isinstance(source, Mapping) else []
+    if isinstance(source, (str, os.PathLike)):
+        names = table_names(source)
+    # Where there is none of them, the first one is reported as missing.
+    facts = next((facts for facts in tables if facts["table"] in names), tables[0])
+    if isinstance(source, Mapping) and not isinstance(source.get(facts["table"]), (Table, type(None))):
+        raise input_error("run", "these metrics have no group sizes", "give the run's folder or tables")
+    return _table(source, facts["table"])[facts["column"]]

@@ -1,4 +1,4 @@
-//! The Python package's native part: scenarios, simulations, tables.
+//! The native part of the Python package: scenarios, simulations, tables.
 //!
 //! ```text
 //! scenario.rs    a file, text or dict -> a compiled scenario
@@ -12,9 +12,12 @@
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells
 //! error.rs       the exceptions             watch.rs        Ctrl-C
+//! worlds.rs      the list of worlds, and what each declares
 //! ```
 //!
-//! It builds on the crate `session`, like the command: the same scenario and seed give the same bits.
+//! It builds on the crate `session`, like the command: the same scenario and seed give the same bits. It is a library,
+//! which makes a native module of a list of worlds: that of the package (`python/native`), and one for its tests
+//! (`python/tests/pond`).
 
 mod arm;
 mod arrays;
@@ -34,46 +37,60 @@ mod stats;
 mod sweep;
 mod table;
 mod watch;
+mod worlds;
 
 use pyo3::prelude::*;
+use sidestep::scenario::Worlds;
 
-/// The native part of `sidestep`.
-#[pymodule(gil_used = false)]
-mod _native {
-    #[pymodule_export]
-    use super::arrays::rows_by_name;
-    #[pymodule_export]
-    use super::batch::Batch;
-    #[pymodule_export]
-    use super::blocks::Blocks;
-    #[pymodule_export]
-    use super::scenario::{Scenario, schema, unpack_scenario, worlds};
-    #[pymodule_export]
-    use super::simulation::{Simulation, rebuild};
-    #[pymodule_export]
-    use super::space::{Space, Team};
-    // Sweeps and analysis.
-    #[pymodule_export]
-    use super::arm::Arm;
-    #[pymodule_export]
-    use super::collectives::{minimize_objective, minimize_pairs};
-    #[pymodule_export]
-    use super::learn::{Learned, learn_effector, learn_sensor};
-    #[pymodule_export]
-    use super::read::{read, table_names};
-    #[pymodule_export]
-    use super::stats::{
-        stats_correlation, stats_holm, stats_mean, stats_next, stats_paired, stats_quantile,
-        stats_share,
-    };
-    #[pymodule_export]
-    use super::sweep::{compare_methods, run_sweep, run_task, sweep_status};
-    #[pymodule_export]
-    use super::table::Table;
-    use pyo3::prelude::*;
+/// Adds all classes and functions to a native module, whose scenarios are of these worlds.
+///
+/// # Errors
+/// When Python cannot add them.
+pub fn fill(module: &Bound<'_, PyModule>, worlds: Worlds) -> PyResult<()> {
+    worlds::set(worlds);
+    module.add("__version__", sidestep::VERSION)?;
+    add_simulation(module)?;
+    add_sweeps(module)?;
+    add_analysis(module)
+}
 
-    #[pymodule_init]
-    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", sidestep::VERSION)
-    }
+fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<scenario::Scenario>()?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add_class::<batch::Batch>()?;
+    module.add_class::<blocks::Blocks>()?;
+    module.add_class::<space::Space>()?;
+    module.add_class::<space::Team>()?;
+    module.add_class::<table::Table>()?;
+    module.add_function(wrap_pyfunction!(arrays::rows_by_name, module)?)?;
+    module.add_function(wrap_pyfunction!(read::read, module)?)?;
+    module.add_function(wrap_pyfunction!(read::table_names, module)?)?;
+    module.add_function(wrap_pyfunction!(scenario::schema, module)?)?;
+    module.add_function(wrap_pyfunction!(scenario::unpack_scenario, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::rebuild, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::world_facts, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::worlds, module)?)
+}
+
+fn add_sweeps(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(sweep::compare_methods, module)?)?;
+    module.add_function(wrap_pyfunction!(sweep::run_sweep, module)?)?;
+    module.add_function(wrap_pyfunction!(sweep::run_task, module)?)?;
+    module.add_function(wrap_pyfunction!(sweep::sweep_status, module)?)
+}
+
+fn add_analysis(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<arm::Arm>()?;
+    module.add_class::<learn::Learned>()?;
+    module.add_function(wrap_pyfunction!(collectives::minimize_objective, module)?)?;
+    module.add_function(wrap_pyfunction!(collectives::minimize_pairs, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::learn_effector, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::learn_sensor, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_correlation, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_holm, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_mean, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_next, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_paired, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_quantile, module)?)?;
+    module.add_function(wrap_pyfunction!(stats::stats_share, module)?)
 }

@@ -4,11 +4,11 @@ use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python, to_toml, to_toml_table};
 use crate::notebook::to_html;
 use crate::watch::run_interruptible;
+use crate::worlds;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{CompiledScenario, ResolvedScenario, SeedTemplate, Source};
-use sidestep::worlds::WORLDS;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -56,7 +56,7 @@ enum ScenarioText {
 impl LoadedScenario {
     /// Reads and compiles a scenario while other threads of Python go on; Ctrl-C interrupts it.
     fn new(py: Python<'_>, source: Source, is_dict: bool) -> PyResult<Self> {
-        let compiled = run_interruptible(py, || WORLDS.compile(&source))?;
+        let compiled = run_interruptible(py, || worlds::list().compile(&source))?;
         let compiled = compiled.map_err(|e| scenario_error(&e, is_dict))?;
         Ok(Self::from_compiled(compiled, ScenarioText::Own(source), is_dict, None))
     }
@@ -155,7 +155,7 @@ impl LoadedScenario {
     /// Returns the same scenario with another seed, read and compiled anew.
     pub(crate) fn compiled_with(&self, seed: u64) -> Result<Box<dyn CompiledScenario>, InputError> {
         let source = self.own_source().map_err(InputError::clone)?;
-        WORLDS.compile(&source.clone().with_overrides(&[format!("seed={seed}")])?)
+        worlds::list().compile(&source.clone().with_overrides(&[format!("seed={seed}")])?)
     }
 
     /// Returns the same scenario with other values.
@@ -211,8 +211,9 @@ fn load_any(
                     let cause = format!("{given} is no path, dict or Scenario");
                     argument_error("scenario", cause, "give a path or a dict, or text=...")
                 })?;
-                let read =
-                    run_interruptible(py, || sidestep_session::read_scenario(&WORLDS, &path, &[]))?;
+                let read = run_interruptible(py, || {
+                    sidestep_session::read_scenario(worlds::list(), &path, &[])
+                })?;
                 let (source, compiled) = read.map_err(|e| error::input_error(&e))?;
                 Ok(LoadedScenario::from_compiled(compiled, ScenarioText::Own(source), false, None))
             }
@@ -371,10 +372,10 @@ pub(crate) fn unpack_scenario(
 #[pyfunction]
 #[pyo3(signature = (world=None))]
 pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>> {
-    match WORLDS.schema(world) {
+    match worlds::list().schema(world) {
         Some(schema) => to_python(py, &schema),
         None => {
-            let names = WORLDS.names().join(", ");
+            let names = worlds::list().names().join(", ");
             let world = world.unwrap_or_default();
             Err(argument_error(
                 "schema",
@@ -383,14 +384,4 @@ pub(crate) fn schema(py: Python<'_>, world: Option<&str>) -> PyResult<Py<PyAny>>
             ))
         }
     }
-}
-
-/// Returns the names of the worlds.
-///
-/// >>> import sidestep
-/// >>> sorted(sidestep.worlds())
-/// ['airspace', 'chain', 'robots']
-#[pyfunction]
-pub(crate) fn worlds() -> Vec<&'static str> {
-    WORLDS.names()
 }

@@ -10,6 +10,7 @@ use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::space::{ObservationBuffers, Team, find_team, team_at};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, TimeSlice};
+use crate::worlds;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
@@ -18,7 +19,6 @@ use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep::worlds::WORLDS;
 use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
 use std::path::PathBuf;
@@ -78,8 +78,13 @@ impl Simulation {
                 Some(_) => scenario.source()?.clone(),
                 None => Source::new("scenario.toml", scenario.identity()?, ""),
             };
-            let run =
-                ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &source, workers, paths);
+            let run = ManagedRun::start(
+                worlds::list(),
+                scenario.compiled.as_ref(),
+                &source,
+                workers,
+                paths,
+            );
             run.map_err(|e| error::session_error(&e))
         })?;
         let teams = run.simulation().teams().iter().cloned().map(Arc::new).collect();

@@ -5,6 +5,7 @@ use crate::json::{to_python, to_toml};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, run_polling};
+use crate::worlds;
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
@@ -15,7 +16,6 @@ use sidestep::experiment::sweep::{
 use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::settings::Method;
 use sidestep_papers::methods;
@@ -153,12 +153,13 @@ fn run(
     watcher: &dyn Watcher,
 ) -> Result<Option<SweepResult>, Error> {
     let Some(out) = out else {
-        let (plan, end) = sweep::run_in_memory(&WORLDS, sweep, engine, watcher)?;
+        let (plan, end) = sweep::run_in_memory(worlds::list(), sweep, engine, watcher)?;
         let SweepEnd::Done(done) = end else { return Ok(None) };
         return Ok(Some(sweep_result(&plan, None, &done)?));
     };
-    let folder = sweep::open_or_create(&WORLDS, sweep, out, engine.planning_workers(), watcher)?;
-    let end = sweep::run_remaining(&WORLDS, &folder, engine, watcher)?;
+    let folder =
+        sweep::open_or_create(worlds::list(), sweep, out, engine.planning_workers(), watcher)?;
+    let end = sweep::run_remaining(worlds::list(), &folder, engine, watcher)?;
     let SweepEnd::Done(done) = end else { return Ok(None) };
     Ok(Some(sweep_result(folder.plan(), Some(&folder), &done)?))
 }
@@ -168,7 +169,7 @@ fn sweep_result(
     folder: Option<&Folder>,
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
-    let summary = plan.summary(&WORLDS, &done.table)?;
+    let summary = plan.summary(worlds::list(), &done.table)?;
     let cloned = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
         results: cloned(done.table.results()),
@@ -203,7 +204,7 @@ impl PyExecutor {
     ) -> PyResult<()> {
         let tuple = |trial: &Trial| (trial.id, trial.variant, trial.replicate, trial.seed);
         let trials: Vec<TrialTuple> = batch.trials().iter().map(tuple).collect();
-        let generator = self.begin.bind(py).call1((WORLDS.build(), trials))?;
+        let generator = self.begin.bind(py).call1((worlds::list().build(), trials))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -302,7 +303,7 @@ pub(crate) fn run_task(
         scenarios: scenarios.into_iter().map(resolved).collect(),
         trials: trials.into_iter().map(trial).collect(),
     };
-    let outcomes = run_polling(py, |watcher| task.run(&WORLDS, watcher))?;
+    let outcomes = run_polling(py, |watcher| task.run(worlds::list(), watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
     let text = |outcome: &Outcome| {
         serde_json::to_string(outcome)

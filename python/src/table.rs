@@ -4,6 +4,7 @@ use crate::arrays::WholeNumber;
 use crate::error;
 use crate::json::to_list;
 use crate::notebook::to_html;
+use crate::worlds;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::{Float64Type, Int32Type, Int64Type, UInt32Type, UInt64Type};
@@ -22,7 +23,6 @@ use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
 use sidestep::scenario::{MetricInfo, metric_label};
-use sidestep::worlds::WORLDS;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ impl Table {
 
     /// Returns a table of a sweep's runs; numbers are not copied.
     pub(crate) fn from_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
-        let infos = WORLDS.find(world).map_or(&[][..], |world| world.metric_infos());
+        let infos = worlds::list().find(world).map_or(&[][..], |world| world.metric_infos());
         let spec = |column: &RunColumn| ColumnSpec {
             is_nullable: true,
             ..ColumnSpec::new(&column.name, column.values.ty(), &column_description(column, infos))

@@ -2,7 +2,8 @@
 
 import type { Action } from "./keys";
 import { page } from "./state/page.svelte";
-import type { Session, TrailMode } from "./state/session.svelte";
+import type { TrailMode } from "./state/display.svelte";
+import type { Session } from "./state/session.svelte";
 import { viewports } from "./state/viewports";
 import type { Studio } from "./state/studio.svelte";
 
@@ -47,10 +48,10 @@ function transport(action: Action, studio: Studio): boolean {
       studio.step(-10);
       return true;
     case "slower":
-      for (const one of studio.controlled) one.changeSpeed(-1);
+      for (const one of studio.controlled) one.playback.changeSpeed(-1);
       return true;
     case "faster":
-      for (const one of studio.controlled) one.changeSpeed(1);
+      for (const one of studio.controlled) one.playback.changeSpeed(1);
       return true;
     case "next-event":
       active.jump(1);
@@ -78,15 +79,16 @@ function view(action: Action, session: Session): void {
   }
   if (action === "nearer" || action === "farther") viewport?.zoom(action === "nearer" ? ZOOM : 1 / ZOOM);
   if (action === "fit") viewport?.fit();
-  if (action === "trails") session.trails = TRAILS[(TRAILS.indexOf(session.trails) + 1) % TRAILS.length]!;
+  if (action === "trails")
+    session.display.trails = TRAILS[(TRAILS.indexOf(session.display.trails) + 1) % TRAILS.length]!;
   if (action === "edit" && !session.isFleet) page.edits = !page.edits;
-  if (action === "deselect") session.select(null);
+  if (action === "deselect") session.selection.select(null);
   if (action === "filter") {
     page.tab = "agents";
     page.filterRequests++;
   }
-  if (action === "center" && session.selected) {
-    const index = session.bodies?.find(session.selected);
+  if (action === "center" && session.selection.body) {
+    const index = session.frames.bodies?.find(session.selection.body);
     if (index !== undefined) viewport?.center(index);
   }
   viewport?.requestDraw();

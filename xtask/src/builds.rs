@@ -9,7 +9,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
 
 /// Programs that are built one by one into the folder in which tests, lints and documentation are built.
-const PROGRAMS: [&str; 4] = ["sidestep-cli", "sidestep-link", "sidestep-python", "xtask"];
+const PROGRAMS: [&str; 5] =
+    ["sidestep-cli", "sidestep-link", "sidestep-python-native", "sidestep-pond-python", "xtask"];
 
 /// Returns the units that cargo would compile for a choice of crates: the name of the package by the identity.
 fn units(choice: &[&str]) -> BTreeMap<u64, String> {

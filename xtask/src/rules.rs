@@ -12,7 +12,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
     ("foxglove", &["sidestep-record"]),
     ("arrow-array", &["sidestep-python"]),
     ("clap", &["sidestep-cli"]),
-    ("pyo3", &["sidestep-python"]),
+    ("pyo3", &["sidestep-python", "sidestep-python-native", "sidestep-pond-python"]),
     ("axum", &["sidestep-server"]),
     ("tokio", &["sidestep-server", "sidestep-workspace-hack"]),
     ("zenoh", &["sidestep-link"]),
@@ -22,13 +22,15 @@ const RESERVED: [(&str, &[&str]); 9] = [
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that depend on a world, through others too. All else takes worlds as an argument, or needs none.
-const KNOWS_WORLDS: [&str; 6] = [
+const KNOWS_WORLDS: [&str; 8] = [
     "sidestep",
     "sidestep-cli",
     "sidestep-fuzz",
     "sidestep-link",
     "sidestep-papers",
+    "sidestep-pond-python",
     "sidestep-python",
+    "sidestep-python-native",
 ];
 
 fn packages() -> Vec<Package> {

@@ -30,6 +30,14 @@ const HOT: [&str; 9] = [
     "sidestep-rods",
 ];
 
+/// Crates without tests in Rust: the Python package is tested from Python, and the crate of features has nothing to test.
+const UNTESTED: [&str; 4] = [
+    "sidestep-pond-python",
+    "sidestep-python",
+    "sidestep-python-native",
+    "sidestep-workspace-hack",
+];
+
 /// Programs with tests beside their code: each other program would be compiled for nothing, with its library.
 /// `.ci/soak` runs all of them with checks.
 const TESTED_PROGRAMS: [&str; 4] = ["--bin", "sidestep-fuzz", "--bin", "xtask"];
@@ -83,8 +91,7 @@ fn with_checks() -> Vec<&'static str> {
 fn beside() -> Vec<&'static str> {
     let mut words = vec!["--workspace", "--lib"];
     words.extend(TESTED_PROGRAMS);
-    // The Python package is tested from Python, and the crate of features has nothing to test.
-    for name in HOT.into_iter().chain(["sidestep-python", "sidestep-workspace-hack"]) {
+    for name in HOT.into_iter().chain(UNTESTED) {
         words.extend(["--exclude", name]);
     }
     words

@@ -75,10 +75,11 @@ pub const HEADINGS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 /// Names of the headings, by number.
 pub const HEADING_NAMES: [&str; 4] = ["east", "north", "west", "south"];
 
-/// Largest number of steps of a path.
+/// Largest number of steps of a path. A body claims all boxes that its paths may sweep, and a map is padded by as
+/// many rings of wall, so a bound keeps conflicts local.
 pub const MAX_PATH_STEPS: usize = 16;
 
-/// One way an action may end, in free space.
+/// One possible end of an action, in free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Probability of the transition.
@@ -87,6 +88,12 @@ pub struct Transition {
     pub path: Vec<Side>,
     /// Quarter turns to the left, 0 to 3, made after the path.
     pub turn: u8,
+}
+
+impl Transition {
+    fn certain(path: Vec<Side>, turn: u8) -> Self {
+        Self { p: 1.0, path, turn }
+    }
 }
 
 /// An effector type as data: for each action its transitions, the intended one first.
@@ -103,15 +110,14 @@ pub struct EffectorModel {
 impl EffectorModel {
     /// Returns an effector that never errs: one box ahead, quarter turns, nothing.
     pub fn perfect() -> Self {
-        let only = |path: Vec<Side>, turn| vec![Transition { p: 1.0, path, turn }];
         Self {
             name: "perfect".into(),
             actions: STANDARD_ACTIONS.map(String::from).to_vec(),
             transitions: vec![
-                only(vec![Side::Front], 0),
-                only(vec![], 1),
-                only(vec![], 3),
-                only(vec![], 0),
+                vec![Transition::certain(vec![Side::Front], 0)],
+                vec![Transition::certain(vec![], 1)],
+                vec![Transition::certain(vec![], 3)],
+                vec![Transition::certain(vec![], 0)],
             ],
         }
     }
@@ -124,7 +130,11 @@ impl EffectorModel {
     /// Returns the transitions of an action; only the intended one where `reliable`.
     pub fn transitions_of(&self, action: ActionId, reliable: bool) -> Vec<Transition> {
         let all = &self.transitions[usize::from(action)];
-        if reliable { vec![Transition { p: 1.0, ..all[0].clone() }] } else { all.clone() }
+        if !reliable {
+            return all.clone();
+        }
+        // The intended transition, also where it has the probability 0.
+        vec![Transition { p: 1.0, ..all[0].clone() }]
     }
 }
 

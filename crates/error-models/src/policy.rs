@@ -3,7 +3,7 @@
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STANDARD_ACTIONS};
 use sidestep_kernel::distr::{Categorical, RowError};
 
-/// Draws each action from fixed probabilities: one row while the way is free, another after a
+/// Draws each action from fixed probabilities: one row while nothing blocks, another after a
 /// contact. It has no memory and asks for nothing else that a robot perceives, so a robot alone in a
 /// building is a Markov chain over its poses.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,9 +81,11 @@ impl ActionDistribution {
 
     /// Returns equal shares for `actions`.
     fn uniform_over(actions: &[ActionId]) -> Self {
-        let longest = actions.iter().max().map_or(0, |&a| usize::from(a) + 1);
-        let mut row = vec![0.0; longest.max(STANDARD_ACTIONS.len())];
-        actions.iter().for_each(|&a| row[usize::from(a)] = 1.0 / actions.len() as f64);
+        let last = actions.iter().max().map_or(0, |&action| usize::from(action) + 1);
+        let mut row = vec![0.0; last.max(STANDARD_ACTIONS.len())];
+        for &action in actions {
+            row[usize::from(action)] = 1.0 / actions.len() as f64;
+        }
         Self::new(row).expect("equal shares of 1 are a distribution")
     }
 }

@@ -35,7 +35,8 @@ pub fn reaches(distance: f64, limit: f64) -> bool {
 /// line between boxes (even sizes, multiples of 90 degrees) counts as running on the left
 /// side of it, seen along the beam.
 pub fn crossings(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
-    // The first octant-exact direction: quarter turns are done on integers.
+    // Quarter turns are made on integers, because a sine of a right angle is not exact and would let a beam along
+    // an axis drift into the next row of boxes.
     let quarter = (bearing_deg / 90.0).floor();
     let rest_deg = bearing_deg - 90.0 * quarter;
     let along = first_quadrant(size, rest_deg, range);
@@ -59,6 +60,7 @@ pub fn turn_crossing(c: Crossing, size: u32, turns: u8) -> Crossing {
 fn first_quadrant(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
     let (ux, uy) = direction(bearing_deg);
     let center = f64::from(size) / 2.0;
+    // Where the beam leaves the body: at the side that it reaches first.
     let exit = (center / ux.max(uy)).min(f64::INFINITY);
     // Start in the box at the center; on a line, in the box north of it, to the left of an eastward
     // beam.
@@ -68,6 +70,7 @@ fn first_quadrant(size: u32, bearing_deg: f64, range: f64) -> Vec<Crossing> {
         let to_col = boundary(f64::from(col + 1), center, ux);
         let to_row = boundary(f64::from(row + 1), center, uy);
         let at = to_col.min(to_row);
+        // Both, where the beam goes through a corner.
         if to_col <= at + EPSILON {
             col += 1;
         }

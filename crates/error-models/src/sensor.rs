@@ -50,8 +50,8 @@ impl SensorModel {
     /// Returns the class of a distance in boxes of side `box_size_m`. A distance equal to an edge is
     /// in the upper class.
     pub fn class_of(&self, distance: f64, box_size_m: f64) -> u8 {
-        let is_beyond = |&&edge_m: &&f64| reaches(distance, edge_m / box_size_m);
-        self.distance_edges_m.iter().filter(is_beyond).count() as u8
+        let edges_m = self.distance_edges_m.iter();
+        edges_m.filter(|&&edge_m| reaches(distance, edge_m / box_size_m)).count() as u8
     }
 
     /// Returns the class that stands for "nothing in range".
@@ -59,8 +59,7 @@ impl SensorModel {
         self.distance_classes.len() as u8
     }
 
-    /// Returns `P(reported
-    /// true)` over all readings, or the certain reading where `reliable`.
+    /// Returns `P(reported | true)` over all readings, or the certain reading where `reliable`.
     ///
     /// A spurious report of something where there is nothing draws its class from the row
     /// `beyond`; a missed report has class `beyond`.
@@ -70,6 +69,7 @@ impl SensorModel {
         }
         let seen = &self.confusion[usize::from(truth.class)][usize::from(truth.observation)];
         let classes = &self.distance_confusion[usize::from(truth.class)];
+        // All reports of nothing are one reading: there is no class to draw.
         let mut row = vec![(self.nothing(), seen[0])];
         for (observation, &p) in seen.iter().enumerate().skip(1) {
             for (class, &q) in classes.iter().enumerate() {

@@ -8,7 +8,7 @@ use crate::faults::FaultyChannel;
 use crate::protocol::CycleStart;
 use crate::recent_senders::{RecentSenders, drop_counts};
 use sidestep::kernel::network::NetworkAgent;
-use sidestep::kernel::{Cycle, EntityId, Simulation};
+use sidestep::kernel::{Cycle, EntityId, Simulation, World};
 use sidestep::worlds::airspace::pilot::{Percept, Pilot};
 use sidestep::worlds::airspace::settings::Deployment;
 use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld, Fleet};
@@ -51,14 +51,13 @@ impl DistributedWorld for DistributedAirspace {
     }
 
     fn name(&self, agent: EntityId) -> AgentName {
-        AgentName::Airplane(agent)
+        AgentName::new(AirspaceWorld::AGENT, agent, None)
     }
 
-    fn id(&self, name: AgentName) -> Option<EntityId> {
-        match name {
-            AgentName::Airplane(id) => Some(id).filter(|&id| (id as usize) < self.count()),
-            AgentName::Connector { .. } => None,
-        }
+    fn id(&self, name: &AgentName) -> Option<EntityId> {
+        let id = name.number;
+        let exists = (id as usize) < self.count() && *name == self.name(id);
+        exists.then_some(id)
     }
 
     fn cycle_s(&self) -> f64 {

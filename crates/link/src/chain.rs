@@ -61,6 +61,9 @@ impl<const D: usize> DistributedChains<D> {
     }
 }
 
+/// The noun for an agent of a fleet: each connector of a chain has a process of its own.
+const CONNECTOR: &str = "connector";
+
 impl<const D: usize> DistributedWorld for DistributedChains<D> {
     fn count(&self) -> usize {
         // Chains are numbered from 0 on; one that does not exist has no connectors.
@@ -70,14 +73,14 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
 
     fn name(&self, agent: EntityId) -> AgentName {
         let (chain, connector) = self.chain_and_number(agent);
-        AgentName::Connector { chain, connector }
+        AgentName::new(CONNECTOR, chain, Some(connector))
     }
 
-    fn id(&self, name: AgentName) -> Option<EntityId> {
-        match name {
-            AgentName::Connector { chain, connector } => self.world.connector_id(chain, connector),
-            AgentName::Airplane(_) => None,
+    fn id(&self, name: &AgentName) -> Option<EntityId> {
+        if name.noun != CONNECTOR {
+            return None;
         }
+        self.world.connector_id(name.number, name.part?)
     }
 
     fn cycle_s(&self) -> f64 {

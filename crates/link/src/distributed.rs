@@ -13,7 +13,7 @@ pub trait DistributedWorld: Send + Sync {
     fn name(&self, agent: EntityId) -> AgentName;
 
     /// Returns the id of a named agent; none if there is no such agent.
-    fn id(&self, name: AgentName) -> Option<EntityId>;
+    fn id(&self, name: &AgentName) -> Option<EntityId>;
 
     /// Duration of a cycle, in seconds of the scenario.
     fn cycle_s(&self) -> f64;
@@ -71,9 +71,9 @@ pub trait DistributedWorld: Send + Sync {
     ///
     /// # Errors
     /// When there is no such agent.
-    fn find(&self, name: AgentName) -> Result<EntityId, InputError> {
+    fn find(&self, name: &AgentName) -> Result<EntityId, InputError> {
         self.id(name).ok_or_else(|| {
-            let cause = format!("the scenario has no {} {name}", name.noun());
+            let cause = format!("the scenario has no {} {name}", name.noun);
             InputError::new(name.option(), cause, self.agent_hint())
         })
     }

@@ -53,7 +53,7 @@ impl HostedRun {
     /// Returns the name of an agent for people, e.g. `airplane 3`.
     pub fn agent_label(&self, agent: EntityId) -> String {
         let name = self.world.name(agent);
-        format!("{} {name}", name.noun())
+        format!("{} {name}", name.noun)
     }
 
     /// Returns the present cycle: the one to be computed next.

@@ -90,6 +90,22 @@ impl Source {
         let key = last.map_or_else(|| path.to_string(), |part| part.name);
         self.error_at(path, format!("`{key}` does nothing {because}"), "leave it out")
     }
+
+    /// Refuses keys that have no effect in the section at a span, because their author expects something of
+    /// them. Each comes with whether it is given without effect; `because` is that of [`Self::unused_key`].
+    ///
+    /// # Errors
+    /// At the first such key.
+    pub fn refuse_unused_keys(
+        &self,
+        section: Range<usize>,
+        keys: &[(&str, bool)],
+        because: &str,
+    ) -> Result<(), InputError> {
+        let Some((key, _)) = keys.iter().find(|(_, is_unused)| *is_unused) else { return Ok(()) };
+        let span = self.key_span(section, &[key]);
+        Err(self.error(span, format!("`{key}` does nothing {because}"), "leave it out"))
+    }
 }
 
 fn keys_of(value: &Spanned<DeValue<'_>>) -> Vec<Key> {
@@ -209,6 +225,21 @@ mod tests {
         assert_eq!(value("many.0.x.\"c d\".1"), Some(7));
         assert_eq!((value("kinds.a.b.n"), value("kinds..n"), value("\"")), (None, None, None));
         assert_eq!(source.unused_key("kinds.\"a.b\"", "here").cause(), "`a.b` does nothing here");
+    }
+
+    #[test]
+    fn the_first_key_without_effect_is_refused_where_it_stands_in_its_section() {
+        let source = Source::new("s.toml", TEXT, "");
+        let start = TEXT.rfind("[[robots]]").expect("a section");
+        let second = start..start + "[[robots]]".len();
+        let keys = [("count", false), ("at", true), ("b", true)];
+        let refused = source.refuse_unused_keys(second.clone(), &keys, "beside `scen`");
+        let error = refused.expect_err("`at` is unused");
+        assert_eq!(
+            (error.position(), error.cause()),
+            (Some((5, 1)), "`at` does nothing beside `scen`")
+        );
+        assert!(source.refuse_unused_keys(second, &keys[..1], "beside `scen`").is_ok());
     }
 
     #[test]

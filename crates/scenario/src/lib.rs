@@ -7,10 +7,15 @@
 //! [`Point`]), errors of the TOML reader get cause and remedy (`explain.rs`), and a [`Bundle`]
 //! collects a scenario with all the files that it refers to. The same sections give JSON Schemas for
 //! editors and forms ([`schema`]).
+//!
+//! A world is a [`WorldType`]. With [`facts`] and [`editing`] it declares what programs ask of a world that they do not
+//! know: orders and rewards of learning agents, recorded positions, and the tools of the studio's page.
 
 mod bundle;
 mod edit;
+pub mod editing;
 mod explain;
+pub mod facts;
 pub mod file;
 mod keys;
 mod locate;
@@ -27,9 +32,13 @@ pub mod world_type;
 
 pub use bundle::{Bundle, ResolvedScenario, SeedTemplate};
 pub use edit::{CharEdit, Edit};
+pub use editing::Editing;
 pub use explain::suggestion;
+pub use facts::WorldFacts;
 pub use keys::Key;
 pub use metric_info::{MetricInfo, MetricLabel, metric_label};
+#[doc(hidden)]
+pub use metric_info::{phrase, phrase_len};
 pub use number::{
     AboveZero, AnyFinite, AtLeastZero, Closed, Fraction, Integer, Interval, LeftOpen, NonNegative,
     Number, NumberRange, Open, Point, Positive, RightOpen, Rule, invalid_value,

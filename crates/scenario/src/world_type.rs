@@ -1,6 +1,6 @@
 //! The interface of a world for programs that run scenarios without knowing any world.
 
-use crate::{MetricInfo, Remark, ResolvedScenario, Source, suggestion};
+use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
@@ -45,6 +45,16 @@ pub trait WorldType: Send + Sync {
     /// Its metrics in words. Reports make words from the names of metrics that are not listed.
     fn metric_infos(&self) -> &'static [MetricInfo] {
         &[]
+    }
+
+    /// Facts for programs that control, plot and learn from its runs.
+    fn facts(&self) -> WorldFacts {
+        WorldFacts::default()
+    }
+
+    /// The editing of its scenarios on the canvas of the studio's page.
+    fn editing(&self) -> Editing {
+        Editing::default()
     }
 
     /// Translates a file of another program into a scenario; `None` for files that this world does

@@ -284,16 +284,17 @@ impl SocketSessions {
     }
 }
 
-/// Returns the schema of a world's scenarios.
+/// Returns the schema of a world's scenarios, and the tools that edit them.
 ///
 /// # Errors
 /// When there is no such world.
-fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
-    let schema = worlds.schema(Some(world)).ok_or_else(|| {
+pub(crate) fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
+    let world_type = worlds.find(world).ok_or_else(|| {
         let names = worlds.names().join(", ");
         Problem::new(world, "no such world", format!("give one of {names}"))
     })?;
-    Ok(ReplyBody::Schema { schema })
+    let schema = sidestep_scenario::schema::for_world(world_type);
+    Ok(ReplyBody::Schema { schema, editing: world_type.editing() })
 }
 
 /// Answers a request with the result of `work`, if there is one, and with a problem if it panics.

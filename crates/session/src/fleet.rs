@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::text::KeyValues;
 use sidestep_kernel::view::{Frame, Scenery};
 use sidestep_kernel::{Cycle, EntityId, InputError};
+use std::borrow::Cow;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -26,49 +27,34 @@ pub enum Job {
     Watch(WatchJob),
 }
 
-/// The name of an agent, in the form used by people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum AgentName {
-    /// An airplane, by its id.
-    Airplane(EntityId),
-    /// A connector of a chain.
-    Connector {
-        /// The chain, by its id.
-        chain: EntityId,
-        /// Its number in the chain.
-        connector: u32,
-    },
+/// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AgentName {
+    /// The noun for such an agent.
+    pub noun: Cow<'static, str>,
+    /// The number of its visible body.
+    pub number: EntityId,
+    /// The part of that body that the agent is, if it is a part.
+    pub part: Option<u32>,
 }
 
 impl AgentName {
-    /// Returns the noun for such an agent.
-    pub fn noun(self) -> &'static str {
-        match self {
-            Self::Airplane(_) => "airplane",
-            Self::Connector { .. } => "connector",
-        }
+    /// Returns the name of an agent that is a body, or a part of one.
+    pub fn new(noun: impl Into<Cow<'static, str>>, number: EntityId, part: Option<u32>) -> Self {
+        Self { noun: noun.into(), number, part }
     }
 
-    /// Returns the number of its visible body, and the part of the body that it is, if it is a part.
-    pub fn body(self) -> (EntityId, Option<u32>) {
-        match self {
-            Self::Airplane(id) => (id, None),
-            Self::Connector { chain, connector } => (chain, Some(connector)),
-        }
-    }
-
-    /// Returns the option that names it.
-    pub fn option(self) -> String {
-        format!("--{} {self}", self.noun())
+    /// Returns the option of the command that selects it.
+    pub fn option(&self) -> String {
+        format!("--{} {self}", self.noun)
     }
 }
 
 impl fmt::Display for AgentName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Airplane(id) => write!(f, "{id}"),
-            Self::Connector { chain, connector } => write!(f, "{chain}.{connector}"),
+        match self.part {
+            None => write!(f, "{}", self.number),
+            Some(part) => write!(f, "{}.{part}", self.number),
         }
     }
 }
@@ -231,7 +217,7 @@ pub struct FleetScene {
     pub build: String,
     /// The world's name.
     pub world: String,
-    /// The noun for an agent, e.g. `airplane`.
+    /// The noun for an agent.
     pub agent: String,
     /// The seed of the run.
     pub seed: u64,
@@ -270,7 +256,7 @@ pub struct FleetStatus {
     pub talk_p50_ms: Option<f64>,
     /// The time in milliseconds below which 99 of 100 of them are.
     pub talk_p99_ms: Option<f64>,
-    /// The noun for an agent, e.g. `airplane`.
+    /// The noun for an agent.
     pub noun: String,
     /// Names of the agents for which all wait, because their nodes are not heard.
     pub waits_for: Vec<String>,
@@ -283,11 +269,11 @@ pub struct FleetStatus {
 pub struct NodeStatus {
     /// Its agent, by its id on the network.
     pub agent: EntityId,
-    /// The name of its agent, e.g. `3`, or `0.3` for connector 3 of chain 0.
+    /// The name of its agent, e.g. `3`, or `0.3` for part 3 of body 0.
     pub name: String,
-    /// The number of its agent's visible body: of the airplane, or of the chain.
+    /// The number of its agent's visible body.
     pub number: EntityId,
-    /// The part of that body that the agent is, if it is a part: the number of the connector.
+    /// The part of that body that the agent is, if it is a part.
     pub part: Option<u32>,
     /// A word for its state: `awaited`, `joined`, `gone`, `silent` if it was not heard for a second, or its part in
     /// the cycle.

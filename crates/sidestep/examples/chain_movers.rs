@@ -10,7 +10,7 @@ use sidestep::rods::geometry::{Bounds, Point, add_scaled, distance, dot, normali
 use sidestep::rods::{
     Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, Rules,
 };
-use sidestep::worlds::chain::{EscapeMethod, EscapePlan, EscapeRules, Escaper};
+use sidestep::worlds::chain::{EscapeMethod, EscapePlan, EscapeRules, EscapeTick, Escaper};
 use std::f64::consts::TAU;
 
 const DT_S: f64 = 0.02;
@@ -199,10 +199,12 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
         }
         if cell.reaction != Reaction::None {
             let escaped = escaper.escape(
-                &mut chain,
-                &obstacles,
-                &mut propagator,
-                &start,
+                EscapeTick {
+                    chain: &mut chain,
+                    obstacles: &obstacles,
+                    propagator: &mut propagator,
+                    start: &start,
+                },
                 &mut EscapePlan::default(),
             )?;
             tally.capped += escaped.capped;

@@ -1,7 +1,7 @@
 """Environments for reinforcement learning, from any scenario whose agents take orders.
 
-PettingZoo's ``ParallelEnv`` (``Robots``, ``Chain``, ``Airspace``; also modules such as ``robots_v0``), many worlds at once as
-arrays (``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` for one agent.
+PettingZoo's ``ParallelEnv``, of which each world has a class (such as ``Robots``) and a module (such as ``robots_v0``), many
+worlds at once as arrays (``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` for one agent.
 
 Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
 
@@ -24,24 +24,47 @@ try:
 except ImportError as error:
     raise ImportError("environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'") from error
 
+import sys as _sys
+from typing import Any as _Any
+
 from ._batch import Batch, VectorEnv
-from ._parallel import Airspace, Chain, ParallelEnv, Robots, parallel_env
+from ._parallel import ENVIRONMENTS, ParallelEnv, parallel_env
 from ._rewards import DEFAULTS, TERMS, Reward, Term
 from ._single import Env
+from ._versions import versioned_module as _versioned_module
 
 __all__ = [
     "DEFAULTS",
+    "ENVIRONMENTS",
     "TERMS",
-    "Airspace",
     "Batch",
-    "Chain",
     "Env",
     "ParallelEnv",
     "Reward",
-    "Robots",
     "Term",
     "VectorEnv",
     "parallel_env",
 ]
 
-del _gymnasium, _pettingzoo
+# The classes and modules of worlds, by their names. A module is known to Python's `import` as well.
+_of_worlds: dict[str, _Any] = {}
+for _environment in ENVIRONMENTS.values():
+    _module = _versioned_module(_environment)
+    _of_worlds[_environment.__name__] = _environment
+    _of_worlds[_environment.metadata["name"]] = _sys.modules[_module.__name__] = _module
+__all__ += sorted(_of_worlds)
+
+
+def __getattr__(name: str) -> _Any:
+    """Returns the class or the module of a world: type checkers do not know which worlds there are."""
+    try:
+        return _of_worlds[name]
+    except KeyError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_of_worlds})
+
+
+del _environment, _gymnasium, _module, _pettingzoo

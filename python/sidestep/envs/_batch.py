@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from .._errors import input_error
 from .._native import Batch as Worlds
-from .._native import Scenario
+from .._native import Scenario, world_facts
 from ._parallel import (
     MAX_SEED,
-    NOUNS,
-    ORDERS,
     action_space,
     orders_of,
     rewards_of,
@@ -77,10 +75,10 @@ class Batch:
         self._number = self._acting_team(team)
         acting = self.worlds.teams[self._number]
         world = self.scenario.world
-        names = [ORDERS[world]] if orders is None else orders
-        self._orders = orders_of(acting, [names] if isinstance(names, str) else names)
+        noun = world_facts(world)["agent"]
+        self._orders = orders_of(acting, world, orders)
         self._reward = rewards_of(acting, world, rewards)
-        self.agents = [f"{NOUNS[world]}_{agent}" for agent in acting.agents]
+        self.agents = [f"{noun}_{agent}" for agent in acting.agents]
         self.single_observation_space = spaces.Dict(
             {space.name: space_of(space) for space in acting.observation_spaces}
         )

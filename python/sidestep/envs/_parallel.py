@@ -12,15 +12,12 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from .._errors import input_error
-from .._native import Scenario, Simulation, Space, Team, rows_by_name
+from .._native import Scenario, Simulation, Space, Team, rows_by_name, world_facts, worlds
 from ._rewards import DEFAULTS, Reward, combine_rewards, compute_rewards
 
 MAX_INT64 = np.iinfo(np.int64).max
 # Seeds of episodes are below this.
 MAX_SEED = 2**62
-# The default order of an action: one in which every value within its bounds is valid.
-ORDERS = {"robots": "action", "chain": "to_m", "airspace": "turn_rate_rad_s"}
-NOUNS = {"robots": "robot", "chain": "chain", "airspace": "airplane"}
 
 
 def space_of(space: Space) -> spaces.Space[Any]:
@@ -56,7 +53,7 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         rewards: weights of named terms (``sidestep.envs.TERMS``), or a function of a team's observations before and
             after a step, which returns a number for each agent.
         orders: names of the orders in an action. With one of them the action is that order itself; with several it
-            is a dict. By default the action of a robot, the target position of a chain, the turn rate of an airplane.
+            is a dict. By default the order that the world declares for it: the action of a robot, for example.
         max_cycles: cycles of an episode; the scenario's own by default. An episode that reaches them is
             *truncated*; one that has finished early is *terminated*.
         render_mode: ``"rgb_array"`` or None.
@@ -108,15 +105,14 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             remedy = "let its agents be controlled externally (`external`)"
             raise input_error("scenario", "no agent of this scenario takes orders", remedy)
         world = self.scenario.world
-        names = [ORDERS[world]] if orders is None else orders
-        names = [names] if isinstance(names, str) else names
-        self._orders = [orders_of(team, names) for _, team in self._teams]
+        noun = world_facts(world)["agent"]
+        self._orders = [orders_of(team, world, orders) for _, team in self._teams]
         self._order_names = [[space.name for space in chosen] for chosen in self._orders]
         self._rewards = [rewards_of(team, world, rewards) for _, team in self._teams]
         self._columns = [
             [(space.name, space.dtype == "float64") for space in team.observation_spaces] for _, team in self._teams
         ]
-        self._names = [[f"{NOUNS[world]}_{agent}" for agent in team.agents] for _, team in self._teams]
+        self._names = [[f"{noun}_{agent}" for agent in team.agents] for _, team in self._teams]
         self.possible_agents = [name for names in self._names for name in names]
         self.agents: list[str] = []
         # During an episode all of them act.
@@ -241,36 +237,38 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         return agents
 
 
-class Robots(ParallelEnv):
-    """Robots that take orders, as a PettingZoo environment: ``robots_v0``; see :class:`ParallelEnv`."""
+def _environment_of(world: str) -> type[ParallelEnv]:
+    """Makes the class of a world's environments, with the name that PettingZoo's users expect."""
+    name = "".join(part.capitalize() for part in world.split("_"))
+    versioned = f"{world}_v0"
+    members = {
+        "__doc__": f"The agents of the world ``{world}`` that take orders, as a PettingZoo environment: ``{versioned}``; "
+        "see :class:`ParallelEnv`.",
+        # By this name it is pickled.
+        "__module__": "sidestep.envs",
+        "world": world,
+        "metadata": {**ParallelEnv.metadata, "name": versioned},
+    }
+    return type(name, (ParallelEnv,), members)
 
-    world = "robots"
-    metadata = {**ParallelEnv.metadata, "name": "robots_v0"}
 
-
-class Chain(ParallelEnv):
-    """Chains that take orders, as a PettingZoo environment: ``chain_v0``; see :class:`ParallelEnv`."""
-
-    world = "chain"
-    metadata = {**ParallelEnv.metadata, "name": "chain_v0"}
-
-
-class Airspace(ParallelEnv):
-    """Airplanes that take orders, as a PettingZoo environment: ``airspace_v0``; see :class:`ParallelEnv`."""
-
-    world = "airspace"
-    metadata = {**ParallelEnv.metadata, "name": "airspace_v0"}
+#: The class of each world's environments.
+ENVIRONMENTS: dict[str, type[ParallelEnv]] = {world: _environment_of(world) for world in worlds()}
 
 
 def parallel_env(scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any) -> ParallelEnv:
-    """Returns the environment of the scenario's world: :class:`Robots`, :class:`Chain` or :class:`Airspace`."""
+    """Returns the environment of the scenario's world, e.g. ``Robots``."""
     scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
-    of_world = next(one for one in (Robots, Chain, Airspace) if one.world == scenario.world)
-    return of_world(scenario, **options)
+    return ENVIRONMENTS[scenario.world](scenario, **options)
 
 
-def orders_of(team: Team, orders: Sequence[str]) -> list[Space]:
-    """Returns the spaces of the named orders of a team."""
+def orders_of(team: Team, world: str, orders: Sequence[str] | str | None) -> list[Space]:
+    """Returns the spaces of the named orders of a team; by default that of the order that its world declares."""
+    if isinstance(orders, str):
+        orders = [orders]
+    if orders is None:
+        # A world without a default has its most plain order first.
+        orders = [world_facts(world)["default_order"] or team.action_spaces[0].name]
     known = {space.name: space for space in team.action_spaces}
     unknown = [order for order in orders if order not in known]
     if unknown or not orders:

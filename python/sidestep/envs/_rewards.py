@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import InputError, input_error
-
-#: An airplane without a way-point reports one beyond this distance.
-MIN_NO_WAY_POINT_M = 1e11
+from .._native import world_facts, worlds
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -21,49 +19,65 @@ Reward = Callable[[Arrays, Arrays], NDArray[Any]]
 """A term: from a team's observations before and after a step to a number for each agent."""
 
 
-def _contact(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["contact"] > 0)
+def _value(observation: str) -> Reward:
+    return lambda before, after: after[observation]
 
 
-def _moved(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1))
+def _positive(observation: str) -> Reward:
+    return lambda before, after: np.asarray(after[observation] > 0)
 
 
-def _turned(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["heading"] != before["heading"])
+def _changed(observation: str) -> Reward:
+    return lambda before, after: np.asarray(after[observation] != before[observation])
 
 
-def _veto(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.asarray(after["veto"] > 0)
+def _distance(observation: str) -> Reward:
+    return lambda before, after: np.asarray(np.abs(after[observation] - before[observation]).sum(axis=1))
 
 
-def _done(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return after["done_share"]
+def _increase(observation: str, active: str) -> Reward:
+    def increase(before: Arrays, after: Arrays) -> NDArray[Any]:
+        return np.where(_acts(before, after, active), after[observation] - before[observation], 0.0)
+
+    return increase
 
 
-def _nearer(before: Arrays, after: Arrays) -> NDArray[Any]:
-    was_m = np.linalg.norm(before["way_point_m"], axis=1)
-    is_m = np.linalg.norm(after["way_point_m"], axis=1)
-    # After reaching a way-point, an airplane observes the next one, at an unrelated distance.
-    is_there = after["way_points_left"] < before["way_points_left"]
-    # An airplane that keeps a heading has no way-point.
-    has_one = (was_m < MIN_NO_WAY_POINT_M) & (is_m < MIN_NO_WAY_POINT_M) & _flies(before, after)
-    return np.where(has_one, np.where(is_there, was_m, was_m - is_m), 0.0)
+def _approach(target: str, targets_left: str, active: str, none_beyond_m: float) -> Reward:
+    def approach(before: Arrays, after: Arrays) -> NDArray[Any]:
+        was_m = np.linalg.norm(before[target], axis=1)
+        is_m = np.linalg.norm(after[target], axis=1)
+        # After reaching a target, an agent observes the next one, at an unrelated distance.
+        is_there = after[targets_left] < before[targets_left]
+        has_one = (was_m < none_beyond_m) & (is_m < none_beyond_m) & _acts(before, after, active)
+        return np.where(has_one, np.where(is_there, was_m, was_m - is_m), 0.0)
+
+    return approach
 
 
-def _separation(before: Arrays, after: Arrays) -> NDArray[Any]:
-    distance_m = np.linalg.norm(after["neighbor_place_m"], axis=2)
-    is_near = (after["neighbor_id"] >= 0) & (distance_m < after["neighbor_separation_m"])
-    return np.asarray(is_near.sum(axis=1))
+def _near(positions: str, ids: str, separations: str) -> Reward:
+    def near(before: Arrays, after: Arrays) -> NDArray[Any]:
+        distance_m = np.linalg.norm(after[positions], axis=2)
+        is_near = (after[ids] >= 0) & (distance_m < after[separations])
+        return np.asarray(is_near.sum(axis=1))
+
+    return near
 
 
-def _delay(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.where(_flies(before, after), after["delay_s"] - before["delay_s"], 0.0)
+def _acts(before: Arrays, after: Arrays, active: str) -> NDArray[Any]:
+    """Returns where observations before and after are real: not the padding of agents that do not act yet, or no more."""
+    return (before[active] > 0) & (after[active] > 0)
 
 
-def _flies(before: Arrays, after: Arrays) -> NDArray[Any]:
-    """Returns where observations before and after are real: not the padding of future or landed airplanes."""
-    return (before["due"] > 0) & (after["due"] > 0)
+#: The measures of terms, by the names by which worlds declare them.
+_MEASURES: dict[str, Callable[..., Reward]] = {
+    "value": _value,
+    "positive": _positive,
+    "changed": _changed,
+    "distance": _distance,
+    "increase": _increase,
+    "approach": _approach,
+    "near": _near,
+}
 
 
 @dataclass(frozen=True)
@@ -76,33 +90,36 @@ class Term:
     forms: tuple[tuple[Reward, frozenset[str]], ...]
 
 
-def _term(meaning: str, *forms: tuple[Reward, str]) -> Term:
-    return Term(meaning, tuple((form, frozenset(needs.split())) for form, needs in forms))
+def _form(measure: Mapping[str, Any]) -> tuple[Reward, frozenset[str]]:
+    """Returns the function of a declared measure, and the observations that it needs: all of its words."""
+    arguments = {name: value for name, value in measure.items() if name != "kind"}
+    needs = frozenset(value for value in arguments.values() if isinstance(value, str))
+    return _MEASURES[measure["kind"]](**arguments), needs
 
 
-TERMS: dict[str, Term] = {
-    "contact": _term("1 where the last action was stopped", (_contact, "contact")),
-    "moved": _term("boxes moved", (_moved, "at_boxes")),
-    "turned": _term("1 where the heading changed", (_turned, "heading")),
-    "veto": _term("1 where a part of the chain vetoed", (_veto, "veto")),
-    "progress": _term(
-        "chain: fraction of the ordered motion that was carried out; airplane: meters closer to its way-point",
-        (_done, "done_share"),
-        (_nearer, "way_point_m way_points_left due"),
-    ),
-    "separation": _term(
-        "number of observed neighbors closer than the separation",
-        (_separation, "neighbor_place_m neighbor_id neighbor_separation_m"),
-    ),
-    "delay": _term("seconds of additional delay at arrival", (_delay, "delay_s due")),
-}
+def _declared_terms() -> dict[str, Term]:
+    """Returns the terms of all worlds. One that several worlds have says what it measures in each."""
+    declared: dict[str, list[tuple[str, Mapping[str, Any]]]] = {}
+    for world in worlds():
+        facts = world_facts(world)
+        for term in facts["reward_terms"]:
+            declared.setdefault(term["name"], []).append((facts["agent"], term))
+    terms = {}
+    for name, alike in declared.items():
+        meanings = [term["meaning"] if len(alike) == 1 else f"{agent}: {term['meaning']}" for agent, term in alike]
+        terms[name] = Term("; ".join(meanings), tuple(_form(term["measure"]) for _, term in alike))
+    return terms
+
+
+def _default_weights(world: str) -> dict[str, float]:
+    terms = world_facts(world)["reward_terms"]
+    return {term["name"]: term["default_weight"] for term in terms if term["default_weight"] != 0}
+
+
+TERMS: dict[str, Term] = _declared_terms()
 """The named terms."""
 
-DEFAULTS: dict[str, dict[str, float]] = {
-    "robots": {"contact": -1.0},
-    "chain": {"veto": -1.0, "progress": 0.1},
-    "airspace": {"separation": -1.0, "delay": -0.01},
-}
+DEFAULTS: dict[str, dict[str, float]] = {world: _default_weights(world) for world in worlds()}
 """The default weights of each world."""
 
 

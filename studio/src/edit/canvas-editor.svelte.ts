@@ -48,18 +48,18 @@ export class CanvasEditor {
   }
 
   readonly map = $derived.by(() =>
-    this.session.scene.world === "robots" ? AsciiMap.fromModel(this.draft.model) : null,
+    this.session.run.scene.world === "robots" ? AsciiMap.fromModel(this.draft.model) : null,
   );
-  readonly ground = $derived.by((): GridPlacement | null => placementOf(this.map, this.session.scene.floor));
+  readonly ground = $derived.by((): GridPlacement | null => placementOf(this.map, this.session.run.scene.floor));
   readonly items = $derived.by((): Item[] => this.#items());
   readonly selected = $derived.by(() => this.items.find(({ path }) => isSame(path, this.draft.selected)) ?? null);
   readonly tools = $derived.by((): Tool[] =>
-    toolsOf(this.session.scene).filter((tool) => this.map !== null || !tool.paints),
+    toolsOf(this.session.run.scene).filter((tool) => this.map !== null || !tool.paints),
   );
   readonly restriction = $derived.by(() => {
     const model = this.draft.model ?? {};
     const has = (path: Path): boolean => valueAt(model, path) !== undefined;
-    return restrictionOn(this.session.scene, this.map, {
+    return restrictionOn(this.session.run.scene, this.map, {
       file: has(["map", "file"]),
       office: has(["map", "office"]),
       airplanes: has(["airplanes"]),
@@ -67,7 +67,7 @@ export class CanvasEditor {
   });
   /** Returns whether the shown map can become a drawn one. */
   readonly canInlineMap = $derived.by(() => {
-    const { world, floor } = this.session.scene;
+    const { world, floor } = this.session.run.scene;
     return (
       world === "robots" &&
       this.map === null &&
@@ -79,7 +79,7 @@ export class CanvasEditor {
 
   #items(): Item[] {
     const { model } = this.draft;
-    const { world, dimensions } = this.session.scene;
+    const { world, dimensions } = this.session.run.scene;
     if (!model) return [];
     if (world === "chain") return chainItems(model, this.m_per_px, dimensions === 3 ? 3 : 2);
     if (dimensions !== 2) return [];
@@ -206,7 +206,7 @@ export class CanvasEditor {
 
   /** Writes the shown map into the text, with the doors of a generated office, so that it can be edited. */
   inlineMap(): Promise<boolean> {
-    const { floor } = this.session.scene;
+    const { floor } = this.session.run.scene;
     const model = this.draft.model;
     if (!floor || !model || !this.canInlineMap) return Promise.resolve(false);
     const removed = ["office", "file", "resolution_m"].filter((key) => valueAt(model, ["map", key]) !== undefined);
@@ -238,7 +238,8 @@ export class CanvasEditor {
   }
 
   #doorsBySize(): Map<string, { at: number[][]; size: [number, number] }> {
-    const { bodies, frame, scene } = this.session;
+    const { bodies, newest: frame } = this.session.frames;
+    const { scene } = this.session.run;
     const bySize = new Map<string, { at: number[][]; size: [number, number] }>();
     const floor = scene.floor;
     if (!bodies || !frame || !floor) return bySize;
@@ -265,7 +266,7 @@ export class CanvasEditor {
   describePosition(to: Point3): string {
     const { ground, map } = this;
     const meters = (axis: string, value: number): string => `${axis} ${value.toPrecision(4)} m`;
-    const height = this.session.scene.dimensions === 3 ? `, ${meters("z", to[2])}` : "";
+    const height = this.session.run.scene.dimensions === 3 ? `, ${meters("z", to[2])}` : "";
     if (!ground) return `${meters("x", to[0])}, ${meters("y", to[1])}${height}`;
     const cell = cellOf(ground, to[0], to[1]);
     const char = map?.charAt(cell);

@@ -79,12 +79,12 @@ export class Draft {
 
   async #load(): Promise<void> {
     try {
-      const answer = await this.session.source();
+      const answer = await this.session.client.source();
       if (answer.is !== "source") return;
       this.place = answer.place;
       this.isLocked = answer.read_only;
       this.saved = answer.text;
-      this.#running = this.session.text ?? answer.text;
+      this.#running = this.session.run.text ?? answer.text;
       this.#history = new TextHistory(this.#running);
       this.#onTextChange(false);
       await Promise.all([this.#loadSchema(), this.#checkNow()]);
@@ -95,7 +95,7 @@ export class Draft {
 
   async #loadSchema(): Promise<void> {
     try {
-      const answer = await this.session.schema();
+      const answer = await this.session.client.schema(this.session.run.scene.world);
       if (answer.is === "schema" && isTable(answer.schema)) this.world = new WorldSchema(answer.schema);
     } catch (error) {
       // Without a schema the text can still be edited.
@@ -137,7 +137,7 @@ export class Draft {
     if (list.length === 0 || this.isLocked) return false;
     const before = this.text;
     try {
-      const answer = await this.session.request({ do: "edit", text: before, edits: [...list] });
+      const answer = await this.session.client.request({ do: "edit", text: before, edits: [...list] });
       if (answer.is !== "edited") return false;
       // Text typed meanwhile is kept: the edit is then repeated on it.
       if (this.text !== before) return await this.#edit(edits);
@@ -146,7 +146,7 @@ export class Draft {
       return true;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
-      this.session.reportProblem(error.problem);
+      this.session.client.reportProblem(error.problem);
       return false;
     }
   }
@@ -179,7 +179,7 @@ export class Draft {
     this.text = this.#history.now;
     this.canUndo = this.#history.canUndo;
     this.canRedo = this.#history.canRedo;
-    this.session.isUnsaved = this.isDirty;
+    this.session.run.isUnsaved = this.isDirty;
     if (!checks) return;
     this.phase = "checking";
     clearTimeout(this.#timer);
@@ -203,11 +203,11 @@ export class Draft {
     const { session } = this;
     this.phase = "checking";
     try {
-      const model = session.request({ do: "model", text }).catch((error: unknown) => {
+      const model = session.client.request({ do: "model", text }).catch((error: unknown) => {
         if (!(error instanceof RequestError)) throw error;
         return null;
       });
-      const [answer, read] = await Promise.all([session.check(text), model]);
+      const [answer, read] = await Promise.all([session.client.check(text), model]);
       if (number !== this.#checks) return;
       this.#onChecked(text, answer, read);
       if (this.isShown) await this.runIfValid();
@@ -259,7 +259,7 @@ export class Draft {
     await this.#queue;
     const { text } = this;
     const file = to ?? this.#file;
-    const answer = await this.session.send({ do: "save", text, to: file, base: this.saved, overwrite });
+    const answer = await this.session.client.send({ do: "save", text, to: file, base: this.saved, overwrite });
     if (answer?.is === "differs") {
       this.theirs = answer.text;
       this.#refusedFile = file;
@@ -270,7 +270,7 @@ export class Draft {
     this.saved = text;
     this.wasSaved = true;
     this.theirs = null;
-    this.session.isUnsaved = this.isDirty;
+    this.session.run.isUnsaved = this.isDirty;
     return true;
   }
 
@@ -287,7 +287,7 @@ export class Draft {
     this.saved = theirs;
     this.theirs = null;
     this.replace(theirs);
-    this.session.isUnsaved = this.isDirty;
+    this.session.run.isUnsaved = this.isDirty;
   }
 
   /** Problems at a path and, if `below`, under it. */

@@ -2,6 +2,7 @@
 
 import { bodyKey } from "../format";
 import type { Fleet, FleetNode, BodyId } from "../protocol";
+import type { Bodies } from "../state/bodies";
 
 /** Two agents by network number: the second hears the first. A mutual pair is one link. */
 export interface Link {
@@ -28,6 +29,18 @@ export function linksOf(fleet: Fleet, selected: number | null): Link[] {
     }
   }
   return links;
+}
+
+/** The links of a fleet by the indices of bodies; of the selected agent alone where one is. */
+export function linksBetweenBodies(fleet: Fleet, bodies: Pick<Bodies, "find">, selected: BodyId | null): Link[] {
+  const indexOfAgent = new Map(fleet.nodes.map((node) => [node.agent, bodies.find(node.body)]));
+  // A body that is no agent, such as an obstacle, has no links: all links stay visible.
+  const node = selected ? nodeOf(fleet, selected) : undefined;
+  return linksOf(fleet, node?.agent ?? null).flatMap((link) => {
+    const from = indexOfAgent.get(link.from);
+    const to = indexOfAgent.get(link.to);
+    return from === undefined || to === undefined ? [] : [{ from, to, isMutual: link.isMutual }];
+  });
 }
 
 /** Condition of a node: heard, late, or not connected. */

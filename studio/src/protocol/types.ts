@@ -375,7 +375,11 @@ text: string, } | { "is": "schema",
 /**
  * JSON Schema, draft 2020-12.
  */
-schema: unknown, };
+schema: unknown,
+/**
+ * The tools for the canvas, as `crates/scenario/src/editing.rs` has them.
+ */
+editing: unknown, };
 
 /**
  * An error as people read it: place, cause, remedy.

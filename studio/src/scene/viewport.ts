@@ -5,7 +5,7 @@ import type { Frame } from "../decode";
 import type { Inspection, Point3, Role, Scene, BodyId } from "../protocol";
 import type { Bodies } from "../state/bodies";
 import type { Link } from "../fleet/links";
-import type { TrailMode } from "../state/session.svelte";
+import type { TrailMode } from "../state/display.svelte";
 import { PlaneCamera, SpaceCamera, type Extent, type Camera } from "./camera";
 import { extentOf, flatRadiusOf } from "./extent";
 import { FloorLayer } from "./floor";

@@ -63,4 +63,10 @@ export class Bodies {
   find(id: BodyId): number | undefined {
     return this.#indexByKey.get(bodyKey(id));
   }
+
+  /** Returns whether a body exists here and is an agent. */
+  isAgent(id: BodyId): boolean {
+    const index = this.find(id);
+    return index !== undefined && this.table.is_agent[index] === true;
+  }
 }

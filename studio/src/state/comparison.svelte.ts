@@ -2,6 +2,7 @@
 
 import { withUnit } from "../format";
 import { bodyDifferences, firstDifference, type BodyDifference } from "./difference";
+import type { RunState } from "./run-state.svelte";
 import type { Session } from "./session.svelte";
 
 /** Maximum number of listed bodies. */
@@ -15,7 +16,7 @@ class ComparisonError extends Error {
 }
 
 /** The error of a run that cannot be compared. */
-function digestMissing({ scene, status }: Session): ComparisonError {
+function digestMissing({ scene, status }: RunState): ComparisonError {
   return new ComparisonError(
     `${scene.name} cannot be compared, as its states have no digests. ${status.banner ?? ""}`.trim(),
   );
@@ -31,17 +32,17 @@ export class Comparison {
   async find(a: Session, b: Session): Promise<void> {
     const round = ++this.#round;
     this.isRunning = true;
-    const last = Math.min(a.lastCycle, b.lastCycle);
+    const last = Math.min(a.run.lastCycle, b.run.lastCycle);
     const differs = async (cycle: number): Promise<boolean> => {
       if (round !== this.#round) throw new ComparisonError();
-      this.words = `Comparing ${a.scene.name} and ${b.scene.name} at cycle ${cycle}…`;
-      const [one, other] = await Promise.all([a.digestAt(cycle), b.digestAt(cycle)]);
+      this.words = `Comparing ${a.run.scene.name} and ${b.run.scene.name} at cycle ${cycle}…`;
+      const [one, other] = await Promise.all([a.playback.digestAt(cycle), b.playback.digestAt(cycle)]);
       if (!one || !other) throw new ComparisonError();
       for (const [session, { digest }] of [
         [a, one],
         [b, other],
       ] as const)
-        if (digest === null) throw digestMissing(session);
+        if (digest === null) throw digestMissing(session.run);
       return one.digest !== other.digest || one.cycle !== other.cycle;
     };
     try {
@@ -63,17 +64,25 @@ export class Comparison {
   }
 
   async #describe(a: Session, b: Session, cycle: number): Promise<string> {
-    const [one, other] = await Promise.all([a.frameAt(a.status.cycle), b.frameAt(b.status.cycle)]);
+    const [frameOfA, frameOfB] = await Promise.all([
+      a.frames.waitForCycle(a.run.status.cycle),
+      b.frames.waitForCycle(b.run.status.cycle),
+    ]);
+    const bodiesOfA = a.frames.bodies;
+    const bodiesOfB = b.frames.bodies;
     const where = cycle === 0 ? "They differ from the start" : `They differ from cycle ${cycle} on`;
-    if (!one || !other || !a.bodies || !b.bodies) return `${where}.`;
-    const differences = bodyDifferences({ bodies: a.bodies, frame: one }, { bodies: b.bodies, frame: other }, (m) =>
-      withUnit(m, "m"),
+    if (!frameOfA || !frameOfB || !bodiesOfA || !bodiesOfB) return `${where}.`;
+    const differences = bodyDifferences(
+      { bodies: bodiesOfA, frame: frameOfA },
+      { bodies: bodiesOfB, frame: frameOfB },
+      (m) => withUnit(m, "m"),
     );
     if (differences.length === 0) return `${where}: in state that is not visible, such as memory or counters.`;
     select(differences, a, b);
-    const listed = differences
-      .slice(0, MAX_LISTED)
-      .map(({ who, words }) => `${(a.bodies!.find(who) === undefined ? b : a).bodies!.nameOf(who)} ${words}`);
+    const listed = differences.slice(0, MAX_LISTED).map(({ who, words }) => {
+      const owner = bodiesOfA.find(who) === undefined ? bodiesOfB : bodiesOfA;
+      return `${owner.nameOf(who)} ${words}`;
+    });
     const more = differences.length > MAX_LISTED ? `, and ${differences.length - MAX_LISTED} more` : "";
     return `${where}: ${listed.join(", ")}${more}.`;
   }
@@ -81,11 +90,8 @@ export class Comparison {
 
 /** Selects the first agent that differs, in both. */
 function select(differences: BodyDifference[], a: Session, b: Session): void {
-  const agent = differences.find(({ who }) => {
-    const index = a.bodies?.find(who);
-    return index !== undefined && a.bodies?.table.is_agent[index];
-  });
+  const agent = differences.find(({ who }) => a.frames.bodies?.isAgent(who));
   if (!agent) return;
-  a.select(agent.who);
-  if (b.bodies?.find(agent.who) !== undefined) b.select(agent.who);
+  a.selection.select(agent.who);
+  if (b.frames.bodies?.find(agent.who) !== undefined) b.selection.select(agent.who);
 }

@@ -22,6 +22,8 @@ export class Events {
   list = $state.raw<RunEvent[]>([]);
   /** Kinds that have occurred, with their counts. */
   kinds = $state.raw<Map<string, number>>(new Map());
+  /** Kinds that lists, timeline and jumps leave out. */
+  hiddenKinds = $state.raw<ReadonlySet<string>>(new Set());
   leftOut = $state(0);
   /** All events before this cycle were fetched. */
   #fetchedUntil = 0;
@@ -99,9 +101,22 @@ export class Events {
     this.kinds = kinds;
   }
 
-  /** The first event after a cycle, or the last one before it, that passes a filter. */
-  neighbor(cycle: number, direction: 1 | -1, passes: (event: RunEvent) => boolean): RunEvent | undefined {
-    const found = (event: RunEvent): boolean => passes(event) && direction * (event.cycle - cycle) > 0;
-    return direction > 0 ? this.list.find(found) : this.list.findLast(found);
+  /** The events of kinds that are not hidden. */
+  get visible(): RunEvent[] {
+    return this.list.filter((event) => !this.hiddenKinds.has(event.kind));
+  }
+
+  /** Hides a kind, or shows it again. */
+  toggleKind(kind: string): void {
+    const hidden = new Set(this.hiddenKinds);
+    const wasHidden = hidden.delete(kind);
+    if (!wasHidden) hidden.add(kind);
+    this.hiddenKinds = hidden;
+  }
+
+  /** The first visible event after a cycle, or the last one before it. */
+  neighbor(cycle: number, direction: 1 | -1): RunEvent | undefined {
+    if (direction > 0) return this.visible.find((event) => event.cycle > cycle);
+    return this.visible.findLast((event) => event.cycle < cycle);
   }
 }

@@ -132,7 +132,7 @@ export class Studio {
     });
     if (!(await this.#openAt(session, seed))) return false;
     // A fleet is known only as long as it is on the studio's command line.
-    if (!session.isFleet) remember(target, session.scene.name);
+    if (!session.isFleet) remember(target, session.run.scene.name);
     this.sessions = [...this.sessions, session];
     this.activeKey = session.key;
     this.#deliver(session);
@@ -157,31 +157,31 @@ export class Studio {
   // Transport, of all sessions or of the active one.
 
   play(): void {
-    for (const session of this.controlled) session.play();
+    for (const session of this.controlled) session.playback.play();
   }
 
   /** Pauses if the active session plays, and plays otherwise. */
   toggle(): void {
-    if (this.active?.isMoving) this.pause();
+    if (this.active?.playback.isMoving) this.pause();
     else this.play();
   }
 
   /** Plays backwards, or pauses if the active session already does. */
   toggleBack(): void {
-    if (this.active?.isRewinding) return this.pause();
-    for (const session of this.controlled) session.rewind();
+    if (this.active?.playback.isRewinding) return this.pause();
+    for (const session of this.controlled) session.playback.rewind();
   }
 
   pause(): void {
-    for (const session of this.controlled) session.pause();
+    for (const session of this.controlled) session.playback.pause();
   }
 
   step(cycles: number): void {
-    for (const session of this.controlled) session.step(cycles);
+    for (const session of this.controlled) session.playback.step(cycles);
   }
 
   seek(cycle: number): void {
-    for (const session of this.controlled) session.seek(cycle);
+    for (const session of this.controlled) session.playback.seek(cycle);
   }
 
   close(session: Session): void {
@@ -208,7 +208,7 @@ export class Studio {
   }
 
   #byId(id: number): Session | undefined {
-    return this.sessions.find((session) => session.id === id);
+    return this.sessions.find((session) => session.client.id === id);
   }
 
   /** Notifications and frames of sessions whose ids the page does not know yet. */
@@ -238,7 +238,7 @@ export class Studio {
   async #reopenFleet(session: Session, generation: number): Promise<void> {
     // A new connection reopens all sessions anyway.
     const isCurrent = (): boolean =>
-      generation === this.#generation && this.sessions.includes(session) && session.ended !== null;
+      generation === this.#generation && this.sessions.includes(session) && session.client.ended !== null;
     if (!isCurrent()) return;
     if (await this.#openAt(session, null, true)) this.#deliver(session);
     else if (isCurrent()) this.#retryFleet(session);
@@ -260,8 +260,8 @@ export class Studio {
 
   /** Delivers the messages that arrived before the page knew the session. */
   #deliver(session: Session): void {
-    const kept = this.#undelivered.get(session.id) ?? [];
-    this.#undelivered.delete(session.id);
+    const kept = this.#undelivered.get(session.client.id) ?? [];
+    this.#undelivered.delete(session.client.id);
     for (const message of kept) {
       if (message instanceof ArrayBuffer) this.#onFrame(message);
       else this.#onNotification(message);
@@ -323,7 +323,7 @@ export class Studio {
       if (!isOpen) {
         this.#onEnded(
           session,
-          makeProblem(session.scene.name, "it could not be reopened", "open it again, or close it"),
+          makeProblem(session.run.scene.name, "it could not be reopened", "open it again, or close it"),
         );
         missing++;
         continue;
@@ -331,7 +331,7 @@ export class Studio {
       this.#deliver(session);
       const cycle = await session.resume();
       if (generation !== this.#generation) return;
-      reopened.push(`${session.scene.name} at cycle ${cycle}`);
+      reopened.push(`${session.run.scene.name} at cycle ${cycle}`);
     }
     const words = reopened.length > 0 ? `Reconnected; reopened ${reopened.join(", ")}.` : "Reconnected.";
     const more = missing > 0 ? ` ${missing} could not be reopened.` : "";

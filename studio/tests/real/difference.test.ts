@@ -17,7 +17,7 @@ async function connected(program: Program): Promise<Studio> {
   });
   studio.connect();
   await vi.waitUntil(() => studio.isConnected, { timeout: 20_000 });
-  timers.push(setInterval(() => studio.sessions.forEach((one) => one.grantHidden()), 50));
+  timers.push(setInterval(() => studio.sessions.forEach((one) => one.frames.grantHidden()), 50));
   return studio;
 }
 
@@ -36,16 +36,16 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const path = `${SCENARIOS}/robots/crossing.toml`;
     for (let i = 0; i < 2; i++) expect(await studio.open({ kind: "scenario", path })).toBe(true);
     const [a, b] = studio.sessions as [(typeof studio.sessions)[0], (typeof studio.sessions)[0]];
-    const source = await b.source();
+    const source = await b.client.source();
     const text = source.is === "source" ? source.text : "";
     expect(await b.restart(null, `conflict_policy = "right_of_way"\n${text}`)).toBe(true);
     await studio.comparison.find(a, b);
     const cycle = Number(/from cycle (\d+) on/.exec(studio.comparison.words)?.[1]);
     expect(cycle).toBeGreaterThan(0);
-    expect([a.displayed.cycle, b.displayed.cycle]).toEqual([cycle, cycle]);
+    expect([a.frames.displayed.cycle, b.frames.displayed.cycle]).toEqual([cycle, cycle]);
     const digests = async (at: number): Promise<(string | null | undefined)[]> => [
-      (await a.digestAt(at))?.digest,
-      (await b.digestAt(at))?.digest,
+      (await a.playback.digestAt(at))?.digest,
+      (await b.playback.digestAt(at))?.digest,
     ];
     const [one, two] = await digests(cycle);
     expect(one).not.toBe(two);

@@ -72,3 +72,13 @@ test("two equal events of one cycle are two, however often they are told", async
   await events.fetch(10, server([event(3, 1), event(3, 1), event(4, 1)]));
   expect([events.list.length, events.kinds.get("contact")]).toEqual([3, 3]);
 });
+
+test("events of hidden kinds are neither visible nor neighbors", () => {
+  const events = new Events();
+  events.add([event(3, 1), { ...event(5, 1), kind: "turn" }, event(7, 1)]);
+  events.toggleKind("turn");
+  expect(events.visible.map(({ cycle }) => cycle)).toEqual([3, 7]);
+  expect([events.neighbor(3, 1)?.cycle, events.neighbor(7, -1)?.cycle]).toEqual([7, 3]);
+  events.toggleKind("turn");
+  expect(events.neighbor(3, 1)?.cycle).toBe(5);
+});

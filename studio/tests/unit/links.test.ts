@@ -1,7 +1,7 @@
 /** Links and health of a fleet's nodes. */
 
 import { describe, expect, test } from "vitest";
-import { fleetSummary, healthOf, linksOf, nodeOf } from "../../src/fleet/links";
+import { fleetSummary, healthOf, linksBetweenBodies, linksOf, nodeOf } from "../../src/fleet/links";
 import type { Fleet, FleetNode } from "../../src/protocol";
 
 function node(agent: number, heard: number[], more: Partial<FleetNode> = {}): FleetNode {
@@ -36,6 +36,15 @@ describe("links", () => {
     expect(linksOf(all, 1)).toEqual([{ from: 0, to: 1, isMutual: true }]);
     expect(linksOf(all, 3)).toEqual([]);
   });
+});
+
+test("links between bodies use the indices of bodies, and omit nodes that have none", () => {
+  const all = fleet([node(0, [1]), node(1, [0]), node(2, [0])]);
+  const bodies = { find: ({ number }: { number: number }) => (number === 2 ? undefined : 10 + number) };
+  const links = [{ from: 10, to: 11, isMutual: true }];
+  expect(linksBetweenBodies(all, bodies, null)).toEqual(links);
+  expect(linksBetweenBodies(all, bodies, { kind: "obstacle", number: 0, part: null })).toEqual(links);
+  expect(linksBetweenBodies(all, bodies, { kind: "airplane", number: 2, part: null })).toEqual([]);
 });
 
 describe("nodes", () => {

@@ -1,80 +1,63 @@
-/** A session goes on after frames that cannot be read. */
+/** The parts of a session work together. */
 
-import { expect, test, vi } from "vitest";
-import type { SessionMethod, BodyTable } from "../../src/protocol";
-import { encodeFrame } from "../fake/encode";
-import { Session, type SessionHost } from "../../src/state/session.svelte";
+import { expect, test } from "vitest";
+import type { BodyTable, RunEvent, Scene, SessionStatus } from "../../src/protocol";
+import { Session } from "../../src/state/session.svelte";
+import { FakeHost } from "./host";
 
-/** A page that keeps the requests to sessions, and answers none. */
-function host(calls: SessionMethod[]): SessionHost {
-  const never = new Promise<never>(() => undefined);
-  return {
-    request: () => never,
-    requestSession: (_, call) => (calls.push(call), never),
-    onProblem: () => undefined,
-  };
-}
+const SCENE = { world: "robots", name: "Hall", cycle_s: 0.1, is_recording: false } as Scene;
+const STATUS = { state: "paused", cycle: 0, cycles_planned: 100, seed: "7" } as SessionStatus;
 
-test("frames that cannot be read are granted again, at most once a second", () => {
-  vi.useFakeTimers();
-  const calls: SessionMethod[] = [];
-  const session = new Session({ kind: "new", world: "robots" }, host(calls));
-  session.id = 1;
-  session.credit.refill();
-  for (let i = 0; i < 2; i++) session.onFrame(new ArrayBuffer(60));
-  vi.advanceTimersByTime(900);
-  expect(calls.length).toBe(1);
-  vi.advanceTimersByTime(5000);
-  expect(calls).toEqual([
-    { do: "credit", frames: 2 },
-    { do: "credit", frames: 2 },
-  ]);
-  vi.useRealTimers();
-});
-
-test("a session that nobody sees is granted frames slowly, and tells none of them as lost", () => {
-  const calls: SessionMethod[] = [];
-  const session = new Session({ kind: "new", world: "robots" }, host(calls));
-  session.id = 1;
-  const frame = (cycle: number, leftOut: number): void =>
-    session.onFrame(
-      encodeFrame({
-        session: 1,
-        tableId: 1,
-        dimensions: 2,
-        cycle,
-        time_s: 0,
-        positions_m: [],
-        orientations: [],
-        lines: [],
-        conditions: [],
-        leftOut,
-      }),
-    );
+function openSession(): { session: Session; host: FakeHost } {
+  const host = new FakeHost();
+  const session = new Session({ kind: "new", world: "robots" }, host);
+  session.onOpened({ is: "opened", session: 1, scene: SCENE, status: STATUS });
   session.onBodyTable({
     session: 1,
     id: 1,
-    kinds: [],
-    kind: [],
-    number: [],
-    part: [],
-    is_agent: [],
+    kinds: ["robot", "crate"],
+    kind: [0, 1],
+    number: [0, 0],
+    part: [-1, -1],
+    is_agent: [true, false],
     names: [],
-    shapes: [],
-    shape: [],
+    shapes: [{ type: "sphere", radius_m: 1 }],
+    shape: [0, 0],
     appearances: [],
-    appearance: [],
+    appearance: [0, 0],
   } as unknown as BodyTable);
-  session.grantHidden();
-  frame(1, 0);
-  frame(2, 20);
-  session.grantHidden();
-  expect(calls.filter((call) => call.do === "credit").length).toBe(2);
-  expect(session.displayed).toMatchObject({ cycle: 2, leftOut: 0 });
-  session.subscribe(() => undefined);
-  frame(3, 40);
-  session.grantHidden();
-  expect(calls.filter((call) => call.do === "credit").length).toBe(2);
-  frame(4, 41);
-  expect(session.displayed.leftOut).toBe(1);
+  return { session, host };
+}
+
+function contact(cycle: number, kind = "contact"): RunEvent {
+  const body = { kind: "crate", number: 0, part: null };
+  const other = { kind: "robot", number: 0, part: null };
+  return { cycle, level: "info", kind, body, other, at_m: null, value: null, text: "" } as RunEvent;
+}
+
+test("a visit of an event seeks to it and selects its agent", () => {
+  const { session, host } = openSession();
+  session.visit(contact(12));
+  expect(session.selection.body).toEqual({ kind: "robot", number: 0, part: null });
+  expect(host.calls("seek")).toEqual([{ do: "seek", cycle: 12 }]);
+});
+
+test("a jump skips events of hidden kinds", () => {
+  const { session, host } = openSession();
+  session.events.add([contact(3, "turn"), contact(8)]);
+  session.events.toggleKind("turn");
+  session.jump(1);
+  expect(host.calls("seek")).toEqual([{ do: "seek", cycle: 8 }]);
+});
+
+test("a restart clears what belongs to the previous run", async () => {
+  const { session, host } = openSession();
+  session.events.add([contact(3)]);
+  session.onEnded({ place: "run", cause: "it failed", remedy: "restart it" } as never);
+  expect(session.run.status.state).toBe("failed");
+  const isAccepted = session.restart(9, "seed = 9");
+  await host.reply("restart", { is: "opened", session: 1, scene: SCENE, status: { ...STATUS, seed: "9" } });
+  expect(await isAccepted).toBe(true);
+  expect([session.client.ended, session.events.list, session.seed]).toEqual([null, [], 9]);
+  expect([session.run.text, session.run.starts]).toEqual(["seed = 9", 2]);
 });

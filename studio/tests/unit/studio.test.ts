@@ -194,7 +194,7 @@ test("a fleet that was lost is looked for until one flies there again, or its se
     is_warning: false,
   };
   line().say({ notice: "ended", session: 2, problem });
-  expect(fleet.ended?.cause).toBe("it was not heard");
+  expect(fleet.client.ended?.cause).toBe("it was not heard");
   const looked = retries.length;
   retries.at(-1)!();
   await settled();
@@ -208,7 +208,7 @@ test("a fleet that was lost is looked for until one flies there again, or its se
   retries.at(-1)!();
   await settled();
   await line().answer("open", { ...OPENED, session: 3 });
-  expect([fleet.ended, fleet.id, retries.length]).toEqual([null, 3, looked + 1]);
+  expect([fleet.client.ended, fleet.client.id, retries.length]).toEqual([null, 3, looked + 1]);
   line().say({ notice: "ended", session: 3, problem });
   studio.close(fleet);
   retries.at(-1)!();
@@ -239,16 +239,16 @@ test("a server that dies while sessions are reopened is not told to be connected
   await line().answer("open", OPENED);
   await line().answer("seek", { is: "done" });
   expect(studio.banner).toEqual({ words: "Reconnected; reopened Hall at cycle 345.", isBad: false });
-  expect([line().calls("play").length, session().ended]).toEqual([1, null]);
+  expect([line().calls("play").length, session().client.ended]).toEqual([1, null]);
 });
 
 test("steps that follow each other faster than they are gone add up, forth and back, and none complains", async () => {
   show(100);
-  for (let i = 0; i < 3; i++) session().step(10);
+  for (let i = 0; i < 3; i++) session().playback.step(10);
   expect(line().calls("step")).toEqual(Array.from({ length: 3 }, () => ({ do: "step", cycles: 10 })));
-  session().step(-1);
-  session().step(-1);
-  session().step(10);
+  session().playback.step(-1);
+  session().playback.step(-1);
+  session().playback.step(10);
   expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 129 }]);
   const problem = { place: "cycle 130", cause: "replaced by another request", remedy: "", is_warning: false };
   for (const { id } of line().asked.filter(({ call }) => call.do === "step")) line().say({ id, problem });
@@ -260,10 +260,10 @@ test("steps that follow each other faster than they are gone add up, forth and b
 
 test("a session that is closed on its way back complains of nothing, and asks for nothing more", async () => {
   show(500);
-  session().select({ kind: "robot", number: 0, part: null });
-  session().rewind();
-  session().seek(300);
-  session().seek(200);
+  session().selection.select({ kind: "robot", number: 0, part: null });
+  session().playback.rewind();
+  session().playback.seek(300);
+  session().playback.seek(200);
   const closed = session();
   studio.close(closed);
   expect(line().calls("close")).toEqual([{ do: "close" }]);
@@ -271,7 +271,7 @@ test("a session that is closed on its way back complains of nothing, and asks fo
   const problem = { place: "session", cause: "the session was closed", remedy: "", is_warning: false };
   for (const { id } of line().asked.splice(0)) line().say({ id, problem });
   await new Promise((then) => setTimeout(then, 300));
-  expect([asked > 0, line().asked, studio.problems, closed.isMoving]).toEqual([true, [], [], false]);
+  expect([asked > 0, line().asked, studio.problems, closed.playback.isMoving]).toEqual([true, [], [], false]);
 });
 
 test("a run whose states have no digests is not compared, and the reason is told", async () => {
@@ -313,10 +313,10 @@ test("what cannot be opened again is told, and opened the next time", async () =
   line().say({ id, problem: { place: "p", line: null, column: null, cause: "gone", remedy: "", is_warning: false } });
   await settled();
   expect(studio.banner!.words).toContain("1 could not be reopened");
-  expect(session().ended).not.toBeNull();
+  expect(session().client.ended).not.toBeNull();
   await lose();
   await back();
   await line().answer("open", OPENED);
   await line().answer("seek", { is: "done" });
-  expect([session().ended, session().seed]).toEqual([null, 7]);
+  expect([session().client.ended, session().seed]).toEqual([null, 7]);
 });

@@ -25,6 +25,10 @@ const USAGE: &str = "\
 sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]
        sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>";
 
+/// The nouns of agents, which are the options that select them.
+const AIRPLANE: &str = "airplane";
+const CONNECTOR: &str = "connector";
+
 /// Run one airplane or connector of a fleet on this machine.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, override_usage = USAGE)]
@@ -61,15 +65,15 @@ pub(crate) struct NodeArgs {
 fn connector(text: &str) -> Result<AgentName, String> {
     let numbers = text.split_once('.').map(|(chain, connector)| (chain.parse(), connector.parse()));
     match numbers {
-        Some((Ok(chain), Ok(connector))) => Ok(AgentName::Connector { chain, connector }),
+        Some((Ok(chain), Ok(connector))) => Ok(AgentName::new(CONNECTOR, chain, Some(connector))),
         _ => Err("give the numbers of chain and connector, e.g. 0.3".into()),
     }
 }
 
 impl NodeArgs {
     fn agent(&self) -> AgentName {
-        let airplane = self.airplane.map(AgentName::Airplane);
-        airplane.or(self.connector).expect("the command line names one of them")
+        let airplane = self.airplane.map(|id| AgentName::new(AIRPLANE, id, None));
+        airplane.or_else(|| self.connector.clone()).expect("the command line has one of them")
     }
 }
 
@@ -90,12 +94,10 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
     run_job(&Job::Node(job), |_| {})?;
     let agent = args.agent();
     let text =
-        || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun());
-    let result = match agent {
-        AgentName::Airplane(id) => json!({ "airplane": id }),
-        AgentName::Connector { chain, connector } => {
-            json!({ "chain": chain, "connector": connector })
-        }
+        || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun);
+    let result = match agent.part {
+        None => json!({ "airplane": agent.number }),
+        Some(connector) => json!({ "chain": agent.number, "connector": connector }),
     };
     console.print_result_or_short(&result, String::new, text)?;
     Ok(ExitCode::Done)

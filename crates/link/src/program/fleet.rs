@@ -251,7 +251,7 @@ impl<'a> FleetSupervisor<'a> {
             late_cycles: fleet.metrics.late_cycles,
             talk_p50_ms: quantile_ms(0.5),
             talk_p99_ms: quantile_ms(0.99),
-            noun: world.name(0).noun().into(),
+            noun: world.name(0).noun.into(),
             waits_for: fleet.waits_for.iter().map(|&agent| world.name(agent).to_string()).collect(),
             nodes,
         };
@@ -280,12 +280,11 @@ impl<'a> FleetSupervisor<'a> {
             Some(_) => &status.activity,
         };
         let name = fleet.run.world().name(agent);
-        let (number, part) = name.body();
         NodeStatus {
             agent,
             name: name.to_string(),
-            number,
-            part,
+            number: name.number,
+            part: name.part,
             state: state.into(),
             process: node.member.as_ref().map(|_| node.process),
             epoch: status.epoch,

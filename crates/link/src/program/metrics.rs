@@ -222,9 +222,9 @@ fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]
 }
 
 /// Returns the metrics of a node.
-pub(super) fn node_metrics(agent: AgentName, status: &Status) -> String {
+pub(super) fn node_metrics(agent: &AgentName, status: &Status) -> String {
     let mut text = MetricsText::default();
-    let agent = format_label(agent.noun(), &agent.to_string());
+    let agent = format_label(&agent.noun, &agent.to_string());
     let one = |value: u64| std::iter::once((agent.clone(), value as f64));
     text.push_per_agent("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
     text.push_per_agent(

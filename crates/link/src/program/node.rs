@@ -20,7 +20,7 @@ use std::time::Duration;
 /// When anything is wrong with the job, or the server is gone.
 pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
-    let agent = scenario.world.find(job.agent)?;
+    let agent = scenario.world.find(&job.agent)?;
     let ports: Vec<PortReservation> = job
         .listen
         .iter()
@@ -53,11 +53,11 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let scenario = scenario.with_overrides(&welcome.overrides)?;
     let program = scenario.world.program(agent, build);
     let channel = scenario.world.channel(agent);
-    let name = job.agent;
-    tracing::info!(agent, who = format!("{} {name}", name.noun()), "joined");
+    let name = job.agent.clone();
+    tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
     let node = Node::new(agent, messenger, program, channel, &welcome)
         .with_lease(Duration::from_secs_f64(job.common.lease_s))
-        .with_listener(move |status| exporter.publish(|| node_metrics(name, status)));
+        .with_listener(move |status| exporter.publish(|| node_metrics(&name, status)));
     node.run().map(drop).map_err(|e| node_error(e, job))
 }
 

@@ -114,7 +114,7 @@ impl Server<'_> {
         let who = self.run.agent_label(join.agent);
         if entry.incarnation().is_some_and(|present| present != incarnation) {
             let cause = format!("{who} has a node already (process {})", entry.process);
-            let noun = self.run.world().name(join.agent).noun();
+            let noun = self.run.world().name(join.agent).noun;
             let remedy = format!("give the --{noun} of one that has none");
             return Err(Refusal::new("taken", cause, &remedy));
         }

@@ -237,9 +237,12 @@ fn chains_of_which_somebody_must_see_all_are_refused_with_the_reason() {
         let (connect, listen) = (vec!["tcp/127.0.0.1:9".into()], Vec::new());
         Job::Node(NodeJob { common: right.common.clone(), agent, connect, listen, patience_s: 1.0 })
     };
-    let connector = |chain, connector| AgentName::Connector { chain, connector };
+    let connector = |chain, connector| AgentName::new("connector", chain, Some(connector));
     for (agent, cause) in [
-        (AgentName::Airplane(0), "the scenario has no airplane 0; give --connector 0.0 to 1.2"),
+        (
+            AgentName::new("airplane", 0, None),
+            "the scenario has no airplane 0; give --connector 0.0 to 1.2",
+        ),
         (connector(0, 3), "the scenario has no connector 0.3; give --connector 0.0 to 1.2"),
         (connector(2, 0), "no connector 2.0"),
     ] {
@@ -263,7 +266,7 @@ fn a_node_joins_a_chain_by_the_name_of_its_connector_and_not_twice() {
     });
     program.fleet("the others", |now| now.nodes[0].state == "joined");
     let node = |connector: u32| {
-        let agent = AgentName::Connector { chain: connector / 2, connector: connector % 2 };
+        let agent = AgentName::new("connector", connector / 2, Some(connector % 2));
         let (common, connect) = (common.clone(), connect.clone());
         Job::Node(NodeJob { common, agent, connect, listen: Vec::new(), patience_s: 30.0 })
     };

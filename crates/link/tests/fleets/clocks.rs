@@ -112,7 +112,7 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
-    let agent = AgentName::Airplane(2);
+    let agent = AgentName::new("airplane", 2, None);
     let (listen, patience_s) = (vec!["tcp/127.0.0.1:0".into()], 30.0);
     let node = Job::Node(NodeJob { common, agent, connect, listen, patience_s });
     let mut command = Command::new("unshare");

@@ -81,7 +81,7 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
     });
     program.fleet("the first node", |now| now.nodes[0].state == "joined");
     let node = |fleet: &FleetJob, airplane| {
-        let agent = AgentName::Airplane(airplane);
+        let agent = AgentName::new("airplane", airplane, None);
         let common = fleet.common.clone();
         let (connect, listen, patience_s) = (connect.clone(), Vec::new(), 30.0);
         Job::Node(NodeJob { common, agent, connect, listen, patience_s })
@@ -111,7 +111,7 @@ fn a_node_whose_server_is_not_there_gives_up_in_time() {
     let nobody = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound");
     let job = NodeJob {
         common: fleet(folder.path()).common,
-        agent: AgentName::Airplane(0),
+        agent: AgentName::new("airplane", 0, None),
         connect: vec![format!("tcp/{nobody}")],
         listen: Vec::new(),
         patience_s: 0.5,

@@ -91,7 +91,7 @@ fn start(machines: &Machines, mut fleet: FleetJob) -> (LinkProcess, Vec<LinkProc
     let node = |airplane| {
         let (common, connect) = (common.clone(), connect.clone());
         let listen = vec![format!("tcp/{}:0", ADDRESSES[1])];
-        let agent = AgentName::Airplane(airplane);
+        let agent = AgentName::new("airplane", airplane, None);
         let job = NodeJob { common, agent, connect, listen, patience_s: 30.0 };
         LinkProcess::start_in(&machines.names[1], &Job::Node(job))
     };

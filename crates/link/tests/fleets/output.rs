@@ -137,7 +137,7 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     });
     let common =
         sidestep_session::fleet::CommonSettings { metrics: Some(at_node.clone()), ..common };
-    let (agent, listen, patience_s) = (AgentName::Airplane(2), Vec::new(), 30.0);
+    let (agent, listen, patience_s) = (AgentName::new("airplane", 2, None), Vec::new(), 30.0);
     let _node =
         LinkProcess::start(&Job::Node(NodeJob { common, agent, connect, listen, patience_s }));
     let now = server.fleet("some cycles", |now| now.cycle > 4 && now.nodes[2].flown > 2);

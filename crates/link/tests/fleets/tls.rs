@@ -77,7 +77,7 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
         let (connect, listen) = (connect.clone(), vec!["tls/127.0.0.1:0".into()]);
         LinkProcess::start(&Job::Node(NodeJob {
             common,
-            agent: AgentName::Airplane(1),
+            agent: AgentName::new("airplane", 1, None),
             connect,
             listen,
             patience_s,

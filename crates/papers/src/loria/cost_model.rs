@@ -55,6 +55,13 @@ pub(super) struct CostSample {
     pub(super) second_ns: f64,
 }
 
+impl CostSample {
+    /// Returns the number of bodies, `n + m`.
+    fn bodies(&self) -> f64 {
+        self.agents + self.objects
+    }
+}
+
 /// A parameter of the model and its value, ns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Parameter {
@@ -105,25 +112,15 @@ impl CostModel {
 
     /// Fits the model to runs.
     pub(super) fn fit(points: Vec<CostSample>) -> Self {
-        let bodies = |p: &CostSample| p.agents + p.objects;
-        let per_body =
-            |p: &CostSample, values: &[f64]| values.iter().map(|v| v / bodies(p)).collect();
-        let fit = |row: fn(&CostSample) -> Vec<f64>, y: fn(&CostSample) -> f64| {
-            let x: Vec<Vec<f64>> = points.iter().map(|p| per_body(p, &row(p))).collect();
-            let y: Vec<f64> = points.iter().map(|p| y(p) / bodies(p)).collect();
-            Fit::new(&x, &y)
-        };
-        let first = fit(first_row, |p| p.first_ns);
-        let second = fit(second_row, |p| p.second_ns);
-        let share = |p: &CostSample| p.in_conflict / bodies(p);
-        let least = points.iter().map(share).fold(f64::INFINITY, f64::min);
-        let greatest = points.iter().map(share).fold(0.0, f64::max);
-        let explained = |fit: &Option<Fit>| fit.as_ref().map_or(0.0, |f| f.r_squared);
+        let first = fit_per_body(&points, first_row, |p| p.first_ns);
+        let second = fit_per_body(&points, second_row, |p| p.second_ns);
+        let least_share = min_value(&points, |p| p.in_conflict / p.bodies());
+        let greatest_share = max_value(&points, |p| p.in_conflict / p.bodies());
         Self {
             parameters: parameters(&first, &second),
-            r_squared: [explained(&first), explained(&second)],
+            r_squared: [&first, &second].map(|fit| fit.as_ref().map_or(0.0, |fit| fit.r_squared)),
             r_squared_cycle: whole_cycles(&points, &first, &second),
-            conflict_share: (least, greatest),
+            conflict_share: (least_share, greatest_share),
             points,
         }
     }
@@ -152,9 +149,6 @@ impl CostModel {
             self.r_squared[1],
             self.r_squared_cycle,
         );
-        let interval = |p: &Parameter| {
-            p.interval_ns.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high))
-        };
         table(
             "The cost model, fitted",
             note,
@@ -163,36 +157,54 @@ impl CostModel {
                 ("parameter", &|p| p.name.clone()),
                 ("what", &|p| p.meaning.clone()),
                 ("ns", &|p| format!("{:.1}", p.value_ns)),
-                ("95 % interval", &|p| interval(p)),
+                ("95 % interval", &format_interval),
             ],
         )
     }
 
     /// Returns a figure of predicted against measured time of a cycle.
     pub(super) fn figure(&self) -> Figure {
-        let value = |name| self.parameter(name).map_or(0.0, |p| p.value_ns);
-        let predict = |p: &CostSample| {
-            let first = dot(&first_row(p), &[value("t_p"), value("t_o")]);
-            first + dot(&second_row(p), &[value("c_d"), value("c_s"), value("e_u")])
-        };
-        let of_size = |size: u32| Series {
-            name: format!("robots of {size} x {size}"),
-            points: self
-                .points
-                .iter()
-                .filter(|p| p.size == size)
-                .map(|p| FigurePoint::new(1e-6 * (p.first_ns + p.second_ns), 1e-6 * predict(p)))
-                .collect(),
-        };
-        Figure {
-            kind: FigureKind::Points,
-            ..figure(
-                "The cost model against measurement",
-                ["measured ms per cycle", "predicted ms per cycle"],
-                SIZES.map(of_size),
-            )
-        }
+        let series = SIZES.map(|size| {
+            let points = self.points.iter().filter(|p| p.size == size);
+            let points = points.map(|p| {
+                let measured_ns = p.first_ns + p.second_ns;
+                FigurePoint::new(1e-6 * measured_ns, 1e-6 * self.predict_ns(p))
+            });
+            Series { name: format!("robots of {size} x {size}"), points: points.collect() }
+        });
+        let title = "The cost model against measurement";
+        let labels = ["measured ms per cycle", "predicted ms per cycle"];
+        Figure { kind: FigureKind::Points, ..figure(title, labels, series) }
     }
+
+    /// Returns the time of a cycle by the fitted parameters, T1 + T2.
+    fn predict_ns(&self, p: &CostSample) -> f64 {
+        let [t_p, t_o, c_d, c_s, e_u] =
+            PARAMETERS.map(|(name, _)| self.parameter(name).map_or(0.0, |p| p.value_ns));
+        let first = dot(&first_row(p), &[t_p, t_o]);
+        first + dot(&second_row(p), &[c_d, c_s, e_u])
+    }
+}
+
+fn format_interval(parameter: &&Parameter) -> String {
+    let interval = parameter.interval_ns;
+    interval.map_or("-".into(), |i| format!("[{:.1}, {:.1}]", i.low, i.high))
+}
+
+/// Fits the rows of a step to its times, both per body, so that all runs have equal weight.
+fn fit_per_body(
+    points: &[CostSample],
+    row: fn(&CostSample) -> Vec<f64>,
+    time_ns: fn(&CostSample) -> f64,
+) -> Option<Fit> {
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let mut times_ns = Vec::new();
+    for point in points {
+        let bodies = point.bodies();
+        rows.push(row(point).into_iter().map(|value| value / bodies).collect());
+        times_ns.push(time_ns(point) / bodies);
+    }
+    Fit::new(&rows, &times_ns)
 }
 
 fn first_row(p: &CostSample) -> Vec<f64> {
@@ -216,21 +228,19 @@ fn max_value(points: &[CostSample], of: fn(&CostSample) -> f64) -> f64 {
 }
 
 fn parameters(first: &Option<Fit>, second: &Option<Fit>) -> Vec<Parameter> {
-    let fits = [first, second].into_iter().flatten();
-    let values = fits.flat_map(|fit| {
-        let interval = |k: usize| fit.intervals.as_ref().map(|all| all[k]);
-        fit.coefficients.iter().enumerate().map(move |(k, &c)| (c, interval(k)))
-    });
-    let named = |((name, meaning), (value_ns, interval_ns)): ((&str, &str), _)| Parameter {
-        name: name.into(),
-        meaning: meaning.into(),
-        value_ns,
-        interval_ns,
-    };
-    match (first, second) {
-        (Some(_), Some(_)) => PARAMETERS.into_iter().zip(values).map(named).collect(),
-        _ => Vec::new(),
+    let (Some(first), Some(second)) = (first, second) else { return Vec::new() };
+    let mut values = Vec::new();
+    for fit in [first, second] {
+        for (k, &value_ns) in fit.coefficients.iter().enumerate() {
+            values.push((value_ns, fit.intervals.as_ref().map(|all| all[k])));
+        }
     }
+    let mut parameters = Vec::new();
+    for ((name, meaning), (value_ns, interval_ns)) in PARAMETERS.into_iter().zip(values) {
+        let name = name.into();
+        parameters.push(Parameter { name, meaning: meaning.into(), value_ns, interval_ns });
+    }
+    parameters
 }
 
 /// Returns the share of the variance of whole cycles' times that both fits together explain.
@@ -238,11 +248,14 @@ fn whole_cycles(points: &[CostSample], first: &Option<Fit>, second: &Option<Fit>
     let (Some(first), Some(second)) = (first, second) else { return 0.0 };
     let measured: Vec<f64> = points.iter().map(|p| p.first_ns + p.second_ns).collect();
     let mean = measured.iter().sum::<f64>() / measured.len() as f64;
-    let square = |x: f64| x * x;
-    let predict = |p: &CostSample| first.predict(&first_row(p)) + second.predict(&second_row(p));
-    let left: f64 = points.iter().zip(&measured).map(|(p, y)| square(y - predict(p))).sum();
-    let all: f64 = measured.iter().map(|y| square(y - mean)).sum();
-    1.0 - left / all.max(f64::MIN_POSITIVE)
+    let unexplained = points.iter().zip(&measured).map(|(p, measured)| {
+        let predicted = first.predict(&first_row(p)) + second.predict(&second_row(p));
+        (measured - predicted) * (measured - predicted)
+    });
+    let unexplained: f64 = unexplained.sum();
+    let all: f64 = measured.iter().map(|measured| (measured - mean) * (measured - mean)).sum();
+    // Of equal times there is no variance to explain.
+    1.0 - unexplained / all.max(f64::MIN_POSITIVE)
 }
 
 /// Sides of robots in boxes.
@@ -254,53 +267,72 @@ fn grid(plan: &LoriaConfig) -> Vec<Workload> {
     let large = (Arc::new(Floor::large()), [100, 300, 800], [0, 200, 600]);
     let mut loads = Vec::new();
     for (floor, agents, objects) in [small, large] {
-        for (robots, people) in agents.into_iter().flat_map(|n| objects.map(|m| (n, m))) {
-            let load =
-                |size| Workload { robots, people, size, operations: 0, floor: floor.clone() };
-            loads.extend(SIZES.map(load));
+        for robots in agents {
+            for people in objects {
+                for size in SIZES {
+                    let floor = Arc::clone(&floor);
+                    loads.push(Workload { robots, people, size, operations: 0, floor });
+                }
+            }
         }
     }
-    let keep = if plan.quick { 5 } else { 1 };
-    loads.into_iter().step_by(keep).collect()
+    // A step that divides neither the sizes nor the numbers, so that a rehearsal has some of each.
+    let step = if plan.quick { 5 } else { 1 };
+    loads.into_iter().step_by(step).collect()
 }
 
-/// Blocks in which a load is timed; the shortest time per cycle of each phase counts.
+/// Blocks in which a load is timed; the shortest time per cycle of each phase counts, because other load on the machine
+/// only ever adds to it.
 const BLOCKS: usize = 16;
 
 /// Sums over a run so far.
 #[derive(Debug, Clone, Copy)]
 struct Totals {
+    /// Time of pool one.
     first_ns: f64,
+    /// Time of joining and of pool two.
     second_ns: f64,
+    /// Bodies that were in no conflict.
     alone: f64,
+    /// Boxes entered or left.
     boxes: f64,
 }
 
 fn measure(load: &Workload, robot_cycles: u64) -> CostSample {
     let cycles = load.cycles(robot_cycles);
     let mut run = load.simulation(1);
+    // A first block that is not counted: it fills buffers, which later ones do not.
     advance(&mut run, cycles);
-    let mut totals = vec![totals(&run)];
+    let mut totals = vec![Totals::of(&run)];
     for _ in 0..BLOCKS {
         advance(&mut run, cycles);
-        totals.push(self::totals(&run));
+        totals.push(Totals::of(&run));
     }
-    let per_cycle = |of: fn(&Totals) -> f64| {
-        let block = |pair: &[Totals]| (of(&pair[1]) - of(&pair[0])) / cycles as f64;
-        totals.windows(2).map(block).collect::<Vec<f64>>()
-    };
-    let best = |of| per_cycle(of).into_iter().fold(f64::INFINITY, f64::min);
-    let mean = |of| per_cycle(of).iter().sum::<f64>() / BLOCKS as f64;
-    let (agents, bodies) = (f64::from(load.robots), run.world().bodies.len() as f64);
+    let agents = f64::from(load.robots);
+    let bodies = run.world().bodies.len() as f64;
+    // Counts are averaged, times are those of the block that nothing disturbed.
     CostSample {
         agents,
         objects: bodies - agents,
         size: load.size,
-        in_conflict: bodies - mean(|t| t.alone),
-        boxes: mean(|t| t.boxes),
-        first_ns: best(|t| t.first_ns),
-        second_ns: best(|t| t.second_ns),
+        in_conflict: bodies - mean_per_cycle(&totals, cycles, |t| t.alone),
+        boxes: mean_per_cycle(&totals, cycles, |t| t.boxes),
+        first_ns: least_per_cycle(&totals, cycles, |t| t.first_ns),
+        second_ns: least_per_cycle(&totals, cycles, |t| t.second_ns),
     }
+}
+
+/// Returns a quantity per cycle, block by block.
+fn per_cycle(totals: &[Totals], cycles: u64, of: fn(&Totals) -> f64) -> impl Iterator<Item = f64> {
+    totals.windows(2).map(move |pair| (of(&pair[1]) - of(&pair[0])) / cycles as f64)
+}
+
+fn mean_per_cycle(totals: &[Totals], cycles: u64, of: fn(&Totals) -> f64) -> f64 {
+    per_cycle(totals, cycles, of).sum::<f64>() / BLOCKS as f64
+}
+
+fn least_per_cycle(totals: &[Totals], cycles: u64, of: fn(&Totals) -> f64) -> f64 {
+    per_cycle(totals, cycles, of).fold(f64::INFINITY, f64::min)
 }
 
 fn advance(run: &mut RobotsRun, cycles: u64) {
@@ -310,18 +342,20 @@ fn advance(run: &mut RobotsRun, cycles: u64) {
     }
 }
 
-fn totals(run: &RobotsRun) -> Totals {
-    let times = run.phase_times();
-    // A step enters a row of boxes and leaves one; bodies that move are square.
-    let boxes = run.state().bodies.iter().map(|body| {
-        let side = run.world().types[usize::from(body.ty)].size.0;
-        f64::from(2 * body.moves.get()) * f64::from(side)
-    });
-    Totals {
-        first_ns: times.claim_ns as f64,
-        second_ns: (times.join_ns + times.act_ns) as f64,
-        alone: run.metrics().group_sizes.first().copied().unwrap_or(0) as f64,
-        boxes: boxes.sum(),
+impl Totals {
+    fn of(run: &RobotsRun) -> Self {
+        let times = run.phase_times();
+        // A step enters a row of boxes and leaves one; bodies that move are square.
+        let boxes = run.state().bodies.iter().map(|body| {
+            let side = run.world().types[usize::from(body.ty)].size.0;
+            f64::from(2 * body.moves.get()) * f64::from(side)
+        });
+        Self {
+            first_ns: times.claim_ns as f64,
+            second_ns: (times.join_ns + times.act_ns) as f64,
+            alone: run.metrics().group_sizes.first().copied().unwrap_or(0) as f64,
+            boxes: boxes.sum(),
+        }
     }
 }
 

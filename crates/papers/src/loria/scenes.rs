@@ -20,12 +20,12 @@ const SEED: u64 = 1;
 /// Returns all pictures: the same floor and seed, without errors and with both.
 pub fn all(plan: &LoriaConfig) -> [Scene; 2] {
     let floor = Arc::new(Floor::medium());
-    let scene =
-        |title, regime| scene(title, &LoriaVariant::new(&floor, regime), CYCLES.min(plan.cycles));
+    let cycles = CYCLES.min(plan.cycles);
     [
-        scene("Ways of robots, all reliable", Regime::Reliable),
-        scene("Ways of the same robots, sensors and effectors unreliable", Regime::Both),
+        ("Ways of robots, all reliable", Regime::Reliable),
+        ("Ways of the same robots, sensors and effectors unreliable", Regime::Both),
     ]
+    .map(|(title, regime)| scene(title, &LoriaVariant::new(&floor, regime), cycles))
 }
 
 fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
@@ -33,13 +33,15 @@ fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
     let scenery = run.scenery();
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let columns = columns(&tracks, cycles.saturating_sub(TRAIL_CYCLES));
-    let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, values)| values);
     let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot);
     let bodies: Vec<BodyId> = robots.map(|body| body.id()).collect();
-    let trails = |rows: &sidestep::kernel::view::PositionColumns| {
-        rows.trails(&scenery, &frame, &bodies, column).unwrap_or_default()
-    };
-    let trails: Vec<Trail> = run.position_columns().iter().flat_map(trails).collect();
+    let mut trails: Vec<Trail> = Vec::new();
+    for positions in run.position_columns() {
+        let found = positions.trails(&scenery, &frame, &bodies, |name: &str| {
+            columns.iter().find(|(own, _)| *own == name).map(|(_, values)| values)
+        });
+        trails.extend(found.unwrap_or_default());
+    }
     Scene {
         title: title.into(),
         caption: format!("Medium floor, seed {SEED}."),
@@ -51,22 +53,26 @@ fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
 
 /// Returns the tracks from a cycle on as columns of the table of trajectories.
 fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
-    let rows = || {
-        let of = |(body, track): (u32, &Track)| {
-            let poses = (0..).zip(track.clone()).skip(from as usize);
-            poses.map(move |(cycle, pose)| (cycle, body, pose)).collect::<Vec<_>>()
-        };
-        (0..).zip(tracks).flat_map(of)
-    };
+    let mut cycles: Vec<u64> = Vec::new();
+    let mut bodies: Vec<u32> = Vec::new();
+    let mut cols: Vec<u32> = Vec::new();
+    let mut rows: Vec<u32> = Vec::new();
+    let mut headings: Vec<u32> = Vec::new();
+    for (body, track) in (0..).zip(tracks) {
+        for (cycle, &(col, row, heading)) in (0..).zip(track).skip(from as usize) {
+            cycles.push(cycle);
+            bodies.push(body);
+            cols.push(col);
+            rows.push(row);
+            headings.push(u32::from(heading));
+        }
+    }
     [
-        ("cycle", Values::U64(rows().map(|(cycle, ..)| cycle).collect())),
-        ("body", Values::U32(rows().map(|(_, body, _)| body).collect())),
-        ("col_boxes", Values::U32(rows().map(|(_, _, (col, ..))| col).collect())),
-        ("row_boxes", Values::U32(rows().map(|(_, _, (_, row, _))| row).collect())),
-        (
-            "heading",
-            Values::Label(rows().map(|(_, _, (.., heading))| u32::from(heading)).collect()),
-        ),
+        ("cycle", Values::U64(cycles.into_iter().collect())),
+        ("body", Values::U32(bodies.into_iter().collect())),
+        ("col_boxes", Values::U32(cols.into_iter().collect())),
+        ("row_boxes", Values::U32(rows.into_iter().collect())),
+        ("heading", Values::Label(headings.into_iter().collect())),
     ]
 }
 

@@ -131,6 +131,9 @@ pub enum ReplyBody {
         /// JSON Schema, draft 2020-12.
         #[cfg_attr(test, ts(type = "unknown"))]
         schema: serde_json::Value,
+        /// The tools for the canvas, as `crates/scenario/src/editing.rs` has them.
+        #[cfg_attr(test, ts(type = "unknown"))]
+        editing: Editing,
     },
 }
 

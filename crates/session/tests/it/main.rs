@@ -4,11 +4,11 @@ mod builds;
 mod changed;
 mod controls;
 mod exports;
+mod fleets;
 #[cfg(unix)]
 mod links;
 mod orders;
 mod places;
-mod pond;
 mod runs;
 mod support;
 mod sweeps;

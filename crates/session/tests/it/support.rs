@@ -1,6 +1,5 @@
 //! Runs of the pond in a folder of their own.
 
-use crate::pond::Pond;
 use sidestep_airspace::Airspace;
 use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_robots::Robots;
@@ -8,6 +7,7 @@ use sidestep_scenario::{WorldType, Worlds};
 use sidestep_session::{
     Error, ManagedRun, NoWatcher, OutputPaths, Progress, Summary, Watcher, read_scenario,
 };
+use sidestep_testing_pond::Pond;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,15 +1,14 @@
 //! The book's chapter of columns says what the program declares: no column more, none less, with its unit.
 //!
 //! The tables between the marks of the chapter are written by `SIDESTEP_WRITE=columns cargo test -p sidestep
-//! --test documentation`; meanings of metrics are written by hand.
+//! --test documentation`.
 
 use super::{read, root};
 use serde_json::Value;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::control::Space;
-use sidestep::kernel::ports::table::split_unit;
 use sidestep::kernel::ports::{ColumnSpec, TableSchema};
-use sidestep::scenario::{Source, metric_label};
+use sidestep::scenario::{MetricInfo, Source, metric_label};
 use sidestep::worlds::WORLDS;
 use std::fmt::Write;
 use std::sync::{Mutex, PoisonError};
@@ -108,14 +107,50 @@ fn rendered_spaces(spaces: &[Space]) -> String {
     text + "\n"
 }
 
-/// Returns the names of a run's metrics; counts by kind of something are one, by reason too.
-fn metrics(value: &Value, path: &str) -> Vec<String> {
-    let is_leaf = path.contains("_by_") || value.as_object().is_none();
-    if is_leaf {
-        return vec![path.trim_start_matches('.').to_string()];
+/// Returns a run's metrics with their names; counts by kind of something are one, by reason too.
+fn metrics<'a>(value: &'a Value, path: &str) -> Vec<(String, &'a Value)> {
+    let name = path.trim_start_matches('.').to_string();
+    match value.as_object() {
+        Some(members) if !is_by_kind(&name) => members
+            .iter()
+            .flat_map(|(key, value)| metrics(value, &format!("{path}.{key}")))
+            .collect(),
+        _ => vec![(name, value)],
     }
-    let members = value.as_object().into_iter().flatten();
-    members.flat_map(|(key, value)| metrics(value, &format!("{path}.{key}"))).collect()
+}
+
+/// Returns whether a metric has a number for every kind or reason.
+fn is_by_kind(name: &str) -> bool {
+    name.contains("_by_")
+}
+
+/// Returns the name of a metric, or of one of a metric's numbers by kind, under which its world has words.
+fn labeled_name(name: &str) -> String {
+    if is_by_kind(name) { format!("{name}.some") } else { name.to_string() }
+}
+
+/// Returns metrics as a table, with the words of their world.
+fn rendered_metrics(metrics: &[(String, &Value)], infos: &[MetricInfo]) -> String {
+    let mut text = "\n| metric | unit | meaning |\n| --- | --- | --- |\n".to_string();
+    for (name, value) in metrics {
+        let label = metric_label(infos, &labeled_name(name));
+        let (unit, meaning) = (label.unit.unwrap_or(""), label.meaning);
+        let counted = format!("{name}_count");
+        let meaning = if is_by_kind(name) {
+            let first = value.as_object().and_then(|kinds| kinds.keys().next());
+            let example =
+                first.map_or_else(String::new, |kind| format!(", such as `{name}.{kind}`"));
+            format!("{meaning} (in sweeps a column for each{example})")
+        } else if value.is_array() && infos.iter().any(|info| info.name == counted) {
+            format!("list: {meaning} (in sweeps their number, `{counted}`)")
+        } else if value.is_array() {
+            format!("list: {meaning} (not in sweeps)")
+        } else {
+            meaning.into()
+        };
+        writeln!(text, "| `{name}` | {unit} | {meaning} |").expect("text");
+    }
+    text + "\n"
 }
 
 /// Compares a marked part of the chapter with the expected text, or writes it.
@@ -180,26 +215,20 @@ fn the_chapter_of_columns_names_every_event_and_no_other() {
 fn every_metric_is_told_in_words_with_a_meaning() {
     for (world, scenario) in SCENARIOS {
         let meanings = WORLDS.find(world).expect("a world").metric_infos();
-        let names = metrics(&started(world, scenario).metrics(), "");
-        for name in names {
-            let one = if name.contains("_by_") { format!("{name}.some") } else { name };
-            assert_ne!(metric_label(meanings, &one).meaning, "", "{world}: `{one}`");
+        let found = started(world, scenario).metrics();
+        for (name, _) in metrics(&found, "") {
+            let label = metric_label(meanings, &labeled_name(&name));
+            assert_ne!(label.meaning, "", "{world}: `{name}`");
         }
     }
 }
 
 #[test]
-fn the_chapter_of_columns_has_every_metric_with_its_unit() {
-    let chapter = read(CHAPTER);
+fn the_chapter_of_columns_has_every_metric_in_the_words_of_its_world() {
     for (world, scenario) in SCENARIOS {
-        let row = |name: &String| format!("| `{name}` | {} |", split_unit(name).1.unwrap_or(""));
-        let mut expected: Vec<String> =
-            metrics(&started(world, scenario).metrics(), "").iter().map(row).collect();
-        let rows = marked(&chapter, &format!("metrics of {world}")).lines();
-        let begin = |row: &str| row.splitn(4, '|').take(3).collect::<Vec<_>>().join("|") + "|";
-        let mut found: Vec<String> = rows.filter(|row| row.starts_with("| `")).map(begin).collect();
-        expected.sort();
-        found.sort();
-        assert_eq!(found, expected, "metrics of {world}");
+        let infos = WORLDS.find(world).expect("a world").metric_infos();
+        let found = started(world, scenario).metrics();
+        let expected = rendered_metrics(&metrics(&found, ""), infos);
+        compare(&format!("metrics of {world}"), &expected);
     }
 }

@@ -27,6 +27,7 @@ pub mod deploy;
 pub mod events;
 mod external;
 pub mod external_action;
+mod facts;
 mod fleet;
 pub mod flight;
 mod flight_plan;

@@ -6,6 +6,7 @@ use super::state::{AirplaneState, AirspaceState, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
+use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
 /// Everything that a run counts beside its state, and that a checkpoint keeps.
@@ -48,78 +49,78 @@ impl Counters {
     }
 }
 
-/// Metrics of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Metrics {
-    /// Closest approach of any two airplanes, in meters; none if no two came near each other.
-    pub min_separation_m: Option<f64>,
-    /// Number of times that two airplanes came nearer than their separation.
-    pub losses_of_separation: u64,
-    /// Seconds that pairs spent nearer than their separation.
-    pub lost_s: f64,
-    /// Number of airplanes that have reached their last way-point.
-    pub arrived: u64,
-    /// Number of all airplanes.
-    pub airplanes: u64,
-    /// Mean delay of those that have arrived: time beyond that of the flight alone, in percent of
-    /// that. Airplanes that would never arrive alone are left out.
-    pub mean_delay_percent: Option<f64>,
-    /// Number of messages between agents, or migrations of a coordinator; none where one process
-    /// decides for all.
-    pub messages: u64,
-    /// Number of bytes of those messages.
-    pub bytes: u64,
-    /// Number of messages if one could reach all of a group.
-    pub multicasts: u64,
-    /// Number of bytes if one message could reach all of a group.
-    pub multicast_bytes: u64,
-    /// Number of messages by which airplanes have found their groups, beside all others; none where groups are
-    /// announced.
-    pub beacons: u64,
-    /// Number of bytes of those messages.
-    pub beacon_bytes: u64,
-    /// Number of those messages if one could reach all near.
-    pub beacon_multicasts: u64,
-    /// Number of their bytes if one message could reach all near.
-    pub beacon_multicast_bytes: u64,
-    /// Seconds that all conversations took on the network, one after the other; none where one process
-    /// decides for all, or where messages take no time.
-    pub network_s: Option<f64>,
-    /// Number of optimizations run.
-    pub optimizations: u64,
-    /// Mean number of their rounds.
-    pub rounds_mean: Option<f64>,
-    /// Number of optimizations that ran out of rounds.
-    pub unconverged: u64,
-    /// Processor time in seconds spent deciding in this process's run, all workers together.
-    pub optimize_cpu_s: f64,
-    /// Number of times that the shield changed an airplane's wish.
-    pub shield_overrides: u64,
-    /// Number of those times when the airplane fell back to an orbit for one `dt`.
-    pub shield_orbits: u64,
-    /// Number of those times when the cause was that not all others had agreed in time.
-    pub shield_held_back: u64,
-    /// Number of times that an airplane lost contact with another one.
-    pub contacts_lost: u64,
-    /// Number of times that an airplane's agent ran out of time.
-    pub deadlines_missed: u64,
-    /// Number of times that a group was too large to be optimized.
-    pub groups_too_large: u64,
-    /// Number of airplanes that have not appeared yet.
-    pub not_appeared: u64,
-    /// Number of airplanes that were removed before they had arrived.
-    pub left: u64,
-    /// Number of airplanes that arrived at the end of their recorded way, which nothing changed.
-    pub replayed: u64,
-    /// Number of orders carried out.
-    pub orders: u64,
-    /// Number of times that an order waited for the next `dt`, because no orbit was apart from
-    /// those of others.
-    pub orders_delayed: u64,
-    /// Pairs for which the shield promises nothing.
-    pub too_close: Vec<TooClose>,
-    /// Airplanes with errors beyond the shield's bounds: it promises nothing for their pairs.
-    pub beyond_bound: Vec<BeyondBound>,
+metrics! {
+    /// Metrics of a run.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct Metrics {
+        /// Closest approach of any two; none if no two came near each other. In meters.
+        pub min_separation_m: Option<f64> => "closest approach",
+        /// Times that two came nearer than their separation.
+        pub losses_of_separation: u64 => "losses of separation",
+        /// Time that pairs spent nearer than their separation. In seconds.
+        pub lost_s: f64 => "time with separation lost",
+        /// Airplanes that have reached their last way-point.
+        pub arrived: u64 => "airplanes arrived",
+        /// All airplanes.
+        pub airplanes: u64 => "airplanes",
+        /// Mean, over those that have arrived, of the time beyond that of the flight alone, in percent of it. Airplanes
+        /// that would never arrive alone are left out.
+        pub mean_delay_percent: Option<f64> => "mean delay",
+        /// Messages between agents (one per receiver), or migrations of a coordinator; 0 where one process decides.
+        pub messages: u64 => "messages",
+        /// Bytes of these messages.
+        pub bytes: u64 => "size of all messages" ("bytes"),
+        /// Messages, if one could reach all of a group.
+        pub multicasts: u64 => "messages with multicast",
+        /// Bytes, if one message could reach all of a group.
+        pub multicast_bytes: u64 => "size of all messages with multicast",
+        /// Messages by which airplanes find their groups, beside all others; none where groups are announced.
+        pub beacons: u64 => "beacons",
+        /// Bytes of those messages.
+        pub beacon_bytes: u64 => "size of all beacons",
+        /// Messages by which airplanes find their groups, if one could reach all near.
+        pub beacon_multicasts: u64 => "beacons with multicast",
+        /// Bytes, if one such message could reach all near.
+        pub beacon_multicast_bytes: u64 => "size of all beacons with multicast",
+        /// Simulated time that all talks took; none where one process decides or messages take no time. In seconds, of one
+        /// talk after the other.
+        pub network_s: Option<f64> => "time on the network",
+        /// Optimizations run.
+        pub optimizations: u64 => "optimizations",
+        /// Mean number of their rounds.
+        pub rounds_mean: Option<f64> => "mean rounds of an optimization",
+        /// Optimizations whose rounds ran out.
+        pub unconverged: u64 => "optimizations without convergence",
+        /// Processor time spent deciding, all workers together; measured, so it differs from run to run. In seconds, of the
+        /// run of this process.
+        pub optimize_cpu_s: f64 => "time spent deciding",
+        /// Times that the shield changed a wish.
+        pub shield_overrides: u64 => "wishes changed by the shield",
+        /// Wishes changed by the shield for an orbit, for one `dt`.
+        pub shield_orbits: u64 => "falls back to an orbit",
+        /// Wishes changed because not all others had agreed in time.
+        pub shield_held_back: u64 => "wishes held back for lack of agreement",
+        /// Times that an airplane lost contact with another one.
+        pub contacts_lost: u64 => "contacts lost",
+        /// Times that an agent ran out of time.
+        pub deadlines_missed: u64 => "deadlines missed",
+        /// Times that a group was too large to be optimized.
+        pub groups_too_large: u64 => "groups too large to optimize",
+        /// Airplanes that had not appeared yet when the run ended.
+        pub not_appeared: u64 => "airplanes that have not appeared",
+        /// Airplanes removed before they had arrived.
+        pub left: u64 => "airplanes removed",
+        /// Airplanes that flew their recorded track to its end. Nothing changed it.
+        pub replayed: u64 => "airplanes replayed to the end",
+        /// Orders carried out.
+        pub orders: u64 => "orders carried out",
+        /// Times that an order waited for the next `dt`. It waits while no orbit is apart from those of others.
+        pub orders_delayed: u64 => "orders delayed",
+        /// Pairs for which the shield promises nothing, and since when.
+        pub too_close: Vec<TooClose> => "pairs without a promise",
+        /// Airplanes whose errors exceeded the bounds, and since when. The shield promises nothing for their pairs.
+        pub beyond_bound: Vec<BeyondBound> => "airplanes beyond their bounds",
+    }
 }
 
 /// An airplane with errors beyond the shield's bounds.
@@ -147,50 +148,54 @@ pub struct TooClose {
     pub callsigns: Option<[String; 2]>,
 }
 
-/// Metrics of one airplane.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AirplaneMetrics {
-    /// Its id.
-    pub airplane: EntityId,
-    /// Its call sign.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub callsign: Option<String>,
-    /// Seconds from its appearance to its arrival, if it has arrived; for a recorded airplane, from
-    /// its handover to the method.
-    pub flown_s: Option<f64>,
-    /// Seconds that the flight takes alone; 0 where it flew its recorded way to the end, infinite
-    /// where it would never end.
-    pub alone_s: f64,
-    /// Time beyond that of the flight alone, in percent of it.
-    pub delay_percent: Option<f64>,
-    /// Number of times that the shield changed its wish.
-    pub shield_overrides: u32,
-    /// Number of those times when it fell back to its orbit.
-    pub shield_orbits: u32,
-    /// Whether it was removed before it had arrived.
-    pub left: bool,
-    /// Number of orders carried out.
-    pub orders: u16,
-    /// Number of times that an order had to wait for the next `dt`.
-    pub orders_delayed: u16,
+metrics! {
+    /// Metrics of one airplane.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct AirplaneMetrics {
+        /// Its id.
+        pub airplane: EntityId,
+        /// Its call sign.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub callsign: Option<String>,
+        /// From its appearance to its arrival. In seconds; for a recorded airplane from its handover to the method, and none
+        /// while it flies.
+        pub flown_s: Option<f64> => "flight",
+        /// Time that the flight takes without others. In seconds; 0 where it flew its recorded track to the end, infinite
+        /// where it would never end.
+        pub alone_s: f64 => "flight alone",
+        /// Time beyond that of the flight alone, in percent of it.
+        pub delay_percent: Option<f64> => "delay",
+        /// Number of times that the shield changed its wish.
+        pub shield_overrides: u32,
+        /// Number of those times when it fell back to its orbit.
+        pub shield_orbits: u32,
+        /// Whether it was removed before it had arrived.
+        pub left: bool,
+        /// Number of orders carried out.
+        pub orders: u16,
+        /// Number of times that an order had to wait for the next `dt`.
+        pub orders_delayed: u16,
+    }
 }
 
-/// Metrics of two airplanes that came near each other.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PairMetrics {
-    /// Their ids.
-    pub airplanes: [EntityId; 2],
-    /// Their call signs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub callsigns: Option<[String; 2]>,
-    /// Closest approach in meters.
-    pub nearest_m: f64,
-    /// Number of times that they came nearer than their separation.
-    pub losses: u32,
-    /// Seconds that they spent nearer than their separation.
-    pub lost_s: f64,
-    /// Largest part of the separation that was lost, from 0 to 1.
-    pub severity: f64,
+metrics! {
+    /// Metrics of two airplanes that came near each other.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct PairMetrics {
+        /// All airplanes.
+        pub airplanes: [EntityId; 2] => "airplanes",
+        /// Their call signs.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub callsigns: Option<[String; 2]>,
+        /// Closest approach of the two. In meters.
+        pub nearest_m: f64 => "closest approach",
+        /// Times that they came nearer than their separation.
+        pub losses: u32 => "losses of separation",
+        /// Seconds that they spent nearer than their separation.
+        pub lost_s: f64,
+        /// Largest part of the separation that was lost, 0 to 1.
+        pub severity: f64 => "severity",
+    }
 }
 
 impl AirplaneMetrics {

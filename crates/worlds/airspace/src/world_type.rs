@@ -5,8 +5,8 @@ use super::{AirspaceWorld, bundle, import, text};
 use sidestep_kernel::text::Description;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, ImportedScenario, MetricInfo, ResolvedScenario, SeedEffect,
-    Source, WorldType,
+    CompiledScenario as AnyCompiled, Editing, ImportedScenario, MetricInfo, ResolvedScenario,
+    SeedEffect, Source, WorldFacts, WorldType,
 };
 use std::any::Any;
 use std::path::Path;
@@ -42,7 +42,15 @@ impl WorldType for Airspace {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
+    }
+
+    fn facts(&self) -> WorldFacts {
+        super::facts::FACTS
+    }
+
+    fn editing(&self) -> Editing {
+        super::facts::editing()
     }
 
     fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {

@@ -8,17 +8,17 @@ use sidestep_kernel::{Cycle, PhaseContext, Slot};
 use sidestep_rods::geometry::{Bounds, with_dimensions};
 
 /// Makes the claim of one chain.
-pub(crate) fn claim<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
-    claim_box(turn, slot);
-    let &mut PhaseContext { world, state, now, .. } = turn;
-    let decision = Perceiver { world, state, now, scratch: turn.scratch }.decide(slot as Slot);
+pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+    claim_box(phase, slot);
+    let &mut PhaseContext { world, state, now, .. } = phase;
+    let decision = Perceiver { world, state, now, scratch: phase.scratch }.decide(slot as Slot);
     state.set_decision(slot, decision);
 }
 
 /// Claims the box that a chain may enter.
-pub(crate) fn claim_box<const D: usize>(turn: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
-    let &mut PhaseContext { world, state, now, .. } = turn;
-    // A chain alone is in no other's way, wherever it goes.
+pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+    let &mut PhaseContext { world, state, now, .. } = phase;
+    // A chain alone is in no other's way, wherever it goes; and to read it would make a copy of it.
     if !world.is_open() {
         state.set_claim(slot, reach_box(world, &world.chains[slot], &state.body(slot), now));
     }
@@ -35,7 +35,7 @@ fn reach_box<const D: usize>(
     let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
     let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
     let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
-    let way_m = match &world.escape {
+    let moved_m = match &world.escape {
         Some(escape) => escape.speed_max_m_s * world.dt_s,
         // A rod that turns aside for an obstacle can swing as far as its length to either side.
         None => {
@@ -45,19 +45,20 @@ fn reach_box<const D: usize>(
             2.0 * longest_m.min(slave_m) + led_m
         }
     };
+    // Changes take effect in the cycle that follows the claim.
     let thrown_m = spec.changes.iter().map(|change| change.max_throw_m(now)).fold(0.0, f64::max);
-    let back_m_s = body.scattered.as_ref().map_or(0.0, |s| s.speed_m_s);
-    let back_m_s =
-        spec.changes.iter().map(|change| change.gather_speed_m_s(now)).fold(back_m_s, f64::max);
-    let of_chain = Bounds::from_points(chain.points())
-        .grown(radius_m + way_m + thrown_m + back_m_s * world.dt_s);
-    of_chain.joined(&robots_reach_box(spec, body, world.dt_s))
+    let gathering_m_s = body.scattered.as_ref().map_or(0.0, |scattered| scattered.speed_m_s);
+    let changes = spec.changes.iter();
+    let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
+    let chain_box = Bounds::from_points(chain.points())
+        .grown(radius_m + moved_m + thrown_m + back_m_s * world.dt_s);
+    chain_box.joined(&robots_reach_box(spec, body, world.dt_s))
 }
 
 /// Returns the box that the robots of a chain may enter during one cycle. A robot that lags is far from its connector.
 fn robots_reach_box<const D: usize>(spec: &ChainSpec<D>, body: &Body<D>, dt_s: f64) -> Bounds<D> {
     let Some(robots) = &spec.robots else { return Bounds::empty() };
-    let way_m = robots.follower.reach_m(dt_s);
+    let reach_m = robots.follower.reach_m(dt_s);
     let places = body.robots.iter().map(|robot| with_dimensions(robot.pose.at));
-    places.fold(Bounds::empty(), |all, at| all.joined(&Bounds::from_points(&[at]).grown(way_m)))
+    places.fold(Bounds::empty(), |all, at| all.joined(&Bounds::from_points(&[at]).grown(reach_m)))
 }

@@ -27,25 +27,28 @@ pub(crate) fn part_clearance<const D: usize>(
     look_m: f64,
     with_rods: bool,
 ) -> PartClearance<D> {
-    let (points, connectors) = (chain.points(), chain.connectors());
+    let points = chain.points();
+    let connectors = chain.connectors();
     let mut near = PartClearance { gap_m: look_m, way: [0.0; D], rod_gap_m: look_m };
     // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
     let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
-    let (at, radii_m) = (points[k], [k, end].map(|i| connectors[i].radius_m));
-    let rod_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
-    // A part that is inside looks only for obstacles that it is deeper in.
-    let room_m = (radii_m[0].max(radii_m[1]) + look_m).max(0.0) + MARGIN_M;
+    let at = points[k];
+    let radius_m = connectors[k].radius_m;
+    let rod_radius_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
+    // Below 0 if a part is inside by `look_m` already: then only obstacles count that it is deeper in.
+    let room_m = (radius_m.max(connectors[end].radius_m) + look_m).max(0.0) + MARGIN_M;
     let room = Bounds::from_points(&[at, points[end]]).grown(room_m);
     obstacles.visit(&room, |o| {
         let nearest = o.core.nearest_to_point(at);
-        let gap_m = nearest.distance_m - radii_m[0] - o.radius_m;
+        let gap_m = nearest.distance_m - radius_m - o.radius_m;
         if gap_m < near.gap_m {
+            near.gap_m = gap_m;
+            // From the core back to the surface; without a direction if the connector's middle lies on the core.
             let part = 1.0 - o.radius_m / nearest.distance_m;
-            let way =
+            near.way =
                 if part.is_finite() { scaled(sub(nearest.on_core, at), part) } else { [0.0; D] };
-            (near.gap_m, near.way) = (gap_m, way);
         }
-        let rod_gap_m = o.core.nearest_to_segment([at, points[end]]).distance_m - rod_m;
+        let rod_gap_m = o.core.nearest_to_segment([at, points[end]]).distance_m - rod_radius_m;
         near.rod_gap_m = near.rod_gap_m.min(rod_gap_m - o.radius_m);
     });
     near
@@ -82,23 +85,27 @@ pub(crate) fn self_gap_m<const D: usize>(
     tree: &mut RodBvh<D>,
     within_m: f64,
 ) -> f64 {
-    let (points, connectors, rods) = (chain.points(), chain.connectors(), chain.rods());
-    let ends = |rod: usize| [points[rod], points[rod + 1]];
-    let thick_m = |rod: usize| connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
-    tree.refit((0..rods.len()).map(|rod| Bounds::from_points(&ends(rod)).grown(thick_m(rod))));
+    let points = chain.points();
+    let connectors = chain.connectors();
+    let rods = chain.rods();
+    tree.refit((0..rods.len()).map(|rod| part_bounds(chain, rod, 0.0)));
     let mut least_m = within_m;
     for rod in 0..rods.len() {
-        let near = Bounds::from_points(&ends(rod)).grown((thick_m(rod) + least_m).max(0.0));
+        let near = part_bounds(chain, rod, least_m);
         tree.visit(&near, |other| {
+            // Each pair of rods is visited twice, and measured once.
             if other >= rod + 2 {
-                let apart_m = between_segments(ends(rod), ends(other)).distance_m;
+                let apart_m = between_segments(rod_ends(chain, rod), rod_ends(chain, other));
+                let apart_m = apart_m.distance_m;
                 least_m = least_m.min(apart_m - rods[rod].radius_m - rods[other].radius_m);
             }
+            // The tree holds rods: each stands for the connector at its start, and the last one for its end as well.
             let is_last = other + 1 == rods.len();
             for k in other..other + 1 + usize::from(is_last) {
-                let (at, radius_m) = (points[k], connectors[k].radius_m);
+                let at = points[k];
+                let radius_m = connectors[k].radius_m;
                 if k + 1 < rod || k > rod + 2 {
-                    let [a, b] = ends(rod);
+                    let [a, b] = rod_ends(chain, rod);
                     let apart_m = distance(at, nearest_on_segment(at, a, b));
                     least_m = least_m.min(apart_m - radius_m - rods[rod].radius_m);
                 }
@@ -110,6 +117,20 @@ pub(crate) fn self_gap_m<const D: usize>(
         });
     }
     least_m
+}
+
+#[inline]
+fn rod_ends<const D: usize>(chain: &Chain<D>, rod: usize) -> [Point<D>; 2] {
+    [chain.points()[rod], chain.points()[rod + 1]]
+}
+
+/// Returns the box around a rod and the connectors at its ends, grown by `by_m`: rods are no thicker than their
+/// connectors.
+#[inline]
+fn part_bounds<const D: usize>(chain: &Chain<D>, rod: usize, by_m: f64) -> Bounds<D> {
+    let connectors = chain.connectors();
+    let radius_m = connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
+    Bounds::from_points(&rod_ends(chain, rod)).grown((radius_m + by_m).max(0.0))
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use sidestep_rods::geometry::{Bounds, Point, normalized, with_dimensions};
 use sidestep_rods::{RequestSource, VetoReason};
 use std::sync::Arc;
 
-/// Largest number of motions in a script.
+/// Largest number of motions in a script: a mistaken repetition must not fill the memory.
 pub(crate) const MAX_MOTIONS: usize = 1_000_000;
 
 /// One task.
@@ -257,7 +257,7 @@ impl<const D: usize> Wander<D> {
     }
 }
 
-/// The turn back of a wandering initiator that is outside, per step.
+/// The turn back of a wandering initiator that is outside, per step: within some ten steps it outweighs the heading.
 const HOMING_TURN: f64 = 0.1;
 
 #[cfg(test)]

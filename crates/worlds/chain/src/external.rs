@@ -17,7 +17,7 @@ mod tests;
 
 /// The noun for an agent that observes and takes orders.
 const CHAIN: &str = "chain";
-/// Sorts of causes of vetoes.
+/// Kinds of causes of vetoes.
 const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
 
 impl<const D: usize> ChainSpec<D> {
@@ -27,6 +27,13 @@ impl<const D: usize> ChainSpec<D> {
     }
 }
 
+/// Returns whether two chains observe, and may be ordered, alike.
+fn is_same_team<const D: usize>(one: &ChainSpec<D>, other: &ChainSpec<D>) -> bool {
+    one.name == other.name
+        && one.start.points().len() == other.start.points().len()
+        && one.is_external() == other.is_external()
+}
+
 fn takes_orders<const D: usize>(task: &Task<D>) -> bool {
     matches!(task.driver, TaskKind::External)
 }
@@ -34,35 +41,35 @@ fn takes_orders<const D: usize>(task: &Task<D>) -> bool {
 impl<const D: usize> ChainWorld<D> {
     /// Returns the teams: chains of one name and one number of connectors, that take orders or do not.
     pub(super) fn find_teams(&self) -> Teams {
-        type TeamKey<'a, const D: usize> = (&'a ChainSpec<D>, Vec<EntityId>);
-        let mut alike: Vec<TeamKey<'_, D>> = Vec::new();
+        let mut alike: Vec<(&ChainSpec<D>, Vec<EntityId>)> = Vec::new();
         for (id, spec) in (0..).zip(self.chains.iter()) {
-            let traits = |s: &ChainSpec<D>| (s.start.points().len(), s.is_external());
-            let is_same = |(other, _): &&mut TeamKey<'_, D>| {
-                other.name == spec.name && traits(other) == traits(spec)
-            };
-            match alike.iter_mut().rev().find(is_same) {
+            // From the last team on: chains that are alike mostly come from one section.
+            match alike.iter_mut().rev().find(|(other, _)| is_same_team(other, spec)) {
                 Some((_, agents)) => agents.push(id),
                 None => alike.push((spec, vec![id])),
             }
         }
-        let team = |(spec, agents): TeamKey<'_, D>| {
-            let (n, is_external) = (spec.start.points().len(), spec.is_external());
-            let mut observed = self.observation_spaces(n);
-            if is_external {
-                observed.extend(order_result_spaces::<D>());
-            }
-            let ordered = if is_external { action_spaces::<D>(n) } else { Vec::new() };
-            let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
-            Team { name, agents, observation_spaces: observed, action_spaces: ordered }
-        };
-        Teams::new(alike.into_iter().map(team).collect(), CHAIN)
+        let teams = alike.into_iter().map(|(spec, agents)| self.team(spec, agents));
+        Teams::new(teams.collect(), CHAIN)
+    }
+
+    /// Returns the team of chains like `spec`.
+    fn team(&self, spec: &ChainSpec<D>, agents: Vec<EntityId>) -> Team {
+        let n = spec.start.points().len();
+        let mut observation_spaces = self.observation_spaces(n);
+        let mut action_spaces = Vec::new();
+        if spec.is_external() {
+            observation_spaces.extend(order_result_spaces::<D>());
+            action_spaces = order_spaces::<D>(n);
+        }
+        let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
+        Team { name, agents, observation_spaces, action_spaces }
     }
 
     /// Returns the spaces of the perception of a chain of `n` connectors, in the order of [`Self::observe`].
     fn observation_spaces(&self, n: usize) -> Vec<Space> {
         let look_m = self.look_m;
-        let up_to_look = || SpaceKind::Real { low: f64::NEG_INFINITY, high: look_m };
+        let up_to_look = SpaceKind::Real { low: f64::NEG_INFINITY, high: look_m };
         let part = SpaceKind::Integer { low: -1, high: n as i64 - 1 };
         let reasons = std::iter::once("none").chain(VetoReason::ALL.iter().map(|r| r.name()));
         let gap = format!(
@@ -71,14 +78,14 @@ impl<const D: usize> ChainWorld<D> {
         );
         vec![
             Space::new("joints_m", any_coordinate(), "places of its connectors").with_shape([n, D]),
-            Space::new("gap_m", up_to_look(), gap).with_shape([n]),
+            Space::new("gap_m", up_to_look.clone(), gap).with_shape([n]),
             Space::new(
                 "nearest_m",
                 any_coordinate(),
                 "way from each connector's middle to the surface of that; 0 where nothing is near",
             )
             .with_shape([n, D]),
-            Space::new("rod_gap_m", up_to_look(), "the same gap of each rod").with_shape([n - 1]),
+            Space::new("rod_gap_m", up_to_look, "the same gap of each rod").with_shape([n - 1]),
             Space::new("leads", part.clone(), "connector that leads; -1 where none does"),
             Space::new("is_broken", choice(["no", "yes"]), "whether its parts are scattered"),
             Space::new("veto", choice(reasons), "reason of the last objection to what it wanted"),
@@ -92,8 +99,9 @@ impl<const D: usize> ChainWorld<D> {
             return Ok(());
         }
         let (first, second) = order.values.split_at(D);
-        let place = |at: &[f64]| -> Point<D> { std::array::from_fn(|i| at[i]) };
-        let long_m = distance(place(first), place(second));
+        let first: Point<D> = std::array::from_fn(|i| first[i]);
+        let second: Point<D> = std::array::from_fn(|i| second[i]);
+        let long_m = distance(first, second);
         let rods = self.chains[order.agent as usize].start.rods();
         if rods.iter().any(|rod| is_length_allowed(*rod, long_m)) {
             return Ok(());
@@ -110,7 +118,7 @@ impl<const D: usize> ChainWorld<D> {
         &self.teams.all()[order.team].action_spaces[order.space].name
     }
 
-    /// Notes an order in the state of its chain.
+    /// Records an order in the state of its chain.
     pub(super) fn record_order(&self, state: &ChainState<D>, order: &Order<'_>) {
         let external = &mut state.body_mut(order.agent as usize).external;
         external.orders.record(self.order_name(order), order.values);
@@ -129,10 +137,10 @@ impl<const D: usize> ChainWorld<D> {
         let boxes: Vec<Box<D>> =
             (0..state.len()).map(|slot| self.bounding_box(&state.body(slot))).collect();
         for (row, &id) in agents.iter().enumerate() {
-            let near = |slot: &Slot| {
-                *slot != id && boxes[*slot as usize].meets(&boxes[id as usize].grown(self.look_m))
-            };
-            scratch.nearby.gather(self, state, now, (0..state.len() as Slot).filter(near));
+            let look = boxes[id as usize].grown(self.look_m);
+            let others = (0..state.len() as Slot).filter(|slot| *slot != id);
+            let near = others.filter(|slot| boxes[*slot as usize].meets(&look));
+            scratch.nearby.gather(self, state, now, near);
             let body = &state.body(id as usize);
             let mut row = ObservationRow { row, rooms: room.iter_mut() };
             self.observe_body(id, body, &scratch.nearby.all, &mut row);
@@ -159,15 +167,14 @@ impl<const D: usize> ChainWorld<D> {
         obstacles: &Obstacles<D>,
         row: &mut ObservationRow<'_, '_>,
     ) {
-        let (chain, n) = (&body.chain, body.chain.points().len());
+        let chain = &body.chain;
+        let n = chain.points().len();
         let is_whole = body.scattered.is_none();
         let all: Vec<_> =
             (0..n).map(|k| part_clearance(chain, obstacles, k, self.look_m, is_whole)).collect();
         row.push_reals(chain.points().as_flattened().iter().copied());
         row.push_reals(all.iter().map(|near| near.gap_m));
-        row.push_reals(
-            all.iter().map(|near| near.way).collect::<Vec<_>>().as_flattened().iter().copied(),
-        );
+        row.push_reals(all.iter().flat_map(|near| near.way));
         row.push_reals(all[..n - 1].iter().map(|near| near.rod_gap_m));
         let leads =
             self.current_task(id, body).filter(|task| !matches!(task.driver, TaskKind::Rest));
@@ -229,20 +236,19 @@ fn order_result_spaces<const D: usize>() -> Vec<Space> {
 }
 
 /// Returns the spaces of the orders for a chain of `n` connectors.
-fn action_spaces<const D: usize>(n: usize) -> Vec<Space> {
-    let place = || SpaceKind::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
-    let number = |most: usize| SpaceKind::Integer { low: 0, high: most as i64 };
+fn order_spaces<const D: usize>(n: usize) -> Vec<Space> {
+    let place = SpaceKind::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
     let mut spaces = vec![
         Space::new(
             Orders::TO,
-            place(),
+            place.clone(),
             "place toward which a connector goes, at its task's speed; without `to_m` and `rod_to_m` nothing \
              moves, and the last of them counts",
         )
         .with_shape([D]),
         Space::new(
             Orders::CONNECTOR,
-            number(n - 1),
+            SpaceKind::Integer { low: 0, high: n as i64 - 1 },
             "that connector, from 0; the one that leads where this is not ordered",
         ),
         Space::new(
@@ -256,14 +262,14 @@ fn action_spaces<const D: usize>(n: usize) -> Vec<Space> {
         spaces.push(
             Space::new(
                 Orders::ROD_TO,
-                place(),
+                place,
                 "places toward which the ends of a rod go, none faster than its task's speed",
             )
             .with_shape([2, D]),
         );
         spaces.push(Space::new(
             Orders::ROD,
-            number(n - 2),
+            SpaceKind::Integer { low: 0, high: n as i64 - 2 },
             "that rod, from 0; the one behind the leading connector where this is not ordered",
         ));
     }

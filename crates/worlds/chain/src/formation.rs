@@ -2,7 +2,7 @@
 
 use super::swarm::drive::Pose2;
 use super::swarm::follower::Follower;
-use super::swarm::laser::RobotBody as Seen;
+use super::swarm::laser::RobotBody;
 use serde::{Deserialize, Serialize};
 use sidestep_rods::geometry::Point;
 
@@ -12,7 +12,7 @@ pub(crate) struct Robots {
     /// Behavior of each robot.
     pub(crate) follower: Follower,
     /// Distance between a robot and its connector at which a leader on wheels stops to wait,
-    /// meters; it slows down from half of that on. Infinite for never.
+    /// meters; it slows down from half of that on. Infinite: it never waits.
     pub(crate) lag_limit_m: f64,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     /// Returns the body as lasers and bumpers see it.
-    pub(crate) fn robot_body(&self) -> Seen {
-        Seen::disc(self.at, self.radius_m)
+    pub(crate) fn robot_body(&self) -> RobotBody {
+        RobotBody::disc(self.at, self.radius_m)
     }
 }

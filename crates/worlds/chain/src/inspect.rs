@@ -46,9 +46,15 @@ impl<const D: usize> ChainWorld<D> {
         }
         let mut scratch = Scratch::new(self);
         scratch.trace = Some(Box::new(InspectionTrace { slot, ..InspectionTrace::default() }));
-        let mut told = Inspection::new(who, now, self.title(who));
-        let (after, group) =
-            self.try_cycle(&state.trial_copy(), now, slot, &mut scratch, &mut told);
+        let mut inspection = Inspection::new(who, now, self.title(who));
+        let mut phase = PhaseContext {
+            world: self,
+            state: &state.trial_copy(),
+            now,
+            clock: &ManualClock::default(),
+            scratch: &mut scratch,
+        };
+        let (after, group) = self.try_cycle(&mut phase, slot, &mut inspection);
         let trace = *scratch.trace.take()?;
         let asked = ConnectorInspection {
             world: self,
@@ -60,8 +66,8 @@ impl<const D: usize> ChainWorld<D> {
             trace,
             scratch,
         };
-        asked.add_all(&mut told, &group);
-        Some(told)
+        asked.add_all(&mut inspection, &group);
+        Some(inspection)
     }
 
     /// Returns the name of a connector, or of its robot, for people.
@@ -76,50 +82,49 @@ impl<const D: usize> ChainWorld<D> {
     /// and the group.
     fn try_cycle(
         &self,
-        state: &ChainState<D>,
-        now: Cycle,
+        phase: &mut PhaseContext<'_, Self>,
         slot: Slot,
-        scratch: &mut Scratch<D>,
-        told: &mut Inspection,
+        inspection: &mut Inspection,
     ) -> (Body<D>, Vec<Slot>) {
-        let clock = &ManualClock::default();
-        let turn = &mut PhaseContext { world: self, state, now, clock, scratch };
+        let &mut PhaseContext { state, now, .. } = phase;
         let groups = ConflictGroups::new(state.len());
-        (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
-        join::join(turn, 0..state.len(), &groups);
+        for slot in 0..state.len() {
+            claim::claim_box(phase, slot);
+        }
+        join::join(phase, 0..state.len(), &groups);
         let mut group = Vec::new();
         groups.members(groups.leader(slot), &mut group);
         group.sort_unstable();
         for &member in &group {
-            let mut looking = Perceiver { world: self, state, now, scratch: turn.scratch };
+            let mut perceiver = Perceiver { world: self, state, now, scratch: phase.scratch };
             if member == slot {
-                add_navigation(&mut looking, slot, told);
+                add_navigation(&mut perceiver, slot, inspection);
             }
-            let decision = looking.decide(member);
+            let decision = perceiver.decide(member);
             state.set_decision(member as usize, decision);
         }
         for &member in group.iter().take_while(|&&member| member <= slot) {
             if member == slot {
-                turn.scratch.events.clear();
+                phase.scratch.events.clear();
             }
-            act::act_one(turn, &group, member);
+            act::act_one(phase, &group, member);
         }
         (state.body(slot as usize).clone(), group)
     }
 }
 
-/// Tells the perception of a leader on wheels, and the layer that acts.
+/// Adds the perception of a leader on wheels, and the layer that acts.
 fn add_navigation<const D: usize>(
-    looking: &mut Perceiver<'_, D>,
+    perceiver: &mut Perceiver<'_, D>,
     slot: Slot,
-    told: &mut Inspection,
+    inspection: &mut Inspection,
 ) {
-    let Some(sight) = looking.percept(slot) else { return };
+    let Some(sight) = perceiver.percept(slot) else { return };
     let leader = &sight.navigator.leader;
     let decision = leader.decide(sight.leader.followed, &sight.percept);
     let walls = sight.percept.walls_m;
     let target = sight.percept.target;
-    told.add_section(
+    inspection.add_section(
         FactSection::new("Perceives")
             .fact("wall on the left", FactValue::meters(walls.left))
             .fact("wall on the right", FactValue::meters(walls.right))
@@ -127,12 +132,13 @@ fn add_navigation<const D: usize>(
             .fact("target ahead", target.map(|target| FactValue::degrees(target.bearing_rad)))
             .fact("way to it is free", target.map(|target| target.way_is_free)),
     );
-    let speed = |m_s| FactValue::number(m_s, "m/s");
-    told.add_section(
+    let left_m_s = decision.wheels.left_m_s;
+    let right_m_s = decision.wheels.right_m_s;
+    inspection.add_section(
         FactSection::new("Decides")
             .fact("layer", format!("{}: {}", decision.layer as u8, decision.layer.name()))
-            .fact("left wheel", speed(decision.wheels.left_m_s))
-            .fact("right wheel", speed(decision.wheels.right_m_s))
+            .fact("left wheel", FactValue::number(left_m_s, "m/s"))
+            .fact("right wheel", FactValue::number(right_m_s, "m/s"))
             .fact("follows the left wall", decision.followed.left)
             .fact("follows the right wall", decision.followed.right),
     );
@@ -151,15 +157,15 @@ struct ConnectorInspection<'a, const D: usize> {
 }
 
 impl<const D: usize> ConnectorInspection<'_, D> {
-    fn add_all(&self, told: &mut Inspection, group: &[Slot]) {
-        self.add_state(told);
-        self.add_group(told, group);
-        self.add_intention(told);
-        self.add_vetoes(told);
-        self.add_recovery(told);
-        self.add_moves(told);
-        self.add_lags(told);
-        self.add_outcome(told);
+    fn add_all(&self, inspection: &mut Inspection, group: &[Slot]) {
+        self.add_state(inspection);
+        self.add_group(inspection, group);
+        self.add_intention(inspection);
+        self.add_vetoes(inspection);
+        self.add_recovery(inspection);
+        self.add_moves(inspection);
+        self.add_lags(inspection);
+        self.add_outcome(inspection);
     }
 
     /// Returns its present task; none after the last.
@@ -179,14 +185,14 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         }
     }
 
-    fn add_state(&self, told: &mut Inspection) {
+    fn add_state(&self, inspection: &mut Inspection) {
         let connector = &self.before.chain.connectors()[self.k];
         let task = self.task();
         let leader =
             task.filter(|task| !matches!(task.driver, TaskKind::Rest)).map(|task| task.agent);
         let tasks = self.world.chains[self.slot as usize].tasks.len();
         let number = (self.before.driving.task as usize + 1).min(tasks);
-        told.add_section(
+        inspection.add_section(
             FactSection::new("Now")
                 .fact("place", self.position(&self.before))
                 .fact("leads", leader == Some(self.k))
@@ -199,7 +205,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    fn add_group(&self, told: &mut Inspection, group: &[Slot]) {
+    fn add_group(&self, inspection: &mut Inspection, group: &[Slot]) {
         let mut table = FactTable::new(["turn", "chain"]);
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
             table.push_row([
@@ -208,7 +214,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             ]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);
-        told.add_section(
+        inspection.add_section(
             FactSection::new("Conflict group")
                 .fact("chains", FactValue::count(group.len()))
                 .fact("turn", FactValue::count(turn))
@@ -216,8 +222,8 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    /// Tells the wish of the initiator.
-    fn add_intention(&self, told: &mut Inspection) {
+    /// Adds the wish of the initiator.
+    fn add_intention(&self, inspection: &mut Inspection) {
         let Some(task) = self.task() else { return };
         let Some(intended) = self.trace.intended else { return };
         let at = self.before.chain.points()[intended.connector];
@@ -225,7 +231,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             TaskKind::Targets(targets) => targets.places.get(self.before.driving.next as usize),
             _ => None,
         };
-        told.add_section(
+        inspection.add_section(
             FactSection::new("Wish")
                 .fact("of", self.connector(intended.connector))
                 .fact("what", intended.words)
@@ -235,10 +241,10 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 .fact_if("way to the target", target.map(|t| FactValue::meters(distance(at, *t)))),
         );
         if let Some(to) = intended.to {
-            told.add_mark(MarkRole::Wish, intended.words, line(&[at, to]));
+            inspection.add_mark(MarkRole::Wish, intended.words, line(&[at, to]));
         }
         if let Some(target) = target {
-            told.add_mark(
+            inspection.add_mark(
                 MarkRole::Target,
                 "target",
                 MarkShape::Point { at_m: with_dimensions(*target) },
@@ -246,10 +252,9 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         }
     }
 
-    /// Tells the objecting connector, its reason, the obstacle, and how far the initiator could have gone.
-    fn add_vetoes(&self, told: &mut Inspection) {
+    /// Adds the objecting connector, its reason, the obstacle, and how far the initiator could have gone.
+    fn add_vetoes(&self, inspection: &mut Inspection) {
         let before = self.before.chain.points();
-        let far_m = |veto: &Veto<D>| distance(veto.reached, before[veto.from]);
         let mut table = FactTable::new(["by", "reason", "because of", "could go"]);
         for veto in self.vetoes() {
             let because = veto.obstacle.map(obstacle_body_id);
@@ -258,21 +263,25 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 by,
                 veto.reason.name().into(),
                 because.into(),
-                FactValue::meters(far_m(veto)),
+                FactValue::meters(distance(veto.reached, before[veto.from])),
             ]);
             let at_m = with_dimensions(before[veto.by]);
-            told.add_mark(MarkRole::Refused, veto.reason.to_string(), MarkShape::Point { at_m });
+            inspection.add_mark(
+                MarkRole::Refused,
+                veto.reason.to_string(),
+                MarkShape::Point { at_m },
+            );
             let way = line(&[before[veto.from], veto.reached]);
-            told.add_mark(MarkRole::Refused, "as far as it could go", way);
+            inspection.add_mark(MarkRole::Refused, "as far as it could go", way);
         }
         let Some(first) = self.vetoes().next() else { return };
-        told.add_section(
+        inspection.add_section(
             FactSection::new("Veto")
                 .fact("by", self.connector(first.by))
                 .fact("reason", first.reason.name())
                 .fact("why", first.reason.to_string())
                 .fact("because of", first.obstacle.map(obstacle_body_id))
-                .fact("could go", FactValue::meters(far_m(first)))
+                .fact("could go", FactValue::meters(distance(first.reached, before[first.from])))
                 .fact("as far as", with_dimensions::<D, 3>(first.reached))
                 .table(table),
         );

@@ -10,13 +10,13 @@ const MAX_PAIRWISE_CHAINS: usize = 32;
 
 /// Joins chains with those whose claims meet theirs.
 pub(crate) fn join<const D: usize>(
-    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
     bodies: Range<usize>,
     groups: &ConflictGroups,
 ) {
-    let state = turn.state;
+    let state = phase.state;
     if state.len() <= MAX_PAIRWISE_CHAINS {
-        return bodies.for_each(|slot| join_each(turn, slot, groups));
+        return bodies.for_each(|slot| join_each(phase, slot, groups));
     }
     let neighbors = state.neighbors();
     for slot in bodies {
@@ -26,11 +26,11 @@ pub(crate) fn join<const D: usize>(
 
 /// Joins one chain with those before it whose claims meet its own.
 fn join_each<const D: usize>(
-    turn: &mut PhaseContext<'_, ChainWorld<D>>,
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
     slot: usize,
     groups: &ConflictGroups,
 ) {
-    let state = turn.state;
+    let state = phase.state;
     let claim = state.claim(slot);
     for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {
         groups.join(slot as Slot, other as Slot);

@@ -26,6 +26,7 @@ mod deploy;
 mod driver;
 mod events;
 mod external;
+mod facts;
 #[cfg(test)]
 mod fixtures;
 mod formation;
@@ -55,8 +56,12 @@ mod world_impl;
 mod world_type;
 
 pub use deploy::Deployment;
-pub use motion::escape::{EscapeMethod, EscapePlan, EscapeReport, EscapeRules, Escaper};
-pub use motion::recovery::{RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation};
+pub use motion::escape::{
+    EscapeMethod, EscapePlan, EscapeReport, EscapeRules, EscapeTick, Escaper,
+};
+pub use motion::recovery::{
+    DirectMover, RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation,
+};
 pub use state::{Body, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};
@@ -82,15 +87,15 @@ impl<const D: usize> Phases for ChainWorld<D> {
         state.len()
     }
 
-    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
-        bodies.for_each(|slot| claim::claim(turn, slot));
+    fn claim(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
+        bodies.for_each(|slot| claim::claim(phase, slot));
     }
 
-    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
-        join::join(turn, bodies, groups);
+    fn join(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
+        join::join(phase, bodies, groups);
     }
 
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
-        act::act(turn, group);
+    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+        act::act(phase, group);
     }
 }

@@ -7,6 +7,7 @@ use super::swarm::follower::FollowResult;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 use sidestep_rods::{CompletedMotion, VetoReason};
+use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
 /// Depth in an obstacle beyond which a part counts as a penetration, meters.
@@ -76,25 +77,27 @@ pub struct ChainTally {
     pub stood: u64,
 }
 
-/// Number of climbs that each rung of the ladder ended.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct RungTally {
-    /// Shorter steps.
-    pub shorter: u64,
-    /// Other headings.
-    pub sideways: u64,
-    /// Turns on the spot.
-    pub turned: u64,
-    /// Cycles waited.
-    pub waited: u64,
-    /// Cycles in which the other end led.
-    pub pulled_back: u64,
-    /// Climbs that reached the end of the ladder without success.
-    pub stuck: u64,
-    /// Ways that a planner found,
-    pub planned: u64,
-    /// and searches that found none.
-    pub not_planned: u64,
+metrics! {
+    /// Number of climbs that each rung of the ladder ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+    pub struct RungTally in "rungs." {
+        /// Climbs that ended with shorter steps.
+        pub shorter: u64 => "vetoes overcome by shorter steps",
+        /// Climbs that ended with another heading.
+        pub sideways: u64 => "vetoes overcome by another heading",
+        /// Climbs that ended with a turn on the spot.
+        pub turned: u64 => "vetoes overcome by a turn on the spot",
+        /// Cycles waited.
+        pub waited: u64 => "time waited" ("cycles"),
+        /// Cycles in which the other end led.
+        pub pulled_back: u64 => "time pulled back" ("cycles"),
+        /// Climbs without success.
+        pub stuck: u64 => "vetoes not overcome",
+        /// Ways planned after local rules came no nearer.
+        pub planned: u64 => "ways planned",
+        /// Plans for which no way was found.
+        pub not_planned: u64 => "plans without a way",
+    }
 }
 
 impl RungTally {
@@ -126,15 +129,17 @@ impl RungTally {
     }
 }
 
-/// Results of getting out of the way.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct EscapeTally {
-    /// Moves of parts.
-    pub moves: u64,
-    /// Vetoes against such moves,
-    pub vetoes: u64,
-    /// of these, the ones due to the speed limit alone.
-    pub capped: u64,
+metrics! {
+    /// Results of getting out of the way.
+    #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+    pub struct EscapeTally in "escapes." {
+        /// Moves of parts out of the way of something.
+        pub moves: u64 => "moves out of the way",
+        /// Vetoes against such moves.
+        pub vetoes: u64 => "vetoes against moves out of the way",
+        /// Vetoes against moves out of the way that were due to the speed limit alone.
+        pub capped: u64 => "moves too slow for the speed limit",
+    }
 }
 
 impl EscapeTally {
@@ -294,96 +299,101 @@ pub struct AbandonedPart {
     pub reason: Option<String>,
 }
 
-/// Metrics of a run. The names of the first seven are fixed, because scripts of users rely on them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Metrics {
-    /// Cycles of all chains, summed.
-    pub steps: u64,
-    /// Vetoes that drivers received.
-    pub vetoes: u64,
-    /// Steps at whose end some part of a chain was in an obstacle.
-    pub penetrations: u64,
-    /// Least distance of any part from obstacles, meters; none if nothing came near.
-    pub min_clearance_m: Option<f64>,
-    /// Greatest amount by which a rod was outside its limits, meters.
-    pub max_rod_violation_m: f64,
-    /// Part of their tasks that the chains have done, 0 to 1, on average; see
-    /// [`super::world::ChainWorld::progress`].
-    pub progress: f64,
-    /// Steps per second of processor time, of this process's part of the run.
-    pub steps_per_cpu_s: f64,
-    /// Vetoes by reason; those that did not occur are left out.
-    pub vetoes_by_reason: BTreeMap<&'static str, u64>,
-    /// Rods turned to avoid something.
-    pub rotations: u64,
-    /// Connectors moved per step, summed over the sub-steps.
-    pub moved_per_step: f64,
-    /// Longest distance that a connector other than an initiator moved in one sub-step, meters.
-    pub max_slave_step_m: f64,
-    /// Greatest speed of any connector, m/s.
-    pub max_speed_m_s: f64,
-    /// Most steps in a row at whose ends some part of one chain was in an obstacle.
-    pub longest_inside_steps: u64,
-    /// Least distance between parts of a chain that are no neighbors, while they are solid to each other,
-    /// meters; negative where they overlapped, none if none came near. Chains of more than 32 rods are
-    /// measured in every 16th cycle.
-    pub min_own_gap_m: Option<f64>,
-    /// Tasks done, targets reached.
-    pub done: u64,
-    /// Number of times that broken parts were joined again,
-    pub reformed: u64,
-    /// and that they could not be: the gap was too long, or no way was found.
-    pub not_reformed: u64,
-    /// Number of parts that were missing in the gaps that were too long, the most of each chain.
-    pub missing_parts: u64,
-    /// Motions and targets that were given up, by chain.
-    pub given_up: Vec<ChainAbandonedPart>,
-    /// Rungs by which initiators continued after vetoes.
-    pub rungs: RungTally,
-    /// Counts of parts that got out of the way.
-    pub escapes: EscapeTally,
-    /// Number of packets between the agents of connectors; 0 where one process moves the chains.
-    pub messages: u64,
-    /// Number of bytes of those packets.
-    pub bytes: u64,
-    /// Number of packets that came and made no sense.
-    pub dropped: u64,
-    /// Number of times that a connector was no longer heard by a neighbor.
-    pub contacts_lost: u64,
-    /// Number of times that time was up before a leader had finished.
-    pub deadlines_missed: u64,
-    /// Steps in which a chain stood because a connector was lost, or time was up.
-    pub stood: u64,
-    /// Metrics of robots on wheels, if there are any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub robots: Option<RobotMetrics>,
+metrics! {
+    /// Metrics of a run. The names of the first seven are fixed, because scripts of users rely on them.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct Metrics {
+        /// Cycles of all chains, summed.
+        pub steps: u64 => "steps",
+        /// Vetoes that initiators received.
+        pub vetoes: u64 => "vetoes",
+        /// Steps at whose end some part was deeper than 1e-6 m in an obstacle.
+        pub penetrations: u64 => "steps inside an obstacle",
+        /// Least distance of any part from obstacles; none if nothing came near. In meters.
+        pub min_clearance_m: Option<f64> => "least clearance",
+        /// Greatest amount by which a rod was outside its limits. In meters.
+        pub max_rod_violation_m: f64 => "greatest error of a rod",
+        /// Share of their tasks that the chains have done, 0 to 1, on average. See [`super::world::ChainWorld::progress`].
+        pub progress: f64 => "share of the tasks done",
+        /// Steps per second of processor time; measured. Processor time is that of the run of this process.
+        pub steps_per_cpu_s: f64 => "speed of simulation",
+        /// Vetoes by reason. Reasons that did not occur are left out.
+        pub vetoes_by_reason.*: BTreeMap<&'static str, u64> => "vetoes because of *",
+        /// Rods turned to avoid something.
+        pub rotations: u64 => "rods turned",
+        /// Connectors moved per step, summed over sub-steps.
+        pub moved_per_step: f64 => "connectors moved per step",
+        /// Longest way of a connector that does not lead, in one sub-step. In meters.
+        pub max_slave_step_m: f64 => "longest way of a follower in a sub-step",
+        /// Greatest speed of any connector. In meters per second.
+        pub max_speed_m_s: f64 => "greatest speed",
+        /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle.
+        pub longest_inside_steps: u64 => "steps inside in a row, at most",
+        /// Least distance between parts of a chain that are no neighbors (of more than 32 rods: in every 16th cycle); below
+        /// 0 where they overlapped; none if none came near. In meters, while they are solid to each other.
+        pub min_own_gap_m: Option<f64> => "least distance of own parts",
+        /// Tasks done, targets reached.
+        pub done: u64 => "tasks done",
+        /// Times that broken parts were joined again.
+        pub reformed: u64 => "parts joined again",
+        /// Times that broken parts could not be joined again. The gap was too long, or no way was found.
+        pub not_reformed: u64 => "parts not joined again",
+        /// Greatest number of parts that were missing when parts could not be joined. Of each chain the most, summed.
+        pub missing_parts: u64 => "missing parts",
+        /// Motions and targets that were given up, by chain, with who objected and why.
+        pub given_up: Vec<ChainAbandonedPart> => "tasks given up",
+        /// Rungs by which initiators continued after vetoes.
+        pub rungs: RungTally,
+        /// Counts of parts that got out of the way.
+        pub escapes: EscapeTally,
+        /// Packets between the agents of connectors; 0 where one process moves the chains.
+        pub messages: u64 => "messages",
+        /// Bytes of these packets.
+        pub bytes: u64 => "size of all messages" ("bytes"),
+        /// Packets that came and were dropped, because they made no sense.
+        pub dropped: u64 => "messages that made no sense",
+        /// Times that a connector was no longer heard by a neighbor.
+        pub contacts_lost: u64 => "contacts lost",
+        /// Times that time was up before a leader had finished.
+        pub deadlines_missed: u64 => "deadlines missed",
+        /// Steps in which a chain stood because a connector was lost, or time was up.
+        pub stood: u64 => "time stood for the network" ("cycles"),
+        /// Metrics of robots on wheels, if there are any.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub robots: Option<RobotMetrics>,
+    }
 }
 
-/// Metrics of the robots on wheels of all swarms.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RobotMetrics {
-    /// Times that a bumper was pressed,
-    pub bumper_events: u64,
-    /// and the part of all robots' steps with a pressed bumper.
-    pub bumper_part: f64,
-    /// Part of all steps in which sensors slowed a robot down.
-    pub held_part: f64,
-    /// Mean distance of robots from their connectors, meters,
-    pub mean_lag_m: f64,
-    /// and the greatest.
-    pub max_lag_m: f64,
-    /// Least gap between a body and anything else, up to 1 m, meters.
-    pub min_gap_m: f64,
+metrics! {
+    /// Metrics of the robots on wheels of all swarms.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct RobotMetrics in "robots." {
+        /// Times that a bumper was pressed.
+        pub bumper_events: u64 => "bumpers pressed",
+        /// Share of all robots' steps with a pressed bumper, 0 to 1.
+        pub bumper_part: f64 => "share of time with a pressed bumper",
+        /// Share of all steps in which sensors slowed a robot down, 0 to 1.
+        pub held_part: f64 => "share of time held back by sensors",
+        /// Mean distance of robots from their connectors. In meters.
+        pub mean_lag_m: f64 => "mean lag of robots behind their connectors",
+        /// Greatest distance of a robot from its connector. In meters.
+        pub max_lag_m: f64 => "greatest lag of a robot",
+        /// Least gap between a body and anything else, up to 1 m. In meters.
+        pub min_gap_m: f64 => "least gap around robots",
+    }
 }
 
 impl RobotMetrics {
     fn from_tally(tally: &RobotTally) -> Option<Self> {
-        let part = |count: u64| count as f64 / tally.steps as f64;
-        (tally.steps > 0).then(|| Self {
+        if tally.steps == 0 {
+            return None;
+        }
+        let steps = tally.steps as f64;
+        Some(Self {
             bumper_events: tally.bumper_events,
-            bumper_part: part(tally.bumper_steps),
-            held_part: part(tally.held_steps),
-            mean_lag_m: tally.lag_sum_m / tally.steps as f64,
+            bumper_part: tally.bumper_steps as f64 / steps,
+            held_part: tally.held_steps as f64 / steps,
+            mean_lag_m: tally.lag_sum_m / steps,
             max_lag_m: tally.max_lag_m,
             min_gap_m: tally.min_gap_m,
         })
@@ -425,45 +435,41 @@ impl Metrics {
         cpu_s: f64,
         timed_steps: u64,
     ) -> Self {
-        let sum = |count: fn(&ChainTally) -> u64| tallies.iter().map(count).sum::<u64>();
-        let most = |value: fn(&ChainTally) -> f64| tallies.iter().map(value).fold(0.0, f64::max);
-        let vetoes_of = |k: usize| tallies.iter().map(|t| t.vetoes[k]).sum::<u64>();
-        let least = |value: fn(&ChainTally) -> f64| {
-            let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
-            Some(least).filter(|m| m.is_finite())
-        };
-        let steps = sum(|t| t.steps);
+        let steps = sum(tallies, |t| t.steps);
         let robots = tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots));
-        let by_reason =
-            (0..VetoReason::ALL.len()).map(|k| (VetoReason::ALL[k].name(), vetoes_of(k)));
+        let mut vetoes_by_reason = BTreeMap::new();
+        for (k, reason) in VetoReason::ALL.iter().enumerate() {
+            let vetoes: u64 = tallies.iter().map(|t| t.vetoes[k]).sum();
+            vetoes_by_reason.insert(reason.name(), vetoes);
+        }
         Self {
             steps,
-            vetoes: (0..VetoReason::ALL.len()).map(vetoes_of).sum(),
-            penetrations: sum(|t| t.penetrations),
-            min_clearance_m: least(|t| t.min_clearance_m),
-            max_rod_violation_m: most(|t| t.max_rod_violation_m),
+            vetoes: vetoes_by_reason.values().sum(),
+            penetrations: sum(tallies, |t| t.penetrations),
+            min_clearance_m: least(tallies, |t| t.min_clearance_m),
+            max_rod_violation_m: greatest(tallies, |t| t.max_rod_violation_m),
             progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
             steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
-            vetoes_by_reason: by_reason.collect(),
-            rotations: sum(|t| t.rotations),
-            moved_per_step: sum(|t| t.moved) as f64 / steps.max(1) as f64,
-            max_slave_step_m: most(|t| t.max_slave_step_m),
-            max_speed_m_s: most(|t| t.max_speed_m_s),
+            vetoes_by_reason,
+            rotations: sum(tallies, |t| t.rotations),
+            moved_per_step: sum(tallies, |t| t.moved) as f64 / steps.max(1) as f64,
+            max_slave_step_m: greatest(tallies, |t| t.max_slave_step_m),
+            max_speed_m_s: greatest(tallies, |t| t.max_speed_m_s),
             longest_inside_steps: tallies.iter().map(|t| t.longest_inside_steps).max().unwrap_or(0),
-            min_own_gap_m: least(|t| t.min_own_gap_m),
-            done: sum(|t| t.done),
-            reformed: sum(|t| t.reformed),
-            not_reformed: sum(|t| t.not_reformed),
-            missing_parts: sum(|t| t.missing_parts),
+            min_own_gap_m: least(tallies, |t| t.min_own_gap_m),
+            done: sum(tallies, |t| t.done),
+            reformed: sum(tallies, |t| t.reformed),
+            not_reformed: sum(tallies, |t| t.not_reformed),
+            missing_parts: sum(tallies, |t| t.missing_parts),
             given_up: abandoned_parts(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
-            messages: sum(|t| t.messages),
-            bytes: sum(|t| t.bytes),
-            dropped: sum(|t| t.dropped),
-            contacts_lost: sum(|t| t.contacts_lost),
-            deadlines_missed: sum(|t| t.deadlines_missed),
-            stood: sum(|t| t.stood),
+            messages: sum(tallies, |t| t.messages),
+            bytes: sum(tallies, |t| t.bytes),
+            dropped: sum(tallies, |t| t.dropped),
+            contacts_lost: sum(tallies, |t| t.contacts_lost),
+            deadlines_missed: sum(tallies, |t| t.deadlines_missed),
+            stood: sum(tallies, |t| t.stood),
             robots: RobotMetrics::from_tally(&robots),
         }
     }
@@ -471,9 +477,25 @@ impl Metrics {
 
 /// Returns what the chains gave up.
 fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedPart> {
-    let of_one = |(chain, tally): (EntityId, &ChainTally)| {
-        let what = tally.given_up.clone().into_iter();
-        what.map(move |what| ChainAbandonedPart { chain, what })
-    };
-    (0..).zip(tallies).flat_map(of_one).collect()
+    let mut parts = Vec::new();
+    for (chain, tally) in (0..).zip(tallies) {
+        for what in tally.given_up.iter().cloned() {
+            parts.push(ChainAbandonedPart { chain, what });
+        }
+    }
+    parts
+}
+
+fn sum(tallies: &[ChainTally], count: fn(&ChainTally) -> u64) -> u64 {
+    tallies.iter().map(count).sum()
+}
+
+fn greatest(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> f64 {
+    tallies.iter().map(value).fold(0.0, f64::max)
+}
+
+/// Returns the least value; none if no chain has one, which is infinite then.
+fn least(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> Option<f64> {
+    let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
+    Some(least).filter(|m| m.is_finite())
 }

@@ -5,10 +5,12 @@ use super::swarm::leader::{Leader, TurnMode};
 use sidestep_rods::geometry::{Point, distance};
 use std::ops::Range;
 
-/// Distance before the end of a line at which the end counts as reached, meters.
+/// Distance before the end of a line at which the end counts as reached, meters: a corridor is open at its end, where a
+/// leader may turn aside and never pass the last point itself.
 const END_TOLERANCE_M: f64 = 0.5;
 
-/// Points of a line ahead among which a navigator looks for the one that it has reached.
+/// Points of a line ahead among which a navigator looks for the one that it has reached: a meter of a corridor's middle.
+/// A leader that cuts a bend passes some of them no nearer than the one before; the next leg of a hairpin is farther on.
 const LOOKAHEAD_POINTS: usize = 10;
 
 /// An initiator that navigates.
@@ -93,11 +95,12 @@ impl NavigationGoal {
         }
     }
 
-    /// Returns the part of the way that is done: by the points of a line from where it began, or by the
+    /// Returns the fraction of the path that is done: by the points of a line from where it began, or by the
     /// distance left to a target compared with the distance at the start.
     pub(crate) fn progress(&self, index: usize, start: Point<2>, nearest_m: f64) -> f64 {
         match self {
             Self::Target { at, .. } if nearest_m.is_finite() => {
+                // At least 1 nm, or a start on the target would divide by zero.
                 1.0 - nearest_m / distance(start, *at).max(nearest_m).max(1e-9)
             }
             Self::Target { .. } => 0.0,
@@ -112,8 +115,12 @@ impl NavigationGoal {
 
 /// Returns the last point of a line up to which all from `index` on come nearer.
 fn last_nearing(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
-    let nearer = |i: usize| distance(line[i + 1], at) <= distance(line[i], at);
-    (index..line.len() - 1).find(|&i| !nearer(i)).unwrap_or(line.len() - 1)
+    let last = line.len() - 1;
+    let farther = (index..last).find(|&i| {
+        let is_nearing = distance(line[i + 1], at) <= distance(line[i], at);
+        !is_nearing
+    });
+    farther.unwrap_or(last)
 }
 
 /// Returns the nearest of some points of a line; of equals the first.

@@ -59,13 +59,27 @@ impl<const D: usize> Neighbors<D> {
 
 /// Returns the axis on which the lower ends of boxes are spread farthest.
 fn widest<const D: usize>(boxes: &[(Bounds<D>, Slot)]) -> usize {
-    let spread = |axis: usize| {
-        let ends = boxes.iter().map(|(claim, _)| claim.lo[axis]);
-        let (lo, hi) =
-            ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)));
-        hi - lo
-    };
-    (1..D).fold(0, |best, axis| if spread(axis) > spread(best) { axis } else { best })
+    let mut widest = 0;
+    let mut widest_m = spread_m(boxes, 0);
+    for axis in 1..D {
+        let axis_m = spread_m(boxes, axis);
+        if axis_m > widest_m {
+            widest = axis;
+            widest_m = axis_m;
+        }
+    }
+    widest
+}
+
+/// Returns the distance on an axis from the least lower end of a box to the greatest.
+fn spread_m<const D: usize>(boxes: &[(Bounds<D>, Slot)], axis: usize) -> f64 {
+    let mut lo = f64::INFINITY;
+    let mut hi = f64::NEG_INFINITY;
+    for (claim, _) in boxes {
+        lo = lo.min(claim.lo[axis]);
+        hi = hi.max(claim.lo[axis]);
+    }
+    hi - lo
 }
 
 #[cfg(test)]

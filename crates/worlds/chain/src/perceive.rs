@@ -55,7 +55,8 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         let obstacles = nearby.all.in_plane()?;
         let around = Surroundings { obstacles, bodies: robot_bodies, target };
         let is_patient = world.start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
-        let percept = navigator.leader.perceive(&leader.pose, &around, noise, scan, is_patient);
+        navigator.leader.scan(&leader.pose, &around, noise, scan);
+        let percept = navigator.leader.perceive(&leader.pose, &around, scan, is_patient);
         Some(NavigatorPercept { navigator, agent: task.agent, leader, percept })
     }
 

@@ -1,16 +1,17 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
 use super::scenario::ChainScenario;
-use super::world::{ChainSpec, ChainWorld, Change, ChangeKind};
-use sidestep_arms::kinematics::{Dof, JointMotion};
-use sidestep_rods::{Connector, Mobility};
+use super::world::{ChainSpec, ChainWorld, ChangeKind};
+use sidestep_arms::kinematics::JointMotion;
+use sidestep_rods::Mobility;
 use sidestep_scenario::Remark;
 
 /// Returns the remarks, in the order of the chains.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
-    let chains = || compiled.world.chains.iter().enumerate();
-    let slow = chains().find_map(|(k, spec)| slow_network(&compiled.world, k, spec));
-    let unlimited = chains().filter_map(|(k, spec)| unlimited_speeds(k, spec));
+    let mut chains = compiled.world.chains.iter().enumerate();
+    let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds(k, spec));
+    // One of them is enough: all chains talk over the same network.
+    let slow = chains.find_map(|(k, spec)| slow_network(&compiled.world, k, spec));
     unlimited.chain(slow).chain(unused_rules(compiled)).collect()
 }
 
@@ -36,11 +37,12 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
 
 /// Returns whether some connector of a chain is, or comes to be, unable to go anywhere.
 fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
-    let is_free = |c: &Connector<D>| c.mobility == Mobility::Free && !c.failed;
-    let holds = |change: &Change<D>| {
-        matches!(change.what, ChangeKind::Mobility { .. } | ChangeKind::Failed { .. })
-    };
-    !spec.start.connectors().iter().all(is_free) || spec.changes.iter().any(holds)
+    let mut connectors = spec.start.connectors().iter();
+    let mut changes = spec.changes.iter();
+    connectors.any(|c| c.mobility != Mobility::Free || c.failed)
+        || changes.any(|change| {
+            matches!(change.what, ChangeKind::Mobility { .. } | ChangeKind::Failed { .. })
+        })
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
@@ -60,34 +62,37 @@ fn slow_network<const D: usize>(
     };
     let steps = (led_m / step_m).ceil().max(1.0);
     let talk_s = steps * 2.0 * rods as f64 * network.latency_s;
-    (talk_s > network.deadline_s).then(|| {
-        let words = format!(
-            "a motion that moves all of chain {k} takes at least {talk_s} s of talk ({steps} sub-steps, each there \
-             and back along {rods} rods), and a talk ends after {} s: such a motion is not carried out; \
-             give messages less time, or cycles more",
-            network.deadline_s
-        );
-        Remark::warning("chain.network.latency_s", words)
-    })
+    if talk_s <= network.deadline_s {
+        return None;
+    }
+    let words = format!(
+        "a motion that moves all of chain {k} takes at least {talk_s} s of talk ({steps} sub-steps, each there \
+         and back along {rods} rods), and a talk ends after {} s: such a motion is not carried out; \
+         give messages less time, or cycles more",
+        network.deadline_s
+    );
+    Some(Remark::warning("chain.network.latency_s", words))
 }
 
 /// Returns a note on joints for whose speed the model gives no limit.
 fn unlimited_speeds<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
-    let speeds = arm.serial.variables.iter().zip(arm.follower.speeds());
-    let taken = |(v, speed): (&Dof, &f64)| {
-        let unit = if v.motion == JointMotion::Turn { "rad/s" } else { "m/s" };
-        v.max_speed.is_none().then(|| format!("`{}` {speed:.4} {unit}", v.name))
-    };
-    let taken: Vec<String> = speeds.filter_map(taken).collect();
-    (!taken.is_empty()).then(|| {
-        let words = format!(
-            "the model gives no velocity for some joints, which are taken to reach: {}; write \
-             <limit velocity=\"...\"/> for others",
-            taken.join(", ")
-        );
-        Remark::note(format!("chains.{k}.arm"), words)
-    })
+    let mut taken = Vec::new();
+    for (joint, speed) in arm.serial.variables.iter().zip(arm.follower.speeds()) {
+        if joint.max_speed.is_none() {
+            let unit = if joint.motion == JointMotion::Turn { "rad/s" } else { "m/s" };
+            taken.push(format!("`{}` {speed:.4} {unit}", joint.name));
+        }
+    }
+    if taken.is_empty() {
+        return None;
+    }
+    let words = format!(
+        "the model gives no velocity for some joints, which are taken to reach: {}; write \
+         <limit velocity=\"...\"/> for others",
+        taken.join(", ")
+    );
+    Some(Remark::note(format!("chains.{k}.arm"), words))
 }
 
 #[cfg(test)]

@@ -31,25 +31,24 @@ impl<const D: usize> ChainWorld<D> {
         let clock = &ManualClock::default();
         let mut scratch = Scratch::new(self);
         scratch.percept_log = Some(Vec::new());
-        let turn = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };
+        let phase = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };
         let groups = ConflictGroups::new(state.len());
-        (0..state.len()).for_each(|slot| claim::claim_box(turn, slot));
-        join::join(turn, 0..state.len(), &groups);
+        (0..state.len()).for_each(|slot| claim::claim_box(phase, slot));
+        join::join(phase, 0..state.len(), &groups);
         for slot in 0..state.len() {
-            let mut looking = Perceiver { world: self, state, now, scratch: turn.scratch };
-            let decision = looking.decide(slot as Slot);
+            let mut perceiver = Perceiver { world: self, state, now, scratch: phase.scratch };
+            let decision = perceiver.decide(slot as Slot);
             state.set_decision(slot, decision);
         }
         for slot in (0..state.len() as Slot).filter(|&slot| groups.leader(slot) == slot) {
             let mut group = Vec::new();
             groups.members(slot, &mut group);
             group.sort_unstable();
-            let is_shown =
-                |turn: &PhaseContext<'_, Self>| turn.scratch.percept_log.as_ref().map(Vec::len);
-            let before = is_shown(turn);
+            let percepts_before = count_percepts(phase.scratch);
             for &member in &group {
-                act::act_one(turn, &group, member);
-                if is_shown(turn) != before {
+                act::act_one(phase, &group, member);
+                // The chains after it perceive where it goes, which its agents have yet to decide.
+                if count_percepts(phase.scratch) != percepts_before {
                     break;
                 }
             }
@@ -68,14 +67,13 @@ impl<const D: usize> ChainWorld<D> {
         chain: EntityId,
         handed: ChainControls<D>,
     ) -> Result<(), InputError> {
-        let wrong = |cause: String, remedy: &str| {
-            Err(InputError::new(format!("decisions of chain {chain}"), cause, remedy))
-        };
+        let place = format!("decisions of chain {chain}");
         let Some(spec) = self.chains.get(chain as usize) else {
-            return wrong(format!("there are {} chains", self.chains.len()), "count from 0");
+            let cause = format!("there are {} chains", self.chains.len());
+            return Err(InputError::new(place, cause, "count from 0"));
         };
         if let Err((cause, remedy)) = handed.check(spec.start.points().len()) {
-            return wrong(cause, remedy);
+            return Err(InputError::new(place, cause, remedy));
         }
         state.body_mut(chain as usize).submitted = Some(handed);
         Ok(())
@@ -122,11 +120,11 @@ impl<const D: usize> ChainWorld<D> {
         let mut all: Vec<_> = lengths.map(|n| ChainControls::empty(now, n)).collect();
         let mut known = BTreeSet::new();
         for (id, bytes) in controls {
-            let refused =
-                |cause: String| OrderError::Control { agent: self.connector_name(*id), cause };
-            let control = self.read_control(now, *id, bytes).map_err(refused)?;
+            let control = self.read_control(now, *id, bytes);
+            let control = control.map_err(|cause| self.control_error(*id, cause))?;
             if !known.insert(*id) {
-                return Err(refused("there are two of it; give one for each connector".into()));
+                let cause = "there are two of it; give one for each connector".into();
+                return Err(self.control_error(*id, cause));
             }
             let Some((chain, connector)) = self.find_connector(*id) else { continue };
             let handed = &mut all[chain as usize];
@@ -138,10 +136,14 @@ impl<const D: usize> ChainWorld<D> {
         Ok(all)
     }
 
-    /// Notes the decisions of connectors in cycle `now`, by their ids on the network: no chain talks in memory in it.
+    fn control_error(&self, id: EntityId, cause: String) -> OrderError {
+        OrderError::Control { agent: self.connector_name(id), cause }
+    }
+
+    /// Records the decisions of connectors in cycle `now`, by their ids on the network: no chain talks in memory in it.
     ///
     /// # Errors
-    /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is noted then.
+    /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is recorded then.
     pub(crate) fn record_controls(
         &self,
         state: &ChainState<D>,
@@ -188,4 +190,9 @@ impl<const D: usize> ChainWorld<D> {
             None => format!("connector of id {id}"),
         }
     }
+}
+
+/// Returns the number of chains whose connectors have been asked what to do.
+fn count_percepts<const D: usize>(scratch: &Scratch<D>) -> usize {
+    scratch.percept_log.as_ref().map_or(0, Vec::len)
 }

@@ -76,13 +76,14 @@ fn events() -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     // The first label stands for events without a reason.
     let reasons = std::iter::once("none").chain(VetoReason::ALL.map(VetoReason::name));
-    let reason = |reason: &VetoReason| label_index(&VetoReason::ALL, reason) + 1;
     Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
         .u32("chain", "entity id", |e| e.chain)
         .label("event", "what happened", kinds, |e| label_index(&EventKind::ALL, &e.kind))
         .u32("connector", "the connector that it is about", |e| e.connector)
-        .label("reason", "why, of vetoes", reasons, move |e| e.reason.as_ref().map_or(0, reason))
+        .label("reason", "why, of vetoes", reasons, |e| {
+            e.reason.as_ref().map_or(0, |reason| label_index(&VetoReason::ALL, reason) + 1)
+        })
         .u32("obstacle", "the obstacle", |e| e.obstacle)
         .f64("value", "meters, radians or a number, by event", |e| e.value)
         .u32("missing", "parts missing in a gap that is too long; else 0", |e| e.missing)
@@ -139,6 +140,8 @@ impl Rows {
             return;
         }
         if self.trajectories.is_enabled() {
+            // Positions are read in each cycle that is recorded.
+            state.catch_up();
             for slot in 0..state.len() {
                 self.trajectories.extend(connectors(now, slot, state.body(slot).chain.points()));
             }
@@ -146,14 +149,10 @@ impl Rows {
         if self.joints.is_enabled() {
             for slot in 0..state.len() {
                 let body = state.body(slot);
-                let values = body.joints.iter().flatten();
-                let row = |(joint, value): (u32, &f64)| JointRow {
-                    cycle: now,
-                    chain: slot as EntityId,
-                    joint,
-                    value: *value,
-                };
-                self.joints.extend((0..).zip(values).map(row));
+                let chain = slot as EntityId;
+                for (joint, &value) in (0..).zip(body.joints.iter().flatten()) {
+                    self.joints.push(JointRow { cycle: now, chain, joint, value });
+                }
             }
         }
         if self.robots.is_enabled() {

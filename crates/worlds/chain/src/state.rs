@@ -16,6 +16,7 @@ use sidestep_kernel::{Cycle, EntityId, InputError, Slot};
 use sidestep_rods::geometry::{Bounds, Point};
 use sidestep_rods::{Grid, bounds_around};
 use snapshot::{Component, ComponentList};
+use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -49,15 +50,40 @@ struct ChainCell<const D: usize> {
     decision: Mutex<Option<Decision>>,
 }
 
-impl<const D: usize> ChainState<D> {
-    fn from_bodies(bodies: impl Iterator<Item = Body<D>>) -> Self {
-        let cell = |body| ChainCell {
+impl<const D: usize> ChainCell<D> {
+    fn new(body: Body<D>) -> Self {
+        Self {
             body: RwLock::new(body),
             claim: Mutex::new(Bounds::empty()),
             decision: Mutex::new(None),
-        };
+        }
+    }
+}
+
+/// One chain as it is read: locked against changes or, while it has motions to follow, a copy that has followed them.
+#[derive(Debug)]
+pub enum BodyRef<'a, const D: usize> {
+    /// The chain itself.
+    Locked(RwLockReadGuard<'a, Body<D>>),
+    /// A copy.
+    Followed(Box<Body<D>>),
+}
+
+impl<const D: usize> Deref for BodyRef<'_, D> {
+    type Target = Body<D>;
+
+    fn deref(&self) -> &Body<D> {
+        match self {
+            Self::Locked(body) => body,
+            Self::Followed(body) => body,
+        }
+    }
+}
+
+impl<const D: usize> ChainState<D> {
+    fn from_bodies(bodies: impl Iterator<Item = Body<D>>) -> Self {
         Self {
-            cells: bodies.map(cell).collect(),
+            cells: bodies.map(ChainCell::new).collect(),
             claims: AtomicU64::new(0),
             neighbors: RwLock::default(),
             has_changed: AtomicBool::new(true),
@@ -109,16 +135,25 @@ impl<const D: usize> ChainState<D> {
         self.cells.is_empty()
     }
 
-    /// Locks one chain for reading, after it has followed its deferred motions; those need the lock for writing
-    /// for a moment.
-    pub fn body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+    /// Returns one chain, for reading: it is as if it had followed its deferred motions, and keeps them.
+    pub fn body(&self, slot: usize) -> BodyRef<'_, D> {
         let body = self.deferred_body(slot);
         if body.deferred.is_empty() {
-            return body;
+            return BodyRef::Locked(body);
         }
-        drop(body);
-        self.body_mut(slot).catch_up();
-        self.deferred_body(slot)
+        let mut followed = Box::new(body.clone());
+        followed.catch_up();
+        BodyRef::Followed(followed)
+    }
+
+    /// Lets all chains follow their deferred motions. A caller that reads them in each cycle does this first,
+    /// because otherwise each read makes a copy that follows them.
+    pub(crate) fn catch_up(&self) {
+        for slot in 0..self.len() {
+            if !self.deferred_body(slot).deferred.is_empty() {
+                self.body_mut(slot).catch_up();
+            }
+        }
     }
 
     /// Locks one chain for reading as it is: all connectors except the initiator may have motions still to follow.
@@ -213,11 +248,14 @@ impl<const D: usize> ChainState<D> {
         cycle: Cycle,
         component: fn(&Body<D>) -> &C,
     ) -> ComponentList<C::Record> {
-        let record = |slot| {
-            let record = component(&self.body(slot)).save(cycle)?;
-            Some((slot as EntityId, record))
-        };
-        (0..self.len()).filter_map(record).collect()
+        let mut records = Vec::new();
+        for slot in 0..self.len() {
+            // Deferred motions change places and sums, and no component.
+            if let Some(record) = component(&self.deferred_body(slot)).save(cycle) {
+                records.push((slot as EntityId, record));
+            }
+        }
+        records
     }
 
     /// Returns the counts of each chain so far.

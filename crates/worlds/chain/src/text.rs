@@ -29,11 +29,13 @@ pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Descripti
         "dt_s": world.dt_s,
         "deployment": world.deployment,
     });
-    let count = |n: usize| group_thousands(n as u64);
-    let (chains, dt_s) = (count(world.chains.len()), world.dt_s);
-    let parts = count(connectors);
-    let (still, moving) = (count(world.obstacles.still().len()), count(world.movers.len()));
-    let (cycles, lasts_s) = (group_thousands(plan.cycles), plan.cycles as f64 * dt_s);
+    let chains = group_thousands(world.chains.len() as u64);
+    let parts = group_thousands(connectors as u64);
+    let still = group_thousands(world.obstacles.still().len() as u64);
+    let moving = group_thousands(world.movers.len() as u64);
+    let cycles = group_thousands(plan.cycles);
+    let dt_s = world.dt_s;
+    let lasts_s = plan.cycles as f64 * dt_s;
     let mut lines = vec![
         key_value("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
         key_value("obstacles", format!("{still}, and {moving} that move")),
@@ -121,7 +123,8 @@ fn motion(m: &Metrics) -> KeyValues {
             )
         }
     };
-    let (moved, turned) = (m.moved_per_step, group_thousands(m.rotations));
+    let moved = m.moved_per_step;
+    let turned = group_thousands(m.rotations);
     let mut lines = vec![
         key_value("progress", format!("{:.1} %", 100.0 * m.progress)),
         key_value("vetoes", vetoes(m)),
@@ -152,7 +155,8 @@ fn robots(robots: &RobotMetrics) -> (String, String) {
         0 => "no bumper pressed".into(),
         n => format!("bumpers pressed {} times", group_thousands(n)),
     };
-    let (mean_m, max_m) = (robots.mean_lag_m, robots.max_lag_m);
+    let mean_m = robots.mean_lag_m;
+    let max_m = robots.max_lag_m;
     key_value(
         "robots",
         format!(
@@ -173,14 +177,8 @@ fn not_reformed(m: &Metrics) -> String {
 /// Returns how initiators continued after vetoes, and the results of getting out of the way; no
 /// lines if there were none.
 fn after_vetoes(m: &Metrics) -> KeyValues {
-    let some = |counts: &[(u64, &str)]| {
-        let said = counts.iter().filter(|(n, _)| *n > 0);
-        let said: Vec<String> =
-            said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
-        (!said.is_empty()).then(|| said.join(", "))
-    };
-    let (rungs, escapes) = (&m.rungs, &m.escapes);
-    let went_on = some(&[
+    let rungs = &m.rungs;
+    let went_on = count_list(&[
         (rungs.shorter, "shorter steps"),
         (rungs.sideways, "to the side"),
         (rungs.turned, "turns on the spot"),
@@ -190,13 +188,24 @@ fn after_vetoes(m: &Metrics) -> KeyValues {
         (rungs.planned, "paths planned"),
         (rungs.not_planned, "plans without a path"),
     ]);
-    let escaped = some(&[
+    let escapes = &m.escapes;
+    let escaped = count_list(&[
         (escapes.moves, "parts moved away"),
         (escapes.vetoes, "could not"),
         (escapes.capped, "of these too slow"),
     ]);
-    let went_on = went_on.map(|said| key_value("after vetoes", said));
-    went_on.into_iter().chain(escaped.map(|said| key_value("escapes", said))).collect()
+    let mut lines = KeyValues::new();
+    lines.extend(went_on.map(|counts| key_value("after vetoes", counts)));
+    lines.extend(escaped.map(|counts| key_value("escapes", counts)));
+    lines
+}
+
+/// Returns counts with their nouns, except those of 0; none if all are.
+fn count_list(counts: &[(u64, &str)]) -> Option<String> {
+    let counts = counts.iter().filter(|(n, _)| *n > 0);
+    let words: Vec<String> =
+        counts.map(|(n, noun)| format!("{} {noun}", group_thousands(*n))).collect();
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 /// Returns the traffic on the network of the agents, and its faults; no lines where there are no agents.
@@ -206,18 +215,13 @@ fn network(m: &Metrics) -> KeyValues {
         let sent = format!("{}, {} bytes", group_thousands(m.messages), group_thousands(m.bytes));
         lines.push(key_value("messages", sent));
     }
-    let counts = [
+    let faults = count_list(&[
         (m.contacts_lost, "contacts lost"),
         (m.deadlines_missed, "leaders out of time"),
         (m.stood, "steps stood because of that"),
         (m.dropped, "messages that made no sense"),
-    ];
-    let said = counts.iter().filter(|(n, _)| *n > 0);
-    let said: Vec<String> =
-        said.map(|(n, what)| format!("{} {what}", group_thousands(*n))).collect();
-    if !said.is_empty() {
-        lines.push(key_value("network", said.join(", ")));
-    }
+    ]);
+    lines.extend(faults.map(|faults| key_value("network", faults)));
     lines
 }
 
@@ -235,8 +239,8 @@ fn vetoes(m: &Metrics) -> String {
     format!("{}: {}", group_thousands(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
 }
 
-fn abandoned_part(told: &ChainAbandonedPart) -> (String, String) {
-    let what = &told.what;
+fn abandoned_part(abandoned: &ChainAbandonedPart) -> (String, String) {
+    let what = &abandoned.what;
     let why = match (&what.by, &what.reason) {
         (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
         _ => "no connector objected".into(),
@@ -246,6 +250,6 @@ fn abandoned_part(told: &ChainAbandonedPart) -> (String, String) {
     } else {
         String::new()
     };
-    let who = format!("chain {}, task {}, part {}", told.chain, what.task, what.part);
+    let who = format!("chain {}, task {}, part {}", abandoned.chain, what.task, what.part);
     key_value("given up", format!("{who}{nearest}; {why}"))
 }

@@ -76,16 +76,19 @@ impl<const D: usize> ChainWorld<D> {
         let scratch = &mut Scratch::new(self);
         scratch.scan.keeps_truth = true;
         let mut perceiver = Perceiver { world: self, state, now, scratch };
-        let mut scan = |slot| leader_scan(&mut perceiver, slot);
         let slots = 0..state.len() as Slot;
         match of {
-            ScanSelection::First(leaders) => slots.filter_map(scan).take(*leaders).collect(),
+            ScanSelection::First(leaders) => {
+                let scans = slots.filter_map(|slot| leader_scan(&mut perceiver, slot));
+                scans.take(*leaders).collect()
+            }
             ScanSelection::Of(bodies) => {
-                let asked = |of: &BodyId| {
-                    let scan = slots.contains(&of.number).then(|| scan(of.number))??;
+                let exist = bodies.iter().filter(|of| slots.contains(&of.number));
+                let scans = exist.filter_map(|of| {
+                    let scan = leader_scan(&mut perceiver, of.number)?;
                     (scan.of.part == of.part).then_some(scan)
-                };
-                bodies.iter().filter_map(asked).collect()
+                });
+                scans.collect()
             }
         }
     }
@@ -95,11 +98,13 @@ impl<const D: usize> ChainWorld<D> {
 fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> Option<Scan> {
     let percept = perceiver.percept(slot)?;
     let laser = &percept.navigator.leader.laser;
+    let most_m = laser.range_m();
     let [x_m, y_m] = percept.leader.pose.at;
     let beams = laser.readings(&perceiver.scratch.scan);
-    let beyond = |range_m: f64| if range_m < laser.range_m() { range_m } else { f64::INFINITY };
-    let (bearings_rad, ranges_m) = beams.map(|(b, range_m)| (b, beyond(range_m))).unzip();
-    let true_m = laser.true_ranges(&perceiver.scratch.scan).map(beyond).collect();
+    let (bearings_rad, ranges_m) =
+        beams.map(|(bearing_rad, range_m)| (bearing_rad, hit_range_m(range_m, most_m))).unzip();
+    let true_m = laser.true_ranges(&perceiver.scratch.scan);
+    let true_m = true_m.map(|range_m| hit_range_m(range_m, most_m)).collect();
     Some(Scan {
         of: BodyId::new(BodyKind::Connector, slot, Some(percept.agent as u32)),
         sensor: LASER.into(),
@@ -111,30 +116,38 @@ fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> 
     })
 }
 
+/// Returns the range of a beam; infinite where it meets nothing, as frames have it.
+fn hit_range_m(range_m: f64, most_m: f64) -> f64 {
+    if range_m < most_m { range_m } else { f64::INFINITY }
+}
+
 /// Returns the targets of a chain.
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
-    let of_task = |task: &Task<D>| -> Vec<(Vec3, f64)> {
-        match &task.driver {
-            TaskKind::Targets(targets) => targets
-                .places
-                .iter()
-                .map(|at| (with_dimensions(*at), targets.tolerance_m))
-                .collect(),
-            TaskKind::Navigate(navigator) => match &navigator.goal {
-                Some(NavigationGoal::Target { at, tolerance_m }) => {
-                    vec![([at[0], at[1], 0.0], *tolerance_m)]
-                }
-                _ => Vec::new(),
-            },
-            _ => Vec::new(),
-        }
-    };
     let least_m = point_radius_m(&spec.start);
-    let goal = |(part, (at_m, radius_m)): (u32, (Vec3, f64))| {
-        let ball = Shape::Sphere { radius_m: radius_m.max(least_m) };
-        Body::new(BodyKind::Goal, id, Pose::from_position(at_m), ball).with_part(part)
-    };
-    (0..).zip(spec.tasks.iter().flat_map(of_task)).map(goal).collect()
+    let mut goals = Vec::new();
+    for (part, (at_m, tolerance_m)) in (0..).zip(spec.tasks.iter().flat_map(task_goals)) {
+        let ball = Shape::Sphere { radius_m: tolerance_m.max(least_m) };
+        let goal = Body::new(BodyKind::Goal, id, Pose::from_position(at_m), ball);
+        goals.push(goal.with_part(part));
+    }
+    goals
+}
+
+/// Returns the places to which a task goes, and the distances at which they count as reached, meters.
+fn task_goals<const D: usize>(task: &Task<D>) -> Vec<(Vec3, f64)> {
+    match &task.driver {
+        TaskKind::Targets(targets) => {
+            let places = targets.places.iter();
+            places.map(|at| (with_dimensions(*at), targets.tolerance_m)).collect()
+        }
+        TaskKind::Navigate(navigator) => match &navigator.goal {
+            Some(NavigationGoal::Target { at, tolerance_m }) => {
+                vec![([at[0], at[1], 0.0], *tolerance_m)]
+            }
+            _ => Vec::new(),
+        },
+        _ => Vec::new(),
+    }
 }
 
 /// Returns the drawn radius of a chain's points, meters.
@@ -221,14 +234,16 @@ fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
-    let side_m = |i: usize| if i < D { 2.0 * (cuboid.half_m[i] + radius_m) } else { HEIGHT_M };
-    Shape::Cuboid { size_m: std::array::from_fn(side_m) }
+    let mut size_m = [HEIGHT_M; 3];
+    for (side_m, half_m) in size_m.iter_mut().zip(cuboid.half_m) {
+        *side_m = 2.0 * (half_m + radius_m);
+    }
+    Shape::Cuboid { size_m }
 }
 
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
-    let axis = |i: usize| cuboid.axes.get(i).map_or([0.0; 3], |axis| with_dimensions(*axis));
-    let x = axis(0);
-    let y = axis(1);
+    let x = with_dimensions(cuboid.axes[0]);
+    let y = with_dimensions(cuboid.axes[1]);
     // Two axes determine the third up to its sign, and a box is symmetric.
     Pose::from_axes(with_dimensions(cuboid.center), [x, y, cross(x, y)])
 }

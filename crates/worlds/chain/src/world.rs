@@ -20,7 +20,7 @@ use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Rules};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// Purposes of this world's random draws.
+/// Purposes of this world's random draws. Their numbers are part of every result: another number, other draws.
 pub(crate) mod purpose {
     use sidestep_kernel::stream::Purpose;
 
@@ -42,10 +42,11 @@ pub(crate) mod purpose {
     pub(crate) const BURST_LOSS: Purpose = Purpose(9);
 }
 
-/// Cutoff of a random throw, in standard deviations.
+/// Cutoff of a random throw, in standard deviations, so that the claim of a chain that breaks can hold all its parts.
 pub(crate) const MAX_THROW_SIGMAS: f64 = 8.0;
 
-/// Ids from here on stand for parts of other chains: the chain's number is added.
+/// Ids from here on stand for parts of other chains: the chain's number is added. It is far above the ids
+/// of obstacles, of which a field has ten million at most.
 pub(crate) const OTHER_CHAIN: u32 = 1 << 31;
 
 /// The immutable world that runs share.
@@ -67,7 +68,7 @@ pub struct ChainWorld<const D: usize> {
     pub(crate) escape: Option<EscapeRules>,
     /// Time that initiators spend on each rung of the ladder after a veto.
     pub(crate) rungs: RecoveryLimits,
-    /// Distance around its parts in which a chain looks for its least clearance, meters.
+    /// Distance up to which the clearance of a chain's parts is measured, meters.
     pub look_m: f64,
     pub(crate) streams: Streams,
     /// Chains that observe, and may be ordered, alike.
@@ -191,11 +192,11 @@ impl<const D: usize> ChainSpec<D> {
     pub(crate) fn robots_at(&self, points: &[Point<D>], driving: &TaskProgress) -> Vec<Robot> {
         let [x, y, _] = driving.ahead;
         let heading_rad = atan2(y, x);
-        let robot = |p: &Point<D>| Robot {
-            pose: Pose2 { at: with_dimensions(*p), heading_rad },
-            is_bumped: false,
-        };
-        self.robots.iter().flat_map(|_| points.iter().map(robot)).collect()
+        if self.robots.is_none() {
+            return Vec::new();
+        }
+        let poses = points.iter().map(|p| Pose2 { at: with_dimensions(*p), heading_rad });
+        poses.map(|pose| Robot { pose, is_bumped: false }).collect()
     }
 
     pub(crate) fn robot_radius_m(&self) -> f64 {
@@ -230,7 +231,8 @@ pub(crate) fn push_parts<const D: usize>(
     slot: Slot,
     chain: &Chain<D>,
 ) {
-    let (id, points) = (OTHER_CHAIN + slot, chain.points());
+    let id = OTHER_CHAIN + slot;
+    let points = chain.points();
     let connectors = points.iter().zip(chain.connectors());
     parts.extend(connectors.map(|(at, connector)| Obstacle::ball(id, *at, connector.radius_m)));
     let rods = points.windows(2).zip(chain.rods());

@@ -10,7 +10,6 @@ use super::text;
 use super::view::view_event;
 use super::world::ChainWorld;
 use serde_json::Value;
-use sidestep_arms::Arm;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
@@ -48,9 +47,9 @@ impl<const D: usize> ChainScenario<D> {
     /// Never, because scripts are tried out when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
-        let books = Collector { rows: Rows::new(self.record), ..Collector::default() };
+        let collector = Collector { rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunStart { config: plan, state, collector: books };
+        let start = RunStart { config: plan, state, collector: collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -83,14 +82,15 @@ impl<const D: usize> ChainWorld<D> {
     pub fn chain_metrics(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
-        let named = |(arm, values): (&Arc<Arm>, &Vec<f64>)| {
+        let mut joints = None;
+        if let (Some(arm), Some(values)) = (&spec.arm, &body.joints) {
             let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
-            names.zip(values.iter().copied()).collect()
-        };
+            joints = Some(names.zip(values.iter().copied()).collect());
+        }
         ChainMetrics {
             chain: slot as EntityId,
             name: spec.name.clone(),
-            joints: spec.arm.as_ref().zip(body.joints.as_ref()).map(named),
+            joints,
             progress: self.progress(slot, &body),
             tally: body.tally.clone(),
         }
@@ -108,57 +108,57 @@ impl<const D: usize> World for ChainWorld<D> {
         self.chains.iter().map(|spec| spec.start.points().len()).sum()
     }
 
-    fn cycles_until_flush(&self, _: &ChainState<D>, books: &Collector, _: Cycle) -> u64 {
-        if books.rows.is_full() { 0 } else { u64::MAX }
+    fn cycles_until_flush(&self, _: &ChainState<D>, collector: &Collector, _: Cycle) -> u64 {
+        if collector.rows.is_full() { 0 } else { u64::MAX }
     }
 
-    fn before_cycle(&self, state: &ChainState<D>, books: &mut Collector, now: Cycle) {
-        books.rows.record_positions(self, state, now);
+    fn before_cycle(&self, state: &ChainState<D>, collector: &mut Collector, now: Cycle) {
+        collector.rows.record_positions(self, state, now);
     }
 
     fn is_over(&self, state: &ChainState<D>) -> bool {
         self.is_all_done(state)
     }
 
-    fn collect(&self, books: &mut Collector, scratch: &mut Scratch<D>) {
-        books.gathered.append(&mut scratch.events);
+    fn collect(&self, collector: &mut Collector, scratch: &mut Scratch<D>) {
+        collector.gathered.append(&mut scratch.events);
     }
 
-    fn commit(&self, books: &mut Collector) {
+    fn commit(&self, collector: &mut Collector) {
         // Events of one chain are already in order, so a stable sort by cycle and chain is enough.
-        books.gathered.sort_by_key(|event| (event.cycle, event.chain));
-        for event in books.gathered.drain(..) {
-            books.log.push(event);
-            books.rows.add_event(event);
+        collector.gathered.sort_by_key(|event| (event.cycle, event.chain));
+        for event in collector.gathered.drain(..) {
+            collector.log.push(event);
+            collector.rows.add_event(event);
         }
     }
 }
 
 impl<const D: usize> WorldRecording for ChainWorld<D> {
-    fn start_recording(&self, _: &mut ChainState<D>, books: &mut Collector, _: Cycle) {
-        books.rows.start(self);
+    fn start_recording(&self, _: &mut ChainState<D>, collector: &mut Collector, _: Cycle) {
+        collector.rows.start(self);
     }
 
-    fn enable_events(&self, books: &mut Collector) {
-        books.log.is_enabled = true;
+    fn enable_events(&self, collector: &mut Collector) {
+        collector.log.is_enabled = true;
     }
 
-    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
-        books.rows.schemas()
+    fn schemas(&self, collector: &Collector) -> Vec<TableSchema> {
+        collector.rows.schemas()
     }
 
     fn record(
         &self,
         _: &mut ChainState<D>,
-        books: &mut Collector,
+        collector: &mut Collector,
         _: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError> {
-        books.rows.record(recorder)
+        collector.rows.record(recorder)
     }
 
-    fn position_columns(&self, books: &Collector) -> Vec<PositionColumns> {
-        ChainWorld::<D>::position_columns(books.rows.interval())
+    fn position_columns(&self, collector: &Collector) -> Vec<PositionColumns> {
+        ChainWorld::<D>::position_columns(collector.rows.interval())
     }
 }
 
@@ -181,9 +181,9 @@ impl<const D: usize> WorldCheckpoint for ChainWorld<D> {
     fn restore(
         &self,
         (snapshot, tallies): (Snapshot, Vec<ChainTally>),
-        books: &mut Collector,
+        collector: &mut Collector,
     ) -> Result<ChainState<D>, CheckpointError> {
-        books.steps_before = tallies.iter().map(|t| t.steps).sum();
+        collector.steps_before = tallies.iter().map(|t| t.steps).sum();
         ChainState::restore(self, &snapshot, tallies)
     }
 }
@@ -196,11 +196,11 @@ impl<const D: usize> WorldView for ChainWorld<D> {
     fn frame(
         &self,
         state: &ChainState<D>,
-        books: &mut Collector,
+        collector: &mut Collector,
         now: Cycle,
         look: FrameOptions,
     ) -> Frame {
-        let (events, log_left_out) = books.log.take();
+        let (events, log_left_out) = collector.log.take();
         Frame {
             cycle: now,
             time_s: self.start_time_s(now),
@@ -245,8 +245,8 @@ impl<const D: usize> WorldControl for ChainWorld<D> {
         self.record_controls(state, now, controls)
     }
 
-    fn records_controls(&self, books: &Collector) -> bool {
-        books.rows.keeps_controls()
+    fn records_controls(&self, collector: &Collector) -> bool {
+        collector.rows.keeps_controls()
     }
 
     fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
@@ -260,20 +260,20 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
     fn metrics(
         &self,
         state: &ChainState<D>,
-        books: &Collector,
+        collector: &Collector,
         _: Cycle,
         effort: &RunStats,
     ) -> Metrics {
         let tallies = state.tallies();
         let progress: Vec<f64> =
             (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
-        let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - books.steps_before;
+        let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - collector.steps_before;
         Metrics::from_tallies(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
     }
 
     fn agent_metrics(&self, state: &ChainState<D>, _: &Collector, _: Cycle) -> Value {
-        let one = |slot| serde_json::to_value(self.chain_metrics(state, slot)).unwrap_or_default();
-        (0..state.len()).map(one).collect()
+        let chains = (0..state.len()).map(|slot| self.chain_metrics(state, slot));
+        chains.map(|metrics| serde_json::to_value(metrics).unwrap_or_default()).collect()
     }
 
     fn summary_lines(&self, metrics: &Metrics) -> KeyValues {

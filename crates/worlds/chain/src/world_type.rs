@@ -5,8 +5,8 @@ use super::{bundle, remarks, text, world::ChainWorld};
 use sidestep_kernel::text::Description;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, MetricInfo, Remark, ResolvedScenario, SeedEffect, Source,
-    WorldType,
+    CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
+    Source, WorldFacts, WorldType,
 };
 use std::any::Any;
 
@@ -40,7 +40,15 @@ impl WorldType for Chains {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
+    }
+
+    fn facts(&self) -> WorldFacts {
+        super::facts::FACTS
+    }
+
+    fn editing(&self) -> Editing {
+        super::facts::editing()
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
@@ -74,7 +82,7 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
 
     fn seed_effect(&self) -> SeedEffect {
         // Where the start does not follow from the seed, few parts draw, and only on occasion: a leader that
-        // wanders, a laser that errs, parts that are thrown about, a way that is planned.
+        // wanders, a laser that errs, parts that are thrown about, a path that is planned.
         match &self.recipe {
             Some(recipe) if !recipe.is_start_random() => SeedEffect::Perhaps,
             _ => SeedEffect::Decide,

@@ -1,4 +1,4 @@
-//! *Act*: the bodies of a group act one after the other; the environment decides.
+//! *Act*, the paper's second pool: the bodies of a group act one after the other; the environment decides.
 
 use super::action::{Action, StepPath};
 use super::cycle_context::{CycleContext, are_free, box_index};
@@ -35,28 +35,28 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Lets one body act with the draw of its own stream.
     #[inline]
     pub(super) fn act_with_draw(&self, slot: Slot, scratch: &mut Scratch) {
-        let [word, _] = self.act_words(self.cell(slot).id);
+        let [word, _] = self.act_words(self.body(slot).id);
         self.act(slot, word, scratch);
     }
 
     /// Lets one body act on the state left by those before it; `word` is its draw.
     #[inline]
     pub(super) fn act(&self, slot: Slot, word: u32, scratch: &mut Scratch) {
-        let cell = self.cell(slot);
-        if cell.intent.get().is_idle() {
+        let body = self.body(slot);
+        if body.intent.get().is_idle() {
             return;
         }
-        let body = self.type_of(cell);
+        let ty = self.type_of(body);
         // A door has no actions in its type, so it toggles.
-        let Some(action) = body.actions.get(usize::from(cell.action.get())) else {
+        let Some(action) = ty.actions.get(usize::from(body.action.get())) else {
             return self.toggle(slot, scratch);
         };
         let walk = &action.walks[self.draw_transition(action, slot, word)];
-        if are_free(self.floor, self.base(cell), &walk.whole.enter) {
+        if are_free(self.floor, self.base(body), &walk.whole.enter) {
             self.execute_whole(walk, slot);
             if scratch.keep_motions {
-                let verdict = WalkResult { steps: walk.steps.len(), contact: None };
-                self.record_motion(walk, verdict, cell, scratch);
+                let result = WalkResult { steps: walk.steps.len(), contact: None };
+                self.record_motion(walk, result, body, scratch);
             }
         } else {
             self.execute_blocked(walk, slot, scratch);
@@ -67,6 +67,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
     #[inline(always)]
     pub(super) fn draw_transition(&self, action: &Action, slot: Slot, word: u32) -> usize {
         match self.world.obstacle_rule {
+            // Here obstacles change the effect of a transition, not its probability.
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
             ObstacleRule::Renormalise => match self.unblocked_distribution(action, slot) {
                 Ok(distribution) => distribution.sample(word),
@@ -75,14 +76,16 @@ impl<T: BoxWord> CycleContext<'_, T> {
         }
     }
 
-    /// Makes a whole walk that meets no obstacle.
+    /// Makes a whole walk that meets no obstacle. It writes only the boxes that differ at its end, and not
+    /// those that steps enter and leave again, because nearly all walks are made whole.
     #[inline]
     fn execute_whole(&self, walk: &StepPath, slot: Slot) {
-        let (floor, cell) = (self.floor, self.cell(slot));
-        let base = self.base(cell);
-        cell.contact.set(LastContact::NONE);
+        let floor = self.floor;
+        let body = self.body(slot);
+        let base = self.base(body);
+        body.contact.set(LastContact::NONE);
         if walk.turn != 0 {
-            cell.facing.set(cell.facing.get().turned(walk.turn));
+            body.facing.set(body.facing.get().turned(walk.turn));
         }
         if walk.steps.is_empty() {
             return;
@@ -90,68 +93,68 @@ impl<T: BoxWord> CycleContext<'_, T> {
         let whole = &walk.whole;
         whole.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
         whole.fill.iter().for_each(|&offset| floor.set(box_index(base, offset), T::standing(slot)));
-        cell.anchor.set(cell.position().offset(whole.delta.0, whole.delta.1).word());
-        cell.moves.set(cell.moves.get() + walk.steps.len() as u32);
-        if self.type_of(cell).marks {
-            let new = |&offset: &i32| self.state.visited.insert(box_index(base, offset));
-            let first_visits = whole.enter.iter().filter(|offset| new(offset)).count();
-            cell.first_visits.set(cell.first_visits.get() + first_visits as u32);
+        body.anchor.set(body.position().offset(whole.delta.0, whole.delta.1).word());
+        body.moves.set(body.moves.get() + walk.steps.len() as u32);
+        if self.type_of(body).marks {
+            let mut first_visits = 0;
+            for &offset in &whole.enter {
+                first_visits += u32::from(self.state.visited.insert(box_index(base, offset)));
+            }
+            body.first_visits.set(body.first_visits.get() + first_visits);
         }
     }
 
     /// Makes a walk that an obstacle may cut short.
     fn execute_blocked(&self, walk: &StepPath, slot: Slot, scratch: &mut Scratch) {
-        let cell = self.cell(slot);
-        let verdict = self.walk_result(walk, slot);
-        let is_mover = matches!(self.type_of(cell).role, Role::Mover(_));
-        let made = match self.world.obstacle_rule {
-            _ if verdict.contact.is_none() => verdict.steps,
-            ObstacleRule::Cut if !is_mover => verdict.steps,
-            _ => 0,
-        };
-        self.execute_steps(walk, made, slot);
+        let body = self.body(slot);
+        let result = self.walk_result(walk, slot);
+        let is_mover = matches!(self.type_of(body).role, Role::Mover(_));
+        // People try single boxes, which cannot be cut short.
+        let keeps_steps = self.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
+        let steps = if result.contact.is_none() || keeps_steps { result.steps } else { 0 };
+        self.execute_steps(walk, steps, slot);
         // Only robots keep contacts; people just try another time.
         if is_mover {
             return;
         }
         if scratch.keep_motions {
-            let made = WalkResult { steps: made, ..verdict };
-            self.record_motion(walk, made, cell, scratch);
+            let result = WalkResult { steps, ..result };
+            self.record_motion(walk, result, body, scratch);
         }
-        match verdict.contact {
+        match result.contact {
             None => {
-                cell.contact.set(LastContact::NONE);
+                body.contact.set(LastContact::NONE);
                 if walk.turn != 0 {
-                    cell.facing.set(cell.facing.get().turned(walk.turn));
+                    body.facing.set(body.facing.get().turned(walk.turn));
                 }
             }
-            Some(touch) => self.record_contact(cell, touch, scratch),
+            Some(blocker) => self.record_contact(body, blocker, scratch),
         }
     }
 
-    /// Notes a contact in the body's cell, in its counters and, where events are kept, as an event.
-    fn record_contact(&self, cell: &BodyState, touch: Blocker, scratch: &mut Scratch) {
-        let Blocker { kind, side, by } = touch;
-        cell.contact.set(LastContact::from_contact(Contact { kind, side }));
-        let (body, kinds) = (cell.id, self.world.kinds.len());
-        self.state.contacts.add(body as usize * kinds + usize::from(kind), 1);
+    /// Records a contact in the body's state, in its counters and, where events are kept, as an event.
+    fn record_contact(&self, body: &BodyState, blocker: Blocker, scratch: &mut Scratch) {
+        let Blocker { kind, side, by } = blocker;
+        body.contact.set(LastContact::from_contact(Contact { kind, side }));
+        let kinds = self.world.kinds.len();
+        self.state.contacts.add(body.id as usize * kinds + usize::from(kind), 1);
         if scratch.keep_events {
-            let with = by.map(|slot| self.cell(slot).id);
+            let with = by.map(|slot| self.body(slot).id);
             let event = EventKind::Contact { kind, side, with };
-            scratch.events.push(self.body_event(cell, event));
+            scratch.events.push(self.body_event(body, event));
         }
     }
 
     /// Returns an event of a body, which is where it happens.
-    fn body_event(&self, cell: &BodyState, event: EventKind) -> Event {
-        let at = self.world.map_position(cell.position());
-        Event { cycle: self.now, body: cell.id, at, event }
+    fn body_event(&self, body: &BodyState, event: EventKind) -> Event {
+        let at = self.world.map_position(body.position());
+        Event { cycle: self.now, body: body.id, at, event }
     }
 
     /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
     pub(super) fn walk_result(&self, walk: &StepPath, slot: Slot) -> WalkResult {
-        let base = self.base(self.cell(slot));
+        let base = self.base(self.body(slot));
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
                 let word = self.floor.get(box_index(base, offset));
@@ -175,9 +178,12 @@ impl<T: BoxWord> CycleContext<'_, T> {
         if steps == 0 {
             return;
         }
-        let (floor, cell) = (self.floor, self.cell(slot));
-        let (base, marks) = (self.base(cell), self.type_of(cell).marks);
-        let (mut moved, mut first_visits) = (cell.position(), 0);
+        let floor = self.floor;
+        let body = self.body(slot);
+        let base = self.base(body);
+        let marks = self.type_of(body).marks;
+        let mut moved = body.position();
+        let mut first_visits = 0;
         for step in &walk.steps[..steps] {
             step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
             for &offset in &step.enter {
@@ -187,20 +193,21 @@ impl<T: BoxWord> CycleContext<'_, T> {
             }
             moved = moved.offset(step.delta.0, step.delta.1);
         }
-        cell.anchor.set(moved.word());
-        cell.moves.set(cell.moves.get() + steps as u32);
-        cell.first_visits.set(cell.first_visits.get() + first_visits);
+        body.anchor.set(moved.word());
+        body.moves.set(body.moves.get() + steps as u32);
+        body.first_visits.set(body.first_visits.get() + first_visits);
     }
 
-    /// Returns the distribution over the walks that are not blocked here, or, when none is left,
-    /// the first blocked one as an error.
+    /// Returns the distribution over the walks that are not blocked here (the paper's update of the
+    /// distribution in the presence of a conflict: an occurrence is allowed or denied), or, when none is
+    /// left, the first blocked one as an error: the action then ends in its contact.
     fn unblocked_distribution(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
-        let free = |walk: &StepPath| self.walk_result(walk, slot).contact.is_none();
-        let mut row: Vec<f64> = action
-            .probabilities
-            .iter()
-            .zip(&action.walks)
-            .map(|(&p, walk)| if p > 0.0 && free(walk) { p } else { 0.0 })
+        let walks = action.probabilities.iter().zip(&action.walks);
+        let mut row: Vec<f64> = walks
+            .map(|(&p, walk)| {
+                let is_allowed = p > 0.0 && self.walk_result(walk, slot).contact.is_none();
+                if is_allowed { p } else { 0.0 }
+            })
             .collect();
         let sum: f64 = row.iter().sum();
         if sum <= 0.0 {
@@ -210,20 +217,22 @@ impl<T: BoxWord> CycleContext<'_, T> {
         Ok(Categorical::new(&row).expect("a rescaled row is a distribution"))
     }
 
-    /// Opens a door, or closes it when no body stands in the way; otherwise closing waits.
+    /// Opens a door, or closes it when no body stands in it; otherwise closing waits.
     fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
-        let (floor, cell) = (self.floor, self.cell(slot));
-        let (base, own) = (self.base(cell), &self.type_of(cell).own);
-        let opens = cell.facing.get() == Facing::CLOSED;
+        let floor = self.floor;
+        let body = self.body(slot);
+        let base = self.base(body);
+        let own = &self.type_of(body).own;
+        let opens = body.facing.get() == Facing::CLOSED;
         if !opens && !are_free(floor, base, own) {
             return;
         }
         let word = if opens { T::FREE } else { T::standing(slot) };
         own.iter().for_each(|&offset| floor.set(box_index(base, offset), word));
-        cell.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
+        body.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
         if scratch.keep_events {
             let event = if opens { EventKind::DoorOpened } else { EventKind::DoorClosed };
-            scratch.events.push(self.body_event(cell, event));
+            scratch.events.push(self.body_event(body, event));
         }
     }
 
@@ -233,25 +242,26 @@ impl<T: BoxWord> CycleContext<'_, T> {
     fn record_motion(
         &self,
         walk: &StepPath,
-        verdict: WalkResult,
-        cell: &BodyState,
+        result: WalkResult,
+        body: &BodyState,
         scratch: &mut Scratch,
     ) {
-        if matches!(self.type_of(cell).role, Role::Mover(_)) {
+        if matches!(self.type_of(body).role, Role::Mover(_)) {
             return;
         }
-        let (mut ahead, mut left) = (0, 0);
-        for step in &walk.steps[..verdict.steps] {
+        let mut ahead = 0;
+        let mut left = 0;
+        for step in &walk.steps[..result.steps] {
             step.side.add_to(&mut ahead, &mut left);
         }
         scratch.motion_samples.push(MotionSample {
             cycle: self.now,
-            robot: cell.id,
-            action: cell.intent.get().number(),
+            robot: body.id,
+            action: body.intent.get().number(),
             ahead,
             left,
-            quarter_turns: if verdict.contact.is_none() { walk.turn } else { 0 },
-            contact: verdict.contact.is_some(),
+            quarter_turns: if result.contact.is_none() { walk.turn } else { 0 },
+            contact: result.contact.is_some(),
         });
     }
 }

@@ -43,21 +43,22 @@ pub(crate) struct NetEffect {
 
 impl NetEffect {
     fn new(steps: &[Step], own: &[i32]) -> Self {
-        let delta = steps.iter().fold((0, 0), |d, s| (d.0 + s.delta.0, d.1 + s.delta.1));
-        let mut now: Vec<i32> = own.to_vec();
+        let mut delta = (0, 0);
+        let mut covered: Vec<i32> = own.to_vec();
         let mut enter: Vec<i32> = Vec::new();
         for step in steps {
-            now.retain(|b| !step.leave.contains(b));
-            now.extend_from_slice(&step.enter);
-            let new = step.enter.iter().filter(|b| !own.contains(b) && !enter.contains(b));
-            enter.extend(new.copied().collect::<Vec<_>>());
+            delta = (delta.0 + step.delta.0, delta.1 + step.delta.1);
+            covered.retain(|offset| !step.leave.contains(offset));
+            covered.extend_from_slice(&step.enter);
+            for offset in &step.enter {
+                if !own.contains(offset) && !enter.contains(offset) {
+                    enter.push(*offset);
+                }
+            }
         }
-        let keep = |from: &[i32], wanted: &dyn Fn(&i32) -> bool| {
-            from.iter().copied().filter(wanted).collect::<Box<[i32]>>()
-        };
         Self {
-            leave: keep(own, &|b| !now.contains(b)),
-            fill: keep(&enter, &|b| now.contains(b)),
+            leave: own.iter().copied().filter(|offset| !covered.contains(offset)).collect(),
+            fill: enter.iter().copied().filter(|offset| covered.contains(offset)).collect(),
             enter: enter.into(),
             delta,
         }
@@ -114,34 +115,40 @@ impl Action {
     ) -> Result<Self, RowError> {
         let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
         let own = own_boxes(body, stride);
-        let walks: Vec<StepPath> = transitions
-            .iter()
-            .map(|t| {
-                let steps = steps(&t.path, heading, body, stride);
-                StepPath { whole: NetEffect::new(&steps, &own), steps, turn: t.turn }
-            })
-            .collect();
+        let mut walks = Vec::with_capacity(transitions.len());
+        for transition in transitions {
+            let steps = steps(&transition.path, heading, body, stride);
+            let whole = NetEffect::new(&steps, &own);
+            walks.push(StepPath { steps, turn: transition.turn, whole });
+        }
+        // A transition that never happens sweeps nothing, and needs no claim.
         let possible: Vec<(&[Side], &[Step])> = transitions
             .iter()
             .zip(&walks)
-            .filter(|(t, _)| t.p > 0.0)
-            .map(|(t, w)| (&t.path[..], &w.steps[..]))
+            .filter(|(transition, _)| transition.p > 0.0)
+            .map(|(transition, walk)| (&transition.path[..], &walk.steps[..]))
             .collect();
-        let (mut nodes, mut boxes) = (Vec::new(), Vec::new());
+        let mut nodes = Vec::new();
+        let mut boxes = Vec::new();
         push_sweep(&possible, 0, &mut nodes, &mut boxes);
-        let mut claims: Vec<i32> = boxes.iter().copied().filter(|b| !own.contains(b)).collect();
+        let mut claims: Vec<i32> =
+            boxes.iter().copied().filter(|offset| !own.contains(offset)).collect();
         claims.sort_unstable();
         claims.dedup();
-        let sweep = SweptVolume { nodes: nodes.into(), boxes: boxes.into() };
-        let (claims, distribution) = (claims.into(), Categorical::new(&probabilities)?);
-        Ok(Self { distribution, probabilities, walks, sweep, claims })
+        Ok(Self {
+            distribution: Categorical::new(&probabilities)?,
+            probabilities,
+            walks,
+            sweep: SweptVolume { nodes: nodes.into(), boxes: boxes.into() },
+            claims: claims.into(),
+        })
     }
 }
 
 /// Returns the offsets of the boxes that a body covers, row by row from its anchor.
 pub(crate) fn own_boxes(body: (u32, u32), stride: u32) -> Box<[i32]> {
-    let row = |y: u32| (0..body.0).map(move |x| (y * stride + x) as i32);
-    (0..body.1).flat_map(row).collect()
+    let (width, height) = body;
+    (0..height).flat_map(|y| (0..width).map(move |x| (y * stride + x) as i32)).collect()
 }
 
 /// Appends the tree of the paths' steps from `depth` on; paths that start alike share nodes.
@@ -155,7 +162,8 @@ fn push_sweep(
         let along: Vec<_> =
             paths.iter().copied().filter(|(path, _)| path.get(depth) == Some(&side)).collect();
         let Some((_, steps)) = along.first() else { continue };
-        let (first, node) = (boxes.len() as u32, nodes.len());
+        let first = boxes.len() as u32;
+        let node = nodes.len();
         boxes.extend_from_slice(&steps[depth].enter);
         nodes.push(SweptVolumeNode { first, end: boxes.len() as u32, after: 0 });
         push_sweep(&along, depth + 1, nodes, boxes);
@@ -164,23 +172,34 @@ fn push_sweep(
 }
 
 fn steps(path: &[Side], heading: u8, body: (u32, u32), stride: u32) -> Vec<Step> {
-    let mut at = (0, 0);
-    path.iter()
-        .map(|&side| {
-            let (ux, uy) = HEADINGS[usize::from((heading + side as u8) % 4)];
-            let index = |(x, y): (i32, i32)| (at.1 + y) * stride as i32 + at.0 + x;
-            let enter = edge(body, (ux, uy), true).into_iter().map(index).collect();
-            let leave = edge(body, (ux, uy), false).into_iter().map(index).collect();
-            at = (at.0 + ux, at.1 + uy);
-            Step { enter, leave, delta: (ux, uy), side }
-        })
-        .collect()
+    let mut steps = Vec::with_capacity(path.len());
+    // Index offset of the anchor before the step.
+    let mut anchor = 0;
+    for &side in path {
+        let delta = HEADINGS[usize::from((heading + side as u8) % 4)];
+        let enter = edge(body, delta, true);
+        let leave = edge(body, delta, false);
+        steps.push(Step {
+            enter: enter.into_iter().map(|at| anchor + index_offset(at, stride)).collect(),
+            leave: leave.into_iter().map(|at| anchor + index_offset(at, stride)).collect(),
+            delta,
+            side,
+        });
+        anchor += index_offset(delta, stride);
+    }
+    steps
+}
+
+/// Returns the difference of two boxes' indices, by that of their columns and rows.
+fn index_offset((columns, rows): (i32, i32), stride: u32) -> i32 {
+    rows * stride as i32 + columns
 }
 
 /// Returns the row of boxes just outside a body in direction `u` (`ahead`), or the body's own
 /// hindmost row, from left to right as seen along `u`.
 fn edge(body: (u32, u32), (ux, uy): (i32, i32), ahead: bool) -> Vec<(i32, i32)> {
-    let (w, h) = (body.0 as i32, body.1 as i32);
+    let w = body.0 as i32;
+    let h = body.1 as i32;
     let across = if ux != 0 { h } else { w };
     (0..across)
         .map(|k| {

@@ -31,6 +31,13 @@ struct AliasColumn {
     reports: [SampledReading; 2],
 }
 
+impl AliasColumn {
+    /// Returns a column that reports one reading only.
+    fn whole(reading: Reading) -> Self {
+        Self { threshold: u32::MAX, reports: [SampledReading::from(reading); 2] }
+    }
+}
+
 /// A drawn reading, with its nearness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SampledReading {
@@ -56,8 +63,10 @@ impl AliasTable {
     pub(crate) fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
         let classes = sensor.distance_classes.len() + 1;
         let observations = sensor.observations.len();
-        let most = 1 + (observations - 1) * (classes - 1);
-        let bits = most.next_power_of_two().ilog2();
+        // Nothing, or one of the other observations in one of the classes but `beyond`. A power of 2, so that
+        // the highest bits of a word are a column.
+        let max_reports = 1 + (observations - 1) * (classes - 1);
+        let bits = max_reports.next_power_of_two().ilog2();
         let mut columns = Vec::with_capacity((observations * classes) << bits);
         for observation in 0..observations as u8 {
             for class in 0..classes as u8 {
@@ -85,6 +94,7 @@ impl AliasTable {
     /// Returns the report for the true reading of `row`, drawn with the uniform word `u`.
     #[inline]
     pub(crate) fn sample(&self, row: RowIndex, u: u32) -> SampledReading {
+        // The highest bits choose the column, the others are compared with its threshold.
         let column = (u64::from(u) << self.bits >> 32) as usize;
         let split = &self.columns[row.0 as usize | column];
         split.reports[usize::from(u << self.bits >= split.threshold)]
@@ -95,11 +105,10 @@ impl AliasTable {
 fn alias_columns(mut row: Vec<(Reading, f64)>, n: usize) -> Vec<AliasColumn> {
     let padding = row[0].0;
     row.resize(n, (padding, 0.0));
-    let mut weights: Vec<f64> = row.iter().map(|r| r.1 * n as f64).collect();
+    let mut weights: Vec<f64> = row.iter().map(|(_, p)| p * n as f64).collect();
     let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| weights[i] < 1.0);
-    let full =
-        |reading| AliasColumn { threshold: u32::MAX, reports: [SampledReading::from(reading); 2] };
-    let mut columns: Vec<AliasColumn> = row.iter().map(|r| full(r.0)).collect();
+    let mut columns: Vec<AliasColumn> =
+        row.iter().map(|&(reading, _)| AliasColumn::whole(reading)).collect();
     while let (Some(&of), Some(from)) = (small.last(), large.last().copied()) {
         small.pop();
         let threshold = (weights[of] * (1u64 << 32) as f64).round() as u32;

@@ -4,7 +4,7 @@
 //! the highest in all of them, because then all bodies that conflict with it and come before it
 //! have acted. So the outcome is that of the policy `random`, because the bids are its draws.
 
-use super::cycle_context::{CycleContext, box_index, with_scene};
+use super::cycle_context::{CycleContext, box_index, with_cycle};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::{BoxWord, Position};
 use sidestep_kernel::world::Auction;
@@ -17,7 +17,7 @@ pub(super) struct Bid {
     pub(super) slot: Slot,
     /// The body's draw of its action's outcome.
     pub(super) word: u32,
-    /// Position of the body when it bid.
+    /// Position of the body when it bid: its bids are there, also after it has moved.
     at: Position,
     /// Value of the bid: the higher one acts first. Never 0, and unique per body.
     value: u64,
@@ -26,11 +26,11 @@ pub(super) struct Bid {
 impl<T: BoxWord> CycleContext<'_, T> {
     /// Bids for all boxes that a body covers or may come to cover.
     fn bid(&self, slot: Slot) -> Bid {
-        let cell = self.cell(slot);
-        let [word, draw] = self.act_words(cell.id);
+        let body = self.body(slot);
+        let [word, draw] = self.act_words(body.id);
         // Inverted, because the smallest (draw, id) acts first.
-        let value = !(u64::from(draw) << 32 | u64::from(cell.id));
-        let bid = Bid { slot, word, at: cell.position(), value };
+        let value = !(u64::from(draw) << 32 | u64::from(body.id));
+        let bid = Bid { slot, word, at: body.position(), value };
         self.for_each_box_of(bid, |index| {
             self.state.bids[index].fetch_max(value, Relaxed);
         });
@@ -52,44 +52,48 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Calls `each` for all boxes that a bidder covers, or may come to cover if it acts; walls
     /// included, for which no body contends.
     fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
-        let cell = self.cell(bid.slot);
-        let body = self.type_of(cell);
+        let body = self.body(bid.slot);
+        let ty = self.type_of(body);
         let base = bid.at.index(self.world.stride);
-        let mut all =
-            |boxes: &[i32]| boxes.iter().for_each(|&offset| each(box_index(base, offset)));
-        all(&body.own);
-        if !cell.intent.get().is_idle()
-            && let Some(action) = body.actions.get(usize::from(cell.action.get()))
+        for &offset in &ty.own {
+            each(box_index(base, offset));
+        }
+        // A door has no actions, and claims only its own boxes.
+        if !body.intent.get().is_idle()
+            && let Some(action) = ty.actions.get(usize::from(body.action.get()))
         {
-            all(&action.claims);
+            for &offset in &action.claims {
+                each(box_index(base, offset));
+            }
         }
     }
 }
 
 impl Auction<Self> for RobotsWorld {
-    fn bid(&self, turn: &mut PhaseContext<'_, Self>, body: Slot) {
-        let bid = with_scene!(self, turn.state, turn.now, |scene| scene.bid(body));
-        turn.scratch.bids.push(bid);
+    fn bid(&self, phase: &mut PhaseContext<'_, Self>, slot: Slot) {
+        let bid = with_cycle!(self, phase.state, phase.now, |cycle| cycle.bid(slot));
+        phase.scratch.bids.push(bid);
     }
 
-    fn act_on_bids(&self, turn: &mut PhaseContext<'_, Self>, pending: &mut Vec<Slot>) {
+    fn act_on_bids(&self, phase: &mut PhaseContext<'_, Self>, pending: &mut Vec<Slot>) {
         pending.clear();
-        let bids = std::mem::take(&mut turn.scratch.bids);
-        with_scene!(self, turn.state, turn.now, |scene| {
+        // Taken out, because acting borrows the whole scratch.
+        let bids = std::mem::take(&mut phase.scratch.bids);
+        with_cycle!(self, phase.state, phase.now, |cycle| {
             for &bid in &bids {
-                if scene.is_highest(bid) {
-                    scene.act(bid.slot, bid.word, turn.scratch);
+                if cycle.is_highest(bid) {
+                    cycle.act(bid.slot, bid.word, phase.scratch);
                 } else {
                     pending.push(bid.slot);
                 }
             }
         });
-        turn.scratch.bids = bids;
+        phase.scratch.bids = bids;
     }
 
-    fn retract_bids(&self, turn: &mut PhaseContext<'_, Self>) {
-        with_scene!(self, turn.state, turn.now, |scene| {
-            turn.scratch.bids.drain(..).for_each(|bid| scene.retract(bid));
+    fn retract_bids(&self, phase: &mut PhaseContext<'_, Self>) {
+        with_cycle!(self, phase.state, phase.now, |cycle| {
+            phase.scratch.bids.drain(..).for_each(|bid| cycle.retract(bid));
         });
     }
 }

@@ -19,10 +19,10 @@ impl RobotsWorld {
                 self.audit_body(state, slot, &mut owner)?;
             }
         }
-        for (index, (&wall, owner)) in self.walls.iter().zip(&owner).enumerate() {
+        for (index, (&kind, owner)) in self.walls.iter().zip(&owner).enumerate() {
             let expected = match owner {
                 Some(slot) => Occupant::Body(*slot),
-                None if wall == FREE => Occupant::Empty,
+                None if kind == FREE => Occupant::Empty,
                 None => Occupant::Wall,
             };
             let shown = state.floor.occupant(index);
@@ -42,7 +42,7 @@ impl RobotsWorld {
         let at = state.position(slot);
         for &offset in &state.body_type(self, slot).own {
             let index = at.index(self.stride).wrapping_add_signed(offset) as usize;
-            let is_wall = self.walls.get(index).is_none_or(|&w| w != FREE);
+            let is_wall = self.walls.get(index).is_none_or(|&kind| kind != FREE);
             if is_wall {
                 return Err(format!("body {slot} stands in a wall at box {index}"));
             }

@@ -18,7 +18,7 @@
 //! Both write claims, as the double pool does; the lock does not use them.
 
 use super::Scratch;
-use super::cycle_context::{CycleContext, with_scene};
+use super::cycle_context::{CycleContext, with_cycle};
 use super::metrics::Metrics;
 use super::scenario::Compiled;
 use super::state::{RobotsState, Snapshot};
@@ -88,13 +88,14 @@ impl BaselineRun {
     /// Returns a run at its start, with `workers` workers (at least 1).
     pub fn new(compiled: Compiled, strategy: Strategy, workers: usize) -> Self {
         let state = RobotsState::restore(&compiled.world, &compiled.start_snapshot());
-        let mut crew = Vec::new();
-        crew.resize_with(workers.max(1), BandWorker::default);
-        let bands = compiled.world.bands(crew.len());
+        let mut band_workers = Vec::new();
+        band_workers.resize_with(workers.max(1), BandWorker::default);
+        let bands = compiled.world.bands(band_workers.len());
         for slot in 0..compiled.world.bodies.len() as Slot {
-            crew[band_of(&bands, state.position(slot).col())].own.push(slot);
+            let band = band_of(&bands, state.position(slot).col());
+            band_workers[band].own.push(slot);
         }
-        Self { compiled, state, strategy, workers: crew, cycle: 0, serial_acts: 0 }
+        Self { compiled, state, strategy, workers: band_workers, cycle: 0, serial_acts: 0 }
     }
 
     /// Runs `cycles` cycles.
@@ -105,7 +106,7 @@ impl BaselineRun {
             Strategy::OneLock => self.advance_one_lock(span),
         }
         self.cycle += cycles;
-        self.serial_acts = self.workers.iter().map(|hand| hand.serial_acts).sum();
+        self.serial_acts = self.workers.iter().map(|worker| worker.serial_acts).sum();
     }
 
     /// Returns the state by entity id.
@@ -125,15 +126,16 @@ impl BaselineRun {
     }
 
     fn advance_one_lock(&mut self, span: Range<Cycle>) {
-        let (world, state) = (&*self.compiled.world, &self.state);
-        let the_world = Mutex::new(());
-        workers::run(&mut self.workers, |worker, hand| {
+        let world = &*self.compiled.world;
+        let state = &self.state;
+        let world_lock = Mutex::new(());
+        workers::run(&mut self.workers, |worker, own| {
             for (pool, now) in (0u64..).zip(span.clone()) {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
-                    with_scene!(world, state, now, |scene| for slot in bodies {
-                        let _turn = lock(&the_world);
-                        scene.perceive(slot as Slot, &mut hand.scratch);
-                        scene.act_with_draw(slot as Slot, &mut hand.scratch);
+                    with_cycle!(world, state, now, |cycle| for slot in bodies {
+                        let _guard = lock(&world_lock);
+                        cycle.perceive(slot as Slot, &mut own.scratch);
+                        cycle.act_with_draw(slot as Slot, &mut own.scratch);
                     });
                 });
                 worker.barrier();
@@ -142,52 +144,53 @@ impl BaselineRun {
     }
 
     fn advance_partition(&mut self, span: Range<Cycle>) {
-        let (world, state) = (&*self.compiled.world, &self.state);
-        let borders = HaloExchange::new(world.bands(self.workers.len()));
-        workers::run(&mut self.workers, |worker, hand| {
+        let world = &*self.compiled.world;
+        let state = &self.state;
+        let exchange = HaloExchange::new(world.bands(self.workers.len()));
+        workers::run(&mut self.workers, |worker, own| {
             for now in span.clone() {
-                with_scene!(world, state, now, |scene| {
-                    partition_cycle(scene, &borders, worker, hand);
+                with_cycle!(world, state, now, |cycle| {
+                    partition_cycle(cycle, &exchange, worker, own);
                 });
             }
         });
     }
 }
 
-/// Runs a worker's part of one cycle: its own bodies perceive; barrier; those inside the band act;
-/// barrier; one worker moves the rest and hands over; barrier.
+/// Runs a worker's part of one cycle: its own bodies perceive; barrier, because no body may act while
+/// others perceive; those inside the band act; barrier; one worker moves the rest and hands over; barrier.
 fn partition_cycle<T: BoxWord>(
-    scene: &CycleContext<'_, T>,
-    borders: &HaloExchange,
+    cycle: &CycleContext<'_, T>,
+    exchange: &HaloExchange,
     worker: &Worker<'_>,
-    hand: &mut BandWorker,
+    band_worker: &mut BandWorker,
 ) {
-    let BandWorker { scratch, own, serial_acts } = hand;
-    own.iter().for_each(|&slot| scene.perceive(slot, scratch));
+    let BandWorker { scratch, own, serial_acts } = band_worker;
+    own.iter().for_each(|&slot| cycle.perceive(slot, scratch));
     worker.barrier();
-    let band = &borders.bands[worker.index()];
+    let band = &exchange.bands[worker.index()];
     own.retain(|&slot| {
-        let inside = scene.is_inside(slot, band);
+        let inside = cycle.is_inside(slot, band);
         if inside {
-            scene.act_with_draw(slot, scratch);
+            cycle.act_with_draw(slot, scratch);
         } else {
-            lock(&borders.crossing).push(slot);
+            lock(&exchange.crossing).push(slot);
         }
         inside
     });
     worker.barrier();
     if worker.index() == 0 {
-        let mut crossing = std::mem::take(&mut *lock(&borders.crossing));
+        let mut crossing = std::mem::take(&mut *lock(&exchange.crossing));
         // The order in which workers arrive depends on scheduling; that of the slots does not.
         crossing.sort_unstable();
         *serial_acts += crossing.len() as u64;
         for slot in crossing {
-            scene.act_with_draw(slot, scratch);
-            borders.transfer(slot, scene.cell(slot).position().col());
+            cycle.act_with_draw(slot, scratch);
+            exchange.transfer(slot, cycle.body(slot).position().col());
         }
     }
     worker.barrier();
-    own.append(&mut lock(&borders.inboxes[worker.index()]));
+    own.append(&mut lock(&exchange.inboxes[worker.index()]));
 }
 
 impl HaloExchange {
@@ -214,26 +217,34 @@ fn band_of(bands: &[Range<u32>], col: u32) -> usize {
 impl RobotsWorld {
     /// Returns `n` vertical bands of equal width.
     fn bands(&self, n: usize) -> Vec<Range<u32>> {
-        let border = |k: usize| match k {
-            0 => 0,
-            _ if k == n => u32::MAX,
-            _ => (u64::from(self.stride) * k as u64 / n as u64) as u32,
-        };
-        (0..n).map(|k| border(k)..border(k + 1)).collect()
+        let mut bands = Vec::with_capacity(n);
+        let mut west = 0;
+        for k in 1..=n as u64 {
+            // The last band reaches over the map's edge, so that one band alone has no border.
+            let is_last = k == n as u64;
+            let east =
+                if is_last { u32::MAX } else { (u64::from(self.stride) * k / n as u64) as u32 };
+            bands.push(west..east);
+            west = east;
+        }
+        bands
     }
 }
 
 impl<T: BoxWord> CycleContext<'_, T> {
     /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
     fn is_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
-        let (world, cell) = (self.world, self.cell(slot));
-        let (col, width) = (cell.position().col(), self.type_of(cell).size.0);
+        let world = self.world;
+        let body = self.body(slot);
+        let col = body.position().col();
+        let width = self.type_of(body).size.0;
         let reach = world.reach;
+        // Most bodies are far from a border, and their claims need not be walked.
         if col >= band.start.saturating_add(reach) && col + width + reach <= band.end {
             return true;
         }
         let covers = band.contains(&col) && band.contains(&(col + width - 1));
-        if !covers || cell.intent.get().is_idle() {
+        if !covers || body.intent.get().is_idle() {
             return covers;
         }
         let mut inside = true;
@@ -253,7 +264,8 @@ pub fn find_violation(world: &RobotsWorld, snapshot: &Snapshot) -> Option<String
         if world.is_door(id) && body.facing.is_open() {
             continue;
         }
-        let (cols, rows) = (body.at.0..body.at.0 + ty.size.0, body.at.1..body.at.1 + ty.size.1);
+        let cols = body.at.0..body.at.0 + ty.size.0;
+        let rows = body.at.1..body.at.1 + ty.size.1;
         for (col, row) in rows.flat_map(|r| cols.clone().map(move |c| (c, r))) {
             let outside = col >= width || row >= world.map.height();
             if outside || world.map.cell(col, row) != Cell::Free {

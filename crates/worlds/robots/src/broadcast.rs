@@ -21,8 +21,7 @@ struct BroadcastPage {
 impl BroadcastBuffer {
     /// Returns the pages of `n` bodies that have said nothing yet.
     pub(crate) fn new(n: usize) -> Self {
-        let page = || BroadcastPage { words: Column::filled(n, 0), spoken: Column::filled(n, 0) };
-        Self([page(), page()])
+        Self([BroadcastPage::silent(n), BroadcastPage::silent(n)])
     }
 
     fn page(&self, read_in: Cycle) -> &BroadcastPage {
@@ -31,19 +30,21 @@ impl BroadcastBuffer {
 
     /// Returns the last word that a robot has broadcast before cycle `now`, if any.
     pub(crate) fn last_broadcast(&self, id: EntityId, now: Cycle) -> Option<u64> {
-        let (page, i) = (self.page(now), id as usize);
-        let has_spoken = i < page.spoken.len() && page.spoken.get(i) == 1;
-        has_spoken.then(|| page.words.get(i))
+        let page = self.page(now);
+        let index = id as usize;
+        // Without radio the pages are empty.
+        let has_spoken = index < page.spoken.len() && page.spoken.get(index) == 1;
+        has_spoken.then(|| page.words.get(index))
     }
 
-    /// Notes the word of a robot in cycle `now`: a new one, or still the last one.
+    /// Records the word of a robot in cycle `now`: a new one, or still the last one.
     pub(crate) fn record(&self, id: EntityId, now: Cycle, word: Option<u64>) {
         if let Some(word) = word.or_else(|| self.last_broadcast(id, now)) {
             self.page(now + 1).set(id, word);
         }
     }
 
-    /// Restores the last word of a robot.
+    /// Restores the last word of a robot, on both pages, because the cycle may be even or odd.
     pub(crate) fn restore(&self, id: EntityId, word: u64) {
         self.0.iter().filter(|page| !page.spoken.is_empty()).for_each(|page| page.set(id, word));
     }
@@ -55,6 +56,10 @@ impl BroadcastBuffer {
 }
 
 impl BroadcastPage {
+    fn silent(bodies: usize) -> Self {
+        Self { words: Column::filled(bodies, 0), spoken: Column::filled(bodies, 0) }
+    }
+
     fn set(&self, id: EntityId, word: u64) {
         self.words.set(id as usize, word);
         self.spoken.set(id as usize, 1);

@@ -44,23 +44,38 @@ fn add_map(bundle: &mut Bundle<'_>, map: &GridMap) {
 
 fn add_profiles(bundle: &mut Bundle<'_>, profiles: &Value) -> Result<(), InputError> {
     let paths = profiles.as_array().into_iter().flatten().filter_map(Value::as_str);
-    let copy = |(k, path)| bundle.copy(&format!("profile-{k}.toml"), path);
-    let names = paths.enumerate().map(copy).collect::<Result<Vec<_>, _>>()?;
+    let mut names = Vec::new();
+    for (k, path) in paths.enumerate() {
+        names.push(bundle.copy(&format!("profile-{k}.toml"), path)?);
+    }
     if !names.is_empty() {
         bundle.set("profiles", format_args!("{names:?}"));
     }
     Ok(())
 }
 
-/// Adds the lists of starts of one section or of many.
+/// Adds the lists of starts: of many sections `[[robots]]`, or of one `[robots]`.
 fn add_starts(bundle: &mut Bundle<'_>, robots: &Value) -> Result<(), InputError> {
-    let many = robots.as_array().into_iter().flatten().enumerate();
-    let many = many.map(|(k, section)| (format!("robots.{k}.scen"), k, section));
-    for (key, k, section) in many.chain([("robots.scen".into(), 0, robots)]) {
-        if let Some(path) = section["scen"].as_str() {
-            let path = bundle.copy(&format!("starts-{k}.scen"), path)?;
-            bundle.set(&key, format_args!("{path:?}"));
+    match robots {
+        Value::Array(sections) => {
+            for (k, section) in sections.iter().enumerate() {
+                add_start_list(bundle, &format!("robots.{k}.scen"), k, section)?;
+            }
+            Ok(())
         }
+        one => add_start_list(bundle, "robots.scen", 0, one),
+    }
+}
+
+fn add_start_list(
+    bundle: &mut Bundle<'_>,
+    key: &str,
+    number: usize,
+    section: &Value,
+) -> Result<(), InputError> {
+    if let Some(path) = section["scen"].as_str() {
+        let path = bundle.copy(&format!("starts-{number}.scen"), path)?;
+        bundle.set(key, format_args!("{path:?}"));
     }
     Ok(())
 }

@@ -18,16 +18,17 @@ pub(super) fn no_contact_remarks(world: &RobotsWorld) -> Vec<Remark> {
         _ => None,
     });
     let effectors: BTreeSet<&str> = models.map(|m| m.body.effector.name.as_str()).collect();
-    let warning = |effector| {
-        let words = format!(
-            "no robot with the effector `{effector}` ever has a contact: each of its actions may \
-             also leave it in place, so something is always left when \"renormalise\" strikes out \
-             what is blocked. Behaviours that turn on contact may push a wall forever: use \
-             obstacle_rule = \"cut\" or \"stay\", or sensors that see what is ahead"
-        );
-        Remark::warning("obstacle_rule", words)
-    };
-    effectors.into_iter().map(warning).collect()
+    effectors.into_iter().map(no_contact_remark).collect()
+}
+
+fn no_contact_remark(effector: &str) -> Remark {
+    let words = format!(
+        "no robot with the effector `{effector}` ever has a contact: each of its actions may \
+         also leave it in place, so something is always left when \"renormalise\" strikes out \
+         what is blocked. Behaviours that turn on contact may push a wall forever: use \
+         obstacle_rule = \"cut\" or \"stay\", or sensors that see what is ahead"
+    );
+    Remark::warning("obstacle_rule", words)
 }
 
 /// Returns whether some action may end elsewhere.
@@ -35,12 +36,12 @@ fn can_move(model: &RobotModel) -> bool {
     model.body.actions.iter().any(|action| possible_lengths(action).any(|steps| steps > 0))
 }
 
-/// Returns whether some action always goes somewhere, so that all of its ways may be blocked.
+/// Returns whether some action always goes somewhere, so that all of its transitions may be blocked.
 fn must_move(model: &RobotModel) -> bool {
     model.body.actions.iter().any(|action| possible_lengths(action).all(|steps| steps > 0))
 }
 
-/// Returns the number of steps of each way in which an action may end.
+/// Returns the number of steps of each transition in which an action may end.
 fn possible_lengths(action: &Action) -> impl Iterator<Item = usize> + '_ {
     let walks = action.probabilities.iter().zip(&action.walks);
     walks.filter(|(p, _)| **p > 0.0).map(|(_, walk)| walk.steps.len())

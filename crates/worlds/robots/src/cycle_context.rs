@@ -16,42 +16,45 @@ pub(super) struct CycleContext<'a, T: BoxWord> {
     pub(super) now: Cycle,
 }
 
-/// Evaluates an expression with the scene of a world's state. The phases are compiled for each
-/// width of the floor's words; this picks the right one.
-macro_rules! with_scene {
-    ($world:expr, $state:expr, $now:expr, |$scene:ident| $value:expr) => {{
-        let (world, state, now) = ($world, $state, $now);
+/// Evaluates an expression with the context of a cycle. The phases are compiled for each
+/// width of the floor's words, because small words mean fewer cache misses and a branch at each box would cost
+/// more than they save; this picks the right one once.
+macro_rules! with_cycle {
+    ($world:expr, $state:expr, $now:expr, |$cycle:ident| $value:expr) => {{
+        let world = $world;
+        let state = $state;
+        let now = $now;
         match &state.floor {
             sidestep_kernel::space::Floor::Narrow(floor) => {
-                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
             sidestep_kernel::space::Floor::Wide(floor) => {
-                let $scene = &$crate::cycle_context::CycleContext { world, state, floor, now };
+                let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
         }
     }};
 }
-pub(super) use with_scene;
+pub(super) use with_cycle;
 
 impl<'a, T: BoxWord> CycleContext<'a, T> {
     /// Returns the changing part of a body.
     #[inline(always)]
-    pub(super) fn cell(&self, slot: Slot) -> &'a BodyState {
+    pub(super) fn body(&self, slot: Slot) -> &'a BodyState {
         &self.state.bodies[slot as usize]
     }
 
     /// Returns the properties that a body shares with others of its type.
     #[inline(always)]
-    pub(super) fn type_of(&self, cell: &BodyState) -> &'a BodyType {
-        &self.world.types[usize::from(cell.ty)]
+    pub(super) fn type_of(&self, body: &BodyState) -> &'a BodyType {
+        &self.world.types[usize::from(body.ty)]
     }
 
     /// Returns the index of a body's lower-left box on the floor.
     #[inline(always)]
-    pub(super) fn base(&self, cell: &BodyState) -> u32 {
-        cell.position().index(self.world.stride)
+    pub(super) fn base(&self, body: &BodyState) -> u32 {
+        body.position().index(self.world.stride)
     }
 
     /// Returns the draws of a body's action: that of its outcome, and that of its priority.
@@ -71,5 +74,6 @@ pub(super) fn box_index(base: u32, offset: i32) -> usize {
 /// Returns whether some boxes are all empty.
 #[inline]
 pub(super) fn are_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
+    // Free is the highest bit of a word, so one branch at the end answers for all boxes.
     offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(box_index(base, offset))).is_free()
 }

@@ -26,12 +26,13 @@ pub use stall_detector::StallDetector;
 pub use wander::Wander;
 
 pub use super::alias_table::UNSEEN;
-use super::effector::{ActionId, Side};
+use super::effector::{ActionId, LEFT, RIGHT, Side};
 use super::sensor::{NOTHING, Reading};
 pub use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 /// A robot's memory between its actions: four words; their meaning is up to the behavior.
@@ -55,7 +56,7 @@ pub struct Contact {
 pub struct ReceivedMessage {
     /// Id of the robot that sent it.
     pub sender: EntityId,
-    /// The message itself.
+    /// The message, of which only behaviors know the meaning.
     pub word: u64,
 }
 
@@ -133,7 +134,23 @@ impl Percept<'_> {
     }
 }
 
-/// A mark on the robot's way.
+/// Returns the side on which the nearest thing reported is farther, drawn where both are alike.
+fn freer_side(percept: &Percept<'_>, draws: &mut Draws) -> ActionId {
+    // [`UNSEEN`] is greater than every class.
+    let left = percept.nearest_in[Sector::Left as usize];
+    let right = percept.nearest_in[Sector::Right as usize];
+    match left.cmp(&right) {
+        Ordering::Greater => LEFT,
+        Ordering::Less => RIGHT,
+        Ordering::Equal => random_turn(draws),
+    }
+}
+
+fn random_turn(draws: &mut Draws) -> ActionId {
+    if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
+}
+
+/// A mark on the path of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TripEvent {
     /// The robot is where its trips start; time counts from here.
@@ -163,7 +180,7 @@ impl From<ActionId> for Decision {
 /// `crates/sidestep/examples/own_behaviour.rs`.
 pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
-    /// and the robot's random stream of this cycle, because robots decide in any order.
+    /// and the robot's random stream of this cycle, because robots decide in any order, on any worker.
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision;
 
     /// Returns whether its robots ask each other to make room. Then word 2 of the memory holds the
@@ -178,7 +195,7 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
         false
     }
 
-    /// Returns the ways to all places that it wants to reach, so that a check can say which of them
+    /// Returns the flow fields of all places that it wants to reach, so that a check can report those that
     /// are out of reach.
     fn flow_fields(&self) -> &[Arc<FlowField>] {
         &[]

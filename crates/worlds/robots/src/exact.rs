@@ -27,8 +27,6 @@ pub fn markov_model(compiled: &Compiled) -> Result<MarkovModel, InputError> {
 /// When there are more robots or none, or other bodies that move.
 pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
     let world = &compiled.world;
-    let refuse =
-        |cause: String, remedy: &str| Err(InputError::new(source_name(compiled), cause, remedy));
     let mut doors = BTreeMap::new();
     let mut robots = Vec::new();
     for &body in &world.bodies {
@@ -38,26 +36,25 @@ pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
             Role::Mover(_) => {
                 let kind = &world.kinds[usize::from(ty.kind)];
                 let cause = format!("body {} (kind `{kind}`) moves by itself", body.id);
-                return refuse(cause, "leave out [people]: a chain has one moving body");
+                let remedy = "leave out [people]: a chain has one moving body";
+                return Err(InputError::new(source_name(compiled), cause, remedy));
             }
             Role::Door(door) if is_always_closed(door) => {
                 doors.extend(covered_boxes(compiled, body.id).map(|at| (at, ty.kind)));
             }
             Role::Door(_) => {
-                return refuse(
-                    format!("door {} opens", body.id),
-                    "keep doors closed with periodic = { open = 0, closed = 1 }, or leave out [doors]",
-                );
+                let cause = format!("door {} opens", body.id);
+                let remedy = "keep doors closed with periodic = { open = 0, closed = 1 }, or leave out [doors]";
+                return Err(InputError::new(source_name(compiled), cause, remedy));
             }
         }
     }
-    match robots[..] {
-        [(body, model, size)] => Ok(robot(compiled, doors, body, model, size)),
-        _ => refuse(
-            format!("{} robots", robots.len()),
-            "give one robot: [robots] with count = 1, or --set robots.count=1",
-        ),
-    }
+    let [(body, model, size)] = robots[..] else {
+        let cause = format!("{} robots", robots.len());
+        let remedy = "give one robot: [robots] with count = 1, or --set robots.count=1";
+        return Err(InputError::new(source_name(compiled), cause, remedy));
+    };
+    Ok(robot(compiled, doors, body, model, size))
 }
 
 fn is_always_closed(door: &Door) -> bool {
@@ -160,7 +157,7 @@ fn run_seed(seed: u64, run: u64) -> Seed {
     Seed(Streams::new(Seed(seed)).draws(0, run, purpose::RUN).next_u64())
 }
 
-/// Gives the robots another behavior.
+/// Gives the robots another behavior. All else of them stays, so that sensors and effectors are tabulated once.
 fn set_policy(world: &mut RobotsWorld, policy: &RandomPolicy) {
     for ty in &mut world.types {
         if let Role::Robot(model) = &mut ty.role {
@@ -170,7 +167,8 @@ fn set_policy(world: &mut RobotsWorld, policy: &RandomPolicy) {
 }
 
 fn robot_pose(simulation: &RobotsRun) -> GridPose {
-    let (world, state) = (simulation.world(), simulation.state());
+    let world = simulation.world();
+    let state = simulation.state();
     let slot = world.robots()[0];
     let (col, row) = world.map_position(state.position(slot));
     let heading = state.bodies[slot as usize].facing.get().heading();

@@ -2,7 +2,7 @@
 //! outside.
 
 use super::Scratch;
-use super::cycle_context::{CycleContext, with_scene};
+use super::cycle_context::{CycleContext, with_cycle};
 use super::decide::External;
 use super::effector::{HEADING_NAMES, Side};
 use super::state::RobotsState;
@@ -15,37 +15,58 @@ use std::sync::Arc;
 #[cfg(test)]
 mod tests;
 
-/// Most words of others that one robot observes: those of the first senders by id.
+/// Most words of others that one robot observes: those of the first senders by id. An observation has one shape
+/// for a whole run, which would else grow with the number of robots.
 const MAX_HEARD: usize = 64;
+
+/// Robots that make up a team.
+struct AlikeRobots<'a> {
+    ty: &'a BodyType,
+    model: &'a RobotModel,
+    agents: Vec<EntityId>,
+}
+
+impl AlikeRobots<'_> {
+    /// Returns whether a robot of this type belongs to them.
+    fn accepts(&self, ty: &BodyType, model: &RobotModel) -> bool {
+        self.ty.kind == ty.kind
+            && Arc::ptr_eq(&self.model.body, &model.body)
+            && self.model.is_external == model.is_external
+    }
+}
+
+/// Returns the numbers from 0 on, by these names.
+fn choice<S: Into<String>>(names: impl IntoIterator<Item = S>) -> SpaceKind {
+    SpaceKind::Discrete(names.into_iter().map(Into::into).collect())
+}
 
 impl RobotsWorld {
     /// Returns the teams: robots of one kind that have one body, and decide themselves or do not.
     pub(super) fn find_teams(&self) -> Teams {
-        let mut alike: Vec<(&BodyType, &RobotModel, Vec<EntityId>)> = Vec::new();
+        let mut alike: Vec<AlikeRobots<'_>> = Vec::new();
         for &id in &self.robots {
             let ty = self.type_of(id);
             let Role::Robot(model) = &ty.role else { continue };
-            let is_same = |(other, its, _): &&mut (&BodyType, &RobotModel, Vec<EntityId>)| {
-                other.kind == ty.kind
-                    && Arc::ptr_eq(&its.body, &model.body)
-                    && its.is_external == model.is_external
-            };
-            match alike.iter_mut().rev().find(is_same) {
-                Some((.., agents)) => agents.push(id),
-                None => alike.push((ty, model, vec![id])),
+            // From the last one, because the robots of one section follow each other.
+            match alike.iter_mut().rev().find(|others| others.accepts(ty, model)) {
+                Some(others) => others.agents.push(id),
+                None => alike.push(AlikeRobots { ty, model, agents: vec![id] }),
             }
         }
-        let team = |(ty, model, agents): (&BodyType, &RobotModel, Vec<EntityId>)| {
-            let ordered = if model.is_external { self.action_spaces(model) } else { Vec::new() };
-            let name = self.kinds[usize::from(ty.kind)].clone();
-            Team {
-                name,
+        let mut teams = Vec::with_capacity(alike.len());
+        for AlikeRobots { ty, model, agents } in alike {
+            teams.push(Team {
+                name: self.kinds[usize::from(ty.kind)].clone(),
                 agents,
                 observation_spaces: self.observation_spaces(model),
-                action_spaces: ordered,
-            }
-        };
-        Teams::new(alike.into_iter().map(team).collect(), Self::AGENT)
+                action_spaces: if model.is_external {
+                    self.action_spaces(model)
+                } else {
+                    Vec::new()
+                },
+            });
+        }
+        Teams::new(teams, Self::AGENT)
     }
 
     /// Returns the spaces of a robot's percept, in the order in which [`Self::observe`] writes them.
@@ -75,28 +96,21 @@ impl RobotsWorld {
 
     /// Returns the spaces that robots perceive without sensors.
     fn common_observation_spaces(&self) -> Vec<Space> {
-        let none = || std::iter::once("none".to_string());
-        let kinds = none().chain(self.kinds.iter().cloned()).collect();
-        let sides = none().chain(Side::ALL.iter().map(|side| side.name().to_string())).collect();
-        let names =
-            |names: &[&str]| SpaceKind::Discrete(names.iter().map(|n| (*n).into()).collect());
-        let (width, height) = (self.map.width(), self.map.height());
-        let boxes = SpaceKind::Integer { low: 0, high: i64::from(width.max(height)) - 1 };
+        let kinds = choice(["none"].into_iter().chain(self.kinds.iter().map(String::as_str)));
+        let sides = choice(["none"].into_iter().chain(Side::ALL.iter().map(|side| side.name())));
+        let longest_side = self.map.width().max(self.map.height());
+        let boxes = SpaceKind::Integer { low: 0, high: i64::from(longest_side) - 1 };
         let mut spaces = vec![
-            Space::new(
-                "contact",
-                SpaceKind::Discrete(kinds),
-                "kind of what stopped its last action",
-            ),
-            Space::new("contact_side", SpaceKind::Discrete(sides), "its side that touched that"),
+            Space::new("contact", kinds, "kind of what stopped its last action"),
+            Space::new("contact_side", sides, "its side that touched that"),
             Space::new("at_boxes", boxes, "column and row of its lower-left box").with_shape([2]),
-            Space::new("heading", names(&HEADING_NAMES), "where it looks"),
-            Space::new("due", names(&["no", "yes"]), "whether it acts in the next cycle"),
+            Space::new("heading", choice(HEADING_NAMES), "where it looks"),
+            Space::new("due", choice(["no", "yes"]), "whether it acts in the next cycle"),
         ];
         if self.radio.is_some() {
             let heard = [self.max_heard()];
-            let most = self.bodies.len() as i64 - 1;
-            let from = SpaceKind::Integer { low: -1, high: most };
+            let max_id = self.bodies.len() as i64 - 1;
+            let from = SpaceKind::Integer { low: -1, high: max_id };
             let meaning = "ids of those whose word it hears, rising; -1 where there are no more";
             spaces.push(Space::new("heard_from", from, meaning).with_shape(heard));
             let word = SpaceKind::Integer { low: 0, high: i64::MAX };
@@ -114,7 +128,7 @@ impl RobotsWorld {
     /// Returns the spaces of a robot's orders.
     fn action_spaces(&self, model: &RobotModel) -> Vec<Space> {
         let actions = SpaceKind::Discrete(model.body.effector.actions.clone());
-        let trip = SpaceKind::Discrete(["none", "begun", "done"].map(String::from).into());
+        let trip = choice(["none", "begun", "done"]);
         let mut spaces = vec![
             Space::new(External::ACTION, actions, "the action that it tries"),
             Space::new(External::TRIP, trip, "a mark on its way: trips are counted and timed"),
@@ -127,7 +141,7 @@ impl RobotsWorld {
         spaces
     }
 
-    /// Notes an order in the memory of its robot.
+    /// Records an order in the memory of its robot.
     pub(super) fn record_order(&self, state: &RobotsState, order: &Order<'_>) {
         let [value] = *order.values else { return };
         let space = &self.teams.all()[order.team].action_spaces[order.space];
@@ -140,25 +154,31 @@ impl RobotsWorld {
         state: &RobotsState,
         now: Cycle,
         team: usize,
-        room: &mut [BufferMut<'_>],
+        buffers: &mut [BufferMut<'_>],
     ) {
         let scratch = &mut self.scratch();
-        with_scene!(self, state, now, |scene| {
+        with_cycle!(self, state, now, |cycle| {
             for (row, &id) in self.teams.all()[team].agents.iter().enumerate() {
-                scene.observe(id, row, scratch, room);
+                cycle.observe(id, row, scratch, buffers);
             }
         });
     }
 }
 
 impl<T: BoxWord> CycleContext<'_, T> {
-    /// Writes a robot's percept into its row of each room.
-    fn observe(&self, id: EntityId, row: usize, scratch: &mut Scratch, room: &mut [BufferMut<'_>]) {
+    /// Writes a robot's percept into its row of each buffer, in the order of the spaces.
+    fn observe(
+        &self,
+        id: EntityId,
+        row: usize,
+        scratch: &mut Scratch,
+        buffers: &mut [BufferMut<'_>],
+    ) {
         let slot = self.state.slot_of_id[id as usize];
-        let cell = self.cell(slot);
-        let Role::Robot(model) = &self.type_of(cell).role else { return };
-        self.sense(model, cell, scratch);
-        let (of_sensors, others) = room.split_at_mut(2 * model.body.sensors.len());
+        let body = self.body(slot);
+        let Role::Robot(model) = &self.type_of(body).role else { return };
+        self.sense(model, body, scratch);
+        let (of_sensors, others) = buffers.split_at_mut(2 * model.body.sensors.len());
         let mut readings = scratch.readings.iter();
         for (sensor, pair) in model.body.sensors.iter().zip(of_sensors.as_chunks_mut().0) {
             let beams = sensor.ends.len();
@@ -168,25 +188,26 @@ impl<T: BoxWord> CycleContext<'_, T> {
                 classes.set_integer(row * beams + k, i64::from(reading.class));
             }
         }
-        let contact = cell.contact.get().get();
-        let (col, line) = self.world.map_position(cell.position());
+        let contact = body.contact.get().get();
+        let (col, map_row) = self.world.map_position(body.position());
         let is_due = self.world.bodies[id as usize].is_due(self.now);
+        // 0 is no contact.
         others[0].set_integer(row, contact.map_or(0, |contact| i64::from(contact.kind) + 1));
         others[1].set_integer(row, contact.map_or(0, |contact| contact.side as i64 + 1));
         others[2].set_integer(2 * row, i64::from(col));
-        others[2].set_integer(2 * row + 1, i64::from(line));
-        others[3].set_integer(row, i64::from(cell.facing.get().heading()));
+        others[2].set_integer(2 * row + 1, i64::from(map_row));
+        others[3].set_integer(row, i64::from(body.facing.get().heading()));
         others[4].set_integer(row, i64::from(is_due));
         if let Some(radio) = &self.world.radio {
             scratch.heard.clear();
             self.listen(radio, slot, &mut scratch.heard);
-            let most = self.world.max_heard();
-            for k in 0..most {
+            let max_heard = self.world.max_heard();
+            for k in 0..max_heard {
                 let heard = scratch.heard.get(k);
-                others[5]
-                    .set_integer(row * most + k, heard.map_or(-1, |heard| heard.sender.into()));
+                let sender = heard.map_or(-1, |heard| heard.sender.into());
+                others[5].set_integer(row * max_heard + k, sender);
                 let word = heard.map_or(0, |heard| heard.word);
-                others[6].set_integer(row * most + k, (word & i64::MAX as u64) as i64);
+                others[6].set_integer(row * max_heard + k, (word & i64::MAX as u64) as i64);
             }
         }
     }

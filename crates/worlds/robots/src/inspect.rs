@@ -1,5 +1,5 @@
 //! Percepts, decisions and claims of a body in a cycle, and their outcome: the cycle is tried on a copy
-//! of the state, as far as this body's turn.
+//! of the state, up to and with this body's action.
 
 mod outcome;
 mod senses;
@@ -7,7 +7,7 @@ mod senses;
 mod tests;
 
 use super::action::Action;
-use super::cycle_context::{CycleContext, with_scene};
+use super::cycle_context::{CycleContext, with_cycle};
 use super::effector::HEADING_NAMES;
 use super::join::GroupMember;
 use super::policy::ConflictPolicy;
@@ -21,7 +21,7 @@ use sidestep_kernel::view::{
 use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
 use sidestep_map::Rect;
 
-/// Largest number of members of a conflict group that are listed: those around the body.
+/// Largest number of members of a conflict group that are listed: those that act just before and after the body.
 const MAX_MEMBERS: usize = 64;
 
 impl RobotsWorld {
@@ -30,18 +30,20 @@ impl RobotsWorld {
         &self,
         state: &RobotsState,
         now: Cycle,
-        who: BodyId,
+        body: BodyId,
     ) -> Option<Inspection> {
-        let id = who.number;
-        if id as usize >= self.bodies.len() || self.body_id(id) != who {
+        let id = body.number;
+        if id as usize >= self.bodies.len() || self.body_id(id) != body {
             return None;
         }
         let copy = state.trial_copy(self);
         let slot = copy.slot_of_id[id as usize];
         let kind = &self.kinds[usize::from(self.type_of(id).kind)];
-        let inspection = Inspection::new(who, now, format!("{kind} {id}"));
-        Some(with_scene!(self, &copy, now, |scene| Inspector { scene, slot, id, inspection }
-            .inspect()))
+        let inspection = Inspection::new(body, now, format!("{kind} {id}"));
+        with_cycle!(self, &copy, now, |cycle| {
+            let inspector = Inspector { cycle, slot, id, inspection };
+            Some(inspector.inspect())
+        })
     }
 
     /// Returns a body's heading in words.
@@ -50,9 +52,9 @@ impl RobotsWorld {
     }
 }
 
-/// A look at one body, on a state that is its own.
+/// An inspection of one body in the making, on a copy of the state.
 struct Inspector<'a, T: BoxWord> {
-    scene: &'a CycleContext<'a, T>,
+    cycle: &'a CycleContext<'a, T>,
     slot: Slot,
     id: EntityId,
     inspection: Inspection,
@@ -60,39 +62,41 @@ struct Inspector<'a, T: BoxWord> {
 
 impl<'a, T: BoxWord> Inspector<'a, T> {
     fn inspect(mut self) -> Inspection {
-        let scratch = &mut self.scene.world.scratch();
+        let scratch = &mut self.cycle.world.scratch();
         // Robots decided from outside perceive within a cycle only where readings are recorded.
         scratch.keep_readings = true;
         self.add_present();
         self.add_percept(scratch);
-        let bodies = 0..self.scene.world.bodies.len() as Slot;
-        bodies.clone().for_each(|slot| self.scene.perceive(slot, scratch));
+        let bodies = 0..self.cycle.world.bodies.len() as Slot;
+        bodies.clone().for_each(|slot| self.cycle.perceive(slot, scratch));
         self.add_claims();
+        // All bodies take part, because a group may reach over any of them.
         let groups = ConflictGroups::new(bodies.len());
-        bodies.for_each(|slot| self.scene.join(slot, &groups));
+        bodies.for_each(|slot| self.cycle.join(slot, &groups));
         let mut members = Vec::new();
         groups.members(groups.leader(self.slot), &mut members);
-        self.scene.order(&members, scratch);
+        self.cycle.order(&members, scratch);
         let order = std::mem::take(&mut scratch.order);
         self.add_conflict_group(&order);
         for place in order.iter().take_while(|place| place.slot != self.slot) {
-            self.scene.act(place.slot, place.word, scratch);
+            self.cycle.act(place.slot, place.word, scratch);
         }
         let own = order.iter().find(|place| place.slot == self.slot);
         self.add_outcome(own.map_or(0, |place| place.word), scratch);
         self.inspection
     }
 
-    /// Tells the facts known before the cycle.
+    /// Adds the facts known before the cycle.
     fn add_present(&mut self) {
-        let (scene, cell) = (self.scene, self.scene.cell(self.slot));
-        let body = &scene.world.bodies[self.id as usize];
+        let cycle = self.cycle;
+        let body = cycle.body(self.slot);
+        let timing = &cycle.world.bodies[self.id as usize];
         let section = FactSection::new("Now")
             .fact("place", self.position_m())
             .fact("heading", self.facing())
-            .fact("due", body.is_due(scene.now))
-            .fact("acts every", FactValue::number(f64::from(body.period), "cycles"));
-        let section = match &scene.type_of(cell).role {
+            .fact("due", timing.is_due(cycle.now))
+            .fact("acts every", FactValue::number(f64::from(timing.period), "cycles"));
+        let section = match &cycle.type_of(body).role {
             Role::Robot(_) => section.fact("last contact", self.last_contact()),
             _ => section,
         };
@@ -101,48 +105,47 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 
     /// Returns where the body is.
     fn position_m(&self) -> view::Vec3 {
-        self.scene.world.visible_body(self.id, self.scene.cell(self.slot)).pose.at_m
+        self.cycle.world.visible_body(self.id, self.cycle.body(self.slot)).pose.at_m
     }
 
     /// Returns its heading, or of a door whether it is open.
     fn facing(&self) -> FactValue {
-        let cell = self.scene.cell(self.slot);
-        match &self.scene.type_of(cell).role {
-            Role::Door(_) => (if cell.facing.get().is_open() { "open" } else { "closed" }).into(),
-            _ => RobotsWorld::heading_name(cell.facing.get().heading()).into(),
+        let body = self.cycle.body(self.slot);
+        match &self.cycle.type_of(body).role {
+            Role::Door(_) => (if body.facing.get().is_open() { "open" } else { "closed" }).into(),
+            _ => RobotsWorld::heading_name(body.facing.get().heading()).into(),
         }
     }
 
     fn last_contact(&self) -> FactValue {
-        let contact = self.scene.cell(self.slot).contact.get().get();
-        let kinds = &self.scene.world.kinds;
-        let words = |c: super::decide::Contact| {
-            format!("{} at its {}", kinds[usize::from(c.kind)], c.side.name())
+        let Some(contact) = self.cycle.body(self.slot).contact.get().get() else {
+            return FactValue::None;
         };
-        contact.map(words).into()
+        let kind = &self.cycle.world.kinds[usize::from(contact.kind)];
+        format!("{kind} at its {}", contact.side.name()).into()
     }
 
     /// Returns the action that it is about to do; none for doors, and for those that do nothing.
     fn action(&self) -> Option<&'a Action> {
-        let cell = self.scene.cell(self.slot);
-        let is_idle = cell.intent.get().is_idle();
-        let action = self.scene.type_of(cell).actions.get(usize::from(cell.action.get()));
+        let body = self.cycle.body(self.slot);
+        let is_idle = body.intent.get().is_idle();
+        let action = self.cycle.type_of(body).actions.get(usize::from(body.action.get()));
         action.filter(|_| !is_idle)
     }
 
-    /// Tells the boxes that it may come to cover.
+    /// Adds the boxes that it may come to cover.
     fn add_claims(&mut self) {
-        let (scene, slot) = (self.scene, self.slot);
-        let intent = scene.cell(slot).intent.get();
+        let cycle = self.cycle;
+        let slot = self.slot;
+        let intent = cycle.body(slot).intent.get();
         let mut boxes = Vec::new();
         if !intent.is_idle() {
-            scene.for_each_claimed(slot, |index, word| boxes.push((index, word)));
+            cycle.for_each_claimed(slot, |index, word| boxes.push((index, word)));
         }
-        // A box may be on several ways.
+        // A box may be on several paths.
         boxes.sort_unstable_by_key(|(index, _)| *index);
         boxes.dedup_by_key(|(index, _)| *index);
-        let is_taken = |(_, word): &&(usize, T)| !word.is_free() && word.slot() != slot;
-        let taken = boxes.iter().filter(is_taken).count();
+        let taken = boxes.iter().filter(|(_, word)| !word.is_free() && word.slot() != slot).count();
         self.inspection.add_section(
             FactSection::new("Claims")
                 .fact("boxes", FactValue::count(boxes.len()))
@@ -160,28 +163,30 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 
     /// Returns the corners of a box, by its index in the padded grid.
     fn box_corners_m(&self, index: usize) -> Vec<view::Vec3> {
-        let world = self.scene.world;
+        let world = self.cycle.world;
         let col = index as u32 % world.stride - world.border;
         let row = index as u32 / world.stride - world.border;
         world.corners_m(Rect { col, row, width: 1, height: 1 })
     }
 
-    /// Tells the group that is in conflict, in its order of acting.
+    /// Adds the group that is in conflict, in its order of acting.
     fn add_conflict_group(&mut self, order: &[GroupMember]) {
-        let world = self.scene.world;
+        let world = self.cycle.world;
         let own = order.iter().position(|place| place.slot == self.slot).unwrap_or(0);
         let from = own.saturating_sub(MAX_MEMBERS / 2);
         let mut table = FactTable::new(["turn", "body", "draw"]);
         let members = order.iter().enumerate().skip(from).take(MAX_MEMBERS);
         for (k, place) in members.filter(|_| order.len() > 1) {
-            let cell = self.scene.cell(place.slot);
-            let (who, draw) = (world.body_id(cell.id), f64::from(place.key.1) / 4_294_967_296.0);
+            let body = self.cycle.body(place.slot);
+            let who = world.body_id(body.id);
+            // The draw is a word of 32 bits, shown as a number below 1.
+            let draw = f64::from(place.key.1) / 4_294_967_296.0;
             let draw = match world.policy {
                 ConflictPolicy::Fixed => FactValue::None,
                 _ => FactValue::number(draw, ""),
             };
             table.push_row([FactValue::count(k + 1), who.into(), draw]);
-            let boxes = world.type_of(cell.id).boxes(world.map_position(cell.position()));
+            let boxes = world.type_of(body.id).boxes(world.map_position(body.position()));
             let corners_m = world.corners_m(boxes);
             let label = format!("{}. {who}", k + 1);
             self.inspection.add_mark(view::MarkRole::Group, label, MarkShape::Area { corners_m });
@@ -199,13 +204,17 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 impl RobotsWorld {
     /// Returns the corners of a rectangle of boxes.
     fn corners_m(&self, Rect { col, row, width, height }: Rect) -> Vec<view::Vec3> {
-        let corner = |x: u32, y: u32| {
-            let side_m = self.map.box_size_m;
-            let [x_m, y_m] =
-                self.map.plane.transform_point([f64::from(x) * side_m, f64::from(y) * side_m]);
-            [x_m, y_m, 0.0]
-        };
-        let (east, north) = (col + width, row + height);
-        vec![corner(col, row), corner(east, row), corner(east, north), corner(col, north)]
+        let east = col + width;
+        let north = row + height;
+        let corners = [(col, row), (east, row), (east, north), (col, north)];
+        corners.map(|(col, row)| self.corner_m(col, row)).to_vec()
+    }
+
+    /// Returns the lower-left corner of a box.
+    fn corner_m(&self, col: u32, row: u32) -> view::Vec3 {
+        let side_m = self.map.box_size_m;
+        let [x_m, y_m] =
+            self.map.plane.transform_point([f64::from(col) * side_m, f64::from(row) * side_m]);
+        [x_m, y_m, 0.0]
     }
 }

@@ -1,4 +1,5 @@
-//! *Join*: groups of bodies with claims that meet, and the order in which a group's bodies act.
+//! *Join*, the paper's detection of conflicts: groups of bodies with claims that meet, and the order in which a
+//! group's bodies act.
 
 use super::Scratch;
 use super::cycle_context::{CycleContext, box_index};
@@ -17,9 +18,31 @@ use sidestep_kernel::space::BoxWord;
 /// A body's place in the order of its group.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GroupMember {
+    /// The body with the smaller key acts earlier, see [`CycleContext::priority`].
     pub(super) key: (u8, u32, u32),
     pub(super) slot: Slot,
+    /// The draw of its action's outcome.
     pub(super) word: u32,
+}
+
+/// Joins one body with those that it meets in boxes.
+struct NeighborJoiner<'a> {
+    slot: Slot,
+    last_met: Slot,
+    groups: &'a ConflictGroups,
+}
+
+impl NeighborJoiner<'_> {
+    /// Joins the body with the one that stands in a box of the floor or claims it. The same neighbor is
+    /// mostly met in several boxes one after the other, and joining it once is enough.
+    #[inline(always)]
+    fn meet<T: BoxWord>(&mut self, word: T) {
+        let other = word.slot();
+        if other != self.slot && other != self.last_met {
+            self.last_met = other;
+            self.groups.join(self.slot, other);
+        }
+    }
 }
 
 impl<T: BoxWord> CycleContext<'_, T> {
@@ -27,75 +50,79 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// it may come to cover, because they stand there or may come there too.
     #[inline]
     pub(super) fn join(&self, slot: Slot, groups: &ConflictGroups) {
-        let cell = self.cell(slot);
-        let intent = cell.intent.get();
+        let body = self.body(slot);
+        let intent = body.intent.get();
         if intent.is_idle() {
             return;
         }
-        if self.world.has_asks {
-            self.deliver_request(cell);
+        if self.world.has_requests {
+            self.deliver_request(body);
         }
-        // The same neighbor is often met in several boxes; joining it once is enough.
-        let mut last_met = slot;
-        let mut meet = |word: T| {
-            let other = word.slot();
-            if other != slot && other != last_met {
-                last_met = other;
-                groups.join(slot, other);
-            }
-        };
+        let mut joiner = NeighborJoiner { slot, last_met: slot, groups };
         if !intent.is_clear() {
-            return self.for_each_claimed(slot, |_, word| meet(word));
+            return self.for_each_claimed(slot, |_, word| joiner.meet(word));
         }
-        let base = self.base(cell);
-        let boxes = &*self.type_of(cell).actions[usize::from(cell.action.get())].claims;
-        boxes.iter().for_each(|&offset| meet(self.floor.get(box_index(base, offset))));
+        // All boxes were free when the body claimed them, so that no wall cuts the tree of its steps, and
+        // the flat list of boxes is enough.
+        let base = self.base(body);
+        let boxes = &*self.type_of(body).actions[usize::from(body.action.get())].claims;
+        boxes.iter().for_each(|&offset| joiner.meet(self.floor.get(box_index(base, offset))));
     }
 
-    /// Hands a robot's request to the first body in its direction, if that is a robot that takes
-    /// part. Bodies stand still in this phase, so it is the same one in every order.
-    fn deliver_request(&self, cell: &BodyState) {
-        let body = self.type_of(cell);
-        if !has_requests(body) {
+    /// Hands a robot's request to the first bodies in its direction, where these are robots that take
+    /// part. Bodies stand still in this phase, so they are the same ones in every order.
+    fn deliver_request(&self, body: &BodyState) {
+        let ty = self.type_of(body);
+        if !has_requests(ty) {
             return;
         }
-        let Some((direction, word)) = own_request(cell.memory[OWN_REQUEST_WORD].get()) else {
+        let Some((direction, word)) = own_request(body.memory[OWN_REQUEST_WORD].get()) else {
             return;
         };
-        let forward = &body.actions[usize::from(body.action_index(direction, FORWARD))];
+        let forward = &ty.actions[usize::from(ty.action_index(direction, FORWARD))];
+        // The intended transition comes first; an effector may have none that moves.
         let Some(step) = forward.walks.first().and_then(|walk| walk.steps.first()) else { return };
-        let base = self.base(cell);
+        let base = self.base(body);
+        let one_box = step.delta.1 * self.world.stride as i32 + step.delta.0;
         for k in 0..MAX_REQUEST_BOXES {
-            let far = k * (step.delta.1 * self.world.stride as i32 + step.delta.0);
-            let words =
-                step.enter.iter().map(|&offset| self.floor.get(box_index(base, offset + far)));
-            // The bodies that stand there are asked, and none behind them.
-            let mut taken = words.filter(|word| !word.is_free()).peekable();
-            let is_taken = taken.peek().is_some();
-            for other in taken.filter(|&word| word != T::WALL).map(|word| self.cell(word.slot())) {
-                if has_requests(self.type_of(other)) {
-                    other.memory[HEARD_REQUEST_WORD].raise_to(word);
+            let mut is_taken = false;
+            for &offset in &step.enter {
+                let occupant = self.floor.get(box_index(base, offset + k * one_box));
+                if occupant.is_free() {
+                    continue;
+                }
+                is_taken = true;
+                if occupant != T::WALL {
+                    self.hear_request(occupant.slot(), word);
                 }
             }
+            // Bodies behind those that stand in the way are not asked.
             if is_taken {
                 return;
             }
         }
     }
 
+    /// Hands a request to the body in a slot, if that takes part; of several it keeps the greatest word,
+    /// in whatever order workers deliver them.
+    fn hear_request(&self, slot: Slot, word: u32) {
+        let body = self.body(slot);
+        if has_requests(self.type_of(body)) {
+            body.memory[HEARD_REQUEST_WORD].raise_to(word);
+        }
+    }
+
     /// Fills `scratch.order` with a group in its order of acting, each body with the draw of its
-    /// action's outcome (drawn together with the priority).
+    /// action's outcome, because one block of the stream holds that and the priority.
     pub(super) fn order(&self, group: &[Slot], scratch: &mut Scratch) {
-        let first = match self.world.policy {
-            ConflictPolicy::RightOfWay => self.first_heading(group),
-            _ => 0,
-        };
+        let has_right_of_way = self.world.policy == ConflictPolicy::RightOfWay;
+        let first_heading = if has_right_of_way { self.first_heading(group) } else { 0 };
         let order = &mut scratch.order;
         order.clear();
         order.extend(group.iter().map(|&slot| {
-            let cell = self.cell(slot);
-            let [word, draw] = self.act_words(cell.id);
-            GroupMember { key: self.priority(cell, draw, first), slot, word }
+            let body = self.body(slot);
+            let [word, draw] = self.act_words(body.id);
+            GroupMember { key: self.priority(body, draw, first_heading), slot, word }
         }));
         order.sort_unstable_by_key(|place| place.key);
     }
@@ -103,16 +130,16 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Returns the key by which the smaller acts earlier: rank by the policy, fair draw, id. It is
     /// unique per body because the id is part of it.
     #[inline]
-    fn priority(&self, cell: &BodyState, draw: u32, first_heading: u8) -> (u8, u32, u32) {
-        let id = cell.id;
+    fn priority(&self, body: &BodyState, draw: u32, first_heading: u8) -> (u8, u32, u32) {
+        let id = body.id;
         match self.world.policy {
             ConflictPolicy::Fixed => (0, 0, id),
             ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw, id),
             ConflictPolicy::ByKind => {
-                (self.world.kind_rank[usize::from(self.type_of(cell).kind)], draw, id)
+                (self.world.kind_rank[usize::from(self.type_of(body).kind)], draw, id)
             }
             ConflictPolicy::RightOfWay => {
-                let rank = match self.heading_of(cell) {
+                let rank = match self.heading_of(body) {
                     // Each heading yields to the one a quarter to its left.
                     Some(heading) => 1 + (4 + first_heading - heading) % 4,
                     None => 0,
@@ -123,9 +150,9 @@ impl<T: BoxWord> CycleContext<'_, T> {
     }
 
     /// Returns the heading of a body; none for doors, which have no heading and go first.
-    fn heading_of(&self, cell: &BodyState) -> Option<u8> {
-        let is_door = matches!(self.type_of(cell).role, Role::Door(_));
-        (!is_door).then(|| cell.facing.get().heading())
+    fn heading_of(&self, body: &BodyState) -> Option<u8> {
+        let is_door = matches!(self.type_of(body).role, Role::Door(_));
+        (!is_door).then(|| body.facing.get().heading())
     }
 
     /// Returns the heading that goes first. A body with heading `h` sees on its right those with
@@ -134,21 +161,21 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// group, by its smallest id, because groups have nothing to do with each other.
     fn first_heading(&self, group: &[Slot]) -> u8 {
         let mut present = [false; 4];
-        for heading in group.iter().filter_map(|&slot| self.heading_of(self.cell(slot))) {
+        for heading in group.iter().filter_map(|&slot| self.heading_of(self.body(slot))) {
             present[usize::from(heading)] = true;
         }
-        let first_id = group.iter().map(|&slot| self.cell(slot).id).min().unwrap_or(0);
+        let first_id = group.iter().map(|&slot| self.body(slot).id).min().unwrap_or(0);
         let words = self.world.streams.block(first_id, self.now, purpose::RIGHT_OF_WAY, 0);
         let draw = (words[0] >> 30) as usize;
-        let candidates = (0..4).map(|k| (draw + k) % 4);
-        let begins = |h: &usize| present[*h] && !present[(h + 1) % 4];
-        candidates.clone().find(begins).unwrap_or(draw) as u8
+        let mut from_draw = (0..4).map(|k| (draw + k) % 4);
+        let first = from_draw.find(|&heading| present[heading] && !present[(heading + 1) % 4]);
+        first.unwrap_or(draw) as u8
     }
 }
 
 /// Returns whether a body is a robot that takes part in requests.
-fn has_requests(body: &BodyType) -> bool {
-    matches!(&body.role, Role::Robot(model) if model.behaviour.has_requests())
+fn has_requests(ty: &BodyType) -> bool {
+    matches!(&ty.role, Role::Robot(model) if model.behaviour.has_requests())
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ mod cycle_context;
 pub mod decide;
 pub mod exact;
 mod external;
+mod facts;
 mod inspect;
 mod join;
 mod metric_info;
@@ -42,7 +43,7 @@ pub mod world;
 pub mod world_impl;
 mod world_type;
 
-use cycle_context::with_scene;
+use cycle_context::with_cycle;
 use effector::Side;
 pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
@@ -130,8 +131,11 @@ pub struct Scratch {
     /// The rows of the readings that a sensor's beams truly have.
     truths: Vec<alias_table::RowIndex>,
     heard: Vec<decide::ReceivedMessage>,
+    /// A conflict group in its order of acting.
     order: Vec<join::GroupMember>,
+    /// This worker's bids of a round.
     bids: Vec<auction::Bid>,
+    /// The kinds of rows that are wanted, see `Collector::prepare`.
     keep_events: bool,
     keep_readings: bool,
     keep_motions: bool,
@@ -159,31 +163,33 @@ impl Phases for RobotsWorld {
     }
 
     #[inline]
-    fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
-        with_scene!(turn.world, turn.state, turn.now, |scene| {
-            bodies.for_each(|slot| scene.perceive(slot as Slot, turn.scratch));
+    fn claim(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
+        with_cycle!(phase.world, phase.state, phase.now, |cycle| {
+            bodies.for_each(|slot| cycle.perceive(slot as Slot, phase.scratch));
         });
     }
 
     #[inline]
-    fn join(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
-        with_scene!(turn.world, turn.state, turn.now, |scene| {
-            bodies.for_each(|slot| scene.join(slot as Slot, groups));
+    fn join(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
+        with_cycle!(phase.world, phase.state, phase.now, |cycle| {
+            bodies.for_each(|slot| cycle.join(slot as Slot, groups));
         });
     }
 
     #[inline]
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
-        with_scene!(turn.world, turn.state, turn.now, |scene| {
+    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+        with_cycle!(phase.world, phase.state, phase.now, |cycle| {
+            // Most groups are one body, which needs no order.
             if let [alone] = *group {
-                return scene.act_with_draw(alone, turn.scratch);
+                return cycle.act_with_draw(alone, phase.scratch);
             }
-            scene.order(group, turn.scratch);
-            let order = std::mem::take(&mut turn.scratch.order);
-            for place in &order {
-                scene.act(place.slot, place.word, turn.scratch);
+            cycle.order(group, phase.scratch);
+            // Taken out, because acting borrows the whole scratch.
+            let order = std::mem::take(&mut phase.scratch.order);
+            for member in &order {
+                cycle.act(member.slot, member.word, phase.scratch);
             }
-            turn.scratch.order = order;
+            phase.scratch.order = order;
         });
     }
 

@@ -5,59 +5,69 @@ use super::world::RobotsWorld;
 use serde::Serialize;
 use sidestep_kernel::{Cycle, EntityId, GroupSizes, Run};
 use sidestep_map::Cell;
+use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
-/// Counters of one robot, or their sums over all robots.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Counters {
-    /// Number of actions started.
-    pub actions: u64,
-    /// Number of contacts in total.
-    pub contacts: u64,
-    /// Number of contacts by the kind touched; 0 for kinds that were never touched.
-    pub contacts_by_kind: BTreeMap<String, u64>,
-    /// Distance traveled, in meters.
-    pub distance_m: f64,
-    /// Number of trips completed.
-    pub trips: u64,
-    /// Mean number of cycles per completed trip; absent without trips.
-    pub trip_cycles_mean: Option<f64>,
-    /// Number of boxes that no robot had covered before.
-    pub first_visits: u64,
+metrics! {
+    /// Counters of one robot, or their sums over all robots.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize)]
+    pub struct Counters {
+        /// Actions started, of all robots.
+        pub actions: u64 => "actions",
+        /// Contacts.
+        pub contacts: u64 => "contacts",
+        /// Contacts by the kind touched; 0 for kinds never touched.
+        pub contacts_by_kind.*: BTreeMap<String, u64> => "contacts with *",
+        /// Way of all robots together. In meters.
+        pub distance_m: f64 => "way of all robots",
+        /// Trips completed.
+        pub trips: u64 => "trips completed",
+        /// Mean length of a completed trip; none without trips.
+        pub trip_cycles_mean: Option<f64> => "mean length of a trip" ("cycles"),
+        /// Boxes that no robot had covered before.
+        pub first_visits: u64 => "boxes covered for the first time",
+    }
 }
 
-/// Metrics of a run so far.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Metrics {
-    /// Sums over all robots.
-    #[serde(flatten)]
-    pub total: Counters,
-    /// Share of the free boxes that have been covered by a robot.
-    pub coverage: f64,
-    /// Share of actions that ended in a contact.
-    pub contacts_per_action: f64,
-    /// Number of conflict groups with 1, 2-3, 4-7, ... bodies, over all cycles.
-    pub group_sizes: Vec<u64>,
-    /// Number of bodies of the largest conflict group; 0 where no two bodies ever met.
-    pub largest_group: u64,
+metrics! {
+    /// Metrics of a run so far.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct Metrics {
+        /// Sums over all robots.
+        #[serde(flatten)]
+        pub total: Counters,
+        /// Share of the free boxes that a robot has covered, 0 to 1. Boxes that robots stand in at the start count.
+        pub coverage: f64 => "share of the floor covered",
+        /// Share of actions that ended in a contact, 0 to 1.
+        pub contacts_per_action: f64 => "contacts per action",
+        /// Conflict groups of 1, 2-3, 4-7, ... bodies, over all cycles.
+        pub group_sizes: Vec<u64> => "conflict groups by size",
+        /// Bodies of the largest conflict group; 0 where no two ever met.
+        pub largest_group: u64 => "largest conflict group" ("bodies"),
+    }
 }
 
 impl RobotsWorld {
     /// Returns the counters of a robot after `cycle` cycles.
     pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counters {
-        let (i, kinds) = (id as usize, self.kinds.len());
-        let cell = state.body(id);
-        let by_kind = (0..kinds).map(|k| u64::from(state.contacts.get(i * kinds + k)));
-        let named = self.kinds.iter().cloned().zip(by_kind.clone());
-        let trips = u64::from(cell.trips.get());
+        let first_contact = id as usize * self.kinds.len();
+        let mut contacts = 0;
+        let mut contacts_by_kind = BTreeMap::new();
+        for (kind, name) in self.kinds.iter().enumerate() {
+            let count = u64::from(state.contacts.get(first_contact + kind));
+            contacts += count;
+            contacts_by_kind.insert(name.clone(), count);
+        }
+        let body = state.body(id);
+        let trips = u64::from(body.trips.get());
         Counters {
-            actions: self.bodies[i].actions_before(cycle),
-            contacts: by_kind.sum(),
-            contacts_by_kind: named.collect(),
-            distance_m: f64::from(cell.moves.get()) * self.map.box_size_m,
+            actions: self.bodies[id as usize].actions_before(cycle),
+            contacts,
+            contacts_by_kind,
+            distance_m: f64::from(body.moves.get()) * self.map.box_size_m,
             trips,
-            trip_cycles_mean: (trips > 0).then(|| cell.trip_cycles.get() as f64 / trips as f64),
-            first_visits: u64::from(cell.first_visits.get()),
+            trip_cycles_mean: (trips > 0).then(|| body.trip_cycles.get() as f64 / trips as f64),
+            first_visits: u64::from(body.first_visits.get()),
         }
     }
 
@@ -77,6 +87,7 @@ impl RobotsWorld {
                 *total.contacts_by_kind.entry(kind).or_default() += n;
             }
         }
+        // Over all trips, and not over the robots' means, which would count a slow robot's trips more.
         total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
         total
     }
@@ -85,6 +96,7 @@ impl RobotsWorld {
     pub fn metrics(&self, state: &RobotsState, cycle: Cycle, groups: &GroupSizes) -> Metrics {
         let total = self.totals(state, cycle);
         let free = self.map.count(Cell::Free).max(1);
+        // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
             coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
@@ -97,8 +109,7 @@ impl RobotsWorld {
 
     /// Returns the number of boxes under robots at the start, which do not count as first visits.
     fn boxes_covered_at_start(&self) -> u64 {
-        let boxes = |&id: &EntityId| self.type_of(id).own.len() as u64;
-        self.robots.iter().map(boxes).sum()
+        self.robots.iter().map(|&id| self.type_of(id).own.len() as u64).sum()
     }
 }
 

@@ -1,4 +1,4 @@
-//! The poses that robots' wheels claim.
+//! Dead reckoning: the poses that robots' wheels report.
 
 use super::MotionSample;
 use super::effector::Transition;
@@ -6,9 +6,9 @@ use super::world::{RobotsWorld, Role};
 use sidestep_kernel::view::Pose;
 use std::f64::consts::FRAC_PI_2;
 
-/// The pose that the wheels of a robot claim, in the frame in which it was when they began to count: every
+/// The pose that the wheels of a robot report, in the frame in which it was when they began to count: every
 /// action as it was intended, slips unnoticed. An action that an obstacle cuts short stalls the wheels, so that
-/// they claim the motion that was made.
+/// they report the motion that was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct DeadReckoning {
     /// Boxes along the axes of that frame.
@@ -22,9 +22,10 @@ impl DeadReckoning {
     pub(super) fn add(&mut self, world: &RobotsWorld, sample: &MotionSample) {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return };
         let intended = &model.body.effector.transitions[usize::from(sample.action)][0];
-        let (ahead, left, turn) = match sample.contact {
-            true => (sample.ahead, sample.left, sample.quarter_turns),
-            false => motion(intended),
+        let (ahead, left, turn) = if sample.contact {
+            (sample.ahead, sample.left, sample.quarter_turns)
+        } else {
+            motion(intended)
         };
         let [dx, dy] = match self.facing {
             0 => [ahead, left],
@@ -36,7 +37,7 @@ impl DeadReckoning {
         self.facing = (self.facing + turn) % 4;
     }
 
-    /// Returns the pose in meters; `turns` are those of the headings.
+    /// Returns the pose in meters; `turns` are those of [`Self::heading_orientations`], computed once for many robots.
     pub(super) fn pose(&self, box_m: f64, turns: &[[f64; 4]; 4]) -> Pose {
         let [x_m, y_m] = self.at_boxes.map(|boxes| boxes as f64 * box_m);
         Pose { at_m: [x_m, y_m, 0.0], turn: turns[usize::from(self.facing)] }
@@ -50,7 +51,8 @@ impl DeadReckoning {
 
 /// Returns the boxes ahead and to the left and the quarter turns of a transition.
 fn motion(transition: &Transition) -> (i32, i32, u8) {
-    let (mut ahead, mut left) = (0, 0);
+    let mut ahead = 0;
+    let mut left = 0;
     for side in &transition.path {
         side.add_to(&mut ahead, &mut left);
     }

@@ -1,4 +1,5 @@
-//! *Claim*: bodies that are due perceive the frozen state, decide, and claim.
+//! *Claim*, the paper's first pool: bodies that are due perceive the frozen state, decide, and claim the boxes
+//! that they may come to cover.
 
 use super::action::SweptVolume;
 use super::alias_table::RowIndex;
@@ -16,38 +17,42 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
     #[inline]
     pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
-        let (world, cell) = (self.world, self.cell(slot));
+        let world = self.world;
+        let body = self.body(slot);
         if let Some(frames) = &self.state.frames {
-            let index = (self.now - frames.first) as usize * frames.bodies + cell.id as usize;
-            frames.poses.set(index, PackedPose::new(cell.position(), cell.facing.get()));
+            let index = (self.now - frames.first) as usize * frames.bodies + body.id as usize;
+            frames.poses.set(index, PackedPose::new(body.position(), body.facing.get()));
         }
-        let is_due = cell.period == 1 || world.bodies[cell.id as usize].is_due(self.now);
+        // Most bodies act in every cycle, and their constant part need not be read.
+        let is_due = body.period == 1 || world.bodies[body.id as usize].is_due(self.now);
         if !is_due && world.radio.is_some() {
-            self.state.voices.record(cell.id, self.now, None);
+            // The word of a robot that does not decide goes on to the page that is read next.
+            self.state.voices.record(body.id, self.now, None);
         }
-        let intent = match &self.type_of(cell).role {
+        let intent = match &self.type_of(body).role {
             _ if !is_due => Intent::IDLE,
             Role::Robot(model) => self.decide_robot(model, slot, scratch),
-            Role::Mover(mover) => self.mover_intent(mover, cell),
-            Role::Door(door) => self.door_intent(door, cell),
+            Role::Mover(mover) => self.mover_intent(mover, body),
+            Role::Door(door) => self.door_intent(door, body),
         };
         let is_clear = !intent.is_idle() && self.claim(slot, intent);
-        cell.intent.set(if is_clear { intent.with_clear() } else { intent });
+        body.intent.set(if is_clear { intent.with_clear() } else { intent });
     }
 
     #[inline]
     fn decide_robot(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let (decision, memory) = self.decision(model, slot, scratch);
-        store_memory(cell, memory);
-        self.record_decision(cell, decision);
-        let known = usize::from(decision.action) < model.body.effector.actions.len();
-        debug_assert!(known, "behaviors choose among the effector's actions");
-        if known { Intent::from_action(decision.action) } else { Intent::IDLE }
+        store_memory(body, memory);
+        self.record_decision(body, decision);
+        // Behaviors may be a user's own.
+        let is_known = usize::from(decision.action) < model.body.effector.actions.len();
+        debug_assert!(is_known, "behaviors choose among the effector's actions");
+        if is_known { Intent::from_action(decision.action) } else { Intent::IDLE }
     }
 
-    /// Returns a robot's decision, and its memory after that; its readings and the words that it
-    /// hears are in the scratch.
+    /// Returns a robot's decision, and its memory after that, which is not stored yet; its readings and the
+    /// words that it hears are in the scratch.
     #[inline(always)]
     pub(super) fn decision(
         &self,
@@ -55,21 +60,21 @@ impl<T: BoxWord> CycleContext<'_, T> {
         slot: Slot,
         scratch: &mut Scratch,
     ) -> (Decision, Memory) {
-        let cell = self.cell(slot);
+        let body = self.body(slot);
         let nearest = self.fill_percept(model, slot, scratch);
         let percept = Percept {
             now: self.now,
-            id: cell.id,
+            id: body.id,
             readings: &scratch.readings,
             sectors: &model.body.sectors,
             nearest_in: nearest,
-            contact: cell.contact.get().get(),
-            at: self.world.map_position(cell.position()),
-            heading: cell.facing.get().heading(),
+            contact: body.contact.get().get(),
+            at: self.world.map_position(body.position()),
+            heading: body.facing.get().heading(),
             heard: &scratch.heard,
         };
-        let mut memory = memory_of(cell);
-        let mut draws = self.world.streams.draws(cell.id, self.now, purpose::DECIDE);
+        let mut memory = memory_of(body);
+        let mut draws = self.world.streams.draws(body.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         (decision, memory)
     }
@@ -84,7 +89,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
             scratch.readings.clear();
             return [UNSEEN; 4];
         }
-        let nearest = self.sense(model, self.cell(slot), scratch);
+        let nearest = self.sense(model, self.body(slot), scratch);
         if let Some(radio) = &self.world.radio {
             self.listen(radio, slot, &mut scratch.heard);
         }
@@ -93,17 +98,17 @@ impl<T: BoxWord> CycleContext<'_, T> {
 
     /// Records the parts of a decision beside the action: trips and broadcasts.
     #[inline]
-    fn record_decision(&self, cell: &BodyState, decision: Decision) {
+    fn record_decision(&self, body: &BodyState, decision: Decision) {
         let now = self.now;
         if let Some(trip) = decision.trip {
             if trip == TripEvent::Completed {
-                cell.trips.set(cell.trips.get() + 1);
-                cell.trip_cycles.set(cell.trip_cycles.get() + now - cell.trip_begun.get());
+                body.trips.set(body.trips.get() + 1);
+                body.trip_cycles.set(body.trip_cycles.get() + now - body.trip_begun.get());
             }
-            cell.trip_begun.set(now);
+            body.trip_begun.set(now);
         }
         if self.world.radio.is_some() {
-            self.state.voices.record(cell.id, now, decision.broadcast);
+            self.state.voices.record(body.id, now, decision.broadcast);
         }
     }
 
@@ -113,24 +118,31 @@ impl<T: BoxWord> CycleContext<'_, T> {
     pub(super) fn sense(
         &self,
         model: &RobotModel,
-        cell: &BodyState,
+        body: &BodyState,
         scratch: &mut Scratch,
     ) -> [u8; 4] {
-        let id = cell.id;
+        let id = body.id;
         let Scratch { readings, truths, .. } = scratch;
         readings.resize(model.body.sectors.len(), Reading::default());
         let mut nearest = [UNSEEN; 4];
         let mut first = 0;
-        for (s, sensor) in model.body.sensors.iter().enumerate() {
+        for (number, sensor) in model.body.sensors.iter().enumerate() {
             let beams = first..first + sensor.ends.len();
             first = beams.end;
-            let (readings, sectors) = (&mut readings[beams.clone()], &model.body.sectors[beams]);
-            cast_beams(self, sensor, cell, truths);
-            let words = |block| self.world.streams.block(id, self.now, purpose::sense(s), block);
-            sample_reports(sensor, truths, words, readings.iter_mut().zip(sectors), &mut nearest);
+            let readings = &mut readings[beams.clone()];
+            let sectors = &model.body.sectors[beams];
+            cast_beams(self, sensor, body, truths);
+            sample_reports(
+                sensor,
+                truths,
+                |block| self.world.streams.block(id, self.now, purpose::sense(number), block),
+                readings.iter_mut().zip(sectors),
+                &mut nearest,
+            );
             if scratch.keep_readings {
                 let samples = truths.iter().zip(&*readings).map(|(&row, &reported)| {
-                    let (truth, sensor) = (sensor.table.truth(row), s as u16);
+                    let truth = sensor.table.truth(row);
+                    let sensor = number as u16;
                     SensorSample { cycle: self.now, robot: id, sensor, truth, reported }
                 });
                 scratch.sensor_samples.extend(samples);
@@ -143,52 +155,61 @@ impl<T: BoxWord> CycleContext<'_, T> {
     pub(super) fn beam_hits(
         &self,
         sensor: &MountedSensor,
-        cell: &BodyState,
+        body: &BodyState,
     ) -> Vec<Option<(T, f64)>> {
-        let base = self.base(cell);
-        let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
-        let mut from = 0;
-        let beam = |&end: &u16| {
-            let span = from..usize::from(end);
-            from = usize::from(end);
-            let mut all =
-                boxes[span.clone()].iter().zip(&sensor.distances[span]).flat_map(|(four, far)| {
-                    four.offsets.iter().map(|&o| self.floor.get(box_index(base, o))).zip(*far)
-                });
-            all.find(|(word, _)| !word.is_free())
-        };
-        sensor.ends.iter().map(beam).collect()
+        let base = self.base(body);
+        let boxes = &*sensor.boxes[usize::from(body.facing.get().heading())];
+        let mut hits = Vec::with_capacity(sensor.ends.len());
+        let mut first = 0;
+        for &end in &sensor.ends {
+            let beam = first..usize::from(end);
+            first = beam.end;
+            let chunks = boxes[beam.clone()].iter().zip(&sensor.distances[beam]);
+            let mut on_beam = chunks.flat_map(|(chunk, distances)| {
+                let words = chunk.offsets.iter().map(|&o| self.floor.get(box_index(base, o)));
+                words.zip(*distances)
+            });
+            hits.push(on_beam.find(|(word, _)| !word.is_free()));
+        }
+        hits
     }
 
     /// Returns the intent of a mover: people and the like continue as before or draw a new
     /// direction.
-    fn mover_intent(&self, mover: &Mover, cell: &BodyState) -> Intent {
-        let words = self.world.streams.block(cell.id, self.now, purpose::MOVE, 0);
+    fn mover_intent(&self, mover: &Mover, body: &BodyState) -> Intent {
+        let words = self.world.streams.block(body.id, self.now, purpose::MOVE, 0);
         if !mover.straight.sample(words[0]) {
-            cell.facing.set(Facing::from_heading((words[1] >> 30) as u8));
+            body.facing.set(Facing::from_heading((words[1] >> 30) as u8));
         }
         Intent::ONLY_ACTION
     }
 
     /// Returns the intent of a door: it tries to toggle when its schedule says so. A closing that
     /// a body blocks waits.
-    fn door_intent(&self, door: &Door, cell: &BodyState) -> Intent {
-        let is_open = cell.facing.get().is_open();
-        let draw = || self.world.streams.block(cell.id, self.now, purpose::DOOR, 0)[0];
-        let wants_open = door.wants_open(is_open, self.now, draw);
+    fn door_intent(&self, door: &Door, body: &BodyState) -> Intent {
+        let is_open = body.facing.get().is_open();
+        let wants_open = door.wants_open(is_open, self.now, || {
+            self.world.streams.block(body.id, self.now, purpose::DOOR, 0)[0]
+        });
         if wants_open == is_open { Intent::IDLE } else { Intent::ONLY_ACTION }
     }
 
     /// Claims every free box that the body may come to cover, and returns whether all of them are
     /// free.
+    ///
+    /// Of several bodies that claim a box at once one stays written in it; each of the others meets that one
+    /// there when it joins, so that all are in one group.
     #[inline]
     fn claim(&self, slot: Slot, intent: Intent) -> bool {
-        let (floor, cell, claim) = (self.floor, self.cell(slot), T::claimed(slot));
-        let (base, body) = (self.base(cell), self.type_of(cell));
-        if !body.actions.is_empty() {
-            let action = body.action_index(cell.facing.get().heading(), intent.number());
-            cell.action.set(action);
-            let boxes = &*body.actions[usize::from(action)].claims;
+        let floor = self.floor;
+        let body = self.body(slot);
+        let claim = T::claimed(slot);
+        let base = self.base(body);
+        let ty = self.type_of(body);
+        if !ty.actions.is_empty() {
+            let action = ty.action_index(body.facing.get().heading(), intent.number());
+            body.action.set(action);
+            let boxes = &*ty.actions[usize::from(action)].claims;
             if are_free(floor, base, boxes) {
                 boxes.iter().for_each(|&offset| floor.set(box_index(base, offset), claim));
                 return true;
@@ -206,11 +227,13 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// content of the box: boxes outside the body, or a door's own boxes. The body must not be
     /// idle.
     pub(super) fn for_each_claimed(&self, slot: Slot, mut each: impl FnMut(usize, T)) {
-        let (floor, cell) = (self.floor, self.cell(slot));
-        let (base, body) = (self.base(cell), self.type_of(cell));
-        match body.actions.get(usize::from(cell.action.get())) {
+        let floor = self.floor;
+        let body = self.body(slot);
+        let base = self.base(body);
+        let ty = self.type_of(body);
+        match ty.actions.get(usize::from(body.action.get())) {
             Some(action) => for_each_swept(floor, &action.sweep, base, each),
-            None => body.own.iter().for_each(|&offset| {
+            None => ty.own.iter().for_each(|&offset| {
                 let index = box_index(base, offset);
                 each(index, floor.get(index));
             }),
@@ -220,13 +243,16 @@ impl<T: BoxWord> CycleContext<'_, T> {
     /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
     /// Robots that have said nothing yet are left out.
     pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<ReceivedMessage>) {
-        let (world, state, id) = (self.world, self.state, self.cell(slot).id);
+        let world = self.world;
+        let state = self.state;
+        let id = self.body(slot).id;
         for &sender in &world.robots {
             let other = state.slot_of_id[sender as usize];
             if other == slot || !self.in_radio_range(radio, slot, other) {
                 continue;
             }
             let Some(word) = state.voices.last_broadcast(sender, self.now) else { continue };
+            // Drawn per pair, because each listener loses a word or not by itself.
             let draws = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
             if !radio.loss.sample(draws[0]) {
                 heard.push(ReceivedMessage { sender, word });
@@ -235,18 +261,18 @@ impl<T: BoxWord> CycleContext<'_, T> {
     }
 
     fn in_radio_range(&self, radio: &Radio, a: Slot, b: Slot) -> bool {
-        // Twice the distance between centers, because then all numbers are integers.
-        let center = |slot: Slot| {
-            let cell = self.cell(slot);
-            let (at, size) = (cell.position(), self.type_of(cell).size);
-            (
-                2 * i64::from(at.col()) + i64::from(size.0),
-                2 * i64::from(at.row()) + i64::from(size.1),
-            )
-        };
-        let (a, b) = (center(a), center(b));
-        let (dx, dy) = (a.0 - b.0, a.1 - b.1);
+        let (a_x, a_y) = self.center_half_boxes(a);
+        let (b_x, b_y) = self.center_half_boxes(b);
+        let (dx, dy) = (a_x - b_x, a_y - b_y);
         ((dx * dx + dy * dy) as u64) <= radio.reach2_half_boxes
+    }
+
+    /// Returns the center of a body in halves of a box, which are whole numbers for every size.
+    fn center_half_boxes(&self, slot: Slot) -> (i64, i64) {
+        let body = self.body(slot);
+        let at = body.position();
+        let (width, height) = self.type_of(body).size;
+        (2 * i64::from(at.col()) + i64::from(width), 2 * i64::from(at.row()) + i64::from(height))
     }
 }
 
@@ -260,33 +286,35 @@ fn for_each_swept<T: BoxWord>(
 ) {
     let mut node = 0;
     while let Some(step) = sweep.nodes.get(node) {
-        let mut walled = false;
+        let mut is_walled = false;
         for &offset in &sweep.boxes[step.first as usize..step.end as usize] {
             let index = box_index(base, offset);
             let word = floor.get(index);
             if word == T::WALL {
-                walled = true;
+                is_walled = true;
             } else {
                 each(index, word);
             }
         }
-        node = if walled { step.after as usize } else { node + 1 };
+        node = if is_walled { step.after as usize } else { node + 1 };
     }
 }
 
 /// Writes the row of each beam's true reading.
 ///
-/// This and [`report`] are two small loops, each in a function of its own, because together they
+/// This and [`sample_reports`] are two small loops, each in a function of its own, because together they
 /// would run out of registers.
 #[inline(never)]
 fn cast_beams<T: BoxWord>(
-    scene: &CycleContext<'_, T>,
+    cycle: &CycleContext<'_, T>,
     sensor: &MountedSensor,
-    cell: &BodyState,
+    body: &BodyState,
     truths: &mut Vec<RowIndex>,
 ) {
-    let (floor, state, base) = (scene.floor, scene.state, scene.base(cell));
-    let boxes = &*sensor.boxes[usize::from(cell.facing.get().heading())];
+    let floor = cycle.floor;
+    let state = cycle.state;
+    let base = cycle.base(body);
+    let boxes = &*sensor.boxes[usize::from(body.facing.get().heading())];
     truths.clear();
     let mut from = 0;
     truths.extend(sensor.ends.iter().map(|&end| {
@@ -302,20 +330,20 @@ fn cast_beams<T: BoxWord>(
 /// Returns the first box along a beam that holds something: its content and distance class.
 #[inline]
 fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[BeamBoxes]) -> Option<(T, u8)> {
-    let look = |offset: i32| floor.get(box_index(base, offset));
-    for BeamBoxes { offsets: [a, b, c, d], classes } in beam {
-        let four = [look(*a), look(*b), look(*c), look(*d)];
-        let [a, b, c, d] = four;
+    for BeamBoxes { offsets, classes } in beam {
+        let words = offsets.map(|offset| floor.get(box_index(base, offset)));
+        let [a, b, c, d] = words;
+        // Free is the highest bit of a word, so one branch answers for all four boxes.
         if !(a & b & c & d).is_free() {
-            let first = four.iter().position(|word| !word.is_free())?;
-            return Some((four[first], classes[first]));
+            let first = words.iter().position(|word| !word.is_free())?;
+            return Some((words[first], classes[first]));
         }
     }
     None
 }
 
-/// Draws each beam's report from its true reading, and notes the nearest class per sector; `words`
-/// are the sensor's draws, four at a time.
+/// Draws each beam's report from its true reading, and keeps the nearest class per sector; `words`
+/// returns a block of the sensor's draws, which holds four.
 #[inline(never)]
 fn sample_reports<'a>(
     sensor: &MountedSensor,
@@ -325,6 +353,7 @@ fn sample_reports<'a>(
     nearest: &mut [u8; 4],
 ) {
     for (block, truths) in (0..).zip(truths.chunks(4)) {
+        // A reliable table reports the truth for every word, and a block of the stream is dear.
         let words = if sensor.table.reliable { [0; 4] } else { words(block) };
         for ((&truth, word), (reading, &sector)) in truths.iter().zip(words).zip(&mut readings) {
             let reported = sensor.table.sample(truth, word);
@@ -336,11 +365,11 @@ fn sample_reports<'a>(
 }
 
 #[inline]
-pub(super) fn memory_of(cell: &BodyState) -> Memory {
-    Memory { words: std::array::from_fn(|k| cell.memory[k].get()) }
+pub(super) fn memory_of(body: &BodyState) -> Memory {
+    Memory { words: std::array::from_fn(|k| body.memory[k].get()) }
 }
 
 #[inline]
-fn store_memory(cell: &BodyState, memory: Memory) {
-    cell.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
+fn store_memory(body: &BodyState, memory: Memory) {
+    body.memory.iter().zip(memory.words).for_each(|(word, value)| word.set(value));
 }

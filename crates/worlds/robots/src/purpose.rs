@@ -1,4 +1,5 @@
-//! Purposes of the random draws of this world.
+//! Purposes of the random draws of this world. A purpose's number is part of the key of its draws: another
+//! number gives other runs. 5 is free.
 
 use sidestep_kernel::stream::Purpose;
 

@@ -16,7 +16,7 @@ pub(super) fn remarks(compiled: &Compiled) -> Vec<Remark> {
         remarks.extend(unseen_kinds(&compiled.world, sensor));
         remarks.extend(unused_classes(sensor));
     }
-    // Sorting is stable: among equals the order of the scenario stays.
+    // Stable, because among equals the order of the scenario stays.
     remarks.sort_by_key(|remark| remark.severity);
     remarks
 }
@@ -50,9 +50,14 @@ fn unseen_kinds(world: &RobotsWorld, sensor: &MountedSensor) -> Option<Remark> {
 /// Returns a note on the distance classes in which no box ever is.
 fn unused_classes(sensor: &MountedSensor) -> Option<Remark> {
     let model = &sensor.model;
-    let classes = || sensor.boxes[0].iter().flat_map(|crossed| crossed.classes);
-    let never = (0..model.distance_classes.len()).filter(|&k| !classes().any(|c| c == k as u8));
-    let names: Vec<&str> = never.map(|k| model.distance_classes[k].as_str()).collect();
+    // The classes are the same at every heading.
+    let mut is_used = vec![false; model.distance_classes.len()];
+    for class in sensor.boxes[0].iter().flat_map(|chunk| chunk.classes) {
+        is_used[usize::from(class)] = true;
+    }
+    let classes = model.distance_classes.iter().zip(is_used);
+    let names: Vec<&str> =
+        classes.filter(|(_, is_used)| !is_used).map(|(name, _)| name.as_str()).collect();
     (!names.is_empty()).then(|| {
         let words = format!(
             "no box within its range of {} m is ever at the distance class {}: see \

@@ -29,7 +29,7 @@ const HEADING_DESCRIPTION: &str =
     "heading, counterclockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
 const BODY_DESCRIPTION: &str = "entity id: robots first, then people, then doors";
 
-/// Returns the table of poses, which are recorded as whole columns because they are many.
+/// Returns the table of poses, which are recorded as whole columns because there is one for every body and cycle.
 fn trajectory_table(world: &RobotsWorld) -> TableSchema {
     let column = ColumnSpec::new;
     let columns = vec![
@@ -52,7 +52,8 @@ fn box_notes(world: &RobotsWorld) -> Vec<(String, String)> {
     // Bodies of one kind have ids in a row.
     for same in ids.chunk_by(|&a, &b| world.visible_kind(a) == world.visible_kind(b)) {
         if let (Some(first), Some(last)) = (same.first(), same.last()) {
-            about.push((format!("ids_{}", world.visible_kind(*first)), format!("{first}-{last}")));
+            let kind = world.visible_kind(*first);
+            about.push((format!("ids_{kind}"), format!("{first}-{last}")));
         }
     }
     about
@@ -161,14 +162,14 @@ pub struct Collector {
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
     pub(super) log: Log<Event>,
-    /// The claims of each robot's wheels, by id, while odometry is watched.
+    /// The pose that each robot's wheels report, by id, while odometry is watched.
     odometry: Option<Vec<DeadReckoning>>,
     sensor_samples: Vec<SensorSample>,
     motion_samples: Vec<MotionSample>,
 }
 
 impl Collector {
-    /// Returns the empty books of a run that records the tables named in `record` once recording starts.
+    /// Returns the empty collector of a run that records the tables named in `record` once recording starts.
     pub(crate) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
@@ -184,11 +185,12 @@ impl Collector {
         self.rows.motions.start(record.calibration.then(|| motion_table(world)));
         if record.trajectories {
             let bodies = world.bodies.len();
-            let wanted = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);
-            let capacity = wanted.min(MAX_BUFFER_POSES / bodies).clamp(1, 4096);
+            let target = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);
+            let capacity = target.min(MAX_BUFFER_POSES / bodies).clamp(1, 4096);
             state.frames = Some(PoseBuffer::new(now, capacity, bodies));
         }
-        (self.is_recording, self.recorded) = (true, now);
+        self.is_recording = true;
+        self.recorded = now;
     }
 
     /// Continues from cycle `now`, after its state was restored.
@@ -204,13 +206,13 @@ impl Collector {
         self.log.is_enabled = true;
     }
 
-    /// Starts to keep the claims of wheels.
+    /// Starts to keep the poses that wheels report.
     pub(super) fn watch_odometry(&mut self, world: &RobotsWorld) {
         // Robots have the first ids.
         self.odometry.get_or_insert_with(|| vec![DeadReckoning::default(); world.robots.len()]);
     }
 
-    /// Returns the claims of each robot's wheels, by id; nothing unless odometry is watched.
+    /// Returns the pose that each robot's wheels report, by id; nothing unless odometry is watched.
     pub(super) fn odometry(&self) -> &[DeadReckoning] {
         self.odometry.as_deref().unwrap_or_default()
     }
@@ -229,15 +231,16 @@ impl Collector {
         self.motion_samples.append(&mut scratch.motion_samples);
     }
 
-    /// Files the gathered rows in an order that does not depend on the workers that saw them.
+    /// Puts the gathered rows in an order that does not depend on the workers that recorded them. A body has at
+    /// most one event and one motion a cycle, so that the order is complete.
     pub(super) fn commit(&mut self, world: &RobotsWorld) {
         self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
         self.gathered.iter().for_each(|&event| self.log.push(event));
         self.rows.events.extend(self.gathered.drain(..));
         self.motion_samples.sort_unstable_by_key(|s| (s.cycle, s.robot));
         for sample in &self.motion_samples {
-            if let Some(claimed) = &mut self.odometry {
-                claimed[sample.robot as usize].add(world, sample);
+            if let Some(odometry) = &mut self.odometry {
+                odometry[sample.robot as usize].add(world, sample);
             }
         }
         self.rows.motions.extend(self.motion_samples.drain(..));
@@ -260,11 +263,14 @@ impl Collector {
             self.rows.trajectories.set(pose_columns(world, frames, self.recorded..now));
             frames.first = now;
         }
-        self.sensor_samples.sort_by_key(|s| (s.cycle, s.robot));
+        // Stable, because a robot's beams of one cycle are in their order already.
+        self.sensor_samples.sort_by_key(|sample| (sample.cycle, sample.robot));
         if !self.sensor_samples.is_empty() {
-            let vocabulary = ReadingLabels::from_world(world);
+            let labels = ReadingLabels::from_world(world);
             let samples = self.sensor_samples.drain(..);
-            self.rows.readings.extend(samples.filter_map(|s| vocabulary.reading_row(world, &s)));
+            self.rows
+                .readings
+                .extend(samples.filter_map(|sample| labels.reading_row(world, &sample)));
         }
         self.recorded = now;
         self.rows.record(recorder)
@@ -274,6 +280,7 @@ impl Collector {
 /// Returns the columns of the table of poses in these cycles.
 fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) -> Vec<Values> {
     let cycles = (span.end - span.start) as usize;
+    // Doors never move; their events say when they open.
     let moving: Vec<EntityId> =
         (0..world.bodies.len() as EntityId).filter(|&id| !world.is_door(id)).collect();
     let [mut bodies, mut cols, mut rows, mut headings] =
@@ -282,20 +289,20 @@ fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) ->
     let from = (span.start - frames.first) as usize;
     // Poses are stored by cycle and written by body: a few bodies at a time, so that reads within a
     // cycle lie together.
-    let mut ways = vec![Vec::new(); BODIES_PER_BLOCK];
+    let mut tracks = vec![Vec::new(); BODIES_PER_BLOCK];
     for some in moving.chunks(BODIES_PER_BLOCK) {
-        ways.iter_mut().for_each(Vec::clear);
+        tracks.iter_mut().for_each(Vec::clear);
         for cycle in from..from + cycles {
-            for (way, &id) in ways.iter_mut().zip(some) {
-                way.push(frames.poses.get(cycle * frames.bodies + id as usize));
+            for (track, &id) in tracks.iter_mut().zip(some) {
+                track.push(frames.poses.get(cycle * frames.bodies + id as usize));
             }
         }
-        for (way, &id) in ways.iter().zip(some) {
+        for (track, &id) in tracks.iter().zip(some) {
             bodies.extend(std::iter::repeat_n(id, cycles));
             at_cycle.extend(span.clone());
-            cols.extend(way.iter().map(|pose| pose.col() - world.border));
-            rows.extend(way.iter().map(|pose| pose.row() - world.border));
-            headings.extend(way.iter().map(|pose| u32::from(pose.heading())));
+            cols.extend(track.iter().map(|pose| pose.col() - world.border));
+            rows.extend(track.iter().map(|pose| pose.row() - world.border));
+            headings.extend(track.iter().map(|pose| u32::from(pose.heading())));
         }
     }
     vec![
@@ -307,7 +314,8 @@ fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) ->
     ]
 }
 
-/// The labels of readings, sorted: observations and distance classes of all sensors.
+/// The labels of readings: observations and distance classes of all sensors, sorted, because a label is found
+/// by its name.
 struct ReadingLabels {
     observations: Vec<String>,
     classes: Vec<String>,
@@ -315,7 +323,8 @@ struct ReadingLabels {
 
 impl ReadingLabels {
     fn from_world(world: &RobotsWorld) -> Self {
-        let (mut observations, mut classes) = (Vec::new(), vec!["beyond".to_string()]);
+        let mut observations = Vec::new();
+        let mut classes = vec!["beyond".to_string()];
         for sensor in world.sensors() {
             observations.extend(sensor.observations.iter().cloned());
             classes.extend(sensor.distance_classes.iter().cloned());
@@ -331,20 +340,23 @@ impl ReadingLabels {
     fn reading_row(&self, world: &RobotsWorld, sample: &SensorSample) -> Option<ReadingRow> {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return None };
         let sensor = &model.body.sensors[usize::from(sample.sensor)].model;
-        let index = |names: &[String], name: &str| {
-            names.binary_search_by(|n| n.as_str().cmp(name)).unwrap_or(0) as u32
-        };
-        let labels = |(observation, class): (&str, &str)| {
-            [index(&self.observations, observation), index(&self.classes, class)]
-        };
         Some(ReadingRow {
             cycle: sample.cycle,
             robot: sample.robot,
             sensor: sample.sensor,
-            truth: labels(sensor.names_of(sample.truth)),
-            reported: labels(sensor.names_of(sample.reported)),
+            truth: self.indices(sensor.names_of(sample.truth)),
+            reported: self.indices(sensor.names_of(sample.reported)),
         })
     }
+
+    /// Returns the numbers of the labels of a reading's observation and class.
+    fn indices(&self, (observation, class): (&str, &str)) -> [u32; 2] {
+        [label_index(&self.observations, observation), label_index(&self.classes, class)]
+    }
+}
+
+fn label_index(labels: &[String], name: &str) -> u32 {
+    labels.binary_search_by(|label| label.as_str().cmp(name)).unwrap_or(0) as u32
 }
 
 impl RobotsWorld {

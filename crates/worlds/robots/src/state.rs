@@ -15,6 +15,10 @@ use sidestep_kernel::space::{AtomicBitSet, BoxWord, Floor, Position};
 use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::AtomicU64;
 
+/// Rows of the map that are stored together, see [`RobotsState::arrange`]. One row would leave neighbors above
+/// and below far apart in memory, many rows those to the side.
+const ROWS_PER_BAND: u32 = 8;
+
 /// The state of a robots world.
 #[derive(Debug)]
 pub struct RobotsState {
@@ -24,11 +28,12 @@ pub struct RobotsState {
     pub(crate) visited: AtomicBitSet,
     /// The changing part of each body, by slot.
     pub bodies: Box<[BodyState]>,
-    /// Kind of each body, by slot.
+    /// Kind of each body, by slot; apart from `bodies`, because beams read it of many bodies and nothing else.
     pub(crate) kinds: Box<[u8]>,
     /// Slot of each entity, by id.
     pub(crate) slot_of_id: Box<[Slot]>,
-    /// Number of contacts of each body by kind touched, at `id * kinds + kind`.
+    /// Number of contacts of each body by kind touched, at `id * kinds + kind`; apart from `bodies`, because
+    /// contacts are rare and the number of kinds is the scenario's.
     pub(crate) contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub(crate) bids: Box<[AtomicU64]>,
@@ -38,7 +43,8 @@ pub struct RobotsState {
     pub(crate) frames: Option<PoseBuffer>,
 }
 
-/// One body's share of the state, in one cache line.
+/// One body's share of the state, in one cache line, because a body mostly reads and writes its own and the
+/// next slot may be another worker's.
 #[derive(Debug, Clone, Default)]
 #[repr(align(64))]
 pub struct BodyState {
@@ -52,7 +58,7 @@ pub struct BodyState {
     pub contact: AtomicCell<LastContact>,
     /// A robot's memory; its behavior gives the words their meaning.
     pub memory: [AtomicCell<u32>; 4],
-    /// Cycles from one action to the next; constant.
+    /// Cycles from one action to the next; constant, and here so that a cycle need not read the world for it.
     pub period: u32,
     /// Unit moves made, in boxes.
     pub moves: AtomicCell<u32>,
@@ -164,7 +170,8 @@ impl RobotsState {
         }
     }
 
-    /// Returns a copy on which a cycle can be tried. It knows no boxes as visited, and records no poses.
+    /// Returns a copy on which a cycle can be tried. It leaves out visited boxes and poses, which nothing in a
+    /// cycle reads.
     pub(super) fn trial_copy(&self, world: &RobotsWorld) -> Self {
         Self {
             floor: self.floor.clone(),
@@ -207,14 +214,16 @@ impl RobotsState {
     }
 
     /// Stores bodies that are near on the map near in memory, because bodies mostly read the boxes
-    /// around them: in bands of eight rows, each from west to east.
+    /// around them: in bands of rows, each from west to east.
     pub(super) fn arrange(&mut self, world: &RobotsWorld) {
-        let place = |cell: &BodyState| (cell.position().row() >> 3, cell.position().col(), cell.id);
-        self.bodies.sort_unstable_by_key(place);
+        self.bodies.sort_unstable_by_key(|body| {
+            let band = body.position().row() / ROWS_PER_BAND;
+            (band, body.position().col(), body.id)
+        });
         for slot in 0..self.bodies.len() {
-            let cell = &self.bodies[slot];
-            self.kinds[slot] = world.types[usize::from(cell.ty)].kind;
-            self.slot_of_id[cell.id as usize] = slot as Slot;
+            let body = &self.bodies[slot];
+            self.kinds[slot] = world.types[usize::from(body.ty)].kind;
+            self.slot_of_id[body.id as usize] = slot as Slot;
             if !self.is_open_door(world, slot as Slot) {
                 self.occupy(world, slot as Slot);
             }
@@ -223,8 +232,8 @@ impl RobotsState {
 
     /// Returns whether the body in a slot is a door that is open.
     pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
-        let cell = &self.bodies[slot as usize];
-        world.is_door(cell.id) && cell.facing.get().is_open()
+        let body = &self.bodies[slot as usize];
+        world.is_door(body.id) && body.facing.get().is_open()
     }
 
     /// Returns the state in the order of ids after `cycle` cycles.
@@ -235,7 +244,8 @@ impl RobotsState {
 
     fn body_record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
         let body = &self.bodies[slot as usize];
-        let (i, kinds) = (body.id as usize, world.kinds.len());
+        let kinds = world.kinds.len();
+        let first_contact = body.id as usize * kinds;
         BodyRecord {
             at: world.map_position(body.position()),
             facing: body.facing.get(),
@@ -244,7 +254,7 @@ impl RobotsState {
             voice: self.voices.last_broadcast(body.id, cycle),
             counts: [body.moves.get(), body.first_visits.get(), body.trips.get()],
             trip: [body.trip_cycles.get(), body.trip_begun.get()],
-            contacts: (0..kinds).map(|k| self.contacts.get(i * kinds + k)).collect(),
+            contacts: (0..kinds).map(|kind| self.contacts.get(first_contact + kind)).collect(),
         }
     }
 
@@ -274,7 +284,6 @@ impl RobotsState {
 
     fn restore_body(&self, world: &RobotsWorld, slot: Slot, record: &BodyRecord) {
         let body = &self.bodies[slot as usize];
-        let i = body.id as usize;
         body.facing.set(record.facing);
         body.contact.set(record.contact);
         (0..4).for_each(|k| body.memory[k].set(record.memory[k]));
@@ -287,8 +296,10 @@ impl RobotsState {
         body.trips.set(trips);
         body.trip_cycles.set(record.trip[0]);
         body.trip_begun.set(record.trip[1]);
-        let kinds = world.kinds.len();
-        record.contacts.iter().enumerate().for_each(|(k, &c)| self.contacts.set(i * kinds + k, c));
+        let first_contact = body.id as usize * world.kinds.len();
+        for (kind, &count) in record.contacts.iter().enumerate() {
+            self.contacts.set(first_contact + kind, count);
+        }
         body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
@@ -337,7 +348,8 @@ impl Snapshot {
             words.for_each(|&w| hasher.write_u32(w));
         }
         hasher.write_bytes(&self.visited);
-        // Whether 0 is a word or silence; nothing is added where no robot has spoken.
+        // A word of 0 and silence differ here, and nothing is added where no robot has spoken, so that
+        // the digests of worlds without radio do not depend on it.
         let spoke = (0u32..).zip(&self.bodies).filter(|(_, body)| body.voice.is_some());
         spoke.for_each(|(id, _)| hasher.write_u32(id));
         hasher.finish()

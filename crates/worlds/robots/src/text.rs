@@ -28,10 +28,7 @@ pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
 }
 
 fn distance(meters: f64) -> String {
-    match meters < 1000.0 {
-        true => format!("{meters:.1} m"),
-        false => format!("{:.1} km", meters / 1000.0),
-    }
+    if meters < 1000.0 { format!("{meters:.1} m") } else { format!("{:.1} km", meters / 1000.0) }
 }
 
 fn contacts(metrics: &Metrics) -> String {
@@ -39,15 +36,12 @@ fn contacts(metrics: &Metrics) -> String {
     let touched = total.contacts_by_kind.iter().filter(|(_, n)| **n > 0);
     let by_kind: Vec<String> =
         touched.map(|(kind, n)| format!("{kind} {}", group_thousands(*n))).collect();
-    let share = 1000.0 * metrics.contacts_per_action;
-    match by_kind.is_empty() {
-        true => "none".into(),
-        false => format!(
-            "{} ({share:.1} in 1000 actions): {}",
-            group_thousands(total.contacts),
-            by_kind.join(", ")
-        ),
+    if by_kind.is_empty() {
+        return "none".into();
     }
+    let in_1000 = 1000.0 * metrics.contacts_per_action;
+    let count = group_thousands(total.contacts);
+    format!("{count} ({in_1000:.1} in 1000 actions): {}", by_kind.join(", "))
 }
 
 fn trips(trips: u64, mean_cycles: Option<f64>) -> String {
@@ -109,25 +103,26 @@ impl BodyText<'_> {
             "x_m": x_m, "y_m": y_m,
         });
         let Value::Object(mut place) = place else { return place };
-        match self.is_door() {
-            true => place.insert("open".into(), self.record.facing.is_open().into()),
-            false => {
-                let heading_rad = self.world.heading_rad(self.record.facing.heading());
-                place.insert("heading_deg".into(), heading_rad.to_degrees().into());
-                place.insert("heading".into(), self.heading().into())
-            }
-        };
+        if self.is_door() {
+            place.insert("open".into(), self.record.facing.is_open().into());
+        } else {
+            let heading_rad = self.world.heading_rad(self.record.facing.heading());
+            place.insert("heading_deg".into(), heading_rad.to_degrees().into());
+            place.insert("heading".into(), self.heading().into());
+        }
         Value::Object(place)
     }
 
     fn row(&self) -> String {
         let (col, row) = self.record.at;
-        let look = match (self.is_door(), self.record.facing.is_open()) {
-            (true, true) => "open",
-            (true, false) => "closed",
-            (false, _) => self.heading(),
+        let facing = if !self.is_door() {
+            self.heading()
+        } else if self.record.facing.is_open() {
+            "open"
+        } else {
+            "closed"
         };
-        format!("  {:<4}  {:<10}  {col:>9}  {row:>9}  {look}\n", self.id, self.kind())
+        format!("  {:<4}  {:<10}  {col:>9}  {row:>9}  {facing}\n", self.id, self.kind())
     }
 }
 
@@ -178,7 +173,7 @@ fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
     count
 }
 
-/// Returns one entry per `[[robots]]` section.
+/// Returns one entry per `[[robots]]` section, by its text, because compiled bodies do not know their section.
 fn robots(file: &Value) -> Vec<Value> {
     let sections = match &file["robots"] {
         Value::Array(many) => many.as_slice(),
@@ -190,32 +185,36 @@ fn robots(file: &Value) -> Vec<Value> {
 
 fn robot_section(section: &Value) -> Value {
     let places = section["at"].as_array().map(|at| at.len().into());
-    let or = |value: &Value, default: Value| if value.is_null() { default } else { value.clone() };
     json!({
-        "name": or(&section["name"], "robots".into()),
-        "count": or(&section["count"], places.unwrap_or(Value::Null)),
-        "size_boxes": or(&section["size"], 1.into()),
-        "period": or(&section["period"], 1.into()),
-        "sensors": or(&section["sensors"], json!([])),
-        "effector": or(&section["effector"], "perfect".into()),
-        "behaviour": or(&section["behaviour"]["kind"], "wander".into()),
+        "name": value_or(&section["name"], "robots".into()),
+        "count": value_or(&section["count"], places.unwrap_or(Value::Null)),
+        "size_boxes": value_or(&section["size"], 1.into()),
+        "period": value_or(&section["period"], 1.into()),
+        "sensors": value_or(&section["sensors"], json!([])),
+        "effector": value_or(&section["effector"], "perfect".into()),
+        "behaviour": value_or(&section["behaviour"]["kind"], "wander".into()),
     })
+}
+
+fn value_or(value: &Value, default: Value) -> Value {
+    if value.is_null() { default } else { value.clone() }
 }
 
 /// Returns the sensors in use, each once.
 fn sensors(world: &RobotsWorld) -> Vec<Value> {
     let by_name: BTreeMap<&str, &SensorModel> =
-        world.sensors().map(|s| (s.name.as_str(), s)).collect();
-    let one = |s: &SensorModel| {
-        json!({
-            "name": s.name,
-            "beams": s.bearings_deg.len(),
-            "range_m": s.range_m,
-            "observations": s.observations,
-            "distance_edges_m": s.distance_edges_m,
-        })
-    };
-    by_name.into_values().map(one).collect()
+        world.sensors().map(|sensor| (sensor.name.as_str(), sensor)).collect();
+    by_name.into_values().map(sensor_entry).collect()
+}
+
+fn sensor_entry(sensor: &SensorModel) -> Value {
+    json!({
+        "name": sensor.name,
+        "beams": sensor.bearings_deg.len(),
+        "range_m": sensor.range_m,
+        "observations": sensor.observations,
+        "distance_edges_m": sensor.distance_edges_m,
+    })
 }
 
 /// Returns the effectors in use, each once, with the chance that an action ends as intended.
@@ -225,48 +224,55 @@ fn effectors(world: &RobotsWorld) -> Vec<Value> {
         _ => None,
     });
     let by_name: BTreeMap<&str, &EffectorModel> = robots.map(|e| (e.name.as_str(), e)).collect();
-    let one = |e: &EffectorModel| {
-        let as_meant = e.transitions.iter().map(|transitions| transitions[0].p);
-        let actions: Vec<_> = e.actions.iter().zip(as_meant).collect();
-        json!({ "name": e.name, "as_meant": actions })
-    };
-    by_name.into_values().map(one).collect()
+    by_name.into_values().map(effector_entry).collect()
 }
 
-fn text(found: &Value) -> String {
+fn effector_entry(effector: &EffectorModel) -> Value {
+    let as_intended = effector.transitions.iter().map(|transitions| transitions[0].p);
+    let actions: Vec<_> = effector.actions.iter().zip(as_intended).collect();
+    json!({ "name": effector.name, "as_meant": actions })
+}
+
+/// Returns the contents in words; made of their JSON, so that both say the same.
+fn text(contents: &Value) -> String {
     let mut lines = vec![
-        key_value("map", map_text(&found["map"])),
-        key_value("bodies", bodies_text(&found["bodies"])),
+        key_value("map", map_text(&contents["map"])),
+        key_value("bodies", bodies_text(&contents["bodies"])),
     ];
-    lines.extend(items(found, "robots").map(|r| key_value(&unquoted(&r["name"]), robots_text(r))));
-    lines.extend(items(found, "sensors").map(|s| key_value("sensor", sensor_text(s))));
-    lines.extend(items(found, "effectors").map(|e| key_value("effector", effector_text(e))));
-    let plain = |key: &str| unquoted(&found[key]);
+    for robots in items(contents, "robots") {
+        lines.push(key_value(&unquoted(&robots["name"]), robots_text(robots)));
+    }
+    for sensor in items(contents, "sensors") {
+        lines.push(key_value("sensor", sensor_text(sensor)));
+    }
+    for effector in items(contents, "effectors") {
+        lines.push(key_value("effector", effector_text(effector)));
+    }
+    let obstacle_rule = unquoted(&contents["obstacle_rule"]);
+    let conflict_policy = unquoted(&contents["conflict_policy"]);
+    let cycles = number(&contents["cycles"]);
+    let seed = unquoted(&contents["seed"]);
     lines.extend([
-        key_value("regime", plain("regime")),
-        key_value(
-            "laws",
-            format!("obstacles {}, conflicts {}", plain("obstacle_rule"), plain("conflict_policy")),
-        ),
-        key_value("run", format!("{} cycles, seed {}", number(&found["cycles"]), plain("seed"))),
+        key_value("regime", unquoted(&contents["regime"])),
+        key_value("laws", format!("obstacles {obstacle_rule}, conflicts {conflict_policy}")),
+        key_value("run", format!("{cycles} cycles, seed {seed}")),
     ]);
     align_pairs(&lines)
 }
 
-fn items<'a>(found: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
-    found[key].as_array().into_iter().flatten()
+fn items<'a>(contents: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
+    contents[key].as_array().into_iter().flatten()
 }
 
 fn map_text(map: &Value) -> String {
-    let meters =
-        |key: &str| map[key].as_f64().unwrap_or(0.0) * map["box_size_m"].as_f64().unwrap_or(0.0);
+    let box_size_m = map["box_size_m"].as_f64().unwrap_or(0.0);
+    let [width_m, height_m] =
+        ["width_boxes", "height_boxes"].map(|key| map[key].as_f64().unwrap_or(0.0) * box_size_m);
     format!(
-        "{} x {} boxes of {} m ({:.1} x {:.1} m), {} of them free",
+        "{} x {} boxes of {} m ({width_m:.1} x {height_m:.1} m), {} of them free",
         map["width_boxes"],
         map["height_boxes"],
         map["box_size_m"],
-        meters("width_boxes"),
-        meters("height_boxes"),
         number(&map["free"]),
     )
 }
@@ -308,10 +314,11 @@ fn sensor_text(sensor: &Value) -> String {
 }
 
 fn effector_text(effector: &Value) -> String {
-    let as_meant = |action: &Value| {
-        format!("{} {:.0} %", unquoted(&action[0]), 100.0 * action[1].as_f64().unwrap_or(0.0))
-    };
-    let actions: Vec<String> = items(effector, "as_meant").map(as_meant).collect();
+    let mut actions = Vec::new();
+    for action in items(effector, "as_meant") {
+        let percent = 100.0 * action[1].as_f64().unwrap_or(0.0);
+        actions.push(format!("{} {percent:.0} %", unquoted(&action[0])));
+    }
     format!("{}: as meant {}", unquoted(&effector["name"]), actions.join(", "))
 }
 

@@ -1,6 +1,6 @@
 //! The visible part of a building: floor, bodies, sensors' readings, and events in words.
 
-use super::cycle_context::{CycleContext, with_scene};
+use super::cycle_context::{CycleContext, with_cycle};
 use super::effector::Side;
 use super::odometry::DeadReckoning;
 use super::sensor::{NOTHING, Reading, SensorModel};
@@ -17,9 +17,9 @@ use sidestep_kernel::{Cycle, EntityId, Phases};
 use sidestep_map::Rect;
 use std::f64::consts::FRAC_PI_2;
 
-/// Length of a cycle in seconds for pictures; the model itself has no time but cycles.
+/// Length of a cycle in seconds for pictures; a scenario gives none, because the model counts cycles only.
 pub(super) const CYCLE_S: f64 = 1.0;
-/// Number of cycles worth showing as trails: longer ways cover the floor.
+/// Number of cycles worth showing as trails: longer ones cover the floor.
 const TRAIL_CYCLES: Cycle = 400;
 
 impl RobotsWorld {
@@ -35,16 +35,17 @@ impl RobotsWorld {
         }
     }
 
-    /// Returns how recorded poses give the places of robots and people.
+    /// Returns the columns of recorded poses that hold the places of robots and people.
     pub(super) fn position_columns(&self) -> Vec<view::PositionColumns> {
         let scale_m = self.map.box_size_m;
-        let axis = |column| view::Axis { column, scale_m, offset_m: 0.0 };
+        let [col, row] =
+            ["col_boxes", "row_boxes"].map(|column| view::Axis { column, scale_m, offset_m: 0.0 });
         vec![view::PositionColumns {
             table: "trajectories",
             kind: BodyKind::Robot,
             number: "body",
             part: None,
-            axes: vec![axis("col_boxes"), axis("row_boxes")],
+            axes: vec![col, row],
             plane: Some(self.map.plane),
             is_corner: true,
             heading: Some("heading"),
@@ -55,14 +56,14 @@ impl RobotsWorld {
 
     /// Returns all bodies by id.
     pub(super) fn visible_bodies(&self, state: &RobotsState) -> Vec<Body> {
-        let eye = BodyViewBuilder::new(self);
+        let builder = BodyViewBuilder::new(self);
         let ids = 0..self.bodies.len() as EntityId;
-        ids.map(|id| eye.body(id, state.body(id))).collect()
+        ids.map(|id| builder.body(id, state.body(id))).collect()
     }
 
     /// Returns one body.
-    pub(super) fn visible_body(&self, id: EntityId, cell: &BodyState) -> Body {
-        BodyViewBuilder::new(self).body(id, cell)
+    pub(super) fn visible_body(&self, id: EntityId, body: &BodyState) -> Body {
+        BodyViewBuilder::new(self).body(id, body)
     }
 
     pub(super) fn visible_kind(&self, id: EntityId) -> BodyKind {
@@ -76,8 +77,8 @@ impl RobotsWorld {
     }
 
     /// Returns the middle of a body at a height, and its heading.
-    fn pose(&self, id: EntityId, cell: &BodyState, z_m: f64) -> Pose {
-        BodyViewBuilder::new(self).pose(self.type_of(id), cell, z_m)
+    fn pose(&self, id: EntityId, body: &BodyState, z_m: f64) -> Pose {
+        BodyViewBuilder::new(self).pose(self.type_of(id), body, z_m)
     }
 
     /// Returns the middle in the world of a body that has its lower-left box at `at`.
@@ -92,18 +93,17 @@ impl RobotsWorld {
 
     /// Returns the readings that some robots are about to perceive.
     pub(super) fn scans(&self, state: &RobotsState, now: Cycle, of: &ScanSelection) -> Vec<Scan> {
-        let mut scratch = self.scratch();
-        let mut scans = |&id: &EntityId| self.scans_of(state, now, id, &mut scratch);
-        match of {
-            ScanSelection::First(robots) => {
-                self.robots.iter().take(*robots).flat_map(scans).collect()
-            }
+        let ids: Vec<EntityId> = match of {
+            ScanSelection::First(robots) => self.robots.iter().take(*robots).copied().collect(),
             ScanSelection::Of(bodies) => {
-                let is_there = |id: &EntityId| (*id as usize) < self.bodies.len();
-                let asked = bodies.iter().filter(|of| of.kind == BodyKind::Robot);
-                asked.map(|of| of.number).filter(is_there).flat_map(|id| scans(&id)).collect()
+                let robots = bodies.iter().filter(|of| of.kind == BodyKind::Robot);
+                let ids = robots.map(|of| of.number);
+                // Viewers may ask for ids that this run does not have.
+                ids.filter(|&id| (id as usize) < self.bodies.len()).collect()
             }
-        }
+        };
+        let mut scratch = self.scratch();
+        ids.into_iter().flat_map(|id| self.scans_of(state, now, id, &mut scratch)).collect()
     }
 
     fn scans_of(
@@ -113,50 +113,56 @@ impl RobotsWorld {
         id: EntityId,
         scratch: &mut Scratch,
     ) -> Vec<Scan> {
-        let (cell, ty) = (state.body(id), self.type_of(id));
-        let Role::Robot(model) = &ty.role else { return Vec::new() };
-        let truths = with_scene!(self, state, now, |scene| {
-            scene.sense(model, cell, scratch);
+        let body = state.body(id);
+        let Role::Robot(model) = &self.type_of(id).role else { return Vec::new() };
+        let true_ranges_m = with_cycle!(self, state, now, |cycle| {
+            cycle.sense(model, body, scratch);
             let sensors = model.body.sensors.iter();
-            sensors.map(|sensor| self.true_ranges_m(scene, sensor, cell)).collect::<Vec<_>>()
+            sensors.map(|sensor| self.true_ranges_m(cycle, sensor, body)).collect::<Vec<_>>()
         });
-        let pose = self.pose(id, cell, 0.5 * self.side_m(id));
-        let mut readings = &scratch.readings[..];
-        let scan = |(sensor, true_m): (&MountedSensor, Vec<f64>)| {
-            let (own, others) = readings.split_at(sensor.model.bearings_deg.len());
-            readings = others;
-            scan(&sensor.model, own, &true_m, self.side_m(id), id, pose)
-        };
-        model.body.sensors.iter().zip(truths).map(scan).collect()
+        let side_m = self.side_m(id);
+        let carrier = ScanCarrier { id, side_m, pose: self.pose(id, body, 0.5 * side_m) };
+        let mut scans = Vec::with_capacity(model.body.sensors.len());
+        let mut rest = &scratch.readings[..];
+        for (sensor, true_m) in model.body.sensors.iter().zip(&true_ranges_m) {
+            let (readings, others) = rest.split_at(sensor.model.bearings_deg.len());
+            rest = others;
+            scans.push(carrier.scan(&sensor.model, readings, true_m));
+        }
+        scans
     }
 
     /// Returns the true distance in meters from the body's boundary to the thing that each
     /// beam meets; infinite where that reads as nothing.
     fn true_ranges_m<T: BoxWord>(
         &self,
-        scene: &CycleContext<'_, T>,
+        cycle: &CycleContext<'_, T>,
         sensor: &MountedSensor,
-        cell: &BodyState,
+        body: &BodyState,
     ) -> Vec<f64> {
-        let far_m = |met: Option<(T, f64)>| {
-            let is_seen =
-                |word| sensor.designated_observation(scene.state.kind_of(word)) != NOTHING;
-            let met = met.filter(|(word, _)| is_seen(*word));
-            met.map_or(f64::INFINITY, |(_, boxes)| boxes * self.map.box_size_m)
-        };
-        scene.beam_hits(sensor, cell).into_iter().map(far_m).collect()
+        let mut ranges_m = Vec::with_capacity(sensor.ends.len());
+        for hit in cycle.beam_hits(sensor, body) {
+            let seen = hit.filter(|(word, _)| {
+                sensor.designated_observation(cycle.state.kind_of(*word)) != NOTHING
+            });
+            let boxes = seen.map_or(f64::INFINITY, |(_, boxes)| boxes);
+            ranges_m.push(boxes * self.map.box_size_m);
+        }
+        ranges_m
     }
 
-    /// Returns the poses that the robots' wheels claim, given by id.
-    pub(super) fn odometry_poses(&self, claimed: &[DeadReckoning]) -> Vec<(BodyId, Pose)> {
+    /// Returns the poses that the robots' wheels report, given by id.
+    pub(super) fn odometry_poses(&self, odometry: &[DeadReckoning]) -> Vec<(BodyId, Pose)> {
         let turns = DeadReckoning::heading_orientations();
-        let of = |(id, claimed): (EntityId, &DeadReckoning)| {
-            (BodyId::new(BodyKind::Robot, id, None), claimed.pose(self.map.box_size_m, &turns))
-        };
-        (0..).zip(claimed).map(of).collect()
+        let mut poses = Vec::with_capacity(odometry.len());
+        for (id, reckoning) in (0..).zip(odometry) {
+            let pose = reckoning.pose(self.map.box_size_m, &turns);
+            poses.push((BodyId::new(BodyKind::Robot, id, None), pose));
+        }
+        poses
     }
 
-    /// Returns which body one is.
+    /// Returns the name of a body in frames: its kind and its id.
     pub(super) fn body_id(&self, id: EntityId) -> BodyId {
         BodyId::new(self.visible_kind(id), id, None)
     }
@@ -174,13 +180,14 @@ impl RobotsWorld {
             EventKind::DoorOpened => (Severity::Info, LogEventKind::DoorOpened, "opens".into()),
             EventKind::DoorClosed => (Severity::Info, LogEventKind::DoorClosed, "closes".into()),
         };
-        let ([x_m, y_m], who) = (self.middle_m(event.body, event.at), self.body_id(event.body));
+        let [x_m, y_m] = self.middle_m(event.body, event.at);
         let at_m = Some([x_m, y_m, 0.0]);
+        let who = self.body_id(event.body);
         LogEvent { cycle: event.cycle, level, kind, who, with, at_m, value: None, words }
     }
 }
 
-/// Values that many bodies have in common when they are looked at: no sine is computed for each.
+/// Values that all bodies of a frame have in common, computed once, so that no sine is computed for each.
 struct BodyViewBuilder<'a> {
     world: &'a RobotsWorld,
     plane: CachedIsometry2,
@@ -190,15 +197,18 @@ struct BodyViewBuilder<'a> {
 
 impl<'a> BodyViewBuilder<'a> {
     fn new(world: &'a RobotsWorld) -> Self {
-        let turn = |heading| Pose::from_heading([0.0; 3], world.heading_rad(heading)).turn;
-        Self { world, plane: world.map.plane.cached(), turns: [0, 1, 2, 3].map(turn) }
+        let turns = [0, 1, 2, 3]
+            .map(|heading| Pose::from_heading([0.0; 3], world.heading_rad(heading)).turn);
+        Self { world, plane: world.map.plane.cached(), turns }
     }
 
-    fn body(&self, id: EntityId, cell: &BodyState) -> Body {
-        let (ty, box_m) = (self.world.type_of(id), self.world.map.box_size_m);
+    fn body(&self, id: EntityId, body: &BodyState) -> Body {
+        let ty = self.world.type_of(id);
+        let box_m = self.world.map.box_size_m;
         let kind = ty.visible_kind();
-        let is_open = kind == BodyKind::Door && cell.facing.get().is_open();
-        // Heights are made up, because the model is a plane.
+        let is_open = kind == BodyKind::Door && body.facing.get().is_open();
+        // The model is a plane; heights are chosen for the picture: robots below people and walls, and an open
+        // door as a threshold.
         let (width, height) = ty.size;
         let side_m = f64::from(width.min(height)) * box_m;
         let height_m = match kind {
@@ -207,24 +217,25 @@ impl<'a> BodyViewBuilder<'a> {
             _ => side_m,
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
-        Body::new(kind, id, self.pose(ty, cell, 0.5 * height_m), Shape::Cuboid { size_m })
-            .with_state_if(cell.contact.get() != LastContact::NONE, Condition::Touching)
+        Body::new(kind, id, self.pose(ty, body, 0.5 * height_m), Shape::Cuboid { size_m })
+            .with_state_if(body.contact.get() != LastContact::NONE, Condition::Touching)
             .with_state_if(is_open, Condition::Open)
     }
 
-    fn pose(&self, ty: &BodyType, cell: &BodyState, z_m: f64) -> Pose {
-        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(cell.position())));
+    fn pose(&self, ty: &BodyType, body: &BodyState, z_m: f64) -> Pose {
+        let [x_m, y_m] = self.middle_m(ty.boxes(self.world.map_position(body.position())));
         let heading = match ty.role {
             Role::Door(_) => 0,
-            _ => cell.facing.get().heading(),
+            _ => body.facing.get().heading(),
         };
         Pose { at_m: [x_m, y_m, z_m], turn: self.turns[usize::from(heading % 4)] }
     }
 
     fn middle_m(&self, Rect { col, row, width, height }: Rect) -> [f64; 2] {
         let box_m = self.world.map.box_size_m;
-        let middle = |at: u32, size: u32| (f64::from(at) + 0.5 * f64::from(size)) * box_m;
-        self.plane.transform_point([middle(col, width), middle(row, height)])
+        let x_m = (f64::from(col) + 0.5 * f64::from(width)) * box_m;
+        let y_m = (f64::from(row) + 0.5 * f64::from(height)) * box_m;
+        self.plane.transform_point([x_m, y_m])
     }
 }
 
@@ -242,35 +253,42 @@ fn side_text(side: Side) -> String {
     format!("{} side", side.name())
 }
 
-/// Returns a sensor's readings, and the true distances of the things that its beams meet, as
-/// ranges from the middle of its robot.
-fn scan(
-    sensor: &SensorModel,
-    readings: &[Reading],
-    true_m: &[f64],
+/// The robot that carries a sensor.
+struct ScanCarrier {
+    id: EntityId,
     side_m: f64,
-    robot: EntityId,
     pose: Pose,
-) -> Scan {
-    let bearings_rad: Vec<f64> = sensor.bearings_deg.iter().map(|deg| deg.to_radians()).collect();
-    let range_m = |(&reading, &bearing_rad): (&Reading, &f64)| {
-        center_to_boundary_m(side_m, bearing_rad) + class_middle_m(sensor, reading)
-    };
-    let true_m = true_m.iter().zip(&bearings_rad);
-    let true_m =
-        true_m.map(|(far_m, bearing_rad)| center_to_boundary_m(side_m, *bearing_rad) + far_m);
-    Scan {
-        of: BodyId::new(BodyKind::Robot, robot, None),
-        sensor: sensor.name.clone(),
-        pose,
-        ranges_m: readings.iter().zip(&bearings_rad).map(range_m).collect(),
-        true_m: true_m.collect(),
-        range_m: sensor.range_m + 0.5 * side_m * std::f64::consts::SQRT_2,
-        bearings_rad,
+}
+
+impl ScanCarrier {
+    /// Returns a sensor's readings, and the true distances of the things that its beams meet, as
+    /// ranges from the middle of the robot. The model measures them from its boundary.
+    fn scan(&self, sensor: &SensorModel, readings: &[Reading], true_m: &[f64]) -> Scan {
+        let mut bearings_rad = Vec::with_capacity(readings.len());
+        let mut ranges_m = Vec::with_capacity(readings.len());
+        let mut true_ranges_m = Vec::with_capacity(readings.len());
+        let beams = sensor.bearings_deg.iter().zip(readings).zip(true_m);
+        for ((bearing_deg, &reading), true_m) in beams {
+            let bearing_rad = bearing_deg.to_radians();
+            let to_boundary_m = center_to_boundary_m(self.side_m, bearing_rad);
+            bearings_rad.push(bearing_rad);
+            ranges_m.push(to_boundary_m + class_middle_m(sensor, reading));
+            true_ranges_m.push(to_boundary_m + true_m);
+        }
+        Scan {
+            of: BodyId::new(BodyKind::Robot, self.id, None),
+            sensor: sensor.name.clone(),
+            pose: self.pose,
+            ranges_m,
+            true_m: true_ranges_m,
+            // The boundary is farthest along a diagonal.
+            range_m: sensor.range_m + 0.5 * self.side_m * std::f64::consts::SQRT_2,
+            bearings_rad,
+        }
     }
 }
 
-/// Returns the way in meters from the middle of a square body to its boundary.
+/// Returns the distance in meters from the middle of a square body to its boundary.
 pub(super) fn center_to_boundary_m(side_m: f64, bearing_rad: f64) -> f64 {
     0.5 * side_m / cos(bearing_rad).abs().max(sin(bearing_rad).abs())
 }
@@ -280,7 +298,8 @@ pub(super) fn class_middle_m(sensor: &SensorModel, reading: Reading) -> f64 {
     if reading.observation == NOTHING || reading.class >= sensor.beyond() {
         return f64::INFINITY;
     }
-    let (class, edges_m) = (usize::from(reading.class), &sensor.distance_edges_m);
+    let class = usize::from(reading.class);
+    let edges_m = &sensor.distance_edges_m;
     let near_m = if class == 0 { 0.0 } else { edges_m[class - 1] };
     let far_m = edges_m.get(class).copied().unwrap_or(sensor.range_m).min(sensor.range_m);
     0.5 * (near_m + far_m)

@@ -18,13 +18,14 @@ use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::{GridMap, Rect};
 use std::sync::Arc;
 
-/// Boxes of a beam that are read together, even past a wall.
+/// Boxes of a beam that are read together, even past a wall: four loads and one branch cost less than a branch
+/// after each load.
 pub(super) const BEAM_CHUNK_BOXES: usize = 4;
 
 /// The order in which bodies are stored; no result depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StorageOrder {
-    /// Neighbors on the map are neighbors in memory; rearranged now and then.
+    /// Neighbors on the map are neighbors in memory; rearranged at intervals, as they move.
     #[default]
     Spatial,
     /// The order of entity ids.
@@ -38,7 +39,7 @@ impl StorageOrder {
     pub(super) fn ids(self, world: &RobotsWorld) -> Vec<EntityId> {
         let mut ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
         match self {
-            // Arranged as it goes.
+            // `Spatial` starts by id, and is rearranged by the first cycle.
             Self::ById | Self::Spatial => {}
             Self::Shuffled(by) => {
                 let streams = Streams::new(Seed(by));
@@ -101,13 +102,14 @@ pub struct RobotsWorld {
     pub bodies: Vec<Body>,
     /// Properties that bodies have in common, one entry per type.
     pub types: Vec<BodyType>,
+    /// Rank of each kind under the policy `by_kind`; the smallest acts first.
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
     /// The robots as a caller sees them.
     pub(super) teams: Arc<Teams>,
     pub(super) robots: Vec<EntityId>,
     /// Whether there are robots that ask each other to make room.
-    pub(super) has_asks: bool,
+    pub(super) has_requests: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
@@ -144,7 +146,8 @@ impl Body {
 
     /// Returns the number of actions that the body has started before this cycle.
     pub(crate) fn actions_before(&self, cycle: Cycle) -> u64 {
-        let (period, phase) = (u64::from(self.period), u64::from(self.phase));
+        let period = u64::from(self.period);
+        let phase = u64::from(self.phase);
         // Multiples of the period in `phase..cycle + phase`.
         (cycle + phase).div_ceil(period) - phase.div_ceil(period)
     }
@@ -191,7 +194,7 @@ pub enum Role {
     Door(Door),
 }
 
-/// A robot type: its body and its mind.
+/// A robot type: its body and its behavior.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
     /// Sensors and effectors, shared by types that differ only in behavior.
@@ -203,7 +206,7 @@ pub struct RobotModel {
 }
 
 impl RobotModel {
-    /// Returns a robot type of this body and this mind.
+    /// Returns a robot type of this body and this behavior.
     pub(crate) fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
         let is_external = behaviour.is_external();
         Self { body, behaviour, is_external }
@@ -240,7 +243,7 @@ pub struct MountedSensor {
     pub(super) nothing: Reading,
 }
 
-/// Consecutive boxes on a beam's way.
+/// Consecutive boxes along a beam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BeamBoxes {
     /// Index offsets from the anchor.
@@ -262,27 +265,32 @@ impl MountedSensor {
         reliable: bool,
     ) -> Result<Self, RowError> {
         let range = model.range_m / box_size_m;
-        let beam = |&deg: &f64| beam_chunks(crossings(size, deg, range));
-        let beams: Vec<_> = model.bearings_deg.iter().map(beam).collect();
-        let crossed = |four: [Crossing; BEAM_CHUNK_BOXES], heading| BeamBoxes {
-            offsets: four.map(|c| {
-                let turned = turn_crossing(c, size, heading);
-                turned.dy * stride as i32 + turned.dx
-            }),
-            classes: four.map(|c| model.class_of(c.distance, box_size_m)),
-        };
-        let boxes = [0, 1, 2, 3]
-            .map(|heading| beams.iter().flatten().map(|&four| crossed(four, heading)).collect());
-        let distances = beams.iter().flatten().map(|four| four.map(|c| c.distance)).collect();
-        let mut end = 0;
-        let ends = beams.iter().map(|beam| {
-            end += beam.len() as u16;
-            end
+        let bearings_deg = model.bearings_deg.iter();
+        let beams: Vec<Vec<[Crossing; BEAM_CHUNK_BOXES]>> =
+            bearings_deg.map(|&deg| beam_chunks(crossings(size, deg, range))).collect();
+        let boxes = [0, 1, 2, 3].map(|heading| {
+            let chunks = beams.iter().flatten();
+            let turned = chunks.map(|chunk| BeamBoxes {
+                offsets: chunk.map(|crossing| {
+                    let at = turn_crossing(crossing, size, heading);
+                    at.dy * stride as i32 + at.dx
+                }),
+                classes: chunk.map(|crossing| model.class_of(crossing.distance, box_size_m)),
+            });
+            turned.collect()
         });
-        let ends = ends.collect();
-        let (table, nothing) = (AliasTable::new(&model, reliable)?, model.nothing());
+        let chunks = beams.iter().flatten();
+        let distances = chunks.map(|chunk| chunk.map(|crossing| crossing.distance)).collect();
+        let mut ends = Vec::with_capacity(beams.len());
+        let mut end = 0;
+        for beam in &beams {
+            end += beam.len() as u16;
+            ends.push(end);
+        }
+        let table = AliasTable::new(&model, reliable)?;
+        let nothing = model.nothing();
         let nothing_row = table.row(nothing);
-        Ok(Self { model, table, boxes, distances, ends, nothing_row, nothing })
+        Ok(Self { model, table, boxes, distances, ends: ends.into(), nothing_row, nothing })
     }
 
     /// Returns whether every reading is the truth.
@@ -292,16 +300,10 @@ impl MountedSensor {
 
     /// Returns whether every reading is the truth by its tables or because errors are off.
     pub(super) fn is_error_free(&self) -> bool {
-        let is_certain = |row: &[f64], truth: usize| row[truth] == 1.0;
-        let all = |matrix: &[Vec<f64>]| {
-            // The last row of a matrix of classes, `beyond`, is used only for spurious reports.
-            matrix
-                .iter()
-                .enumerate()
-                .all(|(truth, row)| row.len() <= truth || is_certain(row, truth))
-        };
+        let model = &self.model;
         self.is_reliable()
-            || all(&self.model.distance_confusion) && self.model.confusion.iter().all(|m| all(m))
+            || is_identity(&model.distance_confusion)
+                && model.confusion.iter().all(|matrix| is_identity(matrix))
     }
 
     /// Returns the observation that a kind designates.
@@ -318,6 +320,12 @@ impl MountedSensor {
             observation => Reading { observation, class },
         }
     }
+}
+
+/// Returns whether every row of a confusion matrix reports the truth for certain.
+fn is_identity(matrix: &[Vec<f64>]) -> bool {
+    // The last row of a matrix of classes, `beyond`, has no column, and is used only for spurious reports.
+    matrix.iter().enumerate().all(|(truth, row)| row.get(truth).is_none_or(|&p| p == 1.0))
 }
 
 /// Returns a beam's crossings in groups of [`BEAM_CHUNK_BOXES`]. The last crossing is repeated to fill the
@@ -363,8 +371,8 @@ impl Door {
         match *self {
             Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
             Self::Random { open, close } => {
-                let toggles = if is_open { close.sample(draw()) } else { open.sample(draw()) };
-                is_open != toggles
+                let chance = if is_open { close } else { open };
+                is_open != chance.sample(draw())
             }
         }
     }
@@ -373,7 +381,7 @@ impl Door {
 /// Radio contact between robots.
 #[derive(Debug, Clone, Copy)]
 pub struct Radio {
-    /// Square of the range, in half boxes.
+    /// Square of the range, in half boxes, so that the distance of two centers is compared with it as an integer.
     pub(super) reach2_half_boxes: u64,
     /// Chance that a reception is lost.
     pub(super) loss: Bernoulli,
@@ -422,10 +430,10 @@ impl RobotsWorld {
 
     /// Returns the indices in the padded grid of the map's boxes, row by row.
     pub(super) fn map_indices(&self) -> impl Iterator<Item = usize> + '_ {
-        let (width, height) = (self.map.width(), self.map.height());
-        (0..height).flat_map(move |row| {
+        let width = self.map.width() as usize;
+        (0..self.map.height()).flat_map(move |row| {
             let first = ((row + self.border) * self.stride + self.border) as usize;
-            first..first + width as usize
+            first..first + width
         })
     }
 }

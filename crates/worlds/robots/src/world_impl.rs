@@ -1,4 +1,4 @@
-//! The hooks by which a run asks the world for more than its phases.
+//! The hooks of a run beside the phases: start, recording, checkpoints, frames, control and metrics.
 
 use super::metrics::Metrics;
 use super::rows::Collector;
@@ -14,8 +14,8 @@ use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{Description, KeyValues};
 use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
 use sidestep_kernel::{
-    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
-    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+    Cycle, Digest, InputError, Run, RunConfig, RunStart, RunStats, World, WorldCheckpoint,
+    WorldControl, WorldMetrics, WorldRecording, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -37,12 +37,13 @@ impl Compiled {
     /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
-        let (plan, books) = (self.plan(), Collector::new(self.record));
-        let start = RunStart { config: plan, state, collector: books };
+        let config = self.plan();
+        let collector = Collector::new(self.record);
+        let start = RunStart { config, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
-    /// Returns the plan that the scenario asks for.
+    /// Returns the settings of a run, as the scenario gives them.
     pub fn plan(&self) -> RunConfig {
         RunConfig {
             name: self.name.clone(),
@@ -55,18 +56,21 @@ impl Compiled {
     /// Returns the state at the start, by entity id.
     pub(crate) fn start_snapshot(&self) -> Snapshot {
         let kinds = self.world.kinds.len();
-        let record = |&(at, heading): &((u32, u32), u8)| BodyRecord {
-            at,
-            facing: Facing::from_heading(heading),
-            contact: LastContact::NONE,
-            memory: [0; 4],
-            voice: None,
-            counts: [0; 3],
-            trip: [0; 2],
-            contacts: vec![0; kinds],
-        };
+        let mut bodies = Vec::with_capacity(self.start.len());
+        for &(at, heading) in &*self.start {
+            bodies.push(BodyRecord {
+                at,
+                facing: Facing::from_heading(heading),
+                contact: LastContact::NONE,
+                memory: [0; 4],
+                voice: None,
+                counts: [0; 3],
+                trip: [0; 2],
+                contacts: vec![0; kinds],
+            });
+        }
         let visited = vec![0; self.world.map.cells().len().div_ceil(8)];
-        Snapshot { cycle: 0, bodies: self.start.iter().map(record).collect(), visited }
+        Snapshot { cycle: 0, bodies, visited }
     }
 }
 
@@ -81,47 +85,47 @@ impl World for RobotsWorld {
     }
 
     fn cycles_until_flush(&self, state: &RobotsState, _: &Collector, now: Cycle) -> u64 {
-        state.frames.as_ref().map_or(u64::MAX, |f| f.first + f.capacity as u64 - now)
+        state.frames.as_ref().map_or(u64::MAX, |poses| poses.first + poses.capacity as u64 - now)
     }
 
-    fn collect(&self, books: &mut Collector, scratch: &mut Scratch) {
-        books.collect(scratch);
+    fn collect(&self, collector: &mut Collector, scratch: &mut Scratch) {
+        collector.collect(scratch);
     }
 
-    fn commit(&self, books: &mut Collector) {
-        books.commit(self);
+    fn commit(&self, collector: &mut Collector) {
+        collector.commit(self);
     }
 }
 
 impl WorldRecording for RobotsWorld {
-    fn start_recording(&self, state: &mut RobotsState, books: &mut Collector, now: Cycle) {
-        books.start(self, state, now);
+    fn start_recording(&self, state: &mut RobotsState, collector: &mut Collector, now: Cycle) {
+        collector.start(self, state, now);
     }
 
-    fn enable_events(&self, books: &mut Collector) {
-        books.watch();
+    fn enable_events(&self, collector: &mut Collector) {
+        collector.watch();
     }
 
-    fn enable_odometry(&self, books: &mut Collector) {
-        books.watch_odometry(self);
+    fn enable_odometry(&self, collector: &mut Collector) {
+        collector.watch_odometry(self);
     }
 
-    fn prepare(&self, books: &Collector, scratch: &mut Scratch) {
-        books.prepare(scratch);
+    fn prepare(&self, collector: &Collector, scratch: &mut Scratch) {
+        collector.prepare(scratch);
     }
 
-    fn schemas(&self, books: &Collector) -> Vec<TableSchema> {
-        books.schemas()
+    fn schemas(&self, collector: &Collector) -> Vec<TableSchema> {
+        collector.schemas()
     }
 
     fn record(
         &self,
         state: &mut RobotsState,
-        books: &mut Collector,
+        collector: &mut Collector,
         now: Cycle,
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError> {
-        books.record(self, state, now, recorder)
+        collector.record(self, state, now, recorder)
     }
 
     fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
@@ -143,7 +147,7 @@ impl WorldCheckpoint for RobotsWorld {
     fn restore(
         &self,
         saved: Snapshot,
-        books: &mut Collector,
+        collector: &mut Collector,
     ) -> Result<RobotsState, CheckpointError> {
         let fits = saved.bodies.len() == self.bodies.len()
             && saved.visited.len() == self.map.cells().len().div_ceil(8);
@@ -151,7 +155,7 @@ impl WorldCheckpoint for RobotsWorld {
             return Err(CheckpointError::Damaged);
         }
         let mut state = RobotsState::restore(self, &saved);
-        books.resume(self, &mut state, saved.cycle);
+        collector.resume(self, &mut state, saved.cycle);
         Ok(state)
     }
 }
@@ -164,17 +168,17 @@ impl WorldView for RobotsWorld {
     fn frame(
         &self,
         state: &RobotsState,
-        books: &mut Collector,
+        collector: &mut Collector,
         now: Cycle,
-        look: FrameOptions,
+        options: FrameOptions,
     ) -> Frame {
-        let (events, log_left_out) = books.log.take();
+        let (events, log_left_out) = collector.log.take();
         Frame {
             cycle: now,
             time_s: now as f64 * CYCLE_S,
             bodies: self.visible_bodies(state),
-            scans: self.scans(state, now, &look.scans),
-            odometry: self.odometry_poses(books.odometry()),
+            scans: self.scans(state, now, &options.scans),
+            odometry: self.odometry_poses(collector.odometry()),
             log: events.iter().map(|event| self.view_event(event)).collect(),
             log_left_out,
         }
@@ -185,9 +189,9 @@ impl WorldView for RobotsWorld {
         state: &RobotsState,
         _: &Collector,
         now: Cycle,
-        who: BodyId,
+        body: BodyId,
     ) -> Option<Inspection> {
-        RobotsWorld::inspect(self, state, now, who)
+        RobotsWorld::inspect(self, state, now, body)
     }
 }
 
@@ -200,27 +204,21 @@ impl WorldControl for RobotsWorld {
         self.record_order(state, order);
     }
 
-    fn observe(&self, state: &RobotsState, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
-        RobotsWorld::observe(self, state, now, team, room);
+    fn observe(&self, state: &RobotsState, now: Cycle, team: usize, buffers: &mut [BufferMut<'_>]) {
+        RobotsWorld::observe(self, state, now, team, buffers);
     }
 }
 
 impl WorldMetrics for RobotsWorld {
     type Metrics = Metrics;
 
-    fn metrics(
-        &self,
-        state: &RobotsState,
-        _: &Collector,
-        now: Cycle,
-        effort: &RunStats,
-    ) -> Metrics {
-        RobotsWorld::metrics(self, state, now, &effort.groups)
+    fn metrics(&self, state: &RobotsState, _: &Collector, now: Cycle, stats: &RunStats) -> Metrics {
+        RobotsWorld::metrics(self, state, now, &stats.groups)
     }
 
     fn agent_metrics(&self, state: &RobotsState, _: &Collector, now: Cycle) -> Value {
-        let one = |&id: &EntityId| json!({ "body": id, "counts": self.counts(state, now, id) });
-        self.robots.iter().map(one).collect()
+        let robots = self.robots.iter();
+        robots.map(|&id| json!({ "body": id, "counts": self.counts(state, now, id) })).collect()
     }
 
     fn summary_lines(&self, metrics: &Metrics) -> KeyValues {

@@ -6,8 +6,8 @@ use super::{RobotsWorld, bundle, remarks, text};
 use sidestep_kernel::text::Description;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, MetricInfo, Remark, ResolvedScenario, SeedEffect, Source,
-    WorldType,
+    CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
+    Source, WorldFacts, WorldType,
 };
 use std::any::Any;
 use std::sync::Arc;
@@ -72,7 +72,15 @@ impl WorldType for Robots {
     }
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
-        super::metric_info::METRIC_INFO
+        &super::metric_info::METRIC_INFO
+    }
+
+    fn facts(&self) -> WorldFacts {
+        super::facts::FACTS
+    }
+
+    fn editing(&self) -> Editing {
+        super::facts::editing()
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
@@ -103,10 +111,11 @@ impl AnyCompiled for Compiled {
     }
 
     fn seed_effect(&self) -> SeedEffect {
-        match self.is_always_random() {
-            true => SeedEffect::Decide,
-            // Behaviors and conflicts may draw: runs show it.
-            false => SeedEffect::Perhaps,
+        if self.is_always_random() {
+            SeedEffect::Decide
+        } else {
+            // Behaviors and conflicts may draw, which only runs show.
+            SeedEffect::Perhaps
         }
     }
 

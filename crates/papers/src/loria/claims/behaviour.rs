@@ -2,9 +2,10 @@
 
 use super::super::LoriaReport;
 use super::super::floor::AvoidancePolicy;
+use super::super::measure::Measure;
 use super::super::reliability::{
-    CONTACTS, EFFECTORS, INCONCLUSIVE, LATERAL, ReliabilityResults, SENSORS, STRAIGHTNESS,
-    SweepCase, TRIP, VariantKey,
+    CONTACTS, DominantError, EFFECTORS, INCONCLUSIVE, LATERAL, ReliabilityResults, SENSORS,
+    STRAIGHTNESS, SweepCase, TRIP, VariantKey,
 };
 use super::{Claim, ThresholdTest, Verdict, claim, judge_thresholds};
 use sidestep::worlds::robots::world::Regime::{self, Both, Effectors, Reliable, Sensors};
@@ -18,89 +19,98 @@ pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
 fn zigzag(r: &ReliabilityResults) -> Claim {
     let bent = r.difference(VariantKey::BASE, [Both, Reliable], STRAIGHTNESS);
     let lateral = r.difference(VariantKey::BASE, [Both, Reliable], LATERAL);
-    let means = |measure| by_regime(|regime| r.estimate(VariantKey::BASE, regime, measure));
     claim(
         "E-8",
         judge_thresholds([ThresholdTest::below(&bent, 0.0), ThresholdTest::above(&lateral, 0.0)]),
         format!(
             "Straightness: {}; both - reliable {bent}. Sideways moves per 1000 actions: {}; both - \
              reliable {lateral}.",
-            means(STRAIGHTNESS),
-            means(LATERAL),
+            by_regime(r, STRAIGHTNESS),
+            by_regime(r, LATERAL),
         ),
     )
 }
 
-/// Returns a measure under each regime, in words.
-fn by_regime(of: impl Fn(Regime) -> Estimate) -> String {
-    Regime::ALL.map(|regime| format!("{} {}", regime.name(), of(regime))).join(", ")
+/// Returns a measure of the base variant under each regime, in words.
+fn by_regime(r: &ReliabilityResults, measure: Measure) -> String {
+    let texts = Regime::ALL.map(|regime| {
+        let mean = r.estimate(VariantKey::BASE, regime, measure);
+        format!("{} {mean}", regime.name())
+    });
+    texts.join(", ")
 }
 
 fn collisions(r: &ReliabilityResults) -> Claim {
     let places = r.base_keys();
-    let more = |key, pair| ThresholdTest::above(&r.difference(key, pair, CONTACTS), 0.0);
-    let orders = |&key: &VariantKey<'static>| {
-        [[Sensors, Effectors], [Effectors, Reliable]].map(|p| more(key, p))
-    };
-    let at_places = places.iter().flat_map(orders);
-    let larger = r.dominant_errors();
-    let at_levels = larger.iter().map(|l| ThresholdTest::above(&l.sensors_less_effectors, 0.0));
-    let count = |name| larger.iter().filter(|l| l.by == name).count();
-    let above = |pair| {
-        let is = |key: &&VariantKey<'static>| r.difference(**key, pair, CONTACTS).is_above(0.0);
-        places.iter().filter(is).count()
-    };
+    let mut tests = Vec::new();
+    // How many places have the sensors above the effectors, and the effectors above none.
+    let mut places_above = [0, 0];
+    for &place in &places {
+        for (k, pair) in [[Sensors, Effectors], [Effectors, Reliable]].into_iter().enumerate() {
+            let difference = r.difference(place, pair, CONTACTS);
+            tests.push(ThresholdTest::above(&difference, 0.0));
+            places_above[k] += usize::from(difference.is_above(0.0));
+        }
+    }
+    let points = r.dominant_errors();
+    tests.extend(points.iter().map(|p| ThresholdTest::above(&p.sensors_less_effectors, 0.0)));
+    let [sensors_more, effectors_more, inconclusive] = [SENSORS, EFFECTORS, INCONCLUSIVE]
+        .map(|errors| points.iter().filter(|point| point.by == errors).count());
     claim(
         "E-9",
-        judge_thresholds(at_places.chain(at_levels)),
+        judge_thresholds(tests),
         format!(
             "Presets, rule cut, per 1000 actions: {}; sensors - effectors {}. Sensors are above \
              effectors at {} of {} places (floors, rules, behaviors), and effectors above \
              reliable at {}. At equal error level, of {} points: sensors more at {}, effectors at {}, \
              not to be told at {} (by Holm). {}",
-            by_regime(|regime| r.estimate(VariantKey::BASE, regime, CONTACTS)),
+            by_regime(r, CONTACTS),
             r.difference(VariantKey::BASE, [Sensors, Effectors], CONTACTS),
-            above([Sensors, Effectors]),
+            places_above[0],
             places.len(),
-            above([Effectors, Reliable]),
-            larger.len(),
-            count(SENSORS),
-            count(EFFECTORS),
-            count(INCONCLUSIVE),
-            flips(r),
+            places_above[1],
+            points.len(),
+            sensors_more,
+            effectors_more,
+            inconclusive,
+            flips(&points),
         ),
     )
 }
 
 /// Returns the error level from which on sensors cause more contacts, by case of the sweep.
-fn flips(r: &ReliabilityResults) -> String {
-    let larger = r.dominant_errors();
-    let sentence = |case: SweepCase| {
-        let levels = larger.iter().rev().filter(|l| l.case == case);
-        // The first level from which on sensors stay worse.
-        let first = levels.take_while(|l| l.by == SENSORS).last();
+fn flips(points: &[DominantError]) -> String {
+    let mut texts = Vec::new();
+    for case in SweepCase::all() {
+        // From the highest level down, so that sensors stay worse from the level found on.
+        let downward = points.iter().rev().filter(|point| point.case == case);
+        let first = downward.take_while(|point| point.by == SENSORS).last();
+        let from = match first {
+            None => "at no level".into(),
+            Some(point) => format!("from e = {} on", point.level),
+        };
         let [mind, beams, spread] = case.names();
-        let from = first.map_or("at no level".into(), |l| format!("from e = {} on", l.level));
-        format!("{mind}, {beams} beams, {spread}: {from}")
-    };
-    let cases: Vec<String> = SweepCase::all().map(sentence).collect();
-    format!("Sensors cause more, by behavior, beams and recipe: {}.", cases.join("; "))
+        texts.push(format!("{mind}, {beams} beams, {spread}: {from}"));
+    }
+    format!("Sensors cause more, by behavior, beams and recipe: {}.", texts.join("; "))
 }
 
 fn slowest_trips(r: &ReliabilityResults) -> Claim {
-    let longer = |key, other| r.difference(key, [Both, other], TRIP);
-    let others = [Reliable, Effectors, Sensors];
     let places = r.base_keys();
-    let each = places.iter().flat_map(|&key| others.map(|other| longer(key, other)));
-    let slowest =
-        |&key: &VariantKey<'static>| others.iter().all(|other| longer(key, *other).is_above(0.0));
-    let held = places.iter().filter(|key| slowest(key)).count();
+    let mut tests = Vec::new();
+    let mut held = 0;
+    for &place in &places {
+        let longer =
+            [Reliable, Effectors, Sensors].map(|other| r.difference(place, [Both, other], TRIP));
+        tests.extend(longer.iter().map(|longer| ThresholdTest::above(longer, 0.0)));
+        held += usize::from(longer.iter().all(|longer| longer.is_above(0.0)));
+    }
     claim(
         "E-10a",
-        judge_thresholds(each.map(|longer| ThresholdTest::above(&longer, 0.0))),
+        judge_thresholds(tests),
         format!(
             "Cycles per trip: {}. Both are slowest at {held} of {} places.",
-            by_regime(|regime| r.estimate(VariantKey::BASE, regime, TRIP)),
+            by_regime(r, TRIP),
             places.len()
         ),
     )
@@ -114,31 +124,27 @@ fn trip_ratios(r: &ReliabilityResults) -> Claim {
         [Both, Sensors],
         [Both, Effectors],
     ];
-    let ratio = |[a, b]: [Regime; 2]| {
+    let ratios = pairs.map(|[a, b]| {
         format!("{} / {} {}", a.name(), b.name(), r.ratio(VariantKey::BASE, [a, b], TRIP))
-    };
-    claim("E-10b", Verdict::Lost, format!("Seed by seed: {}.", pairs.map(ratio).join("; ")))
+    });
+    claim("E-10b", Verdict::Lost, format!("Seed by seed: {}.", ratios.join("; ")))
 }
 
 fn behaviours(r: &ReliabilityResults) -> Claim {
-    let saved = |regime| {
-        r.between_policies([AvoidancePolicy::Avoid, AvoidancePolicy::Filter], regime, TRIP)
-    };
-    let contacts = |regime| {
-        r.between_policies([AvoidancePolicy::Filter, AvoidancePolicy::Avoid], regime, CONTACTS)
-    };
+    let plain_less_filtered = [AvoidancePolicy::Avoid, AvoidancePolicy::Filter];
+    let filtered_less_plain = [AvoidancePolicy::Filter, AvoidancePolicy::Avoid];
+    let [saved_reliable, saved_both] =
+        [Reliable, Both].map(|regime| r.between_policies(plain_less_filtered, regime, TRIP));
+    let [contacts_reliable, contacts_both] =
+        [Reliable, Both].map(|regime| r.between_policies(filtered_less_plain, regime, CONTACTS));
     let more = difference_of_savings(r);
     claim(
         "E-11",
-        judge_thresholds([saved(Both), more].map(|saved| ThresholdTest::above(&saved, 0.0))),
+        judge_thresholds([saved_both, more].map(|saved| ThresholdTest::above(&saved, 0.0))),
         format!(
             "A filter (two reports before a robot believes its side beams) saves cycles per \
-             trip: reliable {}, both {}, the second less the first {more}. It costs contacts per \
-             1000 actions: reliable {}, both {}.",
-            saved(Reliable),
-            saved(Both),
-            contacts(Reliable),
-            contacts(Both),
+             trip: reliable {saved_reliable}, both {saved_both}, the second less the first {more}. It costs contacts per \
+             1000 actions: reliable {contacts_reliable}, both {contacts_both}.",
         ),
     )
 }
@@ -146,11 +152,12 @@ fn behaviours(r: &ReliabilityResults) -> Claim {
 /// Returns the cycles that the filter saves under both errors, minus those that it saves without
 /// any.
 fn difference_of_savings(r: &ReliabilityResults) -> Estimate {
-    let of = |mind, regime| r.values(VariantKey { mind, ..VariantKey::BASE }, regime, TRIP);
-    let saved = |regime| -> Vec<Option<f64>> {
-        let (plain, filtered) =
-            (of(AvoidancePolicy::Avoid, regime), of(AvoidancePolicy::Filter, regime));
-        plain.iter().zip(&filtered).map(|(a, b)| Some((*a)? - (*b)?)).collect()
-    };
-    Estimate::paired_difference(&saved(Both), &saved(Reliable))
+    Estimate::paired_difference(&saved_by_filter(r, Both), &saved_by_filter(r, Reliable))
+}
+
+/// Returns the cycles of a trip that the filter saves under a regime, by seed.
+fn saved_by_filter(r: &ReliabilityResults, regime: Regime) -> Vec<Option<f64>> {
+    let [plain, filtered] = [AvoidancePolicy::Avoid, AvoidancePolicy::Filter]
+        .map(|mind| r.values(VariantKey { mind, ..VariantKey::BASE }, regime, TRIP));
+    plain.iter().zip(&filtered).map(|(a, b)| Some((*a)? - (*b)?)).collect()
 }

@@ -10,6 +10,7 @@ mod tests;
 mod time;
 
 use super::LoriaReport;
+use super::performance::PerformanceResults;
 use crate::claims::{ClaimsFile, PaperClaims, ThresholdTest, judge_every_run, judge_thresholds};
 use sidestep_document::claim::{Claim, Verdict};
 
@@ -28,4 +29,10 @@ pub(super) static CLAIMS: PaperClaims =
 /// Returns a claim by its number, its verdict, and our figures.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     CLAIMS.claim(id, verdict, ours.into())
+}
+
+/// Returns a claim whose rule states the number of processors of the machine at hand.
+fn with_processors(performance: &PerformanceResults, claim: Claim) -> Claim {
+    let reason = claim.reason.replace("{processors}", &performance.processors.to_string());
+    Claim { reason, ..claim }
 }

@@ -1,7 +1,7 @@
 //! E-1 to E-7: the setting of the experiments.
 
 use super::super::LoriaReport;
-use super::{Claim, Verdict, claim, judge_every_run};
+use super::{Claim, Verdict, claim, judge_every_run, with_processors};
 
 pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
     vec![
@@ -38,17 +38,8 @@ fn floors(report: &LoriaReport) -> Claim {
 fn processors(report: &LoriaReport) -> Claim {
     let p = &report.performance;
     let workers: Vec<String> = p.digests.iter().map(|d| d.0.to_string()).collect();
-    Claim {
-        reason: format!(
-            "Says what was run, on {} processors; whether the bits are the same is E-4.",
-            p.processors
-        ),
-        ..claim(
-            "E-3",
-            Verdict::Setting,
-            format!("Workers {}: {}.", workers.join(", "), digests(report)),
-        )
-    }
+    let ours = format!("Workers {}: {}.", workers.join(", "), digests(report));
+    with_processors(p, claim("E-3", Verdict::Setting, ours))
 }
 
 fn sequential(report: &LoriaReport) -> Claim {
@@ -68,10 +59,6 @@ fn digests(report: &LoriaReport) -> &'static str {
     if report.performance.is_deterministic() { "one digest" } else { "different digests" }
 }
 
-/// The rule by which a build is judged generic.
-const GENERIC: &str = "Held when in every run every robot acts in every cycle and no two bodies \
-                       come to share a box";
-
 /// Describes runs with or without a camera, and returns whether all kept the laws.
 fn builds(report: &LoriaReport, camera: bool) -> (String, Verdict) {
     let [lawful, with_trips, all] = report.genericity.runs(camera);
@@ -85,23 +72,14 @@ fn builds(report: &LoriaReport, camera: bool) -> (String, Verdict) {
 
 fn sizes(report: &LoriaReport) -> Claim {
     let (ours, verdict) = builds(report, false);
-    Claim {
-        reason: format!("{GENERIC}; only `size` of the scenario changes, no source."),
-        ..claim("E-5", verdict, format!("{ours}."))
-    }
+    claim("E-5", verdict, format!("{ours}."))
 }
 
 fn camera(report: &LoriaReport) -> Claim {
     let (ours, verdict) = builds(report, true);
     let effect = report.genericity.camera_effect();
-    Claim {
-        reason: format!("{GENERIC}; only `sensors` of the scenario changes, no source."),
-        ..claim(
-            "E-6",
-            verdict,
-            format!("{ours}; contacts per 1000 actions with the camera less without: {effect}."),
-        )
-    }
+    let ours = format!("{ours}; contacts per 1000 actions with the camera less without: {effect}.");
+    claim("E-6", verdict, ours)
 }
 
 fn regimes(report: &LoriaReport) -> Claim {

@@ -1,16 +1,11 @@
 //! E-12 to E-15 and P-3: time, and its parts.
 
 use super::super::LoriaReport;
+use super::super::cost_model::CostModel;
 use super::super::performance::{LoadTiming, PerformanceResults, REFERENCE_CYCLES};
-use super::{Claim, ThresholdTest, Verdict, claim, judge_thresholds};
+use super::{CLAIMS, Claim, ThresholdTest, Verdict, claim, judge_thresholds, with_processors};
 use sidestep::worlds::robots::baseline::Strategy;
 use sidestep_document::Estimate;
-
-/// Share below which initialization is called small.
-const SMALL_SHARE: f64 = 0.05;
-
-/// Efficiency with the most workers below which it is said to fall quickly.
-const LOW_EFFICIENCY: f64 = 0.75;
 
 pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
     let p = &report.performance;
@@ -27,25 +22,19 @@ pub(super) fn claims(report: &LoriaReport) -> Vec<Claim> {
 }
 
 fn initialization(p: &PerformanceResults) -> Claim {
-    let shares = || p.initialization.iter().map(|i| i.share_alone);
-    let worst = shares().max_by(|a, b| a.mean_or_zero().total_cmp(&b.mean_or_zero()));
-    Claim {
-        reason: format!(
-            "Held when below {:.0} % for every load, by its interval over repeats; the paper's share and \
-             cycles are lost.",
-            100.0 * SMALL_SHARE
-        ),
-        ..claim(
-            "E-12",
-            judge_thresholds(shares().map(|share| ThresholdTest::below(&share, SMALL_SHARE))),
-            format!(
-                "Initialization takes up to {} of a run of {REFERENCE_CYCLES} cycles with one \
+    let shares: Vec<Estimate> = p.initialization.iter().map(|i| i.share_alone).collect();
+    let worst = shares.iter().max_by(|a, b| a.mean_or_zero().total_cmp(&b.mean_or_zero()));
+    let small_share = CLAIMS.threshold("E-12");
+    claim(
+        "E-12",
+        judge_thresholds(shares.iter().map(|share| ThresholdTest::below(share, small_share))),
+        format!(
+            "Initialization takes up to {} of a run of {REFERENCE_CYCLES} cycles with one \
              worker (share, largest of {} loads).",
-                worst.map_or("-".into(), |share| share.to_string()),
-                p.loads.len()
-            ),
-        )
-    }
+            worst.map_or("-".into(), |share| share.to_string()),
+            p.loads.len()
+        ),
+    )
 }
 
 /// Returns whether time over workers decides nothing: there is one processor, or others were using them.
@@ -64,10 +53,11 @@ fn unless_inconclusive(p: &PerformanceResults, verdict: Verdict) -> Verdict {
 fn time_falls(report: &LoriaReport) -> Claim {
     let p = &report.performance;
     let most = p.max_workers();
-    let timings = || p.at_max_workers(false).chain(p.at_max_workers(true));
-    let falls =
-        judge_thresholds(timings().map(|timing| ThresholdTest::above(&timing.speed_up, 1.0)));
-    let machine = Estimate::from_values(timings().map(|timing| timing.machine.mean));
+    let timings: Vec<&LoadTiming> = p.at_max_workers(false).chain(p.at_max_workers(true)).collect();
+    let min_speed_up = CLAIMS.threshold("E-13a");
+    let tests = timings.iter().map(|timing| ThresholdTest::above(&timing.speed_up, min_speed_up));
+    let falls = judge_thresholds(tests);
+    let machine = Estimate::from_values(timings.iter().map(|timing| timing.machine.mean));
     claim(
         "E-13a",
         unless_inconclusive(p, falls),
@@ -97,25 +87,16 @@ fn efficiency_falls(p: &PerformanceResults) -> Claim {
         .map(|t| format!("{:.2}", t.speed_up.mean_or_zero() / most as f64))
         .collect();
     let efficiency = p.efficiency();
-    Claim {
-        reason: format!(
-            "Held when the mean efficiency of all loads is below {LOW_EFFICIENCY} by its interval over \
-             repeats; undecided where others were using the machine. The paper went to sixteen \
-             processors; {} can show the beginning of a fall only.",
-            p.processors
-        ),
-        ..claim(
-            "E-13b",
-            match is_time_inconclusive(p) {
-                true => Verdict::Undecided,
-                false => judge_thresholds([ThresholdTest::below(&efficiency, LOW_EFFICIENCY)]),
-            },
-            format!(
-                "Efficiency with {most} workers, unrecorded: {efficiency}; by load: {}.",
-                by_load.join(", ")
-            ),
-        )
-    }
+    let verdict = if is_time_inconclusive(p) {
+        Verdict::Undecided
+    } else {
+        judge_thresholds([ThresholdTest::below(&efficiency, CLAIMS.threshold("E-13b"))])
+    };
+    let ours = format!(
+        "Efficiency with {most} workers, unrecorded: {efficiency}; by load: {}.",
+        by_load.join(", ")
+    );
+    with_processors(p, claim("E-13b", verdict, ours))
 }
 
 fn lost_speed_up(p: &PerformanceResults) -> Claim {
@@ -132,46 +113,40 @@ fn second_machine() -> Claim {
 
 fn costly_decisions(p: &PerformanceResults) -> Claim {
     let gain = p.gain_by_cost();
-    let operations = || p.loads.iter().map(|load| load.operations);
-    let (least, most) = (operations().min().unwrap_or(0), operations().max().unwrap_or(0));
-    let speed_up = |cost: u32| {
-        let timings = p.at_max_workers(false).filter(|t| p.loads[t.load].operations == cost);
-        Estimate::from_factors(timings.flat_map(|timing| timing.ratios.iter().copied()))
+    let least = p.loads.iter().map(|load| load.operations).min().unwrap_or(0);
+    let most = p.loads.iter().map(|load| load.operations).max().unwrap_or(0);
+    let verdict = if is_time_inconclusive(p) {
+        Verdict::Undecided
+    } else {
+        judge_thresholds([ThresholdTest::above(&gain, 0.0)])
     };
-    claim(
-        "E-15a",
-        match is_time_inconclusive(p) {
-            true => Verdict::Undecided,
-            false => judge_thresholds([ThresholdTest::above(&gain, 0.0)]),
-        },
-        format!(
-            "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
-             difference {gain}.",
-            p.max_workers(),
-            speed_up(least),
-            speed_up(most),
-        ),
-    )
+    let ours = format!(
+        "Speed-up with {} workers: {} at {least} operations per decision, {} at {most}; \
+         difference {gain}.",
+        p.max_workers(),
+        speed_up_at_cost(p, least),
+        speed_up_at_cost(p, most),
+    );
+    claim("E-15a", verdict, ours)
+}
+
+/// Returns the speed-up of all loads with decisions of this cost, unrecorded, with the most workers.
+fn speed_up_at_cost(p: &PerformanceResults, operations: u32) -> Estimate {
+    let timings = p.at_max_workers(false).filter(|t| p.loads[t.load].operations == operations);
+    Estimate::from_factors(timings.flat_map(|timing| timing.ratios.iter().copied()))
 }
 
 fn conflicts(report: &LoriaReport) -> Claim {
     let model = &report.cost_model;
     let c_s = model.parameter("c_s").and_then(|p| p.interval_ns);
-    let shown = |name: &str| match model.parameter(name) {
-        None => "not to be told".into(),
-        Some(p) => match p.interval_ns {
-            None => format!("{:.0} ns", p.value_ns),
-            Some(i) => format!("{:.0} ns [{:.0}, {:.0}]", p.value_ns, i.low, i.high),
-        },
-    };
     claim(
         "E-15b",
         judge_thresholds([ThresholdTest::interval_above(c_s, 0.0)]),
         format!(
             "Per body in conflict c_s = {}, besides c_d = {} for every body; p = {:.3} to {:.3}; \
              {} runs, R2 of the second step {:.3}.",
-            shown("c_s"),
-            shown("c_d"),
+            parameter_text(model, "c_s"),
+            parameter_text(model, "c_d"),
             model.conflict_share.0,
             model.conflict_share.1,
             model.points.len(),
@@ -180,28 +155,38 @@ fn conflicts(report: &LoriaReport) -> Claim {
     )
 }
 
+fn parameter_text(model: &CostModel, name: &str) -> String {
+    let Some(parameter) = model.parameter(name) else { return "not to be told".into() };
+    let value_ns = parameter.value_ns;
+    match parameter.interval_ns {
+        None => format!("{value_ns:.0} ns"),
+        Some(i) => format!("{value_ns:.0} ns [{:.0}, {:.0}]", i.low, i.high),
+    }
+}
+
 /// Judges the claim about strategies that the paper rejects before any experiment.
 fn rejected(report: &LoriaReport) -> Claim {
-    let s = &report.strategies;
-    let leads = Strategy::ALL.map(|strategy| (strategy.name(), s.lead_over(strategy)));
-    let all = || leads.iter().flat_map(|(_, leads)| leads);
-    let shown = leads.iter().map(|(name, leads)| {
+    let mut tests = Vec::new();
+    let mut texts = Vec::new();
+    for strategy in Strategy::ALL {
+        let leads = report.strategies.lead_over(strategy);
+        tests.extend(leads.iter().map(|lead| ThresholdTest::above(lead, 0.0)));
         let ahead = leads.iter().filter(|lead| lead.is_above(0.0)).count();
         let behind = leads.iter().filter(|lead| lead.is_below(0.0)).count();
         let listed: Vec<String> = leads.iter().map(ToString::to_string).collect();
-        format!(
-            "over {name}: ahead at {ahead}, behind at {behind} of {} loads ({})",
+        texts.push(format!(
+            "over {}: ahead at {ahead}, behind at {behind} of {} loads ({})",
+            strategy.name(),
             leads.len(),
             listed.join("; ")
-        )
-    });
-    let ahead = judge_thresholds(all().map(|lead| ThresholdTest::above(lead, 0.0)));
+        ));
+    }
     claim(
         "P-3",
-        unless_inconclusive(&report.performance, ahead),
+        unless_inconclusive(&report.performance, judge_thresholds(tests)),
         format!(
             "Speed-up of the double pool with the most workers less that of the other, {}.",
-            shown.collect::<Vec<_>>().join("; ")
+            texts.join("; ")
         ),
     )
 }

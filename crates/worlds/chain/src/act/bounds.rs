@@ -3,7 +3,7 @@
 use super::joints::ArmFollower;
 use super::{ActState, ChainContext};
 use crate::events::{Event, EventKind};
-use crate::motion::escape::Escaper;
+use crate::motion::escape::{EscapeTick, Escaper};
 use crate::scratch::PositionBuffer;
 use crate::state::Body;
 use sidestep_rods::geometry::{Bounds, distance, with_dimensions};
@@ -31,13 +31,13 @@ impl<const D: usize> EscapeContext<'_, D> {
     ) -> bool {
         let Some(escaper) = &mut self.escaper else { return false };
         let ActState { body, before, propagator, sink, .. } = acting;
-        let escaped = escaper.escape(
-            &mut body.chain,
-            context.obstacles,
+        let tick = EscapeTick {
+            chain: &mut body.chain,
+            obstacles: context.obstacles,
             propagator,
-            &before.points,
-            &mut body.escape_plan,
-        );
+            start: &before.points,
+        };
+        let escaped = escaper.escape(tick, &mut body.escape_plan);
         // Beyond the range of coordinates there is no escape.
         let Ok(escaped) = escaped else { return false };
         if let Some(mut arm) = ArmFollower::from_body(context, before, body) {

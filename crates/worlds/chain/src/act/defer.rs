@@ -12,7 +12,7 @@ use sidestep_rods::{Chain, CompletedMotion, MAX_COORDINATE_M};
 /// measures all rods, so that later only those count that move.
 pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> bool {
     let world = context.world;
-    let leads_in_range = |task: &Task<D>| leads_in_range(task, &body.chain, world.dt_s);
+    let Some(task) = context.task(body) else { return false };
     world.is_open()
         && world.rules.step_m.is_none()
         && context.spec.robots.is_none()
@@ -20,7 +20,7 @@ pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Bod
         && body.chain.is_plain()
         && body.tally.steps > 0
         && !body.driving.ladder.is_pulling_back()
-        && context.task(body).is_some_and(leads_in_range)
+        && leads_in_range(task, &body.chain, world.dt_s)
 }
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
@@ -40,14 +40,15 @@ pub(super) fn move_initiator_only<const D: usize>(
     let world = initiator.context.world;
     let goal_m = goal_distance_m(initiator.task, body);
     body.driving.ladder.record_free_motion(initiator.task.source(), goal_m, &world.rungs);
-    let way_m = distance(body.chain.points()[0], to);
-    if way_m > body.chain.min_move_m() {
+    let step_m = distance(body.chain.points()[0], to);
+    if step_m > body.chain.min_move_m() {
         let dt_s = world.dt_s;
-        body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(way_m / dt_s);
+        body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(step_m / dt_s);
         if body.deferred.move_initiator(&mut body.chain, to, dt_s) {
             body.catch_up();
         }
     }
+    // What the chain moves is counted when it follows.
     let nothing = CompletedMotion {
         touched: 0..0,
         changed: 0,

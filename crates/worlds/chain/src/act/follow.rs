@@ -8,7 +8,7 @@ use crate::formation::{Robot, Robots};
 use crate::state::Body;
 use crate::swarm::drive::Pose2;
 use crate::swarm::follower::{Follower, TrackingTarget};
-use crate::swarm::laser::RobotBody;
+use crate::swarm::laser::{NearbyBodies, RobotBody};
 use sidestep_kernel::math::{atan2, wrap_angle};
 use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
@@ -95,8 +95,9 @@ impl<const D: usize> FollowContext<'_, D> {
             velocity_m_s = [0.0; 2];
         }
         let others = self.robots.iter().enumerate().filter(move |(i, _)| *i != k).map(|(_, o)| *o);
+        let around = NearbyBodies { obstacles: solid, robots: others };
         let goal = TrackingTarget { at, velocity_m_s };
-        let followed = self.follower.follow(&body.robots[k].pose, &goal, solid, others, dt_s);
+        let followed = self.follower.follow(&body.robots[k].pose, &goal, around, dt_s);
         let lag_m = distance(followed.pose.at, at);
         body.tally.robots.record(&followed, lag_m);
         if followed.is_bumped && !body.robots[k].is_bumped {

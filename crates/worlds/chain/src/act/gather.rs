@@ -131,16 +131,21 @@ impl<const D: usize> ScatteredParts<'_, D> {
 
     /// Returns the obstacle in the way of connectors, the first of which is `k`, and of the rods between them.
     fn blocking_obstacle(&self, k: usize, from: &[Point<D>], to: &[Point<D>]) -> Option<u32> {
-        let of_connector = |i: usize| {
+        for i in 0..from.len() {
             let sweep = Sweep { from: [from[i]; 2], to: [to[i]; 2] };
-            blocking_obstacle(sweep, self.chain.connectors()[k + i].radius_m, self.obstacles)
-        };
-        let of_rod = |i: usize| {
+            let radius_m = self.chain.connectors()[k + i].radius_m;
+            if let Some(id) = blocking_obstacle(sweep, radius_m, self.obstacles) {
+                return Some(id);
+            }
+        }
+        for i in 0..from.len().saturating_sub(1) {
             let sweep = Sweep { from: [from[i], from[i + 1]], to: [to[i], to[i + 1]] };
-            blocking_obstacle(sweep, self.chain.rods()[k + i].radius_m, self.obstacles)
-        };
-        let blocked = (0..from.len()).find_map(of_connector);
-        blocked.or_else(|| (0..from.len().saturating_sub(1)).find_map(of_rod))
+            let radius_m = self.chain.rods()[k + i].radius_m;
+            if let Some(id) = blocking_obstacle(sweep, radius_m, self.obstacles) {
+                return Some(id);
+            }
+        }
+        None
     }
 
     /// Returns an obstacle in which one of these rods would be, now that their ends are in place.

@@ -3,7 +3,7 @@
 use super::outcome::{MoveResult, record_result};
 use super::situation::{out_of_range_veto, situation};
 use super::{ActState, FollowMode, Initiator, defer, joints, negotiation};
-use crate::motion::recovery::{RecoveryLadder, RecoveryOutcome};
+use crate::motion::recovery::{DirectMover, RecoveryLadder, RecoveryOutcome};
 use sidestep_rods::geometry::{Point, distance, norm, sub};
 use sidestep_rods::{Motion, Request, VetoEffect};
 
@@ -46,13 +46,12 @@ fn request_motion<const D: usize>(
     let situation = situation(initiator, acting.body);
     let memory = std::mem::take(&mut acting.body.driving.ladder);
     let mut ladder = RecoveryLadder { rungs: context.world.rungs, memory };
-    let climbed = ladder.climb_with_veto(
-        &mut acting.body.chain,
-        context.obstacles,
-        acting.propagator,
-        &request,
-        &situation,
-    );
+    let mut mover = DirectMover {
+        chain: &mut acting.body.chain,
+        obstacles: context.obstacles,
+        propagator: acting.propagator,
+    };
+    let climbed = ladder.climb_with(&mut mover, &request, &situation);
     acting.body.driving.ladder = ladder.memory;
     let beyond = out_of_range_veto(&acting.body.chain, k);
     let (climbed, objection) = climbed.unwrap_or((RecoveryOutcome::Vetoed(beyond), Some(beyond)));

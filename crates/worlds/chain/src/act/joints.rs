@@ -20,7 +20,8 @@ use sidestep_rods::{
     Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
 };
 
-/// Fractions of a motion that are tried, each half of the one before.
+/// Fractions of a motion that are tried, each half of the one before: down to 1/32; less is not worth
+/// the search.
 const MAX_TRIES: usize = 6;
 /// Fractions of an escape that are tried; fewer, because escapes come in every cycle.
 const MAX_ESCAPE_TRIES: usize = 3;
@@ -50,6 +51,14 @@ struct ReferenceMotion<'b, const D: usize> {
     from: &'b [Point<D>],
     guide: Option<&'b [Point<D>]>,
     led: &'b [LeadTarget<D>],
+}
+
+impl<const D: usize> ReferenceMotion<'_, D> {
+    /// Returns where connector `k` is after a fraction of its way to `to`.
+    fn position(&self, k: usize, to: Point<D>, fraction: f64) -> Point<D> {
+        // An interpolation to the end would differ from it by rounding.
+        if fraction < 1.0 { lerp(self.from[k], to, fraction) } else { to }
+    }
 }
 
 /// An arm whose joints come along with its chain.
@@ -153,19 +162,18 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         let guided = ReferenceMotion { from: &from, guide, led };
         let free = ReferenceMotion { guide: None, ..guided };
         let mut objection = None;
-        let mut part = 1.0;
+        let mut fraction = 1.0;
         for _ in 0..tries {
             for wanted in [&guided, &free] {
-                let posed = self.solve_posture(wanted, part);
-                match self.find_veto(&from, &posed) {
-                    None => {
-                        self.adopt(posed);
-                        return Ok(());
-                    }
-                    objects => objection = objects,
+                let posed = self.solve_posture(wanted, fraction);
+                let veto = self.find_veto(&from, &posed);
+                if veto.is_none() {
+                    self.adopt(posed);
+                    return Ok(());
                 }
+                objection = veto;
             }
-            part *= 0.5;
+            fraction *= 0.5;
         }
         objection.map_or(Ok(()), Err)
     }
@@ -226,20 +234,17 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// Returns the posture in which the joints follow a part of a motion.
     fn solve_posture(&self, wanted: &ReferenceMotion<'_, D>, part: f64) -> ArmPosture<D> {
         let arm = self.arm;
-        let on_the_way = |k: usize, to: Point<D>| {
-            // An interpolation to the end would differ from it by rounding.
-            if part < 1.0 { lerp(wanted.from[k], to, part) } else { to }
-        };
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();
-            places.map(|(k, to)| arm.to_base(on_the_way(k, *to))).collect::<Vec<_>>()
+            places.map(|(k, to)| arm.to_base(wanted.position(k, *to, part))).collect::<Vec<_>>()
         });
-        let on_its_way =
-            |&LeadTarget { k, to }: &LeadTarget<D>| LeadTarget { k, to: on_the_way(k, to) };
-        let led: Vec<LeadTarget<D>> = wanted.led.iter().map(on_its_way).collect();
-        let aim =
-            |led: &LeadTarget<D>| ConnectorTarget { connector: led.k, at_m: arm.to_base(led.to) };
-        let aims: Vec<ConnectorTarget> = led.iter().map(aim).collect();
+        let mut led = Vec::with_capacity(wanted.led.len());
+        let mut aims = Vec::with_capacity(wanted.led.len());
+        for &LeadTarget { k, to } in wanted.led {
+            let to = wanted.position(k, to, part);
+            led.push(LeadTarget { k, to });
+            aims.push(ConnectorTarget { connector: k, at_m: arm.to_base(to) });
+        }
         let room = arm.follower.reachable_ranges(&self.before.joints, self.context.world.dt_s);
         let joints = arm.follower.track(self.joints, &room, guide.as_deref(), &aims);
         let points = arm.connector_positions(&joints);
@@ -251,37 +256,40 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     fn find_veto(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<Veto<D>> {
         let follower = &self.arm.follower;
         let k = posed.led.first().map_or(0, |led| led.k);
-        let veto = |by, reason| Veto { by, from: k, reason, obstacle: None, reached: from[k] };
-        let is_off = |led: &LeadTarget<D>| {
-            distance(posed.points[led.k], led.to) > follower.arrival_tolerance_m()
-        };
-        if posed.led.iter().any(is_off) {
-            let is_at_limit = follower.is_at_limit(&posed.joints);
-            return Some(veto(
-                k,
-                if is_at_limit { VetoReason::JointLimit } else { VetoReason::StepLimit },
-            ));
+        // A veto by the initiator for want of speed; the others differ from it in some fields.
+        let reason = VetoReason::StepLimit;
+        let too_slow = Veto { by: k, from: k, reason, obstacle: None, reached: from[k] };
+        let tolerance_m = follower.arrival_tolerance_m();
+        let mut led = posed.led.iter();
+        if led.any(|led| distance(posed.points[led.k], led.to) > tolerance_m) {
+            if follower.is_at_limit(&posed.joints) {
+                return Some(Veto { reason: VetoReason::JointLimit, ..too_slow });
+            }
+            return Some(too_slow);
         }
-        let is_fast = |i: &usize| self.is_too_fast(*i, from[*i], posed.points[*i]);
-        if let Some(by) = (0..from.len()).find(is_fast) {
-            return Some(veto(by, VetoReason::StepLimit));
+        if let Some(by) = (0..from.len()).find(|&i| self.is_too_fast(i, from[i], posed.points[i])) {
+            return Some(Veto { by, ..too_slow });
         }
         let ChainContext { world, obstacles, .. } = self.context;
         let is_solid = world.rules.self_collision;
         let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
-        let objection = space.find_veto(&posed.points);
-        let tunnels = |(by, id)| Veto { obstacle: Some(id), ..veto(by, VetoReason::WouldTunnel) };
-        objection.or_else(|| self.find_tunneling(from, posed).map(tunnels))
+        if let Some(veto) = space.find_veto(&posed.points) {
+            return Some(veto);
+        }
+        let (by, id) = self.find_tunneling(from, posed)?;
+        Some(Veto { by, reason: VetoReason::WouldTunnel, obstacle: Some(id), ..too_slow })
     }
 
     /// Returns whether a connector moves farther than it may: at the speed of led joints from where it was before this
     /// motion, or at that of escapes from where it was before the cycle.
     fn is_too_fast(&self, i: usize, from: Point<D>, to: Point<D>) -> bool {
         let world = self.context.world;
-        let escape_m = world.escape.as_ref().map(|e| e.speed_max_m_s * world.dt_s);
-        let is_beyond = |from, most_m: f64| distance(from, to) > most_m * (1.0 + ROUNDING);
-        is_beyond(from, world.rules.joint_step_max_m)
-            || escape_m.is_some_and(|most_m| is_beyond(self.before.points[i], most_m))
+        if distance(from, to) > world.rules.joint_step_max_m * (1.0 + ROUNDING) {
+            return true;
+        }
+        let Some(escape) = &world.escape else { return false };
+        let most_m = escape.speed_max_m_s * world.dt_s;
+        distance(self.before.points[i], to) > most_m * (1.0 + ROUNDING)
     }
 
     /// Returns the rod's outer connector and the obstacle that it would pass through on the way to a posture, if any.

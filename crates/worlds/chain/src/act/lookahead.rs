@@ -25,9 +25,10 @@ pub(super) fn should_yield<const D: usize>(
         // By slot, so that not all chains make their rollouts in the same cycle.
         Some(lead) if (context.now + u64::from(context.slot)).is_multiple_of(every) => {
             let rules = &context.world.rules;
-            let escape_plan = &mut body.escape_plan;
-            escaper.choose_leader_action(&body.chain, context.obstacles, rules, &lead, escape_plan);
+            let rests = escaper.should_rest(&body.chain, context.obstacles, rules, &lead);
+            body.escape_plan.set_resting(rests);
         }
+        // Between two choices the last one holds.
         Some(_) => {}
     }
     body.escape_plan.is_resting()

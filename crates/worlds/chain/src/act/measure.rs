@@ -10,7 +10,7 @@ use sidestep_rods::geometry::distance;
 /// Number of rods up to which a chain's gap to itself is measured in each cycle: the measurement takes time that
 /// grows faster than the chain.
 const MAX_MEASURED_RODS: usize = 32;
-/// Number of cycles between two measurements of longer chains.
+/// Number of cycles between two measurements of longer chains, a third of a second of the usual cycles.
 const MEASURE_INTERVAL_CYCLES: u64 = 16;
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.

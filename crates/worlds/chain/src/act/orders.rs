@@ -11,7 +11,7 @@ use crate::state::Body;
 use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
 use sidestep_rods::{Chain, Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
 
-/// Number of bisections to find how far a motion can go: to 1/256 of it.
+/// Number of bisections to find how far a motion can go: to 1/256 of it, 0.04 mm of the usual cycle's.
 const BISECTIONS: usize = 8;
 
 /// Takes the orders for this cycle. They end with it, whether the task follows them or not.

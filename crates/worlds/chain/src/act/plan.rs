@@ -31,12 +31,14 @@ pub(super) fn plan_if_stuck<const D: usize>(
     let Some(after_s) = task.plans_after_s.filter(|_| body.plan.is_none()) else { return };
     let after = ((after_s / context.world.dt_s).ceil() as u32).max(1);
     let late = body.driving.late;
+    // After one, two, four, eight times that.
     if !late.is_multiple_of(after) || !(late / after).is_power_of_two() {
         return;
     }
     let next = body.driving.next;
     let k = task.agent;
     let target = targets.places[next as usize];
+    // Half of the tolerance, so that the end of the path counts as the target though it is followed with rounding.
     let query = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
     // A chain without a base, or a target out of range, has no plan.
     let plan_found = find_path(context, body, &query).ok().flatten();
@@ -119,7 +121,8 @@ fn follow_rods<const D: usize>(
     let from = space.present();
     let to = path.front()?;
     let limits = StepLimits::from_initiator(initiator);
-    let (next, is_there) = limits.step(&space, &from, to, 1.0, ChainPosture::clone);
+    let segment = Segment { space: &space, from: &from, to };
+    let (next, is_there) = limits.step(&segment, 1.0, ChainPosture::clone);
     if !space.is_path_free(&from, &next) || !move_along(initiator, body, &from, &next) {
         return None;
     }
@@ -154,8 +157,9 @@ fn follow_joints<const D: usize>(
         limits.joint = limits.joint.min(escape.speed_max_m_s * dt_s);
     }
     let fraction = arm.follower.reachable_fraction(&joints, to, dt_s);
-    let positions = |values: &Vec<f64>| arm.connector_positions::<D>(values);
-    let (mut next, is_there) = limits.step(&space, &joints, to, fraction, positions);
+    let segment = Segment { space: &space, from: &joints, to };
+    let (mut next, is_there) =
+        limits.step(&segment, fraction, |values| arm.connector_positions::<D>(values));
     // Rounding must not make a motion at exactly the maximum speed faster.
     for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.reachable_ranges(&joints, dt_s)) {
         *x = x.clamp(lower, upper);
@@ -201,6 +205,13 @@ struct StepLimits {
     joint: f64,
 }
 
+/// A straight piece of a planned path.
+struct Segment<'a, S: ConfigurationSpace> {
+    space: &'a S,
+    from: &'a S::Posture,
+    to: &'a S::Posture,
+}
+
 impl StepLimits {
     fn from_initiator<const D: usize>(initiator: Initiator<'_, D>) -> Self {
         let joint = initiator.context.world.rules.joint_step_max_m;
@@ -211,12 +222,11 @@ impl StepLimits {
     /// it is the second one. `positions` returns where the connectors of a posture are.
     fn step<const D: usize, S: ConfigurationSpace>(
         &self,
-        space: &S,
-        from: &S::Posture,
-        to: &S::Posture,
+        segment: &Segment<'_, S>,
         mut fraction: f64,
         positions: impl Fn(&S::Posture) -> ChainPosture<D>,
     ) -> (S::Posture, bool) {
+        let Segment { space, from, to } = *segment;
         let start = positions(from);
         let mut next = space.interpolate(from, to, fraction);
         while fraction >= MIN_FRACTION {
@@ -227,6 +237,7 @@ impl StepLimits {
             if excess <= 1.0 {
                 break;
             }
+            // Connectors of an arm do not move in proportion, so that it may take several rounds.
             fraction *= STEP_LIMIT_FRACTION / excess;
             next = space.interpolate(from, to, fraction);
         }

@@ -5,23 +5,23 @@ use crate::driver::{Task, TaskKind};
 use crate::motion::recovery::Situation;
 use crate::state::Body;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Veto, VetoReason};
+use sidestep_rods::{Chain, Mobility, Veto, VetoReason};
 
-/// Extra distance, beyond a chain's own look, at which a moving obstacle may still come near,
-/// meters.
+/// Distance beyond that up to which clearance is measured at which a moving obstacle still counts as near, meters: at
+/// 1 m/s it comes within the second that an initiator waits.
 const MOVER_NEAR_M: f64 = 1.0;
 
 /// Returns an initiator's knowledge beside its neighborhood.
 pub(super) fn situation<const D: usize>(initiator: Initiator<'_, D>, body: &Body<D>) -> Situation {
     let at = initiator.position(body);
     let near_m = initiator.context.world.look_m + MOVER_NEAR_M;
-    let is_near = |o: &Obstacle<D>| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m;
     let goal_distance_m = goal_distance_m(initiator.task, body);
     let (can_turn, keeps_heading) = match &initiator.task.driver {
         TaskKind::Navigate(navigator) => (navigator.can_turn_on_the_spot(), true),
         _ => (false, false),
     };
-    let movers_near = initiator.context.obstacles.moving().iter().any(is_near);
+    let mut movers = initiator.context.obstacles.moving().iter();
+    let movers_near = movers.any(|o| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m);
     Situation { goal_distance_m, movers_near, can_turn, keeps_heading }
 }
 
@@ -40,6 +40,5 @@ pub(super) fn out_of_range_veto<const D: usize>(chain: &Chain<D>, by: usize) -> 
 
 /// Returns whether a chain is held somewhere.
 pub(super) fn is_held<const D: usize>(chain: &Chain<D>) -> bool {
-    let is_held = |c: &Connector<D>| c.is_still() || c.mobility != Mobility::Free;
-    chain.connectors().iter().any(is_held)
+    chain.connectors().iter().any(|c| c.is_still() || c.mobility != Mobility::Free)
 }

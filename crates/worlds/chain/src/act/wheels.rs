@@ -4,7 +4,6 @@ use super::initiator::{move_initiator, wait_for_escape};
 use super::outcome::MoveResult;
 use super::{ActState, Initiator};
 use crate::driver::TaskKind;
-use crate::formation::Robot;
 use crate::navigate::{NavigationGoal, Navigator};
 use crate::state::Body;
 use crate::swarm::drive::{Pose2, Wheels};
@@ -13,7 +12,7 @@ use crate::swarm::leader::Decision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
 
-/// Time for which a leader stands and waits for a robot that is late, s.
+/// Time for which a leader stands and waits for a robot that is late, s: enough to turn around and drive half a meter.
 const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;
 /// Fraction of its speed at which it continues after that, because a robot that is blocked by another one may get
 /// free only once their connectors have moved.
@@ -192,9 +191,8 @@ impl<const D: usize> NavigatorContext<'_, D> {
     /// Returns the fraction of its speed at which a leader may drive, so that the robot that lags most keeps up.
     fn speed_fraction(&self) -> f64 {
         let Some(robots) = &self.initiator.context.spec.robots else { return 1.0 };
-        let lag_m =
-            |(robot, at): (&Robot, &Point<D>)| distance(robot.pose.at, with_dimensions(*at));
-        let lags_m = self.body.robots.iter().zip(self.body.chain.points()).map(lag_m);
+        let followers = self.body.robots.iter().zip(self.body.chain.points());
+        let lags_m = followers.map(|(robot, at)| distance(robot.pose.at, with_dimensions(*at)));
         speed_fraction(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
     }
 }

@@ -54,21 +54,29 @@ impl<const D: usize> ChainControls<D> {
 
 /// Returns whether a decision is about connectors of a chain of `n`.
 fn is_valid<const D: usize>(control: &Control<D>, n: usize) -> bool {
-    let is_there = |k: u32| (k as usize) < n;
-    let is_veto = |veto: &Veto<D>| veto.by < n && veto.from < n;
-    let ended = match &control.ended {
-        Some(LeaderOutcome::Climbed { climbed, objection, .. }) => {
-            let climbed = match climbed {
+    let is_end_valid = control.ended.as_ref().is_none_or(|ended| is_valid_outcome(ended, n));
+    let is_led_valid =
+        control.led.is_none_or(|led| led.first <= led.last && (led.last as usize) < n);
+    let mut missing = control.missing.iter().flatten();
+    is_end_valid && is_led_valid && missing.all(|&k| (k as usize) < n)
+}
+
+fn is_valid_outcome<const D: usize>(outcome: &LeaderOutcome<D>, n: usize) -> bool {
+    match outcome {
+        LeaderOutcome::Climbed { climbed, objection, .. } => {
+            let is_climb_valid = match climbed {
                 RecoveryOutcome::PulledBack { by, .. } => *by < n,
-                RecoveryOutcome::Stuck { vetoes } => vetoes.iter().all(is_veto),
-                RecoveryOutcome::Vetoed(veto) => is_veto(veto),
+                RecoveryOutcome::Stuck { vetoes } => vetoes.iter().all(|v| is_valid_veto(v, n)),
+                RecoveryOutcome::Vetoed(veto) => is_valid_veto(veto, n),
                 _ => true,
             };
-            climbed && objection.as_ref().is_none_or(is_veto)
+            is_climb_valid && objection.as_ref().is_none_or(|veto| is_valid_veto(veto, n))
         }
-        Some(LeaderOutcome::Stands { missing }) => is_there(*missing),
-        Some(LeaderOutcome::Rested) | None => true,
-    };
-    let led = control.led.is_none_or(|led| led.first <= led.last && is_there(led.last));
-    ended && led && control.missing.iter().flatten().all(|&k| is_there(k))
+        LeaderOutcome::Stands { missing } => (*missing as usize) < n,
+        LeaderOutcome::Rested => true,
+    }
+}
+
+fn is_valid_veto<const D: usize>(veto: &Veto<D>, n: usize) -> bool {
+    veto.by < n && veto.from < n
 }

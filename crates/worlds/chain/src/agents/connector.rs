@@ -158,8 +158,10 @@ impl<const D: usize> ConnectorAgent<D> {
         rungs: RecoveryLimits,
     ) -> Self {
         let n = chain.points().len() as u32;
-        let rod =
-            |side: Side| side.neighbor(k, n).map(|j| chain.rod_between(k as usize, j as usize));
+        let rods = PerSide::from_fn(|side| {
+            let neighbor = side.neighbor(k, n)?;
+            Some(chain.rod_between(k as usize, neighbor as usize))
+        });
         Self {
             me: k,
             n,
@@ -168,7 +170,7 @@ impl<const D: usize> ConnectorAgent<D> {
             members: member_digest(0, n),
             radio: None,
             rungs,
-            rods: PerSide::from_fn(rod),
+            rods,
             solver: LocalSolver::new(chain, k as usize, rules),
             obstacles: Obstacles::default(),
             cycle: None,
@@ -228,14 +230,13 @@ impl<const D: usize> ConnectorAgent<D> {
         self.began = tick;
         self.now = tick;
         self.position = TentativePosition::new(percept.at.0);
-        let [below, above] = percept.neighbors;
-        let track = |side| if side == Side::Below { below } else { above };
-        self.beside =
-            PerSide::from_fn(|side| track(side).map(|position| TentativePosition::new(position.0)));
+        self.beside = PerSide::new(
+            percept.neighbors.map(|place| place.map(|place| TentativePosition::new(place.0))),
+        );
         // Where messages never get lost no message would report that an agent is back, so those that were lost count
         // as back.
-        let [below, above] = self.radio.map_or([None; 2], |_| percept.missing);
-        self.missing = PerSide::from_fn(|side| if side == Side::Below { below } else { above });
+        let is_lossy = self.radio.is_some();
+        self.missing = PerSide::new(if is_lossy { percept.missing } else { [None; 2] });
         self.following = None;
         self.leading = None;
         self.climbing = None;
@@ -300,8 +301,8 @@ impl<const D: usize> ConnectorAgent<D> {
         let (header, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
         let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } =
             header;
-        let neighbor = |side: &Side| side.neighbor(self.me, self.n).map(|k| self.first_id + k);
-        let side = Side::ALL.into_iter().find(|side| neighbor(side) == Some(from));
+        let mut sides = Side::ALL.into_iter();
+        let side = sides.find(|side| self.neighbor_id(*side) == Some(from));
         let side = side.filter(|_| sender == from).ok_or(DropReason::Sender)?;
         if members != self.members {
             return Err(DropReason::OtherGroup);
@@ -317,6 +318,12 @@ impl<const D: usize> ConnectorAgent<D> {
             _ => return Err(DropReason::NoRoom),
         }
         Ok(())
+    }
+
+    /// Returns the id on the network of the neighbor on a side, if there is one.
+    fn neighbor_id(&self, side: Side) -> Option<EntityId> {
+        let neighbor = side.neighbor(self.me, self.n)?;
+        Some(self.first_id + neighbor)
     }
 
     /// Returns the counts of packets that it has dropped since it was started.

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::network::{RetryPolicy, RetryTimer};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Most messages that are kept because an earlier one is missing.
+/// Most messages that are kept because an earlier one is missing: a neighbor that numbers its messages at will must not
+/// fill the memory.
 const MAX_EARLY_MESSAGES: u32 = 256;
 /// Most messages that wait for a confirmation: far more than honest agents ever cause. A neighbor that
 /// makes an agent say more is no longer answered in the cycle.
@@ -81,10 +82,13 @@ impl<M: Clone> Link<M> {
 
     /// Takes a parcel; returns the messages that are new, in order.
     pub(super) fn receive(&mut self, parcel: Parcel<M>) -> Vec<M> {
-        (self.is_heard, self.is_lost, self.unanswered) = (true, false, 0);
+        self.is_heard = true;
+        self.is_lost = false;
+        self.unanswered = 0;
         let confirmed = (parcel.next.saturating_sub(self.first) as usize).min(self.sent);
         self.said.drain(..confirmed);
-        (self.first, self.sent) = (self.first + confirmed as u32, self.sent - confirmed);
+        self.first += confirmed as u32;
+        self.sent -= confirmed;
         self.owes |= !parcel.messages.is_empty();
         let numbered = parcel.messages.into_iter().enumerate();
         for (k, message) in numbered.take(MAX_EARLY_MESSAGES as usize) {
@@ -127,6 +131,7 @@ impl<M: Clone> Link<M> {
 
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
     pub(super) fn next_parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
+        // All that are unconfirmed, because the neighbor may lack any of them.
         let from = if self.again { 0 } else { self.sent };
         let confirms = self.owes && self.retry.is_some();
         if from == self.said.len() && !confirms {
@@ -139,7 +144,10 @@ impl<M: Clone> Link<M> {
         {
             retry.restart(tick);
         }
-        (self.owes, self.again, self.sent) = (false, false, self.said.len());
+        self.owes = false;
+        self.again = false;
+        self.sent = self.said.len();
+        // Where nothing gets lost, sent is received.
         if self.retry.is_none() {
             self.first += self.said.len() as u32;
             self.said.clear();

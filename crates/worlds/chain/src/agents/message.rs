@@ -159,6 +159,10 @@ impl<const D: usize> Packet<D> {
     }
 }
 
+fn is_valid_point<const D: usize>(point: Option<WirePoint<D>>) -> bool {
+    point.is_none_or(|WirePoint(at)| is_in_range(&at))
+}
+
 fn is_valid_length(length_m: f64) -> bool {
     length_m.is_finite() && length_m >= 0.0
 }
@@ -166,20 +170,18 @@ fn is_valid_length(length_m: f64) -> bool {
 impl<const D: usize> Message<D> {
     /// Returns whether its numbers make sense in a chain of `n` connectors.
     fn is_valid(&self, n: u32) -> bool {
-        let is_place =
-            |place: &Option<WirePoint<D>>| place.is_none_or(|WirePoint(at)| is_in_range(&at));
         match self {
             Self::Here | Self::AskEnd | Self::Over | Self::Done(None) | Self::Settle { .. } => true,
             Self::Prepare(p) => {
                 let is_bend = p.max_bend_rad > 0.0 && p.max_bend_rad <= PI;
-                is_bend && is_in_range(&p.mo) && is_in_range(&p.mn) && is_place(&p.prev)
+                is_bend && is_in_range(&p.mo) && is_in_range(&p.mn) && is_valid_point(p.prev)
             }
             Self::Consent(c) => {
                 let counts = [c.touched, c.changed, c.rotated];
                 counts.iter().all(|&k| k < n) && is_in_range(&c.at) && is_valid_length(c.longest_m)
             }
             Self::Object(objection) => objection.by < n,
-            Self::End(at, ahead) => is_in_range(&at.0) && is_place(ahead),
+            Self::End(at, ahead) => is_in_range(&at.0) && is_valid_point(*ahead),
             Self::Order(order) => is_in_range(&order.to),
             Self::Done(Some(Outcome::Vetoed(veto))) => is_valid_veto(veto, n),
             Self::Done(Some(Outcome::Moved(moved))) => {

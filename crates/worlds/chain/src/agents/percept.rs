@@ -87,19 +87,29 @@ impl SensedObstacle {
 
     /// Returns the obstacle; none if its core is of no shape.
     pub fn to_obstacle<const D: usize>(&self) -> Option<Obstacle<D>> {
-        let point = |k: usize| -> Point<D> { std::array::from_fn(|i| self.core[k * D + i]) };
         let core = match self.core.len() {
-            n if n == D => Core::Point(point(0)),
-            n if n == 2 * D => Core::Segment([point(0), point(1)]),
+            n if n == D => Core::Point(self.point(0)),
+            n if n == 2 * D => Core::Segment([self.point(0), self.point(1)]),
             n if n == D * (D + 2) => Core::Cuboid(Cuboid {
-                center: point(0),
-                axes: std::array::from_fn(|axis| point(1 + axis)),
-                half_m: point(1 + D),
+                center: self.point(0),
+                axes: std::array::from_fn(|axis| self.point(1 + axis)),
+                half_m: self.point(1 + D),
             }),
             _ => return None,
         };
         Some(Obstacle::still(self.id, core, self.radius_m))
     }
+
+    /// Returns the coordinates `k` times `D` and after.
+    fn point<const D: usize>(&self, k: usize) -> Point<D> {
+        std::array::from_fn(|i| self.core[k * D + i])
+    }
+}
+
+/// Returns the error of a percept of connector `me`.
+fn invalid_percept(me: u32, cause: &str) -> InputError {
+    let remedy = "give what its sensors have measured: finite numbers, up to 1e6 m";
+    InputError::new(format!("sight of connector {me}"), cause.to_string(), remedy)
 }
 
 impl<const D: usize> ConnectorPercept<D> {
@@ -117,24 +127,21 @@ impl<const D: usize> ConnectorPercept<D> {
         me: u32,
         n: u32,
     ) -> Result<Vec<Obstacle<D>>, InputError> {
-        let invalid = |what: &str| {
-            let remedy = "give what its sensors have measured: finite numbers, up to 1e6 m";
-            InputError::new(format!("sight of connector {me}"), what.to_string(), remedy)
-        };
         let places = self.neighbors.iter().flatten().chain(std::iter::once(&self.at));
         if !places.map(|WirePoint(at)| at).all(is_in_range) {
-            return Err(invalid("a place is out of range"));
+            return Err(invalid_percept(me, "a place is out of range"));
         }
         if self.neighbors.map(|place| place.is_some()) != [me > 0, me + 1 < n] {
-            return Err(invalid("its neighbors are not those of its place in the chain"));
+            let cause = "its neighbors are not those of its place in the chain";
+            return Err(invalid_percept(me, cause));
         }
         if !(self.max_bend_rad > 0.0 && self.max_bend_rad <= PI) {
-            return Err(invalid("its bend limit is not in (0, pi]"));
+            return Err(invalid_percept(me, "its bend limit is not in (0, pi]"));
         }
         if self.missing.iter().flatten().any(|&k| k >= n || k == me) {
-            return Err(invalid("a lost connector is none of its chain"));
+            return Err(invalid_percept(me, "a lost connector is none of its chain"));
         }
         let seen = self.seen.iter().map(SensedObstacle::to_obstacle);
-        seen.collect::<Option<_>>().ok_or_else(|| invalid("an obstacle has no shape"))
+        seen.collect::<Option<_>>().ok_or_else(|| invalid_percept(me, "an obstacle has no shape"))
     }
 }

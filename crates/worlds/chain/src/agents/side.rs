@@ -48,6 +48,11 @@ pub(crate) struct PerSide<T> {
 }
 
 impl<T> PerSide<T> {
+    /// Returns the values below and above.
+    pub(crate) fn new([below, above]: [T; 2]) -> Self {
+        Self { below, above }
+    }
+
     /// Returns something for each side.
     pub(crate) fn from_fn(mut make: impl FnMut(Side) -> T) -> Self {
         Self { below: make(Side::Below), above: make(Side::Above) }

@@ -7,7 +7,8 @@
 //!   (`crate::scenario::deployment`).
 //!
 //! A deployment gives the connectors of a chain their perception (`sense.rs`), runs their negotiation over a network
-//! in memory (`negotiation.rs`) or in other processes (`remote_agents.rs` of the world), and carries their decisions out (`outcome.rs`).
+//! in memory (`negotiation.rs`) or in other processes (`remote_agents.rs` of the world), and carries their decisions
+//! out (`outcome.rs`).
 
 pub(crate) mod deployment;
 mod negotiation;

@@ -30,10 +30,9 @@ impl<'a> NegotiationContext<'a> {
         chain: EntityId,
         now: Cycle,
     ) -> Self {
-        let (network, streams) = (world.network.as_ref(), world.streams);
         Self {
-            network,
-            streams,
+            network: world.network.as_ref(),
+            streams: world.streams,
             first_id: world.first_id(chain),
             begins: world.negotiation_start(now),
         }
@@ -55,12 +54,17 @@ impl<const D: usize> ChainWorld<D> {
 
 /// Returns the tick in which the talk of a cycle starts.
 pub(super) fn first_tick(network: Option<&Network>, now: Cycle) -> u64 {
+    // One tick more than a talk lasts, so that no packet of a cycle arrives in the next one.
     network.map_or(0, |network| now * (network.deadline_ticks() + 1))
 }
 
 fn draws(streams: Streams) -> FaultStreams {
-    let (network, burst, burst_loss) = (purpose::NETWORK, purpose::BURST, purpose::BURST_LOSS);
-    FaultStreams { streams, network, burst, burst_loss }
+    FaultStreams {
+        streams,
+        network: purpose::NETWORK,
+        burst: purpose::BURST,
+        burst_loss: purpose::BURST_LOSS,
+    }
 }
 
 /// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
@@ -83,7 +87,8 @@ pub(super) fn run_agents<const D: usize>(
     agents: &mut [ConnectorAgent<D>],
     sights: Vec<ConnectorPercept<D>>,
 ) -> Vec<Option<Control<D>>> {
-    let (places, begins) = (StartPositions(talk.first_id, &sights), [talk.begins]);
+    let places = StartPositions(talk.first_id, &sights);
+    let begins = [talk.begins];
     let draws = draws(talk.streams);
     let transport = FaultyTransport::in_memory(talk.network, draws, Some(&places), &begins);
     let (start_tick, _) = talk.begins;

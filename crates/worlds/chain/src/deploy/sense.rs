@@ -2,10 +2,8 @@
 
 use crate::agents::side::Side;
 use crate::agents::{ConnectorPercept, Role, SensedObstacle};
-use crate::driver::Task;
 use crate::state::Body;
 use crate::world::{ChainSpec, ChainWorld};
-use sidestep_kernel::network::Network;
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{Obstacles, bounds_around};
@@ -22,6 +20,26 @@ pub(crate) struct SensingContext<'a, const D: usize> {
     pub(crate) obstacles: &'a Obstacles<D>,
 }
 
+impl<const D: usize> SensingContext<'_, D> {
+    /// Returns the position of the neighbor of connector `k` on a side, if there is one.
+    fn neighbor_position(&self, k: u32, side: Side) -> Option<WirePoint<D>> {
+        let points = self.body.chain.points();
+        let neighbor = side.neighbor(k, points.len() as u32)?;
+        Some(WirePoint(points[neighbor as usize]))
+    }
+
+    /// Returns the obstacles of which connector `k` sees something, up to a distance from its surface.
+    fn obstacles_near(&self, k: u32, range_m: f64) -> Vec<SensedObstacle> {
+        let at = self.body.chain.points()[k as usize];
+        let radius_m = self.body.chain.connectors()[k as usize].radius_m;
+        let mut seen = Vec::new();
+        self.obstacles.visit(&bounds_around(at, range_m + radius_m), |obstacle| {
+            seen.push(SensedObstacle::from_obstacle(obstacle));
+        });
+        seen
+    }
+}
+
 impl<const D: usize> ChainWorld<D> {
     /// Returns the id on the network of a chain's connector 0; the others follow.
     pub(crate) fn first_id(&self, chain: EntityId) -> EntityId {
@@ -36,33 +54,28 @@ impl<const D: usize> ChainWorld<D> {
         leader: usize,
         role: &Role<D>,
     ) -> Vec<ConnectorPercept<D>> {
-        let SensingContext { chain, now, body, obstacles } = sensed;
-        let points = body.chain.points();
-        let n = points.len() as u32;
-        let (first_id, at_s) = (self.first_id(chain), self.start_time_s(now));
+        let SensingContext { chain, now, body, .. } = sensed;
+        let first_id = self.first_id(chain);
+        let at_s = self.start_time_s(now);
         let sees_m = self.sensor_range_m(&self.chains[chain as usize]);
-        let sight = |k: u32| {
-            let connector = body.chain.connectors()[k as usize];
-            let at = points[k as usize];
-            let mut seen = Vec::new();
-            let half_m = sees_m + connector.radius_m;
-            obstacles.visit(&bounds_around(at, half_m), |obstacle| {
-                seen.push(SensedObstacle::from_obstacle(obstacle))
-            });
-            let neighbor = |side: Side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]));
-            let is_silent = |network: &Network| network.is_radio_off(first_id + k, at_s);
-            ConnectorPercept {
+        let n = body.chain.points().len() as u32;
+        let mut percepts = Vec::with_capacity(n as usize);
+        for k in 0..n {
+            let is_leader = k as usize == leader;
+            let network = self.network.as_ref();
+            let is_silent = network.is_some_and(|network| network.is_radio_off(first_id + k, at_s));
+            percepts.push(ConnectorPercept {
                 cycle: now,
-                at: WirePoint(at),
-                neighbors: Side::ALL.map(neighbor),
-                max_bend_rad: connector.max_bend_rad,
-                seen,
-                is_silent: self.network.as_ref().is_some_and(is_silent),
+                at: WirePoint(body.chain.points()[k as usize]),
+                neighbors: Side::ALL.map(|side| sensed.neighbor_position(k, side)),
+                max_bend_rad: body.chain.connectors()[k as usize].max_bend_rad,
+                seen: sensed.obstacles_near(k, sees_m),
+                is_silent,
                 missing: body.missing.get(k as usize).copied().unwrap_or_default(),
-                role: if k as usize == leader { role.clone() } else { Role::Follows },
-            }
-        };
-        (0..n).map(sight).collect()
+                role: if is_leader { role.clone() } else { Role::Follows },
+            });
+        }
+        percepts
     }
 
     /// Returns the distance in which a connector's sensors see everything to which a motion of a cycle
@@ -71,8 +84,7 @@ impl<const D: usize> ChainWorld<D> {
     fn sensor_range_m(&self, spec: &ChainSpec<D>) -> f64 {
         let chain = &spec.start;
         let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
-        let way_m = |task: &Task<D>| task.speed_m_s * self.dt_s;
-        let led_m = spec.tasks.iter().map(way_m).fold(0.0, f64::max);
+        let led_m = spec.tasks.iter().map(|task| task.speed_m_s * self.dt_s).fold(0.0, f64::max);
         let step_m = self.rules.step_m.unwrap_or(chain.step_m());
         let steps = (led_m / step_m).ceil() + 1.0;
         2.0 * longest_m + 2.0 * led_m.max(steps * self.rules.slave_step_max_m) + MARGIN_M

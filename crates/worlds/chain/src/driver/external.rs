@@ -84,8 +84,9 @@ impl External {
     /// Returns whether it belongs to a chain of `n` connectors.
     pub(crate) fn is_within(&self, n: usize) -> bool {
         let Orders { connector, rod, .. } = self.orders;
-        let is_there = |k: Option<u32>, most: usize| k.is_none_or(|k| (k as usize) < most);
-        is_there(connector, n) && is_there(rod, n.saturating_sub(1))
+        let is_connector_there = connector.is_none_or(|k| (k as usize) < n);
+        let is_rod_there = rod.is_none_or(|k| (k as usize) < n.saturating_sub(1));
+        is_connector_there && is_rod_there
     }
 }
 
@@ -101,18 +102,22 @@ impl Orders {
     /// The order that gives the effect of a veto on the way.
     pub(crate) const REACH: &str = "reach";
 
-    /// Notes an order by its name.
+    /// Records an order by its name.
     pub(crate) fn record(&mut self, order: &str, values: &[f64]) {
-        let place = |at: &[f64]| std::array::from_fn(|i| at.get(i).copied().unwrap_or_default());
         match (order, values) {
-            (Self::TO, at) => self.target = Some(Target::Connector(place(at))),
+            (Self::TO, at) => self.target = Some(Target::Connector(in_space(at))),
             (Self::ROD_TO, ends) => {
                 let (first, second) = ends.split_at(ends.len() / 2);
-                self.target = Some(Target::Rod([place(first), place(second)]));
+                self.target = Some(Target::Rod([in_space(first), in_space(second)]));
             }
             (Self::CONNECTOR, &[k]) => self.connector = Some(k as u32),
             (Self::ROD, &[k]) => self.rod = Some(k as u32),
             (_, values) => self.goes_far = values == [1.0],
         }
     }
+}
+
+/// Returns a place in space; in the plane its last coordinate is 0.
+fn in_space(at: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|i| at.get(i).copied().unwrap_or_default())
 }

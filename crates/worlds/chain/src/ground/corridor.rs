@@ -6,10 +6,12 @@ use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::Obstacle;
 use sidestep_rods::geometry::Point;
 
-/// Approximate length of a piece of wall: bends are polygons of such pieces.
+/// Approximate length of a piece of wall: bends are polygons of such pieces. The walls of the measurements had it.
 pub const WALL_PIECE_M: f64 = 0.16;
 /// Longest corridor; longer ones are taken as a mistake.
 const MAX_LENGTH_M: f64 = 1e6;
+/// Largest turn of a bend, degrees: ten times around; more is taken as a mistake.
+const MAX_TURN_DEG: f64 = 3600.0;
 
 /// A part of a corridor's center line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,13 +44,11 @@ impl Leg {
 
     /// Returns its fault, if it has one.
     fn fault(self) -> Option<String> {
-        let is_good = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
-        let is_good_turn = |deg: f64| deg != 0.0 && deg.abs() <= 3600.0;
         match self {
-            Self::Straight { length_m } if !is_good(length_m) => {
+            Self::Straight { length_m } if !is_good_length(length_m) => {
                 Some(format!("has a length of {length_m} m"))
             }
-            Self::Bend { radius_m, .. } if !is_good(radius_m) => {
+            Self::Bend { radius_m, .. } if !is_good_length(radius_m) => {
                 Some(format!("has a radius of {radius_m} m"))
             }
             Self::Bend { turn_deg, .. } if !is_good_turn(turn_deg) => {
@@ -57,6 +57,18 @@ impl Leg {
             _ => None,
         }
     }
+}
+
+fn is_good_length(length_m: f64) -> bool {
+    length_m > 0.0 && length_m <= MAX_LENGTH_M
+}
+
+fn is_good_turn(turn_deg: f64) -> bool {
+    turn_deg != 0.0 && turn_deg.abs() <= MAX_TURN_DEG
+}
+
+fn corridor_error(place: String, cause: String) -> InputError {
+    InputError::new(place, cause, "give it in meters above 0, turns in degrees")
 }
 
 /// Legs one after the other, from the origin along the first axis, with a wall on each side.
@@ -75,25 +87,23 @@ impl Corridor {
     /// When there is no leg, or a length, radius, turn or width is not positive (a turn: 0) or
     /// absurd.
     pub fn new(legs: Vec<Leg>, width_m: f64) -> Result<Self, InputError> {
-        let fault = |place: String, cause: String| {
-            Err(InputError::new(place, cause, "give it in meters above 0, turns in degrees"))
-        };
-        if !(width_m > 0.0 && width_m <= MAX_LENGTH_M) {
-            return fault("corridor".into(), format!("has a width of {width_m} m"));
+        if !is_good_length(width_m) {
+            return Err(corridor_error("corridor".into(), format!("has a width of {width_m} m")));
         }
         if legs.is_empty() {
-            return fault("corridor".into(), "has no leg".into());
+            return Err(corridor_error("corridor".into(), "has no leg".into()));
         }
         for (k, leg) in legs.iter().enumerate() {
             if let Some(cause) = leg.fault() {
-                return fault(format!("corridor, leg {k}"), cause);
+                return Err(corridor_error(format!("corridor, leg {k}"), cause));
             }
         }
         let corridor = Self { legs, width_m };
-        match corridor.length_m() {
-            length_m if length_m <= MAX_LENGTH_M => Ok(corridor),
-            length_m => fault("corridor".into(), format!("is {length_m} m long")),
+        let length_m = corridor.length_m();
+        if length_m > MAX_LENGTH_M {
+            return Err(corridor_error("corridor".into(), format!("is {length_m} m long")));
         }
+        Ok(corridor)
     }
 
     /// Returns the corridor of the measurements: 14 m straight, 90 degrees left (radius 2 m), 90
@@ -103,16 +113,15 @@ impl Corridor {
     /// # Errors
     /// When the width is not positive.
     pub fn pinned(width_m: f64) -> Result<Self, InputError> {
-        let bend = |radius_m, turn_deg| Leg::Bend { radius_m, turn_deg };
         let legs = vec![
             Leg::Straight { length_m: 14.0 },
-            bend(2.0, 90.0),
-            bend(1.5, -90.0),
-            bend(1.6, 180.0),
-            bend(1.3, 60.0),
-            bend(1.3, -120.0),
-            bend(1.3, 60.0),
-            bend(2.0, -180.0),
+            Leg::Bend { radius_m: 2.0, turn_deg: 90.0 },
+            Leg::Bend { radius_m: 1.5, turn_deg: -90.0 },
+            Leg::Bend { radius_m: 1.6, turn_deg: 180.0 },
+            Leg::Bend { radius_m: 1.3, turn_deg: 60.0 },
+            Leg::Bend { radius_m: 1.3, turn_deg: -120.0 },
+            Leg::Bend { radius_m: 1.3, turn_deg: 60.0 },
+            Leg::Bend { radius_m: 2.0, turn_deg: -180.0 },
             Leg::Straight { length_m: 8.0 },
         ];
         Self::new(legs, width_m)
@@ -163,13 +172,14 @@ impl Corridor {
     /// one, then the left one, numbered on from `first_id` in the direction of the corridor.
     pub fn walls(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let line = self.center_line(WALL_PIECE_M);
-        let sides = [-1.0, 1.0].map(|side| line.windows(2).map(move |piece| (side, piece)));
-        (first_id..)
-            .zip(sides.into_iter().flatten())
-            .map(|(id, (side, piece))| {
-                Obstacle::capsule(id, [0, 1].map(|k| self.wall_point(piece[k], side)), 0.0)
-            })
-            .collect()
+        let mut walls = Vec::new();
+        for side in [-1.0, 1.0] {
+            for piece in line.windows(2) {
+                let ends = [self.wall_point(piece[0], side), self.wall_point(piece[1], side)];
+                walls.push(ends);
+            }
+        }
+        (first_id..).zip(walls).map(|(id, ends)| Obstacle::capsule(id, ends, 0.0)).collect()
     }
 
     /// Returns the point of a wall beside a pose; `side` is 1 to the left, -1 to the right.

@@ -62,10 +62,10 @@ impl<const D: usize> Mover<D> {
 
     fn fault(&self) -> Option<(&'static str, &'static str)> {
         let still = ("does not move", "give it a speed, or make it a static obstacle");
-        let moves = |v: &Point<D>| is_finite(v) && norm(*v) > 0.0;
         match &self.course {
-            Course::Straight { velocity_m_s } => (!moves(velocity_m_s)).then_some(still),
-            Course::Bouncing { velocity_m_s, .. } if !moves(velocity_m_s) => Some(still),
+            Course::Straight { velocity_m_s } if !is_motion(velocity_m_s) => Some(still),
+            Course::Straight { .. } => None,
+            Course::Bouncing { velocity_m_s, .. } if !is_motion(velocity_m_s) => Some(still),
             Course::Bouncing { room, .. } if !contains_box(room, &self.bounds) => {
                 Some(("is not in its room", "put it inside, or make the room larger"))
             }
@@ -88,13 +88,16 @@ impl<const D: usize> Mover<D> {
         match &self.course {
             Course::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
             Course::Bouncing { velocity_m_s, room } => {
-                let axis = |i: usize| {
-                    let (lo_m, hi_m) =
-                        (room.lo[i] - self.bounds.lo[i], room.hi[i] - self.bounds.hi[i]);
-                    bounce([lo_m.min(0.0), hi_m.max(0.0)], velocity_m_s[i], t_s)
-                };
-                let axes: [_; D] = std::array::from_fn(axis);
-                (axes.map(|(shift_m, _)| shift_m), axes.map(|(_, v)| v))
+                let mut shift_m = [0.0; D];
+                let mut velocity_now_m_s = [0.0; D];
+                for i in 0..D {
+                    let lo_m = room.lo[i] - self.bounds.lo[i];
+                    let hi_m = room.hi[i] - self.bounds.hi[i];
+                    // A body may stick out by a rounding: then its room ends where it begins.
+                    let limits_m = [lo_m.min(0.0), hi_m.max(0.0)];
+                    (shift_m[i], velocity_now_m_s[i]) = bounce(limits_m, velocity_m_s[i], t_s);
+                }
+                (shift_m, velocity_now_m_s)
             }
             Course::Patrol { way_points, closed, speed_m_s } => {
                 let (at, velocity_m_s) = patrol(way_points, *closed, *speed_m_s, t_s);
@@ -102,6 +105,11 @@ impl<const D: usize> Mover<D> {
             }
         }
     }
+}
+
+/// Returns whether a velocity is one of a body that moves.
+fn is_motion<const D: usize>(velocity_m_s: &Point<D>) -> bool {
+    is_finite(velocity_m_s) && norm(*velocity_m_s) > 0.0
 }
 
 /// Returns whether a box holds another, apart from rounding.
@@ -119,14 +127,18 @@ fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str
     if !way_points.iter().all(is_finite) {
         return Some(("has a way point that is not finite", "give finite numbers"));
     }
-    let stays = way_points.windows(2).any(|w| w[0] == w[1]);
-    stays.then_some(("has two equal consecutive way points", "leave one of them out"))
+    // A leg of no length has no direction.
+    if way_points.windows(2).any(|w| w[0] == w[1]) {
+        return Some(("has two equal consecutive way points", "leave one of them out"));
+    }
+    None
 }
 
-/// Returns a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m` (at least
-/// 0).
+/// Returns the position and the velocity of a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m`
+/// (at least 0).
 fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     if v_m_s < 0.0 {
+        // Its mirror image goes forward.
         let (x_m, v_m_s) = bounce([-hi_m, -lo_m], -v_m_s, t_s);
         return (-x_m, -v_m_s);
     }
@@ -138,10 +150,10 @@ fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     (lo_m + x_m, if forward { v_m_s } else { -v_m_s })
 }
 
-/// Returns the position on a way of `length_m` after `way_m` of going to and fro on it, and whether
-/// the body goes forward from there.
-fn shuttle(way_m: f64, length_m: f64) -> (f64, bool) {
-    let m = way_m.rem_euclid(2.0 * length_m);
+/// Returns the position on a line of `length_m` after a distance of `traveled_m` to and fro on it, and whether the body
+/// goes forward from there.
+fn shuttle(traveled_m: f64, length_m: f64) -> (f64, bool) {
+    let m = traveled_m.rem_euclid(2.0 * length_m);
     // The remainder may round up to the modulus itself.
     if m < length_m { (m, true) } else { ((2.0 * length_m - m).max(0.0), false) }
 }
@@ -154,8 +166,8 @@ fn patrol<const D: usize>(
     t_s: f64,
 ) -> (Point<D>, Point<D>) {
     let first = closed.then_some(&way_points[0]);
-    let ends = || way_points.iter().zip(way_points[1..].iter().chain(first));
-    let length_m: f64 = ends().map(|(a, b)| distance(*a, *b)).sum();
+    let legs = way_points.iter().zip(way_points[1..].iter().chain(first));
+    let length_m: f64 = legs.clone().map(|(a, b)| distance(*a, *b)).sum();
     let (mut left_m, forward) = if closed {
         ((speed_m_s * t_s).rem_euclid(length_m), true)
     } else {
@@ -163,7 +175,7 @@ fn patrol<const D: usize>(
     };
     let mut at = way_points[0];
     let mut u = [0.0; D];
-    for (a, b) in ends() {
+    for (a, b) in legs {
         let leg_m = distance(*a, *b);
         let Some(along) = normalized(sub(*b, *a)) else { continue };
         at = lerp(*a, *b, (left_m / leg_m).min(1.0));

@@ -11,7 +11,7 @@ use std::ops::RangeInclusive;
 
 /// Largest number of obstacles; more are taken as a mistake.
 const MAX_OBSTACLES: f64 = 1e7;
-/// Attempts to find a place for an obstacle before the search fails.
+/// Attempts to find a place for an obstacle before the search fails: enough where one place in a hundred is free.
 const MAX_ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
@@ -42,14 +42,16 @@ impl<const D: usize> Field<D> {
         let n = self.obstacle_count()?;
         let streams = Streams::new(seed);
         let clear = KeepClearIndex::new(&self.keep_clear, self.keep_m, self.length_m)?;
-        let one = |k: u32| {
+        let mut obstacles = Vec::new();
+        for k in 0..n {
             let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
-            let core = if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
-            clear
-                .is_clear(ends, self.radius_m)
-                .then(|| Obstacle::still(first_id + k, core, self.radius_m))
-        };
-        Ok((0..n).filter_map(one).collect())
+            if clear.is_clear(ends, self.radius_m) {
+                let core =
+                    if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
+                obstacles.push(Obstacle::still(first_id + k, core, self.radius_m));
+            }
+        }
+        Ok(obstacles)
     }
 
     /// Returns the ends of a core somewhere in the room.
@@ -60,9 +62,9 @@ impl<const D: usize> Field<D> {
     }
 
     fn obstacle_count(&self) -> Result<u32, InputError> {
-        let extent = |i: usize| self.room.hi[i] - self.room.lo[i];
-        let n = self.part * (0..D).map(extent).product::<f64>() / self.obstacle_size();
-        let is_room = (0..D).all(|i| extent(i) > 0.0) && is_finite(&self.room.lo);
+        let extent_m: Point<D> = std::array::from_fn(|i| self.room.hi[i] - self.room.lo[i]);
+        let n = self.part * extent_m.iter().product::<f64>() / self.obstacle_size();
+        let is_room = extent_m.iter().all(|m| *m > 0.0) && is_finite(&self.room.lo);
         let is_body = self.radius_m > 0.0 && self.length_m >= 0.0 && self.part >= 0.0;
         if is_room && is_body && self.keep_m.is_finite() && n <= MAX_OBSTACLES {
             return Ok(n as u32);
@@ -163,9 +165,9 @@ const ROUNDING_M: f64 = 1e-6;
 impl<const D: usize> KeepClearIndex<D> {
     /// Returns bodies from which obstacles of about `size_m` keep a distance.
     fn new(bodies: &[Core<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
-        let body = |(k, core): (u32, &Core<D>)| Obstacle::still(k, *core, 0.0);
-        let bodies = (0..).zip(bodies).map(body).collect();
-        // Determines the cells of a grid, never the result.
+        let bodies = (0..).zip(bodies).map(|(k, core)| Obstacle::still(k, *core, 0.0)).collect();
+        // Determines the cells of a grid, never the result, so that any length will do where none is given. No cell is
+        // smaller than 1 mm, or points would make cells of no size.
         let reach_m = size_m + 2.0 * keep_m;
         let reach_m = if reach_m.is_finite() { reach_m.max(1e-3) } else { 1.0 };
         Ok(Self { bodies: Obstacles::new(bodies, reach_m)?, keep_m })
@@ -190,7 +192,8 @@ fn random_point<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D>
     std::array::from_fn(|i| uniform(draws, &(room.lo[i]..=room.hi[i])))
 }
 
-/// Returns a unit vector, all directions equally likely: a point in the unit ball, scaled.
+/// Returns a unit vector, all directions equally likely: a point in the unit ball, scaled. A point near the center,
+/// whose direction is the least precise, is drawn anew.
 fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     loop {
         let p: Point<D> = std::array::from_fn(|_| 2.0 * draws.uniform() - 1.0);

@@ -110,8 +110,9 @@ impl Floor {
     /// Returns whether a place is free.
     pub fn is_free(&self, at: Point<2>) -> bool {
         let from = sub(at, self.corner_m);
-        let pixel = |i: usize| (dot(from, self.axes[i]) / self.pixel_m[i]).floor() as i64;
-        !self.is_solid(pixel(0), pixel(1))
+        let col = (dot(from, self.axes[0]) / self.pixel_m[0]).floor() as i64;
+        let row = (dot(from, self.axes[1]) / self.pixel_m[1]).floor() as i64;
+        !self.is_solid(col, row)
     }
 
     /// Returns the middle of a pixel.
@@ -130,7 +131,8 @@ impl Floor {
 
     /// Returns the place of a point counted in pixels; the same bits for the same point.
     fn pixel_position(&self, col: f64, row: f64) -> Point<2> {
-        let [x, y] = [col * self.pixel_m[0], row * self.pixel_m[1]];
+        let x = col * self.pixel_m[0];
+        let y = row * self.pixel_m[1];
         add(self.corner_m, add(scaled(self.axes[0], x), scaled(self.axes[1], y)))
     }
 
@@ -141,16 +143,18 @@ impl Floor {
         let height = i64::from(self.height);
         let mut ends = Vec::new();
         for row in 0..=height {
-            let is_edge = |col| self.is_solid(col, row - 1) != self.is_solid(col, row);
-            for_each_run(width, is_edge, |from, to| {
-                ends.push([from, to].map(|col| self.pixel_position(col as f64, row as f64)));
-            });
+            let edges =
+                (0..width).map(|col| self.is_solid(col, row - 1) != self.is_solid(col, row));
+            for run in runs(edges) {
+                ends.push(run.map(|col| self.pixel_position(col as f64, row as f64)));
+            }
         }
         for col in 0..=width {
-            let is_edge = |row| self.is_solid(col - 1, row) != self.is_solid(col, row);
-            for_each_run(height, is_edge, |from, to| {
-                ends.push([from, to].map(|row| self.pixel_position(col as f64, row as f64)));
-            });
+            let edges =
+                (0..height).map(|row| self.is_solid(col - 1, row) != self.is_solid(col, row));
+            for run in runs(edges) {
+                ends.push(run.map(|row| self.pixel_position(col as f64, row as f64)));
+            }
         }
         (first_id..).zip(ends).map(|(id, ends)| Obstacle::capsule(id, ends, 0.0)).collect()
     }
@@ -163,19 +167,22 @@ fn axes(yaw_rad: f64) -> [Point<2>; 2] {
     [[c, s], [-s, c]]
 }
 
-/// Calls `tell` for every run `from..to` of numbers below `n` for which `is` holds.
-fn for_each_run(n: i64, is: impl Fn(i64) -> bool, mut tell: impl FnMut(i64, i64)) {
+/// Returns the start and the end of every run of true values, the end excluded.
+fn runs(flags: impl Iterator<Item = bool>) -> Vec<[usize; 2]> {
+    let mut runs = Vec::new();
     let mut start = None;
-    for k in 0..=n {
-        match (k < n && is(k), start) {
-            (true, None) => start = Some(k),
-            (false, Some(from)) => {
-                tell(from, k);
+    // One false value more ends the last run.
+    for (k, flag) in flags.chain([false]).enumerate() {
+        match start {
+            None if flag => start = Some(k),
+            Some(from) if !flag => {
+                runs.push([from, k]);
                 start = None;
             }
             _ => {}
         }
     }
+    runs
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use sidestep_map::planning::{Distances, FreeSpace, STEPS};
 use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
 
-/// Random positions that are tried.
+/// Random positions that are tried: many, because the test of one is cheap and little of a map may be free.
 const MAX_PLACES: u64 = 20_000;
 /// Free positions among them from which a path for the chain is searched; each search visits the whole grid.
 const MAX_STARTS: u32 = 64;
@@ -52,6 +52,7 @@ struct PlacementFailure {
 
 /// Returns a start for a chain on a site, from the seed and the chain's `number` alone; `obstacles` are all obstacles
 /// there.
+///
 /// Random positions are tried. From a free one, a breadth-first search finds the positions that are the
 /// most steps away within the chain's reach; the chain lies on the path to one of them, straightened.
 ///
@@ -70,6 +71,7 @@ pub(crate) fn find_placement(
     let mut failure = PlacementFailure::default();
     let bounds = wanted.within.unwrap_or_else(|| site.bounds());
     for place in 0..MAX_PLACES {
+        // A stream for each position, so that the draws of one do not depend on the outcome of another.
         let mut draws = streams.draws(number, place, purposes::ROUTE);
         let leader =
             std::array::from_fn(|i| bounds.lo[i] + (bounds.hi[i] - bounds.lo[i]) * draws.uniform());
@@ -160,17 +162,14 @@ impl RouteSearch<'_> {
         let SpaceRequirement { spacing_m, clearance_m, .. } = *self.wanted;
         // On a grid of 4 neighbors a path is up to sqrt(2) times as long as in a straight line.
         let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
+        // Boxes of half the clearance, so that no wall fits between two neighbors that are both free.
         let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
-        let half = (reach_m / box_m).ceil() as u32;
-        let place = |(col, row): (u32, u32)| {
-            let from_leader = |k: u32| (f64::from(k) - f64::from(half)) * box_m;
-            [leader[0] + from_leader(col), leader[1] + from_leader(row)]
-        };
-        let side = 2 * half + 1;
-        let free = FreeSpace::new(side, side, |col, row| self.is_free(place((col, row))));
-        let steps = Distances::to_nearest(&free, 1, &[(half, half)]);
-        let path = path_back(&steps, far_box(&steps, half, choice));
-        self.straighten(path.into_iter().rev().map(place).collect())
+        let grid = SearchGrid { leader, half: (reach_m / box_m).ceil() as u32, box_m };
+        let side = 2 * grid.half + 1;
+        let free = FreeSpace::new(side, side, |col, row| self.is_free(grid.place((col, row))));
+        let steps = Distances::to_nearest(&free, 1, &[(grid.half, grid.half)]);
+        let path = path_back(&steps, far_box(&steps, grid.half, choice));
+        self.straighten(path.into_iter().rev().map(|at| grid.place(at)).collect())
     }
 
     /// Returns a path with fewer corners: from each, straight ahead as far as there is clearance.
@@ -178,9 +177,13 @@ impl RouteSearch<'_> {
         let mut straightened = vec![path[0]];
         let mut from = 0;
         while from + 1 < path.len() {
-            let is_clear =
-                |to: &usize| self.is_clear([path[from], path[*to]], self.wanted.clearance_m);
-            let to = (from + 2..path.len()).take_while(is_clear).last().unwrap_or(from + 1);
+            // The next point is clear of itself: it is a free neighbor.
+            let mut to = from + 1;
+            while to + 1 < path.len()
+                && self.is_clear([path[from], path[to + 1]], self.wanted.clearance_m)
+            {
+                to += 1;
+            }
             straightened.push(path[to]);
             from = to;
         }
@@ -192,12 +195,15 @@ impl RouteSearch<'_> {
     fn lay_chain(&self, path: &[Point<2>]) -> Option<Vec<Point<2>>> {
         let SpaceRequirement { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
         let mut points = vec![path[0]];
+        // The leg on which the last connector lies, and the fraction of that leg behind it: the next one is never placed
+        // farther back, where the path enters the circle around the last one again.
         let mut leg = 0;
         let mut part = 0.0;
         while points.len() < connectors {
             let last = points[points.len() - 1];
             loop {
-                let [a, b] = [*path.get(leg)?, *path.get(leg + 1)?];
+                let a = *path.get(leg)?;
+                let b = *path.get(leg + 1)?;
                 match exit_fraction(last, spacing_m, [a, b]).filter(|&p| p >= part) {
                     Some(found) => {
                         points.push(lerp(a, b, found));
@@ -211,9 +217,11 @@ impl RouteSearch<'_> {
                 }
             }
         }
-        let is_clear = |rod: &[Point<2>]| self.is_clear([rod[0], rod[1]], rod_clearance_m);
-        (points.windows(2).all(is_clear) && points.iter().all(|&p| self.is_free(p)))
-            .then_some(points)
+        // Rods cut the corners of the path.
+        let mut rods = points.windows(2);
+        let are_rods_clear = rods.all(|rod| self.is_clear([rod[0], rod[1]], rod_clearance_m));
+        let is_clear = are_rods_clear && points.iter().all(|&p| self.is_free(p));
+        is_clear.then_some(points)
     }
 
     /// Returns the start of a chain that lies at `points`, if there is room ahead of it.
@@ -226,13 +234,35 @@ impl RouteSearch<'_> {
     }
 }
 
-/// Returns one of the boxes that are nearly the most steps away.
+/// The grid of boxes around a leader in which a path is searched.
+struct SearchGrid {
+    leader: Point<2>,
+    /// Boxes from the leader's to the edge.
+    half: u32,
+    /// Side of a box, meters.
+    box_m: f64,
+}
+
+impl SearchGrid {
+    /// Returns the middle of a box.
+    fn place(&self, (col, row): (u32, u32)) -> Point<2> {
+        let [x, y] = [col, row].map(|k| (f64::from(k) - f64::from(self.half)) * self.box_m);
+        [self.leader[0] + x, self.leader[1] + y]
+    }
+}
+
+/// Returns one of the boxes that are nearly the most steps away: with the farthest alone, all chains of a site would lie
+/// in the same dead end.
 fn far_box(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
     let most = steps.max_steps().unwrap_or(0);
-    let all = (0..=2 * half).flat_map(|row| (0..=2 * half).map(move |col| (col, row)));
-    let far =
-        |&(col, row): &(u32, u32)| steps.steps(col, row).is_some_and(|n| n + most / 20 >= most);
-    let far: Vec<_> = all.filter(far).collect();
+    let mut far = Vec::new();
+    for row in 0..=2 * half {
+        for col in 0..=2 * half {
+            if steps.steps(col, row).is_some_and(|n| n + most / 20 >= most) {
+                far.push((col, row));
+            }
+        }
+    }
     far.get(choice as usize % far.len().max(1)).copied().unwrap_or((half, half))
 }
 
@@ -242,8 +272,8 @@ fn path_back(steps: &Distances, mut at: (u32, u32)) -> Vec<(u32, u32)> {
     while let Some(n) = steps.steps(at.0, at.1).filter(|&n| n > 0) {
         let beside = STEPS
             .map(|(east, north)| (at.0.wrapping_add_signed(east), at.1.wrapping_add_signed(north)));
-        let is_nearer = |b: &&(u32, u32)| steps.steps(b.0, b.1) == Some(n - 1);
-        let Some(&next) = beside.iter().find(is_nearer) else { break };
+        let nearer = beside.into_iter().find(|&(col, row)| steps.steps(col, row) == Some(n - 1));
+        let Some(next) = nearer else { break };
         at = next;
         path.push(at);
     }

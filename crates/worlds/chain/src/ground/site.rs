@@ -31,6 +31,7 @@ impl Site {
             let pixel_m =
                 [plan.size_m[0] / f64::from(plan.width), plan.size_m[1] / f64::from(plan.height)];
             let floor = Floor::new(plan.width, plan.height, pixel_m, plan.solid.clone());
+            // Stage places models by their middles.
             let pose = GroundPose::from(plan.pose);
             site.floors.push(floor.centered(pose.at, pose.heading_rad).with_open_surroundings());
             if plan.has_boundary {
@@ -38,9 +39,10 @@ impl Site {
                 site.solids.extend(outline(0, &edges.map(|edge| edge[0]), 0.0));
             }
         }
-        let boxes = world.boxes.iter();
-        let solid = |body: &stage::BoxObstacle| Core::Cuboid(cuboid(body.pose.into(), body.size_m));
-        site.solids.extend(boxes.map(|body| Obstacle::still(0, solid(body), 0.0)));
+        for body in &world.boxes {
+            let solid = Core::Cuboid(cuboid(body.pose.into(), body.size_m));
+            site.solids.push(Obstacle::still(0, solid, 0.0));
+        }
         site
     }
 

@@ -2,21 +2,22 @@
 
 use super::{ConnectorInspection, line};
 use crate::motion::recovery::RecoveryOutcome;
+use crate::state::Body;
 use crate::view::obstacle_body_id;
 use sidestep_kernel::geometry::angle_rad;
 use sidestep_kernel::view::{
     BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, Quantity,
 };
 use sidestep_rods::CompletedMotion;
-use sidestep_rods::geometry::{Point, distance, sub, with_dimensions};
+use sidestep_rods::geometry::{distance, sub, with_dimensions};
 use std::borrow::Cow;
 
-/// Connectors that are told, at most.
+/// Connectors that are inspection, at most.
 const MAX_LISTED_CONNECTORS: usize = 64;
 
 impl<const D: usize> ConnectorInspection<'_, D> {
-    /// Tells the rung of the ladder on which the initiator ended.
-    pub(super) fn add_recovery(&self, told: &mut Inspection) {
+    /// Adds the rung of the ladder on which the initiator ended.
+    pub(super) fn add_recovery(&self, inspection: &mut Inspection) {
         let Some(climbed) = &self.trace.climbed else { return };
         let section = FactSection::new("Ladder");
         let (rung, moved) = match climbed {
@@ -39,7 +40,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             RecoveryOutcome::Vetoed(_) => ("none: an operator gets the veto".into(), None),
         };
         let section = section.fact("rung", rung);
-        told.add_section(match moved {
+        inspection.add_section(match moved {
             Some(moved) => self.with_motion(section, moved),
             None => section,
         });
@@ -64,21 +65,31 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             .fact("cut short", cut)
     }
 
-    /// Tells which connectors move, how far, and how far their rods turn.
-    pub(super) fn add_moves(&self, told: &mut Inspection) {
-        let (before, after) = (self.before.chain.points(), self.after.chain.points());
-        let way_m = |k: usize| distance(before[k], after[k]);
-        let moved: Vec<usize> = (0..before.len()).filter(|&k| way_m(k) > 0.0).collect();
+    /// Adds the connectors that move, how far, and how far their rods turn.
+    pub(super) fn add_moves(&self, inspection: &mut Inspection) {
+        let before = self.before.chain.points();
+        let after = self.after.chain.points();
+        let moved: Vec<usize> =
+            (0..before.len()).filter(|&k| distance(before[k], after[k]) > 0.0).collect();
+        // Of many, those around the connector that is inspected.
         let from = moved.partition_point(|&k| k < self.k).saturating_sub(MAX_LISTED_CONNECTORS / 2);
         let mut table = FactTable::new(["connector", "way", "turn of the rod behind it"]);
         for &k in moved.iter().skip(from).take(MAX_LISTED_CONNECTORS) {
-            let rod = |points: &[Point<D>]| sub(points[k + 1], points[k]);
-            let turn = (k + 1 < before.len()).then(|| angle_rad(rod(before), rod(after)));
-            let turn = turn.map(FactValue::degrees);
-            table.push_row([self.connector(k).into(), FactValue::meters(way_m(k)), turn.into()]);
-            told.add_mark(MarkRole::Done, format!("connector {k}"), line(&[before[k], after[k]]));
+            // The last connector has no rod behind it.
+            let turn = (k + 1 < before.len()).then(|| {
+                let was = sub(before[k + 1], before[k]);
+                let is = sub(after[k + 1], after[k]);
+                FactValue::degrees(angle_rad(was, is))
+            });
+            let way = FactValue::meters(distance(before[k], after[k]));
+            table.push_row([self.connector(k).into(), way, turn.into()]);
+            inspection.add_mark(
+                MarkRole::Done,
+                format!("connector {k}"),
+                line(&[before[k], after[k]]),
+            );
         }
-        told.add_section(
+        inspection.add_section(
             FactSection::new("Moves")
                 .fact("connectors", FactValue::count(moved.len()))
                 .fact("motions out of the way", FactValue::count(self.trace.escapes))
@@ -86,18 +97,15 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    /// Tells how late the robots are that keep to the connectors.
-    pub(super) fn add_lags(&self, told: &mut Inspection) {
+    /// Adds the lags of the robots that keep to the connectors.
+    pub(super) fn add_lags(&self, inspection: &mut Inspection) {
         let Some(robots) = &self.world.chains[self.slot as usize].robots else { return };
         let mut table = FactTable::new(["robot", "behind now", "behind then", "touches"]);
-        let behind_m = |body: &crate::state::Body<D>, k: usize| {
-            distance(body.robots[k].pose.at, with_dimensions(body.chain.points()[k]))
-        };
         let all = 0..self.before.robots.len();
         for k in all.clone().take(MAX_LISTED_CONNECTORS) {
-            let then = FactValue::meters(behind_m(&self.after, k));
-            let (now, touches) =
-                (FactValue::meters(behind_m(&self.before, k)), self.after.robots[k].is_bumped);
+            let now = FactValue::meters(lag_m(&self.before, k));
+            let then = FactValue::meters(lag_m(&self.after, k));
+            let touches = self.after.robots[k].is_bumped;
             table.push_row([
                 BodyId::new(BodyKind::Robot, self.slot, Some(k as u32)).into(),
                 now,
@@ -105,8 +113,8 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 touches.into(),
             ]);
         }
-        let latest_m = all.map(|k| behind_m(&self.before, k)).fold(0.0, f64::max);
-        told.add_section(
+        let latest_m = all.map(|k| lag_m(&self.before, k)).fold(0.0, f64::max);
+        inspection.add_section(
             FactSection::new("Robots")
                 .fact("the latest is behind by", FactValue::meters(latest_m))
                 .fact("the leader waits from", FactValue::meters(robots.lag_limit_m))
@@ -114,8 +122,8 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    /// Tells the outcome.
-    pub(super) fn add_outcome(&self, told: &mut Inspection) {
+    /// Adds the outcome.
+    pub(super) fn add_outcome(&self, inspection: &mut Inspection) {
         let mut table = FactTable::new(["event", "connector", "with", "value"]);
         for event in &self.scratch.events {
             let entry = crate::view::view_event(event);
@@ -127,14 +135,20 @@ impl<const D: usize> ConnectorInspection<'_, D> {
                 value.into(),
             ]);
         }
-        let (now, next) = (self.position(&self.before), self.position(&self.after));
-        told.add_section(
+        let now = self.position(&self.before);
+        let next = self.position(&self.after);
+        inspection.add_section(
             FactSection::new("Outcome")
                 .fact("way", FactValue::meters(distance(now, next)))
                 .fact("next place", next)
                 .table(table),
         );
     }
+}
+
+/// Returns the distance of a robot from its connector.
+fn lag_m<const D: usize>(body: &Body<D>, k: usize) -> f64 {
+    distance(body.robots[k].pose.at, with_dimensions(body.chain.points()[k]))
 }
 
 /// Returns the unit of an amount, as worlds write it.

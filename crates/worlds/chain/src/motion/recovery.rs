@@ -23,10 +23,12 @@ use sidestep_rods::{
     VetoEffect,
 };
 
-/// Fractions of a step that are tried when the whole step is vetoed.
+/// Fractions of a step that are tried when the whole step is vetoed. An eighth is the least worth a cycle; where less
+/// is free, another heading leads on sooner.
 const STEP_FRACTIONS: [f64; 3] = [0.5, 0.25, 0.125];
-/// Other headings that are tried, rad: up to a little more than across, because farther back lies where the chain
-/// comes from.
+/// Other headings that are tried, rad: up to a little more than across, to get away from a flat wall; farther back lies
+/// where the chain comes from, and the other end leads there better. With steps finer than 0.4 rad (23 degrees) each veto
+/// costs more attempts, with coarser ones gaps are missed; the prototypes had these, and no others were measured.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 
 /// Lengths of the rungs.
@@ -47,6 +49,9 @@ pub struct RecoveryLimits {
 }
 
 impl Default for RecoveryLimits {
+    /// Returns limits for cycles of 20 ms: a second in which obstacles nearby may go away, a second in which the other end
+    /// pulls, half a second of free motion before a side is no longer preferred. In 16 turns on the spot a robot of the
+    /// usual size turns by 46 degrees. Three times through the same place are a circle, not a detour.
     fn default() -> Self {
         Self { turns: 16, waits: 50, pull_back: 50, hand_overs: 3, visits: 3, straight: 25 }
     }
@@ -153,11 +158,15 @@ pub(crate) struct ChainEnd<const D: usize> {
     pub(crate) ahead: Point<D>,
 }
 
-/// A chain that is moved at once.
-struct DirectMover<'a, const D: usize> {
-    chain: &'a mut Chain<D>,
-    obstacles: &'a Obstacles<D>,
-    propagator: &'a mut Propagator<D>,
+/// A chain that is moved as a whole, in one process.
+#[derive(Debug)]
+pub struct DirectMover<'a, const D: usize> {
+    /// The chain.
+    pub chain: &'a mut Chain<D>,
+    /// Obstacles around it.
+    pub obstacles: &'a Obstacles<D>,
+    /// The rules of its motions.
+    pub propagator: &'a mut Propagator<D>,
 }
 
 impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
@@ -172,8 +181,8 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
     }
 
     fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, InputError> {
-        let attempted =
-            execute_request(self.propagator, &mut self.chain.clone(), self.obstacles, request)?;
+        let mut copy = self.chain.clone();
+        let attempted = execute_request(self.propagator, &mut copy, self.obstacles, request)?;
         Ok(attempted.veto().copied())
     }
 
@@ -206,9 +215,13 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
         })
     }
 
+    /// Records a veto, unless one differs only in the position that the initiator could have reached.
     fn record_veto(&mut self, veto: Veto<D>) {
-        let is_known = self.vetoes.iter().any(|v| {
-            (v.from, v.by, v.reason, v.obstacle) == (veto.from, veto.by, veto.reason, veto.obstacle)
+        let is_known = self.vetoes.iter().any(|known| {
+            known.from == veto.from
+                && known.by == veto.by
+                && known.reason == veto.reason
+                && known.obstacle == veto.obstacle
         });
         if !is_known {
             self.vetoes.push(veto);
@@ -217,14 +230,26 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
 
     /// Returns the wanted motion with another displacement of the initiator.
     fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
-        let to = |k: usize, to: Point<D>| {
-            let at = self.by.place(k);
-            add(at, change(sub(to, at)))
-        };
         match self.wanted.motion {
-            Motion::Connector { k, to: t } => Motion::Connector { k, to: to(k, t) },
-            Motion::Rod { i, to: t } => Motion::Rod { i, to: [to(i, t[0]), to(i + 1, t[1])] },
+            Motion::Connector { k, to } => {
+                Motion::Connector { k, to: self.with_change(k, to, change) }
+            }
+            Motion::Rod { i, to: [first, second] } => Motion::Rod {
+                i,
+                to: [self.with_change(i, first, &change), self.with_change(i + 1, second, &change)],
+            },
         }
+    }
+
+    /// Returns the target of a connector with another displacement than to `to`.
+    fn with_change(
+        &self,
+        k: usize,
+        to: Point<D>,
+        change: impl Fn(Point<D>) -> Point<D>,
+    ) -> Point<D> {
+        let at = self.by.place(k);
+        add(at, change(sub(to, at)))
     }
 
     /// Returns the initiator and the displacement that it wants.
@@ -247,29 +272,12 @@ impl RecoveryLadder {
     /// As [`Propagator::propagate`].
     pub fn climb<const D: usize>(
         &mut self,
-        chain: &mut Chain<D>,
-        obstacles: &Obstacles<D>,
-        propagator: &mut Propagator<D>,
+        by: &mut DirectMover<'_, D>,
         wanted: &Request<D>,
         situation: &Situation,
     ) -> Result<RecoveryOutcome<D>, InputError> {
-        let climbed = self.climb_with_veto(chain, obstacles, propagator, wanted, situation);
-        climbed.map(|(climbed, _)| climbed)
-    }
-
-    /// Climbs, and also returns the veto of the wanted motion itself, if there was one.
-    ///
-    /// # Errors
-    /// As [`Propagator::propagate`].
-    pub fn climb_with_veto<const D: usize>(
-        &mut self,
-        chain: &mut Chain<D>,
-        obstacles: &Obstacles<D>,
-        propagator: &mut Propagator<D>,
-        wanted: &Request<D>,
-        situation: &Situation,
-    ) -> Result<(RecoveryOutcome<D>, Option<Veto<D>>), InputError> {
-        self.climb_with(&mut DirectMover { chain, obstacles, propagator }, wanted, situation)
+        let (climbed, _) = self.climb_with(by, wanted, situation)?;
+        Ok(climbed)
     }
 
     /// Climbs with any kind of mover, and also returns the veto of the wanted motion itself, if there was one.
@@ -371,8 +379,9 @@ impl RecoveryLadder {
         };
         let axes = axes_across(u);
         let step = scaled(u, norm(way));
-        let ways = fan(&RecoveryMemory::default(), D - 1);
-        for (plane, turn_rad) in std::iter::once((0, 0.0)).chain(ways) {
+        // The good side is the initiator's, and means nothing at the other end.
+        let turns = fan(&RecoveryMemory::default(), D - 1);
+        for (plane, turn_rad) in std::iter::once((0, 0.0)).chain(turns) {
             let to = add(at, turn_toward(step, u, axes[plane], turn_rad));
             if let Some(moved) = climb.attempt(Motion::Connector { k: by, to })? {
                 self.memory.record_pull_back();
@@ -390,7 +399,9 @@ impl RecoveryLadder {
         if climb.vetoes.is_empty() {
             // It is stuck in detours without a veto in this tick, so the wanted motion is tried for its veto.
             let request = Request { mode: VetoEffect::Exact, ..climb.wanted };
-            climb.by.find_veto(&request)?.into_iter().for_each(|veto| climb.record_veto(veto));
+            if let Some(veto) = climb.by.find_veto(&request)? {
+                climb.record_veto(veto);
+            }
         }
         Ok(RecoveryOutcome::Stuck { vetoes: std::mem::take(&mut climb.vetoes) })
     }
@@ -430,9 +441,9 @@ fn fan(memory: &RecoveryMemory, planes: usize) -> impl Iterator<Item = (usize, f
     (0..planes).flat_map(move |p| {
         let plane = (first + p) % planes;
         (0..tries).map(move |t| {
-            let (angle, is_other) =
-                if keeps_side { (t % FAN_RAD.len(), t / FAN_RAD.len()) } else { (t / 2, t % 2) };
-            let sign = if is_other == 0 { side } else { -side };
+            let is_other_side = if keeps_side { t >= FAN_RAD.len() } else { t % 2 == 1 };
+            let angle = if keeps_side { t % FAN_RAD.len() } else { t / 2 };
+            let sign = if is_other_side { -side } else { side };
             (plane, sign * FAN_RAD[angle])
         })
     })

@@ -51,12 +51,14 @@ fn is_held_veto(reason: VetoReason) -> bool {
 /// Returns the first connector, other than the one that moves, that belongs on a line, on a plane or in a
 /// box.
 fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
-    let slides = |i: &usize| {
-        let connector = &chain.connectors()[*i];
-        let is_free = matches!(connector.mobility, Mobility::Free | Mobility::Fixed);
-        *i != k && !connector.failed && !is_free
-    };
-    if chain.is_plain() { None } else { (0..chain.connectors().len()).find(slides) }
+    // Most chains have none, and would be searched for each motion.
+    if chain.is_plain() {
+        return None;
+    }
+    chain.connectors().iter().enumerate().position(|(i, connector)| {
+        let slides = !matches!(connector.mobility, Mobility::Free | Mobility::Fixed);
+        i != k && !connector.failed && slides
+    })
 }
 
 /// Moves a chain one of whose connectors slides. Where that one could follow only by moving much farther than the
@@ -75,6 +77,7 @@ fn move_sliding<const D: usize>(
         let veto = match scene.propagator.propagate(chain, scene.obstacles, &request)? {
             Outcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
             Outcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
+                // It would jump, as if it had objected.
                 chain.points_mut().copy_from_slice(before);
                 let reason = VetoReason::Mobility;
                 Veto { by: order.base, from: k, reason, obstacle: None, reached: before[k] }
@@ -122,17 +125,11 @@ fn try_slowed<const D: usize>(
 ) -> Result<Outcome<D>, InputError> {
     let before = chain.points().to_vec();
     let from = before[k];
-    let slow = |by: usize, reached: Point<D>| Veto {
-        by,
-        from: k,
-        reason: VetoReason::StepLimit,
-        obstacle: None,
-        reached,
-    };
-    let mut part = 1.0;
+    let mut fraction = 1.0;
     let mut fastest = k;
     for _ in 0..MAX_SLOWED_TRIES {
-        let target = if part < 1.0 { lerp(from, to, part) } else { to };
+        // The target itself, and not an interpolation that rounds.
+        let target = if fraction < 1.0 { lerp(from, to, fraction) } else { to };
         let (outcome, jump_m) = attempt(chain, &before, target)?;
         let moved = match outcome {
             Outcome::Moved(moved) => moved,
@@ -141,21 +138,35 @@ fn try_slowed<const D: usize>(
         let most_m = joints_m.min(jump_m);
         let (by, longest_m) = max_displacement(&before, chain.points());
         if longest_m <= most_m {
-            let slowed = slow(by, chain.points()[k]);
-            let cut_short = if part < 1.0 { Some(slowed) } else { moved.cut_short };
+            let cut_short = if fraction < 1.0 {
+                Some(speed_veto(k, by, chain.points()[k]))
+            } else {
+                moved.cut_short
+            };
             return Ok(Outcome::Moved(CompletedMotion { cut_short, ..moved }));
         }
         chain.points_mut().copy_from_slice(&before);
-        part = part * SLOWED_FRACTION * most_m / longest_m;
+        fraction = fraction * SLOWED_FRACTION * most_m / longest_m;
         fastest = by;
     }
-    Ok(Outcome::Vetoed(slow(fastest, from)))
+    Ok(Outcome::Vetoed(speed_veto(k, fastest, from)))
+}
+
+/// Returns the veto of connector `by`, which would be too fast, against a motion of connector `k`.
+fn speed_veto<const D: usize>(k: usize, by: usize, reached: Point<D>) -> Veto<D> {
+    Veto { by, from: k, reason: VetoReason::StepLimit, obstacle: None, reached }
 }
 
 /// Returns the connector that has moved farthest, and its displacement, meters.
 fn max_displacement<const D: usize>(before: &[Point<D>], points: &[Point<D>]) -> (usize, f64) {
-    let ways_m = before.iter().zip(points).map(|(a, b)| distance(*a, *b)).enumerate();
-    ways_m.fold((0, 0.0), |most, way| if way.1 > most.1 { way } else { most })
+    let mut most = (0, 0.0);
+    for (k, (from, to)) in before.iter().zip(points).enumerate() {
+        let displacement_m = distance(*from, *to);
+        if displacement_m > most.1 {
+            most = (k, displacement_m);
+        }
+    }
+    most
 }
 
 /// Moves a chain whose base has vetoed by forward and backward passes, or straight to a posture; also returns the
@@ -182,7 +193,8 @@ fn move_to_target<const D: usize>(
     })
 }
 
-/// Most attempts to find the distance that an initiator may go.
+/// Most attempts to find the distance that an initiator may go: as an elbow moves with the square root of the tool's
+/// motion at worst, each halves the excess in orders of magnitude, so that few are needed.
 const MAX_SLOWED_TRIES: usize = 16;
 /// Fraction of the limit that an attempt aims at, because near singular postures joints slow down less
 /// than the initiator.
@@ -212,7 +224,8 @@ fn move_to_posture<const D: usize>(
     let answer = IkSolver::new(scene.propagator.rules).solve(chain, scene.obstacles, &goal)?;
     // The solver knows of no held connector other than the base.
     let mut motions = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
-    if !answer.reached || !motions.all(|(c, (at, to))| may_move(c, *at, *to)) {
+    let is_allowed = motions.all(|(connector, (at, to))| may_move(connector, *at, *to));
+    if !answer.reached || !is_allowed {
         return Ok(Outcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
@@ -235,39 +248,43 @@ fn may_move<const D: usize>(connector: &Connector<D>, at: Point<D>, to: Point<D>
 
 /// Returns the connector, if there is one, from whose positions the rods do not reach the target.
 fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &ReachRequest<D>) -> Option<usize> {
-    let holds_too_far = |i: &usize| {
-        let connector = &chain.connectors()[*i];
-        let at = chain.points()[*i];
-        let [from, to] = [order.k.min(*i), order.k.max(*i)];
-        let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
+    for (i, connector) in chain.connectors().iter().enumerate() {
         // A failed connector may be repaired, so it is reported as failed.
-        !connector.failed
-            && distance(connector.mobility.project(order.target, at), order.target)
-                > reach_m + order.tolerance_m
-    };
-    (0..chain.points().len()).filter(|i| *i != order.k).find(holds_too_far)
+        if i == order.k || connector.failed {
+            continue;
+        }
+        let rods = &chain.rods()[order.k.min(i)..order.k.max(i)];
+        let reach_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
+        let nearest = connector.mobility.project(order.target, chain.points()[i]);
+        if distance(nearest, order.target) > reach_m + order.tolerance_m {
+            return Some(i);
+        }
+    }
+    None
 }
 
 /// Longest move of a connector, as a fraction of the longest rod, with which a posture is accepted as a
-/// motion: farther apart, two postures are not one motion of the chain.
+/// motion: farther apart, two postures are not one motion of the chain. An elbow that changes its side moves by up to two
+/// rods; that of a straight arm that is drawn in moves with the square root of the tool's motion, and has to be allowed
+/// more than small steps. The half between the two was chosen, not measured.
 const MAX_JUMP: f64 = 0.5;
 
 /// Distance at which a connector's step counts as complete, meters.
 pub(crate) const TOLERANCE_M: f64 = 1e-7;
 
-/// Returns the connectors that have moved, by comparison.
+/// Returns a motion that no propagation has counted: how far connectors have moved, by comparison.
 fn motion_since<const D: usize>(
     before: &[Point<D>],
     chain: &Chain<D>,
     k: usize,
 ) -> CompletedMotion<D> {
-    let ways_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
-    let slaves = ways_m.enumerate().filter(|(i, _)| *i != k);
+    let moves_m = before.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+    let slaves_m = moves_m.enumerate().filter(|(i, _)| *i != k).map(|(_, m)| m);
     CompletedMotion {
         touched: 0..before.len(),
         changed: before.iter().zip(chain.points()).filter(|(a, b)| a != b).count(),
         rotated: 0,
-        max_slave_step_m: slaves.map(|(_, way_m)| way_m).fold(0.0, f64::max),
+        max_slave_step_m: slaves_m.fold(0.0, f64::max),
         cut_short: None,
     }
 }

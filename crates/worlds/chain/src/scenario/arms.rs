@@ -40,16 +40,16 @@ impl<const D: usize> Compiler<'_, D> {
         let s = section.get_ref();
         let at = section.span();
         let model = self.model(s, at.clone())?;
-        let link = |name: &Option<String>, key: &str, preset: usize| match name {
-            Some(name) => {
-                let at = || self.source.key_span(at.clone(), &[key]);
-                model.link(key, name).map_err(|error| self.source.error_from(at(), &error))
-            }
-            None => Ok(preset),
+        let base = match &s.base {
+            Some(name) => self.link(&model, "base", name, at.clone())?,
+            None => model.root,
         };
-        let base = link(&s.base, "base", model.root)?;
-        let tip = link(&s.tip, "tip", model.default_tip())?;
-        let serial = SerialChain::new(&model, base, tip, s.urdf.as_deref().unwrap_or("urdf_text"))
+        let tip = match &s.tip {
+            Some(name) => self.link(&model, "tip", name, at.clone())?,
+            None => model.default_tip(),
+        };
+        let place = s.urdf.as_deref().unwrap_or("urdf_text");
+        let serial = SerialChain::new(&model, base, tip, place)
             .map_err(|error| self.source.error_from(at.clone(), &error))?;
         if serial.variables.is_empty() {
             let at = self.source.key_span(at, &["tip", "base", "urdf", "urdf_text"]);
@@ -57,11 +57,28 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, cause, "give another base or another tip"));
         }
         let values = self.values(s, &model, &serial, at.clone())?;
-        let at = || self.source.key_span(at, &["joints", "posture"]);
-        serial
-            .check_limits("joints", &values)
-            .map_err(|error| self.source.error_from(at(), &error))?;
+        serial.check_limits("joints", &values).map_err(|error| self.posture_error(at, &error))?;
         Ok(Arm::new(serial, at_m, values))
+    }
+
+    /// Returns the link of a model that a key gives by its name.
+    fn link(
+        &self,
+        model: &Model,
+        key: &str,
+        name: &str,
+        at: Range<usize>,
+    ) -> Result<usize, InputError> {
+        model.link(key, name).map_err(|error| {
+            let at = self.source.key_span(at, &[key]);
+            self.source.error_from(at, &error)
+        })
+    }
+
+    /// Returns an error about the joint values at the start, at the key that gives them.
+    fn posture_error(&self, at: Range<usize>, error: &InputError) -> InputError {
+        let at = self.source.key_span(at, &["joints", "posture"]);
+        self.source.error_from(at, error)
     }
 
     /// Returns the model of an arm: from a file, or from the scenario itself.
@@ -91,25 +108,25 @@ impl<const D: usize> Compiler<'_, D> {
         serial: &SerialChain,
         at: Range<usize>,
     ) -> Result<Vec<f64>, InputError> {
-        let told = |error: InputError| {
-            let at = self.source.key_span(at.clone(), &["joints", "posture"]);
-            self.source.error_from(at, &error)
-        };
         match (&s.joints, &s.posture, &s.srdf) {
             (Some(values), None, None) => {
-                serial.check_count("joints", values).map_err(told)?;
+                serial
+                    .check_count("joints", values)
+                    .map_err(|error| self.posture_error(at, &error))?;
                 Ok(values.clone())
             }
             (None, Some(name), Some(srdf)) => {
                 let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model);
                 let semantics = self.source.with_file_key(at.clone(), "srdf", semantics)?;
-                let posture = semantics.posture("posture", name).map_err(told)?;
+                let posture = semantics
+                    .posture("posture", name)
+                    .map_err(|error| self.posture_error(at, &error))?;
                 Ok(serial.with_posture(model, &posture))
             }
             (None, None, None) => Ok(serial.rest_values()),
             _ => {
                 let remedy = "give joints = [...], or srdf and posture, or none of them";
-                let at = self.source.key_span(at.clone(), &["posture", "srdf", "joints"]);
+                let at = self.source.key_span(at, &["posture", "srdf", "joints"]);
                 Err(self.source.error(at, "a posture given twice, or by half", remedy))
             }
         }

@@ -12,7 +12,7 @@ use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
 use super::obstacles::to_dimensions;
 use super::tasks::TaskSection;
-use super::{BoxSection, Compiler, Measure, PointValue};
+use super::{BoxSection, Compiler, MIN_REACH_M, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
@@ -20,14 +20,23 @@ use sidestep_kernel::{InputError, Seed, math};
 use sidestep_rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacles, Rod};
 use sidestep_scenario::{NumberRange, Sections, Spanned};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Free distance around the parts of a chain that starts anywhere, as a multiple of its radius: at exactly one radius
-/// its first motion would be vetoed.
+/// its first motion would be vetoed. A larger factor refuses starts in narrow passages; how much larger than 1 it has to
+/// be was chosen, not measured.
 const ROOM_FACTOR: f64 = 1.2;
-/// Margin of connectors around robots that follow them on wheels, which lag behind, meters.
+/// Margin of connectors around robots that follow them on wheels, which lag behind, meters. Without one, robots
+/// hung on the walls that their connectors graze, with bumpers pressed 47 to 62 % of the time; 0.05 was enough where
+/// wheels are a fifth faster than the leader, 0.1 where they are as fast.
 const MARGIN_M: f64 = 0.08;
+/// Radius of connectors, unless it is given, meters.
+const DEFAULT_RADIUS_M: f64 = 0.05;
+/// Radius of rods, unless it is given, as a multiple of that of their connectors: a master that touches a wall with a
+/// thick rod blocks half a plane, and slaves jump 12 to 19 times as far as a step. The rods of a swarm are virtual anyway.
+const ROD_RADIUS_FACTOR: f64 = 0.2;
+/// The same for the links of an arm: they are solid, and about as thick as its joints.
+const LINK_RADIUS_FACTOR: f64 = 0.8;
 /// Keys of a chain that an arm does not have, and the arm.
 const NON_ARM_KEYS: [&str; 11] = [
     "connectors",
@@ -121,8 +130,8 @@ impl<const D: usize> Compiler<'_, D> {
         self.check_total()?;
         let mut all = Vec::new();
         for (number, section) in (0..).zip(&self.file.chains.0) {
-            let spec =
-                self.chain(section, dt_s, PlacementContext { site, number, placed: &all })?;
+            let around = PlacementContext { site, number, placed: &all };
+            let spec = self.chain(section, dt_s, around)?;
             for copy in 0..section.get_ref().count {
                 all.push(self.copy_chain(&spec, section, copy)?);
             }
@@ -163,12 +172,10 @@ impl<const D: usize> Compiler<'_, D> {
         let apart_m: Point<D> = match &s.apart_m {
             Some(given) => given.get(),
             None if s.count > 1 => {
+                let cause = format!("{} chains at one place", s.count);
                 let remedy = "add apart_m = [...], the offset from one to the next";
-                return Err(self.source.error(
-                    self.source.key_span(section.span(), &["count"]),
-                    format!("{} chains at one place", s.count),
-                    remedy,
-                ));
+                let at = self.source.key_span(section.span(), &["count"]);
+                return Err(self.source.error(at, cause, remedy));
             }
             None => [0.0; D],
         };
@@ -187,40 +194,37 @@ impl<const D: usize> Compiler<'_, D> {
         around: PlacementContext<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let s = section.get_ref();
-        let at = section.span();
-        let (start, arm) = self.shape(s, around, at.clone())?;
-        let tasks = self.tasks(s, &start, at.clone())?;
+        let (start, arm) = self.shape(section, around)?;
+        let tasks = self.tasks(section, &start)?;
         if let Some(arm) = &arm {
-            let sections = s.tasks.0.iter().zip(&tasks);
-            sections
-                .into_iter()
-                .try_for_each(|(section, task)| self.check_joint_reach(section, task, arm))?;
+            for (section, task) in s.tasks.0.iter().zip(&tasks) {
+                self.check_joint_reach(section, task, arm)?;
+            }
         }
-        let changes = self.changes(s, &start, dt_s, at.clone())?;
+        let changes = self.changes(section, &start, dt_s)?;
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
-        self.check_steps(&start, speed_m_s * dt_s, at.clone())?;
+        self.check_steps(section, &start, speed_m_s * dt_s)?;
         let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
         if let Some(robots) = &robots {
-            self.check_room(robots, &start, at.clone())?;
+            self.check_room(section, robots, &start)?;
         }
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
-            let at = self.source.key_span(at, &["robots"]);
+            let at = self.source.key_span(section.span(), &["robots"]);
             return Err(self.source.error(at, "robots on wheels in space", remedy));
         }
         Ok(ChainSpec { name: s.name.clone(), start, tasks, changes, arm, robots })
     }
 
-    /// Returns tasks of a chain of `n` connectors: at least one, and an endless one only at the
-    /// end.
+    /// Returns the tasks of a chain: at least one, and an endless one only at the end.
     fn tasks(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         start: &Chain<D>,
-        at: Range<usize>,
     ) -> Result<Vec<Task<D>>, InputError> {
-        let tasks =
-            s.tasks.0.iter().map(|task| self.task(task, start)).collect::<Result<Vec<_>, _>>()?;
+        let s = section.get_ref();
+        let tasks = s.tasks.0.iter().map(|task| self.task(task, start));
+        let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;
         }
@@ -231,7 +235,7 @@ impl<const D: usize> Compiler<'_, D> {
         if tasks.is_empty() {
             let remedy = "add [[chains.tasks]] with a kind: rest, wander, script, targets or \
                           external";
-            return Err(self.source.error(at, "a chain without a task", remedy));
+            return Err(self.source.error(section.span(), "a chain without a task", remedy));
         }
         Ok(tasks)
     }
@@ -239,21 +243,23 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns the changes of a chain by their time.
     fn changes(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         start: &Chain<D>,
         dt_s: f64,
-        at: Range<usize>,
     ) -> Result<Vec<Change<D>>, InputError> {
+        let s = section.get_ref();
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
         // A chain may break and be joined in the same cycle, in either order in the file.
-        let joins = |change: &Change<D>| matches!(change.what, ChangeKind::Reform { .. });
-        changes.sort_by_key(|change| (change.cycle, joins(change)));
+        changes.sort_by_key(|change| {
+            let joins = matches!(change.what, ChangeKind::Reform { .. });
+            (change.cycle, joins)
+        });
         let breaks =
             changes.iter().filter(|change| matches!(change.what, ChangeKind::Scatter { .. }));
         if breaks.count() > 1 {
-            let remedy = "break it once";
-            return Err(self.source.error(at, "a chain that breaks more than once", remedy));
+            let cause = "a chain that breaks more than once";
+            return Err(self.source.error(section.span(), cause, "break it once"));
         }
         self.check_breaks(s, dt_s)?;
         Ok(changes)
@@ -262,33 +268,38 @@ impl<const D: usize> Compiler<'_, D> {
     /// Refuses to join a chain that has not been broken by then, by the cycles in which both take effect.
     fn check_breaks(&self, s: &ChainSection<D>, dt_s: f64) -> Result<(), InputError> {
         let broken = s.changes.0.iter().find_map(|change| change.get_ref().break_cycle(dt_s));
-        let is_early = |joins: u64| broken.is_none_or(|broken| joins < broken);
-        let joins_at = |change: &Spanned<ChangeSection<D>>| change.get_ref().join_cycle(dt_s);
-        match s.changes.0.iter().find(|change| joins_at(change).is_some_and(is_early)) {
-            None => Ok(()),
-            Some(change) => {
+        for change in &s.changes.0 {
+            let Some(joined) = change.get_ref().join_cycle(dt_s) else { continue };
+            if broken.is_none_or(|broken| joined < broken) {
                 let at = self.source.key_span(change.span(), &["reform"]);
                 let remedy = "break the chain before: a change with scatter = [first, last]";
-                Err(self.source.error(at, "reform of a chain that is whole", remedy))
+                return Err(self.source.error(at, "reform of a chain that is whole", remedy));
             }
         }
+        Ok(())
     }
 
     /// Refuses a speed that would need too many sub-steps per cycle to be practical.
     fn check_steps(
         &self,
+        section: &Spanned<ChainSection<D>>,
         chain: &Chain<D>,
-        way_m: f64,
-        at: Range<usize>,
+        cycle_m: f64,
     ) -> Result<(), InputError> {
-        let step_m = self.file.chain.step_m.map(f64::from).unwrap_or(chain.step_m());
-        if way_m <= MAX_STEPS * step_m {
+        let step_m = self.step_m(chain);
+        if cycle_m <= MAX_STEPS * step_m {
             return Ok(());
         }
-        let cause = format!("its initiator goes {way_m:e} m in a cycle, in steps of {step_m:e} m");
+        let cause =
+            format!("its initiator goes {cycle_m:e} m in a cycle, in steps of {step_m:e} m");
         let remedy = "give a shorter chain.dt_s, a lower speed_m_s, larger connectors and rods, \
                       or a longer chain.step_m";
-        Err(self.source.error(at, cause, remedy))
+        Err(self.source.error(section.span(), cause, remedy))
+    }
+
+    /// Returns the longest sub-step of an initiator of a chain: as given, or as the chain allows.
+    fn step_m(&self, chain: &Chain<D>) -> f64 {
+        self.file.chain.step_m.map_or(chain.step_m(), f64::from)
     }
 
     /// Refuses a speed of escapes that would need too many sub-steps: the literal escape moves step by step.
@@ -300,37 +311,38 @@ impl<const D: usize> Compiler<'_, D> {
         let Some(escape) = escape.filter(|escape| escape.method == EscapeMethod::Literal) else {
             return Ok(());
         };
-        let way_m = escape.speed_max_m_s * escape.dt_s;
-        let given_m = self.file.chain.step_m.map(f64::from);
-        let step_m = |spec: &ChainSpec<D>| given_m.unwrap_or(spec.start.step_m());
-        let is_long = |spec: &ChainSpec<D>| way_m > MAX_STEPS * step_m(spec);
-        let Some(slot) = chains.iter().position(is_long) else { return Ok(()) };
-        let cause = format!(
-            "it may have to flee {way_m:e} m in a cycle, in steps of {:e} m",
-            step_m(&chains[slot])
-        );
-        let remedy = "give a shorter chain.dt_s, a lower chain.escape_speed_m_s, slower obstacles, \
-                      chain.escape_by = \"simultaneous\", or a longer chain.step_m";
-        Err(self.source.error(self.section_span(slot), cause, remedy))
+        let cycle_m = escape.speed_max_m_s * escape.dt_s;
+        for (slot, spec) in chains.iter().enumerate() {
+            let step_m = self.step_m(&spec.start);
+            if cycle_m > MAX_STEPS * step_m {
+                let cause = format!(
+                    "it may have to flee {cycle_m:e} m in a cycle, in steps of {step_m:e} m"
+                );
+                let remedy = "give a shorter chain.dt_s, a lower chain.escape_speed_m_s, slower \
+                              obstacles, chain.escape_by = \"simultaneous\", or a longer chain.step_m";
+                return Err(self.source.error(self.section_span(slot), cause, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
     fn check_room(
         &self,
+        section: &Spanned<ChainSection<D>>,
         robots: &Robots,
         chain: &Chain<D>,
-        at: Range<usize>,
     ) -> Result<(), InputError> {
         let radius_m = robots.follower.ring.radius_m;
         let least_m = chain.rods().iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min);
         if least_m < 2.0 * radius_m {
             let cause = format!("robots of radius {radius_m} m as near as {least_m} m");
-            let at = self.source.key_span(at, &["rod_m", "robots"]);
+            let at = self.source.key_span(section.span(), &["rod_m", "robots"]);
             return Err(self.source.error(at, cause, "give longer rods, or smaller robots"));
         }
         if chain.connectors().iter().any(|connector| connector.radius_m < radius_m) {
             let remedy = "give robots.margin_m of 0 or more";
-            let at = self.source.key_span(at, &["robots"]);
+            let at = self.source.key_span(section.span(), &["robots"]);
             return Err(self.source.error(at, "connectors smaller than their robots", remedy));
         }
         Ok(())
@@ -338,54 +350,55 @@ impl<const D: usize> Compiler<'_, D> {
 
     fn shape(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         around: PlacementContext<D>,
-        at: Range<usize>,
     ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
-        let radius_m = self.radius_m(s, at.clone())?;
-        if let Some(section) = &s.arm {
-            return self.arm_shape(s, section, radius_m, at);
+        let s = section.get_ref();
+        let radius_m = self.radius_m(section)?;
+        if let Some(arm) = &s.arm {
+            let (chain, arm) = self.arm_shape(section, arm, radius_m)?;
+            return Ok((chain, Some(arm)));
         }
-        let rod = self.rod(s, radius_m, at.clone())?;
+        let rod = self.rod(section, radius_m)?;
         if let Some(within) = s.within_m.as_ref().filter(|_| !s.anywhere) {
+            let cause = "within_m of a chain that has its place";
             let remedy = "leave it out, or set anywhere = true";
-            return Err(self.source.error(
-                within.span(),
-                "within_m of a chain that has its place",
-                remedy,
-            ));
+            return Err(self.source.error(within.span(), cause, remedy));
         }
         let points = if s.anywhere {
-            self.random_start(s, &rod, radius_m, around, at.clone())?
+            self.random_start(section, &rod, radius_m, around)?
         } else {
-            self.points(s, rod.max_m, at.clone())?
+            self.points(section, rod.max_m)?
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
         self.trim_leaders(s, &mut connectors);
         if let Some(deg) = s.max_bend_deg {
-            connectors.iter_mut().for_each(|c| c.max_bend_rad = deg.to_radians());
+            for connector in &mut connectors {
+                connector.max_bend_rad = deg.to_radians();
+            }
         }
         for limit in &s.limits.0 {
             self.limit(&mut connectors, limit)?;
         }
         let rods = vec![rod; points.len() - 1];
         let chain = Chain::new(points, connectors, rods)
-            .map_err(|error| self.source.error_from(at, &error))?;
+            .map_err(|error| self.source.error_from(section.span(), &error))?;
         Ok((chain, None))
     }
 
     /// Returns the radius of the connectors: that of the robots, with the margin that followers
     /// need.
-    fn radius_m(&self, s: &ChainSection<D>, at: Range<usize>) -> Result<f64, InputError> {
+    fn radius_m(&self, section: &Spanned<ChainSection<D>>) -> Result<f64, InputError> {
+        let s = section.get_ref();
         match (&s.robots, s.radius_m) {
-            (None, given) => Ok(given.unwrap_or(0.05)),
+            (None, given) => Ok(given.unwrap_or(DEFAULT_RADIUS_M)),
             (Some(robots), None) => {
                 let robots = robots.get_ref();
                 Ok(robots.radius_m() + robots.margin_m.unwrap_or(MARGIN_M))
             }
             (Some(_), Some(_)) => {
                 let remedy = "give robots.radius_m and robots.margin_m instead";
-                let at = self.source.key_span(at, &["radius_m"]);
+                let at = self.source.key_span(section.span(), &["radius_m"]);
                 Err(self.source.error(at, "radius_m beside robots", remedy))
             }
         }
@@ -401,14 +414,15 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Returns the chain that represents an arm.
+    /// Returns the chain that represents an arm, and the arm.
     fn arm_shape(
         &self,
-        s: &ChainSection<D>,
-        section: &Spanned<ArmSection>,
+        section: &Spanned<ChainSection<D>>,
+        arm: &Spanned<ArmSection>,
         radius_m: f64,
-        at: Range<usize>,
-    ) -> Result<(Chain<D>, Option<Arc<Arm>>), InputError> {
+    ) -> Result<(Chain<D>, Arc<Arm>), InputError> {
+        let s = section.get_ref();
+        let at = section.span();
         let is_shaped = s.connectors.is_some() || s.points_m.is_some() || s.rod_m.is_some();
         let is_shaped = is_shaped || s.folded_m.is_some();
         let is_turned = s.along.is_some() || s.heading_deg.is_some() || s.max_bend_deg.is_some();
@@ -420,39 +434,36 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
         let base_m = s.at_m.map_or([0.0; D], PointValue::get);
-        let arm = self.arm(section, to_dimensions(base_m))?;
-        let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(0.8 * radius_m));
-        let solid = solid.map_err(|error| self.source.error_from(section.span(), &error))?;
-        // The same in the required number of dimensions, which is three.
+        let arm_span = arm.span();
+        let arm = self.arm(arm, to_dimensions(base_m))?;
+        let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(LINK_RADIUS_FACTOR * radius_m));
+        let solid = solid.map_err(|error| self.source.error_from(arm_span, &error))?;
+        // D is 3 here, but only the types of `D` dimensions tell the compiler so.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
-        let connector = |c: &Connector<3>| Connector {
-            mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
-            max_bend_rad: c.max_bend_rad,
-            ..Connector::free(c.radius_m)
-        };
-        let mut connectors: Vec<_> = solid.connectors().iter().map(connector).collect();
+        let mut connectors: Vec<_> = solid.connectors().iter().map(arm_connector).collect();
         for limit in &s.limits.0 {
             self.limit(&mut connectors, limit)?;
         }
-        self.check_arm_whole(s, &connectors, at.clone())?;
-        let chain = Chain::new(points, connectors, solid.rods().to_vec());
-        Ok((chain.map_err(|error| self.source.error_from(at, &error))?, Some(Arc::new(arm))))
+        self.check_arm_whole(section, &connectors)?;
+        let chain = Chain::new(points, connectors, solid.rods().to_vec())
+            .map_err(|error| self.source.error_from(at, &error))?;
+        Ok((chain, Arc::new(arm)))
     }
 
     /// Refuses an arm with a base that may move, and changes that take it apart: its joints determine the places
     /// of its connectors.
     fn check_arm_whole(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         connectors: &[Connector<D>],
-        at: Range<usize>,
     ) -> Result<(), InputError> {
         if connectors.first().is_some_and(|base| base.mobility != Mobility::Fixed) {
-            let at = self.source.key_span(at, &["limits"]);
+            let at = self.source.key_span(section.span(), &["limits"]);
             let remedy = "leave the mobility of connector 0 out; at_m says where the base stands";
             return Err(self.source.error(at, "an arm whose base may move", remedy));
         }
-        match s.changes.0.iter().find(|change| change.get_ref().takes_apart()) {
+        let changes = &section.get_ref().changes.0;
+        match changes.iter().find(|change| change.get_ref().takes_apart()) {
             None => Ok(()),
             Some(change) => {
                 let remedy = "make a connector fail, or give a chain of rods in place of the arm";
@@ -463,16 +474,19 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    fn rod(&self, s: &ChainSection<D>, radius_m: f64, at: Range<usize>) -> Result<Rod, InputError> {
-        // Thick rods make slaves jump, and the rods of a swarm are virtual.
-        let rod_radius_m = s.rod_radius_m.unwrap_or(0.2 * radius_m);
+    fn rod(
+        &self,
+        section: &Spanned<ChainSection<D>>,
+        connector_radius_m: f64,
+    ) -> Result<Rod, InputError> {
+        let s = section.get_ref();
+        let radius_m = s.rod_radius_m.unwrap_or(ROD_RADIUS_FACTOR * connector_radius_m);
         match s.rod_m {
-            Some(NumberRange { low: least, high: greatest }) => {
-                Ok(Rod { min_m: least, max_m: greatest, radius_m: rod_radius_m })
-            }
+            Some(NumberRange { low: min_m, high: max_m }) => Ok(Rod { min_m, max_m, radius_m }),
             None => {
+                let cause = "a chain without the length of its rods";
                 let remedy = "add rod_m = 0.5, or rod_m = [least, greatest]";
-                Err(self.source.error(at, "a chain without the length of its rods", remedy))
+                Err(self.source.error(section.span(), cause, remedy))
             }
         }
     }
@@ -480,12 +494,13 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns a random place on the ground where the chain has room; it depends on the seed.
     fn random_start(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         rod: &Rod,
         radius_m: f64,
         PlacementContext { site, number, placed }: PlacementContext<D>,
-        at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
+        let s = section.get_ref();
+        let at = section.span();
         let (Some(site), Some(connectors)) = (site, s.connectors) else {
             let remedy = "give a ground.map or a ground.stage, and give connectors";
             let at = self.source.key_span(at, &["anywhere"]);
@@ -498,9 +513,9 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.key_span(at, &keys);
             return Err(self.source.error(at, "a chain placed twice", remedy));
         }
-        let obstacles =
-            Obstacles::new(self.placement_obstacles(Some(site), placed)?, rod.max_m.max(1e-3))
-                .map_err(|error| self.source.error_from(at.clone(), &error))?;
+        let obstacles = self.placement_obstacles(Some(site), placed)?;
+        let obstacles = Obstacles::new(obstacles, rod.max_m.max(MIN_REACH_M))
+            .map_err(|error| self.source.error_from(at.clone(), &error))?;
         let obstacles = obstacles.in_plane().expect("only worlds in the plane have a ground");
         let wanted = SpaceRequirement {
             connectors,
@@ -518,10 +533,11 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns the positions of the connectors: one by one, or on a line from the first one.
     fn points(
         &self,
-        s: &ChainSection<D>,
+        section: &Spanned<ChainSection<D>>,
         length_m: f64,
-        at: Range<usize>,
     ) -> Result<Vec<Point<D>>, InputError> {
+        let s = section.get_ref();
+        let at = section.span();
         if let Some(given) = &s.points_m {
             if s.connectors.is_some() || s.at_m.is_some() || s.folded_m.is_some() {
                 let remedy = "give points_m alone, or connectors and at_m";
@@ -557,7 +573,7 @@ impl<const D: usize> Compiler<'_, D> {
         })
     }
 
-    /// Returns the direction from the first connector to the last.
+    /// Returns the direction from the first connector to the last; by default the chain looks along the first axis.
     fn direction(&self, s: &ChainSection<D>) -> Result<Point<D>, InputError> {
         match (&s.along, s.heading_deg) {
             (None, None) => Ok(first_axis().map(|x: f64| -x)),
@@ -624,20 +640,35 @@ fn folded<const D: usize>(
     rod_m: f64,
     [leg_m, apart_m]: [f64; 2],
 ) -> Vec<Point<D>> {
-    let rods = |length_m: f64| (length_m / rod_m).round().max(1.0) as usize;
-    let leg = rods(leg_m);
-    let apart = rods(apart_m);
+    let leg = rod_count(leg_m, rod_m);
+    let apart = rod_count(apart_m, rod_m);
     let aside = perpendicular(u);
-    let place = |k: usize| {
+    let mut points = Vec::with_capacity(n);
+    for k in 0..n {
         let fold = k / (leg + apart);
         let rest = k % (leg + apart);
         let on = rest.min(leg);
         let aside_by = fold * apart + rest.saturating_sub(leg);
+        // Every second leg comes back.
         let along_by = if fold.is_multiple_of(2) { on } else { leg - on };
         let at = add_scaled(start, u, rod_m * along_by as f64);
-        add_scaled(at, aside, rod_m * aside_by as f64)
-    };
-    (0..n).map(place).collect()
+        points.push(add_scaled(at, aside, rod_m * aside_by as f64));
+    }
+    points
+}
+
+/// Returns the number of rods that come nearest to a length, one at least.
+fn rod_count(length_m: f64, rod_m: f64) -> usize {
+    (length_m / rod_m).round().max(1.0) as usize
+}
+
+/// Returns a connector of an arm in `D` dimensions, which are three: an arm holds connectors only by fixing them.
+fn arm_connector<const D: usize>(c: &Connector<3>) -> Connector<D> {
+    Connector {
+        mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
+        max_bend_rad: c.max_bend_rad,
+        ..Connector::free(c.radius_m)
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::super::world::{Change, ChangeKind};
 use super::mobility::MobilitySection;
+use super::tasks::DEFAULT_SPEED_M_S;
 use super::{Compiler, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,6 +11,9 @@ use sidestep_rods::Chain;
 use sidestep_rods::rebuild::MovableEnd;
 use sidestep_scenario::{NonNegative, Number, Open, Spanned};
 use std::ops::Range;
+
+/// Standard deviation of each coordinate of a scattered connector, unless it is given, meters.
+const DEFAULT_THROW_M: f64 = 1.0;
 
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -103,7 +107,7 @@ impl<const D: usize> Compiler<'_, D> {
             };
             return Ok(ChangeKind::Reform {
                 may_come,
-                speed_m_s: s.speed_m_s.map_or(0.5, f64::from),
+                speed_m_s: s.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from),
             });
         }
         let Some(connector) = s.connector.filter(|&k| k < n) else {
@@ -164,8 +168,10 @@ impl<const D: usize> Compiler<'_, D> {
             }
             _ => Ok(()),
         };
-        let at = || self.source.key_span(at, &["max_bend_deg", "mobility"]);
-        tried.map_err(|error| self.source.error_from(at(), &error))
+        tried.map_err(|error| {
+            let at = self.source.key_span(at, &["max_bend_deg", "mobility"]);
+            self.source.error_from(at, &error)
+        })
     }
 
     fn scatter(
@@ -181,7 +187,7 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.key_span(at, &["scatter"]);
             return Err(self.source.error(at, cause, remedy));
         }
-        let by_m = s.by_m.map_or(1.0, f64::from);
+        let by_m = s.by_m.map_or(DEFAULT_THROW_M, f64::from);
         let apart_m = s.apart_m.map_or([0.0; D], PointValue::get);
         Ok(ChangeKind::Scatter { connectors: first..=last, by_m, apart_m })
     }

@@ -50,8 +50,9 @@ impl<const D: usize> Compiler<'_, D> {
         let TaskKind::Targets(targets) = &task.driver else { return Ok(()) };
         for (i, at) in targets.places.iter().enumerate() {
             let (chain, goal) = arm.goal(task.agent, *at, targets.tolerance_m);
-            let answer = chain.solve(&goal, &arm.values);
-            let answer = answer.map_err(|error| self.source.error_from(section.span(), &error))?;
+            let answer = chain
+                .solve(&goal, &arm.values)
+                .map_err(|error| self.source.error_from(section.span(), &error))?;
             if let Some(reason) = answer.reason {
                 let cause = format!("connector {} cannot reach target {i}: {reason}", task.agent);
                 let at = self.source.key_span(section.span(), &["targets_m"]);
@@ -73,14 +74,21 @@ impl<const D: usize> Compiler<'_, D> {
         let TaskKind::Targets(targets) = &task.driver else { return Ok(()) };
         let k = task.agent;
         let mobility = start.connectors()[k].mobility;
-        let off_m = |p| distance(mobility.project(p, start.points()[k]), p);
-        let is_off = |p: &_| mobility != Mobility::Free && off_m(*p) > targets.tolerance_m;
-        let Some(i) = targets.places.iter().position(is_off) else { return Ok(()) };
-        let off_m = off_m(targets.places[i]);
-        let cause = format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
-        let at = self.source.key_span(section.span(), &["targets_m"]);
-        let remedy = "give targets where its mobility allows it, or make another connector lead";
-        Err(self.source.error(at, cause, remedy))
+        if mobility == Mobility::Free {
+            return Ok(());
+        }
+        for (i, &target) in targets.places.iter().enumerate() {
+            let off_m = distance(mobility.project(target, start.points()[k]), target);
+            if off_m > targets.tolerance_m {
+                let cause =
+                    format!("target {i} is {off_m:.4} m off the places where connector {k} may be");
+                let at = self.source.key_span(section.span(), &["targets_m"]);
+                let remedy =
+                    "give targets where its mobility allows it, or make another connector lead";
+                return Err(self.source.error(at, cause, remedy));
+            }
+        }
+        Ok(())
     }
 }
 

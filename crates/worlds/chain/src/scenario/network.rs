@@ -98,7 +98,8 @@ impl AgentNaming for ConnectorCounts {
     type Partition = PartitionSection;
     type UnidirectionalLink = UnidirectionalLinkSection;
 
-    // That of a bus along the chain.
+    // That of a bus along the chain. A motion passes from connector to connector and back, which takes this time at
+    // each of them, and all of it has to be over by the deadline in the cycle.
     const DEFAULT_LATENCY_S: f64 = 1e-5;
     const MIN_LATENCY_S: f64 = 1e-7;
     const CONVERSATIONS_PER_CYCLE: u32 = 1;
@@ -110,8 +111,8 @@ impl AgentNaming for ConnectorCounts {
     }
 
     fn partition(&self, one: &PartitionSection) -> Result<network::Partition, SectionError> {
-        let sides = one.sides.iter().map(|side| self.ids(one.chain, side));
-        let sides = sides.collect::<Result<_, _>>()?;
+        let sides =
+            one.sides.iter().map(|side| self.ids(one.chain, side)).collect::<Result<_, _>>()?;
         check_sides(&one.sides, "connector")?;
         Ok(network::Partition { sides, window: time_window(one.from_s, one.until_s)? })
     }

@@ -3,7 +3,8 @@
 use super::super::ground::fields::{Crowd, Field};
 use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
 use super::super::world::{ChainSpec, push_parts};
-use super::{Compiler, MAX_VALUE, Measure, PointValue};
+use super::tasks::DEFAULT_SPEED_M_S;
+use super::{Compiler, MAX_VALUE, MIN_REACH_M, Measure, PointValue};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
@@ -141,20 +142,19 @@ impl<const D: usize> Compiler<'_, D> {
         for (k, section) in (0..).zip(&self.file.fields.0) {
             self.add_field(section, k, chains, &mut all)?;
         }
-        let longest = |spec: &ChainSpec<D>| {
-            let rods = spec.start.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
-            let radii = spec.start.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
-            rods + 2.0 * radii
-        };
-        let reach_m = chains.iter().map(longest).fold(0.0, f64::max).max(1e-3);
-        let told = |error: InputError| {
-            let place = format!("{}, {}", self.source.place, error.place());
-            InputError::new(place, error.cause(), error.remedy())
-        };
+        let reach_m = chains.iter().map(longest_part_m).fold(0.0, f64::max).max(MIN_REACH_M);
+        let obstacles = Obstacles::new(all.still, reach_m);
+        let movers = Movers::new(all.movers);
         Ok(Ground {
-            obstacles: Obstacles::new(all.still, reach_m).map_err(told)?,
-            movers: Movers::new(all.movers).map_err(told)?,
+            obstacles: obstacles.map_err(|error| self.ground_error(&error))?,
+            movers: movers.map_err(|error| self.ground_error(&error))?,
         })
+    }
+
+    /// Returns an error that is about an obstacle by its id, and of no section.
+    fn ground_error(&self, error: &InputError) -> InputError {
+        let place = format!("{}, {}", self.source.place, error.place());
+        InputError::new(place, error.cause(), error.remedy())
     }
 
     /// Returns all obstacles except those at random places, which keep away from chains.
@@ -179,7 +179,9 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<Vec<Obstacle<D>>, InputError> {
         let ObstacleBuilder { still: mut all, movers, .. } = self.given_obstacles(site)?;
         all.extend(movers.iter().map(|mover| mover.at(0.0)));
-        (0..).zip(placed).for_each(|(slot, spec)| push_parts(&mut all, slot, &spec.start));
+        for (slot, spec) in (0..).zip(placed) {
+            push_parts(&mut all, slot, &spec.start);
+        }
         Ok(all)
     }
 
@@ -188,10 +190,8 @@ impl<const D: usize> Compiler<'_, D> {
         let Some(section) = &self.file.ground else { return Ok(None) };
         let s = section.get_ref();
         let at = section.span();
-        let given = [s.corridor.is_some(), s.map.is_some(), s.stage.is_some()]
-            .iter()
-            .filter(|g| **g)
-            .count();
+        let kinds = [s.corridor.is_some(), s.map.is_some(), s.stage.is_some()];
+        let given = kinds.iter().filter(|is_given| **is_given).count();
         if given != 1 {
             let remedy = "give one of corridor, map and stage";
             return Err(self.source.error(at, format!("{given} grounds"), remedy));
@@ -220,10 +220,8 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     fn add_corridor(&self, all: &mut ObstacleBuilder<D>) -> Result<(), InputError> {
-        let section =
-            self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
-        let Some(given) = section else { return Ok(()) };
-        let walls = self.corridor(given)?.walls(all.next_id);
+        let Some(corridor) = self.corridor()? else { return Ok(()) };
+        let walls = corridor.walls(all.next_id);
         all.add_still(walls.iter().map(wall_to_dimensions));
         Ok(())
     }
@@ -233,15 +231,16 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         step_m: f64,
     ) -> Result<Option<(Vec<Point<2>>, f64)>, InputError> {
-        let section =
-            self.file.ground.as_ref().and_then(|ground| ground.get_ref().corridor.as_ref());
-        let corridor = section.map(|given| self.corridor(given)).transpose()?;
-        let middle =
-            |corridor: &Corridor| corridor.center_line(step_m).iter().map(|pose| pose.at).collect();
-        Ok(corridor.map(|corridor| (middle(&corridor), corridor.width_m())))
+        let Some(corridor) = self.corridor()? else { return Ok(None) };
+        let middle = corridor.center_line(step_m).iter().map(|pose| pose.at).collect();
+        Ok(Some((middle, corridor.width_m())))
     }
 
-    fn corridor(&self, given: &Spanned<CorridorSection>) -> Result<Corridor, InputError> {
+    /// Returns the corridor, if the scenario has one.
+    fn corridor(&self) -> Result<Option<Corridor>, InputError> {
+        let ground = self.file.ground.as_ref();
+        let section = ground.and_then(|ground| ground.get_ref().corridor.as_ref());
+        let Some(given) = section else { return Ok(None) };
         let s = given.get_ref();
         let corridor = match &s.legs {
             None => Corridor::pinned(s.width_m),
@@ -250,7 +249,7 @@ impl<const D: usize> Compiler<'_, D> {
                 Corridor::new(legs?, s.width_m)
             }
         };
-        corridor.map_err(|error| self.source.error_from(given.span(), &error))
+        corridor.map(Some).map_err(|error| self.source.error_from(given.span(), &error))
     }
 
     fn leg(&self, given: &Spanned<LegSection>) -> Result<Leg, InputError> {
@@ -279,14 +278,16 @@ impl<const D: usize> Compiler<'_, D> {
             return self.add_outline(s, corners, at, all);
         }
         let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
-        let of_shape = || self.source.key_span(at.clone(), &["radius_m", "size_m"]);
-        body.check().map_err(|error| self.source.error_from(of_shape(), &error))?;
+        body.check().map_err(|error| {
+            let at = self.source.key_span(at.clone(), &["radius_m", "size_m"]);
+            self.source.error_from(at, &error)
+        })?;
         all.next_id += 1;
         match self.course(s, at.clone())? {
             None => all.still.push(body),
             Some(course) => {
-                let mover =
-                    Mover::new(body, course).map_err(|error| self.source.error_from(at, &error))?;
+                let mover = Mover::new(body, course);
+                let mover = mover.map_err(|error| self.source.error_from(at, &error))?;
                 all.movers.push(mover);
             }
         }
@@ -364,7 +365,7 @@ impl<const D: usize> Compiler<'_, D> {
             (None, None, Some(way_points)) => Course::Patrol {
                 way_points: way_points.iter().map(|place| place.get()).collect(),
                 closed: s.closed.unwrap_or(false),
-                speed_m_s: s.speed_m_s.map_or(0.5, f64::from),
+                speed_m_s: s.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from),
             },
             _ => {
                 let remedy = "give velocity_m_s, or it and bounces_m, or patrol_m and speed_m_s";
@@ -383,13 +384,12 @@ impl<const D: usize> Compiler<'_, D> {
         all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
         let s = section.get_ref();
-        let told = |error: InputError| self.source.error_from(section.span(), &error);
         let room = Bounds { lo: s.lo_m.get(), hi: s.hi_m.get() };
         let keep_clear = chains.iter().flat_map(|spec| parts(&spec.start)).collect();
-        let widest = chains.iter().flat_map(|spec| spec.start.connectors());
-        let widest_m = widest.map(|c| c.radius_m).fold(0.0, f64::max);
+        let connectors = chains.iter().flat_map(|spec| spec.start.connectors());
+        let widest_m = connectors.map(|c| c.radius_m).fold(0.0, f64::max);
         let keep_m = widest_m + s.keep_m.unwrap_or(DEFAULT_KEEP_M);
-        // Every field has its own places.
+        // With one seed for all, fields in the same room would have their obstacles at the same places.
         let seed = Seed(self.head.seed.wrapping_add(number << 32));
         let NumberRange { low: least, high: greatest } = s.radius_m;
         if s.fill_fraction.is_some() && s.part.is_some() {
@@ -400,13 +400,19 @@ impl<const D: usize> Compiler<'_, D> {
             (Some(part), None, None) if least == greatest => {
                 let length_m = s.length_m.unwrap_or(0.0);
                 let field = Field { room, part, radius_m: least, length_m, keep_clear, keep_m };
-                all.add_still(field.fill(seed, all.next_id).map_err(told)?);
+                let obstacles = field.fill(seed, all.next_id);
+                all.add_still(
+                    obstacles.map_err(|error| self.source.error_from(section.span(), &error))?,
+                );
             }
             (None, Some(n), Some(speed_m_s)) if s.length_m.is_none() => {
                 let [radius_m, speed_m_s] =
                     self.crowd_sizes([s.radius_m, speed_m_s], section.span())?;
                 let crowd = Crowd { room, n, radius_m, speed_m_s, keep_clear, keep_m };
-                all.movers.extend(crowd.generate(seed, all.next_id).map_err(told)?);
+                let movers = crowd.generate(seed, all.next_id);
+                all.movers.extend(
+                    movers.map_err(|error| self.source.error_from(section.span(), &error))?,
+                );
                 all.next_id += n;
             }
             _ => {
@@ -437,7 +443,14 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// Returns the rods of a chain.
+/// Returns the length of the longest rod of a chain, with the connectors at both its ends, meters.
+fn longest_part_m<const D: usize>(spec: &ChainSpec<D>) -> f64 {
+    let rod_m = spec.start.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+    let radius_m = spec.start.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
+    rod_m + 2.0 * radius_m
+}
+
+/// Returns the rods of a chain; of a chain without rods its connector.
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_ {
     let points = chain.points();
     let one = (points.len() == 1).then(|| Core::Point(points[0]));
@@ -467,7 +480,7 @@ fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     Obstacle::still(wall.id, core, wall.radius_m)
 }
 
-/// Returns the axes of a box turned in the plane of the first two.
+/// Returns the axes of a box that is turned in the plane of the first two: in space, about the third axis.
 fn turned_axes<const D: usize>(turn_deg: f64) -> [Point<D>; D] {
     let s = math::sin(turn_deg.to_radians());
     let c = math::cos(turn_deg.to_radians());

@@ -2,8 +2,8 @@
 
 use super::super::metrics::PENETRATION_THRESHOLD_M;
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
-use super::Compiler;
 use super::obstacles::Ground;
+use super::{Compiler, MIN_REACH_M};
 use sidestep_kernel::{InputError, Slot};
 use sidestep_rods::geometry::Bounds;
 use sidestep_rods::{Chain, Obstacle, Obstacles};
@@ -40,18 +40,22 @@ impl<const D: usize> Compiler<'_, D> {
         if chains.len() < 2 {
             return Ok(());
         }
+        // All chains are obstacles to all, each apart from its own parts, so that the grid of obstacles is built once.
         let mut parts = Vec::new();
-        let with_slots = || (0..).zip(chains);
-        with_slots().for_each(|(slot, spec)| push_parts(&mut parts, slot, &spec.start));
-        let longest_m = chains.iter().flat_map(|spec| spec.start.rods()).map(|rod| rod.max_m);
-        let parts = Obstacles::new(parts, longest_m.fold(1e-3, f64::max))?;
-        let met = with_slots().find_map(|(slot, spec)| {
-            deepest(&spec.start, &parts, Some(OTHER_CHAIN + slot)).map(|inside| (slot, inside))
-        });
-        met.map_or(Ok(()), |(slot, inside): (Slot, _)| {
-            let other = format!("chain {}", inside.id - OTHER_CHAIN);
-            Err(self.start_error(slot as usize, inside, &other))
-        })
+        for (slot, spec) in (0..).zip(chains) {
+            push_parts(&mut parts, slot, &spec.start);
+        }
+        let rods = chains.iter().flat_map(|spec| spec.start.rods());
+        let longest_m = rods.map(|rod| rod.max_m).fold(MIN_REACH_M, f64::max);
+        let parts = Obstacles::new(parts, longest_m)?;
+        for (slot, spec) in chains.iter().enumerate() {
+            let own = OTHER_CHAIN + slot as Slot;
+            if let Some(inside) = deepest(&spec.start, &parts, Some(own)) {
+                let other = format!("chain {}", inside.id - OTHER_CHAIN);
+                return Err(self.start_error(slot, inside, &other));
+            }
+        }
+        Ok(())
     }
 
     fn start_error(&self, slot: usize, inside: StartOverlap, what: &str) -> InputError {

@@ -12,11 +12,17 @@ use sidestep_scenario::Spanned;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Speed of initiators, unless it is given.
-const DEFAULT_SPEED_M_S: f64 = 0.5;
+/// Speed of initiators, and of connectors that come back, unless it is given: that of the measured leader.
+pub(super) const DEFAULT_SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
 const DEFAULT_TOLERANCE_M: f64 = 1e-3;
-/// Time without coming nearer to a target after which a path is planned, s.
+/// Time of vetoes after which a task is given up, unless it is given, s.
+const DEFAULT_PATIENCE_S: f64 = 5.0;
+/// Standard deviation of the heading of an initiator that wanders, per square root of a meter, unless it is given,
+/// degrees.
+const DEFAULT_TURN_DEG: f64 = 30.0;
+/// Time without coming nearer to a target after which a path is planned, unless it is given, s: long enough for the
+/// recovery after a veto to be tried first, which costs far less than a plan.
 const DEFAULT_PLAN_DELAY_S: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -118,7 +124,7 @@ impl<const D: usize> Compiler<'_, D> {
             agent: s.connector,
             speed_m_s: s.speed_m_s(),
             lasts_s: s.lasts_s.map_or(f64::INFINITY, f64::from),
-            patience_s: s.patience_s.map_or(5.0, f64::from),
+            patience_s: s.patience_s.map_or(DEFAULT_PATIENCE_S, f64::from),
             plans_after_s: plans.then(|| s.plans_after_s.map_or(DEFAULT_PLAN_DELAY_S, f64::from)),
             driver: self.driver(s, at)?,
         })
@@ -128,7 +134,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(match s.kind {
             TaskKindWord::Rest => TaskKind::Rest,
             TaskKindWord::Wander => TaskKind::Wander(Wander {
-                turn_rad: s.turn_deg.map_or(30.0, f64::from).to_radians(),
+                turn_rad: s.turn_deg.map_or(DEFAULT_TURN_DEG, f64::from).to_radians(),
                 within: s.within_m.map(|room| room.0),
             }),
             TaskKindWord::Script => {
@@ -157,10 +163,10 @@ impl<const D: usize> Compiler<'_, D> {
             }
             (None, Some(file)) => {
                 let path = self.source.path(file.as_ref());
-                let text =
-                    sidestep_scenario::file::read_text(&path, crate::script::MAX_BYTES as u64);
-                let script =
-                    text.and_then(|text| Script::parse(&path.display().to_string(), &text));
+                let max_bytes = crate::script::MAX_BYTES as u64;
+                let text = sidestep_scenario::file::read_text(&path, max_bytes);
+                let place = path.display().to_string();
+                let script = text.and_then(|text| Script::parse(&place, &text));
                 self.source.with_file_key(at, "script_file", script)
             }
             _ => {
@@ -211,7 +217,7 @@ impl<const D: usize> Compiler<'_, D> {
         plans: bool,
         at: Range<usize>,
     ) -> Result<(), InputError> {
-        let keys = [
+        let keys_of_kinds = [
             ("turn_deg", s.turn_deg.is_some(), TaskKindWord::Wander),
             ("within_m", s.within_m.is_some(), TaskKindWord::Wander),
             ("script", s.script.is_some(), TaskKindWord::Script),
@@ -221,14 +227,14 @@ impl<const D: usize> Compiler<'_, D> {
             ("navigator", s.navigator.is_some(), TaskKindWord::Navigate),
             ("planner", s.planner.is_some(), TaskKindWord::Targets),
         ];
-        let keys = keys.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
-        let of = format!("in a task of kind {:?}", s.kind).to_lowercase();
-        self.check_unused_key(&keys, &of, at.clone())?;
+        let keys = keys_of_kinds.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
+        let context = format!("in a task of kind {:?}", s.kind).to_lowercase();
+        self.check_unused_key(&keys, &context, at.clone())?;
         // A caller sees each veto, and decides itself when to give up; a resting chain wants nothing.
         let is_patient = !matches!(s.kind, TaskKindWord::External | TaskKindWord::Rest);
-        let keys = [("patience_s", s.patience_s.is_some(), is_patient)];
-        self.check_unused_key(&keys, &of, at.clone())?;
-        let keys = [("plans_after_s", s.plans_after_s.is_some(), plans)];
-        self.check_unused_key(&keys, "without a planner", at)
+        let patience = ("patience_s", s.patience_s.is_some(), is_patient);
+        self.check_unused_key(&[patience], &context, at.clone())?;
+        let delay = ("plans_after_s", s.plans_after_s.is_some(), plans);
+        self.check_unused_key(&[delay], "without a planner", at)
     }
 }

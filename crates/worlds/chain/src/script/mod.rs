@@ -34,13 +34,13 @@ use sidestep_kernel::InputError;
 
 pub(crate) use run::{ScriptMotion, ScriptMotions, Turtle};
 
-/// Longest script, in bytes.
+/// Longest script, in bytes: a megabyte is parsed in a moment, and no script that a person writes is as long.
 pub(crate) const MAX_BYTES: usize = 1 << 20;
 
-/// Deepest nesting of brackets.
+/// Deepest nesting of brackets: the parser recurses for each.
 pub(crate) const MAX_NESTING: usize = 64;
 
-/// Deepest nesting of procedures and repetitions while a script runs.
+/// Deepest nesting of procedures and repetitions while a script runs, so that one that calls itself for ever is reported.
 pub(crate) const MAX_DEPTH: usize = 1000;
 
 /// Most statements that a script may carry out. Repetitions count as one each time.

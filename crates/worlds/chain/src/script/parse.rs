@@ -29,7 +29,8 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
         let (cause, remedy) = words(error.inner(), &text[error.offset()..]);
         InputError::new(place, cause, remedy).with_offset(text, error.offset())
     })?;
-    let (mut main, mut procedures) = (Vec::new(), Vec::new());
+    let mut main = Vec::new();
+    let mut procedures = Vec::new();
     for item in items {
         match item {
             Item::Statement(statement) => main.push(statement),
@@ -43,7 +44,8 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
 /// Limits nesting, because the parser recurses for each bracket and the stack must not set the
 /// limit.
 fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
-    let (mut depth, mut in_comment) = (0usize, false);
+    let mut depth: usize = 0;
+    let mut in_comment = false;
     for (at, c) in text.char_indices() {
         match c {
             '#' => in_comment = true,
@@ -122,7 +124,8 @@ fn procedure(input: &mut Input) -> ModalResult<Procedure> {
 }
 
 fn statement(input: &mut Input) -> ModalResult<Statement> {
-    let (start, at) = (input.checkpoint(), input.current_token_start());
+    let start = input.checkpoint();
+    let at = input.current_token_start();
     let action = match name.parse_next(input)? {
         "forward" => Action::Forward(argument(input)?),
         "turn" => Action::Turn(argument(input)?),
@@ -130,6 +133,7 @@ fn statement(input: &mut Input) -> ModalResult<Statement> {
         "wait" => Action::Wait(argument(input)?),
         "goto" => Action::Goto(coordinates(input)?),
         "repeat" => Action::Repeat(argument(input)?, block(input)?),
+        // They end the statements before them, and are for the caller to parse.
         "to" | "end" => {
             input.reset(&start);
             return Err(ErrMode::Backtrack(ContextError::from_input(input)));
@@ -200,8 +204,8 @@ fn operand(
     terms: &mut Vec<Term>,
     parse: fn(&mut Input, &mut Vec<Term>) -> ModalResult<()>,
 ) -> ModalResult<()> {
-    let mut parse = |input: &mut Input| parse(input, terms);
-    cut_err(parse.by_ref()).context(expected("a value")).parse_next(input)
+    let operand = |input: &mut Input| parse(input, terms);
+    cut_err(operand).context(expected("a value")).parse_next(input)
 }
 
 fn factor(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {

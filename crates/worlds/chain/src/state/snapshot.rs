@@ -211,11 +211,11 @@ impl<const D: usize> Component for Option<ChainControls<D>> {
     }
 
     fn restore(&mut self, bytes: &Vec<u8>, owner: &Owner) -> Result<(), CheckpointError> {
-        let read = postcard::from_bytes::<ChainControls<D>>(bytes).ok();
-        let is_its_own = |controls: &ChainControls<D>| {
-            controls.cycle == owner.cycle && controls.check(owner.connectors).is_ok()
-        };
-        let controls = read.filter(is_its_own).ok_or(CheckpointError::Damaged)?;
+        let controls: ChainControls<D> =
+            postcard::from_bytes(bytes).map_err(|_| CheckpointError::Damaged)?;
+        if controls.cycle != owner.cycle || controls.check(owner.connectors).is_err() {
+            return Err(CheckpointError::Damaged);
+        }
         *self = Some(controls);
         Ok(())
     }

@@ -6,11 +6,10 @@
 //! to exceed their own by a margin.
 
 use super::drive::{DifferentialDrive, Pose2, Wheels};
-use super::laser::RobotBody;
+use super::laser::{NearbyBodies, RobotBody};
 use super::proximity::{Gaps, SECTOR_RAD, SensorRing, safe_speed_m_s};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
-use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{Point, add_scaled, dot, norm, sub};
 use std::f64::consts::PI;
 
@@ -64,11 +63,29 @@ pub struct FollowResult {
 
 /// Distance below which a bumper is pressed, meters.
 const BUMPER_M: f64 = 1e-3;
+/// Distance up to which the gap around a robot is measured, meters.
+const GAP_RANGE_M: f64 = 1.0;
 
-/// Angle between a robot's heading and its goal beyond which it drives backward.
+/// Angle between a robot's heading and its goal beyond which it drives backward: more than a right angle, because a robot
+/// that is to go aside should turn and go ahead.
 const BACKWARD_RAD: f64 = 2.0;
-/// Wanted speed up to which a robot stands still, m/s.
+/// Wanted speed up to which a robot stands still, m/s: the direction of a velocity that is nearly zero is noise, and the
+/// robot would turn after it.
 const STANDING_M_S: f64 = 1e-3;
+
+/// Range of the sensors, unless it is given, meters.
+const SENSOR_RANGE_M: f64 = 0.15;
+/// Speed per distance from the connector, unless it is given, 1/s: half a step of lag is made up for in a few cycles, and
+/// at 0.1 m the wheels' reserve of a fifth is used up.
+const GAIN_PER_S: f64 = 3.0;
+/// Turn rate per angle, unless it is given, 1/s: twice the gain of the distance, because a robot has to face its connector
+/// before it can go there.
+const TURN_GAIN_PER_S: f64 = 6.0;
+/// Time to collision that a follower keeps, s.
+const HORIZON_S: f64 = 0.1;
+/// Distance below which a follower slides along obstacles, meters: the default margin of connectors around robots, so
+/// that a robot at its place beside a wall does not slide.
+const SLIDE_M: f64 = 0.08;
 
 impl Follower {
     /// Returns a follower with the usual gains, and with sensors that see 0.15 m.
@@ -80,14 +97,14 @@ impl Follower {
             let cause = format!("has a radius of {radius_m} m");
             return Err(InputError::new("follower", cause, "give more than 0"));
         }
-        let ring = SensorRing { radius_m, range_m: 0.15 };
+        let ring = SensorRing { radius_m, range_m: SENSOR_RANGE_M };
         Ok(Self {
             drive,
             ring,
-            gain_per_s: 3.0,
-            turn_gain_per_s: 6.0,
-            horizon_s: 0.1,
-            slide_m: 0.08,
+            gain_per_s: GAIN_PER_S,
+            turn_gain_per_s: TURN_GAIN_PER_S,
+            horizon_s: HORIZON_S,
+            slide_m: SLIDE_M,
         })
     }
 
@@ -108,29 +125,31 @@ impl Follower {
         let off_rad = wrap_angle(atan2(wanted[1], wanted[0]) - pose.heading_rad);
         let is_backward = off_rad.abs() > BACKWARD_RAD;
         let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
+        // Only the part of the wish along the heading is driven; the turn makes the rest possible.
         let ahead_m_s = speed_m_s * cos(off_rad).max(0.0);
         let wheels = self.drive.wheels(ahead_m_s, self.turn_gain_per_s * off_rad);
         self.limit_speed(wheels, is_backward, gaps, dt_s)
     }
 
-    /// Makes one tick: reads the sensors and turns the wheels. `others` are the bodies of other
-    /// robots.
+    /// Makes one tick: reads the sensors and turns the wheels.
     pub fn follow(
         &self,
         pose: &Pose2,
         goal: &TrackingTarget,
-        obstacles: &Obstacles<2>,
-        others: impl Iterator<Item = RobotBody> + Clone,
+        around: NearbyBodies<'_, impl Iterator<Item = RobotBody> + Clone>,
         dt_s: f64,
     ) -> FollowResult {
-        let gaps = self.ring.read(pose, obstacles, others.clone());
+        let NearbyBodies { obstacles, robots } = around;
+        let gaps = self.ring.read(pose, obstacles, robots.clone());
         let command = self.decide(pose, goal, &gaps, dt_s);
         let pose = self.drive.step(*pose, command.wheels, dt_s);
         let radius_m = self.ring.radius_m;
-        let to_robot =
-            |b: RobotBody| b.core.nearest_to_point(pose.at).distance_m - b.radius_m - radius_m;
-        let apart_m = others.map(to_robot).fold(1.0, f64::min);
-        let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, 1.0).min(apart_m);
+        let mut apart_m: f64 = GAP_RANGE_M;
+        for robot in robots {
+            let distance_m = robot.core.nearest_to_point(pose.at).distance_m;
+            apart_m = apart_m.min(distance_m - robot.radius_m - radius_m);
+        }
+        let gap_m = obstacles.clearance_m([pose.at; 2], radius_m, GAP_RANGE_M).min(apart_m);
         FollowResult { pose, is_held: command.is_held, is_bumped: gap_m < BUMPER_M, gap_m }
     }
 
@@ -151,7 +170,9 @@ impl Follower {
     fn limit_speed(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
         let turn_rad_s = self.drive.turn_rad_s(wheels);
         let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };
+        // The chord of an arc leads half of its turn aside.
         let slack_rad = 0.5 * turn_rad_s.abs() * dt_s;
+        // With less than two cycles a robot could use up the gap in one, and another body the rest.
         let horizon_s = self.horizon_s.max(2.0 * dt_s);
         let safe_m_s = safe_speed_m_s(gaps, toward_rad, slack_rad, horizon_s);
         let speed_m_s = wheels.speed_m_s();
@@ -162,7 +183,7 @@ impl Follower {
     }
 }
 
-/// Returns the part of its speed at which a leader may go, given the largest lag of a follower: it
+/// Returns the fraction of its speed at which a leader may go, given the largest lag of a follower: it
 /// slows down from half the limit on.
 ///
 /// A connector that is pulled around a sharp corner goes up to three times as fast as the leader, too

@@ -34,6 +34,15 @@ impl RobotBody {
     }
 }
 
+/// All bodies around a robot.
+#[derive(Debug, Clone, Copy)]
+pub struct NearbyBodies<'a, R> {
+    /// The world's obstacles.
+    pub obstacles: &'a Obstacles<2>,
+    /// Other robots.
+    pub robots: R,
+}
+
 /// A laser with equally spaced beams all around, of which it reads those within its field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Laser {
@@ -75,26 +84,28 @@ impl Laser {
         half_field_rad: f64,
         noise_std_m: f64,
     ) -> Result<Self, InputError> {
-        let wrong = |cause: String, remedy: &str| Err(InputError::new("laser", cause, remedy));
         if !(4..=3600).contains(&beams) {
-            return wrong(format!("has {beams} beams"), "give 4 to 3600");
+            return Err(laser_error(format!("has {beams} beams"), "give 4 to 3600"));
         }
         if !(range_m > 0.0 && range_m <= 1e4) {
-            return wrong(format!("has a range of {range_m} m"), "give more than 0, up to 1e4 m");
+            let cause = format!("has a range of {range_m} m");
+            return Err(laser_error(cause, "give more than 0, up to 1e4 m"));
         }
+        // Half a turn may have come from degrees, and be a rounding more.
         if !(half_field_rad > 0.0 && half_field_rad <= PI + 1e-9) {
-            return wrong(format!("sees {half_field_rad} rad to each side"), "give up to pi");
+            let cause = format!("sees {half_field_rad} rad to each side");
+            return Err(laser_error(cause, "give up to pi"));
         }
         if !(0.0..=range_m).contains(&noise_std_m) {
-            return wrong(format!("errs by {noise_std_m} m"), "give 0 up to its range");
+            return Err(laser_error(format!("errs by {noise_std_m} m"), "give 0 up to its range"));
         }
         let step_rad = TAU / beams as f64;
-        let direction = |k: usize| [cos(k as f64 * step_rad), sin(k as f64 * step_rad)];
+        let angles_rad = (0..beams).map(|k| k as f64 * step_rad);
         Ok(Self {
             range_m,
             noise_std_m,
             beams_per_side: last_beam(half_field_rad, step_rad),
-            directions: (0..beams).map(direction).collect(),
+            directions: angles_rad.map(|angle_rad| [cos(angle_rad), sin(angle_rad)]).collect(),
         })
     }
 
@@ -115,29 +126,33 @@ impl Laser {
     pub fn scan(
         &self,
         pose: &Pose2,
-        obstacles: &Obstacles<2>,
-        bodies: impl IntoIterator<Item = RobotBody>,
+        around: NearbyBodies<'_, impl IntoIterator<Item = RobotBody>>,
         noise: &mut Draws,
         scan: &mut Scan,
     ) {
         scan.ranges_m.clear();
         scan.ranges_m.resize(self.directions.len(), 0.0);
-        self.read_beams().for_each(|beam| scan.ranges_m[beam] = self.range_m);
-        let turn = [cos(pose.heading_rad), sin(pose.heading_rad)];
+        for beam in self.read_beams() {
+            scan.ranges_m[beam] = self.range_m;
+        }
+        let view = Viewpoint { pose, turn: [cos(pose.heading_rad), sin(pose.heading_rad)] };
         let near = bounds_around(pose.at, self.range_m);
         let mut some_move = false;
         // Movers come last, because a beam records whether a mover is what it meets first.
-        obstacles.visit(&near, |o| {
+        around.obstacles.visit(&near, |o| {
             if is_moving(o) {
                 some_move = true;
             } else {
-                self.scan_core(pose, turn, &o.core, o.radius_m, scan);
+                self.scan_body(&view, &obstacle_body(o), scan);
             }
         });
-        for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.scan_core(pose, turn, &body.core, body.radius_m, scan);
+        for robot in around.robots.into_iter().filter(|robot| robot.bounds().meets(&near)) {
+            self.scan_body(&view, &robot, scan);
         }
-        self.scan_movers(pose, turn, obstacles, some_move, scan);
+        scan.meets_mover.clear();
+        if some_move {
+            self.scan_movers(&view, around.obstacles, scan);
+        }
         if scan.keeps_truth {
             scan.true_m.clone_from(&scan.ranges_m);
         }
@@ -150,23 +165,12 @@ impl Laser {
         }
     }
 
-    /// Shortens the beams that meet a moving obstacle, if there is any, and notes which they are.
-    fn scan_movers(
-        &self,
-        pose: &Pose2,
-        turn: Point<2>,
-        obstacles: &Obstacles<2>,
-        some_move: bool,
-        scan: &mut Scan,
-    ) {
-        scan.meets_mover.clear();
-        if !some_move {
-            return;
-        }
+    /// Shortens the beams that meet a moving obstacle, and records which they are.
+    fn scan_movers(&self, view: &Viewpoint<'_>, obstacles: &Obstacles<2>, scan: &mut Scan) {
         scan.still_m.clone_from(&scan.ranges_m);
-        obstacles.visit(&bounds_around(pose.at, self.range_m), |o| {
+        obstacles.visit(&bounds_around(view.pose.at, self.range_m), |o| {
             if is_moving(o) {
-                self.scan_core(pose, turn, &o.core, o.radius_m, scan);
+                self.scan_body(view, &obstacle_body(o), scan);
             }
         });
         let nearer = scan.ranges_m.iter().zip(&scan.still_m).map(|(with, still)| with < still);
@@ -180,44 +184,41 @@ impl Laser {
         (0..(2 * m + 1).min(n)).map(move |k| (n + k - m) % n)
     }
 
-    fn scan_core(
-        &self,
-        pose: &Pose2,
-        turn: Point<2>,
-        core: &Core<2>,
-        radius_m: f64,
-        scan: &mut Scan,
-    ) {
+    /// Shortens the beams that meet a body.
+    fn scan_body(&self, view: &Viewpoint<'_>, body: &RobotBody, scan: &mut Scan) {
+        let RobotBody { core, radius_m } = body;
         match core {
-            Core::Point(c) => self.scan_segment(pose, turn, [*c; 2], core, radius_m, scan),
-            Core::Segment(ends) => self.scan_segment(pose, turn, *ends, core, radius_m, scan),
+            Core::Point(c) => self.scan_segment(view, [*c; 2], body, scan),
+            Core::Segment(ends) => self.scan_segment(view, *ends, body, scan),
             Core::Cuboid(cuboid) => {
                 // From inside, the edges are not visible in every direction.
-                if core.nearest_to_point(pose.at).distance_m <= radius_m {
+                if core.nearest_to_point(view.pose.at).distance_m <= *radius_m {
                     return scan.ranges_m.fill(0.0);
                 }
                 for edge in cuboid.edges_2d() {
-                    self.scan_segment(pose, turn, edge, &Core::Segment(edge), radius_m, scan);
+                    let side = RobotBody { core: Core::Segment(edge), radius_m: *radius_m };
+                    self.scan_segment(view, edge, &side, scan);
                 }
             }
         }
     }
 
-    /// Shortens the beams that meet a core, which lies around the segment `ends`.
+    /// Shortens the beams that meet a body, whose core lies around the segment `ends`.
     fn scan_segment(
         &self,
-        pose: &Pose2,
-        turn: Point<2>,
+        view: &Viewpoint<'_>,
         ends: [Point<2>; 2],
-        core: &Core<2>,
-        radius_m: f64,
+        body: &RobotBody,
         scan: &mut Scan,
     ) {
+        let Viewpoint { pose, turn } = *view;
         let n = self.directions.len();
-        let (first, count) = match ray::extent_rad(pose.at, ends, radius_m) {
+        let (first, count) = match ray::extent_rad(pose.at, ends, body.radius_m) {
             None => (0, n),
             Some((middle, half)) => {
                 let right = wrap_angle(middle - pose.heading_rad) - half;
+                // One more at each end, and one for the fraction that is cut off: a beam too many costs a test, a beam
+                // too few passes through the body.
                 let beams = (2.0 * half / self.step_rad()) as usize + 3;
                 let first = (right / self.step_rad()).floor() as isize;
                 (first.rem_euclid(n as isize) as usize, beams.min(n))
@@ -230,7 +231,7 @@ impl Laser {
             if so_far_m > 0.0 {
                 let [c, s] = self.directions[beam];
                 let u = [c * turn[0] - s * turn[1], s * turn[0] + c * turn[1]];
-                let hit_m = ray::distance_m(pose.at, u, core, radius_m);
+                let hit_m = ray::distance_m(pose.at, u, &body.core, body.radius_m);
                 scan.ranges_m[beam] = hit_m.map_or(so_far_m, |m| m.min(so_far_m));
             }
         }
@@ -240,10 +241,9 @@ impl Laser {
     /// rightmost on.
     pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
-        let bearing_rad = move |k: usize| (rightmost + k as f64) * self.step_rad();
-        self.read_values(&scan.ranges_m)
-            .enumerate()
-            .map(move |(k, range_m)| (bearing_rad(k), range_m))
+        let step_rad = self.step_rad();
+        let ranges_m = self.read_values(&scan.ranges_m).enumerate();
+        ranges_m.map(move |(k, range_m)| ((rightmost + k as f64) * step_rad, range_m))
     }
 
     /// Returns the ranges without errors in the order of [`Self::readings`]; none unless they were
@@ -261,9 +261,9 @@ impl Laser {
     /// left positive; `None` if [`Self::sees`] returns false.
     pub fn min_range_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
-        let range_m = |k: isize| scan.ranges_m[k.rem_euclid(n) as usize];
         let beams = self.sector(sector_rad)?;
-        Some(beams.map(range_m).fold(self.range_m, f64::min))
+        let ranges_m = beams.map(|k| scan.ranges_m[k.rem_euclid(n) as usize]);
+        Some(ranges_m.fold(self.range_m, f64::min))
     }
 
     /// Returns the least range of the beams of a sector that meet a moving body, or of the others, as
@@ -275,9 +275,15 @@ impl Laser {
         moves: bool,
     ) -> Option<f64> {
         let n = self.directions.len() as isize;
-        let counts = |k: &usize| scan.meets_mover.get(*k).copied().unwrap_or(false) == moves;
-        let beams = self.sector(sector_rad)?.map(|k| k.rem_euclid(n) as usize);
-        Some(beams.filter(counts).map(|k| scan.ranges_m[k]).fold(self.range_m, f64::min))
+        let mut least_m = self.range_m;
+        for k in self.sector(sector_rad)? {
+            let beam = k.rem_euclid(n) as usize;
+            let meets_mover = scan.meets_mover.get(beam).copied().unwrap_or(false);
+            if meets_mover == moves {
+                least_m = least_m.min(scan.ranges_m[beam]);
+            }
+        }
+        Some(least_m)
     }
 
     /// Returns whether a sector lies completely in the field and has a beam.
@@ -299,10 +305,26 @@ impl Laser {
     }
 }
 
+/// The place from which a scan is made.
+struct Viewpoint<'a> {
+    pose: &'a Pose2,
+    /// The direction of the heading, by which each beam's direction is turned.
+    turn: Point<2>,
+}
+
+fn obstacle_body(o: &Obstacle<2>) -> RobotBody {
+    RobotBody { core: o.core, radius_m: o.radius_m }
+}
+
+fn laser_error(cause: String, remedy: &str) -> InputError {
+    InputError::new("laser", cause, remedy)
+}
+
 fn is_moving(o: &Obstacle<2>) -> bool {
     o.velocity_m_s != [0.0; 2]
 }
 
+/// Returns the number of the last beam at an angle; a beam exactly there counts, whatever its rounding.
 fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
     (angle_rad / step_rad + 1e-9) as usize
 }
@@ -328,7 +350,8 @@ mod tests {
         bodies: &[RobotBody],
     ) -> Scan {
         let mut scan = Scan::default();
-        laser.scan(pose, obstacles, bodies.iter().copied(), &mut draws(), &mut scan);
+        let around = NearbyBodies { obstacles, robots: bodies.iter().copied() };
+        laser.scan(pose, around, &mut draws(), &mut scan);
         scan
     }
 
@@ -384,7 +407,8 @@ mod tests {
         for cycle in 0..500 {
             let mut scan = Scan::default();
             let mut noise = Streams::new(Seed(5)).draws(0, cycle, LASER_NOISE);
-            laser.scan(&pose, &obstacles, [], &mut noise, &mut scan);
+            let around = NearbyBodies { obstacles: &obstacles, robots: [] };
+            laser.scan(&pose, around, &mut noise, &mut scan);
             ahead_m.push(scan.ranges_m[0]);
         }
         let mean = ahead_m.iter().sum::<f64>() / 500.0;

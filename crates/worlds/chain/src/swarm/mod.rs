@@ -23,5 +23,5 @@ mod tests;
 
 pub use drive::{DifferentialDrive, Pose2, Wheels};
 pub use follower::Follower;
-pub use laser::{Laser, RobotBody, Scan};
+pub use laser::{Laser, NearbyBodies, RobotBody, Scan};
 pub use leader::{Leader, Percept, WallLossRule};

@@ -5,11 +5,12 @@ use super::drive::Pose2;
 use super::laser::RobotBody;
 use super::ray;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
-use sidestep_rods::geometry::{Core, sub};
+use sidestep_rods::geometry::sub;
 use sidestep_rods::{Obstacles, bounds_around};
 use std::f64::consts::TAU;
 
-/// Number of sensors. The first looks ahead, the others follow counterclockwise.
+/// Number of sensors. The first looks ahead, the others follow counterclockwise. Eight tell a wall beside a robot from one
+/// ahead, and are still much simpler than the leader's laser, as the slides want them.
 pub(crate) const SECTORS: usize = 8;
 /// The angle that one sensor watches.
 pub(crate) const SECTOR_RAD: f64 = TAU / SECTORS as f64;
@@ -40,9 +41,12 @@ impl SensorRing {
             let toward = pose.heading_rad + (k as f64 + 0.5) * SECTOR_RAD;
             [cos(toward), sin(toward)]
         });
-        obstacles.visit(&near, |o| self.read_body(pose, &borders, &o.core, o.radius_m, &mut gaps));
+        obstacles.visit(&near, |o| {
+            let body = RobotBody { core: o.core, radius_m: o.radius_m };
+            self.read_body(pose, &borders, &body, &mut gaps);
+        });
         for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.read_body(pose, &borders, &body.core, body.radius_m, &mut gaps);
+            self.read_body(pose, &borders, &body, &mut gaps);
         }
         gaps
     }
@@ -53,10 +57,10 @@ impl SensorRing {
         &self,
         pose: &Pose2,
         borders: &[[f64; 2]; SECTORS],
-        core: &Core<2>,
-        radius_m: f64,
+        body: &RobotBody,
         gaps: &mut Gaps,
     ) {
+        let RobotBody { core, radius_m } = *body;
         let nearest = core.nearest_to_point(pose.at);
         let gap_m = (nearest.distance_m - radius_m - self.radius_m).max(0.0);
         if gap_m >= self.range_m {
@@ -69,7 +73,7 @@ impl SensorRing {
         let sector = sector_of(atan2(to[1], to[0]) - pose.heading_rad);
         gaps[sector] = gaps[sector].min(gap_m);
         for (k, &u) in borders.iter().enumerate() {
-            if let Some(hit_m) = ray::distance_m(pose.at, u, core, radius_m) {
+            if let Some(hit_m) = ray::distance_m(pose.at, u, &core, radius_m) {
                 let gap_m = (hit_m - self.radius_m).max(0.0);
                 for side in [k, (k + 1) % SECTORS] {
                     gaps[side] = gaps[side].min(gap_m);
@@ -88,12 +92,16 @@ fn sector_of(bearing_rad: f64) -> usize {
 /// Returns the speed at which a body may go into a direction relative to its heading without
 /// reaching a static obstacle within `horizon_s`. It may turn by up to `slack_rad` meanwhile.
 pub(crate) fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: f64) -> f64 {
-    let limit = |(k, gap_m): (usize, &f64)| {
+    let mut safe_m_s = f64::INFINITY;
+    for (k, gap_m) in gaps.iter().enumerate() {
         let off_rad = wrap_angle(k as f64 * SECTOR_RAD - bearing_rad).abs();
+        // The obstacle may be at the nearer border of the sector, and the body may turn toward it.
         let closing = cos((off_rad - 0.5 * SECTOR_RAD - slack_rad).max(0.0));
-        if closing > 0.0 { gap_m / (horizon_s * closing) } else { f64::INFINITY }
-    };
-    gaps.iter().enumerate().map(limit).fold(f64::INFINITY, f64::min)
+        if closing > 0.0 {
+            safe_m_s = safe_m_s.min(gap_m / (horizon_s * closing));
+        }
+    }
+    safe_m_s
 }
 
 #[cfg(test)]

@@ -84,6 +84,7 @@ pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
 /// between the outermost; `None` if it may be in any direction.
 pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<(f64, f64)> {
     use sidestep_kernel::math::{asin, atan2, wrap_angle};
+    // At the surface rounding decides what is seen in which direction.
     if Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
         return None;
     }

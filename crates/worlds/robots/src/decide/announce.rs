@@ -6,10 +6,10 @@ use sidestep_kernel::stream::Draws;
 
 /// Wanders, and broadcasts the place where its action is meant to end. It turns before a robot that
 /// it hears of, as before one that it senses, and waits where a robot with a smaller id is about to
-/// enter the same boxes. Without radio it is [`Wander`].
+/// enter the same boxes. Without radio it behaves as [`Wander`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Announce {
-    /// The behavior that chooses the way.
+    /// The behavior that chooses the actions.
     pub wander: Wander,
     /// Side of the robot, in boxes.
     pub size: u32,
@@ -37,22 +37,24 @@ impl Behaviour for Announce {
         if announced_poses(percept.heard).any(|(_, other)| other.overlaps(next)) {
             nearest_in[Sector::Ahead as usize] = 0;
         }
-        let wanted = self.wander.decide(&Percept { nearest_in, ..*percept }, memory, draws);
-        let mut first = announced_poses(percept.heard).filter(|(sender, _)| *sender < percept.id);
-        let gives_way = wanted.action == FORWARD
-            && first.any(|(_, other)| other.after_action(FORWARD).overlaps(next));
-        let action = if gives_way { STAY } else { wanted.action };
-        Decision { action, broadcast: Some(here.after_action(action).word()), ..wanted }
+        let wander = self.wander.decide(&Percept { nearest_in, ..*percept }, memory, draws);
+        // Of two that are about to enter the same boxes exactly one waits: the one with the larger id.
+        let mut smaller_ids =
+            announced_poses(percept.heard).filter(|(sender, _)| *sender < percept.id);
+        let gives_way = wander.action == FORWARD
+            && smaller_ids.any(|(_, other)| other.after_action(FORWARD).overlaps(next));
+        let action = if gives_way { STAY } else { wander.action };
+        Decision { action, broadcast: Some(here.after_action(action).word()), ..wander }
     }
 }
 
-/// Returns the announced places, each with its sender.
+/// Returns the announced poses, each with its sender.
 fn announced_poses(heard: &[ReceivedMessage]) -> impl Iterator<Item = (u32, AnnouncedPose)> + '_ {
     heard.iter().map(|heard| (heard.sender, AnnouncedPose::from_word(heard.word)))
 }
 
 impl AnnouncedPose {
-    /// Returns the place after one of the standard actions, if nothing goes wrong.
+    /// Returns the pose after one of the standard actions, if the effector does not err.
     fn after_action(self, action: ActionId) -> Self {
         let (east, north) = HEADINGS[usize::from(self.heading % 4)];
         match action {
@@ -65,11 +67,12 @@ impl AnnouncedPose {
 
     /// Returns whether two squares share a box.
     fn overlaps(self, other: Self) -> bool {
-        let overlap = |a: i32, b: i32| a < b + other.size && b < a + self.size;
-        overlap(self.col, other.col) && overlap(self.row, other.row)
+        let share_columns = self.col < other.col + other.size && other.col < self.col + self.size;
+        let share_rows = self.row < other.row + other.size && other.row < self.row + self.size;
+        share_columns && share_rows
     }
 
-    /// Returns the place in one word: 16 bits each for column, row, heading and size. Columns and
+    /// Returns the pose in one word: 16 bits each for column, row, heading and size. Columns and
     /// rows are below 32,768, and may be -1 where a robot faces a wall at the edge of the map.
     fn word(self) -> u64 {
         let parts = [self.col as u16, self.row as u16, u16::from(self.heading), self.size as u16];
@@ -77,9 +80,19 @@ impl AnnouncedPose {
     }
 
     fn from_word(word: u64) -> Self {
-        let part = |k: u32| i32::from((word >> (16 * k)) as u16 as i16);
-        Self { col: part(0), row: part(1), heading: (part(2) % 4) as u8, size: part(3) }
+        Self {
+            col: signed_part(word, 0),
+            row: signed_part(word, 1),
+            // Any word may come in over the radio, from other behaviors too.
+            heading: (signed_part(word, 2) % 4) as u8,
+            size: signed_part(word, 3),
+        }
     }
+}
+
+/// Returns 16 bits of a word, of which part 0 is the lowest, as a number with a sign.
+fn signed_part(word: u64, part: u32) -> i32 {
+    i32::from((word >> (16 * part)) as u16 as i16)
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@ use sidestep_kernel::stream::Draws;
 
 /// Follows the order that the caller gave before the cycle; stays when there is none.
 ///
-/// Its memory holds the orders: they stand until the robot's next turn, and are gone after it. Word 0 has the
-/// action (plus 1) and the mark of the trip, and says whether there is a broadcast; words 1 and 2 are
-/// that.
+/// Its memory holds the orders, so that they are part of a checkpoint: they stand until the robot's next
+/// turn, and are gone after it. Word 0 has the action plus 1 in bits 0 to 7 (0 for no order), the mark of the
+/// trip in bits 8 to 15, and in bit 16 whether there is a broadcast; words 1 and 2 are that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct External;
 
@@ -19,12 +19,12 @@ const HAS_BROADCAST: u32 = 1 << 16;
 impl External {
     /// The order to try an action, by its number.
     pub const ACTION: &'static str = "action";
-    /// The order to mark the way: 0 none, 1 a trip has begun, 2 it is done.
+    /// The order to mark a trip: 0 none, 1 it has begun, 2 it is done.
     pub const TRIP: &'static str = "trip";
     /// The order to say a word over the radio.
     pub const BROADCAST: &'static str = "broadcast";
 
-    /// Notes an order; it takes the place of one of the same name.
+    /// Records an order; it takes the place of one of the same name.
     pub(crate) fn record_order(memory: &[AtomicCell<u32>; 4], order: &str, value: u64) {
         let first = memory[0].get();
         match order {

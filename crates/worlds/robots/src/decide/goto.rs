@@ -1,4 +1,4 @@
-//! Going somewhere: along shortest ways on the static map, and past obstacles.
+//! Going somewhere: along shortest paths on the static map, and past obstacles.
 
 use super::plan::{CurrentGoal, Planner};
 use super::sidestep::{SensorTrust, sidestep};
@@ -9,31 +9,31 @@ use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
 
-/// The way in which a robot that goes somewhere deals with obstacles.
+/// The rule by which a robot that goes somewhere deals with obstacles.
 #[derive(Debug, Clone)]
 pub enum Avoidance {
     /// Plans around the things that it senses, and makes room for others.
     Plan(Arc<Planner>),
     /// Steps aside from near things that its sensors report.
     Sidestep(SensorTrust),
-    /// Keeps to its way until it touches something, then waits or steps aside at random.
+    /// Keeps to its path until it touches something, then waits or steps aside at random.
     Touch,
 }
 
 impl Avoidance {
     fn step(
         &self,
-        way: CurrentGoal<'_>,
+        goal: CurrentGoal<'_>,
         percept: &Percept<'_>,
         memory: &mut Memory,
         draws: &mut Draws,
     ) -> ActionId {
         match self {
-            Self::Plan(planner) => planner.step(way, percept, memory, draws),
-            // Only planners know others, and leave a goal for them.
-            _ if way.is_done => STAY,
-            Self::Sidestep(trust) => sidestep(*trust, way.field, percept, memory, draws),
-            Self::Touch => follow(way.field, percept, memory, draws),
+            Self::Plan(planner) => planner.step(goal, percept, memory, draws),
+            // Only planners hear requests, and leave a goal for others.
+            _ if goal.is_done => STAY,
+            Self::Sidestep(trust) => sidestep(*trust, goal.field, percept, memory, draws),
+            Self::Touch => follow(goal.field, percept, memory, draws),
         }
     }
 
@@ -45,20 +45,20 @@ impl Avoidance {
 /// Visits goals in order; each robot starts with the goals of its own list.
 #[derive(Debug, Clone)]
 pub struct Goto {
-    /// Shortest ways to the goals, in order.
+    /// Shortest paths to the goals, in order.
     pub goals: Vec<Arc<FlowField>>,
     /// Whether it starts again after the last goal, rather than staying there.
     pub repeat: bool,
-    /// Its way past obstacles.
+    /// Its rule for obstacles.
     pub avoidance: Avoidance,
 }
 
 /// Goes back and forth between two regions; a trip is there and back again.
 #[derive(Debug, Clone)]
 pub struct Shuttle {
-    /// Shortest ways to the two regions.
+    /// Shortest paths to the two regions.
     pub ends: [Arc<FlowField>; 2],
-    /// Its way past obstacles.
+    /// Its rule for obstacles.
     pub avoidance: Avoidance,
 }
 
@@ -67,14 +67,14 @@ pub struct Shuttle {
 const GOALS_REACHED_WORD: usize = 0;
 
 impl Goto {
-    /// Counts the goals that are reached here, and returns the way to the next one; none where all
-    /// goals of a repeated list are here.
+    /// Counts the goals that are reached here, and returns the next one; none where all goals of a
+    /// repeated list are here.
     fn next_goal(
         &self,
         percept: &Percept<'_>,
         memory: &mut Memory,
     ) -> (Option<CurrentGoal<'_>>, Option<TripEvent>) {
-        let (mut trip, n) = (None, self.goals.len());
+        let mut trip = None;
         loop {
             let reached = memory.words[GOALS_REACHED_WORD] as usize;
             let Some(field) = self.goals.get(reached) else {
@@ -86,7 +86,7 @@ impl Goto {
             }
             trip = Some(TripEvent::Completed);
             memory.words[GOALS_REACHED_WORD] += 1;
-            if self.repeat && reached + 1 == n {
+            if self.repeat && reached + 1 == self.goals.len() {
                 memory.words[GOALS_REACHED_WORD] = 0;
                 // Stop here, because a list with all of its goals here would loop forever.
                 return (None, trip);
@@ -97,8 +97,8 @@ impl Goto {
 
 impl Behaviour for Goto {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let (way, trip) = self.next_goal(percept, memory);
-        let action = way.map_or(STAY, |way| self.avoidance.step(way, percept, memory, draws));
+        let (goal, trip) = self.next_goal(percept, memory);
+        let action = goal.map_or(STAY, |goal| self.avoidance.step(goal, percept, memory, draws));
         Decision { trip, ..action.into() }
     }
 
@@ -122,17 +122,15 @@ impl Behaviour for Shuttle {
         if self.ends[target].is_goal(percept.at.0, percept.at.1) {
             memory.words[GOALS_REACHED_WORD] = memory.words[GOALS_REACHED_WORD].wrapping_add(1);
             if target == 0 {
-                // The first arrival at end 0 only starts the first trip.
-                trip = Some(if memory.words[GOALS_REACHED_WORD] > 1 {
-                    TripEvent::Completed
-                } else {
-                    TripEvent::Started
-                });
+                // The first arrival at end 0 only starts the first trip, because a robot may start anywhere.
+                let is_first = memory.words[GOALS_REACHED_WORD] <= 1;
+                let event = if is_first { TripEvent::Started } else { TripEvent::Completed };
+                trip = Some(event);
             }
             target = 1 - target;
         }
-        let way = CurrentGoal { field: &self.ends[target], is_done: false };
-        let action = self.avoidance.step(way, percept, memory, draws);
+        let goal = CurrentGoal { field: &self.ends[target], is_done: false };
+        let action = self.avoidance.step(goal, percept, memory, draws);
         Decision { trip, ..action.into() }
     }
 

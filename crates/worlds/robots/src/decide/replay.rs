@@ -19,6 +19,7 @@ impl Behaviour for Replay {
         if step >= self.actions.len() {
             return STAY.into();
         }
+        // Word 0 counts up to the length of the list, and stays there, so that it cannot overflow.
         memory.words[0] += 1;
         if self.repeat && memory.words[0] as usize == self.actions.len() {
             memory.words[0] = 0;

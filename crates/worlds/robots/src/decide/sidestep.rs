@@ -1,9 +1,9 @@
 //! Stepping aside from near things that the sensors report, and trusting them more or less.
 //!
-//! The paper's robot avoids obstacles and follows corridors by its sonar; this does the same on the
-//! way to a goal, and [`SensorTrust`] says how far it believes a beam.
+//! The paper's robot avoids obstacles and follows corridors by its sonar; this does the same while it
+//! goes to a goal, and [`SensorTrust`] says how far it believes a beam.
 
-use super::{Memory, Percept, Sector};
+use super::{Memory, Percept, Sector, freer_side, random_turn};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STAY, Side};
 use crate::sensor::NOTHING;
 use sidestep_kernel::stream::Draws;
@@ -26,7 +26,8 @@ const SIDESTEP_WORD: usize = 1;
 /// fourth byte its heading plus 1.
 const LAST_REPORTS_WORD: usize = 2;
 
-/// The sectors that matter, in the order of the bytes of `LAST_REPORTS_WORD`.
+/// The sectors that matter to a robot that never moves backward, in the order of the bytes of
+/// `LAST_REPORTS_WORD`.
 const SECTORS: [Sector; 3] = [Sector::Ahead, Sector::Left, Sector::Right];
 
 /// The sides on which something is believed to be near.
@@ -37,7 +38,7 @@ struct NearSides {
     right: bool,
 }
 
-/// Returns one action along the way, or of a sidestep.
+/// Returns one action along the path, or of a sidestep.
 pub(super) fn sidestep(
     trust: SensorTrust,
     field: &FlowField,
@@ -57,32 +58,38 @@ pub(super) fn sidestep(
 
 /// Returns the sides believed to be near something after this percept.
 fn near_sides(trust: SensorTrust, percept: &Percept<'_>, memory: &mut Memory) -> NearSides {
-    let now = SECTORS.map(|sector| near_reports(percept, sector));
+    let [ahead, left, right] = SECTORS.map(|sector| near_reports(percept, sector));
     let heading = percept.heading + 1;
-    let [ahead, left, right, seen_heading] = memory.words[LAST_REPORTS_WORD].to_le_bytes();
-    memory.words[LAST_REPORTS_WORD] = u32::from_le_bytes([now[0], now[1], now[2], heading]);
-    let before = if seen_heading == heading { [ahead, left, right] } else { [0; 3] };
-    let believed = |k: usize| match trust {
-        SensorTrust::TwoReports if k > 0 => now[k].saturating_add(before[k]) > 1,
-        _ => now[k] > 0,
+    let last = memory.words[LAST_REPORTS_WORD].to_le_bytes();
+    memory.words[LAST_REPORTS_WORD] = u32::from_le_bytes([ahead, left, right, heading]);
+    let [_, last_left, last_right, last_heading] = last;
+    // After a turn the sides are other places, and reports about them cannot agree.
+    let (last_left, last_right) =
+        if last_heading == heading { (last_left, last_right) } else { (0, 0) };
+    let (left, right) = match trust {
+        SensorTrust::OneBeam => (left > 0, right > 0),
+        SensorTrust::TwoReports => {
+            (left.saturating_add(last_left) > 1, right.saturating_add(last_right) > 1)
+        }
     };
-    let touched = |side| percept.contact.is_some_and(|contact| contact.side == side);
+    let touched = percept.contact.map(|contact| contact.side);
     NearSides {
-        ahead: believed(0) || touched(Side::Front),
-        left: believed(1) || touched(Side::Left),
-        right: believed(2) || touched(Side::Right),
+        ahead: ahead > 0 || touched == Some(Side::Front),
+        left: left || touched == Some(Side::Left),
+        right: right || touched == Some(Side::Right),
     }
 }
 
-/// Goes on with a sidestep, unless there is none or its way is blocked.
+/// Continues a sidestep, unless there is none or it is blocked.
 fn resume_sidestep(
     percept: &Percept<'_>,
     near: NearSides,
     memory: &mut Memory,
 ) -> Option<ActionId> {
     let word = &mut memory.words[SIDESTEP_WORD];
-    let (heading, boxes) = ((*word % 4) as u8, *word / 4);
-    if boxes == 0 {
+    let heading = (*word % 4) as u8;
+    let boxes_left = *word / 4;
+    if boxes_left == 0 {
         return None;
     }
     match (4 + heading - percept.heading) % 4 {
@@ -91,7 +98,7 @@ fn resume_sidestep(
             None
         }
         0 => {
-            *word -= 4;
+            *word = (boxes_left - 1) * 4 + u32::from(heading);
             Some(FORWARD)
         }
         3 => Some(RIGHT),
@@ -102,7 +109,9 @@ fn resume_sidestep(
 /// Returns the number of near reports of a sector in one percept.
 fn near_reports(percept: &Percept<'_>, sector: Sector) -> u8 {
     let beams = percept.readings.iter().zip(percept.sectors);
-    let near = beams.filter(|(r, s)| **s == sector && r.observation != NOTHING && r.class == 0);
+    let near = beams.filter(|(reading, of)| {
+        **of == sector && reading.observation != NOTHING && reading.class == 0
+    });
     near.count().min(255) as u8
 }
 
@@ -122,7 +131,7 @@ fn follow_course(
     draws: &mut Draws,
 ) -> ActionId {
     let (away, boxes) = match near {
-        // Two robots that meet must not mirror each other, so wait or step aside by a fair draw.
+        // Two robots that meet must not mirror each other forever, so wait or step aside by a draw.
         NearSides { ahead: true, .. } if draws.uniform_below(4) == 0 => return STAY,
         NearSides { ahead: true, .. } => (freer_side(percept, draws), 1 + draws.uniform_below(3)),
         NearSides { left: true, right: false, .. } => (RIGHT, 1),
@@ -132,19 +141,6 @@ fn follow_course(
     let quarter = if away == LEFT { 1 } else { 3 };
     memory.words[SIDESTEP_WORD] = boxes * 4 + u32::from((percept.heading + quarter) % 4);
     away
-}
-
-fn freer_side(percept: &Percept<'_>, draws: &mut Draws) -> ActionId {
-    let clear = |sector| percept.nearest(sector).unwrap_or(u8::MAX);
-    match clear(Sector::Left).cmp(&clear(Sector::Right)) {
-        std::cmp::Ordering::Greater => LEFT,
-        std::cmp::Ordering::Less => RIGHT,
-        std::cmp::Ordering::Equal => random_turn(draws),
-    }
-}
-
-fn random_turn(draws: &mut Draws) -> ActionId {
-    if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
 }
 
 #[cfg(test)]

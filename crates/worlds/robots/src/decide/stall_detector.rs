@@ -1,7 +1,7 @@
-//! A way on for robots that wait for a contact where none can happen.
+//! Contacts for behaviors that wait for one where none can happen.
 //!
 //! Under the rule `renormalise` an action that may also do nothing never ends in a contact: before a
-//! wall it does nothing. A robot notices that it does not get on, and takes this for a contact.
+//! wall it does nothing. A robot notices that its steps have no effect, and takes this for a contact.
 
 use super::{Behaviour, Contact, Decision, Memory, Percept};
 use crate::effector::{FORWARD, Side};
@@ -9,34 +9,41 @@ use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
 
-/// Decides as another behavior does, which perceives a contact in front after some vain steps. It
-/// keeps word 3 of the memory to itself.
+/// Decides as another behavior does, which perceives a contact in front after some steps without effect.
+/// It keeps word 3 of the memory to itself.
 #[derive(Debug)]
 pub struct StallDetector {
     /// The behavior that decides; it must not use word 3 of the memory.
     pub inner: Arc<dyn Behaviour>,
 }
 
-/// Index of the memory's word: vain steps above the place modulo 64.
+/// Index of the memory's word: the place, column and row modulo 64, below the number of steps in vain.
 const STALL_WORD: usize = 3;
-/// Steps in vain that count as a contact. An action that does nothing now and then rarely does so
-/// that often: a chance of 0.05 comes to one in 160,000.
+/// Bits of the word that hold the place.
+const PLACE_BITS: u32 = 13;
+/// A bit of every place, so that a memory of 0 is no place.
+const IS_PLACE: u32 = 1 << 12;
+/// Steps in vain that count as a contact. An action that may do nothing rarely does so that often: a
+/// chance of 0.05 comes to one in 160,000.
 const STALL_STEPS: u32 = 4;
 
 impl Behaviour for StallDetector {
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let place = 1 << 12 | (percept.at.0 & 63) << 6 | percept.at.1 & 63;
-        let (before, vain) = (memory.words[STALL_WORD] & 0x1fff, memory.words[STALL_WORD] >> 13);
-        let vain = if before == place { vain } else { 0 };
-        let touched = (vain >= STALL_STEPS).then_some(Contact { kind: 0, side: Side::Front });
-        let percept = Percept { contact: percept.contact.or(touched), ..*percept };
+        let place = IS_PLACE | (percept.at.0 & 63) << 6 | percept.at.1 & 63;
+        let word = memory.words[STALL_WORD];
+        let last_place = word & ((1 << PLACE_BITS) - 1);
+        let in_vain = if last_place == place { word >> PLACE_BITS } else { 0 };
+        let is_stalled = in_vain >= STALL_STEPS;
+        let assumed = is_stalled.then_some(Contact { kind: 0, side: Side::Front });
+        let percept = Percept { contact: percept.contact.or(assumed), ..*percept };
         let decision = self.inner.decide(&percept, memory, draws);
-        let vain = match decision.action {
-            _ if touched.is_some() => 0,
-            FORWARD => vain + 1,
-            _ => vain,
+        let in_vain = if is_stalled {
+            0
+        } else {
+            // Turns and waiting leave a robot where it is, and are not in vain.
+            in_vain + u32::from(decision.action == FORWARD)
         };
-        memory.words[STALL_WORD] = vain << 13 | place;
+        memory.words[STALL_WORD] = in_vain << PLACE_BITS | place;
         decision
     }
 

@@ -1,10 +1,11 @@
 //! Obstacle avoidance and corridor following, like the Nomad's basic behavior in the paper.
 
-use super::{Behaviour, Decision, Memory, Percept, Sector};
+use super::{Behaviour, Decision, Memory, Percept, Sector, random_turn};
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT};
 use sidestep_kernel::stream::Draws;
+use std::cmp::Ordering;
 
-/// Goes ahead; turns to the freer side before a near obstacle or after a contact; now and then
+/// Goes ahead; turns to the freer side before a near obstacle or after a contact; at intervals
 /// turns into an open side, so that it explores crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wander {
@@ -20,7 +21,8 @@ impl Default for Wander {
 
 /// Word 0 of the memory: actions left until the next voluntary turn, plus 1; 0 = not drawn.
 const STRIDE_WORD: usize = 0;
-/// Word 1: the turn of the last avoidance plus 1, kept while the way stays blocked.
+/// Word 1: the turn of the last avoidance plus 1, kept while the front stays blocked, because a robot in a
+/// corner would otherwise turn to and fro.
 const AVOIDANCE_WORD: usize = 1;
 
 impl Behaviour for Wander {
@@ -33,14 +35,12 @@ impl Behaviour for Wander {
         }
         memory.words[AVOIDANCE_WORD] = 0;
         if self.is_stride_over(memory, draws) {
-            let open = [(left, LEFT), (right, RIGHT)];
-            let mut open = open.iter().filter(|(class, _)| *class > 0).map(|&(_, turn)| turn);
-            match (open.next(), open.next()) {
-                (Some(a), Some(b)) => {
-                    return if draws.uniform_below(2) == 0 { a } else { b }.into();
-                }
-                (Some(only), None) => return only.into(),
-                _ => {}
+            // A side with something in the nearest class is a wall of the corridor, and no crossing.
+            match (left > 0, right > 0) {
+                (true, true) => return random_turn(draws).into(),
+                (true, false) => return LEFT.into(),
+                (false, true) => return RIGHT.into(),
+                (false, false) => {}
             }
         }
         FORWARD.into()
@@ -57,30 +57,24 @@ impl Wander {
             *stride -= 1;
             return false;
         }
-        let first = *stride == 0;
+        let is_first = *stride == 0;
+        // Uniform over twice the mean, so that robots that start together do not turn together.
         *stride = draws.uniform_below(self.turn_every.saturating_mul(2)).saturating_add(2);
-        !first
+        !is_first
     }
 }
 
-/// Turns to the freer side, and keeps turning that way until the way is free.
+/// Turns to the side on which the nearest thing is farther, and keeps turning that way until the front is free.
 fn avoid(left: u8, right: u8, memory: &mut Memory, draws: &mut Draws) -> ActionId {
-    let turn = match memory.words[AVOIDANCE_WORD] {
-        0 if left != right => {
-            if left > right {
-                LEFT
-            } else {
-                RIGHT
-            }
+    let kept = memory.words[AVOIDANCE_WORD];
+    let turn = if kept != 0 {
+        (kept - 1) as ActionId
+    } else {
+        match left.cmp(&right) {
+            Ordering::Greater => LEFT,
+            Ordering::Less => RIGHT,
+            Ordering::Equal => random_turn(draws),
         }
-        0 => {
-            if draws.uniform_below(2) == 0 {
-                LEFT
-            } else {
-                RIGHT
-            }
-        }
-        kept => (kept - 1) as ActionId,
     };
     memory.words[AVOIDANCE_WORD] = u32::from(turn) + 1;
     turn

@@ -9,12 +9,19 @@ use crate::world::Role;
 use sidestep_kernel::Slot;
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{self, FactSection, FactTable, FactValue, MarkShape};
+use std::ops::Range;
 
 /// A transition as it would be where the body is.
 struct TransitionResult {
-    verdict: WalkResult,
+    walk: WalkResult,
     /// Its probability here, after the obstacle rule.
     p: f64,
+}
+
+impl TransitionResult {
+    fn is_free(&self) -> bool {
+        self.walk.contact.is_none()
+    }
 }
 
 impl<T: BoxWord> Inspector<'_, T> {
@@ -23,13 +30,13 @@ impl<T: BoxWord> Inspector<'_, T> {
         let mut section = FactSection::new("Outcome");
         let start_m = self.position_m();
         if let Some(action) = self.action() {
-            let drawn = self.scene.draw_transition(action, self.slot, word);
+            let drawn = self.cycle.draw_transition(action, self.slot, word);
             let all = self.transition_results(action);
             section = self.with_drawn_transition(section, &action.walks[drawn], &all[drawn]);
             section = section.table(transition_table(action, &all, drawn));
             self.draw_paths(start_m, action, drawn, &all[drawn]);
         }
-        self.scene.act(self.slot, word, scratch);
+        self.cycle.act(self.slot, word, scratch);
         let section =
             section.fact("next place", self.position_m()).fact("next heading", self.facing());
         self.inspection.add_section(section);
@@ -37,20 +44,20 @@ impl<T: BoxWord> Inspector<'_, T> {
 
     /// Tries all transitions of an action where the body is.
     fn transition_results(&self, action: &Action) -> Vec<TransitionResult> {
-        let verdicts = action.walks.iter().map(|walk| self.scene.walk_result(walk, self.slot));
-        let mut all: Vec<TransitionResult> = verdicts
-            .zip(&action.probabilities)
-            .map(|(verdict, &p)| TransitionResult { verdict, p })
+        let walks = action.walks.iter().zip(&action.probabilities);
+        let mut all: Vec<TransitionResult> = walks
+            .map(|(walk, &p)| TransitionResult { walk: self.cycle.walk_result(walk, self.slot), p })
             .collect();
-        let free = |one: &TransitionResult| one.verdict.contact.is_none();
-        let sum: f64 = all.iter().filter(|one| free(one)).map(|one| one.p).sum();
-        if self.scene.world.obstacle_rule == ObstacleRule::Renormalise && sum > 0.0 {
-            all.iter_mut().for_each(|one| one.p = if free(one) { one.p / sum } else { 0.0 });
+        let sum: f64 = all.iter().filter(|one| one.is_free()).map(|one| one.p).sum();
+        if self.cycle.world.obstacle_rule == ObstacleRule::Renormalise && sum > 0.0 {
+            for one in &mut all {
+                one.p = if one.is_free() { one.p / sum } else { 0.0 };
+            }
         }
         all
     }
 
-    /// Tells the transition that is drawn.
+    /// Adds the transition that is drawn.
     fn with_drawn_transition(
         &self,
         section: FactSection,
@@ -64,29 +71,28 @@ impl<T: BoxWord> Inspector<'_, T> {
             .fact("probability", FactValue::Share(tried.p))
             .fact("steps wanted", FactValue::count(walk.steps.len()))
             .fact("steps made", FactValue::count(self.steps_made(tried)));
-        let Some(touch) = tried.verdict.contact else { return section };
-        let kind = &self.scene.world.kinds[usize::from(touch.kind)];
-        let side = touch.side.name();
+        let Some(blocker) = tried.walk.contact else { return section };
+        let kind = &self.cycle.world.kinds[usize::from(blocker.kind)];
+        let side = blocker.side.name();
         section
-            .fact("cut by", touch.by.map(|slot: Slot| self.body_in(slot)))
+            .fact("cut by", blocker.by.map(|slot: Slot| self.body_in(slot)))
             .fact("what is there", kind.as_str())
             .fact("touches it with its", side)
     }
 
     fn body_in(&self, slot: Slot) -> view::BodyId {
-        self.scene.world.body_id(self.scene.cell(slot).id)
+        self.cycle.world.body_id(self.cycle.body(slot).id)
     }
 
     /// Returns the number of steps that are made of a transition.
     fn steps_made(&self, tried: &TransitionResult) -> usize {
-        let cell = self.scene.cell(self.slot);
-        let is_mover = matches!(self.scene.type_of(cell).role, Role::Mover(_));
-        let is_cut = self.scene.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
-        let is_free = tried.verdict.contact.is_none();
-        if is_free || is_cut { tried.verdict.steps } else { 0 }
+        let body = self.cycle.body(self.slot);
+        let is_mover = matches!(self.cycle.type_of(body).role, Role::Mover(_));
+        let is_cut = self.cycle.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
+        if tried.is_free() || is_cut { tried.walk.steps } else { 0 }
     }
 
-    /// Draws the way that is intended, and those that are made and refused.
+    /// Draws the path that is intended, and those that are made and refused.
     fn draw_paths(
         &mut self,
         from_m: view::Vec3,
@@ -94,20 +100,14 @@ impl<T: BoxWord> Inspector<'_, T> {
         drawn: usize,
         tried: &TransitionResult,
     ) {
-        let way = |walk: &StepPath, steps: std::ops::Range<usize>| {
-            let mut at = [0, 0];
-            let mut points_m = vec![self.offset_point(from_m, at)];
-            for step in &walk.steps[..steps.end] {
-                at = [at[0] + step.delta.0, at[1] + step.delta.1];
-                points_m.push(self.offset_point(from_m, at));
-            }
-            points_m.drain(..steps.start);
-            MarkShape::Line { points_m }
-        };
-        let (meant, walk, made) = (&action.walks[0], &action.walks[drawn], self.steps_made(tried));
+        // The first transition of an action is the intended one.
+        let intended = &action.walks[0];
+        let walk = &action.walks[drawn];
+        let made = self.steps_made(tried);
         let all = walk.steps.len();
-        let [wish, done, refused] =
-            [way(meant, 0..meant.steps.len()), way(walk, 0..made), way(walk, made..all)];
+        let wish = self.path_line(from_m, intended, 0..intended.steps.len());
+        let done = self.path_line(from_m, walk, 0..made);
+        let refused = self.path_line(from_m, walk, made..all);
         self.inspection.add_mark(view::MarkRole::Wish, "what it wants", wish);
         self.inspection.add_mark(view::MarkRole::Done, "what it does", done);
         if made < all {
@@ -115,9 +115,22 @@ impl<T: BoxWord> Inspector<'_, T> {
         }
     }
 
-    /// Returns the place some boxes away from another one.
+    /// Returns the line of some steps of a walk that starts at `from_m`.
+    fn path_line(&self, from_m: view::Vec3, walk: &StepPath, steps: Range<usize>) -> MarkShape {
+        let mut at = [0, 0];
+        let mut points_m = vec![self.offset_point(from_m, at)];
+        for step in &walk.steps[..steps.end] {
+            at = [at[0] + step.delta.0, at[1] + step.delta.1];
+            points_m.push(self.offset_point(from_m, at));
+        }
+        points_m.drain(..steps.start);
+        MarkShape::Line { points_m }
+    }
+
+    /// Returns the place some boxes away from another one, along the axes of the map.
     fn offset_point(&self, from_m: view::Vec3, boxes: [i32; 2]) -> view::Vec3 {
-        let (plane, box_m) = (self.scene.world.map.plane, self.scene.world.map.box_size_m);
+        let plane = self.cycle.world.map.plane;
+        let box_m = self.cycle.world.map.box_size_m;
         let [x, y] = plane.inverse_transform_point([from_m[0], from_m[1]]);
         let [x_m, y_m] = plane
             .transform_point([x + f64::from(boxes[0]) * box_m, y + f64::from(boxes[1]) * box_m]);
@@ -131,9 +144,14 @@ fn transition_table(action: &Action, all: &[TransitionResult], drawn: usize) -> 
         FactTable::new(["transition", "turn", "in free space", "here", "steps free", "drawn"]);
     for (k, (walk, tried)) in action.walks.iter().zip(all).enumerate() {
         let (path, turn) = path_and_turn(walk);
-        let (free, here) = (FactValue::Share(action.probabilities[k]), FactValue::Share(tried.p));
-        let steps = FactValue::count(tried.verdict.steps);
-        table.push_row([path.into(), turn, free, here, steps, (k == drawn).into()]);
+        table.push_row([
+            path.into(),
+            turn,
+            FactValue::Share(action.probabilities[k]),
+            FactValue::Share(tried.p),
+            FactValue::count(tried.walk.steps),
+            (k == drawn).into(),
+        ]);
     }
     table
 }
@@ -142,6 +160,7 @@ fn transition_table(action: &Action, all: &[TransitionResult], drawn: usize) -> 
 fn path_and_turn(walk: &StepPath) -> (String, FactValue) {
     let path: String = walk.steps.iter().map(|step| step.side.letter()).collect();
     let path = if path.is_empty() { "none".into() } else { path };
+    // Three quarters to the left are one to the right.
     let quarters = f64::from(walk.turn) - if walk.turn == 3 { 4.0 } else { 0.0 };
     (path, FactValue::number(90.0 * quarters, "°"))
 }

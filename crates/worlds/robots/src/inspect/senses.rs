@@ -22,22 +22,24 @@ struct BeamReading<'a, T> {
 }
 
 impl<T: BoxWord> Inspector<'_, T> {
-    /// Tells the percept and the decision of a robot; nothing of other bodies, which have neither.
+    /// Adds the percept and the decision of a robot; nothing of other bodies, which have neither.
     pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
-        let cell = self.scene.cell(self.slot);
-        let Role::Robot(model) = &self.scene.type_of(cell).role else { return };
-        let is_due = self.scene.world.bodies[self.id as usize].is_due(self.scene.now);
-        let before = super::super::perceive::memory_of(cell);
-        let (decision, after) = self.scene.decision(model, self.slot, scratch);
+        let body = self.cycle.body(self.slot);
+        let Role::Robot(model) = &self.cycle.type_of(body).role else { return };
+        let is_due = self.cycle.world.bodies[self.id as usize].is_due(self.cycle.now);
+        let before = super::super::perceive::memory_of(body);
+        let (decision, after) = self.cycle.decision(model, self.slot, scratch);
         self.add_readings(model, &scratch.readings);
         self.add_messages(scratch);
         let after = if is_due { after } else { before };
         self.add_memory(before, after);
         let section = FactSection::new("Decides");
-        self.inspection.add_section(match is_due {
-            true => with_decision(section, model, decision),
-            false => section.fact("action", "none: it is not its turn"),
-        });
+        let section = if is_due {
+            with_decision(section, model, decision)
+        } else {
+            section.fact("action", "none: it is not its turn")
+        };
+        self.inspection.add_section(section);
     }
 
     fn add_readings(&mut self, model: &RobotModel, readings: &[Reading]) {
@@ -55,9 +57,10 @@ impl<T: BoxWord> Inspector<'_, T> {
         ]);
         let mut k = 0;
         for sensor in &model.body.sensors {
-            let met = self.scene.beam_hits(sensor, self.scene.cell(self.slot));
+            let met = self.cycle.beam_hits(sensor, self.cycle.body(self.slot));
             for (&bearing_deg, met) in sensor.model.bearings_deg.iter().zip(met) {
-                let (reported, sector) = (readings[k], model.body.sectors[k]);
+                let reported = readings[k];
+                let sector = model.body.sectors[k];
                 k += 1;
                 let truth = self.truth(sensor, met);
                 let beam = BeamReading { sensor, bearing_deg, sector, met, truth, reported };
@@ -70,25 +73,26 @@ impl<T: BoxWord> Inspector<'_, T> {
 
     fn truth(&self, sensor: &MountedSensor, met: Option<(T, f64)>) -> Reading {
         let Some((word, boxes)) = met else { return sensor.nothing };
-        let class = sensor.model.class_of(boxes, self.scene.world.map.box_size_m);
-        sensor.truth(self.scene.state.kind_of(word), class)
+        let class = sensor.model.class_of(boxes, self.cycle.world.map.box_size_m);
+        sensor.truth(self.cycle.state.kind_of(word), class)
     }
 
     fn row(&self, beam: &BeamReading<'_, T>) -> [FactValue; 10] {
         let BeamReading { sensor, truth, reported, .. } = *beam;
         let sector = ["ahead", "left", "behind", "right"][beam.sector as usize];
-        let names = |reading| sensor.model.names_of(reading);
+        let (true_name, true_class) = sensor.model.names_of(truth);
+        let (reported_name, reported_class) = sensor.model.names_of(reported);
         let row = sensor.model.reading_row(truth, sensor.is_reliable());
         let chance = row.iter().filter(|(reading, _)| *reading == reported).map(|(_, p)| p).sum();
         [
             sensor.model.name.as_str().into(),
             FactValue::number(beam.bearing_deg, "°"),
             sector.into(),
-            names(truth).0.into(),
-            names(truth).1.into(),
+            true_name.into(),
+            true_class.into(),
             FactValue::meters(self.true_range_m(beam)),
-            names(reported).0.into(),
-            names(reported).1.into(),
+            reported_name.into(),
+            reported_class.into(),
             FactValue::meters(class_middle_m(&sensor.model, reported)),
             FactValue::Share(chance),
         ]
@@ -96,38 +100,40 @@ impl<T: BoxWord> Inspector<'_, T> {
 
     /// Returns the distance from the body's boundary to the thing that a beam meets, whether seen or not.
     fn true_range_m(&self, beam: &BeamReading<'_, T>) -> f64 {
-        beam.met.map_or(f64::INFINITY, |(_, boxes)| boxes * self.scene.world.map.box_size_m)
+        beam.met.map_or(f64::INFINITY, |(_, boxes)| boxes * self.cycle.world.map.box_size_m)
     }
 
     fn draw_beam(&mut self, beam: &BeamReading<'_, T>) {
-        let (world, cell) = (self.scene.world, self.scene.cell(self.slot));
-        let bearing_rad = beam.bearing_deg.to_radians();
-        let to_boundary_m = center_to_boundary_m(world.side_m(self.id), bearing_rad);
-        let toward_rad = world.heading_rad(cell.facing.get().heading()) + bearing_rad;
-        let [x_m, y_m, z_m] = self.position_m();
-        let line = |beyond_m: f64| {
-            let reach_m = to_boundary_m + beyond_m.min(beam.sensor.model.range_m);
-            let end_m = [x_m + reach_m * cos(toward_rad), y_m + reach_m * sin(toward_rad), z_m];
-            MarkShape::Line { points_m: vec![[x_m, y_m, z_m], end_m] }
-        };
-        let name = |reading| beam.sensor.model.names_of(reading).0;
+        let model = &beam.sensor.model;
         let true_m = self.true_range_m(beam);
-        let weight = |is_there: bool| if is_there { 1.0 } else { 0.25 };
-        let (is_met, is_reported) = (true_m.is_finite(), beam.reported.observation != NOTHING);
-        let said_m = class_middle_m(&beam.sensor.model, beam.reported);
+        let true_line = self.beam_line(beam, true_m);
+        let reported_line = self.beam_line(beam, class_middle_m(model, beam.reported));
         self.inspection.add_weighted_mark(
             view::MarkRole::True,
-            name(beam.truth),
-            weight(is_met),
-            line(true_m),
+            model.names_of(beam.truth).0,
+            beam_weight(true_m.is_finite()),
+            true_line,
         );
-        let label = name(beam.reported);
         self.inspection.add_weighted_mark(
             view::MarkRole::Reported,
-            label,
-            weight(is_reported),
-            line(said_m),
+            model.names_of(beam.reported).0,
+            beam_weight(beam.reported.observation != NOTHING),
+            reported_line,
         );
+    }
+
+    /// Returns the line of a beam from the middle of the robot to a distance beyond its boundary, at most
+    /// the sensor's range.
+    fn beam_line(&self, beam: &BeamReading<'_, T>, beyond_m: f64) -> MarkShape {
+        let world = self.cycle.world;
+        let body = self.cycle.body(self.slot);
+        let bearing_rad = beam.bearing_deg.to_radians();
+        let to_boundary_m = center_to_boundary_m(world.side_m(self.id), bearing_rad);
+        let reach_m = to_boundary_m + beyond_m.min(beam.sensor.model.range_m);
+        let toward_rad = world.heading_rad(body.facing.get().heading()) + bearing_rad;
+        let [x_m, y_m, z_m] = self.position_m();
+        let end_m = [x_m + reach_m * cos(toward_rad), y_m + reach_m * sin(toward_rad), z_m];
+        MarkShape::Line { points_m: vec![[x_m, y_m, z_m], end_m] }
     }
 
     fn add_messages(&mut self, scratch: &Scratch) {
@@ -136,24 +142,29 @@ impl<T: BoxWord> Inspector<'_, T> {
             let sender = BodyId::new(BodyKind::Robot, heard.sender, None);
             table.push_row([sender.into(), format!("{:#018x}", heard.word).into()]);
         }
-        if self.scene.world.radio.is_some() {
-            let said = self.scene.state.voices.last_broadcast(self.id, self.scene.now);
+        if self.cycle.world.radio.is_some() {
+            let said = self.cycle.state.voices.last_broadcast(self.id, self.cycle.now);
             let said = said.map(|word| format!("{word:#018x}"));
             let heard = FactValue::count(scratch.heard.len());
-            self.inspection.add_section(
-                FactSection::new("Radio").fact("hears", heard).fact("has said", said).table(table),
-            );
+            let section = FactSection::new("Radio").fact("hears", heard).fact("has said", said);
+            self.inspection.add_section(section.table(table));
         }
     }
 
     fn add_memory(&mut self, before: Memory, after: Memory) {
         let mut table = FactTable::new(["word", "now", "after deciding"]);
         for (k, (before, after)) in before.words.into_iter().zip(after.words).enumerate() {
-            let number = |word: u32| FactValue::number(f64::from(word), "");
-            table.push_row([FactValue::count(k), number(before), number(after)]);
+            let before = FactValue::number(f64::from(before), "");
+            let after = FactValue::number(f64::from(after), "");
+            table.push_row([FactValue::count(k), before, after]);
         }
         self.inspection.add_section(FactSection::new("Memory").table(table));
     }
+}
+
+/// Returns the weight of a beam's line: beams that end at nothing are many, and drawn faintly.
+fn beam_weight(ends_at_something: bool) -> f64 {
+    if ends_at_something { 1.0 } else { 0.25 }
 }
 
 /// Adds a decision in words.

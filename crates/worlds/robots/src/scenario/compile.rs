@@ -47,7 +47,10 @@ use std::sync::Arc;
 const MAX_BODIES: u64 = 10_000_000;
 /// Number of cycles of a run where the scenario does not give it.
 const DEFAULT_CYCLES: u64 = 10_000;
+/// Longest beam in boxes, because all of its boxes are tabulated, for four headings.
 const MAX_RANGE_BOXES: f64 = 4096.0;
+/// Largest number of boxes along all beams of a sensor; the tables number them, four at a time, with 16 bits.
+const MAX_BEAM_BOXES: f64 = 60_000.0;
 
 /// Behaviors that the library's user adds, by the name that a scenario gives them.
 pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
@@ -100,19 +103,16 @@ impl Compiled {
     /// start, as far as another seed gives others.
     pub(crate) fn is_always_random(&self) -> bool {
         let RobotsWorld { regime, types, radio, .. } = &*self.world;
-        let is_robot = |ty: &BodyType| matches!(ty.role, Role::Robot(_));
-        if *regime != Regime::Reliable || radio.is_some() || !types.iter().all(is_robot) {
+        let has_errors = *regime != Regime::Reliable;
+        let are_all_robots = types.iter().all(|ty| matches!(ty.role, Role::Robot(_)));
+        if has_errors || radio.is_some() || !are_all_robots {
             return true;
         }
-        let start = |bodies: &[Body], at: &[((u32, u32), u8)]| {
-            let phases: Vec<u32> = bodies.iter().map(|body| body.phase).collect();
-            (phases, at.to_vec())
-        };
-        let other = self.placer.place(&Streams::new(Seed(self.seed ^ 1)));
-        let same = other.is_ok_and(|other| {
-            start(&other.bodies, &other.start) == start(&self.world.bodies, &self.start)
-        });
-        !same
+        // The start is drawn if another seed, any one, gives another.
+        let Ok(other) = self.placer.place(&Streams::new(Seed(self.seed ^ 1))) else { return true };
+        let phases = self.world.bodies.iter().map(|body| body.phase);
+        let other_phases = other.bodies.iter().map(|body| body.phase);
+        other.start[..] != self.start[..] || !phases.eq(other_phases)
     }
 }
 
@@ -173,8 +173,8 @@ impl<'a> Compiler<'a> {
         let robots = self.file.robots.0.len();
         let groups = self.groups()?;
         let sizes = self.types.iter().map(|ty| ty.size).collect();
-        let (source, map) = (Arc::clone(&self.source), Arc::clone(&self.map));
-        let placer = Placer { source, map, groups, sizes };
+        let placer =
+            Placer { source: Arc::clone(&self.source), map: Arc::clone(&self.map), groups, sizes };
         let placed = placer.place(&self.streams)?;
         let firsts = placer.first_ids();
         self.warn_of_unreachable_goals(placer.groups.iter().zip(firsts).take(robots), &placed);
@@ -187,12 +187,11 @@ impl<'a> Compiler<'a> {
         placer: Placer,
         placed: Placement,
     ) -> Result<Compiled, InputError> {
-        let is_robot = |b: &&Body| matches!(self.types[usize::from(b.ty)].role, Role::Robot(_));
-        let robots = placed.bodies.iter().filter(is_robot).map(|b| b.id).collect();
+        let robots = self.robot_ids(&placed.bodies);
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
-        let has_asks = self.has_requests();
+        let has_requests = self.has_requests();
         let kind_rank = self.kind_rank()?;
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -207,13 +206,14 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
-            has_asks,
+            has_requests,
             storage: order,
             streams: self.streams,
             border: self.border,
             stride,
             reach: self.reach,
         };
+        // Teams are found in the finished world, of whose types and robots they are made.
         world.teams = Arc::new(world.find_teams());
         let mut remarks = self.remarks;
         remarks.extend(crate::contact_remarks::no_contact_remarks(&world));
@@ -229,14 +229,26 @@ impl<'a> Compiler<'a> {
         })
     }
 
+    fn robot_ids(&self, bodies: &[Body]) -> Vec<EntityId> {
+        let mut ids = Vec::new();
+        for body in bodies {
+            if matches!(self.types[usize::from(body.ty)].role, Role::Robot(_)) {
+                ids.push(body.id);
+            }
+        }
+        ids
+    }
+
     fn stride(&self) -> u32 {
         self.map.width() + 2 * self.border
     }
 
     /// Returns whether some robots ask each other to make room.
     fn has_requests(&self) -> bool {
-        let asks = |ty: &BodyType| matches!(&ty.role, Role::Robot(model) if model.behaviour.has_requests());
-        self.types.iter().any(asks)
+        self.types.iter().any(|ty| match &ty.role {
+            Role::Robot(model) => model.behaviour.has_requests(),
+            _ => false,
+        })
     }
 
     fn radio(&self) -> Option<Radio> {
@@ -261,13 +273,17 @@ impl<'a> Compiler<'a> {
 }
 
 /// Returns as many rings of wall as the longest path has steps, and as a beam may be read past a
-/// wall.
+/// wall, so that neither is checked against the map's edge.
 fn border(file: &RobotsFile, effectors: &Effectors) -> u32 {
     let named = file.robots.0.iter().filter_map(|robots| robots.get_ref().effector.as_ref());
     let known = named.filter_map(|name| effectors.get(name.get_ref()));
-    let transitions = known.flat_map(|e| e.section.get_ref().actions.values());
-    let steps = transitions.flat_map(|list| list.get_ref()).map(|t| t.path.0.len());
-    steps.max().unwrap_or(1).clamp(BEAM_CHUNK_BOXES, MAX_PATH_STEPS) as u32
+    let mut max_steps = 1;
+    for actions in known.map(|effector| &effector.section.get_ref().actions) {
+        for transition in actions.values().flat_map(|transitions| transitions.get_ref()) {
+            max_steps = max_steps.max(transition.path.0.len());
+        }
+    }
+    max_steps.clamp(BEAM_CHUNK_BOXES, MAX_PATH_STEPS) as u32
 }
 
 /// Returns every action at every heading, see `BodyType::actions`.
@@ -276,17 +292,25 @@ fn actions_at_headings(
     size: (u32, u32),
     stride: u32,
 ) -> Arc<[Action]> {
-    let at = |heading: u8| {
-        let build = move |a| Action::new(a, heading, size, stride).expect("the rows were checked");
-        actions.iter().map(Vec::as_slice).map(build)
-    };
-    (0..4).flat_map(at).collect()
+    let mut all = Vec::with_capacity(4 * actions.len());
+    for heading in 0..4 {
+        for transitions in actions {
+            let action = Action::new(transitions, heading, size, stride);
+            all.push(action.expect("the rows were checked"));
+        }
+    }
+    all.into()
 }
 
 /// Checks every table, whether or not a robot uses it.
 fn check_tables(kinds: &Kinds, sensors: &Sensors, effectors: &Effectors) -> Result<(), InputError> {
-    sensors.iter().try_for_each(|(name, at)| tables::sensor(name, at, kinds, false).map(drop))?;
-    effectors.iter().try_for_each(|(name, at)| tables::effector(name, at).map(drop))
+    for (name, at) in sensors {
+        tables::sensor(name, at, kinds, false)?;
+    }
+    for (name, at) in effectors {
+        tables::effector(name, at)?;
+    }
+    Ok(())
 }
 
 type Sensors = BTreeMap<String, LocatedSection<SensorSection>>;
@@ -300,10 +324,12 @@ fn check_names(
     effectors: &Effectors,
 ) -> Result<(), InputError> {
     for robots in file.robots.0.iter().map(Spanned::get_ref) {
-        let mut names = robots.sensors.iter();
-        names.try_for_each(|name| find_named(source, sensors, name, "sensor").map(drop))?;
-        let mut name = robots.effector.iter();
-        name.try_for_each(|name| find_named(source, effectors, name, "effector").map(drop))?;
+        for name in &robots.sensors {
+            find_named(source, sensors, name, "sensor")?;
+        }
+        if let Some(name) = &robots.effector {
+            find_named(source, effectors, name, "effector")?;
+        }
     }
     Ok(())
 }
@@ -326,7 +352,9 @@ fn known_tables(
     source: &Arc<Source>,
     file: &RobotsFile,
 ) -> Result<(Sensors, Effectors), InputError> {
-    let (mut sensors, mut effectors) = (BTreeMap::new(), BTreeMap::new());
+    let mut sensors = BTreeMap::new();
+    let mut effectors = BTreeMap::new();
+    // Later ones replace earlier ones of the same name, so the scenario's own come last.
     let presets = Source::new("presets", include_str!("../presets.toml"), "");
     add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
     for named in &file.profiles {
@@ -362,10 +390,8 @@ fn add_all<T: Clone>(
     into: &mut BTreeMap<String, LocatedSection<T>>,
 ) {
     for (name, section) in from {
-        into.insert(
-            name.clone(),
-            LocatedSection { section: section.clone(), source: Arc::clone(source) },
-        );
+        let located = LocatedSection { section: section.clone(), source: Arc::clone(source) };
+        into.insert(name.clone(), located);
     }
 }
 

@@ -9,7 +9,10 @@ use std::sync::Arc;
 
 /// Names by number: those that are built in, before the scenario's own.
 pub(super) const BUILT_IN: [&str; 5] = ["free", "wall", "door", "person", "robot"];
+/// Number of the kind `wall`, the first that a body or a beam can meet.
 const WALL: usize = 1;
+/// Largest number of kinds, because a contact keeps its kind in seven bits.
+const MAX_KINDS: usize = 127;
 
 /// All kinds, by number.
 pub(super) struct Kinds {
@@ -27,6 +30,13 @@ struct Kind {
     is_met: bool,
 }
 
+impl Kind {
+    /// Returns a kind that designates the observation of the same name.
+    fn new(name: &str) -> Self {
+        Self { name: name.into(), observation: name.into(), ..Self::default() }
+    }
+}
+
 /// A section of bodies of one kind.
 struct BodySection<'f> {
     kind: &'f Spanned<String>,
@@ -40,10 +50,8 @@ impl Kinds {
     /// # Errors
     /// When a section names a kind that does not exist, or no section names an own kind.
     pub(super) fn new(source: &Arc<Source>, file: &RobotsFile) -> Result<Self, InputError> {
-        let named =
-            |name: &str| Kind { name: name.into(), observation: name.into(), ..Kind::default() };
-        let mut kinds =
-            Self { source: Arc::clone(source), all: BUILT_IN.into_iter().map(named).collect() };
+        let all = BUILT_IN.into_iter().map(Kind::new).collect();
+        let mut kinds = Self { source: Arc::clone(source), all };
         kinds.all[WALL].is_met = true;
         for (name, section) in &file.kinds {
             let k = kinds.own_index(name)?;
@@ -61,22 +69,22 @@ impl Kinds {
 
     /// Returns the number of a kind with a section of its own, which may be new.
     fn own_index(&mut self, name: &Spanned<String>) -> Result<usize, InputError> {
-        let error = |cause: &str, remedy: &str| Err(self.source.error(name.span(), cause, remedy));
         if name.get_ref() == BUILT_IN[0] {
-            return error("`free` is no kind", "choose another name for the kind");
+            let remedy = "choose another name for the kind";
+            return Err(self.source.error(name.span(), "`free` is no kind", remedy));
         }
         if let Some(k) = self.all.iter().position(|kind| kind.name == *name.get_ref()) {
             return Ok(k);
         }
-        if self.all.len() == 127 {
-            return error("more than 122 kinds of your own", "give several kinds one name");
+        if self.all.len() == MAX_KINDS {
+            let cause = "more than 122 kinds of your own";
+            return Err(self.source.error(name.span(), cause, "give several kinds one name"));
         }
-        let (name, observation) = (name.get_ref().clone(), name.get_ref().clone());
-        self.all.push(Kind { name, observation, ..Kind::default() });
+        self.all.push(Kind::new(name.get_ref()));
         Ok(self.all.len() - 1)
     }
 
-    /// Notes the kinds that occur, and refuses own kinds that no section names.
+    /// Records the kinds that occur, and refuses own kinds that no section names.
     fn record_used(&mut self, file: &RobotsFile) -> Result<(), InputError> {
         let mut is_named = vec![false; self.all.len()];
         for bodies in body_sections(file) {
@@ -86,13 +94,12 @@ impl Kinds {
             kind.is_met |= bodies.are_there;
             kind.span.get_or_insert(bodies.span);
         }
-        let idle = (BUILT_IN.len()..self.all.len()).find(|k| !is_named[*k]);
-        idle.map_or(Ok(()), |k| {
-            let Kind { name, span, .. } = &self.all[k];
-            let cause = format!("no body is of the kind `{name}`");
-            let remedy = format!("{}; or name it by `kind`", suggestion(name, &BUILT_IN[WALL..]));
-            Err(self.source.error(span.clone(), cause, remedy))
-        })
+        let unused = (BUILT_IN.len()..self.all.len()).find(|k| !is_named[*k]);
+        let Some(unused) = unused else { return Ok(()) };
+        let Kind { name, span, .. } = &self.all[unused];
+        let cause = format!("no body is of the kind `{name}`");
+        let remedy = format!("{}; or name it by `kind`", suggestion(name, &BUILT_IN[WALL..]));
+        Err(self.source.error(span.clone(), cause, remedy))
     }
 
     /// Returns the number of a kind.
@@ -126,22 +133,18 @@ impl Kinds {
         at: &LocatedSection<SensorSection>,
         is_mounted: bool,
     ) -> Result<Vec<u8>, InputError> {
-        let section = at.section.get_ref();
-        let observations = section.observations.get_ref();
-        let index = |kind: &Kind| {
-            let own = section.designates.iter().find(|(name, _)| *name.get_ref() == kind.name);
-            let observation = own.map_or(&kind.observation, |(_, o)| o.get_ref());
-            observations.iter().position(|o| o == observation)
-        };
-        let designated = |kind: &Kind| match index(kind) {
-            Some(index) => Ok(index as u8),
-            None if kind.is_met && is_mounted => {
-                Err(self.no_observation_for_kind(sensor, at, kind))
+        // `free` designates `nothing`, which is observation 0.
+        let mut designated = vec![0];
+        for kind in self.all.iter().skip(WALL) {
+            match observation_index(at.section.get_ref(), kind) {
+                Some(index) => designated.push(index as u8),
+                None if kind.is_met && is_mounted => {
+                    return Err(self.no_observation_for_kind(sensor, at, kind));
+                }
+                None => designated.push(0),
             }
-            None => Ok(0),
-        };
-        let rest = self.all.iter().skip(WALL).map(designated);
-        std::iter::once(Ok(0)).chain(rest).collect()
+        }
+        Ok(designated)
     }
 
     /// Returns the error for a kind that a sensor meets and does not know, at the key that names
@@ -200,18 +203,30 @@ impl Kinds {
     }
 }
 
+/// Returns the index of the observation that a kind has for a sensor: by the sensor's own table, else by the
+/// kind.
+fn observation_index(sensor: &SensorSection, kind: &Kind) -> Option<usize> {
+    let own = sensor.designates.iter().find(|(name, _)| *name.get_ref() == kind.name);
+    let observation = own.map_or(&kind.observation, |(_, observation)| observation.get_ref());
+    sensor.observations.get_ref().iter().position(|name| name == observation)
+}
+
+/// Returns whether a section with this count has bodies; without a count it lists places.
+fn has_bodies(count: Option<&Spanned<u32>>) -> bool {
+    count.is_none_or(|count| *count.get_ref() > 0)
+}
+
 /// Returns the kinds of all sections of bodies.
 fn body_sections(file: &RobotsFile) -> impl Iterator<Item = BodySection<'_>> {
-    let some = |count: &Option<Spanned<u32>>| count.as_ref().is_none_or(|n| *n.get_ref() > 0);
-    let robots = file.robots.0.iter().map(move |s| BodySection {
+    let robots = file.robots.0.iter().map(|s| BodySection {
         kind: &s.get_ref().kind,
         span: s.span(),
-        are_there: some(&s.get_ref().count),
+        are_there: has_bodies(s.get_ref().count.as_ref()),
     });
-    let people = file.people.0.iter().map(move |s| BodySection {
+    let people = file.people.0.iter().map(|s| BodySection {
         kind: &s.get_ref().kind,
         span: s.span(),
-        are_there: some(&s.get_ref().count),
+        are_there: has_bodies(s.get_ref().count.as_ref()),
     });
     let doors = file.doors.0.iter().map(|s| BodySection {
         kind: &s.get_ref().kind,

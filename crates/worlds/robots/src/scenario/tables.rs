@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 const MAX_NAMES: usize = 250;
 /// Largest number of actions, because an intent holds an action and a flag in one byte.
 const MAX_ACTIONS: usize = 120;
+/// Largest number of beams; more are refused before their boxes are tabulated.
 const MAX_BEAMS: usize = 1024;
 
 /// Checks a sensor and puts its rows in order.
@@ -92,7 +93,8 @@ fn observations(at: &LocatedSection<SensorSection>) -> Result<Vec<String>, Input
     Ok(names.clone())
 }
 
-/// Returns edges and names of the distance classes; without edges there is one class, `near`.
+/// Returns edges and names of the distance classes; without edges there is one class, and without names they
+/// are `class0`, `class1` and so on.
 fn classes(at: &LocatedSection<SensorSection>) -> Result<(Vec<f64>, Vec<String>), InputError> {
     let s = at.section.get_ref();
     let edges = s.distance_edges_m.as_ref().map_or(vec![], |e| e.get_ref().clone());
@@ -107,8 +109,10 @@ fn classes(at: &LocatedSection<SensorSection>) -> Result<(Vec<f64>, Vec<String>)
             ));
         }
     }
-    let default = || (0..=edges.len()).map(|k| format!("class{k}")).collect();
-    let names = s.distance_classes.as_ref().map_or_else(default, |c| c.get_ref().clone());
+    let names = match &s.distance_classes {
+        Some(names) => names.get_ref().clone(),
+        None => (0..=edges.len()).map(|k| format!("class{k}")).collect(),
+    };
     if names.len() != edges.len() + 1 {
         let span = s.distance_classes.as_ref().map_or(at.section.span(), Spanned::span);
         let cause = format!("{} class names for {} edges", names.len(), edges.len());
@@ -123,12 +127,12 @@ fn check_class_names(
     names: &[String],
 ) -> Result<(), InputError> {
     let doubled = (1..names.len()).find(|&k| names[..k].contains(&names[k]));
-    let cause = match doubled {
-        _ if names.iter().any(|name| name == "beyond") => {
-            "a class named `beyond`, which means out of range".into()
-        }
-        Some(k) => format!("the class `{}` stands twice", names[k]),
-        None => return Ok(()),
+    let cause = if names.iter().any(|name| name == "beyond") {
+        "a class named `beyond`, which means out of range".into()
+    } else if let Some(k) = doubled {
+        format!("the class `{}` stands twice", names[k])
+    } else {
+        return Ok(());
     };
     let section = &at.section;
     let span = section.get_ref().distance_classes.as_ref().map_or(section.span(), Spanned::span);
@@ -142,9 +146,8 @@ fn distance_confusion(
     classes: &[String],
 ) -> Result<Vec<Vec<f64>>, InputError> {
     let n = classes.len();
-    let certain = |k: usize| (0..n).map(|c| if c == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-    let mut rows: Vec<Vec<f64>> = (0..n).map(certain).collect();
-    rows.push(certain(n - 1));
+    let mut rows: Vec<Vec<f64>> = (0..n).map(|class| certain_row(class, n)).collect();
+    rows.push(certain_row(n - 1, n));
     let Some(given) = &at.section.get_ref().distance_confusion else { return Ok(rows) };
     let mut names = classes.to_vec();
     names.push("beyond".into());
@@ -162,6 +165,13 @@ fn distance_confusion(
         ));
     }
     Ok(rows)
+}
+
+/// Returns the row that puts all probability on one of `n` classes.
+fn certain_row(class: usize, n: usize) -> Vec<f64> {
+    let mut row = vec![0.0; n];
+    row[class] = 1.0;
+    row
 }
 
 fn matrix(
@@ -222,6 +232,7 @@ fn checked_row<T>(
         let cause = format!("row `{}`: {e}", name.get_ref());
         at.error(row.span(), cause, "make the entries probabilities that sum to 1")
     })?;
+    // Rounded entries are accepted, and scaled to sum to 1.
     let sum: f64 = values.iter().sum();
     Ok(values.iter().map(|v| v / sum).collect())
 }

@@ -87,13 +87,11 @@ pub(crate) struct QuarterTurns(pub(crate) u8);
 impl<'de> Deserialize<'de> for QuarterTurns {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let turn_deg = i32::deserialize(deserializer)?;
-        match turn_deg % 90 {
-            0 => Ok(Self((turn_deg / 90).rem_euclid(4) as u8)),
-            _ => {
-                let remedy = "give a multiple of 90 degrees, positive to the left";
-                Err(invalid_value(turn_deg, remedy))
-            }
+        if turn_deg % 90 != 0 {
+            let remedy = "give a multiple of 90 degrees, positive to the left";
+            return Err(invalid_value(turn_deg, remedy));
         }
+        Ok(Self((turn_deg / 90).rem_euclid(4) as u8))
     }
 }
 

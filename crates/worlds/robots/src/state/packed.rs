@@ -6,14 +6,15 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::space::Position;
 
-/// The action that a body is about to do in this cycle, in one byte.
+/// The action that a body is about to do in this cycle, in one byte: 0 for none, else its number plus 1, and a
+/// flag in the highest bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Intent(u8);
 
 impl Intent {
     /// No action.
     pub(crate) const IDLE: Self = Self(0);
-    /// The only action of bodies without a choice: people go on, doors toggle.
+    /// The only action of bodies without a choice: people step on, doors toggle.
     pub(crate) const ONLY_ACTION: Self = Self(1);
     /// Flag added when every box that the action may sweep is free.
     const CLEAR: u8 = 0x80;

@@ -121,13 +121,13 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Adds this connector's part to the sums of a consent.
     fn merged_consent(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
-        let way_m = distance(self.position.base, self.position.now);
+        let displacement_m = distance(self.position.base, self.position.now);
         Consent {
             at: self.position.now,
             touched: beyond.touched + 1,
             changed: beyond.changed + u32::from(self.position.base != self.position.now),
             rotated: beyond.rotated + u32::from(rotated),
-            longest_m: beyond.longest_m.max(way_m),
+            longest_m: beyond.longest_m.max(displacement_m),
         }
     }
 
@@ -176,10 +176,12 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Carries out the motion, or returns to where it was before it, and passes that on.
     pub(super) fn on_settle(&mut self, from: Side, request: u32, goes: bool) {
-        let is_its = |f: &mut SlaveMotion| {
-            (f.request, f.master) == (request, from) && (f.has_consented || !goes)
-        };
-        let Some(following) = self.following.take_if(is_its) else { return };
+        // One that has not consented was not part of a motion that is carried out.
+        let its = self.following.take_if(|motion| {
+            let is_same = motion.request == request && motion.master == from;
+            is_same && (motion.has_consented || !goes)
+        });
+        let Some(following) = its else { return };
         self.settle_motion(goes.then_some(request));
         if following.has_asked {
             self.send(from.other(), Message::Settle { request, goes });

@@ -13,7 +13,7 @@ use sidestep_rods::geometry::{
     Point, add_scaled, distance, dot, normalized, perpendicular, scaled, sub,
 };
 use sidestep_rods::{
-    Chain, Motion, Obstacle, Outcome, ReachOutcome, ReachRequest, Request, RequestSource, RodBvh,
+    Chain, Motion, Outcome, ReachOutcome, ReachRequest, Request, RequestSource, RodBvh,
     TOLERANCE_M, Veto, VetoEffect, VetoReason, reach,
 };
 use std::ops::Range;
@@ -31,9 +31,11 @@ pub(super) struct LiteralEscape<const D: usize> {
 
 /// Distance by which a push goes beyond the depth, meters, so that rounding leaves no violation.
 const PUSH_MARGIN_M: f64 = 1e-6;
-/// Least gain of a helpful motion, as a fraction of its length.
+/// Least gain of a helpful motion, as a fraction of its length: a push that is turned by 1.5 rad gains 0.07 of it, one
+/// that gains less only slides along the obstacle.
 const MIN_GAIN: f64 = 0.05;
-/// Least motion of the point of contact, as a fraction of the motion of a rod's end, for a helpful end.
+/// Least motion of the point of contact, as a fraction of the motion of a rod's end, for a helpful end: with less, the end
+/// would have to go more than ten times as far as the contact.
 const MIN_LEVER: f64 = 0.1;
 /// Fractions of the push that are tried, each in all directions.
 const PUSH_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.25];
@@ -59,15 +61,22 @@ impl<const D: usize> LiteralEscape<D> {
         tick: &mut EscapeTick<'_, D>,
     ) -> Result<EscapeReport<D>, InputError> {
         let ahead = self.rules.look_ahead_margin();
+        // No part gets farther from where it is now than from one side of its start to the other.
         let reach_m = 2.0 * self.max_travel_m(tick);
-        let within_m = |o: &Obstacle<D>| ahead.required_gap_m(o) + reach_m;
-        collect(tick.chain, tick.obstacles, &mut self.body, within_m, &mut self.threats);
+        collect(
+            tick.chain,
+            tick.obstacles,
+            &mut self.body,
+            |mover| ahead.required_gap_m(mover) + reach_m,
+            &mut self.threats,
+        );
         let mut report = EscapeReport::default();
         if self.threats.is_empty() {
             return Ok(report);
         }
         self.before.clear();
         self.before.extend_from_slice(tick.chain.points());
+        // The look-ahead gets half of the tries, so that contacts are handled even where many parts are threatened.
         let mut tries = self.rules.most / 2;
         if ahead != Margin::NONE {
             self.relieve_round(tick, ahead, &mut tries, &mut report)?;
@@ -136,13 +145,13 @@ impl<const D: usize> LiteralEscape<D> {
     /// Returns the deepest violation; of equals the first by part and obstacle, so that the order of the list does not
     /// matter.
     fn deepest(&self) -> Option<usize> {
-        let order = |&a: &usize, &b: &usize| {
-            let [a, b] = [a, b].map(|k| &self.threats[k]);
-            a.depth_m.total_cmp(&b.depth_m).then((b.part, b.mover).cmp(&(a.part, a.mover)))
-        };
-        (0..self.threats.len())
-            .filter(|&k| !self.threats[k].given_up && self.threats[k].depth_m > TOLERANCE_M)
-            .max_by(order)
+        let violations = self.threats.iter().enumerate();
+        let violations = violations.filter(|(_, t)| !t.given_up && t.depth_m > TOLERANCE_M);
+        let deepest = violations.max_by(|(_, a), (_, b)| {
+            let by_depth = a.depth_m.total_cmp(&b.depth_m);
+            by_depth.then((b.part, b.mover).cmp(&(a.part, a.mover)))
+        });
+        deepest.map(|(k, _)| k)
     }
 
     /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if no motion
@@ -212,17 +221,19 @@ impl<const D: usize> LiteralEscape<D> {
             }
             Outcome::Vetoed(veto) => return Ok(Err(veto)),
         };
-        let refused = self
-            .first_too_far(tick, touched.clone())
-            .map(|by| Veto { by, ..make_veto(tick.chain, k, VetoReason::StepLimit, None) })
-            .or_else(|| self.check_gain(tick, &touched, which, k, distance(to, at)));
-        let run = touched.clone();
-        let (from, to) = match refused {
-            Some(_) => (&self.before[run.clone()], &mut tick.chain.points_mut()[run]),
-            None => (&tick.chain.points()[run.clone()], &mut self.before[run]),
+        let refused = if let Some(by) = self.first_too_far(tick, touched.clone()) {
+            Some(Veto { by, ..make_veto(tick.chain, k, VetoReason::StepLimit, None) })
+        } else {
+            let deeper_in = self.find_loss(tick, &touched, which, distance(to, at));
+            deeper_in.map(|id| make_veto(tick.chain, k, VetoReason::TargetBlocked, id))
         };
-        to.copy_from_slice(from);
-        Ok(refused.map_or(Ok(touched), Err))
+        let run = touched.clone();
+        if let Some(veto) = refused {
+            tick.chain.points_mut()[run.clone()].copy_from_slice(&self.before[run]);
+            return Ok(Err(veto));
+        }
+        self.before[run.clone()].copy_from_slice(&tick.chain.points()[run]);
+        Ok(Ok(touched))
     }
 
     /// Returns the first connector that went farther than its speed allows.
@@ -232,28 +243,25 @@ impl<const D: usize> LiteralEscape<D> {
         })
     }
 
-    /// Returns a veto if a motion did not bring the part farther away, or brought another as deep.
-    fn check_gain(
+    /// Returns the obstacle in which a motion left a part too deep: the part itself, if it did not get farther away, or
+    /// another that is as deep now.
+    fn find_loss(
         &self,
         tick: &EscapeTick<'_, D>,
         touched: &Range<usize>,
         which: usize,
-        k: usize,
         distance_m: f64,
-    ) -> Option<Veto<D>> {
+    ) -> Option<u32> {
         let depth_m = self.threats[which].depth_m;
         let bound_m = depth_m - MIN_GAIN * distance_m.min(depth_m);
         // Untouched parts are as deep as before.
         let all = self.threats.iter().enumerate();
         let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
-        let worse = changed.find(|(i, threat)| {
+        let (_, worse) = changed.find(|(i, threat)| {
             let allowed_m = if *i == which { bound_m } else { threat.depth_m.max(bound_m) };
             threat_depth(tick, threat) > allowed_m
-        });
-        worse.map(|(_, threat)| {
-            let id = tick.obstacles.moving()[threat.mover].id;
-            make_veto(tick.chain, k, VetoReason::TargetBlocked, id)
-        })
+        })?;
+        Some(tick.obstacles.moving()[worse.mover].id)
     }
 
     fn report_trapped(&mut self, tick: &EscapeTick<'_, D>, report: &mut EscapeReport<D>) {
@@ -261,11 +269,9 @@ impl<const D: usize> LiteralEscape<D> {
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
         report.deepest_m = threat.depth_m;
-        let veto = self
-            .vetoes
-            .iter()
-            .find(|(t, _)| (t.part, t.mover) == (threat.part, threat.mover))
-            .map(|(_, veto)| *veto);
+        let mut vetoes = self.vetoes.iter();
+        let veto = vetoes.find(|(t, _)| t.part == threat.part && t.mover == threat.mover);
+        let veto = veto.map(|(_, veto)| *veto);
         let obstacle = tick.obstacles.moving()[threat.mover].id;
         report.left = Some(TrappedPart { part: threat.part, obstacle, veto });
     }
@@ -288,9 +294,11 @@ fn movable_connectors<const D: usize>(
         ChainPart::Rod(i) if a < 0.5 => [Some((i, 1.0 - a)), Some((i + 1, a))],
         ChainPart::Rod(i) => [Some((i + 1, a)), Some((i, 1.0 - a))],
     };
-    let may_move =
-        |&(k, lever): &(usize, f64)| lever >= MIN_LEVER && !chain.connectors()[k].is_still();
-    ends.map(|end| end.filter(may_move))
+    ends.map(|end| {
+        let (k, lever) = end?;
+        let may_help = lever >= MIN_LEVER && !chain.connectors()[k].is_still();
+        may_help.then_some((k, lever))
+    })
 }
 
 /// Returns the veto of a part without a connector that may move.
@@ -306,32 +314,35 @@ fn push_directions<const D: usize>(
     velocity: Point<D>,
 ) -> impl Iterator<Item = Point<D>> {
     let planes = turn_planes(away, velocity);
-    let turned = move |turn_rad: f64| {
-        let n = if turn_rad == 0.0 { 1 } else { D - 1 };
-        planes
-            .into_iter()
-            .take(n)
-            .map(move |across| add_scaled(scaled(away, cos(turn_rad)), across, sin(turn_rad)))
-    };
-    let all =
-        move |part: f64| PUSH_TURNS_RAD.into_iter().flat_map(turned).map(move |u| scaled(u, part));
-    PUSH_FRACTIONS.into_iter().flat_map(all)
+    PUSH_FRACTIONS.into_iter().flat_map(move |fraction| {
+        PUSH_TURNS_RAD.into_iter().flat_map(move |turn_rad| {
+            // Straight away is the same in all planes.
+            let n = if turn_rad == 0.0 { 1 } else { D - 1 };
+            planes.into_iter().take(n).map(move |across| {
+                let u = add_scaled(scaled(away, cos(turn_rad)), across, sin(turn_rad));
+                scaled(u, fraction)
+            })
+        })
+    })
 }
 
 /// Returns directions perpendicular to `away` to turn it toward: the first away from the obstacle's path.
 fn turn_planes<const D: usize>(away: Point<D>, velocity: Point<D>) -> [Point<D>; 2] {
-    let off = normalized(velocity)
-        .map(|v| add_scaled(away, v, -dot(away, v)))
-        .and_then(|off| normalized(add_scaled(off, away, -dot(off, away))));
-    let first = off.unwrap_or_else(|| perpendicular(away));
+    let first = away_from_path(away, velocity).unwrap_or_else(|| perpendicular(away));
     [first, cross_product(away, first)]
+}
+
+/// Returns the unit vector across `away` that leads off the line on which the obstacle moves; none if `away` is along it.
+fn away_from_path<const D: usize>(away: Point<D>, velocity: Point<D>) -> Option<Point<D>> {
+    let v = normalized(velocity)?;
+    let off = add_scaled(away, v, -dot(away, v));
+    normalized(add_scaled(off, away, -dot(off, away)))
 }
 
 /// Returns the vector across two that are perpendicular; in the plane there is none, and the result
 /// is not used.
 fn cross_product<const D: usize>(u: Point<D>, v: Point<D>) -> Point<D> {
-    let at = |i: usize| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D];
-    std::array::from_fn(at)
+    std::array::from_fn(|i| u[(i + 1) % D] * v[(i + 2) % D] - u[(i + 2) % D] * v[(i + 1) % D])
 }
 
 /// Returns the point of a ball around `center` that is nearest to `to`.

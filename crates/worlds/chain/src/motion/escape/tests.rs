@@ -45,8 +45,12 @@ fn tick<const D: usize>(
 ) -> EscapeReport<D> {
     let start = chain.points().to_vec();
     obstacles.advance(escaper.rules().dt_s);
-    let told =
-        escaper.escape(chain, obstacles, propagator, &start, &mut EscapePlan::default()).unwrap();
+    let told = escaper
+        .escape(
+            EscapeTick { chain, obstacles, propagator, start: &start },
+            &mut EscapePlan::default(),
+        )
+        .unwrap();
     for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
         assert!(distance(*from, *to) <= escaper.rules().max_step_m() + 1e-12, "connector {k}");
         assert!(from == to || !chain.connectors()[k].is_still());
@@ -104,10 +108,12 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
     let mut escaper = Escaper::new(EscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
     escaper
         .escape(
-            &mut chain,
-            &obstacles,
-            &mut Propagator::default(),
-            &start,
+            EscapeTick {
+                chain: &mut chain,
+                obstacles: &obstacles,
+                propagator: &mut Propagator::default(),
+                start: &start,
+            },
             &mut EscapePlan::default(),
         )
         .unwrap();
@@ -172,10 +178,12 @@ fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
     let start = chain.points().to_vec();
     let told = escaper
         .escape(
-            &mut chain,
-            &obstacles,
-            &mut Propagator::default(),
-            &start,
+            EscapeTick {
+                chain: &mut chain,
+                obstacles: &obstacles,
+                propagator: &mut Propagator::default(),
+                start: &start,
+            },
             &mut EscapePlan::default(),
         )
         .unwrap();
@@ -225,10 +233,12 @@ fn walls_stop_an_escape_and_are_not_passed() {
         let start = chain.points().to_vec();
         escaper
             .escape(
-                &mut chain,
-                &obstacles,
-                &mut Propagator::default(),
-                &start,
+                EscapeTick {
+                    chain: &mut chain,
+                    obstacles: &obstacles,
+                    propagator: &mut Propagator::default(),
+                    start: &start,
+                },
                 &mut EscapePlan::default(),
             )
             .unwrap();
@@ -244,10 +254,12 @@ fn where_nothing_moves_nothing_changes() {
     let start = chain.points().to_vec();
     let told = Escaper::new(literal(DT_S, 1.0))
         .escape(
-            &mut chain,
-            &obstacles,
-            &mut Propagator::default(),
-            &start,
+            EscapeTick {
+                chain: &mut chain,
+                obstacles: &obstacles,
+                propagator: &mut Propagator::default(),
+                start: &start,
+            },
             &mut EscapePlan::default(),
         )
         .unwrap();
@@ -261,10 +273,12 @@ fn wrong_numbers_are_named() {
     let mut place = |rules: EscapeRules, start: &[Point<2>]| {
         Escaper::new(rules)
             .escape(
-                &mut chain,
-                &Obstacles::default(),
-                &mut Propagator::default(),
-                start,
+                EscapeTick {
+                    chain: &mut chain,
+                    obstacles: &Obstacles::default(),
+                    propagator: &mut Propagator::default(),
+                    start,
+                },
                 &mut EscapePlan::default(),
             )
             .unwrap_err()

@@ -114,19 +114,32 @@ pub(super) fn collect<const D: usize>(
     let movers = obstacles.moving().iter().enumerate();
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
-        let mut check = |part: ChainPart| {
-            if gap_m(chain, part, mover) < within_m {
-                let threat =
-                    Threat { part, mover: k, margin_m: 0.0, depth_m: 0.0, given_up: false };
-                threats.push(threat);
-            }
-        };
+        let reach = Reach { chain, mover, index: k, within_m };
         body.visit(&mover.bounds().grown(within_m), |rod| {
-            check(ChainPart::Connector(rod));
-            check(ChainPart::Rod(rod));
+            reach.add_if_near(ChainPart::Connector(rod), threats);
+            reach.add_if_near(ChainPart::Rod(rod), threats);
         });
         // The last connector starts no rod.
-        check(ChainPart::Connector(n_rods));
+        reach.add_if_near(ChainPart::Connector(n_rods), threats);
+    }
+}
+
+/// The surroundings of an obstacle in which parts are threatened.
+struct Reach<'a, const D: usize> {
+    chain: &'a Chain<D>,
+    mover: &'a Obstacle<D>,
+    /// Index among [`Obstacles::moving`].
+    index: usize,
+    within_m: f64,
+}
+
+impl<const D: usize> Reach<'_, D> {
+    #[inline]
+    fn add_if_near(&self, part: ChainPart, threats: &mut Vec<Threat>) {
+        if gap_m(self.chain, part, self.mover) < self.within_m {
+            let mover = self.index;
+            threats.push(Threat { part, mover, margin_m: 0.0, depth_m: 0.0, given_up: false });
+        }
     }
 }
 

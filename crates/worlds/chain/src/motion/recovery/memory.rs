@@ -8,13 +8,15 @@ use sidestep_rods::geometry::Point;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-/// Side of the cells in which visits are counted, meters, to detect that an initiator moves to and fro.
+/// Side of the cells in which visits are counted, meters, to detect that an initiator moves to and fro: ten steps at the
+/// usual speed, so that the same detour leads through the same cells though its steps differ.
 const CELL_M: f64 = 0.1;
-/// Number of headings that count as different visits to a cell.
+/// Number of headings that count as different visits to a cell: 22.5 degrees each, about the least turn of a detour.
 const HEADINGS: f64 = 16.0;
-/// Number of remembered visits; the oldest is forgotten.
+/// Number of remembered visits; the oldest is forgotten, so that a checkpoint stays small; a loop through
+/// more cells than that goes unnoticed.
 const MAX_VISITS: usize = 64;
-/// Approach to the goal, as a fraction of a cell, that counts as progress.
+/// Approach to the goal, as a fraction of a cell, that counts as progress: a step of a centimeter, not rounding.
 const MIN_PROGRESS_FRACTION: f64 = 0.1;
 
 /// An initiator's memory of its ladder.
@@ -97,6 +99,7 @@ impl RecoveryMemory {
         self.straight = self.straight.saturating_add(1);
         if self.straight >= forget_after {
             self.side = 0;
+            // Without a goal to come nearer to, free motion is the only sign of progress.
             if self.best_m.is_none() {
                 self.hand_overs = 0;
             }
@@ -120,6 +123,7 @@ impl RecoveryMemory {
         let begins = !std::mem::replace(&mut self.on_detour, true);
         let Some(goal_m) = goal_m else { return 0 };
         let last = self.places.back().map(|visit| visit.place);
+        // Several ticks of one detour in a cell are one visit.
         if !begins && last == Some(place) {
             return 0;
         }

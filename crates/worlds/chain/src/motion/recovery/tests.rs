@@ -43,7 +43,13 @@ fn climb(
     let before = chain.clone();
     let wanted = ahead(chain, 0.0);
     let mut propagator = Propagator::new(Rules { self_collision: true, ..Rules::default() });
-    let came = ladder.climb(chain, obstacles, &mut propagator, &wanted, situation).unwrap();
+    let came = ladder
+        .climb(
+            &mut DirectMover { chain, obstacles, propagator: &mut propagator },
+            &wanted,
+            situation,
+        )
+        .unwrap();
     match &came {
         RecoveryOutcome::Straight(_)
         | RecoveryOutcome::Shorter { .. }
@@ -190,9 +196,11 @@ fn a_planner_gets_the_veto() {
         let mut ladder = RecoveryLadder::default();
         let came = ladder
             .climb(
-                &mut chain,
-                &obstacles,
-                &mut Propagator::default(),
+                &mut DirectMover {
+                    chain: &mut chain,
+                    obstacles: &obstacles,
+                    propagator: &mut Propagator::default(),
+                },
                 &wanted,
                 &Situation::default(),
             )
@@ -242,7 +250,15 @@ fn in_space_it_turns_towards_the_second_axis_then_the_third() {
         };
         let mut propagator = Propagator::default();
         let came = RecoveryLadder::default()
-            .climb(&mut chain, &obstacles, &mut propagator, &wanted, &Situation::default())
+            .climb(
+                &mut DirectMover {
+                    chain: &mut chain,
+                    obstacles: &obstacles,
+                    propagator: &mut propagator,
+                },
+                &wanted,
+                &Situation::default(),
+            )
             .unwrap();
         let RecoveryOutcome::Sideways { plane, .. } = came else { panic!("{came:?}") };
         let way = chain.points()[0];

@@ -1,4 +1,4 @@
-//! The cheapest way through the places around a robot, to where the way of the static map goes on.
+//! The cheapest path through the places around a robot, to where the path of the static map goes on.
 
 use super::LocalView;
 use super::local_costmap::{LocalBoxSet, PLAN_RADIUS_BOXES, PLAN_SIDE_BOXES};
@@ -9,6 +9,8 @@ const LOCAL_BOXES: usize = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as usize;
 /// there because a robot sees little of a wide obstacle, and would otherwise go to and fro before it.
 const CHANGE_COST: u16 = 4;
 const INFINITE_COST: u16 = u16::MAX;
+/// Stands for the direction of the first step at the start, where none has been made.
+const NO_DIRECTION: u8 = 4;
 
 /// Prices of a search, in actions.
 #[derive(Debug, Clone, Copy)]
@@ -21,11 +23,11 @@ pub(super) struct StepCosts {
     pub(super) vague: u16,
     /// Direction of the last step.
     pub(super) moved: Option<u8>,
-    /// Whether that step did not lead nearer to the goal.
+    /// Whether that step did not lead nearer to the goal, so that it belongs to a detour.
     pub(super) is_sidestep: bool,
 }
 
-/// A way that is known to a place.
+/// The cheapest path found so far to a place.
 #[derive(Debug, Clone, Copy)]
 struct Label {
     cost: u16,
@@ -37,14 +39,15 @@ struct Label {
     last: u8,
 }
 
-/// Returns the direction of the first step; none where every way out is walled in.
+/// Returns the direction of the first step; none where walls leave no way out.
 pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> {
-    let start = Label { cost: 0, rise: 0, first: 4, last: view.heading };
+    let start = Label { cost: 0, rise: 0, first: NO_DIRECTION, last: view.heading };
     let mut labels = [Label { cost: INFINITE_COST, ..start }; LOCAL_BOXES];
     let center = LocalBoxSet::index(0, 0)?;
     labels[center] = start;
-    // Labels are corrected until none changes; there are few of them.
-    let (mut waiting, mut next) = (1u128 << center, 0u128);
+    // Label correcting in rounds, because the set of all 81 places fits into one word.
+    let mut waiting = 1u128 << center;
+    let mut next = 0u128;
     while waiting != 0 {
         let n = waiting.trailing_zeros() as usize;
         waiting &= waiting - 1;
@@ -53,10 +56,14 @@ pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> 
             waiting = std::mem::take(&mut next);
         }
     }
-    let out = (0..LOCAL_BOXES).filter(|&n| n != center && is_exit(view, n));
-    let known = out.map(|n| labels[n]).filter(|label| label.cost != INFINITE_COST);
-    let best =
-        known.min_by_key(|l| (i32::from(l.cost) + i32::from(l.rise), l.first != view.heading));
+    let exits = (0..LOCAL_BOXES).filter(|&n| n != center && is_exit(view, n));
+    let reached = exits.map(|n| labels[n]).filter(|label| label.cost != INFINITE_COST);
+    // The rest of the path, beyond the exit, costs one action a box: the rise is how much longer it is
+    // than from here. Of equal exits one straight ahead saves a turn.
+    let best = reached.min_by_key(|label| {
+        let whole_cost = i32::from(label.cost) + i32::from(label.rise);
+        (whole_cost, label.first != view.heading)
+    });
     best.map(|label| label.first)
 }
 
@@ -67,23 +74,19 @@ fn relax_neighbors(
     labels: &mut [Label; LOCAL_BOXES],
     n: usize,
 ) -> u128 {
-    let (from, (col, row)) = (labels[n], box_offset(n));
+    let from = labels[n];
+    let (col, row) = box_offset(n);
+    let at = view.offset(col, row);
+    let is_first = from.first == NO_DIRECTION;
     let mut changed = 0;
-    // First ahead, then to the right: of equal ways the first is kept, and robots that meet head on
+    // First ahead, then to the right: of equal paths the first is kept, and robots that meet head on
     // both keep to the right.
     for turn in [0, 3, 1, 2] {
         let direction = (from.last + turn) % 4;
         let (east, north) = HEADINGS[usize::from(direction)];
         let Some(next) = LocalBoxSet::index(col + east, row + north) else { continue };
-        let at = view.offset(col, row);
         let Some(rise) = view.field.rise(at.0, at.1, direction) else { continue };
-        let is_first = from.first == 4;
-        let gives_up = |moved: u8| match (4 + direction - moved) % 4 {
-            0 => false,
-            2 => true,
-            _ => prices.is_sidestep,
-        };
-        let is_change = is_first && rise >= 0 && prices.moved.is_some_and(gives_up);
+        let is_change = is_first && rise >= 0 && prices.is_change_of_course(direction);
         let change = if is_change { CHANGE_COST } else { 0 };
         let lane = u16::from(is_left_lane(view, box_offset(next), direction));
         let cost = from.cost
@@ -102,6 +105,18 @@ fn relax_neighbors(
     changed
 }
 
+impl StepCosts {
+    /// Returns whether a step in a direction goes back, or gives up the last step if that was a sidestep.
+    fn is_change_of_course(self, direction: u8) -> bool {
+        let Some(moved) = self.moved else { return false };
+        match (4 + direction - moved) % 4 {
+            0 => false,
+            2 => true,
+            _ => self.is_sidestep,
+        }
+    }
+}
+
 /// Returns the price of standing in a place, beside the step.
 fn box_cost(view: &LocalView<'_>, prices: StepCosts, (col, row): (i32, i32)) -> u16 {
     if view.blocked.contains(col, row) {
@@ -116,17 +131,17 @@ fn box_cost(view: &LocalView<'_>, prices: StepCosts, (col, row): (i32, i32)) -> 
 /// to the right. A robot that comes the other way then finds its own right lane taken.
 fn is_left_lane(view: &LocalView<'_>, (col, row): (i32, i32), direction: u8) -> bool {
     let at = view.offset(col, row);
-    let is_wall = |side: u8| view.field.rise(at.0, at.1, (direction + side) % 4).is_none();
-    is_wall(1) && !is_wall(3)
+    let is_wall_left = view.field.rise(at.0, at.1, (direction + 1) % 4).is_none();
+    is_wall_left && view.field.rise(at.0, at.1, (direction + 3) % 4).is_some()
 }
 
 fn quarter_turns(turn: u8) -> u16 {
     u16::from(turn.min(4 - turn))
 }
 
-/// Returns whether the static map's way may be followed from a place on: at a goal, and where it
-/// leads out of the planned square, or along its edge. Where it leads back in there is no way
-/// around.
+/// Returns whether the static map's path may be followed from a place on: at a goal, and where it
+/// leads out of the planned square, or along its edge. Where it leads back in, it may lead to the
+/// same obstacle again.
 fn is_exit(view: &LocalView<'_>, n: usize) -> bool {
     let (col, row) = box_offset(n);
     let at = view.offset(col, row);
@@ -135,8 +150,13 @@ fn is_exit(view: &LocalView<'_>, n: usize) -> bool {
     }
     let Some(direction) = view.field.direction(at.0, at.1) else { return false };
     let (east, north) = HEADINGS[usize::from(direction)];
-    let ring = |col: i32, row: i32| col.abs().max(row.abs());
-    ring(col, row) == PLAN_RADIUS_BOXES && ring(col + east, row + north) >= PLAN_RADIUS_BOXES
+    let is_at_edge = ring(col, row) == PLAN_RADIUS_BOXES;
+    is_at_edge && ring(col + east, row + north) >= PLAN_RADIUS_BOXES
+}
+
+/// Returns the number of the square ring around the robot in which a place lies.
+fn ring(col: i32, row: i32) -> i32 {
+    col.abs().max(row.abs())
 }
 
 /// Returns column and row of a place from the robot.

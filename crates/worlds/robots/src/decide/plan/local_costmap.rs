@@ -7,15 +7,20 @@ use sidestep_error_models::ray::{crossings, turn_crossing};
 use sidestep_map::planning::FreeSpace;
 use std::sync::Arc;
 
-/// Distance in boxes up to which a robot plans.
+/// Distance in boxes up to which a robot plans. The square around it then has 81 places, which one word of
+/// 128 bits holds as a set.
 pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
 /// Side of the square in which it plans.
 pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
-/// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for.
+/// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for. The body
+/// covers boxes east and north of the one from which all are counted, so there must be more on that side.
 const SEARCH_SIDE_BOXES: i32 = 32;
-/// Most boxes in which one thing is believed to be, where the class does not say more exactly; the
-/// nearest class is believed however many boxes it spans.
-const MAX_VAGUE_BOXES: usize = 2;
+/// Most boxes that one report of a class other than the nearest may block. A class of many boxes with one
+/// thing somewhere in them would wall a corridor off; its boxes are vague instead.
+const MAX_EXACT_BOXES: usize = 2;
+/// Votes of one beam for a box that it has passed, where beams are reliable: it outweighs 63 reports, each
+/// of which says only that something is in one of several boxes.
+const RELIABLE_VOTES: i8 = 64;
 
 /// A set of places around a robot, by the columns and rows from its own place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,7 +56,7 @@ pub(super) struct LocalCostmap {
     pub(super) vague: LocalBoxSet,
 }
 
-/// The eyes of a robot type: its beams, and the walls that it knows.
+/// The beams of a robot type, and the walls that it knows.
 #[derive(Debug)]
 pub(super) struct BeamModel {
     walls: Arc<FreeSpace>,
@@ -89,15 +94,21 @@ impl Default for OccupancyVotes {
 
 impl OccupancyVotes {
     fn add(&mut self, crossed: &BeamBox, votes: i8) {
-        let sum = &mut self.0[(crossed.row + PLAN_RADIUS_BOXES) as usize]
-            [(crossed.col + PLAN_RADIUS_BOXES) as usize];
+        let (row, col) = Self::index(crossed);
+        let sum = &mut self.0[row][col];
         *sum = sum.saturating_add(votes);
     }
 
     fn is_free(&self, crossed: &BeamBox) -> bool {
-        self.0[(crossed.row + PLAN_RADIUS_BOXES) as usize]
-            [(crossed.col + PLAN_RADIUS_BOXES) as usize]
-            > 0
+        let (row, col) = Self::index(crossed);
+        self.0[row][col] > 0
+    }
+
+    #[inline(always)]
+    fn index(crossed: &BeamBox) -> (usize, usize) {
+        let row = crossed.row + PLAN_RADIUS_BOXES;
+        let col = crossed.col + PLAN_RADIUS_BOXES;
+        (row as usize, col as usize)
     }
 }
 
@@ -109,42 +120,54 @@ struct OccupiedSegment<'a> {
 
 impl BeamModel {
     pub(super) fn new(walls: Arc<FreeSpace>, size: u32, body: &RobotBody, box_size_m: f64) -> Self {
-        let at = |heading| {
-            let all =
-                body.sensors.iter().flat_map(|sensor| beams(sensor, size, heading, box_size_m));
-            all.collect()
-        };
+        let beams = [0, 1, 2, 3].map(|heading| {
+            let sensors = body.sensors.iter();
+            sensors.flat_map(|sensor| beam_paths(sensor, size, heading, box_size_m)).collect()
+        });
         let are_reliable = body.sensors.iter().all(MountedSensor::is_error_free);
-        Self { walls, size: size as i32, are_reliable, beams: [0, 1, 2, 3].map(at) }
+        Self { walls, size: size as i32, are_reliable, beams }
     }
 
     /// Returns the things that the robot's readings report and the static map does not explain; none
     /// where there are no such things, near or far.
     pub(super) fn local_costmap(&self, percept: &Percept<'_>) -> Option<LocalCostmap> {
-        let beams = &self.beams[usize::from(percept.heading)];
-        let mut sight = LocalCostmap::default();
-        let reports = || beams.iter().zip(percept.readings);
         // Mostly nothing unknown is there, and then the free boxes need not be found.
-        if !reports()
-            .any(|(beam, &reading)| self.occupied_segment(beam, reading, percept.at).is_some())
-        {
-            return None;
-        }
-        let suspicions = || reports().filter_map(|(b, &r)| self.occupied_segment(b, r, percept.at));
+        self.occupied_segments(percept).next()?;
         let mut votes = OccupancyVotes::default();
-        for (beam, &reading) in reports() {
+        for (beam, &reading) in self.reports(percept) {
             self.vote_free(beam, reading, percept.at, &mut votes);
         }
-        for suspicion in suspicions() {
-            suspicion.boxes.iter().for_each(|c| votes.add(c, -1));
+        for segment in self.occupied_segments(percept) {
+            segment.boxes.iter().for_each(|crossed| votes.add(crossed, -1));
         }
-        for suspicion in suspicions() {
-            let left = || suspicion.boxes.iter().filter(|c| !votes.is_free(c));
-            let is_exact = suspicion.is_near || left().count() <= MAX_VAGUE_BOXES;
-            let places = if is_exact { &mut sight.blocked } else { &mut sight.vague };
-            left().for_each(|c| self.block(c, places));
+        // Only now, because a box is free or not by the votes of all beams.
+        let mut costmap = LocalCostmap::default();
+        for segment in self.occupied_segments(percept) {
+            let occupied = segment.boxes.iter().filter(|crossed| !votes.is_free(crossed));
+            let is_exact = segment.is_near || occupied.clone().count() <= MAX_EXACT_BOXES;
+            let places = if is_exact { &mut costmap.blocked } else { &mut costmap.vague };
+            occupied.for_each(|crossed| self.block(crossed, places));
         }
-        Some(sight)
+        Some(costmap)
+    }
+
+    /// Returns each beam at the robot's heading with its reading.
+    #[inline(always)]
+    fn reports<'a>(
+        &'a self,
+        percept: &'a Percept<'_>,
+    ) -> impl Iterator<Item = (&'a BeamPath, &'a Reading)> {
+        self.beams[usize::from(percept.heading)].iter().zip(percept.readings)
+    }
+
+    /// Returns the stretches of all beams in which something unknown is.
+    #[inline(always)]
+    fn occupied_segments<'a>(
+        &'a self,
+        percept: &'a Percept<'_>,
+    ) -> impl Iterator<Item = OccupiedSegment<'a>> {
+        let reports = self.reports(percept);
+        reports.filter_map(move |(beam, &reading)| self.occupied_segment(beam, reading, percept.at))
     }
 
     fn is_wall(&self, (col, row): (u32, u32), crossed: &BeamBox) -> bool {
@@ -167,6 +190,7 @@ impl BeamModel {
         for crossed in &beam.crossed {
             if self.is_wall(at, crossed) {
                 let explains = crossed.class == reading.class && reading.observation == beam.wall;
+                // A report from behind a wall is an error, because no beam goes through.
                 if explains || crossed.class < reading.class {
                     return None;
                 }
@@ -191,14 +215,15 @@ impl BeamModel {
         at: (u32, u32),
         votes: &mut OccupancyVotes,
     ) {
-        let to_wall = beam.crossed.iter().position(|c| self.is_wall(at, c));
-        let wall =
+        let to_wall = beam.crossed.iter().position(|crossed| self.is_wall(at, crossed));
+        let wall_reading =
             to_wall.map(|n| Reading { observation: beam.wall, class: beam.crossed[n].class });
-        let is_clear = reading.observation == NOTHING || wall == Some(reading);
+        let is_clear = reading.observation == NOTHING || wall_reading == Some(reading);
         let before_wall = &beam.crossed[..to_wall.unwrap_or(beam.crossed.len())];
-        let passed = before_wall.iter().take_while(|c| is_clear || c.class < reading.class);
-        let weight = if self.are_reliable { 64 } else { 1 };
-        passed.for_each(|c| votes.add(c, weight));
+        let weight = if self.are_reliable { RELIABLE_VOTES } else { 1 };
+        let passed =
+            before_wall.iter().take_while(|crossed| is_clear || crossed.class < reading.class);
+        passed.for_each(|crossed| votes.add(crossed, weight));
     }
 
     /// Blocks the places from which the robot would cover a box.
@@ -210,22 +235,27 @@ impl BeamModel {
 }
 
 /// Returns the beams of a sensor at a heading, as far as their boxes are looked at.
-fn beams(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -> Vec<BeamPath> {
+fn beam_paths(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -> Vec<BeamPath> {
     let model = &sensor.model;
+    // A box farther off along an axis blocks no place of the square; times 1.5, because a diagonal is
+    // longer than its side by the square root of 2.
     let reach = f64::from(PLAN_RADIUS_BOXES + 1 + size as i32) * 1.5;
     let range = (model.range_m / box_size_m).min(reach);
-    let inside = |v: i32| (-PLAN_RADIUS_BOXES..SEARCH_SIDE_BOXES - PLAN_RADIUS_BOXES).contains(&v);
-    let beam = |&deg: &f64| {
-        let crossed = crossings(size, deg, range).into_iter().map(|c| {
-            let turned = turn_crossing(c, size, heading);
-            BeamBox {
-                col: turned.dx,
-                row: turned.dy,
-                class: model.class_of(c.distance, box_size_m),
-            }
+    let wall = model.designates[usize::from(WALL)];
+    let mut paths = Vec::with_capacity(model.bearings_deg.len());
+    for &bearing_deg in &model.bearings_deg {
+        let beam_boxes = crossings(size, bearing_deg, range).into_iter().map(|crossing| {
+            let turned = turn_crossing(crossing, size, heading);
+            let class = model.class_of(crossing.distance, box_size_m);
+            BeamBox { col: turned.dx, row: turned.dy, class }
         });
-        let crossed = crossed.take_while(|c| inside(c.col) && inside(c.row)).collect();
-        BeamPath { wall: model.designates[usize::from(WALL)], crossed }
-    };
-    model.bearings_deg.iter().map(beam).collect()
+        let crossed = beam_boxes.take_while(|one| is_searched(one.col) && is_searched(one.row));
+        paths.push(BeamPath { wall, crossed: crossed.collect() });
+    }
+    paths
+}
+
+/// Returns whether something is looked for in boxes of this column or row.
+fn is_searched(offset: i32) -> bool {
+    (-PLAN_RADIUS_BOXES..SEARCH_SIDE_BOXES - PLAN_RADIUS_BOXES).contains(&offset)
 }

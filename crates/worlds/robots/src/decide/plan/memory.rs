@@ -1,4 +1,5 @@
-//! The memory of a planning robot, in two words.
+//! The memory of a planning robot, packed into two words: one of the four belongs to its list of goals, and
+//! one to the requests that it hears.
 
 use super::super::Memory;
 use super::super::pass_request::{self, OWN_REQUEST_WORD, PassRequest};
@@ -13,7 +14,7 @@ pub(super) struct PlannerMemory {
     pub(super) rank: u8,
     /// Actions without progress, less those with progress; up to 255.
     pub(super) stuck: u8,
-    /// Column and row at its last decision, modulo 16 each.
+    /// Column and row at its last decision, modulo 16 each, which is enough to find its last move.
     pub(super) place: u8,
     /// Direction of its last move plus 1; 0 before the first.
     pub(super) moved: u8,
@@ -23,13 +24,13 @@ pub(super) struct PlannerMemory {
     pub(super) bump_left: u8,
     /// Its request as a word, 0 for none.
     pub(super) request: u32,
-    /// Decisions for which it makes room, or keeps away from the room it has made; up to 15.
+    /// Decisions for which it makes room, or keeps away from the room it has made; up to 7.
     pub(super) yield_left: u8,
     /// Direction in which it makes room.
     pub(super) yield_to: u8,
     /// Whether it still has to move for that.
     pub(super) yield_pending: bool,
-    /// Rank of the request that it follows, in steps of 8; its own request has that rank.
+    /// Rank of the request that it follows, in steps of 8 to save bits; its own request has that rank.
     pub(super) yield_rank: u8,
     /// Decisions to stand still before something since the last move; up to 7.
     pub(super) waited: u8,
@@ -100,7 +101,8 @@ impl BitReader {
     }
 }
 
-/// A word that is filled from its low bits; values that are too large count as the largest one.
+/// A word that is filled from its low bits; values that are too large count as the largest one, so that a
+/// counter stops instead of starting again.
 #[derive(Default)]
 struct BitWriter {
     word: u32,
@@ -119,8 +121,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mood_survives_its_memory_and_large_counts_stop_at_their_largest() {
-        let mut mood = PlannerMemory {
+    fn a_memory_survives_its_words_and_large_counts_stop_at_their_largest() {
+        let mut planner = PlannerMemory {
             rank: 200,
             stuck: 77,
             place: 0xa5,
@@ -135,12 +137,12 @@ mod tests {
             waited: 5,
             stray_left: 15,
         };
-        mood.set_request(9, 1, Some(2));
+        planner.set_request(9, 1, Some(2));
         let mut memory = Memory::default();
-        mood.store(&mut memory);
-        assert_eq!(PlannerMemory::from_memory(&memory), mood);
-        PlannerMemory { waited: 200, ..mood }.store(&mut memory);
-        assert_eq!(PlannerMemory::from_memory(&memory), PlannerMemory { waited: 7, ..mood });
+        planner.store(&mut memory);
+        assert_eq!(PlannerMemory::from_memory(&memory), planner);
+        PlannerMemory { waited: 200, ..planner }.store(&mut memory);
+        assert_eq!(PlannerMemory::from_memory(&memory), PlannerMemory { waited: 7, ..planner });
         assert_eq!(memory.words[0], 0);
     }
 }

@@ -1,12 +1,12 @@
 //! Going somewhere among others: around the things that are sensed, and out of each other's way.
 //!
-//! Every robot decides alone, from its percept, its memory, the static map and the way to its goal:
+//! Every robot decides alone, from its percept, its memory, the static map and the flow field of its goal:
 //!
-//! 1. *Sight*: readings that the static map does not explain block places around the robot; so does
+//! 1. *Local costmap*: readings that the static map does not explain block places around the robot; so does
 //!    the last contact, for a few decisions.
-//! 2. *Detour*: the cheapest way through the places around it. A blocked place costs some actions
+//! 2. *Detour*: the cheapest path through the places around it. A blocked place costs some actions
 //!    that grow while the robot waits, because the obstacle may go away.
-//! 3. *Requests*: a robot that waits before something asks it to make room ([`super::set_request`]). A robot
+//! 3. *Requests*: a robot that waits before something asks it to make room ([`PassRequest`]). A robot
 //!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
 //!    request on with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority
 //!    inheritance with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn;
@@ -33,18 +33,25 @@ use sidestep_map::planning::{FlowField, FreeSpace};
 use std::sync::Arc;
 
 /// Actions without progress after which a robot strays, at least; its rank adds up to 31, so that
-/// not all stray at once.
+/// not all stray at once. A queue before a narrow passage makes no progress for long either, and must
+/// not be taken for a deadlock.
 const MIN_STRAY_ACTIONS: u8 = 64;
-/// Decisions for which a robot believes that the thing it has touched is still there.
+/// Decisions for which a robot believes that the thing it has touched is still there: one in which it
+/// turns to a detour, and one in which it takes the first step of that.
 const BUMP_DECISIONS: u8 = 2;
-/// Decisions for which a robot keeps out of a place that it was asked to leave.
+/// Decisions for which a robot keeps out of a place that it was asked to leave; within one the robot
+/// that asked can step into it.
 const KEEP_AWAY_DECISIONS: u8 = 1;
-
 /// Decisions to wait before something after which a robot with sensors that err tries to go on.
 const WAIT_TIMEOUT_DECISIONS: u8 = 5;
+/// Decisions since the last move after which a robot no longer yields to others that might step into
+/// the same place, because in a crowd there is always one.
+const MAX_YIELD_DECISIONS: u8 = 4;
 /// Highest rank of a robot that has been at its last goal and was asked to leave it. Its rank grows
-/// with the time that it is away.
+/// with the time that it is away, but stays below the ranks of robots that still have a goal.
 const MAX_DONE_RANK: u8 = 63;
+/// Rank of a robot that stands at its last goal: the lowest one that a request can have.
+const AT_LAST_GOAL_RANK: u8 = 1;
 
 /// Plans the steps of robots of one type.
 #[derive(Debug)]
@@ -57,10 +64,17 @@ pub struct Planner {
 /// The present goal of a robot.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CurrentGoal<'a> {
-    /// Ways to it.
+    /// Shortest paths to it.
     pub(super) field: &'a FlowField,
     /// Whether it is the last one and was reached before.
     pub(super) is_done: bool,
+}
+
+impl CurrentGoal<'_> {
+    /// Returns whether a robot with this lower-left box stands at its last goal.
+    fn is_final_place(&self, at: (u32, u32)) -> bool {
+        self.is_done && self.field.is_goal(at.0, at.1)
+    }
 }
 
 /// Everything that a robot knows of the places around it.
@@ -90,7 +104,20 @@ impl LocalView<'_> {
         self.blocked.contains(east, north)
     }
 
-    /// Returns the direction of a shortest way on the static map; ahead where there is one.
+    /// Returns whether a step in a direction meets neither a wall nor a known obstacle.
+    fn is_open(&self, direction: u8) -> bool {
+        self.rise(direction).is_some() && !self.is_blocked(direction)
+    }
+
+    /// Returns whether an obstacle stands next to the place ahead, on that side of it.
+    fn is_blocked_beyond(&self, ahead: u8, side: u8) -> bool {
+        let (east, north) = HEADINGS[usize::from(ahead)];
+        let (side_east, side_north) = HEADINGS[usize::from(side % 4)];
+        self.blocked.contains(east + side_east, north + side_north)
+    }
+
+    /// Returns the direction of a shortest path on the static map; ahead where there is one, because
+    /// every turn costs an action.
     fn goal_direction(&self) -> Option<u8> {
         if self.rise(self.heading) == Some(-1) {
             return Some(self.heading);
@@ -98,7 +125,7 @@ impl LocalView<'_> {
         self.field.direction(self.at.0, self.at.1)
     }
 
-    /// Returns the direction in which the way goes on behind the next place.
+    /// Returns the direction in which the path goes on behind the next place.
     fn next_direction(&self, direction: u8) -> Option<u8> {
         let (east, north) = HEADINGS[usize::from(direction)];
         let (col, row) = self.offset(east, north);
@@ -115,118 +142,146 @@ impl Planner {
         box_size_m: f64,
         wheels_err: bool,
     ) -> Self {
-        let eyes = BeamModel::new(walls, size, body, box_size_m);
-        Self { is_careful: wheels_err || !eyes.are_reliable, beam_model: eyes }
+        let beam_model = BeamModel::new(walls, size, body, box_size_m);
+        Self { is_careful: wheels_err || !beam_model.are_reliable, beam_model }
     }
 
     /// Returns the next action of a robot.
     pub(super) fn step(
         &self,
-        way: CurrentGoal<'_>,
+        goal: CurrentGoal<'_>,
         percept: &Percept<'_>,
-        memory: &mut Memory,
+        words: &mut Memory,
         draws: &mut Draws,
     ) -> ActionId {
-        let heard = PassRequest::take_heard(memory);
-        let mut mood = PlannerMemory::from_memory(memory);
-        update_memory(&mut mood, way, percept, draws);
-        let seen = self.beam_model.local_costmap(percept);
-        let is_alone = seen.is_none() && mood.bump_left == 0 && heard.is_none();
-        let LocalCostmap { mut blocked, vague } = seen.unwrap_or_default();
-        if mood.bump_left > 0 {
-            let (east, north) = HEADINGS[usize::from(mood.bump)];
-            blocked.insert(east, north);
-        }
-        let (at, heading) = (percept.at, percept.heading);
-        let is_careful = self.is_careful;
-        let view =
-            LocalView { field: way.field, at, heading, blocked, vague, is_alone, is_careful };
+        let heard = PassRequest::take_heard(words);
+        let mut memory = PlannerMemory::from_memory(words);
+        update_memory(&mut memory, goal, percept, draws);
+        let view = self.view(goal, percept, &memory, heard.is_some());
         // An obstacle ahead is believed to be there once more, because a sensor may miss it.
-        if !self.beam_model.are_reliable && view.is_blocked(heading) && mood.bump_left == 0 {
-            mood.bump = heading;
-            mood.bump_left = BUMP_DECISIONS;
+        let may_miss = !self.beam_model.are_reliable;
+        if may_miss && view.is_blocked(view.heading) && memory.bump_left == 0 {
+            memory.bump = view.heading;
+            memory.bump_left = BUMP_DECISIONS;
         }
-        obey_request(&mut mood, heard, &view, draws);
-        let stands = way.is_done && way.field.is_goal(at.0, at.1);
-        let action = if mood.yield_left > 0 {
-            make_room(&mut mood, &view)
-        } else if mood.stray_left > 0 {
-            stray(&mut mood, &view, draws)
-        } else if stands {
+        if let Some(request) = heard {
+            obey_request(&mut memory, request, &view, draws);
+        }
+        // Making room comes first, because a robot of a higher rank waits for it.
+        let action = if memory.yield_left > 0 {
+            make_room(&mut memory, &view)
+        } else if memory.stray_left > 0 {
+            stray(&mut memory, &view, draws)
+        } else if goal.is_final_place(percept.at) {
             STAY
         } else {
-            travel(&mut mood, &view, draws)
+            travel(&mut memory, &view, draws)
         };
-        mood.store(memory);
+        memory.store(words);
         action
+    }
+
+    /// Returns the places around a robot as it knows them: by the static map, its readings, and its
+    /// last contact.
+    fn view<'a>(
+        &self,
+        goal: CurrentGoal<'a>,
+        percept: &Percept<'_>,
+        memory: &PlannerMemory,
+        is_asked: bool,
+    ) -> LocalView<'a> {
+        let costmap = self.beam_model.local_costmap(percept);
+        let is_alone = costmap.is_none() && memory.bump_left == 0 && !is_asked;
+        let LocalCostmap { mut blocked, vague } = costmap.unwrap_or_default();
+        if memory.bump_left > 0 {
+            let (east, north) = HEADINGS[usize::from(memory.bump)];
+            blocked.insert(east, north);
+        }
+        LocalView {
+            field: goal.field,
+            at: percept.at,
+            heading: percept.heading,
+            blocked,
+            vague,
+            is_careful: self.is_careful,
+            is_alone,
+        }
     }
 }
 
 /// Brings a robot's memory up to date: its last move, its progress, its last contact.
 fn update_memory(
-    mood: &mut PlannerMemory,
-    way: CurrentGoal<'_>,
+    memory: &mut PlannerMemory,
+    goal: CurrentGoal<'_>,
     percept: &Percept<'_>,
     draws: &mut Draws,
 ) {
     let place = ((percept.at.0 & 15) << 4 | percept.at.1 & 15) as u8;
-    mood.request = 0;
-    mood.bump_left = mood.bump_left.saturating_sub(1);
-    if mood.rank == 0 {
-        mood.rank = draw_rank(draws);
-        mood.place = place;
+    memory.request = 0;
+    memory.bump_left = memory.bump_left.saturating_sub(1);
+    if memory.rank == 0 {
+        memory.rank = draw_rank(draws);
+        memory.place = place;
     }
-    if way.is_done {
-        mood.rank = match way.field.is_goal(percept.at.0, percept.at.1) {
-            true => 1,
-            false => (mood.rank + u8::from(percept.now.is_multiple_of(4))).clamp(2, MAX_DONE_RANK),
-        };
+    if goal.is_final_place(percept.at) {
+        memory.rank = AT_LAST_GOAL_RANK;
+    } else if goal.is_done {
+        let growth = u8::from(percept.now.is_multiple_of(4));
+        memory.rank = (memory.rank + growth).clamp(AT_LAST_GOAL_RANK + 1, MAX_DONE_RANK);
     }
-    let moved = direction_between(mood.place, place);
-    mood.place = place;
+    let moved = direction_between(memory.place, place);
+    memory.place = place;
     if let Some(direction) = moved {
-        mood.moved = direction + 1;
-        mood.waited = 0;
-        mood.bump_left = 0;
-        mood.yield_pending = false;
+        memory.moved = direction + 1;
+        memory.waited = 0;
+        memory.bump_left = 0;
+        memory.yield_pending = false;
     }
-    mood.stuck = stuck_count(mood.stuck, way, percept.at, moved);
-    if mood.stuck >= MIN_STRAY_ACTIONS + mood.rank / 8 {
-        mood.stuck = 0;
-        if !way.is_done {
-            mood.rank = draw_rank(draws);
-        }
-        mood.stray_left = 4 + draws.uniform_below(12) as u8;
-        mood.yield_left = 0;
+    memory.stuck = stuck_count(memory.stuck, goal, percept.at, moved);
+    if memory.stuck >= MIN_STRAY_ACTIONS + memory.rank / 8 {
+        start_straying(memory, goal, draws);
     }
+    // Walls are on the static map, and need not be remembered.
     if let Some(contact) = percept.contact.filter(|contact| contact.kind != WALL) {
-        mood.bump = (percept.heading + contact.side as u8) % 4;
-        mood.bump_left = BUMP_DECISIONS;
+        memory.bump = (percept.heading + contact.side as u8) % 4;
+        memory.bump_left = BUMP_DECISIONS;
     }
 }
 
+/// Lets a robot leave a deadlock: with a new rank, because the old ones have led into it.
+fn start_straying(memory: &mut PlannerMemory, goal: CurrentGoal<'_>, draws: &mut Draws) {
+    memory.stuck = 0;
+    if !goal.is_done {
+        memory.rank = draw_rank(draws);
+    }
+    // Drawn, so that two robots do not come back at once; at most 15, which four bits hold.
+    memory.stray_left = 4 + draws.uniform_below(12) as u8;
+    memory.yield_left = 0;
+}
+
 /// Returns how stuck a robot is after a move in this direction: less, the nearer the goal it came.
-fn stuck_count(stuck: u8, way: CurrentGoal<'_>, (col, row): (u32, u32), moved: Option<u8>) -> u8 {
-    let rise_back = moved.and_then(|d| way.field.rise(col, row, (d + 2) % 4));
+fn stuck_count(stuck: u8, goal: CurrentGoal<'_>, at: (u32, u32), moved: Option<u8>) -> u8 {
+    if goal.is_final_place(at) {
+        return stuck.saturating_sub(1);
+    }
+    let rise_back = moved.and_then(|direction| goal.field.rise(at.0, at.1, (direction + 2) % 4));
     match rise_back {
-        _ if way.is_done && way.field.is_goal(col, row) => stuck.saturating_sub(1),
         Some(1) => stuck.saturating_sub(2),
+        // More than a step forward takes off, so that going to and fro counts as being stuck.
         Some(-1) => stuck.saturating_add(3),
         _ => stuck.saturating_add(1),
     }
 }
 
+/// Returns a rank of a robot that still has a goal, above all that have none.
 fn draw_rank(draws: &mut Draws) -> u8 {
     MAX_DONE_RANK + 1 + draws.uniform_below(255 - u32::from(MAX_DONE_RANK)) as u8
 }
 
 /// Returns the direction from one place to another, both modulo 16; none where they are the same.
 fn direction_between(from: u8, to: u8) -> Option<u8> {
-    let part = |shift: u8| {
-        let step = (to >> shift & 15).wrapping_sub(from >> shift & 15) & 15;
-        if step < 8 { i32::from(step) } else { i32::from(step) - 16 }
-    };
-    let (east, north) = (part(4), part(0));
+    let east = signed_difference(from >> 4, to >> 4);
+    let north = signed_difference(from, to);
     match (east, north) {
         (0, 0) => None,
         _ if east.abs() >= north.abs() => Some(if east > 0 { 0 } else { 2 }),
@@ -234,26 +289,50 @@ fn direction_between(from: u8, to: u8) -> Option<u8> {
     }
 }
 
-/// Chooses where to make room, where a request is to be obeyed.
+/// Returns the difference of two numbers that are known modulo 16, as -8 to 7.
+fn signed_difference(from: u8, to: u8) -> i32 {
+    let step = (to & 15).wrapping_sub(from & 15) & 15;
+    if step < 8 { i32::from(step) } else { i32::from(step) - 16 }
+}
+
+/// Chooses where to make room, if a request has a rank above those that bind the robot.
 fn obey_request(
-    mood: &mut PlannerMemory,
-    heard: Option<PassRequest>,
+    memory: &mut PlannerMemory,
+    request: PassRequest,
     view: &LocalView<'_>,
     draws: &mut Draws,
 ) {
-    let Some(ask) = heard else { return };
-    let own = mood.rank;
-    let bound = if mood.yield_left > 0 { own.max(mood.yield_rank * 8) } else { own };
-    if ask.rank <= bound {
+    let own = memory.rank;
+    let inherited = if memory.yield_left > 0 { memory.yield_rank * 8 } else { 0 };
+    if request.rank <= own.max(inherited) {
         return;
     }
-    let from = (ask.toward + 2) % 4;
+    let place_to_leave_to = cheapest_exit(request, view, draws);
+    // A robot at its goal that is asked again and again stands in a jam: a few requests let it stray.
+    if own == AT_LAST_GOAL_RANK && memory.yield_left == 0 {
+        memory.stuck = memory.stuck.saturating_add(10);
+    }
+    if let Some(direction) = place_to_leave_to {
+        memory.yield_to = direction;
+        memory.yield_pending = true;
+        memory.yield_left = KEEP_AWAY_DECISIONS;
+        memory.yield_rank = request.rank / 8;
+    }
+}
+
+/// Returns the direction in which a robot best makes room; none where walls leave it only the one
+/// that the request comes from.
+fn cheapest_exit(request: PassRequest, view: &LocalView<'_>, draws: &mut Draws) -> Option<u8> {
+    let asked_from = (request.toward + 2) % 4;
     let mut best: Option<(u32, u8)> = None;
-    for direction in (0..4).filter(|&d| d != from) {
+    for direction in (0..4).filter(|&direction| direction != asked_from) {
         let Some(rise) = view.rise(direction) else { continue };
         let turn = (4 + direction - view.heading) % 4;
+        // All else together is below the 32 of a blocked place, so a free one is always taken. The place
+        // into which the asking robot goes next would have to be left again. The draw decides between
+        // equal places, so that two robots that make room do not go on choosing alike.
         let price = 32 * u32::from(view.is_blocked(direction))
-            + 12 * u32::from(ask.then == Some(direction))
+            + 12 * u32::from(request.then == Some(direction))
             + 4 * (rise + 1) as u32
             + 2 * u32::from(turn.min(4 - turn))
             + draws.uniform_below(2);
@@ -261,29 +340,24 @@ fn obey_request(
             best = Some((price, direction));
         }
     }
-    if own == 1 && mood.yield_left == 0 {
-        mood.stuck = mood.stuck.saturating_add(10);
-    }
-    if let Some((_, direction)) = best {
-        mood.yield_to = direction;
-        mood.yield_pending = true;
-        mood.yield_left = KEEP_AWAY_DECISIONS;
-        mood.yield_rank = ask.rank / 8;
-    }
+    best.map(|(_, direction)| direction)
 }
 
-/// Leaves its place as it was asked to, then keeps away from it for a while.
-fn make_room(mood: &mut PlannerMemory, view: &LocalView<'_>) -> ActionId {
-    mood.yield_left -= 1;
-    if !mood.yield_pending {
+/// Leaves its place as it was asked to, then keeps away from it for some decisions.
+fn make_room(memory: &mut PlannerMemory, view: &LocalView<'_>) -> ActionId {
+    memory.yield_left -= 1;
+    if !memory.yield_pending {
         return STAY;
     }
-    let direction = mood.yield_to;
+    let direction = memory.yield_to;
     if view.is_blocked(direction) {
-        mood.set_request(mood.yield_rank.saturating_mul(8).saturating_add(7), direction, None);
+        // The rank is kept in steps of 8, and the highest one of the step is passed on: the next robot
+        // must obey wherever this one did.
+        let inherited_rank = memory.yield_rank.saturating_mul(8).saturating_add(7);
+        memory.set_request(inherited_rank, direction, None);
     } else {
-        // It counts only the decisions after the move.
-        mood.yield_left = KEEP_AWAY_DECISIONS;
+        // Only the decisions after the move count.
+        memory.yield_left = KEEP_AWAY_DECISIONS;
     }
     match turn_to(view.heading, direction) {
         Some(turn) => turn,
@@ -292,58 +366,61 @@ fn make_room(mood: &mut PlannerMemory, view: &LocalView<'_>) -> ActionId {
     }
 }
 
-/// Goes somewhere, to get out of a deadlock.
-fn stray(mood: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
-    mood.stray_left -= 1;
-    let is_open = |d: u8| view.rise(d).is_some() && !view.is_blocked(d);
-    if is_open(view.heading) && draws.uniform_below(4) > 0 {
-        mood.set_request(mood.rank, view.heading, None);
+/// Goes somewhere at random, to get out of a deadlock; mostly ahead, because a turn gains no distance.
+fn stray(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
+    memory.stray_left -= 1;
+    if view.is_open(view.heading) && draws.uniform_below(4) > 0 {
+        memory.set_request(memory.rank, view.heading, None);
         return FORWARD;
     }
     if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
 }
 
 /// Takes the next step toward the goal, or waits before an obstacle.
-fn travel(mood: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
+fn travel(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
     let direction = if view.is_alone {
         view.goal_direction()
     } else {
-        let blocked = 3 + 4 * u16::from(mood.waited);
-        let moved = mood.moved.checked_sub(1);
-        let (beside, vague) = if view.is_careful { (6, 5) } else { (1, 1) };
-        // Where nothing errs robots see enough to keep to every change of course.
-        let gained = |moved: u8| view.rise((moved + 2) % 4) == Some(1);
-        let is_sidestep = !view.is_careful || moved.is_some_and(|moved| !gained(moved));
-        detour::first_step(view, StepCosts { blocked, beside, vague, moved, is_sidestep })
+        detour::first_step(view, step_costs(memory, view))
     };
     let Some(direction) = direction else { return STAY };
-    mood.set_request(mood.rank, direction, view.next_direction(direction));
+    memory.set_request(memory.rank, direction, view.next_direction(direction));
     if let Some(turn) = turn_to(view.heading, direction) {
         return turn;
     }
     if view.is_blocked(direction) {
-        mood.waited += 1;
+        memory.waited += 1;
         // Sensors that err may see something in a narrow gap forever.
-        let tries =
-            view.is_careful && mood.waited > WAIT_TIMEOUT_DECISIONS && draws.uniform_below(4) == 0;
+        let has_waited = view.is_careful && memory.waited > WAIT_TIMEOUT_DECISIONS;
+        let tries = has_waited && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }
-    if mood.waited < 4 && should_yield(view, direction, draws) {
-        mood.waited += 1;
+    if memory.waited < MAX_YIELD_DECISIONS && should_yield(view, direction, draws) {
+        memory.waited += 1;
         return STAY;
     }
     FORWARD
 }
 
+/// Returns the prices of a detour, which depend on how long the robot has waited, and on whether it
+/// has to allow for errors.
+fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
+    let moved = memory.moved.checked_sub(1);
+    // Where sensors or wheels err, a slip or a thing at the far end of its class soon ends in a contact.
+    let beside = if view.is_careful { 6 } else { 1 };
+    let vague = if view.is_careful { 5 } else { 1 };
+    let has_gained = moved.is_some_and(|moved| view.rise((moved + 2) % 4) == Some(1));
+    // Where nothing errs robots see enough to keep to every change of course.
+    let is_sidestep = !view.is_careful || moved.is_some() && !has_gained;
+    StepCosts { blocked: 3 + 4 * u16::from(memory.waited), beside, vague, moved, is_sidestep }
+}
+
 /// Returns whether to let another robot pass that may step into the same place: one from the
-/// right goes first, and of two head on one by a fair draw.
+/// right goes first, and of two head on one by a fair draw. It is a draw in both cases, because the thing
+/// on the right may also be a parked body, which never goes first.
 fn should_yield(view: &LocalView<'_>, direction: u8, draws: &mut Draws) -> bool {
-    let (east, north) = HEADINGS[usize::from(direction)];
-    let beside = |d: u8| {
-        let (e, n) = HEADINGS[usize::from(d % 4)];
-        view.blocked.contains(east + e, north + n)
-    };
-    let comes = beside(direction + 3) || beside(direction);
+    let is_on_right = view.is_blocked_beyond(direction, direction + 3);
+    let comes = is_on_right || view.is_blocked_beyond(direction, direction);
     comes && draws.uniform_below(2) == 0
 }
 
@@ -351,6 +428,7 @@ fn turn_to(heading: u8, direction: u8) -> Option<ActionId> {
     match (4 + direction - heading) % 4 {
         0 => None,
         3 => Some(RIGHT),
+        // To go back, two turns to the left do it.
         _ => Some(LEFT),
     }
 }

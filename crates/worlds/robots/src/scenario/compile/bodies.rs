@@ -24,7 +24,9 @@ pub(super) enum GroupTypes {
 }
 
 impl Compiler<'_> {
+    /// Returns the bodies of all sections: robots, people, doors, in the order of their ids.
     pub(super) fn groups(&mut self) -> Result<Vec<BodyGroup>, InputError> {
+        // Taken out, because making a group adds its types to the compiler.
         let robots = std::mem::take(&mut self.file.robots.0);
         let people = std::mem::take(&mut self.file.people.0);
         let doors = std::mem::take(&mut self.file.doors.0);
@@ -114,19 +116,23 @@ impl Compiler<'_> {
         [col, row, width, height]: [u32; 4],
         span: Range<usize>,
     ) -> Result<(), InputError> {
-        let fits = |from: u32, extent: u32, limit: u32| {
-            extent > 0 && from.checked_add(extent).is_some_and(|end| end <= limit)
-        };
-        if fits(col, width, self.map.width()) && fits(row, height, self.map.height()) {
+        let columns = self.map.width();
+        let rows = self.map.height();
+        if is_inside(col, width, columns) && is_inside(row, height, rows) {
             return Ok(());
         }
-        let (columns, rows) = (self.map.width(), self.map.height());
         let cause = format!(
             "the region [{col}, {row}, {width}, {height}] is empty or leaves the map of \
              {columns} x {rows} boxes"
         );
         Err(self.source.error(span, cause, "write [col, row, width, height] in boxes"))
     }
+}
+
+/// Returns whether a row of boxes is not empty and ends before a limit; the numbers come from a file, and may
+/// overflow.
+fn is_inside(from: u32, extent: u32, limit: u32) -> bool {
+    extent > 0 && from.checked_add(extent).is_some_and(|end| end <= limit)
 }
 
 /// Returns the number of cycles from one action to the next.

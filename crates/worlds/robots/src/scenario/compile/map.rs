@@ -3,7 +3,8 @@
 use super::*;
 use sidestep_import::GridOptions;
 
-/// Farthest corner of a map: poses are recorded with 15 bits per coordinate.
+/// Longest side of a map: poses are recorded with 15 bits per coordinate, and the border takes some of that on
+/// both sides.
 const MAX_SIDE_BOXES: u32 = (1 << 15) - 2 * MAX_PATH_STEPS as u32;
 
 /// Returns the map of a scenario, and the doors that a generated office has.
@@ -15,14 +16,14 @@ pub(super) fn load_map(
     section: &Spanned<MapSection>,
 ) -> Result<(Arc<GridMap>, Vec<Rect>), InputError> {
     let (map, doors) = read_map(source, section)?;
-    let error = |cause: String, remedy: String| Err(source.error(section.span(), cause, remedy));
     if map.width() > MAX_SIDE_BOXES || map.height() > MAX_SIDE_BOXES {
         let cause = format!("a map of {} x {} boxes", map.width(), map.height());
-        return error(cause, format!("use larger boxes: at most {MAX_SIDE_BOXES} a side"));
+        let remedy = format!("use larger boxes: at most {MAX_SIDE_BOXES} a side");
+        return Err(source.error(section.span(), cause, remedy));
     }
     if map.count(Cell::Free) == 0 {
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
-        return error("the map has no free box".into(), remedy.into());
+        return Err(source.error(section.span(), "the map has no free box", remedy));
     }
     Ok((Arc::new(map), doors))
 }

@@ -5,7 +5,7 @@ use super::bodies::{BodyGroup, GroupTypes, period_cycles, size_boxes};
 use super::*;
 use crate::effector::Side;
 
-/// Longest side of a door that a map brings, in boxes.
+/// Longest side of a door that a map brings, in boxes: the same as of one that a scenario gives.
 const MAX_DOOR_SIDE_BOXES: u32 = 64;
 
 /// Place of a door, and its columns and rows.
@@ -42,7 +42,8 @@ impl Compiler<'_> {
         span: Range<usize>,
     ) -> Result<BodyGroup, InputError> {
         let doors = self.door_places(s, &span)?;
-        let (mut places, mut types) = (Vec::new(), Vec::new());
+        let mut places = Vec::new();
+        let mut types = Vec::new();
         for (k, (place, size)) in doors.iter().enumerate() {
             // Each door gets a phase, because otherwise all doors of a section would toggle at
             // once.
@@ -62,23 +63,22 @@ impl Compiler<'_> {
         })
     }
 
-    /// Returns the places and sizes of doors; they all face the same way.
+    /// Returns the places and sizes of doors; all of them are closed.
     fn door_places(
         &self,
         s: &DoorSection,
         span: &Range<usize>,
     ) -> Result<Vec<SizedPosition>, InputError> {
+        // The facing of a door is whether it is open, see `Facing`.
         let facing = Some(0);
-        let given = s.at.iter().map(|place| {
-            let place = Spanned::new(place.span(), StartPose { facing, ..*place.get_ref() });
-            (place, size_boxes(s.size))
-        });
-        let mut doors: Vec<_> = given.collect();
+        let mut doors = Vec::new();
+        for place in &s.at {
+            let closed = StartPose { facing, ..*place.get_ref() };
+            doors.push((Spanned::new(place.span(), closed), size_boxes(s.size)));
+        }
         for rect in self.office_doors.iter().filter(|_| s.office) {
-            if [rect.width, rect.height]
-                .iter()
-                .any(|side| !(1..=MAX_DOOR_SIDE_BOXES).contains(side))
-            {
+            let sides = 1..=MAX_DOOR_SIDE_BOXES;
+            if !sides.contains(&rect.width) || !sides.contains(&rect.height) {
                 let cause = format!("a door of {} x {} boxes", rect.width, rect.height);
                 let remedy = format!("give 1 to {MAX_DOOR_SIDE_BOXES} boxes a side");
                 return Err(self.source.error(span.clone(), cause, remedy));
@@ -103,6 +103,7 @@ impl Compiler<'_> {
         match (&s.periodic, &s.random) {
             (Some(periodic), None) => {
                 let p = periodic.get_ref();
+                // Below 2^40, so that the product with the number of a door does not overflow.
                 let total = p.open.checked_add(p.closed).filter(|t| *t > 0 && *t < 1 << 40);
                 let total = total.ok_or_else(|| {
                     let cause = "a period of 0 or far too many cycles";

@@ -23,19 +23,19 @@ pub(super) struct Placement {
 impl Placer {
     /// Returns the first id of each group: robots, people, doors, in whichever order they are placed.
     pub(super) fn first_ids(&self) -> Vec<EntityId> {
+        let mut first_ids = Vec::with_capacity(self.groups.len());
         let mut next = 0;
-        let first = |group: &BodyGroup| {
-            let first = next;
+        for group in &self.groups {
+            first_ids.push(next);
             next += group.count as EntityId;
-            first
-        };
-        self.groups.iter().map(first).collect()
+        }
+        first_ids
     }
 
     /// Places all bodies, with the draws of `streams`.
     pub(super) fn place(&self, streams: &Streams) -> Result<Placement, InputError> {
         let n = self.groups.iter().map(|group| group.count as usize).sum();
-        let mut round = PlacementBuilder {
+        let mut builder = PlacementBuilder {
             placer: self,
             streams,
             floor: PlacementGrid::new(&self.map),
@@ -43,20 +43,20 @@ impl Placer {
             bodies: vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n],
             start: vec![((0, 0), 0); n],
         };
-        // Doors and bodies with a given place are placed first, because draws must find the
-        // remaining free boxes.
-        for given in [true, false] {
+        // Bodies with a given place, as all doors are, come first, because draws must find the free boxes
+        // that these leave.
+        for is_given in [true, false] {
             for (group, first) in self.groups.iter().zip(self.first_ids()) {
-                if group.places.is_empty() != given {
-                    round.add_group(group, first)?;
+                if group.places.is_empty() != is_given {
+                    builder.add_group(group, first)?;
                 }
             }
         }
-        Ok(Placement { bodies: round.bodies, start: round.start })
+        Ok(Placement { bodies: builder.bodies, start: builder.start })
     }
 }
 
-/// One round of placing.
+/// Bodies in the course of being placed.
 struct PlacementBuilder<'a> {
     placer: &'a Placer,
     streams: &'a Streams,
@@ -81,6 +81,7 @@ impl PlacementBuilder<'_> {
                 None => (self.drawn_place(group, k, id, size)?, group.span.clone()),
             };
             let facing = group.places.get(k).and_then(|place| place.get_ref().facing);
+            // The index is one that no draw of a place comes to.
             let facing = facing.unwrap_or_else(|| {
                 self.streams.block(id, 0, purpose::PLACE, u16::MAX)[0] as u8 % 4
             });
@@ -144,8 +145,9 @@ impl PlacementBuilder<'_> {
             }
             PlacementError::Wall(c, r) => format!("{body} stands in the wall at [{c}, {r}]"),
             PlacementError::Body(id, c, r) => {
-                let other =
-                    self.placer.source.error(self.spans[id as usize].clone(), "", "").position();
+                // An error knows the line of a span.
+                let span = self.spans[id as usize].clone();
+                let other = self.placer.source.error(span, "", "").position();
                 let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));
                 format!("{body} stands on body {id}{line} at [{c}, {r}]")
             }

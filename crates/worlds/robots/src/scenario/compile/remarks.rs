@@ -4,19 +4,22 @@ use super::super::RobotsFile;
 use super::bodies::BodyGroup;
 use super::*;
 
-/// Returns warnings of effectors that move in a way that their author may not expect.
+/// Returns warnings of effectors that move otherwise than their author may expect.
 pub(super) fn effector_remarks(
     file: &RobotsFile,
     effectors: &BTreeMap<String, LocatedSection<EffectorSection>>,
 ) -> Vec<Remark> {
-    let sections = file.robots.0.iter().enumerate();
-    let remarks = sections.flat_map(|(k, section)| {
-        let name = section.get_ref().effector.as_ref().map(Spanned::get_ref);
-        let found = name.and_then(|name| Some((name, effectors.get(name)?)));
-        let words = found.map_or(vec![], |(name, at)| misleading_transitions(name, at));
-        words.into_iter().map(move |words| Remark::warning(format!("robots.{k}.effector"), words))
-    });
-    remarks.collect()
+    let mut remarks = Vec::new();
+    for (k, section) in file.robots.0.iter().enumerate() {
+        let Some(name) = section.get_ref().effector.as_ref().map(Spanned::get_ref) else {
+            continue;
+        };
+        let Some(at) = effectors.get(name) else { continue };
+        for words in misleading_transitions(name, at) {
+            remarks.push(Remark::warning(format!("robots.{k}.effector"), words));
+        }
+    }
+    remarks
 }
 
 /// Behaviors that never say anything.
@@ -24,12 +27,14 @@ const SILENT: [&str; 5] = ["wander", "shuttle", "goto", "replay", "random"];
 
 /// Returns a note on a radio over which no robot speaks.
 pub(super) fn radio_remark(file: &RobotsFile) -> Option<Remark> {
-    let speaks = |section: &Spanned<RobotSection>| {
-        let behaviour = section.get_ref().behaviour.as_ref();
-        behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.get_ref().as_str()))
-    };
-    let is_idle = file.radio.is_some() && !file.robots.0.iter().any(speaks);
+    let is_idle = file.radio.is_some() && !file.robots.0.iter().any(may_broadcast);
     is_idle.then(|| Remark::note("radio", "has no effect: no robot has a behavior that broadcasts"))
+}
+
+/// Returns whether the robots of a section have a behavior that may broadcast, as a user's own may.
+fn may_broadcast(section: &Spanned<RobotSection>) -> bool {
+    let behaviour = section.get_ref().behaviour.as_ref();
+    behaviour.is_some_and(|b| !SILENT.contains(&b.get_ref().kind.get_ref().as_str()))
 }
 
 /// Refuses effectors that were learned for boxes of another size: a slip of a box is another length
@@ -44,6 +49,7 @@ pub(super) fn refuse_other_boxes(
     for name in named {
         let learned = effectors.get(name.get_ref()).and_then(|at| at.section.get_ref().box_m);
         let Some(box_m) = learned.map(|m| m.get()) else { continue };
+        // But for rounding, since both are written in decimal.
         if (box_m - map_m).abs() > 1e-9 * map_m {
             let cause = format!(
                 "the effector `{}` was learned for boxes of {box_m} m, and those of the map are \
@@ -108,7 +114,8 @@ impl Compiler<'_> {
             let missed: Vec<usize> = ids.map(|id| self.unreachable_goals(placed, id)).collect();
             let robots = missed.iter().filter(|goals| **goals > 0).count();
             if robots > 0 {
-                let (all, goals) = (group.count, missed.iter().sum::<usize>());
+                let all = group.count;
+                let goals: usize = missed.iter().sum();
                 let words = format!(
                     "{robots} of {all} robots cannot reach a goal, {goals} goals in all: walls are \
                      between it and their start, or the way is too narrow for them"
@@ -119,12 +126,11 @@ impl Compiler<'_> {
     }
 
     fn unreachable_goals(&self, placed: &Placement, id: EntityId) -> usize {
-        let Role::Robot(model) = &self.types[usize::from(placed.bodies[id as usize].ty)].role
-        else {
-            return 0;
-        };
-        // Ways lead back as well, so a robot that reaches a goal from its start reaches it from other goals.
+        let ty = &self.types[usize::from(placed.bodies[id as usize].ty)];
+        let Role::Robot(model) = &ty.role else { return 0 };
+        // Paths lead back as well, so a robot that reaches a goal from its start reaches it from other goals.
         let (col, row) = placed.start[id as usize].0;
-        model.behaviour.flow_fields().iter().filter(|way| !way.reaches_goal(col, row)).count()
+        let fields = model.behaviour.flow_fields().iter();
+        fields.filter(|field| !field.reaches_goal(col, row)).count()
     }
 }

@@ -5,6 +5,8 @@ use super::bodies::{BodyGroup, GroupTypes, period_cycles};
 use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
+use sidestep_import::movingai::{ScenRow, load_scen};
+use std::path::PathBuf;
 
 impl Compiler<'_> {
     pub(super) fn robots(
@@ -38,10 +40,10 @@ impl Compiler<'_> {
     fn robots_from_scen(
         &mut self,
         s: &RobotSection,
-        scen: &Spanned<std::path::PathBuf>,
+        scen: &Spanned<PathBuf>,
         span: &Range<usize>,
     ) -> Result<BodyGroup, InputError> {
-        let rows = sidestep_import::movingai::load_scen(&self.source.path(scen.get_ref()));
+        let rows = load_scen(&self.source.path(scen.get_ref()));
         let rows = rows.map_err(|error| self.source.with_key_at(scen.span(), error))?;
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
@@ -52,19 +54,11 @@ impl Compiler<'_> {
         let body = Arc::new(self.robot_body(s, size)?);
         let free = Arc::new(FreeSpace::from_map(&self.map));
         let avoidance = self.avoidance(None, &free, size, &body);
-        let (mut places, mut types) = (Vec::new(), Vec::new());
-        let place = self.source.path(scen.get_ref()).display().to_string();
+        let mut places = Vec::new();
+        let mut types = Vec::new();
         for row in &rows[..count] {
-            let checked = row.check_against(&place, &self.map);
-            checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
-            let goals = vec![Arc::new(FlowField::to_nearest(&free, size, &[row.goal]))];
+            let goals = vec![self.scen_goal(scen, row, &free, size)?];
             let avoidance = avoidance.clone();
-            if !goals[0].is_goal(row.goal.0, row.goal.1) {
-                let cause =
-                    format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
-                let remedy = "give smaller robots, or another list";
-                return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
-            }
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel::new(Arc::clone(&body), behaviour);
             let actions = Arc::clone(&body.actions);
@@ -83,23 +77,45 @@ impl Compiler<'_> {
         })
     }
 
+    /// Returns the shortest paths to the goal of a row of a MovingAI list.
+    fn scen_goal(
+        &self,
+        scen: &Spanned<PathBuf>,
+        row: &ScenRow,
+        free: &FreeSpace,
+        size: u32,
+    ) -> Result<Arc<FlowField>, InputError> {
+        let place = self.source.path(scen.get_ref()).display().to_string();
+        let checked = row.check_against(&place, &self.map);
+        checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
+        let field = FlowField::to_nearest(free, size, &[row.goal]);
+        if !field.is_goal(row.goal.0, row.goal.1) {
+            let cause = format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
+            let remedy = "give smaller robots, or another list";
+            return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
+        }
+        Ok(Arc::new(field))
+    }
+
     fn robot_body(&mut self, s: &RobotSection, size: u32) -> Result<RobotBody, InputError> {
-        let sensors = s
-            .sensors
-            .iter()
-            .map(|name| self.mounted_sensor(name, size))
-            .collect::<Result<Vec<_>, _>>()?;
+        let mut sensors = Vec::with_capacity(s.sensors.len());
+        let mut sectors = Vec::new();
+        for name in &s.sensors {
+            let sensor = self.mounted_sensor(name, size)?;
+            let bearings_deg = sensor.model.bearings_deg.iter();
+            sectors.extend(bearings_deg.map(|&deg| Sector::from_bearing_deg(deg)));
+            sensors.push(sensor);
+        }
         let effector = self.effector(s.effector.as_ref())?;
-        let reliable = self.file.regime.has_reliable_effectors();
-        let longest =
-            effector.transitions.iter().flatten().map(|t| t.path.len()).max().unwrap_or(0);
-        self.reach = self.reach.max(longest as u32);
-        let actions =
-            (0..effector.actions.len()).map(|a| effector.transitions_of(a as u8, reliable));
-        let actions =
-            actions_at_headings(&actions.collect::<Vec<_>>(), (size, size), self.stride());
-        let bearings = sensors.iter().flat_map(|m| m.model.bearings_deg.iter());
-        let sectors = bearings.map(|&deg| Sector::from_bearing_deg(deg)).collect();
+        let transitions = effector.transitions.iter().flatten();
+        let max_steps = transitions.map(|transition| transition.path.len()).max().unwrap_or(0);
+        self.reach = self.reach.max(max_steps as u32);
+        let is_reliable = self.file.regime.has_reliable_effectors();
+        let mut actions = Vec::with_capacity(effector.actions.len());
+        for action in 0..effector.actions.len() {
+            actions.push(effector.transitions_of(action as u8, is_reliable));
+        }
+        let actions = actions_at_headings(&actions, (size, size), self.stride());
         Ok(RobotBody { sectors, sensors, actions, effector })
     }
 
@@ -112,7 +128,7 @@ impl Compiler<'_> {
         let box_size_m = self.map.box_size_m;
         let range_boxes = model.range_m / box_size_m;
         let beams = model.bearings_deg.len();
-        if range_boxes * beams as f64 > 60_000.0 || range_boxes > MAX_RANGE_BOXES {
+        if range_boxes * beams as f64 > MAX_BEAM_BOXES || range_boxes > MAX_RANGE_BOXES {
             let sensor = name.get_ref();
             let cause =
                 format!("sensor `{sensor}` reaches over {range_boxes:.0} boxes with {beams} beams");
@@ -144,49 +160,21 @@ impl Compiler<'_> {
         let Some(section) = section else {
             return Ok(self.with_stall_detector(Arc::new(Wander::default()), body));
         };
-        let s = section.get_ref();
-        let error = |wrong: UnlocatedError| self.source.error(section.span(), wrong.0, wrong.1);
-        let free = Arc::new(FreeSpace::from_map(&self.map));
-        let ways = FlowFieldBuilder { compiler: self, free: &free, size, span: section.span() };
-        let avoidance = || self.avoidance(s.avoidance, &free, size, body);
-        let actions = &body.effector.actions;
-        let behaviour: Arc<dyn Behaviour> = match s.kind.get_ref().as_str() {
-            "wander" => Arc::new(wander(s)),
-            "announce" => Arc::new(Announce { wander: wander(s), size }),
-            "shuttle" => {
-                let end = |given: Option<[u32; 4]>, key: &str| {
-                    ways.build(required(s, key, given, "[col, row, width, height]").map_err(error)?)
-                };
-                Arc::new(Shuttle { ends: [end(s.a, "a")?, end(s.b, "b")?], avoidance: avoidance() })
-            }
-            "goto" => {
-                let goals = required(s, "goals", s.goals.as_ref(), "[[col, row], ...]");
-                let goals = goals.map_err(error)?.iter().map(|&(c, r)| ways.build([c, r, 1, 1]));
-                let goals = goals.collect::<Result<_, _>>()?;
-                let repeat = s.repeat.unwrap_or(false);
-                Arc::new(Goto { goals, repeat, avoidance: avoidance() })
-            }
-            "replay" => Arc::new(replay(s, actions).map_err(error)?),
-            "random" => Arc::new(random::behaviour(s, actions).map_err(error)?),
-            "external" => Arc::new(External),
-            other => match self.own.get(other) {
-                Some(own) => Arc::clone(own),
-                None => {
-                    let (cause, remedy) = self.unknown_behaviour(other);
-                    return Err(self.source.error(s.kind.span(), cause, remedy));
-                }
-            },
-        };
-        let waits = ["wander", "shuttle", "goto"].contains(&s.kind.get_ref().as_str());
-        Ok(if waits && !behaviour.has_requests() {
-            self.with_stall_detector(behaviour, body)
+        let robot = BehaviourBuilder { compiler: self, section, size, body };
+        let kind = section.get_ref().kind.get_ref().as_str();
+        let behaviour = robot.build(kind)?;
+        // Planners need no contact: they see obstacles, and leave deadlocks by straying.
+        let waits_for_contacts =
+            ["wander", "shuttle", "goto"].contains(&kind) && !behaviour.has_requests();
+        if waits_for_contacts {
+            Ok(self.with_stall_detector(behaviour, body))
         } else {
-            behaviour
-        })
+            Ok(behaviour)
+        }
     }
 
-    /// Returns a behavior that turns on contact, with another way to notice that it is blocked where
-    /// there may be no contact.
+    /// Returns a behavior that turns on contact, which also notices that it is blocked where there may be no
+    /// contact.
     fn with_stall_detector(
         &self,
         inner: Arc<dyn Behaviour>,
@@ -196,12 +184,12 @@ impl Compiler<'_> {
     }
 
     /// Returns whether a step that is blocked may do nothing, without a contact. Behaviors that turn
-    /// on contact then need another way to notice it.
+    /// on contact then need a [`StallDetector`].
     fn has_no_contacts(&self, body: &RobotBody) -> bool {
-        let reliable = self.file.regime.has_reliable_effectors();
-        let may_stay = |t: &Transition| t.p > 0.0 && t.path.is_empty();
-        self.file.obstacle_rule == ObstacleRule::Renormalise
-            && body.effector.transitions_of(FORWARD, reliable).iter().any(may_stay)
+        let is_reliable = self.file.regime.has_reliable_effectors();
+        let steps = body.effector.transitions_of(FORWARD, is_reliable);
+        let may_stay = steps.iter().any(|step| step.p > 0.0 && step.path.is_empty());
+        self.file.obstacle_rule == ObstacleRule::Renormalise && may_stay
     }
 
     fn avoidance(
@@ -213,10 +201,11 @@ impl Compiler<'_> {
     ) -> Avoidance {
         match section.unwrap_or_default() {
             AvoidanceSection::Plan => {
-                let (free, box_size_m) = (Arc::clone(free), self.map.box_size_m);
+                let walls = Arc::clone(free);
+                let box_size_m = self.map.box_size_m;
                 let wheels_err =
                     !self.file.regime.has_reliable_effectors() && body.effector.has_errors();
-                Avoidance::Plan(Arc::new(Planner::new(free, size, body, box_size_m, wheels_err)))
+                Avoidance::Plan(Arc::new(Planner::new(walls, size, body, box_size_m, wheels_err)))
             }
             AvoidanceSection::Avoid => Avoidance::Sidestep(SensorTrust::OneBeam),
             AvoidanceSection::Filter => Avoidance::Sidestep(SensorTrust::TwoReports),
@@ -231,30 +220,86 @@ impl Compiler<'_> {
     }
 }
 
-/// Ways for robots of one size, asked for at one place of the scenario.
-struct FlowFieldBuilder<'c, 'a> {
+/// The behavior of one section of robots in the making, with the robots that it is for.
+struct BehaviourBuilder<'c, 'a> {
     compiler: &'c Compiler<'a>,
-    free: &'c FreeSpace,
+    section: &'c Spanned<BehaviourSection>,
     size: u32,
-    span: Range<usize>,
+    body: &'c RobotBody,
 }
 
-impl FlowFieldBuilder<'_, '_> {
-    /// Returns the way to a region in which there is room for a robot.
-    fn build(&self, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
-        let (compiler, size) = (self.compiler, self.size);
-        compiler.check_rect(rect, self.span.clone())?;
+impl BehaviourBuilder<'_, '_> {
+    fn build(&self, kind: &str) -> Result<Arc<dyn Behaviour>, InputError> {
+        let s = self.section.get_ref();
+        let actions = &self.body.effector.actions;
+        Ok(match kind {
+            "wander" => Arc::new(wander(s)),
+            "announce" => Arc::new(Announce { wander: wander(s), size: self.size }),
+            "shuttle" => self.shuttle()?,
+            "goto" => self.goto()?,
+            "replay" => Arc::new(replay(s, actions).map_err(|error| self.located(error))?),
+            "random" => {
+                Arc::new(random::behaviour(s, actions).map_err(|error| self.located(error))?)
+            }
+            "external" => Arc::new(External),
+            other => match self.compiler.own.get(other) {
+                Some(own) => Arc::clone(own),
+                None => {
+                    let (cause, remedy) = self.compiler.unknown_behaviour(other);
+                    return Err(self.compiler.source.error(s.kind.span(), cause, remedy));
+                }
+            },
+        })
+    }
+
+    fn shuttle(&self) -> Result<Arc<dyn Behaviour>, InputError> {
+        let s = self.section.get_ref();
+        let free = Arc::new(FreeSpace::from_map(&self.compiler.map));
+        let a = self.required("a", s.a, "[col, row, width, height]")?;
+        let start = self.flow_field(&free, a)?;
+        let b = self.required("b", s.b, "[col, row, width, height]")?;
+        let end = self.flow_field(&free, b)?;
+        let avoidance = self.compiler.avoidance(s.avoidance, &free, self.size, self.body);
+        Ok(Arc::new(Shuttle { ends: [start, end], avoidance }))
+    }
+
+    fn goto(&self) -> Result<Arc<dyn Behaviour>, InputError> {
+        let s = self.section.get_ref();
+        let free = Arc::new(FreeSpace::from_map(&self.compiler.map));
+        let mut goals = Vec::new();
+        for &(col, row) in self.required("goals", s.goals.as_ref(), "[[col, row], ...]")? {
+            goals.push(self.flow_field(&free, [col, row, 1, 1])?);
+        }
+        let avoidance = self.compiler.avoidance(s.avoidance, &free, self.size, self.body);
+        Ok(Arc::new(Goto { goals, repeat: s.repeat.unwrap_or(false), avoidance }))
+    }
+
+    /// Returns the value of a key that the behavior cannot do without.
+    fn required<T>(&self, key: &str, given: Option<T>, example: &str) -> Result<T, InputError> {
+        required(self.section.get_ref(), key, given, example).map_err(|error| self.located(error))
+    }
+
+    /// Returns the shortest paths to a region in which there is room for a robot.
+    fn flow_field(&self, free: &FreeSpace, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
+        let size = self.size;
+        self.compiler.check_rect(rect, self.section.span())?;
         let [col, row, width, height] = rect;
         let goals: Vec<_> =
             (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
-        let field = FlowField::to_nearest(self.free, size, &goals);
+        let field = FlowField::to_nearest(free, size, &goals);
+        // A box of the region in which a robot does not fit is no goal.
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
             return Ok(Arc::new(field));
         }
         let cause = format!("a robot of {size} x {size} boxes fits nowhere in {rect:?}");
         let remedy =
             "give a region with free boxes; its boxes stand for the robot's lower-left box";
-        Err(compiler.source.error(self.span.clone(), cause, remedy))
+        Err(self.compiler.source.error(self.section.span(), cause, remedy))
+    }
+
+    /// Puts an error at the section.
+    fn located(&self, (cause, remedy): UnlocatedError) -> InputError {
+        self.compiler.source.error(self.section.span(), cause, remedy)
     }
 }
 
@@ -266,10 +311,9 @@ fn required<T>(
     example: &str,
 ) -> Result<T, UnlocatedError> {
     given.ok_or_else(|| {
-        (
-            format!("behaviour `{}` needs `{key}`", s.kind.get_ref()),
-            format!("add {key} = {example}"),
-        )
+        let cause = format!("behaviour `{}` needs `{key}`", s.kind.get_ref());
+        let remedy = format!("add {key} = {example}");
+        (cause, remedy)
     })
 }
 

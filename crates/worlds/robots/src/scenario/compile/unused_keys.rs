@@ -15,9 +15,6 @@ pub(in crate::scenario) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("external", &[]),
 ];
 
-/// A key that does nothing, with the reason.
-struct UnusedKeyRule(&'static str, bool, &'static str);
-
 /// Refuses keys that do nothing in a scenario; `own` are behaviors beside the built-in ones,
 /// and `has_doors` says whether its map brings doors.
 ///
@@ -29,55 +26,45 @@ pub(super) fn refuse_unused(
     own: &Behaviours,
     has_doors: bool,
 ) -> Result<(), InputError> {
-    let by_kind = file.conflict_policy == ConflictPolicy::ByKind;
-    let is_ordered = !file.kind_order.is_empty();
-    let map = file.map.get_ref();
-    let unknown = map.office.is_some() && source.keys("map").iter().any(|k| k.name == "unknown");
-    let rules = [
-        UnusedKeyRule(
-            "kind_order",
-            is_ordered && !by_kind,
-            "unless conflict_policy is \"by_kind\"",
-        ),
-        UnusedKeyRule("map.unknown", unknown, "beside `office`, in which nothing is unknown"),
-    ];
-    apply(source, "", &rules)?;
+    if !file.kind_order.is_empty() && file.conflict_policy != ConflictPolicy::ByKind {
+        return Err(source.unused_key("kind_order", "unless conflict_policy is \"by_kind\""));
+    }
+    // By its text, because a value that is not given is the default.
+    let has_unknown = source.keys("map").iter().any(|key| key.name == "unknown");
+    if has_unknown && file.map.get_ref().office.is_some() {
+        let because = "beside `office`, in which nothing is unknown";
+        return Err(source.unused_key("map.unknown", because));
+    }
     for (k, section) in file.robots.0.iter().enumerate() {
-        check_robots(source, &format!("robots.{k}."), section.get_ref(), own)?;
+        check_robots(source, &format!("robots.{k}."), section, own)?;
     }
     for (k, section) in file.people.0.iter().enumerate() {
-        check_people(source, &format!("people.{k}."), section.get_ref())?;
+        check_people(source, &format!("people.{k}."), section)?;
     }
-    for (k, section) in file.doors.0.iter().enumerate() {
-        check_doors(source, &format!("doors.{k}."), section.get_ref(), has_doors)?;
+    for section in &file.doors.0 {
+        check_doors(source, section, has_doors)?;
     }
     Ok(())
-}
-
-fn apply(source: &Source, path: &str, rules: &[UnusedKeyRule]) -> Result<(), InputError> {
-    match rules.iter().find(|UnusedKeyRule(_, does_nothing, _)| *does_nothing) {
-        Some(UnusedKeyRule(key, _, because)) => {
-            Err(source.unused_key(&format!("{path}{key}"), because))
-        }
-        None => Ok(()),
-    }
 }
 
 fn check_robots(
     source: &Source,
     path: &str,
-    s: &RobotSection,
+    section: &Spanned<RobotSection>,
     own: &Behaviours,
 ) -> Result<(), InputError> {
-    let (scen, at) = (s.scen.is_some(), !s.at.is_empty());
-    let listed = "beside `scen`, which lists starts and goals";
-    let rules = [
-        UnusedKeyRule("at", at && scen, listed),
-        UnusedKeyRule("region", s.region.is_some() && scen, listed),
-        UnusedKeyRule("behaviour", s.behaviour.is_some() && scen, listed),
-        UnusedKeyRule("region", s.region.is_some() && at, "beside `at`"),
+    let s = section.get_ref();
+    let has_places = !s.at.is_empty();
+    let has_list = s.scen.is_some();
+    let beside_list = [
+        ("at", has_list && has_places),
+        ("region", has_list && s.region.is_some()),
+        ("behaviour", has_list && s.behaviour.is_some()),
     ];
-    apply(source, path, &rules)?;
+    let because = "beside `scen`, which lists starts and goals";
+    source.refuse_unused_keys(section.span(), &beside_list, because)?;
+    let beside_places = [("region", has_places && s.region.is_some())];
+    source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
     check_phase(source, path, s.period, s.phase)?;
     match &s.behaviour {
         Some(section) => {
@@ -100,9 +87,6 @@ fn check_behaviour(
         // Its name is wrong, and that error is the one to report.
         None => return Ok(()),
     };
-    let error = |key: &str, cause: String, remedy: String| {
-        Err(source.error_at(&format!("{path}{key}"), cause, remedy))
-    };
     let foreign =
         s.given_keys().into_iter().find(|(key, is_given)| *is_given && !known.contains(key));
     if let Some((key, _)) = foreign {
@@ -110,43 +94,48 @@ fn check_behaviour(
             Some((other, _)) => format!("leave it out: it is a key of `{other}`"),
             None => "leave it out".into(),
         };
-        return error(key, format!("`{key}` does nothing in the behaviour `{own_kind}`"), remedy);
+        let cause = format!("`{key}` does nothing in the behaviour `{own_kind}`");
+        return Err(source.error_at(&format!("{path}{key}"), cause, remedy));
     }
     let lists = [
         ("goals", s.goals.as_ref().is_some_and(Vec::is_empty), "[col, row]"),
         ("actions", s.actions.as_ref().is_some_and(Vec::is_empty), "action, e.g. \"forward\""),
     ];
     if let Some((key, _, one)) = lists.into_iter().find(|(_, is_empty, _)| *is_empty) {
-        return error(key, format!("`{key}` is empty"), format!("give at least one {one}"));
+        let cause = format!("`{key}` is empty");
+        let remedy = format!("give at least one {one}");
+        return Err(source.error_at(&format!("{path}{key}"), cause, remedy));
     }
-    match s.turn_every {
-        Some(0) => error("turn_every", "turn_every = 0".into(), "give 1 or more actions".into()),
-        _ => Ok(()),
+    if s.turn_every == Some(0) {
+        let key = format!("{path}turn_every");
+        return Err(source.error_at(&key, "turn_every = 0", "give 1 or more actions"));
     }
+    Ok(())
 }
 
-fn check_people(source: &Source, path: &str, s: &MoverSection) -> Result<(), InputError> {
-    let beside = s.region.is_some() && !s.at.is_empty();
-    apply(source, path, &[UnusedKeyRule("region", beside, "beside `at`")])?;
+fn check_people(
+    source: &Source,
+    path: &str,
+    section: &Spanned<MoverSection>,
+) -> Result<(), InputError> {
+    let s = section.get_ref();
+    let beside_places = [("region", s.region.is_some() && !s.at.is_empty())];
+    source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
     check_phase(source, path, s.period, s.phase)
 }
 
 fn check_doors(
     source: &Source,
-    path: &str,
-    s: &DoorSection,
+    section: &Spanned<DoorSection>,
     has_doors: bool,
 ) -> Result<(), InputError> {
-    let unsized_doors = s.office && s.at.is_empty();
-    let rules = [
-        UnusedKeyRule("office", s.office && !has_doors, "on a map without doors of its own"),
-        UnusedKeyRule(
-            "size",
-            s.size.is_some() && unsized_doors,
-            "beside `office`, whose doors have sizes",
-        ),
-    ];
-    apply(source, path, &rules)
+    let s = section.get_ref();
+    let without_doors = [("office", s.office && !has_doors)];
+    let because = "on a map without doors of its own";
+    source.refuse_unused_keys(section.span(), &without_doors, because)?;
+    let beside_office = [("size", s.size.is_some() && s.office && s.at.is_empty())];
+    let because = "beside `office`, whose doors have sizes";
+    source.refuse_unused_keys(section.span(), &beside_office, because)
 }
 
 /// Refuses a phase beyond the period, which would be another one.

@@ -1,6 +1,5 @@
 //! The hard constraints, which every motion keeps.
 
-use super::super::threat::ChainPart;
 use super::contacts::{Contacts, nearest};
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::SolveInput;
@@ -29,12 +28,15 @@ impl BendConstraint {
     /// Moves the neighbors of a connector that bends too far apart; returns the correction, meters.
     pub(super) fn correct<const D: usize>(&self, posture: &mut TrialPosture<'_, D>) -> f64 {
         let [a, b, c] = [0, 1, 2].map(|k| posture.points[self.connector - 1 + k]);
-        let (into_m, out_m) = (distance(a, b), distance(b, c));
+        let into_m = distance(a, b);
+        let out_m = distance(b, c);
+        // The law of cosines: the bend is the outer angle.
         let least2 = into_m * into_m + out_m * out_m + 2.0 * into_m * out_m * cos(self.most_rad);
         let short_m = least2.max(0.0).sqrt() * (1.0 + BEND_MARGIN) - distance(a, c);
         let Some(away) = normalized(sub(c, a)).filter(|_| short_m > 0.0) else { return 0.0 };
-        let spot = |k: usize| PartPoint { part: ChainPart::Connector(k), along_rod: 0.0 };
-        posture.separate(spot(self.connector - 1), spot(self.connector + 1), away, short_m);
+        let before = PartPoint::connector(self.connector - 1);
+        let after = PartPoint::connector(self.connector + 1);
+        posture.separate(before, after, away, short_m);
         short_m
     }
 
@@ -74,8 +76,8 @@ impl<const D: usize> Constraints<'_, '_, D> {
     }
 
     fn are_lengths_met(&self) -> bool {
-        let ways = self.points.windows(2).map(|w| distance(w[0], w[1]));
-        ways.zip(self.input.chain.rods()).all(|(length_m, rod)| {
+        let lengths_m = self.points.windows(2).map(|w| distance(w[0], w[1]));
+        lengths_m.zip(self.input.chain.rods()).all(|(length_m, rod)| {
             let allowed = rod.min_m - LENGTH_TOLERANCE_M..=rod.max_m + LENGTH_TOLERANCE_M;
             allowed.contains(&length_m)
         })

@@ -4,7 +4,7 @@ use super::super::threat::{Threat, collect};
 use super::super::{ChainPart, Margin};
 use super::posture::ends;
 use sidestep_rods::geometry::{Bounds, Core, NearestPoints, Point, between_segments, distance};
-use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
+use sidestep_rods::{Chain, Obstacles, RodBvh};
 
 /// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]
@@ -42,8 +42,14 @@ impl<const D: usize> Contacts<D> {
         margin: Margin,
         way_m: f64,
     ) {
-        let within_m = |o: &Obstacle<D>| margin.required_gap_m(o) + CONTACT_RANGE_FACTOR * way_m;
-        collect(chain, obstacles, &mut self.body, within_m, &mut self.threats);
+        let reach_m = CONTACT_RANGE_FACTOR * way_m;
+        collect(
+            chain,
+            obstacles,
+            &mut self.body,
+            |mover| margin.required_gap_m(mover) + reach_m,
+            &mut self.threats,
+        );
     }
 
     /// Collects walls and own parts that connectors may reach with a displacement of `way_m`.
@@ -79,14 +85,12 @@ impl<const D: usize> Contacts<D> {
 
     fn find_pairs(&mut self, chain: &Chain<D>, reach_m: f64) {
         let n = chain.rods().len();
-        let boxes = |i: usize| {
-            let [a, b] = [i, i + 1].map(|k| chain.connectors()[k].radius_m);
-            Bounds::from_points(&chain.points()[i..i + 2]).grown(a.max(b) + 0.5 * reach_m)
-        };
-        self.body.rebuild((0..n).map(boxes));
+        // Half of the reach around each of two rods.
+        let by_m = 0.5 * reach_m;
+        self.body.rebuild((0..n).map(|i| grown_rod_box(chain, i, by_m)));
         let Self { body, pairs, .. } = self;
         for rod in 0..n {
-            body.visit(&boxes(rod), |other| {
+            body.visit(&grown_rod_box(chain, rod, by_m), |other| {
                 if other > rod {
                     let last = (other + 1 == n).then_some(other + 1);
                     for parts in candidate_pairs(rod, other, last).into_iter().flatten() {
@@ -98,8 +102,16 @@ impl<const D: usize> Contacts<D> {
     }
 }
 
-/// Distance within which a body is a contact, as a multiple of a connector's longest displacement.
+/// Distance within which a body is a contact, as a multiple of a connector's longest displacement: two parts may each go
+/// as far as from one side of their start to the other.
 const CONTACT_RANGE_FACTOR: f64 = 4.0;
+
+/// Returns the box around a rod and its connectors, grown by `by_m`.
+#[inline]
+fn grown_rod_box<const D: usize>(chain: &Chain<D>, i: usize, by_m: f64) -> Bounds<D> {
+    let [a, b] = [i, i + 1].map(|k| chain.connectors()[k].radius_m);
+    Bounds::from_points(&chain.points()[i..i + 2]).grown(a.max(b) + by_m)
+}
 
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + use<D> {
     let n = chain.rods().len();
@@ -117,17 +129,22 @@ pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: ChainPart) -> f64
 /// Returns the pairs that two rods and their connectors make. As in any motion, neighbors are
 /// exempt: connectors one index apart, rods two.
 fn candidate_pairs(rod: usize, other: usize, last: Option<usize>) -> [Option<[ChainPart; 2]>; 6] {
-    let connectors =
-        |c: usize| (c > rod + 1).then_some([ChainPart::Connector(rod), ChainPart::Connector(c)]);
-    let on_rod = |c: usize| (c > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(c)]);
     [
-        connectors(other),
-        last.and_then(connectors),
-        on_rod(other),
-        last.and_then(on_rod),
+        connector_pair(rod, other),
+        last.and_then(|last| connector_pair(rod, last)),
+        rod_and_connector(rod, other),
+        last.and_then(|last| rod_and_connector(rod, last)),
         (rod + 1 < other).then_some([ChainPart::Connector(rod), ChainPart::Rod(other)]),
         (other > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Rod(other)]),
     ]
+}
+
+fn connector_pair(one: usize, other: usize) -> Option<[ChainPart; 2]> {
+    (other > one + 1).then_some([ChainPart::Connector(one), ChainPart::Connector(other)])
+}
+
+fn rod_and_connector(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
+    (connector > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(connector)])
 }
 
 fn near_pair<const D: usize>(

@@ -6,7 +6,7 @@
 //! with obstacles at constant velocity, and the one with the least time inside is taken.
 
 use super::super::EscapeRules;
-use super::super::threat::{ChainPart, gap_m};
+use super::super::threat::gap_m;
 use super::posture::ends;
 use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
 use super::solve::{EscapeSolver, direction_away};
@@ -37,11 +37,14 @@ struct ActiveExit {
 
 /// Ticks from one choice of an exit to the next: rollouts in every tick would take too long.
 const CHOICE_INTERVAL_TICKS: u32 = 4;
-/// Gap below which a chain is in danger and an exit is searched for, meters.
+/// Gap below which a chain is in danger and an exit is searched for, meters: more than the margin of 0.05 m, so that
+/// the search begins while tongs still close. An exit ends at a wider gap, so that it does not end and begin by turns.
 const DANGER_DISTANCE_M: f64 = 0.12;
-/// Limit on the work of a choice: ticks of rollouts times connectors in them.
+/// Limit on the work of a choice: ticks of rollouts times connectors in them. It suffices for some 25 whole rollouts of 26
+/// connectors; most end early.
 const MAX_WORK: usize = 100_000;
-/// Connectors to either side of those in contact that rollouts include.
+/// Connectors to either side of those in contact that rollouts include: those farther away hardly move while a part leaves
+/// an obstacle.
 const SIDE_CONNECTORS: usize = 12;
 
 impl EscapePlan {
@@ -131,7 +134,7 @@ fn exit_candidates<const D: usize>(
     input: &SolveInput<'_, D>,
     solver: &EscapeSolver<D>,
 ) -> Vec<ExitDirection<D>> {
-    let mut ways = Vec::new();
+    let mut exits = Vec::new();
     let threats = &solver.contacts.threats;
     for (k, mover) in input.obstacles.moving().iter().enumerate() {
         let near = threats.iter().filter(|t| t.mover == k);
@@ -140,14 +143,15 @@ fn exit_candidates<const D: usize>(
         if gap_m < 2.0 * DANGER_DISTANCE_M {
             let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), part));
             let through = scaled(direction_away(mover, &nearest), -1.0);
-            let way = |toward| ExitDirection { obstacle: mover.id, toward };
-            ways.push(exit_directions(through, mover.velocity_m_s).into_iter().map(way));
+            let obstacle = mover.id;
+            let directions = exit_directions(through, mover.velocity_m_s).into_iter();
+            exits.push(directions.map(move |toward| ExitDirection { obstacle, toward }));
         }
     }
     // In turn of each obstacle, because the limit on the work may end the search before the last candidate.
     let mut all = Vec::new();
-    while ways.iter().any(|ways| ways.len() > 0) {
-        all.extend(ways.iter_mut().filter_map(Iterator::next));
+    while exits.iter().any(|exits| exits.len() > 0) {
+        all.extend(exits.iter_mut().filter_map(Iterator::next));
     }
     all
 }
@@ -167,11 +171,10 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
         axes.extend(normalized(with_dimensions::<3, D>([normal[0], normal[1], normal[2]])));
     }
     for axis in axes {
-        let turned = |k: i32| {
+        for k in 1..12 {
             let turn_rad = f64::from(k) * FRAC_PI_6;
-            add_scaled(scaled(through, cos(turn_rad)), axis, sin(turn_rad))
-        };
-        all.extend((1..12).map(turned));
+            all.push(add_scaled(scaled(through, cos(turn_rad)), axis, sin(turn_rad)));
+        }
     }
     all
 }
@@ -182,15 +185,18 @@ fn endangered_connectors<const D: usize>(
     solver: &EscapeSolver<D>,
 ) -> RangeInclusive<usize> {
     let SolveInput { chain, obstacles, .. } = *input;
-    let near = |mover: usize, part: ChainPart| {
-        gap_m(chain, part, &obstacles.moving()[mover]) < 2.0 * DANGER_DISTANCE_M
-    };
-    let threats = solver.contacts.threats.iter().filter(|t| near(t.mover, t.part));
-    let (from, to) = threats.fold((usize::MAX, 0), |(from, to), threat| {
-        let k = threat.part.connector();
-        (from.min(k), to.max(k))
-    });
+    let mut from = usize::MAX;
+    let mut to = 0;
+    for threat in &solver.contacts.threats {
+        let mover = &obstacles.moving()[threat.mover];
+        if gap_m(chain, threat.part, mover) < 2.0 * DANGER_DISTANCE_M {
+            let k = threat.part.connector();
+            from = from.min(k);
+            to = to.max(k);
+        }
+    }
     let last = chain.points().len() - 1;
+    // The minimum of the two is 0 if no part is in danger.
     from.min(to).saturating_sub(SIDE_CONNECTORS)..=(to + 1 + SIDE_CONNECTORS).min(last)
 }
 

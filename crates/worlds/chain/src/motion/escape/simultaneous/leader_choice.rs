@@ -10,11 +10,13 @@ use super::super::EscapeRules;
 use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
 use super::solve_input::{LeadMotion, SolveInput};
 
-/// Connectors to either side of the leader that rollouts include.
+/// Connectors to either side of the leader that rollouts include: many more than for an exit, because the leader pulls
+/// those far behind it between obstacles, too.
 const SIDE_CONNECTORS: usize = 48;
-/// Limit on the work of a choice: ticks of rollouts times connectors in them.
+/// Limit on the work of a choice: ticks of rollouts times connectors in them. It suffices for two whole rollouts, of 150
+/// ticks each, with all 97 connectors.
 const MAX_WORK: usize = 40_000;
-/// Ticks inside that resting must save.
+/// Ticks inside that resting must save: a leader that rests for nothing gets nowhere.
 const MIN_BENEFIT_TICKS: f64 = 0.5;
 
 /// Returns whether a leader should rest.
@@ -28,8 +30,12 @@ pub(super) fn should_rest<const D: usize>(
     let rollout = Rollout::cut(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
     let mut left = rollout.ticks_for(MAX_WORK);
-    let tried = |way_m| RolloutOptions::with_lead(LeadMotion { k: lead.k - from, way_m });
-    let as_wanted = rollout.cost(&tried(lead.way_m), f64::INFINITY, &mut left);
-    let enough = IMPROVEMENT_FACTOR * as_wanted - MIN_BENEFIT_TICKS;
-    enough > 0.0 && rollout.cost(&tried([0.0; D]), enough, &mut left) < enough
+    let wanted = LeadMotion { k: lead.k - from, way_m: lead.way_m };
+    let rest = LeadMotion { way_m: [0.0; D], ..wanted };
+    let wanted_cost = rollout.cost(&RolloutOptions::with_lead(wanted), f64::INFINITY, &mut left);
+    let enough = IMPROVEMENT_FACTOR * wanted_cost - MIN_BENEFIT_TICKS;
+    if enough <= 0.0 {
+        return false;
+    }
+    rollout.cost(&RolloutOptions::with_lead(rest), enough, &mut left) < enough
 }

@@ -19,15 +19,18 @@ pub(super) struct LengthSolver<const D: usize> {
     beyond_m: Vec<f64>,
 }
 
-/// Part of a rod's play that is left free at either limit, and the most of it, meters.
+/// Fraction of a rod's play that is left free at either limit, so that rounding does not carry a rod beyond it.
 const MARGIN_FRACTION: f64 = 0.25;
+/// Most of it, meters.
 const MAX_MARGIN_M: f64 = 1e-7;
-/// Distance from a limit at which a rod counts as being there, meters.
+/// Distance from a limit at which a rod counts as being there, meters: its neighbors' corrections may push it beyond.
 const AT_LIMIT_M: f64 = 1e-6;
 /// Keeps the equations solvable if a straight chain is held at both ends.
 const DAMPING: f64 = 1e-9;
-/// Corrections of a restoration at most, and the error at which it ends, meters.
+/// Corrections of a restoration at most. They are steps of Newton's method: near the limits each squares the error, so that
+/// more gain nothing.
 const MAX_CORRECTIONS: usize = 8;
+/// Error at which a restoration ends, meters: a thousandth of the tolerance of lengths.
 const ERROR_TOLERANCE_M: f64 = 1e-12;
 
 impl<const D: usize> LengthSolver<D> {
@@ -59,7 +62,8 @@ impl<const D: usize> LengthSolver<D> {
             let way = sub(posture.points[i + 1], posture.points[i]);
             let length_m = norm(way);
             let spare_m = MAX_MARGIN_M.min(MARGIN_FRACTION * (rod.max_m - rod.min_m));
-            let (low_m, high_m) = (rod.min_m + spare_m, rod.max_m - spare_m);
+            let low_m = rod.min_m + spare_m;
+            let high_m = rod.max_m - spare_m;
             let beyond_m = length_m - length_m.clamp(low_m, high_m);
             let is_free = length_m > low_m + AT_LIMIT_M && length_m < high_m - AT_LIMIT_M;
             let counts = !is_free && length_m > 0.0;
@@ -75,6 +79,7 @@ impl<const D: usize> LengthSolver<D> {
         self.side.clear();
         for (i, u) in self.directions.iter().enumerate() {
             let ease = dot(*u, *u) * (posture.inverse_mass[i] + posture.inverse_mass[i + 1]);
+            // A rod that is free, or held at both ends, has the equation "no correction".
             self.diagonal.push(if ease > 0.0 { ease + DAMPING } else { 1.0 });
             let before = i.checked_sub(1).map_or([0.0; D], |b| self.directions[b]);
             self.side.push(-posture.inverse_mass[i] * dot(before, *u));

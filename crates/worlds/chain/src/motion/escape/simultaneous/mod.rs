@@ -28,7 +28,7 @@ mod solve_input;
 mod tests;
 
 use super::threat::Threat;
-use super::{EscapeReport, EscapeRules, Margin, TrappedPart};
+use super::{EscapeReport, EscapeRules, EscapeTick, Margin, TrappedPart};
 pub use escape_plan::EscapePlan;
 use leader_choice::should_rest;
 use sidestep_rods::geometry::{Point, distance};
@@ -48,9 +48,11 @@ pub(super) struct SimultaneousEscape<const D: usize> {
 
 /// Most steps of a tick, each at most as long as the thinnest part, so that no obstacle is tunneled through.
 const MAX_STEPS: f64 = 8.0;
-/// Rounds of a solve with margins, and rounds without.
+/// Rounds of a solve with margins, and rounds without: twice as many as in rollouts, because a solve of the tick itself is
+/// made once. Most end earlier, as soon as corrections are small.
 const ROUNDS: [usize; 2] = [24, 40];
-/// Fraction of its maximum speed from which on a chain counts as pressed.
+/// Fraction of its maximum speed from which on a chain counts as pressed: below all of it, because a solve leaves a reserve
+/// and corrections of rods take some of the way back.
 const PRESSED_SPEED_FRACTION: f64 = 0.9;
 /// Penetration that counts as contact, meters.
 const TOUCH_M: f64 = 1e-9;
@@ -64,12 +66,12 @@ impl<const D: usize> SimultaneousEscape<D> {
     /// Moves the chain away from moving obstacles.
     pub(super) fn escape(
         &mut self,
-        chain: &mut Chain<D>,
-        obstacles: &Obstacles<D>,
-        rules: &Rules,
-        start: &[Point<D>],
+        tick: &mut EscapeTick<'_, D>,
         escape_plan: &mut EscapePlan,
     ) -> EscapeReport<D> {
+        let EscapeTick { chain, obstacles, start, .. } = tick;
+        let rules = &tick.propagator.rules;
+        // A step of the chain is a quarter of its thinnest part.
         let thinnest_m = 4.0 * chain.step_m();
         let most_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (most_m / thinnest_m).ceil().max(1.0);
@@ -77,6 +79,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         escape_plan.tick();
         for step in 1..=steps as usize {
             let most_m = most_m * step as f64 / steps;
+            // Taken out, because the solve borrows the start and changes everything else.
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
@@ -90,8 +93,8 @@ impl<const D: usize> SimultaneousEscape<D> {
                 break;
             }
         }
-        let ways_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
-        let longest_m = ways_m.fold(0.0, f64::max);
+        let moves_m = start.iter().zip(chain.points()).map(|(a, b)| distance(*a, *b));
+        let longest_m = moves_m.fold(0.0, f64::max);
         report.is_pressed = report.left.is_some()
             || escape_plan.is_exiting()
             || longest_m > PRESSED_SPEED_FRACTION * most_m;
@@ -129,6 +132,7 @@ impl<const D: usize> SimultaneousEscape<D> {
             return false;
         }
         let mut gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
+        // An exit is searched for only where the plain escape has left the chain in danger.
         if escape_plan.plan(&self.rules, input, &self.solver, gap_m) {
             gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
         }

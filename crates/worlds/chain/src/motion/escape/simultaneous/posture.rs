@@ -18,7 +18,14 @@ pub(super) struct PartPoint {
     pub(super) along_rod: f64,
 }
 
-/// Inverse mass below which a part counts as held.
+impl PartPoint {
+    /// Returns the middle of a connector.
+    pub(super) fn connector(k: usize) -> Self {
+        Self { part: ChainPart::Connector(k), along_rod: 0.0 }
+    }
+}
+
+/// Inverse mass below which a part counts as held, because the division by it would throw the part about.
 const MIN_INVERSE_MASS: f64 = 1e-9;
 
 impl<const D: usize> TrialPosture<'_, D> {

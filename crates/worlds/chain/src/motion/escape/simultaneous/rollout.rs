@@ -29,18 +29,51 @@ pub(super) struct RolloutOptions<const D: usize> {
     clear: usize,
 }
 
-/// Factor by which the cost of a choice must be lower than that of the present one.
+/// Factor by which the cost of a choice must be lower than that of the present one: a chain that changes its exit whenever
+/// another is a little shorter goes to and fro and leaves by none.
 pub(super) const IMPROVEMENT_FACTOR: f64 = 0.8;
 /// Longest time of a rollout, s: farther ahead obstacles no longer move at constant velocity.
 const MAX_HORIZON_S: f64 = 3.0;
 /// Most ticks of a rollout, which limits the work where ticks are short.
 const MAX_TICKS: usize = 150;
-/// Ticks without contact after which an exit has ended.
+/// Ticks without contact after which an exit has ended: half of a rollout, or tongs that open and close again would look
+/// harmless.
 const CLEAR_TICKS: usize = 75;
-/// Cost of depth, in ticks per meter and tick.
+/// Cost of depth, in ticks per meter and tick: it only decides between exits that take as long.
 const DEPTH_COST: f64 = 0.2;
 /// Rounds of a solve in a rollout, with margins and without; fewer than in a tick, because rollouts are many.
 const ROUNDS: [usize; 2] = [12, 20];
+
+/// The chain under trial, and its surroundings.
+struct Trial<const D: usize> {
+    chain: Chain<D>,
+    obstacles: Obstacles<D>,
+    propagator: Propagator<D>,
+}
+
+impl<const D: usize> Trial<D> {
+    /// Leads the chain on, unless it needs its speed of `most_m` in a tick to escape. `start` holds the positions at the
+    /// start of the tick.
+    fn move_leader(&mut self, lead: LeadMotion<D>, start: &[Point<D>], most_m: f64) {
+        if self.max_displacement_m(start) > PRESSED_SPEED_FRACTION * most_m {
+            return;
+        }
+        let escaped = self.chain.points().to_vec();
+        let to = add(escaped[lead.k], lead.way_m);
+        let request = Request::exact(lead.k, to);
+        // Beyond the range of coordinates nothing is led.
+        let went = self.propagator.propagate(&mut self.chain, &self.obstacles, &request);
+        if went.is_err() || self.max_displacement_m(start) > most_m {
+            self.chain.points_mut().copy_from_slice(&escaped);
+        }
+    }
+
+    /// Returns the longest displacement of a connector from its start.
+    fn max_displacement_m(&self, start: &[Point<D>]) -> f64 {
+        let moves = start.iter().zip(self.chain.points());
+        moves.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
+    }
+}
 
 impl<const D: usize> RolloutOptions<D> {
     /// Returns the options of an exit through an obstacle, or of none, while no connector leads.
@@ -69,14 +102,17 @@ impl<'a, const D: usize> Rollout<'a, D> {
             chain.rods()[from..to].to_vec(),
         );
         let horizon_s = MAX_HORIZON_S.min(MAX_TICKS as f64 * rules.dt_s);
-        let mut near = obstacles.clone();
         let middle = chain.points()[usize::midpoint(from, to)];
         let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
-        let is_near = |o: &&Obstacle<D>| {
-            let way_m = horizon_s * (norm(o.velocity_m_s) + rules.speed_max_m_s);
-            o.core.nearest_to_point(middle).distance_m - o.radius_m < reach_m + way_m
-        };
-        let moving: Vec<_> = obstacles.moving().iter().filter(is_near).copied().collect();
+        let mut moving = Vec::new();
+        for mover in obstacles.moving() {
+            let gap_m = mover.core.nearest_to_point(middle).distance_m - mover.radius_m;
+            let approach_m = horizon_s * (norm(mover.velocity_m_s) + rules.speed_max_m_s);
+            if gap_m < reach_m + approach_m {
+                moving.push(*mover);
+            }
+        }
+        let mut near = obstacles.clone();
         near.set_moving(&moving).ok()?;
         Some(Self {
             rules: input.rules,
@@ -102,34 +138,36 @@ impl<'a, const D: usize> Rollout<'a, D> {
     /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
     /// `enough`, or when no tick is `left`.
     pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut usize) -> f64 {
-        let mut chain = self.chain.clone();
-        let mut obstacles = self.obstacles.clone();
+        let mut trial = Trial {
+            chain: self.chain.clone(),
+            obstacles: self.obstacles.clone(),
+            propagator: self.propagator(),
+        };
         let mut solver = EscapeSolver::default();
-        let mut propagator = self.propagator();
         let RolloutOptions { mut through, lead, clear: clear_ticks } = *tried;
         let mut cost = 0.0;
         let mut clear = 0;
         if let Some(lead) = lead {
             // The leader chooses after the escape of this cycle, so its motion comes first.
-            let start = chain.points().to_vec();
-            self.move_leader(&mut chain, &start, &obstacles, &mut propagator, lead);
-            obstacles.advance(self.dt_s);
+            let start = trial.chain.points().to_vec();
+            trial.move_leader(lead, &start, self.most_m);
+            trial.obstacles.advance(self.dt_s);
         }
         for _ in 0..self.ticks {
             if *left == 0 {
                 return f64::INFINITY;
             }
             *left -= 1;
-            let start = chain.points().to_vec();
+            let start = trial.chain.points().to_vec();
             let input = SolveInput {
-                chain: &chain,
-                obstacles: &obstacles,
+                chain: &trial.chain,
+                obstacles: &trial.obstacles,
                 rules: self.rules,
                 start: &start,
                 most_m: self.most_m,
             };
             let gap_m = self.tick(&input, &mut solver, &mut through);
-            chain.points_mut().copy_from_slice(&solver.points);
+            trial.chain.points_mut().copy_from_slice(&solver.points);
             clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
             if clear == 0 {
                 cost += 1.0 - DEPTH_COST * gap_m;
@@ -137,10 +175,11 @@ impl<'a, const D: usize> Rollout<'a, D> {
             if clear > clear_ticks || cost >= enough {
                 break;
             }
+            // As in the run itself, a leader gives way while parts are inside.
             if let Some(lead) = lead.filter(|_| clear > 0) {
-                self.move_leader(&mut chain, &start, &obstacles, &mut propagator, lead);
+                trial.move_leader(lead, &start, self.most_m);
             }
-            obstacles.advance(self.dt_s);
+            trial.obstacles.advance(self.dt_s);
         }
         cost
     }
@@ -148,32 +187,6 @@ impl<'a, const D: usize> Rollout<'a, D> {
     fn propagator(&self) -> Propagator<D> {
         let slave_step_max_m = self.rules.slave_step_max_m.min(self.most_m);
         Propagator::new(Rules { slave_step_max_m, ..*self.rules })
-    }
-
-    /// Leads the chain on, unless it needs its speed to escape. `start` holds the positions at the start of the
-    /// tick.
-    fn move_leader(
-        &self,
-        chain: &mut Chain<D>,
-        start: &[Point<D>],
-        obstacles: &Obstacles<D>,
-        propagator: &mut Propagator<D>,
-        lead: LeadMotion<D>,
-    ) {
-        let longest_m = |chain: &Chain<D>| {
-            let ways = start.iter().zip(chain.points());
-            ways.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
-        };
-        if longest_m(chain) > PRESSED_SPEED_FRACTION * self.most_m {
-            return;
-        }
-        let escaped = chain.points().to_vec();
-        let to = add(chain.points()[lead.k], lead.way_m);
-        // Beyond the range of coordinates nothing is led.
-        let went = propagator.propagate(chain, obstacles, &Request::exact(lead.k, to));
-        if went.is_err() || longest_m(chain) > self.most_m {
-            chain.points_mut().copy_from_slice(&escaped);
-        }
     }
 
     /// Makes one tick of a rollout; the solver has the new positions. Returns the least gap, meters.
@@ -195,6 +208,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
         let soft = SoftConstraints { margin: self.margin, through: *through, rounds: ROUNDS };
         if solver.solve(input, &soft) {
             let (gap_m, _) = solver.min_gap(input, &solver.points);
+            // On an exit a part gets deeper first; otherwise a solve that makes it deeper is dropped.
             if through.is_some() || gap_m >= before_m.min(0.0) {
                 return gap_m;
             }

@@ -5,7 +5,7 @@
 //! obstacles may be in conflict with laws, and never the other way round.
 
 use super::super::Margin;
-use super::super::threat::{Threat, gap_m, left_of};
+use super::super::threat::{ChainPart, Threat, gap_m, left_of};
 use super::constraints::{BendConstraint, Constraints};
 use super::contacts::{Contacts, fraction_along, nearest, radius_m};
 use super::lengths::LengthSolver;
@@ -32,10 +32,11 @@ pub(super) struct EscapeSolver<const D: usize> {
 /// Distance around an obstacle in which the chain joins an exit through it, as a multiple of its
 /// longest rod.
 const EXIT_RANGE_FACTOR: f64 = 2.0;
-/// Distance from which on an obstacle is passed, meters.
+/// Distance from which on an obstacle is passed, meters: beyond that at which an exit is searched for, or the chain would
+/// be caught again at once.
 const PASSED_DISTANCE_M: f64 = 0.17;
-/// Fraction of a margin's violation that a round corrects: all of it would push a part back and forth between two
-/// margins.
+/// Fraction of a margin's violation that a round corrects. All of it would push a part back and forth between two margins;
+/// with 0.3, the 24 rounds leave 0.02 % of a violation where nothing else pushes. Values beside it were not measured.
 const SOFT_FRACTION: f64 = 0.3;
 /// Most rounds in which only hard constraints count.
 const MAX_SETTLE_ROUNDS: usize = 48;
@@ -43,13 +44,14 @@ const MAX_SETTLE_ROUNDS: usize = 48;
 const CHECK_INTERVAL: usize = 8;
 /// Fractions of the motion that are tried if all of it violates a hard constraint.
 const MOTION_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.2];
-/// Distance beyond contact that corrections aim at, at most, meters.
+/// Distance beyond contact that corrections aim at, at most, meters: the corrections that follow take some of it back.
 const MAX_SLACK_M: f64 = 1e-4;
-/// The same as a fraction of the distance to be kept.
+/// The same as a fraction of the distance to be kept, so that thin parts are not pushed farther than they are thick.
 const SLACK_FRACTION: f64 = 0.01;
 /// Correction below which all is settled, meters.
 const SETTLE_TOLERANCE_M: f64 = 1e-6;
-/// Fraction of its longest motion that a connector leaves free for the last corrections.
+/// Fraction of its longest motion that a connector leaves free for the last corrections, of rods above all: they come
+/// after the limit of speed, and would exceed it.
 const RESERVE_FRACTION: f64 = 1e-4;
 
 impl<const D: usize> EscapeSolver<D> {
@@ -62,8 +64,8 @@ impl<const D: usize> EscapeSolver<D> {
         }
         self.contacts.find_nearby(chain, obstacles, rules.self_collision, most_m);
         self.inverse_mass.clear();
-        self.inverse_mass
-            .extend(chain.connectors().iter().map(|c| f64::from(u8::from(!c.is_still()))));
+        let connectors = chain.connectors().iter();
+        self.inverse_mass.extend(connectors.map(|c| if c.is_still() { 0.0 } else { 1.0 }));
         self.bends.clear();
         let limited = chain.connectors().iter().enumerate().filter(|(_, c)| c.max_bend_rad < PI);
         self.bends.extend(limited.filter_map(|(k, _)| BendConstraint::from_connector(chain, k)));
@@ -169,11 +171,8 @@ impl<const D: usize> EscapeSolver<D> {
             let short_m = pair.keep_m + slack_m(pair.keep_m) - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
-                let spot = |part, at| PartPoint {
-                    part,
-                    along_rod: fraction_along(posture.ends(part), at),
-                };
-                let [one, other] = [spot(one, nearest.on_body), spot(other, nearest.on_core)];
+                let one = part_point(&posture, one, nearest.on_body);
+                let other = part_point(&posture, other, nearest.on_core);
                 let away = normalized(sub(nearest.on_core, nearest.on_body))
                     .unwrap_or_else(|| perpendicular(first_axis()));
                 posture.separate(one, other, away, short_m);
@@ -254,6 +253,16 @@ fn trial_posture<'a, const D: usize>(
     TrialPosture { points, inverse_mass }
 }
 
+/// Returns the point of a part that is at a position.
+#[inline]
+fn part_point<const D: usize>(
+    posture: &TrialPosture<'_, D>,
+    part: ChainPart,
+    at: Point<D>,
+) -> PartPoint {
+    PartPoint { part, along_rod: fraction_along(posture.ends(part), at) }
+}
+
 /// Returns the direction from an obstacle to the nearest point of a part.
 pub(super) fn direction_away<const D: usize>(
     mover: &Obstacle<D>,
@@ -268,6 +277,10 @@ fn slack_m(keep_m: f64) -> f64 {
 
 /// Returns the point of a ball around `center` that is nearest to `to`.
 fn clamp_to_ball<const D: usize>(center: Point<D>, to: Point<D>, radius_m: f64) -> Point<D> {
-    let way_m = distance(center, to);
-    if way_m <= radius_m { to } else { add_scaled(center, sub(to, center), radius_m / way_m) }
+    let distance_m = distance(center, to);
+    if distance_m <= radius_m {
+        to
+    } else {
+        add_scaled(center, sub(to, center), radius_m / distance_m)
+    }
 }

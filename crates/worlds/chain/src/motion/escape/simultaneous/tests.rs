@@ -60,7 +60,12 @@ impl<const D: usize> Case<D> {
         self.obstacles.advance(DT_S);
         let mut propagator = Propagator::new(SOLID);
         let Self { chain, obstacles, escaper, escape_plan } = self;
-        let told = escaper.escape(chain, obstacles, &mut propagator, &start, escape_plan).unwrap();
+        let told = escaper
+            .escape(
+                EscapeTick { chain, obstacles, propagator: &mut propagator, start: &start },
+                escape_plan,
+            )
+            .unwrap();
         let most_m = escaper.rules().speed_max_m_s * DT_S;
         for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
             assert!(distance(*from, *to) <= most_m + 1e-12, "connector {k} is too fast");

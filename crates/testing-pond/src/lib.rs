@@ -1,18 +1,25 @@
 //! A world of frogs on lily pads, written against the kernel and the scenario format alone. It
-//! shows the parts of a new world: phases, a run, rows, a picture, and its `Kind`.
+//! shows the parts of a new world: phases, a run, orders, rows, a picture, and its `WorldType`.
+//!
+//! No program knows it. Tests of the session, the server, fleets and the Python package take it as an argument, so
+//! none of these can rely on a world that is shipped.
 
+mod external;
+mod facts;
 mod rows;
 mod world_impl;
 mod world_type;
 
-pub(crate) use world_type::Pond;
+pub use world_type::Pond;
 
 use rows::{Event, FrogAction};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::ConflictGroups;
+use sidestep_kernel::control::Teams;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{Column, Cycle, PhaseContext, Phases, Slot};
 use std::ops::Range;
+use std::sync::Arc;
 
 const HOP: Purpose = Purpose(1);
 
@@ -21,7 +28,11 @@ pub(crate) struct PondWorld {
     frogs: u32,
     width: u32,
     height: u32,
+    /// Pads overgrown with reeds, which no frog enters.
+    reeds: Vec<u32>,
     streams: Streams,
+    /// The frogs as a caller sees them, if they take orders.
+    teams: Arc<Teams>,
 }
 
 /// The pads of all frogs: everything that changes in a run, except sums.
@@ -32,12 +43,31 @@ pub(crate) struct PondState {
     goal: Column<u32>,
     /// The frog on each pad, counted from 1; 0 if there is none.
     frog: Column<u32>,
+    /// The ordered hop of each frog, as a number of [`Hop`]; that of [`Hop::Stay`] without an order.
+    order: Column<u32>,
+}
+
+/// A hop of a frog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Hop {
+    Stay,
+    East,
+    West,
+    North,
+    South,
+}
+
+impl Hop {
+    const ALL: [Self; 5] = [Self::Stay, Self::East, Self::West, Self::North, Self::South];
+    /// Their names, in the same order.
+    const NAMES: [&'static str; 5] = ["stay", "east", "west", "north", "south"];
 }
 
 /// The state as saved.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Saved {
     pads: Vec<u32>,
+    orders: Vec<u32>,
     sums: Sums,
 }
 
@@ -51,25 +81,49 @@ pub(crate) struct Sums {
 impl PondWorld {
     /// Returns the start: frogs on every other pad.
     fn start(&self) -> PondState {
-        self.with_pads((0..self.frogs).map(|frog| 2 * frog).collect())
+        let pads = (0..self.frogs).map(|frog| 2 * frog).collect();
+        self.state(pads, vec![Hop::Stay as u32; self.frogs as usize])
     }
 
-    fn with_pads(&self, pads: Vec<u32>) -> PondState {
+    fn state(&self, pads: Vec<u32>, orders: Vec<u32>) -> PondState {
         let frog = Column::filled((self.width * self.height) as usize, 0);
         (1u32..).zip(&pads).for_each(|(number, &pad)| frog.set(pad as usize, number));
-        PondState { goal: pads.iter().copied().collect(), pad: pads.into_iter().collect(), frog }
+        PondState {
+            goal: pads.iter().copied().collect(),
+            pad: pads.into_iter().collect(),
+            frog,
+            order: orders.into_iter().collect(),
+        }
     }
 
-    /// Returns the pad that a frog wants: one beside its own, or its own at the bank.
-    fn wanted(&self, frog: Slot, pad: u32, now: Cycle) -> u32 {
-        let (column, row) = (pad % self.width, pad / self.width);
-        match self.streams.draws(frog, now, HOP).uniform_below(4) {
-            0 if column + 1 < self.width => pad + 1,
-            1 if column > 0 => pad - 1,
-            2 if row + 1 < self.height => pad + self.width,
-            3 if row > 0 => pad - self.width,
-            _ => pad,
+    /// Returns the hop of a frog: the ordered one, or one drawn at random.
+    fn decide(&self, state: &PondState, frog: usize, now: Cycle) -> Hop {
+        if self.takes_orders() {
+            let order = state.order.get(frog) as usize;
+            // An order is for one cycle: a frog without a new one stays.
+            state.order.set(frog, Hop::Stay as u32);
+            return Hop::ALL[order];
         }
+        match self.streams.draws(frog as Slot, now, HOP).uniform_below(4) {
+            0 => Hop::East,
+            1 => Hop::West,
+            2 => Hop::North,
+            _ => Hop::South,
+        }
+    }
+
+    /// Returns the pad that a hop leads to: the frog's own at the bank and before reeds.
+    fn target(&self, pad: u32, hop: Hop) -> u32 {
+        let column = pad % self.width;
+        let row = pad / self.width;
+        let target = match hop {
+            Hop::East if column + 1 < self.width => pad + 1,
+            Hop::West if column > 0 => pad - 1,
+            Hop::North if row + 1 < self.height => pad + self.width,
+            Hop::South if row > 0 => pad - self.width,
+            _ => pad,
+        };
+        if self.reeds.contains(&target) { pad } else { target }
     }
 
     fn place_m(&self, pad: u32) -> [f64; 2] {
@@ -92,7 +146,8 @@ impl Phases for PondWorld {
     fn claim(turn: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
         for frog in bodies {
             let pad = turn.state.pad.get(frog);
-            turn.state.goal.set(frog, turn.world.wanted(frog as Slot, pad, turn.now));
+            let hop = turn.world.decide(turn.state, frog, turn.now);
+            turn.state.goal.set(frog, turn.world.target(pad, hop));
         }
     }
 
@@ -109,7 +164,8 @@ impl Phases for PondWorld {
         group.sort_unstable();
         let state = turn.state;
         for &mut frog in group {
-            let (pad, goal) = (state.pad.get(frog as usize), state.goal.get(frog as usize));
+            let pad = state.pad.get(frog as usize);
+            let goal = state.goal.get(frog as usize);
             if pad == goal {
                 continue;
             }

@@ -1,17 +1,20 @@
 //! Scenarios of ponds.
 
-use super::PondWorld;
 use super::world_impl::Collector;
+use super::{PondWorld, external};
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::text::{Description, align_pairs, key_value};
 use sidestep_kernel::{InputError, Run, RunConfig, RunStart, Seed, Simulation};
-use sidestep_scenario::{CompiledScenario, ResolvedScenario, Source, WorldType};
+use sidestep_scenario::{
+    CompiledScenario, Editing, ResolvedScenario, Source, WorldFacts, WorldType,
+};
 use std::any::Any;
 use std::sync::Arc;
 
 /// The world of frogs on lily pads, an entry of the list of worlds.
-pub(crate) struct Pond;
+#[derive(Debug, Clone, Copy)]
+pub struct Pond;
 
 /// The sections of a scenario file.
 #[derive(Debug, Clone, Deserialize)]
@@ -27,6 +30,8 @@ struct File {
     seed: u64,
     cycles: u64,
     pond: Section,
+    #[serde(default)]
+    reeds: Vec<ReedSection>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -37,6 +42,17 @@ struct Section {
     height: u32,
     #[serde(default)]
     checkpoint_every: u64,
+    /// Whether frogs take orders instead of deciding themselves.
+    #[serde(default)]
+    external: bool,
+}
+
+/// A pad overgrown with reeds.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReedSection {
+    /// A point on the pad.
+    at_m: [f64; 2],
 }
 
 struct CompiledPond {
@@ -62,19 +78,40 @@ impl WorldType for Pond {
          [pond]\nfrogs = 12\nwidth = 8\nheight = 6\ncheckpoint_every = 500\n"
     }
 
+    fn facts(&self) -> WorldFacts {
+        super::facts::FACTS
+    }
+
+    fn editing(&self) -> Editing {
+        super::facts::editing()
+    }
+
     fn compile(&self, source: &Source) -> Result<Box<dyn CompiledScenario>, InputError> {
-        let File { name, seed, cycles, pond, .. } = source.parse()?;
-        let Section { frogs, width, height, checkpoint_every } = pond;
+        let File { name, seed, cycles, pond, reeds, .. } = source.parse()?;
+        let Section { frogs, width, height, checkpoint_every, external } = pond;
         if 2 * frogs > width * height {
             return Err(source.error(None, "there are too few pads", "give two pads a frog"));
         }
-        let streams = Streams::new(Seed(seed));
-        let world = Arc::new(PondWorld { frogs, width, height, streams });
+        let world = Arc::new(PondWorld {
+            frogs,
+            width,
+            height,
+            reeds: reeds.iter().filter_map(|reed| pad_at(reed.at_m, width, height)).collect(),
+            streams: Streams::new(Seed(seed)),
+            teams: Arc::new(external::teams(frogs, width * height, external)),
+        });
         Ok(Box::new(CompiledPond {
             world,
             plan: RunConfig { name, seed, cycles, checkpoint_every },
         }))
     }
+}
+
+/// Returns the pad at a point, if one is there.
+fn pad_at([x_m, y_m]: [f64; 2], width: u32, height: u32) -> Option<u32> {
+    let is_inside =
+        (0.0..f64::from(width)).contains(&x_m) && (0.0..f64::from(height)).contains(&y_m);
+    is_inside.then(|| y_m as u32 * width + x_m as u32)
 }
 
 impl CompiledScenario for CompiledPond {

@@ -4,6 +4,7 @@ use super::rows::{Event, FrogAction, Rows};
 use super::{PondState, PondWorld, Saved, Sums};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
+use sidestep_kernel::control::{BufferMut, Order, Teams};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{Description, KeyValues, key_value};
@@ -14,6 +15,7 @@ use sidestep_kernel::{
     Cycle, Digest, RunStats, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
     WorldView,
 };
+use std::sync::Arc;
 
 /// The part of a run that is kept beside the state.
 #[derive(Debug, Default)]
@@ -99,19 +101,28 @@ impl WorldCheckpoint for PondWorld {
         let mut hasher = Hasher::default();
         hasher.write_u64(now);
         state.pad.iter().for_each(|pad| hasher.write_u32(pad));
+        // Given orders are part of the state; without any the digest is that of the pads.
+        if self.takes_orders() {
+            state.order.iter().for_each(|order| hasher.write_u32(order));
+        }
         hasher.finish()
     }
 
     fn save(&self, state: &PondState, books: &Collector, _: Cycle) -> Saved {
-        Saved { pads: state.pad.iter().collect(), sums: books.sums }
+        Saved {
+            pads: state.pad.iter().collect(),
+            orders: state.order.iter().collect(),
+            sums: books.sums,
+        }
     }
 
     fn restore(&self, saved: Saved, books: &mut Collector) -> Result<PondState, CheckpointError> {
-        if saved.pads.len() != self.frogs as usize {
+        let frogs = self.frogs as usize;
+        if saved.pads.len() != frogs || saved.orders.len() != frogs {
             return Err(CheckpointError::Damaged);
         }
         books.sums = saved.sums;
-        Ok(self.with_pads(saved.pads))
+        Ok(self.state(saved.pads, saved.orders))
     }
 }
 
@@ -122,7 +133,7 @@ impl WorldView for PondWorld {
             dimensions: 2,
             cycle_s: 1.0,
             floor: None,
-            bodies: Vec::new(),
+            bodies: (0..).zip(&self.reeds).map(|(number, &pad)| self.reed(number, pad)).collect(),
             names: Vec::new(),
         }
     }
@@ -138,7 +149,28 @@ impl WorldView for PondWorld {
     }
 }
 
-impl WorldControl for PondWorld {}
+impl PondWorld {
+    fn reed(&self, number: u32, pad: u32) -> Body {
+        let [x_m, y_m] = self.place_m(pad);
+        let shape = Shape::Cuboid { size_m: [1.0, 1.0, 0.5] };
+        Body::new(BodyKind::Obstacle, number, Pose::from_position([x_m, y_m, 0.25]), shape)
+    }
+}
+
+impl WorldControl for PondWorld {
+    fn teams(&self) -> Arc<Teams> {
+        Arc::clone(&self.teams)
+    }
+
+    fn order(&self, state: &mut PondState, order: &Order<'_>) {
+        let [hop] = *order.values else { return };
+        state.order.set(order.agent as usize, hop as u32);
+    }
+
+    fn observe(&self, state: &PondState, _: Cycle, _: usize, buffers: &mut [BufferMut<'_>]) {
+        self.write_observations(state, buffers);
+    }
+}
 
 impl WorldMetrics for PondWorld {
     type Metrics = Value;

@@ -1,0 +1,219 @@
+//! How the studio's page edits the text of a scenario on its canvas. The page has the tools; a world declares those that
+//! its scenarios need, with the keys that they edit.
+
+use serde::Serialize;
+
+/// The editing of a world's scenarios on the canvas; by default there is none.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Editing {
+    /// The tools for scenes in the plane, in the order of the toolbar.
+    pub tools: Vec<EditTool>,
+    /// The tools for scenes in space, where a point on the screen has no unique position.
+    pub tools_in_space: Vec<EditTool>,
+    /// The items that can be selected, those that are drawn first in front.
+    pub items: Vec<EditItems>,
+    /// Restrictions of some scenarios; the first that holds is shown.
+    pub notes: Vec<EditNote>,
+    /// Uses of files that hold no scenario; the first that fits a file is made.
+    pub files: Vec<FileUse>,
+    /// Words about the use of such files, for people who choose one.
+    pub about_files: &'static str,
+}
+
+/// A tool.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EditTool {
+    /// Its name for programs, unique among the tools of a world.
+    pub id: &'static str,
+    /// Its symbol on narrow screens.
+    pub sign: &'static str,
+    /// Its name for people.
+    pub name: &'static str,
+    /// Its use.
+    pub help: &'static str,
+    /// Its effect.
+    pub action: EditAction,
+}
+
+/// The effect of a tool. Positions are those of a press and of its end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub enum EditAction {
+    /// Selects, moves, removes and rotates items.
+    Select,
+    /// Draws boxes of the map in `map.ascii`.
+    Paint {
+        /// The boxes.
+        area: PaintArea,
+    },
+    /// Adds a body at a box, to the selected section that gives boxes (`at`), to the last one, or in a new one.
+    AddBody {
+        /// The sections.
+        section: &'static str,
+        /// Other keys of a new section.
+        template: serde_json::Value,
+    },
+    /// Adds a body that covers all boxes of a rectangle, and clears the map there.
+    AddDoor {
+        /// The sections.
+        section: &'static str,
+        /// Other keys of a new section.
+        template: serde_json::Value,
+    },
+    /// Adds a box to the way-points of the selected bodies (`behaviour.goals`).
+    AddGoal {
+        /// The sections of the bodies.
+        section: &'static str,
+    },
+    /// Adds a point (`at_m`).
+    AddPoint {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a ball (`at_m`, `radius_m`).
+    AddBall {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a wall (`ends_m`).
+    AddWall {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a box (`at_m`, `size_m`).
+    AddBox {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a triangle, or a corner to the selected polygon (`corners_m`).
+    AddPolygon {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a way-point to a ball or a box (`patrol_m`).
+    AddPatrol {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a body with its start, heading and first way-point (`at_m`, `heading_deg`, `way_points_m`).
+    AddRoute {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Adds a way-point to the selected route.
+    AddWayPoint {
+        /// The sections.
+        section: &'static str,
+    },
+}
+
+/// The boxes that a tool draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PaintArea {
+    /// Those along the pointer's path.
+    Brush,
+    /// Those on a straight line.
+    Line,
+    /// The edge of a rectangle.
+    Rectangle,
+    /// All that are connected with one.
+    Fill,
+    /// Those along the pointer's path, which become free.
+    Eraser,
+}
+
+/// Items of a text that have positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "of", rename_all = "kebab-case")]
+pub enum EditItems {
+    /// Way-points and areas of bodies on boxes.
+    Goals {
+        /// The sections of the bodies.
+        section: &'static str,
+    },
+    /// Bodies on boxes (`at`, `size`).
+    Bodies {
+        /// The sections.
+        section: &'static str,
+        /// The noun for one of them.
+        noun: &'static str,
+        /// Whether they have headings.
+        turns: bool,
+    },
+    /// Points (`at_m`).
+    Points {
+        /// The sections.
+        section: &'static str,
+        /// The noun for one of them.
+        noun: &'static str,
+    },
+    /// Balls, walls, boxes and polygons, with their patrols.
+    Obstacles {
+        /// The sections.
+        section: &'static str,
+    },
+    /// Starts (`at_m`), and the targets of tasks.
+    Starts {
+        /// The sections.
+        section: &'static str,
+        /// The noun for one of them.
+        noun: &'static str,
+    },
+    /// Routes: starts, headings and way-points.
+    Routes {
+        /// The sections.
+        section: &'static str,
+        /// The noun for one of them.
+        noun: &'static str,
+    },
+}
+
+/// A restriction of the scenarios that have or lack some keys, as `map.ascii`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct EditNote {
+    /// The key that it needs.
+    pub when: Option<&'static str>,
+    /// The key without which it holds.
+    pub unless: Option<&'static str>,
+    /// Its words.
+    pub text: &'static str,
+}
+
+/// The use of a file that holds no scenario.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FileUse {
+    /// The kind of the file.
+    pub kind: UsedFile,
+    /// Endings of its name, e.g. `.png`; none for any name.
+    pub endings: &'static [&'static str],
+    /// The key that gets its path.
+    pub key: &'static str,
+    /// Whether that is a list, to which the path is added.
+    pub is_list: bool,
+    /// Keys that it replaces.
+    pub replaces: &'static [&'static str],
+    /// Numbers of keys that are set with it, unless the text has them.
+    pub defaults: &'static [(&'static str, f64)],
+}
+
+/// The kind of a file that holds no scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum UsedFile {
+    /// A map or an image of a floor.
+    Map,
+    /// Sensors and effectors that were learned from logs.
+    Profile,
+}
+
+impl EditTool {
+    /// Returns a tool that selects.
+    pub const SELECT: Self = Self {
+        id: "select",
+        sign: "↖",
+        name: "Select",
+        help: "Click selects, drag moves, Delete removes, r rotates",
+        action: EditAction::Select,
+    };
+}

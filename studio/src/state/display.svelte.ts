@@ -1,0 +1,11 @@
+/** The page's display settings of one session. */
+
+export type TrailMode = "none" | "selected" | "all";
+
+export class Display {
+  trails = $state<TrailMode>("selected");
+  /** Whether lines are drawn at their true width. */
+  widthIsTrue = $state(false);
+  /** Cycle under the pointer in the timeline or a chart. */
+  cursor = $state<number | null>(null);
+}

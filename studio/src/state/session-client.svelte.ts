@@ -1,0 +1,82 @@
+/** Requests of one session to the server, and the reports of those that failed. */
+
+import { CONNECTION_LOST, RequestError, makeProblem } from "../connection";
+import type { Problem, ReplyBody, ServerMethod, SessionMethod } from "../protocol";
+
+/** What a session needs from the page: requests and a sink of problems. */
+export interface SessionHost {
+  request(call: ServerMethod): Promise<ReplyBody>;
+  requestSession(session: number, call: SessionMethod): Promise<ReplyBody>;
+  onProblem(problem: Problem): void;
+}
+
+const SESSION_NOT_OPEN = makeProblem("session", "it is not open on the server", "wait until the page has reconnected");
+
+export class SessionClient {
+  /** The server's number of the session; 0 between two connections, as each server assigns numbers anew. */
+  id = $state(0);
+  /** The problem that ended the session on the server. */
+  ended = $state.raw<Problem | null>(null);
+  readonly #host: SessionHost;
+
+  constructor(host: SessionHost) {
+    this.#host = host;
+  }
+
+  /** Returns whether the server has this session and can still serve it. */
+  get isLive(): boolean {
+    return this.id !== 0 && this.ended === null;
+  }
+
+  /** Sends a request to the session. */
+  request(call: SessionMethod): Promise<ReplyBody> {
+    if (this.id === 0) return Promise.reject(new RequestError(SESSION_NOT_OPEN));
+    return this.#host.requestSession(this.id, call);
+  }
+
+  /** Sends a request and reports its problem, if there is one. */
+  async send(call: SessionMethod): Promise<ReplyBody | null> {
+    try {
+      return await this.request(call);
+    } catch (error) {
+      this.reportError(error);
+      return null;
+    }
+  }
+
+  /** Sends a request whose failure is ignored. */
+  sendQuietly(call: SessionMethod): void {
+    this.request(call).catch(() => undefined);
+  }
+
+  /** The scenario's text and file. */
+  source(): Promise<ReplyBody> {
+    return this.request({ do: "source" });
+  }
+
+  /** The JSON Schema of the scenarios of a world. */
+  schema(world: string): Promise<ReplyBody> {
+    return this.#host.request({ do: "schema", world });
+  }
+
+  /** The problems of a text, with the session's folder as that of relative paths. */
+  check(text: string): Promise<ReplyBody> {
+    return this.request({ do: "check", text });
+  }
+
+  /** The names of the recorded tables. */
+  async tables(): Promise<string[]> {
+    const answer = await this.send({ do: "tables" });
+    return answer?.is === "tables" ? answer.names : [];
+  }
+
+  reportProblem(problem: Problem): void {
+    this.#host.onProblem(problem);
+  }
+
+  /** Reports the problem of a failed request, except for a lost connection, which one banner reports for all. */
+  reportError(error: unknown): void {
+    if (!(error instanceof RequestError)) throw error;
+    if (error.problem !== CONNECTION_LOST && error.problem !== SESSION_NOT_OPEN) this.reportProblem(error.problem);
+  }
+}
