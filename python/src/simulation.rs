@@ -1,6 +1,6 @@
 //! Simulations that Python advances, observes and orders.
 
-use crate::arrays::{WholeNumber, agent_ids, body_column, body_rows, body_texts, order_values};
+use crate::arrays::{UnsignedArg, agent_ids, body_column, body_rows, body_texts, order_values};
 use crate::blocks::Blocks;
 use crate::error::{self, ClosedError, argument_error};
 use crate::json::to_python;
@@ -61,7 +61,7 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// Starts a scenario while other threads of Python go on.
+    /// Starts a scenario while other threads of Python run.
     fn start(
         py: Python<'_>,
         scenario: Arc<LoadedScenario>,
@@ -92,7 +92,7 @@ impl Simulation {
         Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
     }
 
-    /// Works with the run while other threads of Python go on.
+    /// Works with the run while other threads of Python run.
     fn with_run<T: Send>(
         &self,
         py: Python<'_>,
@@ -164,10 +164,10 @@ impl Simulation {
     /// Returns the team of an agent; the first one for an agent that is in none, whose order the run then refuses with a
     /// reason.
     fn team_of(&self, agent: Option<EntityId>) -> PyResult<IndexedTeam> {
-        let has = |team: &Arc<control::Team>| {
-            agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
-        };
-        let number = self.teams.iter().position(has).unwrap_or(0);
+        let position = agent.and_then(|id| {
+            self.teams.iter().position(|team| team.agents.binary_search(&id).is_ok())
+        });
+        let number = position.unwrap_or(0);
         team_at(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
     }
 
@@ -188,12 +188,12 @@ impl Simulation {
     /// Gives an order to agents of a team.
     fn order_agents(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         agents: &[EntityId],
         team: &control::Team,
     ) -> PyResult<()> {
+        let py = values.py();
         let shape =
             team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
         let values = order_values(py, order, values, agents.len(), shape)?;
@@ -263,6 +263,10 @@ struct SliceOutcome {
     is_last: bool,
 }
 
+fn condition_name(body: &Body) -> String {
+    format!("{:?}", body.state).to_lowercase()
+}
+
 fn draw_error(error: &DrawError) -> PyErr {
     error::RecordError::new_err(error.to_string())
 }
@@ -306,18 +310,18 @@ fn closed_error() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=WholeNumber(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=UnsignedArg(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
-        seed: Option<WholeNumber>,
-        workers: WholeNumber,
+        seed: Option<UnsignedArg>,
+        workers: UnsignedArg,
         record: RecordArgument,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
         let py = scenario.py();
         let mut scenario = load(scenario)?;
-        let seed = seed.map(|WholeNumber(seed)| seed);
+        let seed = seed.map(|UnsignedArg(seed)| seed);
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
@@ -336,8 +340,8 @@ impl Simulation {
     ///
     /// >>> sim.step(), sim.step(5)
     /// (1, 5)
-    #[pyo3(signature = (cycles=WholeNumber(1)), text_signature = "($self, cycles=1)")]
-    fn step(&self, py: Python<'_>, cycles: WholeNumber) -> PyResult<u64> {
+    #[pyo3(signature = (cycles=UnsignedArg(1)), text_signature = "($self, cycles=1)")]
+    fn step(&self, py: Python<'_>, cycles: UnsignedArg) -> PyResult<u64> {
         self.advance_to_goal(py, Goal::Further(cycles.0))
     }
 
@@ -354,12 +358,12 @@ impl Simulation {
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     fn run(
         slf: &Bound<'_, Self>,
-        until: Option<WholeNumber>,
+        until: Option<UnsignedArg>,
         decide: Option<&Bound<'_, PyAny>>,
         state: Option<Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
         let simulation = slf.get();
-        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
+        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
         match decide {
             None => simulation.advance_to_goal(slf.py(), Goal::Until(until)),
             Some(decide) => run_with_policies(slf.py(), simulation, decide, state, until),
@@ -447,19 +451,18 @@ impl Simulation {
     #[pyo3(signature = (name, values, *, agents=None, team=None))]
     fn order(
         &self,
-        py: Python<'_>,
         name: &str,
         values: &Bound<'_, PyAny>,
         agents: Option<&Bound<'_, PyAny>>,
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let agents = agents.map(|agents| agent_ids(py, agents)).transpose()?;
+        let agents = agents.map(|agents| agent_ids(agents.py(), agents)).transpose()?;
         let (_, team) = match (team, &agents) {
             (None, Some(agents)) => self.team_of(agents.first().copied())?,
             (team, _) => self.find_team(team)?,
         };
         let agents = agents.as_deref().unwrap_or(&team.agents);
-        self.order_agents(py, name, values, agents, &team)
+        self.order_agents(name, values, agents, &team)
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold such checkpoints.
@@ -470,7 +473,7 @@ impl Simulation {
         Ok(PyBytes::new(py, &self.checkpoint_bytes(py)?))
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
+    /// Continues from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
     /// `tables` gives the rows of a run that never went there. Rows that `tables` has already given are up to you.
     ///
     /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. Recorded rows have one
@@ -535,8 +538,7 @@ impl Simulation {
         dict.set_item("at_m", body_rows(py, bodies, |body| body.pose.at_m)?)?;
         dict.set_item("turn", body_rows(py, bodies, |body| body.pose.turn)?)?;
         dict.set_item("velocity_m_s", body_rows(py, bodies, |body| body.velocity_m_s)?)?;
-        let condition = |body: &Body| format!("{:?}", body.state).to_lowercase();
-        dict.set_item("condition", body_texts(py, bodies, condition)?)?;
+        dict.set_item("condition", body_texts(py, bodies, condition_name)?)?;
         Ok(dict)
     }
 
@@ -618,7 +620,7 @@ impl Simulation {
         &self,
         py: Python<'_>,
         tables: Option<RecordArgument>,
-        frames: Option<WholeNumber>,
+        frames: Option<UnsignedArg>,
     ) -> PyResult<()> {
         let RecordArgument(selection) =
             tables.unwrap_or(RecordArgument(Some(RowSelection::default())));
@@ -629,7 +631,7 @@ impl Simulation {
                 "leave it out",
             ));
         };
-        let frames = frames.map(|WholeNumber(frames)| frames);
+        let frames = frames.map(|UnsignedArg(frames)| frames);
         let selection = RowSelection { frames, ..selection };
         self.with_run(py, |run| run.keep_rows(&selection).map_err(|e| error::input_error(&e)))
     }
@@ -668,13 +670,13 @@ impl Simulation {
     /// 80 80
     /// 100 40
     #[pyo3(
-        signature = (cycles=WholeNumber(1024), until=None, *, decide=None, state=None),
+        signature = (cycles=UnsignedArg(1024), until=None, *, decide=None, state=None),
         text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
     )]
     fn blocks(
         slf: Bound<'_, Self>,
-        cycles: WholeNumber,
-        until: Option<WholeNumber>,
+        cycles: UnsignedArg,
+        until: Option<UnsignedArg>,
         decide: Option<Py<PyAny>>,
         state: Option<Py<PyAny>>,
     ) -> PyResult<Blocks> {
@@ -693,7 +695,7 @@ impl Simulation {
             }
             run.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
         })?;
-        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
+        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
         // Functions keep their state from block to block, as from cycle to cycle.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
         let simulation = slf.into_any().unbind();
@@ -782,12 +784,11 @@ impl PolicyRun for Simulation {
 
     fn give_order(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         team: &control::Team,
     ) -> PyResult<()> {
-        self.order_agents(py, order, values, &team.agents, team)
+        self.order_agents(order, values, &team.agents, team)
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {

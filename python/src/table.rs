@@ -1,6 +1,6 @@
 //! Tables: rows as Arrow and NumPy arrays.
 
-use crate::arrays::WholeNumber;
+use crate::arrays::UnsignedArg;
 use crate::error;
 use crate::json::to_list;
 use crate::notebook::to_html;
@@ -59,23 +59,21 @@ impl Table {
     /// Returns a table of a sweep's runs; numbers are not copied.
     pub(crate) fn from_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
         let infos = worlds::list().find(world).map_or(&[][..], |world| world.metric_infos());
-        let spec = |column: &RunColumn| ColumnSpec {
+        let specs = columns.iter().map(|column| ColumnSpec {
             is_nullable: true,
             ..ColumnSpec::new(&column.name, column.values.ty(), &column_description(column, infos))
-        };
-        let schema = TableSchema::new(name, columns.iter().map(spec).collect());
+        });
+        let schema = TableSchema::new(name, specs.collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())
     }
 
     fn column_index(&self, name: &str) -> PyResult<usize> {
-        let known = || {
-            let names: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
-            names.join(", ")
-        };
         let position = self.schema.columns.iter().position(|column| column.name == name);
         position.ok_or_else(|| {
             let table = &self.schema.name;
-            PyKeyError::new_err(format!("no column `{name}` in `{table}`; it has {}", known()))
+            let known: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
+            let known = known.join(", ");
+            PyKeyError::new_err(format!("no column `{name}` in `{table}`; it has {known}"))
         })
     }
 }
@@ -167,19 +165,20 @@ impl Table {
     ///
     /// >>> [row[:2] for row in table.head(2)]
     /// [(0, 0), (1, 0)]
-    #[pyo3(signature = (rows=WholeNumber(5)), text_signature = "($self, rows=5)")]
-    fn head<'py>(&self, py: Python<'py>, rows: WholeNumber) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+    #[pyo3(signature = (rows=UnsignedArg(5)), text_signature = "($self, rows=5)")]
+    fn head<'py>(&self, py: Python<'py>, rows: UnsignedArg) -> PyResult<Vec<Bound<'py, PyTuple>>> {
         let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));
         let first = self.batch.slice(0, rows);
         let mut columns = Vec::new();
         for (array, spec) in first.columns().iter().zip(&self.schema.columns) {
             columns.push(to_python_values(py, array, spec.ty)?);
         }
-        let row = |k: usize| {
+        let mut head = Vec::with_capacity(rows);
+        for k in 0..rows {
             let cells = columns.iter().map(|column: &Bound<'_, PyList>| column.get_item(k));
-            PyTuple::new(py, cells.collect::<PyResult<Vec<_>>>()?)
-        };
-        (0..rows).map(row).collect()
+            head.push(PyTuple::new(py, cells.collect::<PyResult<Vec<_>>>()?)?);
+        }
+        Ok(head)
     }
 
     /// The schema as an Arrow capsule.
