@@ -16,7 +16,7 @@ use sidestep_statistics::{Moments, percentile};
 const MAX_FORWARD_TURN_DEG: f64 = 10.0;
 /// A smaller turn does not count as a turn.
 const MIN_TURN_DEG: f64 = 20.0;
-/// A shorter step of odometry is too short to show its slip: logs give centimeters, so rounding would look like it.
+/// A shorter step of odometry is too short to show its slip, a ratio in which the noise of poses is divided by the step.
 const MIN_SLIP_STEP_M: f64 = 0.03;
 /// A step of odometry as long as this, or a turn as wide, is none: the pose has jumped.
 const MIN_JUMP_M: f64 = 1.0;
