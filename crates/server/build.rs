@@ -10,6 +10,7 @@ use std::fs::{self, File};
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::SystemTime;
 use std::{env, io};
 
 /// Parts of `studio/` that do not go into the page.
@@ -24,8 +25,8 @@ fn main() {
     for name in ["SIDESTEP_PAGE", "SIDESTEP_PAGE_DIST"] {
         println!("cargo::rerun-if-env-changed={name}");
     }
-    let wish = env::var("SIDESTEP_PAGE").unwrap_or_default();
-    let page = match (env::var_os("SIDESTEP_PAGE_DIST"), wish.as_str()) {
+    let mode = env::var("SIDESTEP_PAGE").unwrap_or_default();
+    let page = match (env::var_os("SIDESTEP_PAGE_DIST"), mode.as_str()) {
         (Some(folder), _) => {
             println!("cargo::rerun-if-changed={}", Path::new(&folder).display());
             Ok(PathBuf::from(folder))
@@ -35,7 +36,7 @@ fn main() {
     };
     let files = page.and_then(|page| files_of(&page));
     let files = files.unwrap_or_else(|cause| {
-        assert!(wish != "require", "SIDESTEP_PAGE=require, but there is no page: {cause}");
+        assert!(mode != "require", "SIDESTEP_PAGE=require, but there is no page: {cause}");
         vec![("index.html".into(), write_plain(&out, &cause))]
     });
     fs::write(out.join("assets.rs"), table(&files)).expect("the table is written");
@@ -43,18 +44,18 @@ fn main() {
 
 /// Builds the page into a folder.
 fn build_page(studio: &Path, page: &Path) -> Result<PathBuf, String> {
-    let missing = || "the sources of the page are not here".to_string();
+    const NO_SOURCES: &str = "the sources of the page are not here";
     if !studio.join("package.json").is_file() {
-        return Err(missing());
+        return Err(NO_SOURCES.into());
     }
-    let entries = fs::read_dir(studio).map_err(|_| missing())?;
+    let entries = fs::read_dir(studio).map_err(|_| NO_SOURCES)?;
     let mut names: Vec<_> = entries.flatten().map(|entry| entry.file_name()).collect();
     names.sort();
     for name in names.iter().filter(|name| EXCLUDED.iter().all(|aside| name != aside)) {
         println!("cargo::rerun-if-changed={}", studio.join(name).display());
     }
     if npm().arg("--version").output().is_err() {
-        return Err("npm was not there when it was built".into());
+        return Err("npm was not installed when it was built".into());
     }
     // Several cargo processes may build at once, such as an editor's.
     let lock = File::create(studio.join(".build-lock")).map_err(|e| e.to_string())?;
@@ -71,14 +72,19 @@ fn build_page(studio: &Path, page: &Path) -> Result<PathBuf, String> {
 
 /// Installs the tools that build the page, unless they are installed already.
 fn install(studio: &Path) -> Result<(), String> {
-    let wanted = studio.join("package-lock.json");
-    let changed = |path: &Path| path.metadata().and_then(|about| about.modified());
-    let is_there =
-        |there: PathBuf| -> io::Result<bool> { Ok(changed(&there)? >= changed(&wanted)?) };
-    match is_there(studio.join("node_modules/.package-lock.json")) {
-        Ok(true) => Ok(()),
-        _ => run(studio, &["ci", "--omit=dev", "--no-audit", "--no-fund", "--prefer-offline"]),
+    // npm writes a copy of the lock file at the end of an installation.
+    let installed = modified(&studio.join("node_modules/.package-lock.json"));
+    let wanted = modified(&studio.join("package-lock.json"));
+    if let (Ok(installed), Ok(wanted)) = (installed, wanted)
+        && installed >= wanted
+    {
+        return Ok(());
     }
+    run(studio, &["ci", "--omit=dev", "--no-audit", "--no-fund", "--prefer-offline"])
+}
+
+fn modified(path: &Path) -> io::Result<SystemTime> {
+    path.metadata()?.modified()
 }
 
 fn npm() -> Command {
@@ -101,12 +107,11 @@ fn run(studio: &Path, args: &[&str]) -> Result<(), String> {
 
 /// Returns the files below a folder by their paths in it, in their order.
 fn files_of(folder: &Path) -> Result<Vec<(String, PathBuf)>, String> {
-    let unreadable = |e: io::Error| format!("{} cannot be read: {e}", folder.display());
     let mut open = vec![folder.to_path_buf()];
     let mut files = Vec::new();
     while let Some(folder) = open.pop() {
-        for entry in fs::read_dir(&folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
+        for entry in fs::read_dir(&folder).map_err(|e| unreadable(&folder, &e))? {
+            let path = entry.map_err(|e| unreadable(&folder, &e))?.path();
             if path.is_dir() { open.push(path) } else { files.push(path) }
         }
     }
@@ -114,13 +119,19 @@ fn files_of(folder: &Path) -> Result<Vec<(String, PathBuf)>, String> {
     for path in files {
         let inside = path.strip_prefix(folder).map_err(|e| e.to_string())?;
         let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
-        named.push((parts.join("/"), fs::canonicalize(&path).map_err(unreadable)?));
+        let real = fs::canonicalize(&path).map_err(|e| unreadable(&path, &e))?;
+        named.push((parts.join("/"), real));
     }
+    // The order of a folder's entries differs between machines, and the table shall not.
     named.sort();
-    match named.iter().any(|(name, _)| name == "index.html") {
-        true => Ok(named),
-        false => Err(format!("there is no index.html in {}", folder.display())),
+    if !named.iter().any(|(name, _)| name == "index.html") {
+        return Err(format!("there is no index.html in {}", folder.display()));
     }
+    Ok(named)
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> String {
+    format!("{} cannot be read: {error}", path.display())
 }
 
 /// Returns the table of files as source.
@@ -130,7 +141,8 @@ fn table(files: &[(String, PathBuf)]) -> String {
         let content = fs::read(path).expect("the page is read");
         let mut hasher = DefaultHasher::new();
         content.hash(&mut hasher);
-        let (media, tag) = (media(name), format!("\"{:016x}\"", hasher.finish()));
+        let media = media(name);
+        let tag = format!("\"{:016x}\"", hasher.finish());
         let path = path.display().to_string();
         writeln!(
             text,

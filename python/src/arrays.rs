@@ -11,13 +11,13 @@ use sidestep::kernel::view::Body;
 
 /// An argument that is a whole number, which may be larger in Python than in Rust.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct WholeNumber(pub(crate) u64);
+pub(crate) struct UnsignedArg(pub(crate) u64);
 
-impl FromPyObject<'_, '_> for WholeNumber {
+impl FromPyObject<'_, '_> for UnsignedArg {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        value.extract::<u64>().map(WholeNumber).map_err(|raised| {
+        value.extract::<u64>().map(UnsignedArg).map_err(|raised| {
             if !raised.is_instance_of::<PyOverflowError>(value.py()) {
                 return raised;
             }

@@ -1,6 +1,6 @@
 //! Many worlds of one scenario, stepped together.
 
-use crate::arrays::{WholeNumber, order_values};
+use crate::arrays::{UnsignedArg, order_values};
 use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python};
 use crate::scenario::{LoadedScenario, Scenario, load};
@@ -100,7 +100,7 @@ impl Batch {
 }
 
 /// Returns a number of things, which must be from 1 to `max`.
-fn bounded_count(name: &str, WholeNumber(count): WholeNumber, max: usize) -> PyResult<usize> {
+fn bounded_count(name: &str, UnsignedArg(count): UnsignedArg, max: usize) -> PyResult<usize> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     if (1..=max).contains(&count) {
         return Ok(count);
@@ -154,14 +154,14 @@ fn start_function(scenario: &Arc<LoadedScenario>) -> PyResult<Arc<SimulationFact
 impl Batch {
     #[new]
     #[pyo3(
-        signature = (scenario, worlds, *, workers=WholeNumber(1), seeds=None),
+        signature = (scenario, worlds, *, workers=UnsignedArg(1), seeds=None),
         text_signature = "(scenario, worlds, *, workers=1, seeds=None)"
     )]
     fn new(
         py: Python<'_>,
         scenario: &Bound<'_, PyAny>,
-        worlds: WholeNumber,
-        workers: WholeNumber,
+        worlds: UnsignedArg,
+        workers: UnsignedArg,
         seeds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let worlds = bounded_count("worlds", worlds, MAX_WORLDS)?;
@@ -275,11 +275,11 @@ impl Batch {
     /// >>> batch.step(mask=np.array([True, False, True]))
     /// >>> batch.cycles.tolist()
     /// [6, 5, 6]
-    #[pyo3(signature = (cycles=WholeNumber(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
+    #[pyo3(signature = (cycles=UnsignedArg(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
     fn step(
         &self,
         py: Python<'_>,
-        cycles: WholeNumber,
+        cycles: UnsignedArg,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let mask = self.parse_mask(mask)?;

@@ -1,6 +1,6 @@
 //! Simulations that Python advances, observes and orders.
 
-use crate::arrays::{WholeNumber, agent_ids, body_column, body_rows, body_texts, order_values};
+use crate::arrays::{UnsignedArg, agent_ids, body_column, body_rows, body_texts, order_values};
 use crate::blocks::Blocks;
 use crate::error::{self, ClosedError, argument_error};
 use crate::json::to_python;
@@ -310,18 +310,18 @@ fn closed_error() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=WholeNumber(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=UnsignedArg(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
-        seed: Option<WholeNumber>,
-        workers: WholeNumber,
+        seed: Option<UnsignedArg>,
+        workers: UnsignedArg,
         record: RecordArgument,
         out: Option<PathBuf>,
         replace: bool,
     ) -> PyResult<Self> {
         let py = scenario.py();
         let mut scenario = load(scenario)?;
-        let seed = seed.map(|WholeNumber(seed)| seed);
+        let seed = seed.map(|UnsignedArg(seed)| seed);
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
@@ -340,8 +340,8 @@ impl Simulation {
     ///
     /// >>> sim.step(), sim.step(5)
     /// (1, 5)
-    #[pyo3(signature = (cycles=WholeNumber(1)), text_signature = "($self, cycles=1)")]
-    fn step(&self, py: Python<'_>, cycles: WholeNumber) -> PyResult<u64> {
+    #[pyo3(signature = (cycles=UnsignedArg(1)), text_signature = "($self, cycles=1)")]
+    fn step(&self, py: Python<'_>, cycles: UnsignedArg) -> PyResult<u64> {
         self.advance_to_goal(py, Goal::Further(cycles.0))
     }
 
@@ -358,12 +358,12 @@ impl Simulation {
     #[pyo3(signature = (until=None, *, decide=None, state=None))]
     fn run(
         slf: &Bound<'_, Self>,
-        until: Option<WholeNumber>,
+        until: Option<UnsignedArg>,
         decide: Option<&Bound<'_, PyAny>>,
         state: Option<Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
         let simulation = slf.get();
-        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
+        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
         match decide {
             None => simulation.advance_to_goal(slf.py(), Goal::Until(until)),
             Some(decide) => run_with_policies(slf.py(), simulation, decide, state, until),
@@ -620,7 +620,7 @@ impl Simulation {
         &self,
         py: Python<'_>,
         tables: Option<RecordArgument>,
-        frames: Option<WholeNumber>,
+        frames: Option<UnsignedArg>,
     ) -> PyResult<()> {
         let RecordArgument(selection) =
             tables.unwrap_or(RecordArgument(Some(RowSelection::default())));
@@ -631,7 +631,7 @@ impl Simulation {
                 "leave it out",
             ));
         };
-        let frames = frames.map(|WholeNumber(frames)| frames);
+        let frames = frames.map(|UnsignedArg(frames)| frames);
         let selection = RowSelection { frames, ..selection };
         self.with_run(py, |run| run.keep_rows(&selection).map_err(|e| error::input_error(&e)))
     }
@@ -670,13 +670,13 @@ impl Simulation {
     /// 80 80
     /// 100 40
     #[pyo3(
-        signature = (cycles=WholeNumber(1024), until=None, *, decide=None, state=None),
+        signature = (cycles=UnsignedArg(1024), until=None, *, decide=None, state=None),
         text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
     )]
     fn blocks(
         slf: Bound<'_, Self>,
-        cycles: WholeNumber,
-        until: Option<WholeNumber>,
+        cycles: UnsignedArg,
+        until: Option<UnsignedArg>,
         decide: Option<Py<PyAny>>,
         state: Option<Py<PyAny>>,
     ) -> PyResult<Blocks> {
@@ -695,7 +695,7 @@ impl Simulation {
             }
             run.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
         })?;
-        let until = simulation.end_cycle(until.map(|WholeNumber(until)| until));
+        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
         // Functions keep their state from block to block, as from cycle to cycle.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
         let simulation = slf.into_any().unbind();

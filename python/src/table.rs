@@ -1,6 +1,6 @@
 //! Tables: rows as Arrow and NumPy arrays.
 
-use crate::arrays::WholeNumber;
+use crate::arrays::UnsignedArg;
 use crate::error;
 use crate::json::to_list;
 use crate::notebook::to_html;
@@ -165,8 +165,8 @@ impl Table {
     ///
     /// >>> [row[:2] for row in table.head(2)]
     /// [(0, 0), (1, 0)]
-    #[pyo3(signature = (rows=WholeNumber(5)), text_signature = "($self, rows=5)")]
-    fn head<'py>(&self, py: Python<'py>, rows: WholeNumber) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+    #[pyo3(signature = (rows=UnsignedArg(5)), text_signature = "($self, rows=5)")]
+    fn head<'py>(&self, py: Python<'py>, rows: UnsignedArg) -> PyResult<Vec<Bound<'py, PyTuple>>> {
         let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));
         let first = self.batch.slice(0, rows);
         let mut columns = Vec::new();

@@ -1,6 +1,6 @@
 /** Numbers and names as text for people. */
 
-import type { Point3, Value, BodyId } from "./protocol";
+import type { Point3, FactValue, BodyId } from "./protocol";
 
 /** Narrow space between a number and its unit. */
 const NARROW = "\u202f";
@@ -90,7 +90,7 @@ export function bodyKey(who: BodyId): string {
 }
 
 /** A value of an inspection, except bodies, which become links. */
-export function valueText(value: Value, dimensions: number): string {
+export function valueText(value: FactValue, dimensions: number): string {
   if (value === "none") return "–";
   if ("number" in value) return withUnit(value.number.value, value.number.unit);
   if ("share" in value) return share(value.share);

@@ -2,7 +2,7 @@
 
 import { chromium, type Browser, type Page } from "playwright-core";
 
-/** Longest wait: on a busy machine software rendering is slow; nothing waits for luck. */
+/** Maximum wait: software rendering is slow on a busy machine. */
 export const WAIT_MS = Number(process.env.WAIT_MS ?? 60_000);
 
 export function launch(): Promise<Browser> {
@@ -28,12 +28,12 @@ export interface PageOptions {
   isDark?: boolean;
 }
 
-/** Opens the page; its complaints are gathered in `complaints`. */
+/** Opens the page and collects its errors in `consoleErrors`. */
 export async function openPage(
   browser: Browser,
   url: string,
   look: PageOptions = {},
-): Promise<{ page: Page; complaints: string[] }> {
+): Promise<{ page: Page; consoleErrors: string[] }> {
   const context = await browser.newContext({
     viewport: { width: look.width ?? 1280, height: look.height ?? 800 },
     colorScheme: look.isDark ? "dark" : "light",
@@ -41,21 +41,21 @@ export async function openPage(
   });
   const page = await context.newPage();
   page.setDefaultTimeout(WAIT_MS);
-  const complaints: string[] = [];
+  const consoleErrors: string[] = [];
   page.on("console", (message) => {
-    if (message.type() === "error" || message.type() === "warning") complaints.push(message.text());
+    if (message.type() === "error" || message.type() === "warning") consoleErrors.push(message.text());
   });
-  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("pageerror", (error) => consoleErrors.push(String(error)));
   await page.goto(url);
-  return { page, complaints };
+  return { page, consoleErrors };
 }
 
-/** Waits until the picture shows a frame that was asked for by now. */
+/** Waits until the view shows a frame that has been requested by now. */
 export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(() => Number(document.querySelector<HTMLElement>(".view")?.dataset.pictures ?? 0) > 1);
 }
 
-/** Begins with the defaults of a world. */
+/** Opens a new scenario with the defaults of a world. */
 export async function openNew(page: Page, world: string): Promise<void> {
   await page.getByRole("button", { name: world, exact: true }).first().click();
   await drawn(page);

@@ -1,4 +1,4 @@
-/** A hand that draws on the canvas at places of the world. */
+/** Drives the pointer at positions of the world. */
 
 import type { Page } from "playwright-core";
 
@@ -29,7 +29,7 @@ export class PointerDriver {
     await this.#page.mouse.click(...(await this.at(x_m, y_m)));
   }
 
-  /** Presses at the first place, goes over the others, and lets go at the last. */
+  /** Presses at the first position, moves over the others, and releases at the last. */
   async drag(...places: [number, number][]): Promise<void> {
     const points = await Promise.all(places.map(([x, y]) => this.at(x, y)));
     await this.#page.mouse.move(...points[0]!);

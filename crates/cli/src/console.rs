@@ -56,10 +56,10 @@ impl Console {
     pub(crate) fn print_result_or_short(
         self,
         json: &impl Serialize,
-        short: impl FnOnce() -> String,
+        short: &str,
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
-        self.print_result(json, || if self.quiet { short() } else { text() })
+        self.print_result(json, || if self.quiet { short.to_string() } else { text() })
     }
 
     /// Prints a remark for people to standard error.
@@ -69,7 +69,7 @@ impl Console {
         }
     }
 
-    /// Prints a warning: something is wrong, but the command goes on.
+    /// Prints a warning: something is wrong, but the command continues.
     pub(crate) fn warn(self, text: impl Display) {
         let lines = wrap(&format!("warning: {text}"), usize::from(prose_columns()));
         let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
@@ -84,9 +84,13 @@ impl Console {
 /// Returns the number of columns that text may take: those of the terminal; without one, the value of the variable
 /// `COLUMNS`, or [`LINE_COLS`].
 pub(crate) fn terminal_columns() -> u16 {
-    let variable = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
     let terminal = terminal_size::terminal_size().map(|(width, _)| width.0);
-    terminal.or_else(variable).unwrap_or(LINE_COLS as u16)
+    terminal.or_else(columns_variable).unwrap_or(LINE_COLS as u16)
+}
+
+/// Returns the value of the variable `COLUMNS`, if it is a positive number.
+fn columns_variable() -> Option<u16> {
+    std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0)
 }
 
 /// Returns the number of columns that prose may take.
@@ -122,8 +126,8 @@ pub(crate) fn format_columns(table: &Table) -> String {
     let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();
     let lines: Vec<Vec<&str>> = std::iter::once(head).chain(rows).collect();
     let blocks = blocks(&widths(&lines));
-    let text = |block: &Range<usize>| block_text(&lines, block);
-    blocks.iter().map(text).collect::<Vec<_>>().join("\n")
+    let texts: Vec<String> = blocks.iter().map(|block| block_text(&lines, block)).collect();
+    texts.join("\n")
 }
 
 /// Columns before each line of a table.
@@ -136,8 +140,13 @@ const COLUMN_GAP: usize = 3;
 const MAX_FIRST_COLUMN_COLS: usize = 40;
 
 fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
-    let width = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
-    (0..lines.first().map_or(0, Vec::len)).map(width).collect()
+    let mut widths = vec![0; lines.first().map_or(0, Vec::len)];
+    for line in lines {
+        for (width, cell) in widths.iter_mut().zip(line) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    widths
 }
 
 /// Returns the columns beside the first of each block: as many as a line has room for.
@@ -170,16 +179,20 @@ fn blocks(widths: &[usize]) -> Vec<Range<usize>> {
 fn block_text(lines: &[Vec<&str>], block: &Range<usize>) -> String {
     let widths = widths(lines);
     let first = widths.first().copied().unwrap_or(0);
-    let line = |line: &Vec<&str>| {
-        let cell = |k: usize| format!("{:COLUMN_GAP$}{:>width$}", "", line[k], width = widths[k]);
-        let cells: String = block.clone().map(cell).collect();
-        if first <= MAX_FIRST_COLUMN_COLS {
-            format!("  {}\n", format!("{:<first$}{cells}", line[0]).trim_end())
-        } else {
-            format!("  {}\n  {}\n", line[0], cells.trim_end())
+    let mut text = String::new();
+    for line in lines {
+        let mut cells = String::new();
+        for k in block.clone() {
+            cells.push_str(&format!("{:COLUMN_GAP$}{:>width$}", "", line[k], width = widths[k]));
         }
-    };
-    lines.iter().map(line).collect()
+        if first <= MAX_FIRST_COLUMN_COLS {
+            let joined = format!("{:<first$}{cells}", line[0]);
+            text.push_str(&format!("  {}\n", joined.trim_end()));
+        } else {
+            text.push_str(&format!("  {}\n  {}\n", line[0], cells.trim_end()));
+        }
+    }
+    text
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::console::Console;
 use crate::exit::Failure;
 use crate::interrupt;
-use crate::progress::{RunProgress, StageProgress};
+use crate::progress::{RunBar, StageBar};
 use sidestep::kernel::Interrupt;
 use sidestep_session::{Progress, Watcher};
 use std::sync::{Mutex, PoisonError};
@@ -18,8 +18,8 @@ pub(crate) struct ConsoleWatcher {
 
 #[derive(Debug)]
 enum ProgressDisplay {
-    Bar(RunProgress),
-    Stages(StageProgress),
+    Bar(RunBar),
+    Stages(StageBar),
 }
 
 impl ConsoleWatcher {
@@ -34,17 +34,21 @@ impl Watcher for ConsoleWatcher {
         let mut display = self.display.lock().unwrap_or_else(PoisonError::into_inner);
         match progress {
             Progress::Cycles { from, done, until } => {
-                let new =
-                    || ProgressDisplay::Bar(RunProgress::for_cycles(self.console, from, until));
-                display.get_or_insert_with(new).set(done);
+                let bar = display.get_or_insert_with(|| {
+                    ProgressDisplay::Bar(RunBar::for_cycles(self.console, from, until))
+                });
+                bar.set(done);
             }
             Progress::Runs { before, done, of } => {
-                let new = || ProgressDisplay::Bar(RunProgress::for_runs(self.console, before, of));
-                display.get_or_insert_with(new).set(done);
+                let bar = display.get_or_insert_with(|| {
+                    ProgressDisplay::Bar(RunBar::for_runs(self.console, before, of))
+                });
+                bar.set(done);
             }
             Progress::Stage { what, share } => {
-                let new = || ProgressDisplay::Stages(StageProgress::new(self.console));
-                if let ProgressDisplay::Stages(stages) = display.get_or_insert_with(new) {
+                let stages = display
+                    .get_or_insert_with(|| ProgressDisplay::Stages(StageBar::new(self.console)));
+                if let ProgressDisplay::Stages(stages) = stages {
                     stages.set(what, share);
                 }
             }

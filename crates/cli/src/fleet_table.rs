@@ -1,7 +1,7 @@
 //! The table of a fleet's nodes while it runs, in 80 columns.
 
 use crate::console::Console;
-use crate::progress::RunProgress;
+use crate::progress::RunBar;
 use sidestep_session::fleet::{FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::io::{IsTerminal, Write as _};
@@ -19,7 +19,7 @@ pub(crate) struct FleetTable {
     console: Console,
     is_table: bool,
     is_terminal: bool,
-    bar: Option<RunProgress>,
+    bar: Option<RunBar>,
     /// Number of lines of the table that was printed last.
     lines: usize,
     /// Time of the next table where there is no terminal.
@@ -36,8 +36,9 @@ impl FleetTable {
     /// Shows the fleet as it is now.
     pub(crate) fn update(&mut self, now: &FleetStatus) {
         if !self.is_table {
-            let new = || RunProgress::for_cycles(self.console, 0, now.cycles);
-            self.bar.get_or_insert_with(new).set(now.cycle);
+            let bar =
+                self.bar.get_or_insert_with(|| RunBar::for_cycles(self.console, 0, now.cycles));
+            bar.set(now.cycle);
             return;
         }
         if !self.is_terminal && Instant::now() < self.next {
@@ -94,8 +95,8 @@ fn heading(now: &FleetStatus) -> String {
         let present = now.nodes.iter().filter(|node| node.state != "awaited").count();
         return format!("{present} of {} nodes are there\n", now.nodes.len());
     }
-    let ms = |time: Option<f64>| time.map_or("-".into(), |ms| format!("{ms}"));
-    let (p50, p99) = (ms(now.talk_p50_ms), ms(now.talk_p99_ms));
+    let p50 = format_ms(now.talk_p50_ms);
+    let p99 = format_ms(now.talk_p99_ms);
     let late =
         if now.late_cycles > 0 { format!(", {} late", now.late_cycles) } else { String::new() };
     format!(
@@ -106,7 +107,12 @@ fn heading(now: &FleetStatus) -> String {
     )
 }
 
-/// Returns a line that names the nodes the fleet waits for, if it does.
+/// Returns a time, or a dash if nothing has been measured yet.
+fn format_ms(time_ms: Option<f64>) -> String {
+    time_ms.map_or("-".into(), |ms| ms.to_string())
+}
+
+/// Returns a line with the nodes that the fleet waits for, if there are any.
 fn waiting_line(now: &FleetStatus) -> String {
     match now.waits_for.as_slice() {
         [] => String::new(),

@@ -1,6 +1,6 @@
 //! Ctrl-C: the first one asks the run to stop in good order, the second one ends the process.
 //!
-//! Good order is between two cycles. A run that has not come to the end of its cycle after
+//! Good order is between two cycles. A run that has not finished its cycle after
 //! [`CYCLE_TIMEOUT`] leaves it half done; its recording continues from the last checkpoint.
 
 use crate::exit::{ExitCode, Failure};

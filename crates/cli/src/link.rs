@@ -14,7 +14,7 @@ use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Environment variable with the path of the program, for users who have it elsewhere.
+/// Environment variable with the path of the program, if it is not beside this one.
 const PATH_VARIABLE: &str = "SIDESTEP_LINK";
 
 /// Time between two checks for an interrupt.

@@ -8,9 +8,9 @@ use crate::console::{Console, group_thousands};
 
 /// The progress bar of a run, or of many.
 #[derive(Debug)]
-pub(crate) struct RunProgress(ProgressBar);
+pub(crate) struct RunBar(ProgressBar);
 
-impl RunProgress {
+impl RunBar {
     /// Returns a bar from cycle `from` to `until`; hidden if the console shows no progress.
     pub(crate) fn for_cycles(console: Console, from: Cycle, until: Cycle) -> Self {
         let bar = new_bar(console, until);
@@ -55,12 +55,13 @@ fn new_bar(console: Console, length: u64) -> ProgressBar {
 
 /// The progress bar of work in several stages.
 #[derive(Debug)]
-pub(crate) struct StageProgress(ProgressBar);
+pub(crate) struct StageBar(ProgressBar);
 
-/// Length of the bar of [`StageProgress`], which counts in whole steps.
+/// Length of the bar of a [`StageBar`]: indicatif counts in whole steps, and a tenth of a percent is less than a
+/// character of the bar.
 const STEPS: f64 = 1000.0;
 
-impl StageProgress {
+impl StageBar {
     /// Returns a bar at its start; hidden if the console shows no progress.
     pub(crate) fn new(console: Console) -> Self {
         let bar = new_bar(console, STEPS as u64);
@@ -82,15 +83,18 @@ impl StageProgress {
 }
 
 fn style() -> ProgressStyle {
-    let position = |s: &ProgressState, w: &mut dyn Write| {
-        let _ =
-            write!(w, "{} of {}", group_thousands(s.pos()), group_thousands(s.len().unwrap_or(0)));
-    };
-    let rate = |s: &ProgressState, w: &mut dyn Write| {
-        let _ = write!(w, "{}", group_thousands(s.per_sec() as u64));
-    };
     ProgressStyle::with_template("{bar:30} {cycles} cycles  {rate} cycles/s  {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
-        .with_key("cycles", position)
-        .with_key("rate", rate)
+        .with_key("cycles", write_position)
+        .with_key("rate", write_rate)
+}
+
+fn write_position(state: &ProgressState, out: &mut dyn Write) {
+    let position = group_thousands(state.pos());
+    let length = group_thousands(state.len().unwrap_or(0));
+    let _ = write!(out, "{position} of {length}");
+}
+
+fn write_rate(state: &ProgressState, out: &mut dyn Write) {
+    let _ = write!(out, "{}", group_thousands(state.per_sec() as u64));
 }

@@ -65,8 +65,10 @@ fn phases_text(phases_s: &Phases) -> String {
         ("record", phases_s.record),
     ];
     let all: f64 = phases.iter().map(|(_, s)| s).sum();
-    let share = |(name, s): &(&str, f64)| format!("{name} {:.0} %", 100.0 * s / all.max(1e-12));
-    phases.iter().map(share).collect::<Vec<_>>().join(", ")
+    // A run of no cycles takes no time.
+    let all = all.max(1e-12);
+    let shares = phases.map(|(name, s)| format!("{name} {:.0} %", 100.0 * s / all));
+    shares.join(", ")
 }
 
 /// Formats a rate with as many digits as it needs.

@@ -108,9 +108,10 @@ impl DistributedWorld for DistributedAirspace {
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let conversation_starts = move |cycle| world.conversation_times(cycle).to_vec();
         let injector = self.world.fault_injector()?;
-        Some(Box::new(FaultyChannel::new(injector, agent, conversation_starts)))
+        Some(Box::new(FaultyChannel::new(injector, agent, move |cycle| {
+            world.conversation_times(cycle).to_vec()
+        })))
     }
 }
 

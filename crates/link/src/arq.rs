@@ -39,7 +39,7 @@ pub(crate) struct ArqLink {
     oldest_since: Option<Duration>,
     /// Time at which they are retransmitted.
     retransmit_at: Option<Duration>,
-    /// Delay of the next retransmission; it doubles each time and starts anew with an acknowledgment.
+    /// Delay of the next retransmission; it doubles each time and is reset by an acknowledgment.
     retransmit_delay: Duration,
     /// Sequence number of the next message to be accepted from the other end.
     next_received: u64,

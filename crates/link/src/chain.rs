@@ -193,9 +193,10 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
 
     fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
         let world = self.world.clone();
-        let conversation_starts = move |cycle| vec![world.negotiation_start(cycle)];
         let injector = self.world.fault_injector()?;
-        Some(Box::new(FaultyChannel::new(injector, agent, conversation_starts)))
+        Some(Box::new(FaultyChannel::new(injector, agent, move |cycle| {
+            vec![world.negotiation_start(cycle)]
+        })))
     }
 }
 

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// for a sign of life before it gives up a broken link by itself.
 const LINK_CHECK_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Reasons for which a messenger drops frames and messages, as named in metrics.
+/// Reasons for which a messenger drops frames and messages: the labels of metrics.
 mod drop_reason {
     /// The frame is for an earlier process of this peer.
     pub(super) const FORMER_LIFE: &str = "former-life";
@@ -221,9 +221,12 @@ impl Messenger {
     /// Sends the frames that are due: retransmissions and acknowledgments.
     fn send_due(&mut self) {
         let now = self.now();
-        let is_due = |state: &PeerState| state.link.next_due().is_some_and(|at| at <= now);
-        let due_peers: Vec<Peer> =
-            self.peers.iter().filter(|(_, state)| is_due(state)).map(|(&peer, _)| peer).collect();
+        let mut due_peers = Vec::new();
+        for (&peer, state) in &self.peers {
+            if state.link.next_due().is_some_and(|at| at <= now) {
+                due_peers.push(peer);
+            }
+        }
         for peer in due_peers {
             let Some(state) = self.peers.get_mut(&peer) else { continue };
             let due = state.link.take_due(now);

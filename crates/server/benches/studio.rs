@@ -140,7 +140,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
     let options = Options {
         worlds: WORLDS.clone(),
         program: "bench".into(),
-        named: vec![folder.to_path_buf()],
+        targets: vec![folder.to_path_buf()],
         host: "127.0.0.1".into(),
         port: Some(0),
         read_only: false,

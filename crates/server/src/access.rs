@@ -6,8 +6,8 @@
 //! address's fragment, which is never sent, and the page exchanges it for a cookie that no script can read. Browsers
 //! send that cookie only to the name under which they got it, so there any name of the machine will do.
 
+use axum::http::HeaderMap;
 use axum::http::header::{COOKIE, HOST, ORIGIN};
-use axum::http::{HeaderMap, HeaderValue};
 use std::net::{IpAddr, SocketAddr};
 
 /// The name of the cookie, followed by the port: cookies are shared by all ports of a host.
@@ -98,9 +98,9 @@ impl AccessPolicy {
     /// When it does not.
     pub(crate) fn authorize_fetch(&self, headers: &HeaderMap) -> Result<(), AccessError> {
         self.authorize(headers)?;
-        let is_own = |site: &HeaderValue| site == "same-origin" || site == "none";
         // Programs that are no browsers do not send it.
-        if !headers.get_all(SEC_FETCH_SITE).iter().all(is_own) {
+        let mut sites = headers.get_all(SEC_FETCH_SITE).iter();
+        if !sites.all(|site| site == "same-origin" || site == "none") {
             return Err(AccessError::Origin);
         }
         Ok(())

@@ -4,7 +4,7 @@ use crate::files::AllowedFiles;
 use sidestep_scenario::Source;
 use std::collections::{BTreeSet, VecDeque};
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// Maximum number of files listed.
 const MAX_FILES: usize = 300;
@@ -23,8 +23,9 @@ impl AllowedFiles {
         if folder.canonicalize().is_ok_and(|real| self.contains(&real)) {
             found.extend(self.files_below(folder).iter().filter_map(|path| slash_path(path)));
         }
-        let is_readable = |name: &&String| self.is_readable_file(&source.path(Path::new(name)));
-        found.extend(names.iter().filter(is_readable).take(MAX_FILES).cloned());
+        let readable =
+            names.iter().filter(|name| self.is_readable_file(&source.path(Path::new(name))));
+        found.extend(readable.take(MAX_FILES).cloned());
         found.into_iter().collect()
     }
 
@@ -68,8 +69,11 @@ fn entries(folder: &Path, limit: usize) -> Vec<PathBuf> {
 
 /// Returns a path with slashes, as in scenarios on every system.
 fn slash_path(path: &Path) -> Option<String> {
-    let part = |part: Component<'_>| part.as_os_str().to_str().map(String::from);
-    path.components().map(part).collect::<Option<Vec<_>>>().map(|parts| parts.join("/"))
+    let mut parts = Vec::new();
+    for part in path.components() {
+        parts.push(part.as_os_str().to_str()?);
+    }
+    Some(parts.join("/"))
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::{fs, io};
 
 /// Maximum number of entries of a folder that are listed.
 const MAX_ENTRIES: usize = 1000;
@@ -74,7 +74,10 @@ impl AllowedFiles {
 
     /// Also allows the files to which these scenarios refer, because a user who starts the studio with a scenario wants it
     /// to run. Texts that pages write later can refer to no further files elsewhere.
-    pub(crate) fn with_files_named_by<'p>(self, scenarios: impl Iterator<Item = &'p Path>) -> Self {
+    pub(crate) fn with_files_referenced_by<'p>(
+        self,
+        scenarios: impl Iterator<Item = &'p Path>,
+    ) -> Self {
         let mut granted = BTreeSet::new();
         for source in scenarios.filter_map(|path| Source::read(path, &[]).ok()) {
             for name in strings_in(&source).unwrap_or_default() {
@@ -146,13 +149,9 @@ impl AllowedFiles {
             return Ok(roots.filter_map(|root| entry(&root.path, worlds, &mut 0)).collect());
         };
         let path = self.resolve(folder)?;
-        let unreadable = |e: std::io::Error| {
+        let mut paths = paths_in(&path).map_err(|e| {
             Problem::new(folder, format!("cannot be listed: {e}"), "give a folder that may be read")
-        };
-        let mut paths = Vec::new();
-        for item in fs::read_dir(&path).map_err(unreadable)?.take(MAX_ENTRIES) {
-            paths.push(item.map_err(unreadable)?.path());
-        }
+        })?;
         paths.sort();
         let mut foreign = 0;
         let mut entries: Vec<FileEntry> = Vec::new();
@@ -165,6 +164,11 @@ impl AllowedFiles {
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
         Ok(entries)
     }
+}
+
+/// Returns the paths of the entries of a folder, at most [`MAX_ENTRIES`].
+fn paths_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    fs::read_dir(folder)?.take(MAX_ENTRIES).map(|item| Ok(item?.path())).collect()
 }
 
 /// Returns the problem of a path that may not be read.
@@ -218,20 +222,19 @@ fn kind_of_folder(path: &Path) -> FileKind {
 
 fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(FileKind, String)> {
     let bytes = fs::metadata(path).ok().filter(fs::Metadata::is_file)?.len();
-    let ends_in =
-        |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-    if ends_in("mcap") {
+    if has_extension(path, "mcap") {
         let megabytes = bytes as f64 / 1e6;
         return Some((FileKind::Recording, format!("{megabytes:.1} MB")));
     }
     if bytes > MAX_FILE_BYTES {
         return None;
     }
-    if ends_in("toml") {
+    if has_extension(path, "toml") {
         let header: TomlHeader = Source::read(path, &[]).ok()?.parse().ok()?;
         return kind_of_toml(header);
     }
-    if let Some((_, about)) = MAP_EXTENSIONS.iter().find(|(ending, _)| ends_in(ending)) {
+    if let Some((_, about)) = MAP_EXTENSIONS.iter().find(|(ending, _)| has_extension(path, ending))
+    {
         return Some((FileKind::Map, (*about).into()));
     }
     *foreign += 1;
@@ -240,6 +243,10 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
     }
     let imported = worlds.translate(path).ok()??;
     imported.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
 fn kind_of_toml(header: TomlHeader) -> Option<(FileKind, String)> {
@@ -368,7 +375,7 @@ mod tests {
         let path = |name: &str| folder.path().join(name).display().to_string();
         fs::write(path("out/map.txt"), "....").expect("written");
         fs::write(path("in/a.toml"), "map = { file = \"../out/map.txt\" }\n").expect("written");
-        let files = files.with_files_named_by([Path::new(&path("in/a.toml"))].into_iter());
+        let files = files.with_files_referenced_by([Path::new(&path("in/a.toml"))].into_iter());
         let check =
             |text: &str| files.check_text(&Source::new("s.toml", text, folder.path().join("in")));
         assert_eq!(check("a = \"../out/map.txt\""), Ok(()));

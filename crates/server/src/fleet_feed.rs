@@ -49,7 +49,7 @@ impl FleetFeed {
         snapshot.last_heard = Instant::now();
     }
 
-    /// Records why no more views arrive of a fleet that has not come to its end.
+    /// Records why no more views of a running fleet arrive.
     pub fn mark_lost(&self, cause: &str, remedy: &str) {
         let mut snapshot = self.lock();
         if snapshot.view.as_ref().is_none_or(|view| !view.is_over) {

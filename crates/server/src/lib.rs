@@ -77,7 +77,7 @@ pub struct Options {
     /// The program and its build, for people.
     pub program: String,
     /// Scenarios and recordings to open, and folders that may be read; the current folder if there are none.
-    pub named: Vec<PathBuf>,
+    pub targets: Vec<PathBuf>,
     /// The address to listen at.
     pub host: String,
     /// The port; 0 for any free one, `None` for the first free one of a range.
@@ -106,13 +106,13 @@ impl Studio {
     /// # Errors
     /// When something that was named does not exist, or the port cannot be bound.
     pub fn start(options: Options) -> Result<Self, Error> {
-        let (folders, mut open) = split_targets(&options.named);
+        let (folders, mut open) = split_targets(&options.targets);
         for fleet in &options.fleets {
             open.push(TargetRef { kind: "fleet".into(), path: fleet.endpoint.clone() });
         }
-        let scenarios = open.iter().filter(|named| named.kind == "scenario");
+        let scenarios = open.iter().filter(|target| target.kind == "scenario");
         let files = AllowedFiles::from_roots(&folders).map_err(|p| input_error(&p))?;
-        let files = files.with_files_named_by(scenarios.map(|named| Path::new(&named.path)));
+        let files = files.with_files_referenced_by(scenarios.map(|target| Path::new(&target.path)));
         let listener = listen::bind(&options.host, options.port)?;
         listener.set_nonblocking(true).map_err(start_error)?;
         let address = listener.local_addr().map_err(start_error)?;
@@ -195,15 +195,15 @@ fn run(runtime: Runtime, listener: TcpListener, state: &Arc<AppState>) {
         serve::serve(listener, routes, state.shutdown_signal(), Timeouts::default()).await;
         state.wait_for_sessions().await;
     });
-    // A report or an export under way is not waited for.
+    // A report or an export in progress is not waited for.
     runtime.shutdown_timeout(Duration::from_millis(100));
 }
 
 /// Returns the folders that may be read, and the things to open.
-fn split_targets(named: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
+fn split_targets(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
     let mut folders: Vec<PathBuf> = Vec::new();
     let mut open = Vec::new();
-    for path in named {
+    for path in targets {
         let is_run = path.join("run.json").is_file();
         let is_mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
         let is_sweep = path.join("sweep.json").is_file();
@@ -262,10 +262,10 @@ mod tests {
         std::fs::write(path("sweep/sweep.json"), "{}").expect("written");
         std::fs::write(path("a.toml"), "").expect("written");
         std::fs::write(path("b.mcap"), "").expect("written");
-        let named = ["run", "a.toml", "b.mcap", "sweep"].map(path);
-        let (folders, open) = split_targets(&named);
+        let targets = ["run", "a.toml", "b.mcap", "sweep"].map(path);
+        let (folders, open) = split_targets(&targets);
         assert_eq!(folders, [path("run"), place.path().to_path_buf(), path("sweep")]);
-        let kinds: Vec<&str> = open.iter().map(|named| named.kind.as_str()).collect();
+        let kinds: Vec<&str> = open.iter().map(|target| target.kind.as_str()).collect();
         assert_eq!(kinds, ["recording", "scenario", "recording", "sweep"]);
         assert_eq!(split_targets(&[]), (vec![".".into()], vec![]));
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The port: found and bound; and the address by which others reach it.
+//! The server's port, and the address at which other machines reach it.
 
 use sidestep_kernel::InputError;
 use sidestep_session::next_free_port;
@@ -13,25 +13,37 @@ const PORT_COUNT: u16 = 100;
 /// Binds the given port, or the first free one of a range.
 ///
 /// # Errors
-/// When the address is not one of this machine, or the port is in use; the error then names the next free one.
+/// If the address is not one of this machine, or the port is in use; the error then suggests the next free one.
 pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputError> {
     let ip = resolve(host)?;
-    let at = |port: u16| TcpListener::bind(SocketAddr::new(ip, port));
     let Some(port) = port else {
-        let mut tried = (FIRST_PORT..FIRST_PORT + PORT_COUNT).map(at);
-        let found = tried.find(|bound| !is_taken(bound)).unwrap_or_else(|| at(0));
-        return found.map_err(|e| host_error(host, &e));
+        return bind_first_free(ip).map_err(|e| host_error(host, &e));
     };
-    match at(port) {
-        bound if is_taken(&bound) => {
-            let remedy = match next_free_port(ip, port) {
-                Some(free) => format!("give --port {free}, which is free, or leave it out"),
-                None => "leave it out to use a free one".into(),
-            };
-            Err(InputError::new(format!("--port {port}"), "the port is in use", remedy))
-        }
-        bound => bound.map_err(|e| host_error(&format!("{host} --port {port}"), &e)),
+    let bound = bind_port(ip, port);
+    if is_taken(&bound) {
+        let remedy = match next_free_port(ip, port) {
+            Some(free) => format!("give --port {free}, which is free, or leave it out"),
+            None => "leave it out to use a free one".into(),
+        };
+        return Err(InputError::new(format!("--port {port}"), "the port is in use", remedy));
     }
+    bound.map_err(|e| host_error(&format!("{host} --port {port}"), &e))
+}
+
+/// Binds the first free port of the range, else any that the system has: addresses in bookmarks and terminals stay the
+/// same as long as possible.
+fn bind_first_free(ip: IpAddr) -> io::Result<TcpListener> {
+    for port in FIRST_PORT..FIRST_PORT + PORT_COUNT {
+        let bound = bind_port(ip, port);
+        if !is_taken(&bound) {
+            return bound;
+        }
+    }
+    bind_port(ip, 0)
+}
+
+fn bind_port(ip: IpAddr, port: u16) -> io::Result<TcpListener> {
+    TcpListener::bind(SocketAddr::new(ip, port))
 }
 
 fn is_taken(bound: &io::Result<TcpListener>) -> bool {
@@ -50,7 +62,7 @@ fn host_error(host: &str, error: &io::Error) -> InputError {
     InputError::new(format!("--addr {host}"), error.to_string(), remedy)
 }
 
-/// Returns the address by which others reach this machine, if it has one: the one from which it would send to them.
+/// Returns the address at which other machines reach this one, if it has one: that from which it would send to them.
 /// Nothing is sent to find it.
 pub(crate) fn own_address(ip: IpAddr) -> Option<IpAddr> {
     // Addresses reserved for documentation: they lead nowhere, but take the route of all others.

@@ -1,4 +1,4 @@
-//! Files that a page may write: scenarios below the folders that were named at start, whole or not at all.
+//! Files that a page may write: scenarios below the folders that were given at start, each completely or not at all.
 
 use crate::files::AllowedFiles;
 use crate::protocol::Problem;
@@ -16,7 +16,7 @@ const BYTE_ORDER_MARK: &str = "\u{feff}";
 /// A file that a page may write.
 #[derive(Debug)]
 pub(crate) struct WriteTarget {
-    /// Its path as named.
+    /// Its path as given.
     pub(crate) path: PathBuf,
     /// Its path without links.
     pub(crate) real: PathBuf,
@@ -35,29 +35,28 @@ impl AllowedFiles {
     /// # Errors
     /// When it is elsewhere, hidden, or no plain file.
     pub(crate) fn target(&self, path: &str) -> Result<WriteTarget, Problem> {
-        let refuse = |cause| {
-            let remedy = "give a .toml file below the folders that were given at start";
-            Err(Problem::new(path, cause, remedy))
-        };
         let given = PathBuf::from(path);
         // A missing folder and a forbidden one are reported alike.
         let real = real_path(&given).unwrap_or_default();
         let Some(below) = self.relative_to_root(&real) else {
-            return refuse("is in no folder below those that were given at start");
+            return Err(not_writable(path, "is in no folder below those that were given at start"));
         };
-        let is_hidden = |part: &std::ffi::OsStr| part.as_encoded_bytes().starts_with(b".");
-        if below.iter().any(is_hidden) {
-            return refuse("is hidden");
+        if below.iter().any(|part| part.as_encoded_bytes().starts_with(b".")) {
+            return Err(not_writable(path, "is hidden"));
         }
         match fs::symlink_metadata(&real) {
-            Ok(found) if !found.is_file() => refuse("is no plain file"),
+            Ok(found) if !found.is_file() => Err(not_writable(path, "is no plain file")),
             Ok(_) => Ok(WriteTarget { path: given, real }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 Ok(WriteTarget { path: given, real })
             }
-            Err(_) => refuse("cannot be read"),
+            Err(_) => Err(not_writable(path, "cannot be read")),
         }
     }
+}
+
+fn not_writable(path: &str, cause: &str) -> Problem {
+    Problem::new(path, cause, "give a .toml file below the folders that were given at start")
 }
 
 /// Returns the path without links of a file that exists, or that can be created.
@@ -104,29 +103,31 @@ pub(crate) fn replace_file(
 }
 
 fn read(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
-    let refuse = |cause: String, remedy: &str| {
-        Err(Problem::new(target.path.display().to_string(), cause, remedy))
+    let place = target.path.display().to_string();
+    let other_name = "save it under another name";
+    let (bytes, permissions) = match try_read(&target.real) {
+        Ok(content) => content,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(Problem::new(place, format!("cannot be read: {error}"), other_name));
+        }
     };
-    match try_read(&target.real) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => refuse(format!("cannot be read: {error}"), "save it under another name"),
-        Ok((bytes, _)) if bytes.starts_with(GZIP_MAGIC) => {
-            refuse("is packed with gzip".into(), "unpack it, or save it under another name")
-        }
-        Ok((bytes, _)) if bytes.len() as u64 > MAX_FILE_BYTES => {
-            refuse(format!("has more than {MAX_FILE_BYTES} bytes"), "save it under another name")
-        }
-        Ok((bytes, permissions)) => match String::from_utf8(bytes) {
-            Err(_) => refuse("is no text (UTF-8)".into(), "save it under another name"),
-            Ok(text) => {
-                // Kept aside, so that texts are compared without it, and it is written again.
-                let unmarked = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
-                let has_byte_order_mark = unmarked.is_some();
-                let text = unmarked.unwrap_or(text);
-                Ok(Some(OldContent { text, has_byte_order_mark, permissions }))
-            }
-        },
+    if bytes.starts_with(GZIP_MAGIC) {
+        let remedy = format!("unpack it, or {other_name}");
+        return Err(Problem::new(place, "is packed with gzip", remedy));
     }
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let cause = format!("has more than {MAX_FILE_BYTES} bytes");
+        return Err(Problem::new(place, cause, other_name));
+    }
+    let Ok(text) = String::from_utf8(bytes) else {
+        return Err(Problem::new(place, "is no text (UTF-8)", other_name));
+    };
+    // Kept aside, so that texts are compared without it, and it is written again.
+    let unmarked = text.strip_prefix(BYTE_ORDER_MARK).map(String::from);
+    let has_byte_order_mark = unmarked.is_some();
+    let text = unmarked.unwrap_or(text);
+    Ok(Some(OldContent { text, has_byte_order_mark, permissions }))
 }
 
 fn try_read(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {

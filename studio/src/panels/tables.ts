@@ -1,9 +1,9 @@
 /** Narrower tables of an inspection. */
 
-import type { Fact, Table } from "../protocol";
+import type { Fact, FactTable } from "../protocol";
 
 /** Returns constant columns as facts, and the table without them. A table of one row stays unchanged. */
-export function hoistConstantColumns({ columns, rows }: Table): Table & { same: Fact[] } {
+export function hoistConstantColumns({ columns, rows }: FactTable): FactTable & { same: Fact[] } {
   const [first, ...others] = rows;
   if (!first || others.length === 0) return { same: [], columns, rows };
   const words = first.map((value) => JSON.stringify(value));

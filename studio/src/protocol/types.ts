@@ -5,8 +5,8 @@
 export const VERSION = 2;
 
 /**
- * A request; its reply has the same number, chosen by the page from 1 on: a request that cannot be read is answered with
- * number 0.
+ * A request. Its reply has the same number, which the page chooses from 1 on: 0 is that of the reply to a request
+ * whose number cannot be read.
  */
 export type ClientRequest = {
 /**
@@ -14,7 +14,7 @@ export type ClientRequest = {
  */
 id: number,
 /**
- * What is asked.
+ * The method and its arguments.
  */
 call: ServerMethod, } | {
 /**
@@ -26,7 +26,7 @@ id: number,
  */
 session: number,
 /**
- * What is asked.
+ * The method and its arguments.
  */
 call: SessionMethod, };
 
@@ -222,7 +222,7 @@ world: string, } | { "kind": "recording",
  */
 path: string, } | { "kind": "fleet",
 /**
- * The endpoint that the command line named.
+ * The endpoint, as given on the command line.
  */
 path: string, };
 
@@ -287,12 +287,12 @@ status: SessionStatus, } | { "is": "inspection" } & Inspection | { "is": "metric
  */
 names: Array<MetricName>,
 /**
- * Number of the first sample here: the one that was asked for, or the number of all samples.
+ * Number of the first sample here: the requested one, or the number of all samples.
  */
 first: number,
 /**
- * The number of times that the samples were thinned by half, and numbered anew, since the session began:
- * ask from 0 whenever it has changed.
+ * How often every second sample was dropped, which renumbers the samples, since the session started:
+ * request from 0 whenever it has changed.
  */
 thinned: number,
 /**
@@ -360,8 +360,8 @@ text: string, } | { "is": "model",
  */
 value: unknown,
 /**
- * Files that a key of the text can name, written as it would name them: those below its folder, and those
- * elsewhere that it names.
+ * Files that a key of the text can refer to, by the paths that it would use: those below its folder, and those
+ * outside that it refers to.
  */
 files: Array<string>, } | { "is": "saved",
 /**
@@ -406,7 +406,7 @@ end_line: number | null,
  */
 end_column: number | null,
 /**
- * Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+ * Key of the scenario that is wrong, as `--set` takes it: `robots.1.at.0`.
  */
 key: string | null,
 /**
@@ -418,7 +418,7 @@ cause: string,
  */
 remedy: string,
 /**
- * Whether the text is valid all the same.
+ * Whether it is a warning: the text is valid.
  */
 is_warning: boolean, };
 
@@ -548,7 +548,7 @@ cycles_per_s: number,
  */
 seed: string,
 /**
- * Digest of the state, while the run stands still.
+ * Digest of the state, while the run is paused or over.
  */
 digest: string | null,
 /**
@@ -676,7 +676,7 @@ cycle_s: number,
  */
 floor: OccupancyGrid | null,
 /**
- * Walls, obstacles that stand still, starts and goals.
+ * Walls, obstacles at rest, starts and goals.
  */
 bodies: Array<StaticBody>,
 /**
@@ -714,7 +714,7 @@ yaw_rad: number,
 runs: Array<number>, };
 
 /**
- * A body that stands still.
+ * A body that never moves.
  */
 export type StaticBody = {
 /**
@@ -876,7 +876,7 @@ replay: TargetRef, };
  */
 export type FrameText = {
 /**
- * The scans of the bodies that were asked for.
+ * The scans of the selected bodies.
  */
 scans: Array<Scan>,
 /**
@@ -967,7 +967,7 @@ unit: string,
 text: string, };
 
 /**
- * Facts and marks of a body: its percepts, decisions and deeds.
+ * Percepts and decisions of a body in a cycle, and their outcome.
  */
 export type Inspection = {
 /**
@@ -975,88 +975,65 @@ export type Inspection = {
  */
 body: BodyId,
 /**
- * Cycles done.
+ * The cycle that is about to run.
  */
 cycle: number,
 /**
- * The body's name.
+ * The body's name for people.
  */
 title: string,
 /**
- * Facts, by subject.
+ * Facts about it, by topic.
  */
-sections: Array<Section>,
+sections: Array<FactSection>,
 /**
- * Marks to draw of it.
+ * Marks to draw over the scene.
  */
 marks: Array<Mark>, };
 
 /**
- * Facts on one subject.
+ * Facts about one topic.
  */
-export type Section = {
+export type FactSection = {
 /**
- * The subject.
+ * The topic.
  */
 title: string,
 /**
- * The facts.
+ * Single facts.
  */
 facts: Array<Fact>,
 /**
- * A table, where facts are many of a kind.
+ * A table of facts of one kind.
  */
-table: Table | null, };
+table: FactTable | null, };
 
 /**
- * A fact.
+ * A fact: the question that it answers, and the answer.
  */
-export type Fact = {
-/**
- * Its name, in words.
- */
-label: string,
-/**
- * Its value.
- */
-value: Value, };
+export type Fact = { label: string, value: FactValue, };
 
 /**
- * The value of a fact.
+ * The value of a fact: a number with its unit (empty for plain numbers), a share or probability from 0 to 1, text, a
+ * body, a position in meters, yes or no; `none` for nothing, or not known.
  */
-export type Value = { "number": {
-/**
- * The number.
- */
-value: number,
-/**
- * Its unit; may be empty.
- */
-unit: string, } } | { "share": number } | { "text": string } | { "body": BodyId } | { "place": [number, number, number] } | { "flag": boolean } | "none";
+export type FactValue = { "number": { value: number, unit: string, } } | { "share": number } | { "text": string } | { "body": BodyId } | { "place": [number, number, number] } | { "flag": boolean } | "none";
 
 /**
- * Facts in rows.
+ * A table of facts of one kind, e.g. one row per neighbor: headings of the columns, and rows of a value per column.
  */
-export type Table = {
-/**
- * The heads of the columns.
- */
-columns: Array<string>,
-/**
- * The rows, each with a value for each column.
- */
-rows: Array<Array<Value>>, };
+export type FactTable = { columns: Array<string>, rows: Array<Array<FactValue>>, };
 
 /**
- * Something to draw over the scene while the body is selected.
+ * Something to draw over the scene.
  */
 export type Mark = {
 /**
- * Its meaning.
+ * Its role in the inspection.
  */
-role: Role,
+role: MarkRole,
 /**
- * The same in words.
+ * Text for it.
  */
 label: string,
 /**
@@ -1069,31 +1046,11 @@ weight: number,
 shape: MarkShape, };
 
 /**
- * The meaning of a mark.
+ * The role of a mark in an inspection.
  */
-export type Role = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
+export type MarkRole = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
 
 /**
- * The shape of a mark.
+ * The shape of a mark, in meters: a polyline, a polygon, a point, or a horizontal circle.
  */
-export type MarkShape = { "type": "line",
-/**
- * Its points, in meters.
- */
-points_m: Array<[number, number, number]>, } | { "type": "area",
-/**
- * Its corners, in meters.
- */
-corners_m: Array<[number, number, number]>, } | { "type": "point",
-/**
- * Its place, in meters.
- */
-at_m: [number, number, number], } | { "type": "circle",
-/**
- * Its center, in meters.
- */
-at_m: [number, number, number],
-/**
- * Its radius, in meters.
- */
-radius_m: number, };
+export type MarkShape = { "type": "line", points_m: Array<[number, number, number]>, } | { "type": "area", corners_m: Array<[number, number, number]>, } | { "type": "point", at_m: [number, number, number], } | { "type": "circle", at_m: [number, number, number], radius_m: number, };

@@ -1,7 +1,7 @@
 /** Drawings over the scene for the selected body: its inspection marks and sensor beams. */
 
 import { BufferGeometry, DoubleSide, Float32BufferAttribute, Mesh, ShapeUtils, Vector2 } from "three";
-import type { Mark, Point3, Role, Scan } from "../protocol";
+import type { Mark, Point3, MarkRole, Scan } from "../protocol";
 import { material } from "./material";
 import { ROLES, visibleColor, packColor, type Palette, type Rgb } from "./palette";
 import type { Strokes } from "./strokes";
@@ -20,8 +20,8 @@ export function circle(at: Point3, radius_m: number): Point3[] {
 }
 
 /** Draws the outlines of marks. Returns the roles that occur, for a legend. */
-export function drawMarks(marks: readonly Mark[], strokes: Strokes, palette: Palette): Set<Role> {
-  const roles = new Set<Role>();
+export function drawMarks(marks: readonly Mark[], strokes: Strokes, palette: Palette): Set<MarkRole> {
+  const roles = new Set<MarkRole>();
   for (const { role, weight, shape } of marks) {
     roles.add(role);
     const { color, dashed } = ROLES[role];
@@ -80,8 +80,8 @@ function beamEnd(scan: Scan, bearing: number, range_m: number): Point3 {
 }
 
 /** Draws beams: as it is solid, as reported dashed with a dot at the end. Returns the roles that occur. */
-export function drawScans(scans: readonly Scan[], strokes: Strokes, palette: Palette): Set<Role> {
-  const roles = new Set<Role>();
+export function drawScans(scans: readonly Scan[], strokes: Strokes, palette: Palette): Set<MarkRole> {
+  const roles = new Set<MarkRole>();
   const truth = visibleColor(ROLES.true.color, palette);
   const report = visibleColor(ROLES.reported.color, palette);
   for (const scan of scans) {

@@ -1,6 +1,6 @@
 /** Colors of the canvas: the page's own by theme, and the server's appearances adjusted to them. */
 
-import type { Appearance, Role } from "../protocol";
+import type { Appearance, MarkRole } from "../protocol";
 
 export type Rgb = [number, number, number];
 
@@ -77,7 +77,7 @@ export function packColor([r, g, b]: Rgb, alpha: number): number {
 }
 
 /** The style of marks by role. Colors are Okabe and Ito's; roles that share a color differ by dashes. */
-export const ROLES: Record<Role, { words: string; color: Rgb; dashed: boolean }> = {
+export const ROLES: Record<MarkRole, { words: string; color: Rgb; dashed: boolean }> = {
   true: { words: "true", color: [0, 158, 115], dashed: false },
   reported: { words: "as reported", color: [230, 159, 0], dashed: true },
   wish: { words: "intended", color: [86, 180, 233], dashed: true },

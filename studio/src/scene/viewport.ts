@@ -2,7 +2,7 @@
 
 import { Color, Group, Scene as Graph, SRGBColorSpace, WebGLRenderer, type Mesh } from "three";
 import type { Frame } from "../decode";
-import type { Inspection, Point3, Role, Scene, BodyId } from "../protocol";
+import type { Inspection, Point3, MarkRole, Scene, BodyId } from "../protocol";
 import type { Bodies } from "../state/bodies";
 import type { Link } from "../fleet/links";
 import type { TrailMode } from "../state/display.svelte";
@@ -72,7 +72,7 @@ function hasSameExtent(a: Scene, b: Scene): boolean {
 export class Viewport {
   readonly camera: Camera;
   /** Called after each draw, with the roles of the visible marks. */
-  onDrawn: (roles: ReadonlySet<Role>) => void = () => undefined;
+  onDrawn: (roles: ReadonlySet<MarkRole>) => void = () => undefined;
   /** Also called after each draw: overlays follow the camera. */
   readonly drawListeners = new Set<() => void>();
   /** Number of draws so far. */
@@ -102,7 +102,7 @@ export class Viewport {
   #bodiesChanged = true;
   #marksChanged = true;
   #viewChanged = true;
-  #roles: ReadonlySet<Role> = new Set();
+  #roles: ReadonlySet<MarkRole> = new Set();
 
   constructor(canvas: HTMLCanvasElement, overlay: HTMLCanvasElement, scene: Scene, isDark: boolean, camera?: Camera) {
     this.#renderer = createRenderer(canvas, scene.dimensions === 3);

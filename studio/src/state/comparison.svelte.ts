@@ -79,9 +79,9 @@ export class Comparison {
     );
     if (differences.length === 0) return `${where}: in state that is not visible, such as memory or counters.`;
     select(differences, a, b);
-    const listed = differences.slice(0, MAX_LISTED).map(({ who, words }) => {
-      const owner = bodiesOfA.find(who) === undefined ? bodiesOfB : bodiesOfA;
-      return `${owner.nameOf(who)} ${words}`;
+    const listed = differences.slice(0, MAX_LISTED).map(({ body, words }) => {
+      const owner = bodiesOfA.find(body) === undefined ? bodiesOfB : bodiesOfA;
+      return `${owner.nameOf(body)} ${words}`;
     });
     const more = differences.length > MAX_LISTED ? `, and ${differences.length - MAX_LISTED} more` : "";
     return `${where}: ${listed.join(", ")}${more}.`;
@@ -90,8 +90,8 @@ export class Comparison {
 
 /** Selects the first agent that differs, in both. */
 function select(differences: BodyDifference[], a: Session, b: Session): void {
-  const agent = differences.find(({ who }) => a.frames.bodies?.isAgent(who));
+  const agent = differences.find(({ body }) => a.frames.bodies?.isAgent(body));
   if (!agent) return;
-  a.selection.select(agent.who);
-  if (b.frames.bodies?.find(agent.who) !== undefined) b.selection.select(agent.who);
+  a.selection.select(agent.body);
+  if (b.frames.bodies?.find(agent.body) !== undefined) b.selection.select(agent.body);
 }

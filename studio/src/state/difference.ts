@@ -36,7 +36,7 @@ export interface RunFrame {
 
 /** A body that differs between two runs, and how. */
 export interface BodyDifference {
-  who: BodyId;
+  body: BodyId;
   words: string;
 }
 
@@ -45,15 +45,15 @@ export function bodyDifferences(a: RunFrame, b: RunFrame, lengthWords: (meters: 
   const found: BodyDifference[] = [];
   const unmatched: BodyDifference[] = [];
   for (let i = 0; i < a.bodies.count; i++) {
-    const who = a.bodies.bodyId(i);
-    const k = b.bodies.find(who);
+    const body = a.bodies.bodyId(i);
+    const k = b.bodies.find(body);
     const words =
       k === undefined ? "exists in only one of them" : describeDifference(a.frame, i, b.frame, k, lengthWords);
-    if (words !== null) (k === undefined ? unmatched : found).push({ who, words });
+    if (words !== null) (k === undefined ? unmatched : found).push({ body, words });
   }
   for (let k = 0; k < b.bodies.count; k++) {
-    const who = b.bodies.bodyId(k);
-    if (a.bodies.find(who) === undefined) unmatched.push({ who, words: "exists in only one of them" });
+    const body = b.bodies.bodyId(k);
+    if (a.bodies.find(body) === undefined) unmatched.push({ body, words: "exists in only one of them" });
   }
   return [...found, ...unmatched];
 }

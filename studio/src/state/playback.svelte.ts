@@ -95,8 +95,8 @@ export class Playback {
     if (!(await this.#seeker.seekTo(cycle))) return null;
     return this.#waiters.waitFor(() => {
       const { state, digest, cycle: at } = this.#run.status;
-      const isThere = (state === "paused" && at === cycle) || (state === "over" && at <= cycle);
-      return isThere ? { cycle: at, digest } : null;
+      const isReached = (state === "paused" && at === cycle) || (state === "over" && at <= cycle);
+      return isReached ? { cycle: at, digest } : null;
     });
   }
 

@@ -4,7 +4,7 @@ export class Seeker {
   #requested: number | null = null;
   #current: number | null = null;
   #seeking: Promise<boolean> | null = null;
-  #isSought = false;
+  #isAfterSeek = false;
   readonly #seek: (cycle: number) => Promise<boolean>;
 
   /** `seek` asks the server, and returns whether it reached the cycle. */
@@ -20,33 +20,33 @@ export class Seeker {
   /** Seeks to a cycle, after the seek in progress. Returns whether the last requested cycle was reached. */
   seekTo(cycle: number): Promise<boolean> {
     this.#requested = cycle;
-    this.#isSought = true;
+    this.#isAfterSeek = true;
     this.#seeking ??= this.#run();
     return this.#seeking;
   }
 
   /** The server has restarted the run: its next frame follows no earlier one. */
   onRestart(): void {
-    this.#isSought = true;
+    this.#isAfterSeek = true;
   }
 
   /** Registers a frame; returns whether it results from a seek and does not just follow the previous one. */
   onFrame(): boolean {
-    const isSought = this.#isSought;
+    const isAfterSeek = this.#isAfterSeek;
     // The frame after the reply is the last one of a seek.
-    if (this.#seeking === null) this.#isSought = false;
-    return isSought;
+    if (this.#seeking === null) this.#isAfterSeek = false;
+    return isAfterSeek;
   }
 
   async #run(): Promise<boolean> {
-    let isThere = false;
+    let isReached = false;
     while (this.#requested !== null) {
       const cycle = this.#requested;
       this.#requested = null;
       this.#current = cycle;
-      isThere = await this.#seek(cycle);
+      isReached = await this.#seek(cycle);
     }
     this.#seeking = null;
-    return isThere;
+    return isReached;
   }
 }

@@ -23,10 +23,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const program = await Program.start(scenario);
     try {
       const listening = performance.now();
-      const { page, complaints } = await openPage(browser, program.url);
+      const { page, consoleErrors } = await openPage(browser, program.url);
       await drawn(page);
       const shown = performance.now();
-      expect(complaints).toEqual([]);
+      expect(consoleErrors).toEqual([]);
       await page.context().close();
       return [(listening - began) / 1000, (shown - began) / 1000];
     } finally {

@@ -12,7 +12,7 @@ import { openCrowd } from "./crowd";
 
 const { STUDIO_URL: url = "", STUDIO_PID: pid = "", SPEED: speed = "fastest" } = process.env;
 const minutes = Number(process.env.MINUTES ?? "60");
-/** Until then caches fill, as they may. */
+/** Caches may fill until then. */
 const SETTLED = 1 / 12;
 const MAX_GROWTH = 1.1;
 
@@ -21,7 +21,7 @@ function server_mb(): number {
   return Number(/VmRSS:\s+(\d+) kB/.exec(status)![1]) / 1e3;
 }
 
-/** Returns how much of the page's heap is in use, garbage aside. */
+/** Returns the used part of the page's heap, without garbage. */
 async function page_mb(client: CDPSession): Promise<number> {
   await client.send("HeapProfiler.collectGarbage");
   const { metrics } = await client.send("Performance.getMetrics");
@@ -35,8 +35,8 @@ describe.skipIf(url === "" || pid === "")("a real server", () => {
   });
   afterAll(async () => browser.close());
 
-  test("memory stays as it was after a while", { timeout: 60_000 * minutes + 2 * WAIT_MS }, async () => {
-    const { page, complaints } = await openPage(browser, url);
+  test("memory does not grow over time", { timeout: 60_000 * minutes + 2 * WAIT_MS }, async () => {
+    const { page, consoleErrors } = await openPage(browser, url);
     await openCrowd(page, true);
     const client = await page.context().newCDPSession(page);
     await client.send("Performance.enable");
@@ -47,11 +47,11 @@ describe.skipIf(url === "" || pid === "")("a real server", () => {
     };
     const early = await measure(SETTLED);
     const late = await measure(1 - SETTLED);
-    const told = ([server, heap, cycle]: [number, number, string | null]): string =>
+    const summary = ([server, heap, cycle]: [number, number, string | null]): string =>
       `server ${server.toFixed(0)} MB, heap ${heap.toFixed(1)} MB at cycle ${cycle}`;
-    console.log(`after ${minutes * SETTLED} minutes ${told(early)}; after ${minutes} ${told(late)}`);
+    console.log(`after ${minutes * SETTLED} minutes ${summary(early)}; after ${minutes} ${summary(late)}`);
     expect(late[0] / early[0]).toBeLessThanOrEqual(MAX_GROWTH);
     expect(late[1] / early[1]).toBeLessThanOrEqual(MAX_GROWTH);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-/** axe finds nothing to object to, in any of the page's states. */
+/** axe finds no accessibility problems in any state of the page. */
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";

@@ -1,4 +1,4 @@
-/** Changing a scenario on the canvas, in forms and as text, against a server of made-up worlds. */
+/** Editing a scenario on the canvas, in forms and as text, against a fake server. */
 
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
@@ -11,7 +11,7 @@ const server = new FakeServer("dist");
 let browser: Browser;
 let page: Page;
 let hand: PointerDriver;
-let complaints: string[];
+let consoleErrors: string[];
 
 beforeAll(async () => {
   await server.start();
@@ -30,7 +30,7 @@ afterEach(async () => {
 });
 
 async function visit(world: string, look: PageOptions = {}): Promise<void> {
-  ({ page, complaints } = await openPage(browser, server.url, look));
+  ({ page, consoleErrors } = await openPage(browser, server.url, look));
   await openNew(page, world);
   hand = new PointerDriver(page);
 }
@@ -48,7 +48,7 @@ async function checked(words = "no problems"): Promise<void> {
 
 const edits = (): Edit[] => server.calls.flatMap((call) => (call.do === "edit" ? call.edits : []));
 
-/** Waits for so many edits and returns the last. */
+/** Waits for a number of edits and returns the last. */
 async function edited(count: number): Promise<Edit> {
   await expect.poll(() => edits().length, { timeout: 30_000 }).toBe(count);
   await checked();
@@ -61,7 +61,7 @@ const text = (): string => {
 };
 
 describe("the canvas", () => {
-  test("a brush, a line, a rectangle and a fill draw the boxes that they cross, and the picture starts anew", async () => {
+  test("a brush, a line, a rectangle and a fill draw the boxes that they cross, and the run restarts", async () => {
     await draws("robots");
     await hand.tool("Brush");
     await hand.drag([1.25, 0.75], [3.25, 0.75]);
@@ -97,10 +97,10 @@ describe("the canvas", () => {
     await page.keyboard.press("Control+y");
     await checked();
     expect(text()).toContain("#.#####..#");
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("robots are put, moved, turned and taken away; a door makes its way through a wall", async () => {
+  test("robots are placed, moved, rotated and removed; a door replaces a part of a wall", async () => {
     await draws("robots");
     await hand.tool("Robot");
     await hand.click(3.25, 1.75);
@@ -137,7 +137,7 @@ describe("the canvas", () => {
     expect((await edited(7)).key).toBe("robots.0.behaviour");
   });
 
-  test("all of it goes by keys alone", async () => {
+  test("all tools can be used by keys alone", async () => {
     await draws("robots");
     await page.locator("canvas.layer").focus();
     await page.keyboard.press("3");
@@ -183,7 +183,7 @@ describe("the canvas", () => {
     await page.mouse.up();
   }
 
-  test("what chains in space start from, go to and must avoid is moved along axes, in the view and by keys, and put back", async () => {
+  test("starts, targets and obstacles of chains in space move along axes, in the view and by keys, and back by undo", async () => {
     await draws("chain");
     await page.locator("canvas.layer").focus();
     await page.keyboard.press("n");
@@ -193,7 +193,7 @@ describe("the canvas", () => {
     const lifted = (await edited(1)) as { key: string; value: number[] };
     expect([lifted.key, lifted.value[0], lifted.value[1]]).toEqual(["obstacles.0.at_m", 1, 2]);
     expect(lifted.value[2]).toBeGreaterThan(0.6);
-    // It is dragged on from its present place, which the program tells.
+    // The next drag starts at its current position, as reported by the program.
     const [middle] = await axes(before!);
     await pull(middle!, 70, 0);
     const aside = (await edited(2)) as { key: string; value: number[] };
@@ -213,10 +213,10 @@ describe("the canvas", () => {
     expect(text()).toContain("at_m = [1.0, 2.0, 0.5]");
     expect(await page.getByRole("button", { name: "Undo" }).isDisabled()).toBe(true);
     await page.screenshot({ path: "screenshots/edit-space-1280.png" });
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("routes of airplanes are put and moved", async () => {
+  test("routes of airplanes are drawn and moved", async () => {
     await draws("airspace");
     await hand.drag([-4000, 0], [-3000, 2000]);
     const moved = await edited(1);
@@ -231,7 +231,7 @@ describe("the canvas", () => {
     expect(await edited(3)).toMatchObject({ op: "insert", key: "airplanes", value: { heading_deg: 90 } });
   });
 
-  test("who plays wants to watch, and Run does", async () => {
+  test("playing ends editing, and Run plays", async () => {
     await draws("robots");
     await page.getByRole("button", { name: "Run", exact: true }).click();
     await page.getByRole("button", { name: "Pause" }).waitFor();
@@ -243,8 +243,8 @@ describe("the canvas", () => {
 });
 
 describe("a new drawing", () => {
-  test("begins with walls around, one robot and a brush", async () => {
-    ({ page, complaints } = await openPage(browser, server.url));
+  test("starts with surrounding walls, one robot and the brush", async () => {
+    ({ page, consoleErrors } = await openPage(browser, server.url));
     hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Draw a new one…" }).click();
     const dialog = page.getByRole("dialog", { name: "Draw a new scenario of robots" });
@@ -259,12 +259,12 @@ describe("a new drawing", () => {
     expect(text()).toContain(`${"#".repeat(20)}\n#${".".repeat(18)}#`);
     expect(text()).toContain("at = [[9, 4]]");
     expect(await page.getByRole("button", { name: "Brush", exact: true }).getAttribute("aria-pressed")).toBe("true");
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 });
 
 describe("forms", () => {
-  test("a field becomes one edit, its problem stands at it, and steps back go over all views", async () => {
+  test("a field yields one edit, shows its problem, and undo works across all views", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "robots 1: couriers" }).click();
@@ -296,10 +296,10 @@ describe("forms", () => {
     await checked();
     expect(await page.getByRole("button", { name: "Undo" }).isDisabled()).toBe(true);
     expect(text()).toContain("# A made-up scenario.");
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("a matrix sums its rows while one types, marks the wrong one, and scales it", async () => {
+  test("a matrix sums its rows during typing, marks wrong ones, and scales them", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "sensors: echo" }).click();
@@ -321,7 +321,7 @@ describe("forms", () => {
     expect(await page.getByLabel("Sum of wall").textContent()).toBe("1");
   });
 
-  test("a unit stands apart from its key, and all stays in sight where the window becomes narrow", async () => {
+  test("a unit is separated from its key, and all stays visible in a narrow window", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "map", exact: true }).click();
@@ -336,7 +336,7 @@ describe("forms", () => {
     await expect.poll(mPerPx, { timeout: WAIT_MS }).toBeGreaterThan(1.2 * wide);
   });
 
-  test("a problem leads to its field", async () => {
+  test("a click on a problem opens its field", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "sensors: echo" }).click();
@@ -350,7 +350,7 @@ describe("forms", () => {
 });
 
 describe("text", () => {
-  test("problems are marked over all of their span, and keys are completed from the schema", async () => {
+  test("problems are marked over their whole span, and keys are completed from the schema", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Text" }).click();
     const box = page.getByRole("textbox", { name: "Text of the scenario" });
@@ -370,10 +370,10 @@ describe("text", () => {
     await page.keyboard.press("Control+z");
     await checked();
     expect(text().endsWith("size = 2\n")).toBe(true);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("what was drawn is in the text, and what was typed in the picture", async () => {
+  test("drawn changes appear in the text, and typed ones in the view", async () => {
     await draws("robots");
     await hand.tool("Robot");
     await hand.click(3.25, 1.75);
@@ -384,7 +384,7 @@ describe("text", () => {
 });
 
 describe("saving", () => {
-  test("a new scenario asks where, a saved one does not, and leaving unsaved asks", async () => {
+  test("a new scenario asks for its file, a saved one does not, and leaving unsaved changes asks", async () => {
     await draws("robots");
     await hand.tool("Robot");
     await hand.click(3.25, 1.75);
@@ -409,21 +409,21 @@ describe("saving", () => {
     });
     await hand.click(1.25, 2.25);
     await edited(3);
-    const asked = new Promise<string>((told) =>
-      page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))),
+    const asked = new Promise<string>((resolve) =>
+      page.once("dialog", (one) => void one.dismiss().then(() => resolve(one.type()))),
     );
     await page.getByRole("button", { name: "Close Made-up hall" }).click();
     expect(await asked).toBe("confirm");
     expect(await page.locator("canvas.layer").count()).toBe(1);
-    const left = new Promise<string>((told) =>
-      page.once("dialog", (one) => void one.dismiss().then(() => told(one.type()))),
+    const left = new Promise<string>((resolve) =>
+      page.once("dialog", (one) => void one.dismiss().then(() => resolve(one.type()))),
     );
     await page.close({ runBeforeUnload: true });
     expect(await left).toBe("beforeunload");
   });
 
-  test("a file that was changed meanwhile is shown, and mine or theirs stays", async () => {
-    ({ page, complaints } = await openPage(browser, server.url));
+  test("a file that was changed meanwhile is compared, and either text can be kept", async () => {
+    ({ page, consoleErrors } = await openPage(browser, server.url));
     hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Open…", exact: true }).click();
     await page.getByRole("button", { name: /^robots\.toml/ }).click();

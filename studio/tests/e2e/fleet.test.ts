@@ -1,4 +1,4 @@
-/** A watched fleet, in a real browser, against a made-up server; and pictures of it for people to look at. */
+/** A watched fleet in a real browser, against a fake server; and screenshots for people. */
 
 import { mkdirSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
@@ -10,7 +10,7 @@ const server = new FakeServer("dist");
 server.open = [{ kind: "fleet", path: "tcp/127.0.0.1:7600" }];
 let browser: Browser;
 let page: Page;
-let complaints: string[];
+let consoleErrors: string[];
 
 beforeAll(async () => {
   mkdirSync("screenshots", { recursive: true });
@@ -29,11 +29,11 @@ afterEach(async () => {
 });
 
 async function visit(look: PageOptions = {}): Promise<void> {
-  ({ page, complaints } = await openPage(browser, server.url, look));
+  ({ page, consoleErrors } = await openPage(browser, server.url, look));
   await drawn(page);
 }
 
-test("a fleet is shown as it flies, and nothing steers it", async () => {
+test("a flying fleet is shown without controls", async () => {
   await visit();
   await page.getByText("Watching a fleet at tcp/127.0.0.1:7600").waitFor();
   await page.waitForFunction(
@@ -48,10 +48,10 @@ test("a fleet is shown as it flies, and nothing steers it", async () => {
     (call) => !["open", "credit", "select-scans", "events", "files"].includes(call.do),
   );
   expect(steered).toEqual([]);
-  expect(complaints).toEqual([]);
+  expect(consoleErrors).toEqual([]);
 });
 
-test("a node that is selected tells whom it hears and who hears it", async () => {
+test("a selected node lists the nodes that it hears and that hear it", async () => {
   await visit();
   await page.getByRole("button", { name: "ONE18", exact: true }).click();
   const facts = page.getByTestId("node");
@@ -79,6 +79,6 @@ for (const [width, isDark] of [
     const cut = await page.evaluate(() => document.documentElement.scrollWidth > document.documentElement.clientWidth);
     expect(cut).toBe(false);
     await page.screenshot({ path: `screenshots/fleet-${width}-${isDark ? "dark" : "light"}.png` });
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 }

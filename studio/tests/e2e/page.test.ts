@@ -1,4 +1,4 @@
-/** A person's use of the page, in a real browser, against a server of made-up worlds. */
+/** Use of the page in a real browser, against a fake server. */
 
 import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
@@ -9,7 +9,7 @@ import { FakeServer, PARTING } from "../fake/server";
 const server = new FakeServer("dist");
 let browser: Browser;
 let page: Page;
-let complaints: string[];
+let consoleErrors: string[];
 
 beforeAll(async () => {
   await server.start();
@@ -27,7 +27,7 @@ afterEach(async () => {
 });
 
 async function visit(world: string | null, look: PageOptions = {}): Promise<void> {
-  ({ page, complaints } = await openPage(browser, server.url, look));
+  ({ page, consoleErrors } = await openPage(browser, server.url, look));
   if (world) await openNew(page, world);
 }
 
@@ -46,7 +46,7 @@ async function askedFor(what: string, times: number): Promise<void> {
 }
 
 describe("transport", () => {
-  test("a run is opened, played, paused and stepped, and nothing complains", async () => {
+  test("a run is opened, played, paused and stepped without errors", async () => {
     await visit("robots");
     expect(await cycle()).toBe(0);
     await page.getByRole("button", { name: "Play", exact: true }).click();
@@ -58,7 +58,7 @@ describe("transport", () => {
     await cycleIs(stopped + 1);
     await page.getByRole("button", { name: "One cycle back" }).click();
     await cycleIs(stopped);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
   test("the timeline seeks, and shows events as ticks", async () => {
@@ -81,10 +81,10 @@ describe("transport", () => {
     await page.locator(".events .row:not(.later)").first().waitFor();
     await slider.fill("12");
     await cycleIs(12);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("a run plays backwards, and stands still when asked to", async () => {
+  test("a run plays backwards and can be paused", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("800");
     await cycleIs(800);
@@ -105,11 +105,11 @@ describe("transport", () => {
     expect(asked("seek")).toBe(seeks);
     await page.getByRole("button", { name: "Play backwards" }).click();
     await cycleIs((c) => c < 590);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
     expect(await page.getByRole("alert").textContent()).toBe("");
   });
 
-  test("another seed starts anew", async () => {
+  test("another seed restarts the run", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("100");
     await cycleIs(100);
@@ -119,7 +119,7 @@ describe("transport", () => {
     await cycleIs(0);
   });
 
-  test("frames that are left out are told", async () => {
+  test("dropped frames are displayed", async () => {
     await visit("robots");
     await page.evaluate(() => {
       const draw = window.requestAnimationFrame.bind(window);
@@ -136,7 +136,7 @@ describe("transport", () => {
 });
 
 describe("agents", () => {
-  test("a click in the picture selects, and the inspector shows facts", async () => {
+  test("a click in the view selects, and the inspector shows facts", async () => {
     await visit("airspace");
     await page.getByRole("slider", { name: "Cycle" }).fill("10");
     await cycleIs(10);
@@ -157,7 +157,7 @@ describe("agents", () => {
     await page.getByRole("list", { name: "Marks" }).getByText("chosen").waitFor();
   });
 
-  test("the list selects, filters ten thousand, and has only the rows that are seen", async () => {
+  test("the list selects, filters ten thousand agents, and renders only visible rows", async () => {
     await visit("crowd");
     await page.getByTestId("agent-count").filter({ hasText: "10000" }).waitFor();
     expect(await page.locator(".agents").getByRole("option").count()).toBeLessThan(60);
@@ -175,7 +175,7 @@ describe("agents", () => {
     await page.getByRole("heading", { name: "courier Anna" }).waitFor();
   });
 
-  test("beams of the selected are asked for and shown with a legend", async () => {
+  test("beams of the selected agent are requested and shown with a legend", async () => {
     await visit("robots");
     await page.getByRole("option", { name: "robot 5" }).click();
     await page.getByRole("list", { name: "Marks" }).getByText("as reported").waitFor();
@@ -184,7 +184,7 @@ describe("agents", () => {
 });
 
 describe("events", () => {
-  test("a click goes there and selects, kinds can be hidden, and keys jump", async () => {
+  test("a click seeks and selects, kinds can be hidden, and keys jump", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("400");
     await cycleIs(400);
@@ -205,7 +205,7 @@ describe("events", () => {
 });
 
 describe("text", () => {
-  test("a wrong key is marked where it stands, refused, and a right text runs", async () => {
+  test("a wrong key is marked at its position and refused, and a valid text runs", async () => {
     await visit("robots");
     await page.getByRole("tab", { name: "Text" }).click();
     const text = page.getByRole("textbox", { name: "Text of the scenario" });
@@ -229,7 +229,7 @@ describe("text", () => {
     await page.locator("canvas.picture").waitFor();
     const restart = server.calls.findLast((call) => call.do === "restart");
     expect(restart?.do === "restart" && restart.text?.endsWith("size = 3")).toBe(true);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 });
 
@@ -264,7 +264,7 @@ describe("keyboard", () => {
     expect(asked("play")).toBe(plays);
   });
 
-  test("everything can be reached by Tab, and shows that it is", async () => {
+  test("everything can be reached by Tab, with a visible focus", async () => {
     await visit("robots");
     const reached = new Set<string>();
     for (let i = 0; i < 60; i++) {
@@ -328,7 +328,7 @@ describe("results", () => {
     await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name }).click();
   }
 
-  test("the report of a recording stands in a frame that reaches nobody, and its parts can be kept", async () => {
+  test("the report of a recording is shown in a sandboxed frame, and can be downloaded in parts", async () => {
     await openFile(/robots\.run/);
     await page.getByRole("tab", { name: "Report" }).click();
     const frame = page.frameLocator("iframe");
@@ -353,10 +353,10 @@ describe("results", () => {
     expect(await charts.first().getByRole("option").count()).toBe(2);
     await charts.first().selectOption({ index: 1 });
     expect(await charts.count()).toBe(3);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("why there is no report stands in its place, and another session shows its picture instead", async () => {
+  test("the reason for a missing report is shown in its place, and other sessions show their view", async () => {
     await openFile(/broken\.run/);
     await page.getByRole("tab", { name: "Report" }).click();
     await page.getByText("it is cut off").waitFor();
@@ -367,7 +367,7 @@ describe("results", () => {
     await page.getByRole("region", { name: "Charts" }).waitFor();
   });
 
-  test("the picture on the canvas and the tables of a recording are kept as files", async () => {
+  test("the view and the tables of a recording are exported as files", async () => {
     await openFile(/robots\.run/);
     await drawn(page);
     await page.getByRole("slider", { name: "Cycle" }).fill("50");
@@ -399,7 +399,7 @@ describe("results", () => {
     const table = page.waitForEvent("download");
     await dialog.getByRole("row", { name: "trajectories" }).getByRole("link", { name: "CSV" }).click();
     expect((await table).url()).toContain("/export?path=robots.run&as=csv&table=trajectories");
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
   test("a sweep shows its report and its runs, and a run is opened with its seed", async () => {
@@ -422,7 +422,7 @@ describe("results", () => {
     await page.locator("canvas.picture").waitFor();
   });
 
-  test("a variant that is named in a report opens its first run, by its name or its number", async () => {
+  test("a variant clicked in a report opens its first run, by name or number", async () => {
     await openFile(/^sweep/);
     await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
     const report = page.frameLocator("iframe");
@@ -434,12 +434,12 @@ describe("results", () => {
     await report.getByRole("button", { name: "count = 4" }).click();
     await drawn(page);
     // The frame itself tries forbidden actions.
-    expect(complaints.filter((words) => !words.includes("/enter") && !words.includes("Fetch API"))).toEqual([]);
+    expect(consoleErrors.filter((words) => !words.includes("/enter") && !words.includes("Fetch API"))).toEqual([]);
   });
 });
 
 describe("sessions", () => {
-  test("two beside each other go in step, and only when asked to", async () => {
+  test("two sessions side by side run in step only if requested", async () => {
     await visit("robots");
     await page.getByRole("button", { name: "Open…" }).click();
     await page.getByRole("dialog", { name: "Open" }).getByRole("button", { name: "chain", exact: true }).click();
@@ -458,7 +458,7 @@ describe("sessions", () => {
     await page.waitForFunction(() => document.querySelectorAll("canvas.picture").length === 1);
   });
 
-  test("the first difference of two runs in step is found, and who differs", async () => {
+  test("the first difference of two runs in step is found, with the bodies that differ", async () => {
     await visit("robots");
     await page.getByRole("button", { name: "Open…" }).click();
     const dialog = page.getByRole("dialog", { name: "Open" });
@@ -472,7 +472,7 @@ describe("sessions", () => {
       .waitFor();
     await cycleIs(PARTING);
     await page.getByRole("heading", { name: "robot 3" }).waitFor();
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
   for (const [status, words] of [
@@ -480,7 +480,7 @@ describe("sessions", () => {
     [401, "Open the whole address"],
     [421, "does not accept this address"],
   ] as const) {
-    test(`a server that answers ${status} is told as that, and found again`, async () => {
+    test(`a server that replies ${status} is reported as such, and reconnected`, async () => {
       await visit("robots");
       await page.getByRole("button", { name: "Play", exact: true }).click();
       await cycleIs((c) => c > 2);
@@ -494,7 +494,7 @@ describe("sessions", () => {
     });
   }
 
-  test("what cannot be opened is told with its remedy", async () => {
+  test("a target that cannot be opened is reported with a remedy", async () => {
     await visit(null);
     await page.getByRole("button", { name: /^Open a scenario/ }).click();
     await page.getByRole("button", { name: /nowhere/ }).click();
@@ -502,14 +502,14 @@ describe("sessions", () => {
     await page.getByRole("alert").getByText("choose another one").waitFor();
   });
 
-  test("a session that ended says why", async () => {
+  test("a session that has ended shows the reason", async () => {
     await visit("robots");
     server.endAll();
     await page.getByTestId("ended").getByText("the disk is full").waitFor();
     await page.getByTestId("ended").getByText("make room").waitFor();
   });
 
-  test("a recording that was played is opened again too, as it was", async () => {
+  test("a recording that was playing is reopened in its state", async () => {
     await visit(null);
     await page.getByRole("button", { name: /^Open a scenario/ }).click();
     await page.getByRole("button", { name: /chain\.mcap/ }).click();
@@ -522,7 +522,7 @@ describe("sessions", () => {
     await cycleIs(100);
   });
 
-  test("a server that dies and comes back finds its sessions where they were", async () => {
+  test("sessions are restored after the server restarts", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("345");
     await cycleIs(345);

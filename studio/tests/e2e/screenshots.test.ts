@@ -1,4 +1,4 @@
-/** Pictures of the page for people to look at: three worlds, two widths, dark and light. They go to `screenshots/`. */
+/** Screenshots for people, in `screenshots/`: three worlds, two widths, dark and light. */
 
 import { mkdirSync } from "node:fs";
 import type { Browser } from "playwright-core";
@@ -24,8 +24,8 @@ for (const world of ["robots", "chain", "airspace"]) {
     [400, 800],
   ] as const) {
     for (const isDark of [false, true]) {
-      test(`${world} at ${width} pixels, ${isDark ? "dark" : "light"}, is drawn without complaints`, async () => {
-        const { page, complaints } = await openPage(browser, server.url, { width, height, isDark });
+      test(`${world} at ${width} pixels, ${isDark ? "dark" : "light"}, is drawn without errors`, async () => {
+        const { page, consoleErrors } = await openPage(browser, server.url, { width, height, isDark });
         await openNew(page, world);
         await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
         await page.getByRole("button", { name: "Play", exact: true }).click();
@@ -40,7 +40,7 @@ for (const world of ["robots", "chain", "airspace"]) {
         if (width === 1280) await page.locator(".chart .value").filter({ hasText: /\d/ }).first().waitFor();
         await page.getByRole("list", { name: "Marks" }).waitFor();
         await page.screenshot({ path: `screenshots/${world}-${width}-${isDark ? "dark" : "light"}.png` });
-        expect(complaints).toEqual([]);
+        expect(consoleErrors).toEqual([]);
         await page.context().close();
       });
     }

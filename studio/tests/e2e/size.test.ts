@@ -1,13 +1,13 @@
-/** The page, as it was built, is small where it is loaded first and where it is edited, and keeps to itself. */
+/** The built page is small, both for the first load and for editing, and loads nothing from elsewhere. */
 
 import { readdirSync, readFileSync } from "node:fs";
 import { basename, join } from "node:path";
 import { gzipSync } from "node:zlib";
 import { expect, test } from "vitest";
 
-/** Greatest size of all that is fetched before anything is seen. */
+/** Maximum size of all files of the first load. */
 const MAX_FIRST_BYTES = 300_000;
-/** Greatest size of the files that the editor adds, with the text view. */
+/** Maximum size of the files that the editor adds, including the text view. */
 const MAX_LATER_BYTES = 220_000;
 
 const html = readFileSync("dist/index.html", "utf8");
@@ -17,7 +17,7 @@ const files = new Map(
     .map((entry) => [entry.name, readFileSync(join(entry.parentPath, entry.name))]),
 );
 
-/** The files that the first load needs: those that the page names, and their static imports. */
+/** The files of the first load: those that the page refers to, and their static imports. */
 function first(): Set<string> {
   const found = new Set(["index.html"]);
   const open = [...html.matchAll(/(?:src|href)="\/([^"]+)"/g)].map(([, path]) => basename(path!));
@@ -38,7 +38,7 @@ function first(): Set<string> {
 const weight = (names: Iterable<string>): number =>
   [...names].reduce((bytes, name) => bytes + gzipSync(files.get(name)!, { level: 9 }).length, 0);
 
-test("the first load is at most 300 kB, compressed, and the rest comes when it is asked for", () => {
+test("the first load is at most 300 kB, compressed, and the rest is loaded on demand", () => {
   const needed = first();
   const [now, all] = [weight(needed), weight(files.keys())];
   console.log(`${Math.round(now / 1000)} kB first, ${Math.round((all - now) / 1000)} kB later`);

@@ -1,4 +1,4 @@
-/** A server's part of the editor: a little of it, on tables instead of the text, so comments go. */
+/** The server's part of the editor, reduced: it edits tables instead of text, so comments are lost. */
 
 import { parse, stringify } from "smol-toml";
 import { isTable, partsOf, type Json, type TomlTable } from "../../src/edit/keypath";
@@ -148,7 +148,7 @@ function problem(
   };
 }
 
-/** Any key that is not known is a problem, and any row that does not sum to 1, as the program itself would say. */
+/** The problems of unknown keys and of rows that do not sum to 1, in the program's words. */
 export function check(text: string): Problem[] {
   const lines = text.split("\n");
   const unknown = lines.flatMap((line, i) => {

@@ -1,4 +1,4 @@
-/** Frames as the server makes them, after the layout at the head of its protocol. */
+/** Encodes frames by the layout in the server's protocol. */
 
 import type { FrameText } from "../../src/protocol";
 

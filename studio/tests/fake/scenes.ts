@@ -1,4 +1,4 @@
-/** Three made-up worlds: closed formulas of the cycle, so that going to and fro shows the same. */
+/** Three made-up worlds: closed formulas of the cycle, so that seeks are reproducible. */
 
 import type { BodyTable, RunEvent, Inspection, Appearance, Scan, Scene, Shape, BodyId } from "../../src/protocol";
 import type { Columns } from "./encode";
@@ -34,7 +34,7 @@ function looks(
 
 const ALL_COLORS = COLORS.map((color) => looks(color, 1, 5));
 
-/** A number from 0 to 1 that follows from two others. */
+/** A pseudo-random number from 0 to 1, by two numbers. */
 function chance(a: number, b: number): number {
   const x = Math.sin(a * 127.1 + b * 311.7) * 43758.5453;
   return x - Math.floor(x);

@@ -5,7 +5,7 @@ import { FakeServer } from "./server";
 
 const DAY_S = 86_400;
 
-test("the made-up server serves until it is ended", { timeout: 2000 * DAY_S }, async () => {
+test("the fake server serves until it is stopped", { timeout: 2000 * DAY_S }, async () => {
   const server = new FakeServer("dist");
   server.port = Number(process.env.PORT ?? 7920);
   await server.start();

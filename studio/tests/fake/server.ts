@@ -1,4 +1,4 @@
-/** A small server that speaks the studio's protocol about made-up worlds. Tests kill it and start it again. */
+/** A small server of the studio's protocol with made-up worlds, which tests stop and restart. */
 
 import { readFileSync } from "node:fs";
 import { createServer, type Server, type ServerResponse } from "node:http";
@@ -18,6 +18,7 @@ import type {
   SweepRun,
 } from "../../src/protocol";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
+import { declaredEditing } from "./editing";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
 
@@ -50,7 +51,7 @@ function problemOf(cause: string, remedy: string, line: number | null = null, co
   };
 }
 
-/** The cycle from which on runs of the seed 2 are others. */
+/** The cycle from which runs of seed 2 differ. */
 export const PARTING = 137;
 
 /** Eight nodes: all hear all but the last, which none hears and which is late; the third is lost. */
@@ -204,7 +205,7 @@ export class FakeServer {
   open: OpenTarget[] = [];
   /** The text that a file would have by now, if another program had changed it. */
   theirs: string | null = null;
-  /** The answer of the way in; anything but 204 refuses sockets, too. */
+  /** The status of the sign-in; anything but 204 refuses sockets, too. */
   entrance = 204;
   readonly #dist: string;
   #http: Server | null = null;
@@ -316,11 +317,11 @@ export class FakeServer {
     for (const run of this.#runs.values()) {
       const before = JSON.stringify(run.status());
       run.tick(0.033);
-      if (JSON.stringify(run.status()) !== before) this.#tell(run);
+      if (JSON.stringify(run.status()) !== before) this.#sendStatus(run);
     }
   }
 
-  #tell(run: Run): void {
+  #sendStatus(run: Run): void {
     const text = JSON.stringify({ notice: "status", ...run.status() });
     for (const socket of this.#sockets?.clients ?? []) socket.send(text);
   }
@@ -347,14 +348,14 @@ export class FakeServer {
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
     }
-    return { is: "schema", schema: SCHEMA };
+    return { is: "schema", schema: SCHEMA, editing: declaredEditing(call.world) };
   }
 
   #answerSession(session: number, call: SessionMethod, say: (words: unknown) => void): ReplyBody {
     const run = this.#runs.get(session);
     if (!run) throw problemOf("no such session", "open it again");
     if (run.isFleet && !["close", "credit", "select-scans", "events", "tables"].includes(call.do)) {
-      throw problemOf("a fleet is only watched here", "steer it where it was started");
+      throw problemOf("a fleet is only watched here", "control it where it was started");
     }
     const answer = call.do === "save" ? this.#save(call.to, call.overwrite) : act(call, run);
     if (call.do === "close") this.#runs.delete(run.id);

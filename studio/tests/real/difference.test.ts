@@ -31,7 +31,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await program?.stop();
   });
 
-  test("two runs that one key tells apart are alike before the cycle that is found, and not in it", async () => {
+  test("two runs that differ in one key are equal before the found cycle, and differ in it", async () => {
     const studio = await connected(program);
     const path = `${SCENARIOS}/robots/crossing.toml`;
     for (let i = 0; i < 2; i++) expect(await studio.open({ kind: "scenario", path })).toBe(true);

@@ -1,4 +1,4 @@
-/** The program runs and writes every drawn, filled-in and typed change. SIDESTEP_BINARY names the program. */
+/** The program at SIDESTEP_BINARY runs and writes every drawn, filled-in and typed change. */
 
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -43,7 +43,7 @@ wall = [0.05, 0.90, 0.05]
 robot = [0.05, 0.05, 0.90]
 `;
 
-if (BINARY === "") console.log("skipped: SIDESTEP_BINARY names no program");
+if (BINARY === "") console.log("skipped: SIDESTEP_BINARY is not set");
 
 describe.skipIf(BINARY === "")("the real program", () => {
   let browser: Browser;
@@ -51,7 +51,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
   let folder: string;
   let page: Page;
   let hand: PointerDriver;
-  let complaints: string[];
+  let consoleErrors: string[];
   const file = (): string => join(folder, "hall.toml");
 
   beforeAll(async () => {
@@ -70,7 +70,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
   });
 
   async function open(name = "hall.toml"): Promise<void> {
-    ({ page, complaints } = await openPage(browser, program.url));
+    ({ page, consoleErrors } = await openPage(browser, program.url));
     hand = new PointerDriver(page);
     await page.getByRole("button", { name: "Open…", exact: true }).click();
     await page.getByRole("button", { name: new RegExp(`^${name}`) }).click();
@@ -109,7 +109,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     return Math.min(...cycles);
   }
 
-  test("a wall that is drawn is one that is run into, where it was drawn", async () => {
+  test("robots collide with a drawn wall at its position", async () => {
     await open();
     await page.getByRole("slider", { name: "Cycle" }).fill("100");
     // From column 1 to the wall at column 11 it is nine steps.
@@ -123,10 +123,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await page.getByRole("button", { name: "Run", exact: true }).click();
     // And three to that at column 5.
     await expect.poll(contact, { timeout: WAIT_MS }).toBe(3);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("a robot that is put stands in the box of the click, and a moved one where it was let go", async () => {
+  test("a new robot is in the box of the click, and a moved one where it was released", async () => {
     await open();
     await edit();
     await hand.tool("Robot");
@@ -141,7 +141,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await page.getByText(/4\.25/).first().waitFor();
   });
 
-  test("a wrong row is marked at its field, told in the text, and scaled", async () => {
+  test("a wrong row is marked at its field and in the text, and scaled", async () => {
     await open();
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "sensors: echo" }).click();
@@ -165,7 +165,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(await saved()).toContain("wall = [0.1, 0.8, 0.1]");
   });
 
-  test("comments and layout stay through ten changes, and ten steps back leave nothing", async () => {
+  test("comments and layout survive ten changes, and ten undo steps restore the text", async () => {
     await open();
     await page.getByRole("tab", { name: "Forms" }).click();
     await page.getByRole("button", { name: "robots 1", exact: true }).click();
@@ -216,7 +216,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(await saved()).toBe(HALL);
   });
 
-  test("a file that was changed by somebody else is not written over unseen", async () => {
+  test("a file changed by another program is not overwritten without asking", async () => {
     await open();
     await edit();
     await hand.tool("Brush");
@@ -232,9 +232,9 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(readFileSync(file(), "utf8")).toContain("#...#......#");
   });
 
-  test("from nothing to a corridor with a door and five robots that are watched, within two minutes", async () => {
+  test("a corridor with a door and five robots is drawn and run within two minutes", async () => {
     const begun = performance.now();
-    ({ page, complaints } = await openPage(browser, program.url));
+    ({ page, consoleErrors } = await openPage(browser, program.url));
     hand = new PointerDriver(page);
     await page.getByRole("button", { name: "New…" }).click();
     await page
@@ -258,7 +258,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
     );
     expect(await page.getByTestId("agent-count").textContent()).toContain("5");
     expect((performance.now() - begun) / 1000).toBeLessThan(120);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
     await page.keyboard.press("e");
     await page.locator("canvas.layer").waitFor();
     await page.keyboard.press("Control+s");
@@ -269,8 +269,8 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(readFileSync(join(folder, "corridor.toml"), "utf8")).toContain("[[doors]]");
   });
 
-  test("the walls of a generated office become walls that can be drawn upon", async () => {
-    ({ page, complaints } = await openPage(browser, program.url));
+  test("the walls of a generated office can be copied into the text and edited", async () => {
+    ({ page, consoleErrors } = await openPage(browser, program.url));
     hand = new PointerDriver(page);
     await page.getByRole("button", { name: "robots", exact: true }).first().click();
     await drawn(page);
@@ -287,7 +287,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
       .waitFor();
   });
 
-  test("a polygon and a patrol are put with the mouse, and the program takes them", async () => {
+  test("a polygon and a patrol are drawn with the mouse, and accepted by the program", async () => {
     copyFileSync(join(SCENARIOS, "chain", "default.toml"), join(folder, "chain.toml"));
     await open("chain.toml");
     await edit();
@@ -307,10 +307,10 @@ describe.skipIf(BINARY === "")("the real program", () => {
     const text = readFileSync(join(folder, "chain.toml"), "utf8");
     expect(text).toMatch(/^corners_m = \[\[2(\.0\d*)?, 5/m);
     expect(text).toMatch(/^patrol_m = \[\[7[^\]]*\], \[(9|8\.99|9\.0)[^\]]*\], \[(9|8\.99|9\.0)[^\]]*\]\]/m);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
-  /** Runs to the end, and returns the digest that is told there. */
+  /** Runs to the end and returns the displayed digest. */
   async function digest(): Promise<string> {
     await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
     await page.getByRole("button", { name: "Play", exact: true }).click();
@@ -335,7 +335,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
       // It goes as fast as before, to its end.
       await page.locator("canvas.layer").waitFor({ state: "detached" });
       expect(await page.locator(".banner .digest").textContent()).toBe(before);
-      expect(complaints).toEqual([]);
+      expect(consoleErrors).toEqual([]);
     },
   );
 });

@@ -1,4 +1,4 @@
-/** A running fleet of real processes in the page. SIDESTEP_BINARY names the program; sidestep-link lies beside it. */
+/** A running fleet of real processes in the page: the program at SIDESTEP_BINARY, with sidestep-link in the same folder. */
 
 import { spawn, type ChildProcess } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, writeFileSync } from "node:fs";
@@ -55,17 +55,17 @@ async function fly(scenario: string, ...more: string[]): Promise<Fleet> {
     stdio: ["ignore", "ignore", "pipe"],
   });
   const lines = createInterface({ input: process.stderr! });
-  const endpoint = await new Promise<string>((told, failed) => {
+  const endpoint = await new Promise<string>((resolve, reject) => {
     lines.on("line", (line) => {
       const found = /listens at (\S+)/.exec(line);
-      if (found) told(found[1]!);
+      if (found) resolve(found[1]!);
     });
-    process.once("exit", (code) => failed(new Error(`the fleet ended with ${code}`)));
+    process.once("exit", (code) => reject(new Error(`the fleet ended with ${code}`)));
   });
   return { process, endpoint };
 }
 
-/** Ends a fleet in good order. */
+/** Stops a fleet in order. */
 async function land({ process }: Fleet): Promise<void> {
   process.removeAllListeners("exit");
   if (process.exitCode !== null) return;
@@ -112,8 +112,8 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     await expect.poll(() => cycle(page), { timeout: WAIT_MS }).toBeGreaterThan(before);
   }
 
-  test("airplanes fly in the page, and it says who hears whom", async () => {
-    const { page, complaints } = await watch(RING, "--speed", "4");
+  test("airplanes fly in the page, which lists their links", async () => {
+    const { page, consoleErrors } = await watch(RING, "--speed", "4");
     await expect.poll(() => cycle(page), { timeout: WAIT_MS }).toBeGreaterThanOrEqual(2);
     await goesOn(page);
     await page
@@ -126,12 +126,12 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
       .filter({ hasText: /Hears.*airplane/ })
       .waitFor();
     await page.screenshot({ path: "screenshots/real-fleet-1280.png" });
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
     await page.context().close();
   });
 
-  test("a connector is selected in the table, and a fleet that begins where one has ended is found", async () => {
-    const { fleet, page, complaints } = await watch(CHAINS, "--speed", "0.2", "--cycles", "1000000");
+  test("a connector is selected in the table, and a new fleet at the same address is opened", async () => {
+    const { fleet, page, consoleErrors } = await watch(CHAINS, "--speed", "0.2", "--cycles", "1000000");
     await goesOn(page);
     await page.locator(".fleet tbody button").nth(4).click();
     const facts = page.getByTestId("node");
@@ -147,7 +147,7 @@ describe.skipIf(BINARY === "" || !existsSync(join(dirname(BINARY), "sidestep-lin
     fleets.push(await fly(CHAINS, "--speed", "0.2", "--cycles", "1000000", "--listen", fleet.endpoint));
     await page.getByTestId("state").filter({ hasText: "flying" }).waitFor();
     await goesOn(page);
-    expect(complaints).toEqual([]);
+    expect(consoleErrors).toEqual([]);
     await page.context().close();
   });
 });

@@ -1,4 +1,4 @@
-/** The real program behind the page as it was built: SIDESTEP_BINARY names it. */
+/** The real program, at the path SIDESTEP_BINARY, behind the built page. */
 
 import { spawn, type ChildProcess } from "node:child_process";
 import { createInterface } from "node:readline";
@@ -20,15 +20,15 @@ export class Program {
     this.#page = page;
   }
 
-  /** Starts it over a folder; the page comes from `dist` and hands its socket on. */
+  /** Starts it with a folder; the page comes from `dist` and forwards its socket. */
   static async start(folder: string): Promise<Program> {
     const child = spawn(BINARY, ["studio", "--no-open", "--port", "0", "--quiet", folder], {
       stdio: ["ignore", "pipe", "inherit"],
     });
     const lines = createInterface({ input: child.stdout! });
-    const server = await new Promise<string>((told, failed) => {
-      lines.once("line", (line) => told(line.trim().replace(/\/$/, "")));
-      child.once("exit", (code) => failed(new Error(`the program ended with ${code}`)));
+    const server = await new Promise<string>((resolve, reject) => {
+      lines.once("line", (line) => resolve(line.trim().replace(/\/$/, "")));
+      child.once("exit", (code) => reject(new Error(`the program ended with ${code}`)));
     });
     const proxy = {
       "/socket": { target: server, ws: true, changeOrigin: true, rewriteWsOrigin: true },

@@ -6,7 +6,7 @@ import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { drawn, launch, openPage } from "../browser";
 import { BINARY, Program, SCENARIOS as FOLDER } from "./program";
 
-/** Pictures for people to look at; MANY=1 for all widths and themes. */
+/** Screenshots for people; MANY=1 for all widths and themes. */
 const LOOKS = process.env.MANY
   ? ([
       [1280, false],
@@ -43,7 +43,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
   for (const [folder, name] of SCENARIOS) {
     for (const [width, isDark] of LOOKS) {
       test(`${folder}/${name} at ${width}${isDark ? ", dark" : ""} plays and is inspected`, async () => {
-        const { page, complaints } = await openPage(browser, program.url, { width, isDark });
+        const { page, consoleErrors } = await openPage(browser, program.url, { width, isDark });
         await page.getByRole("button", { name: "Open…" }).click();
         await page.getByRole("button", { name: `${folder}/` }).click();
         await page.getByRole("button", { name }).first().click();
@@ -60,7 +60,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
         await page.screenshot({
           path: `screenshots/real-${folder}-${name.replace(".toml", "")}-${width}${isDark ? "-dark" : ""}.png`,
         });
-        expect(complaints).toEqual([]);
+        expect(consoleErrors).toEqual([]);
         await page.context().close();
       });
     }

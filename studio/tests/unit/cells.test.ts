@@ -6,7 +6,7 @@ import { brushCells, floodCells, lineCells, rectangleCells, type Cell } from "..
 const sorted = (cells: Cell[]): string[] => cells.map((cell) => cell.join()).sort();
 
 describe("boxes", () => {
-  test("a line touches every column of a flat one, ends included, whichever way it is drawn", () => {
+  test("a flat line covers every column, ends included, in both directions", () => {
     expect(lineCells([0, 0], [6, 2])).toEqual([
       [0, 0],
       [1, 0],
@@ -27,14 +27,14 @@ describe("boxes", () => {
     ]);
   });
 
-  test("a rectangle is its border, from any corner, or all of it", () => {
+  test("a rectangle is a border or filled, from any corner", () => {
     expect(rectangleCells([3, 3], [0, 1], false).length).toBe(10);
     expect(rectangleCells([0, 1], [3, 3], true).length).toBe(12);
     expect(sorted(rectangleCells([3, 1], [0, 3], false))).toEqual(sorted(rectangleCells([0, 1], [3, 3], false)));
     expect(rectangleCells([1, 1], [1, 1], false)).toEqual([[1, 1]]);
   });
 
-  test("a wide brush names each box once", () => {
+  test("a wide brush lists each box once", () => {
     expect(sorted(brushCells([[5, 5]], 2))).toEqual(["5,5", "5,6", "6,5", "6,6"]);
     expect(
       brushCells(
@@ -48,7 +48,7 @@ describe("boxes", () => {
     expect(brushCells([[5, 5]], 1)).toEqual([[5, 5]]);
   });
 
-  test("filling stays within walls, and does not slip through corners", () => {
+  test("filling stays within walls, also at corners", () => {
     const map = new AsciiMap("#####\n#.#.#\n##.##\n#...#\n#####\n", 1);
     const fill = (from: Cell): string[] => sorted(floodCells(from, map.width, map.height, (cell) => map.charAt(cell)));
     expect(fill([1, 3])).toEqual(["1,3"]);
@@ -66,7 +66,7 @@ describe("a drawn map", () => {
     expect(map.charAt([5, 0])).toBe(undefined);
   });
 
-  test("an edit names lines from the top, and only what changes", () => {
+  test("an edit counts lines from the top, and contains only changes", () => {
     const map = new AsciiMap("...\n.#.\n...\n", 1);
     expect(
       map.paint(
@@ -97,7 +97,7 @@ describe("a drawn map", () => {
     });
   });
 
-  test("boxes and meters agree, on a turned ground too", () => {
+  test("boxes and meters are converted, also on a rotated ground", () => {
     const turned: GridPlacement = { box_m: 0.25, width: 10, height: 10, origin_m: [3, -2], yaw_rad: 0.7 };
     for (const ground of [turned, { ...turned, yaw_rad: 0, origin_m: [0, 0] as const }]) {
       for (const cell of [
@@ -112,7 +112,7 @@ describe("a drawn map", () => {
     expect(cornerPosition({ ...turned, yaw_rad: 0, origin_m: [0, 0] }, 4, 2)).toEqual([1, 0.5, 0]);
   });
 
-  test("boxes that the picture does not show yet are told, and all where it has another floor", () => {
+  test("boxes that the view does not show yet are listed, and all where it has another floor", () => {
     const map = new AsciiMap("#.?\n..#\n", 1);
     expect(changedCells(map, Uint8Array.from([0, 0, 1, 1, 0, 1]))).toEqual([]);
     expect(changedCells(map, Uint8Array.from([1, 0, 1, 0, 0, 0]))).toEqual([
@@ -122,7 +122,7 @@ describe("a drawn map", () => {
     expect(changedCells(map, null).length).toBe(6);
   });
 
-  test("an empty map is as large as asked for", () => {
+  test("an empty map has the requested size", () => {
     const art = /"""\n([^"]*)"""/.exec(emptyScenario("x", 8, 6, 0.25))![1]!;
     const map = new AsciiMap(art, 0.25);
     expect([map.width, map.height]).toEqual([8, 6]);

@@ -9,7 +9,7 @@ const [recorded, scenario, fleet] = [
   { isFleet: true, folder: null },
 ];
 
-test("where a session has no report, or nothing but a picture, the picture is shown and its tab is chosen", () => {
+test("a session without the requested panel shows the view", () => {
   expect([recorded, scenario, fleet].map((one) => centerOf(one, "report"))).toEqual(["report", "view", "view"]);
   expect([recorded, scenario, fleet].map((one) => centerOf(one, "text"))).toEqual(["text", "text", "view"]);
   for (const one of [recorded, scenario, fleet]) expect(centersOf(one)).toContain(centerOf(one, "report"));

@@ -11,7 +11,7 @@ function labels(text: string): string[] | null {
   return completionAt(text.replace("|", ""), at, world, modelOf(TEXT))?.options.map(({ label }) => label) ?? null;
 }
 
-describe("what can be written", () => {
+describe("completions", () => {
   test("keys of the section that the cursor is in", () => {
     expect(labels("|")).toContain("seed");
     expect(labels("[map]\nbo|")).toEqual(["box_size_m", "ascii"]);
@@ -26,7 +26,7 @@ describe("what can be written", () => {
     expect(labels('robots = { regime = "|')).toEqual(['"reliable"', '"both"']);
   });
 
-  test("values: choices, yes and no, names that the text itself has", () => {
+  test("values: choices, booleans, names defined in the text", () => {
     expect(labels('[[robots]]\nregime = "b|')).toEqual(['"reliable"', '"both"']);
     expect(labels("[record]\nevents = |")).toEqual(["true", "false"]);
     expect(labels('[[robots]]\nsensors = ["|')).toEqual(['"sonar-ring"', '"echo"']);
@@ -38,7 +38,7 @@ describe("what can be written", () => {
     expect(labels("[sensors.echo.|")).toEqual(["confusion"]);
   });
 
-  test("nothing in comments, drawings, and where nothing is known", () => {
+  test("nothing in comments, drawn maps and unknown sections", () => {
     expect(labels("# se|")).toBe(null);
     expect(labels('[map]\nascii = """\n##|')).toBe(null);
     expect(labels("seed = 1 # se|")).toBe(null);
@@ -46,12 +46,12 @@ describe("what can be written", () => {
     expect(labels("[[robots]]\nsize = |")).toBe(null);
   });
 
-  test("what is chosen replaces what was typed of it", () => {
+  test("a completion replaces the typed prefix", () => {
     expect(completionAt("[map]\nbo", 8, world, null)?.from).toBe(6);
     expect(completionAt('[[robots]]\nregime = "b', 22, world, null)?.from).toBe(20);
   });
 
-  test("a description and the default come along", () => {
+  test("a completion has a description and the default", () => {
     const seed = completionAt("se", 2, world, null)?.options.find(({ label }) => label === "seed");
     expect(seed?.words).toBe("All randomness grows from it. [1]");
   });

@@ -57,7 +57,7 @@ test("waits double from a quarter of a second up to eight seconds", () => {
   expect([0, 1, 2, 3, 4, 5, 6, 50].map(delayBefore_ms)).toEqual([250, 500, 1000, 2000, 4000, 8000, 8000, 8000]);
 });
 
-test("each attempt waits longer, and a greeting begins anew", () => {
+test("each attempt waits longer, and a hello resets the delay", () => {
   for (let i = 0; i < 3; i++) {
     sockets.at(-1)!.onclose!();
     timers.at(-1)!.then();
@@ -69,7 +69,7 @@ test("each attempt waits longer, and a greeting begins anew", () => {
   expect(timers.at(-1)!.ms).toBe(250);
 });
 
-test("a socket that stays silent is given up", () => {
+test("a socket without a hello is abandoned", () => {
   sockets[0]!.onopen!();
   greetings[0]!.then();
   expect([sockets[0]!.isClosed, heard]).toEqual([true, ["lost 1"]]);
@@ -78,7 +78,7 @@ test("a socket that stays silent is given up", () => {
   expect(heard).toEqual(["lost 1"]);
 });
 
-test("replies find their calls, also out of order", async () => {
+test("replies are matched with their requests, also out of order", async () => {
   const socket = sockets[0]!;
   socket.onopen!();
   const first = connection.requestSession(1, { do: "pause" });
@@ -92,7 +92,7 @@ test("replies find their calls, also out of order", async () => {
   expect((await second).is).toBe("source");
 });
 
-test("a refusal carries place, cause and remedy", async () => {
+test("a refused request has place, cause and remedy", async () => {
   sockets[0]!.onopen!();
   const call = connection.requestSession(9, { do: "pause" });
   const problem = {
@@ -110,7 +110,7 @@ test("a refusal carries place, cause and remedy", async () => {
   await expect(call).rejects.toMatchObject({ problem });
 });
 
-test("calls that are open when the socket dies are refused, as are those without one", async () => {
+test("pending requests fail when the socket closes, and so do requests without a socket", async () => {
   sockets[0]!.onopen!();
   const call = connection.requestSession(1, { do: "pause" });
   sockets[0]!.onclose!();
@@ -118,14 +118,14 @@ test("calls that are open when the socket dies are refused, as are those without
   await expect(connection.requestSession(1, { do: "pause" })).rejects.toBeInstanceOf(RequestError);
 });
 
-test("connecting now gives up the old socket, whose end is then nobody's loss", () => {
+test("connecting now abandons the old socket, whose end is not reported as a loss", () => {
   const old = sockets[0]!;
   connection.connect();
   expect([old.isClosed, old.onclose]).toEqual([true, null]);
   expect(heard).toEqual([]);
 });
 
-test("a problem of which the server cannot tell whose it is, is told", () => {
+test("a problem of an unknown request is reported", () => {
   const problem = { place: "request", cause: "it cannot be read", remedy: "" };
   sockets[0]!.onmessage!({ data: JSON.stringify({ id: 0, problem }) });
   expect(heard).toEqual(["problem it cannot be read"]);

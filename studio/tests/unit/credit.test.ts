@@ -1,4 +1,4 @@
-/** The server may have two frames under way, never more, and never waits for credit that was lost. */
+/** At most two frames are in flight, and lost credit never stops the server. */
 
 import { expect, test } from "vitest";
 import { Credit } from "../../src/credit";
@@ -8,7 +8,7 @@ function counted(): { credit: Credit; granted: number[] } {
   return { credit: new Credit((frames) => granted.push(frames)), granted };
 }
 
-test("a session begins with two frames, and each drawn one is granted again", () => {
+test("a session starts with credit for two frames, which each drawn one refills", () => {
   const { credit, granted } = counted();
   credit.refill();
   for (let i = 0; i < 5; i++) {
@@ -18,13 +18,13 @@ test("a session begins with two frames, and each drawn one is granted again", ()
   expect(granted).toEqual([2, 1, 1, 1, 1, 1]);
 });
 
-test("pictures without a new frame grant nothing", () => {
+test("redrawing the same frame grants nothing", () => {
   const { credit, granted } = counted();
   for (let i = 0; i < 5; i++) credit.refill();
   expect(granted).toEqual([2]);
 });
 
-test("two frames that come before one picture are both granted again", () => {
+test("two frames that arrive before one drawing are both granted again", () => {
   const { credit, granted } = counted();
   credit.refill();
   credit.onFrame();
@@ -34,7 +34,7 @@ test("two frames that come before one picture are both granted again", () => {
   expect(granted).toEqual([2, 2]);
 });
 
-test("a server that starts anew is granted anew", () => {
+test("a restarted session gets new credit", () => {
   const { credit, granted } = counted();
   credit.refill();
   credit.reset();

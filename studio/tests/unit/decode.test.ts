@@ -1,4 +1,4 @@
-/** Frames are read byte for byte as the head of the server's protocol says, and anything else is refused. */
+/** Frames are decoded by the layout in the server's protocol, and anything else is refused. */
 
 import { describe, expect, test } from "vitest";
 import { decodeFrame, FrameError } from "../../src/decode";
@@ -70,7 +70,7 @@ describe("a frame of the plane", () => {
     expect(frame.text).toEqual({});
   });
 
-  test("is looked at without a copy", () => {
+  test("is viewed without a copy", () => {
     const bytes = bytesOf(HEX);
     expect(decodeFrame(bytes).positions_m.buffer).toBe(bytes);
   });

@@ -1,4 +1,4 @@
-/** The first difference of two runs is found, and little is computed beyond it. */
+/** The first difference of two runs is found, with few cycles computed beyond it. */
 
 import { expect, test } from "vitest";
 import { bodyDifferences, firstDifference } from "../../src/state/difference";
@@ -14,7 +14,7 @@ async function searched(last: number, parting: number): Promise<{ found: number 
   return { found, asked };
 }
 
-test("every cycle of a run can be the first, and none", async () => {
+test("the first difference is found at every cycle, or none", async () => {
   for (const last of [0, 1, 2, 3, 100]) {
     for (let parting = 0; parting <= last; parting++)
       expect((await searched(last, parting)).found, `${parting} of ${last}`).toBe(parting);
@@ -22,7 +22,7 @@ test("every cycle of a run can be the first, and none", async () => {
   }
 });
 
-test("a difference early in a long run is found early", async () => {
+test("an early difference in a long run needs few comparisons", async () => {
   const { found, asked } = await searched(1e9, 1000);
   expect(found).toBe(1000);
   expect(Math.max(...asked)).toBeLessThanOrEqual(2000);
@@ -63,11 +63,11 @@ function frame(positions_m: number[], orientations: number[], conditions: number
   );
 }
 
-test("bodies that differ are found by who they are, whatever their order", () => {
+test("bodies are matched by identity, in any order", () => {
   const a = { bodies: bodies([1, 2, 3, 4]), frame: frame([0, 0, 1, 1, 2, 2, 3, 3], [0, 0, 0, 0], [0, 0, 0, 0]) };
   const b = { bodies: bodies([3, 2, 1, 5]), frame: frame([2, 2, 1, 1, 0, 3, 9, 9], [1, 0, 0, 0], [0, 2, 0, 0]) };
-  const told = bodyDifferences(a, b, (m) => `${m} m`).map(({ who, words }) => `${who.number} ${words}`);
-  expect(told).toEqual([
+  const listed = bodyDifferences(a, b, (m) => `${m} m`).map(({ body, words }) => `${body.number} ${words}`);
+  expect(listed).toEqual([
     "1 is 3 m apart",
     "2 has another condition",
     "3 has another heading",
@@ -76,7 +76,7 @@ test("bodies that differ are found by who they are, whatever their order", () =>
   ]);
 });
 
-test("runs that look alike have no body to name", () => {
+test("runs with equal frames have no differing bodies", () => {
   const one = { bodies: bodies([1]), frame: frame([0, 0], [0], [0]) };
   expect(bodyDifferences(one, one, String)).toEqual([]);
 });

@@ -1,14 +1,14 @@
-/** A watched session loses frames; one out of sight loses nothing. */
+/** Only a watched session counts dropped frames. */
 
 import { expect, test } from "vitest";
 import { DroppedFrames } from "../../src/state/dropped-frames";
 
-test("what is left out while somebody looks is counted", () => {
+test("frames dropped while the session is watched count", () => {
   const missed = new DroppedFrames();
   expect([0, 2, 5].map((n) => missed.count(n, true))).toEqual([0, 2, 5]);
 });
 
-test("what is left out while nobody looks is not, nor in the first frame afterwards", () => {
+test("frames dropped while the session is hidden do not count, nor those before the first watched frame", () => {
   const missed = new DroppedFrames();
   missed.count(0, true);
   missed.count(3, true);

@@ -1,4 +1,4 @@
-/** All events are asked for, however many there are, and each that is missing is counted once. */
+/** All events are fetched, in several requests if necessary, and missing ones are counted once. */
 
 import { expect, test } from "vitest";
 import type { ReplyBody, RunEvent } from "../../src/protocol";
@@ -17,7 +17,7 @@ function event(cycle: number, number: number): RunEvent {
   } as RunEvent;
 }
 
-/** The server's answers: of not more than 5000 events, however many are asked for. */
+/** The server's replies, of at most 5000 events each. */
 function server(
   all: RunEvent[],
   lost = 0,
@@ -34,19 +34,19 @@ function server(
   };
 }
 
-test("what does not fit into one answer is asked for again", async () => {
+test("events that do not fit into one reply are fetched by further requests", async () => {
   const events = new Events();
   await events.fetch(5000, server(Array.from({ length: 5000 }, (_, i) => event(i, 1))));
   expect([events.list.length, events.leftOut]).toEqual([5000, 0]);
 });
 
-test("a cycle of more events than an answer holds is fetched as a whole", async () => {
+test("a cycle with more events than the request's limit is fetched completely", async () => {
   const events = new Events();
   await events.fetch(10, server(Array.from({ length: 4500 }, (_, i) => event(3, i))));
   expect([events.list.length, events.leftOut]).toEqual([4500, 0]);
 });
 
-test("a cycle of more events than any answer holds is fetched as a whole, and what comes after it, too", async () => {
+test("a cycle with more events than the server's limit is fetched completely, and so are later ones", async () => {
   const events = new Events();
   const all = [
     event(2, 1),
@@ -57,14 +57,14 @@ test("a cycle of more events than any answer holds is fetched as a whole, and wh
   expect([events.list.length, events.leftOut]).toEqual([all.length, 0]);
 });
 
-test("what the server never kept is counted once", async () => {
+test("events that the server never kept are counted once", async () => {
   const events = new Events();
   await events.fetch(10, server([event(3, 1)], 7));
   await events.fetch(20, server([event(9, 1), event(12, 1)]));
   expect([events.list.length, events.leftOut]).toEqual([2, 7]);
 });
 
-test("two equal events of one cycle are two, however often they are told", async () => {
+test("two equal events of one cycle stay two, however often they are fetched", async () => {
   const events = new Events();
   events.add([event(3, 1), event(3, 1), event(4, 1)]);
   expect(events.list.length).toBe(3);

@@ -1,4 +1,4 @@
-/** Numbers are short, have their units, and are never wrong by rounding of whole ones. */
+/** Numbers are short and have units, and whole numbers are not rounded. */
 
 import { expect, test } from "vitest";
 import { number, place, share, short, time, valueText, bodyLabel, withUnit } from "../../src/format";
@@ -27,7 +27,7 @@ test.each([
   expect(number(value)).toBe(words);
 });
 
-test("units stand behind a narrow space", () => {
+test("units follow a narrow space", () => {
   expect(withUnit(1.25, "m")).toBe(`1.25${S}m`);
   expect(withUnit(3)).toBe("3");
   expect([1, 2].map((value) => withUnit(value, "cycles"))).toEqual([`1${S}cycle`, `2${S}cycles`]);
@@ -60,7 +60,7 @@ test("places have as many coordinates as the world", () => {
   expect(place([1, 2.5, -3], 3)).toBe(`(1, 2.5, −3)${S}m`);
 });
 
-test("values of all kinds have words", () => {
+test("values of all kinds have a text", () => {
   expect(valueText("none", 2)).toBe("–");
   expect(valueText({ flag: false }, 2)).toBe("no");
   expect(valueText({ number: { value: -12.5, unit: "°" } }, 2)).toBe(`−12.5${S}°`);

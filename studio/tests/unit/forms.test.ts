@@ -22,7 +22,7 @@ const world = new WorldSchema(SCHEMA);
 const model = modelOf(TEXT);
 
 describe("paths of keys", () => {
-  test("what is not bare stands in quotes, to and fro", () => {
+  test("keys that are not bare are quoted, and read back", () => {
     for (const parts of [
       ["robots", "1", "at", "0"],
       ["kinds", "a.b", "observation"],
@@ -35,7 +35,7 @@ describe("paths of keys", () => {
     expect(partsOf("kinds.'a.b'.x")).toEqual(["kinds", "a.b", "x"]);
   });
 
-  test("a section that stands alone may be told as the first", () => {
+  test("the index of a single section may be given", () => {
     const alone = { robots: { size: 2 }, doors: [{ at: [[1, 2]] }] };
     expect(normalizedPath(alone, "robots.0.size")).toEqual(["robots", "size"]);
     expect(normalizedPath(alone, "robots.size")).toEqual(["robots", "size"]);
@@ -74,14 +74,14 @@ describe("fields", () => {
     );
   });
 
-  test("an empty field takes the key away, an equal one changes nothing", () => {
+  test("an empty field removes the key, an equal value changes nothing", () => {
     expect(valueEdits(["robots", 0, "size"], 3, 2)).toEqual([{ op: "set", key: "robots.0.size", value: 3 }]);
     expect(valueEdits(["robots", 0, "size"], undefined, 2)).toEqual([{ op: "remove", key: "robots.0.size" }]);
     expect(valueEdits(["seed"], undefined, undefined)).toEqual([]);
     expect(valueEdits(["at"], [1, 2], [1, 2])).toEqual([]);
   });
 
-  test("what cannot be read is told, and sends nothing", () => {
+  test("text that cannot be parsed is reported, and yields no edit", () => {
     expect(readNumber("2.5", false)).toEqual({ value: 2.5 });
     expect(readNumber("", false)).toEqual({ value: undefined });
     expect(readNumber("2.5", true)).toEqual({ error: "write a whole number" });
@@ -94,7 +94,7 @@ describe("fields", () => {
     expect(readAny("null")).toHaveProperty("error");
   });
 
-  test("sections are listed, plain keys told from tables", () => {
+  test("sections are listed, and plain keys are separated from tables", () => {
     expect(entriesOf(model, world).map(({ words }) => words)).toEqual([
       "Scenario",
       "map",
@@ -110,14 +110,14 @@ describe("fields", () => {
     expect(splitKeys(world, robots, {}).tables).toEqual([]);
   });
 
-  test("a new name is one that nobody has", () => {
+  test("a new name is unused", () => {
     expect(unusedName(["new", "new-2"], "new")).toBe("new-3");
     expect(unusedName([], "new")).toBe("new");
   });
 });
 
 describe("rows of numbers", () => {
-  test("are known by name or by number, with the names of their columns", () => {
+  test("are recognized by name or number, with the names of their columns", () => {
     expect(rowsOf({ wall: [0.1, 0.9] }, ["c"])).toEqual([{ name: "wall", path: ["c", "wall"], values: [0.1, 0.9] }]);
     expect(
       rowsOf(
@@ -139,7 +139,7 @@ describe("rows of numbers", () => {
     expect(columnsOf(model, ["sensors", "echo", "confusion"], 2)).toEqual(["1", "2"]);
   });
 
-  test("a scaled row sums to exactly 1 and keeps its shares", () => {
+  test("a scaled row sums to exactly 1 and keeps its proportions", () => {
     expect(normalize([0.3, 0.3, 0.3])).toEqual([0.333334, 0.333333, 0.333333]);
     expect(normalize([2, 1, 1])).toEqual([0.5, 0.25, 0.25]);
     expect(normalize([0, 0])).toBe(null);
@@ -152,7 +152,7 @@ describe("rows of numbers", () => {
 });
 
 describe("differences", () => {
-  test("tell what only one text has, with a little around it", () => {
+  test("contain the lines of only one text, with some context", () => {
     const mine = Array.from({ length: 20 }, (_, i) => `line ${i}`);
     const theirs = [...mine];
     theirs[10] = "changed";

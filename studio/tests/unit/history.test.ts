@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { TextHistory } from "../../src/edit/history";
 
-test("steps are undone one by one, to the first, and done again", () => {
+test("steps are undone one by one, and redone", () => {
   const history = new TextHistory("a");
   for (let i = 0; i < 5000; i++) history.push(`a${i}`, null, i);
   for (let i = 4998; i >= 0; i--) {
@@ -14,7 +14,7 @@ test("steps are undone one by one, to the first, and done again", () => {
   expect(history.now).toBe("a0");
 });
 
-test("typing without a pause is one step, and an edit between is its own", () => {
+test("typing without a pause is one step, and an edit between is a step of its own", () => {
   const history = new TextHistory("");
   history.push("w", "typing", 0);
   history.push("wo", "typing", 300);
@@ -34,7 +34,7 @@ test("a pause in typing ends a step", () => {
   expect(history.now).toBe("a");
 });
 
-test("a new step drops those that were undone, and no step changes nothing", () => {
+test("a new step drops undone ones, and an equal text is no step", () => {
   const history = new TextHistory("a");
   history.push("b", null, 0);
   history.push("b", null, 1);

@@ -27,7 +27,7 @@ function fleet(nodes: FleetNode[], has_begun = true): Fleet {
 }
 
 describe("links", () => {
-  test("two that hear each other have one link, and one that is not heard back has a one-sided one", () => {
+  test("nodes that hear each other have one mutual link, others a one-sided one", () => {
     const all = fleet([node(0, [1]), node(1, [0]), node(2, [0])]);
     expect(linksOf(all, null)).toEqual([
       { from: 0, to: 1, isMutual: true },
@@ -48,7 +48,7 @@ test("links between bodies use the indices of bodies, and omit nodes that have n
 });
 
 describe("nodes", () => {
-  test("are found by the bodies of their agents, also where these are parts", () => {
+  test("are found by the bodies of their agents, including parts", () => {
     const connector = (agent: number, number: number, part: number): FleetNode =>
       node(agent, [], { body: { kind: "connector", number, part } });
     const all = fleet([connector(0, 0, 0), connector(1, 0, 1), connector(2, 1, 0)]);
@@ -68,7 +68,7 @@ describe("nodes", () => {
     ).toEqual(["well", "late", "away", "away"]);
   });
 
-  test("are told in a few words", () => {
+  test("have a short summary", () => {
     expect(fleetSummary(fleet([node(0, [])]))).toBe("1 node");
     expect(fleetSummary(fleet([node(0, []), node(1, [], { state: "gone" }), node(2, [], { silent_s: 9 })]))).toBe(
       "3 nodes, 1 late, 1 lost",

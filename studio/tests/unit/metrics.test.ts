@@ -1,4 +1,4 @@
-/** Samples stand at the cycles at which they were taken, also of metrics that appear later. */
+/** Samples belong to the cycles at which they were taken, also those of metrics that appear later. */
 
 import { expect, test } from "vitest";
 import type { ReplyBody } from "../../src/protocol";
@@ -24,7 +24,7 @@ test("a metric that appears later has no value before", async () => {
   ]);
 });
 
-test("a metric that appears before others takes no column of theirs", async () => {
+test("a metric that appears before others does not take their columns", async () => {
   const metrics = new Metrics();
   await metrics.fetch(answered(["b"], 0, [0, 10], [[1, 2]]));
   await metrics.fetch(answered(["a", "b"], 2, [20], [[9], [3]]));
@@ -34,7 +34,7 @@ test("a metric that appears before others takes no column of theirs", async () =
   ]);
 });
 
-test("a new name without a new sample has a column all the same", async () => {
+test("a new name without a new sample has a column", async () => {
   const metrics = new Metrics();
   await metrics.fetch(answered(["a"], 0, [0], [[1]]));
   await metrics.fetch(answered(["a", "b"], 1, [], [[], []]));

@@ -1,4 +1,4 @@
-/** Addresses and names of results hold for all names of folders and scenarios. */
+/** Addresses and file names of results are valid for all names of folders and scenarios. */
 
 import { expect, test } from "vitest";
 import {
@@ -10,14 +10,14 @@ import {
   parseRunRequest,
 } from "../../src/state/results";
 
-test("paths are written so that the server reads them as they are", () => {
+test("paths are encoded in addresses", () => {
   expect(reportAddress("runs/a & b/ü%")).toBe("/report?path=runs%2Fa%20%26%20b%2F%C3%BC%25");
   expect(reportAddress("x", "figures")).toBe("/report?path=x&as=figures");
   expect(exportAddress("x", { form: "csv", table: "events" })).toBe("/export?path=x&as=csv&table=events");
   expect(exportAddress("x", { form: "svg", cycle: 0 })).toBe("/export?path=x&as=svg&cycle=0");
 });
 
-test("names of files are plain", () => {
+test("file names need no quoting", () => {
   expect(["Made-up hall", "../a/b", "…", "v1.2 (é)"].map(safeFileName)).toEqual([
     "Made-up-hall",
     "a-b",
@@ -26,7 +26,7 @@ test("names of files are plain", () => {
   ]);
 });
 
-test("what a report's page asks for is read with care, and found by name or number", () => {
+test("requests of a report's page are validated, and runs are found by name or number", () => {
   const run = (variant: string, seed: string) => ({
     variant,
     seed,
@@ -45,7 +45,7 @@ test("what a report's page asks for is read with care, and found by name or numb
   expect([null, 3, "opens", {}, { opens: null }, { opens: { variant: 3 } }].map(found)).toEqual(Array(6).fill(null));
 });
 
-test("why there is no result is read from what the server has said", () => {
+test("a failure is parsed from the server's text", () => {
   expect(parseFailure("r", "r/run.json: it is cut off: 3 bytes\nhelp: record it again\n")).toMatchObject({
     place: "r/run.json",
     cause: "it is cut off: 3 bytes",

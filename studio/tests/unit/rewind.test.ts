@@ -6,7 +6,7 @@ import { cyclesBack_per_s, Rewind } from "../../src/state/rewind.svelte";
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
 
-test("cycles go down by the clock to the start, and it ends there", async () => {
+test("rewinding follows the clock down to the start, and ends there", async () => {
   const asked: number[] = [];
   const rewind = new Rewind();
   const done = rewind.start(100, 50, (cycle) => (asked.push(cycle), Promise.resolve(true)));
@@ -21,7 +21,7 @@ test("cycles go down by the clock to the start, and it ends there", async () => 
   expect(new Set(asked).size).toBe(asked.length);
 });
 
-test("a slow server is asked one question at a time, and cycles are passed over", async () => {
+test("a slow server gets one request at a time, and cycles are skipped", async () => {
   const asked: number[] = [];
   let open = 0;
   void new Rewind().start(1000, 100, async (cycle) => {
@@ -36,7 +36,7 @@ test("a slow server is asked one question at a time, and cycles are passed over"
   expect(asked.at(-1)).toBeLessThan(600);
 });
 
-test("nothing is asked once it is stopped, or once the server refuses", async () => {
+test("rewinding ends when stopped, or when the server refuses", async () => {
   let asked = 0;
   const rewind = new Rewind();
   void rewind.start(100, 50, () => (asked++, Promise.resolve(true)));
@@ -49,7 +49,7 @@ test("nothing is asked once it is stopped, or once the server refuses", async ()
   expect(rewind.isOn).toBe(false);
 });
 
-test("as fast as it goes is at the start in some seconds, however long the run is", () => {
+test("the fastest speed reaches the start in some seconds, regardless of the run's length", () => {
   expect(cyclesBack_per_s(2, 0.5, 1e6)).toBe(4);
   expect(1e6 / cyclesBack_per_s("fastest", 1, 1e6)).toBeLessThan(20);
   expect(cyclesBack_per_s("fastest", 0.1, 100)).toBe(1000);

@@ -1,4 +1,4 @@
-/** After a loss the page names its cause, and all goes on where it was, however often the server dies. */
+/** After a lost connection the page reports its cause and restores all sessions, however often the server stops. */
 
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Socket } from "../../src/connection";
@@ -35,41 +35,41 @@ function status(more: Partial<SessionStatus> = {}): SessionStatus {
   };
 }
 
-/** A request as it was sent. */
-type Asked = { id: number; session?: number; call: ServerMethod | SessionMethod };
+/** A sent request. */
+type SentRequest = { id: number; session?: number; call: ServerMethod | SessionMethod };
 
-/** A server's end of a socket: answers by hand. */
-class Line implements Socket {
+/** The server's end of a socket, which tests reply through. */
+class FakeSocket implements Socket {
   binaryType = "";
   onopen: (() => void) | null = null;
   onclose: (() => void) | null = null;
   onmessage: ((event: { data: unknown }) => void) | null = null;
-  readonly asked: Asked[] = [];
+  readonly sent: SentRequest[] = [];
   send(text: string): void {
-    this.asked.push(JSON.parse(text) as Asked);
+    this.sent.push(JSON.parse(text) as SentRequest);
   }
   close(): void {}
 
   greet(): void {
     this.onopen!();
-    this.say({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
+    this.sendToPage({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
   }
-  say(words: unknown): void {
+  sendToPage(words: unknown): void {
     this.onmessage?.({ data: JSON.stringify(words) });
   }
-  calls(what: string): Asked["call"][] {
-    return this.asked.map(({ call }) => call).filter((call) => call.do === what);
+  calls(what: string): SentRequest["call"][] {
+    return this.sent.map(({ call }) => call).filter((call) => call.do === what);
   }
-  /** Answers all questions of a kind that are open. */
+  /** Replies to all open requests of a kind. */
   async answer(what: string, answer: unknown): Promise<void> {
-    const found = this.asked.filter(({ call }) => call.do === what);
+    const found = this.sent.filter(({ call }) => call.do === what);
     for (const { id } of found)
-      this.asked.splice(
-        this.asked.findIndex((one) => one.id === id),
+      this.sent.splice(
+        this.sent.findIndex((one) => one.id === id),
         1,
       );
-    for (const { id } of found) this.say({ id, answer });
-    expect(found.length, `open questions: ${what}`).toBeGreaterThan(0);
+    for (const { id } of found) this.sendToPage({ id, answer });
+    expect(found.length, `open requests: ${what}`).toBeGreaterThan(0);
     await settled();
   }
 }
@@ -82,35 +82,35 @@ const settled = (): Promise<void> =>
     });
 const OPENED = { is: "opened", session: 1, scene: SCENE, status: status() };
 
-let lines: Line[];
+let sockets: FakeSocket[];
 let retries: (() => void)[];
-let standing: AccessStatus;
+let access: AccessStatus;
 let studio: Studio;
 
 beforeEach(async () => {
-  lines = [];
+  sockets = [];
   retries = [];
-  standing = "silent";
+  access = "silent";
   studio = new Studio({
-    open: () => (lines.push(new Line()), lines.at(-1)!),
+    open: () => (sockets.push(new FakeSocket()), sockets.at(-1)!),
     after: (ms, then) => (ms === 6000 ? 0 : retries.push(then)),
     cancel: () => undefined,
-    accessStatus: () => Promise.resolve(standing),
+    accessStatus: () => Promise.resolve(access),
   });
   studio.connect();
-  line().greet();
+  socket().greet();
   void studio.open({ kind: "new", world: "robots" });
   await settled();
-  await line().answer("open", OPENED);
+  await socket().answer("open", OPENED);
 });
 
-const line = (): Line => lines.at(-1)!;
+const socket = (): FakeSocket => sockets.at(-1)!;
 const session = () => studio.sessions[0]!;
-const tell = (more: Partial<SessionStatus>): void =>
-  line().say({ notice: "status", ...status(more) } satisfies ServerNotification);
+const sendStatus = (more: Partial<SessionStatus>): void =>
+  socket().sendToPage({ notice: "status", ...status(more) } satisfies ServerNotification);
 
 function show(cycle: number): void {
-  line().say({
+  socket().sendToPage({
     notice: "bodies",
     session: 1,
     id: 1,
@@ -136,17 +136,17 @@ function show(cycle: number): void {
     lines: [],
     conditions: [0],
   });
-  line().onmessage!({ data: frame });
+  socket().onmessage!({ data: frame });
 }
 
 async function lose(): Promise<void> {
-  line().onclose!();
+  socket().onclose!();
   await settled();
 }
 
 async function back(): Promise<void> {
   retries.at(-1)!();
-  line().greet();
+  socket().greet();
   await settled();
 }
 
@@ -157,30 +157,30 @@ for (const [how, words] of [
   ["name", /does not accept this address/],
   ["in", /connection was lost/],
 ] as const) {
-  test(`a loss where the server is "${how}" is told as that`, async () => {
-    standing = how;
+  test(`a loss where the access status is "${how}" is reported as such`, async () => {
+    access = how;
     await lose();
     expect(studio.banner).toMatchObject({ isBad: true, words: expect.stringMatching(words) });
   });
 }
 
-test("a run that played goes to its cycle and plays on", async () => {
-  tell({ state: "playing", cycle: 345 });
+test("a run that was playing is sought to its cycle and plays again", async () => {
+  sendStatus({ state: "playing", cycle: 345 });
   show(345);
   await lose();
   await back();
-  await line().answer("open", OPENED);
-  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 345 }]);
-  expect(line().calls("play")).toEqual([]);
-  await line().answer("seek", { is: "done" });
-  expect(line().calls("play").length).toBe(1);
+  await socket().answer("open", OPENED);
+  expect(socket().calls("seek")).toEqual([{ do: "seek", cycle: 345 }]);
+  expect(socket().calls("play")).toEqual([]);
+  await socket().answer("seek", { is: "done" });
+  expect(socket().calls("play").length).toBe(1);
   expect(studio.banner).toEqual({ words: "Reconnected; reopened Hall at cycle 345.", isBad: false });
 });
 
-test("a fleet that was lost is looked for until one flies there again, or its session is closed", async () => {
+test("a lost fleet is reopened once there is one at its address, unless its session is closed", async () => {
   void studio.open({ kind: "fleet", path: "tcp/127.0.0.1:7600" });
   await settled();
-  await line().answer("open", { ...OPENED, session: 2 });
+  await socket().answer("open", { ...OPENED, session: 2 });
   const fleet = studio.sessions[1]!;
   const problem = {
     place: "tcp/127.0.0.1:7600",
@@ -193,72 +193,72 @@ test("a fleet that was lost is looked for until one flies there again, or its se
     remedy: "wait",
     is_warning: false,
   };
-  line().say({ notice: "ended", session: 2, problem });
+  socket().sendToPage({ notice: "ended", session: 2, problem });
   expect(fleet.client.ended?.cause).toBe("it was not heard");
   const looked = retries.length;
   retries.at(-1)!();
   await settled();
-  const { id } = line().asked.splice(
-    line().asked.findIndex(({ call }) => call.do === "open"),
+  const { id } = socket().sent.splice(
+    socket().sent.findIndex(({ call }) => call.do === "open"),
     1,
   )[0]!;
-  line().say({ id, problem });
+  socket().sendToPage({ id, problem });
   await settled();
   expect([studio.problems, retries.length]).toEqual([[], looked + 1]);
   retries.at(-1)!();
   await settled();
-  await line().answer("open", { ...OPENED, session: 3 });
+  await socket().answer("open", { ...OPENED, session: 3 });
   expect([fleet.client.ended, fleet.client.id, retries.length]).toEqual([null, 3, looked + 1]);
-  line().say({ notice: "ended", session: 3, problem });
+  socket().sendToPage({ notice: "ended", session: 3, problem });
   studio.close(fleet);
   retries.at(-1)!();
   await settled();
-  expect(line().calls("open")).toEqual([]);
+  expect(socket().calls("open")).toEqual([]);
 });
 
-test("a run that stood still stays so", async () => {
+test("a run that was paused stays paused", async () => {
   show(20);
   await lose();
   await back();
-  await line().answer("open", OPENED);
-  await line().answer("seek", { is: "done" });
-  expect(line().calls("play")).toEqual([]);
+  await socket().answer("open", OPENED);
+  await socket().answer("seek", { is: "done" });
+  expect(socket().calls("play")).toEqual([]);
 });
 
-test("a server that dies while sessions are reopened is not told to be connected, and nothing is lost", async () => {
-  tell({ state: "playing", cycle: 345 });
+test("a server that stops while sessions are reopened does not count as connected, and no state is lost", async () => {
+  sendStatus({ state: "playing", cycle: 345 });
   show(345);
   await lose();
   await back();
-  await line().answer("open", OPENED);
+  await socket().answer("open", OPENED);
   show(3);
   await lose();
   expect(studio.banner!.isBad).toBe(true);
   expect(studio.problems).toEqual([]);
   await back();
-  await line().answer("open", OPENED);
-  await line().answer("seek", { is: "done" });
+  await socket().answer("open", OPENED);
+  await socket().answer("seek", { is: "done" });
   expect(studio.banner).toEqual({ words: "Reconnected; reopened Hall at cycle 345.", isBad: false });
-  expect([line().calls("play").length, session().client.ended]).toEqual([1, null]);
+  expect([socket().calls("play").length, session().client.ended]).toEqual([1, null]);
 });
 
-test("steps that follow each other faster than they are gone add up, forth and back, and none complains", async () => {
+test("steps requested faster than they complete add up, forward and backward, without problems", async () => {
   show(100);
   for (let i = 0; i < 3; i++) session().playback.step(10);
-  expect(line().calls("step")).toEqual(Array.from({ length: 3 }, () => ({ do: "step", cycles: 10 })));
+  expect(socket().calls("step")).toEqual(Array.from({ length: 3 }, () => ({ do: "step", cycles: 10 })));
   session().playback.step(-1);
   session().playback.step(-1);
   session().playback.step(10);
-  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 129 }]);
+  expect(socket().calls("seek")).toEqual([{ do: "seek", cycle: 129 }]);
   const problem = { place: "cycle 130", cause: "replaced by another request", remedy: "", is_warning: false };
-  for (const { id } of line().asked.filter(({ call }) => call.do === "step")) line().say({ id, problem });
+  for (const { id } of socket().sent.filter(({ call }) => call.do === "step")) socket().sendToPage({ id, problem });
   await settled();
-  await line().answer("seek", { is: "done" });
-  expect(line().calls("seek")).toEqual([{ do: "seek", cycle: 138 }]);
+  await socket().answer("seek", { is: "done" });
+  expect(socket().calls("seek")).toEqual([{ do: "seek", cycle: 138 }]);
   expect(studio.problems).toEqual([]);
 });
 
-test("a session that is closed on its way back complains of nothing, and asks for nothing more", async () => {
+test("a session that is closed while rewinding reports nothing and requests nothing more", async () => {
   show(500);
   session().selection.select({ kind: "robot", number: 0, part: null });
   session().playback.rewind();
@@ -266,57 +266,60 @@ test("a session that is closed on its way back complains of nothing, and asks fo
   session().playback.seek(200);
   const closed = session();
   studio.close(closed);
-  expect(line().calls("close")).toEqual([{ do: "close" }]);
-  const asked = line().asked.length;
+  expect(socket().calls("close")).toEqual([{ do: "close" }]);
+  const sent = socket().sent.length;
   const problem = { place: "session", cause: "the session was closed", remedy: "", is_warning: false };
-  for (const { id } of line().asked.splice(0)) line().say({ id, problem });
+  for (const { id } of socket().sent.splice(0)) socket().sendToPage({ id, problem });
   await new Promise((then) => setTimeout(then, 300));
-  expect([asked > 0, line().asked, studio.problems, closed.playback.isMoving]).toEqual([true, [], [], false]);
+  expect([sent > 0, socket().sent, studio.problems, closed.playback.isMoving]).toEqual([true, [], [], false]);
 });
 
-test("a run whose states have no digests is not compared, and the reason is told", async () => {
+test("a run whose states have no digests is not compared, and the reason is reported", async () => {
   void studio.open({ kind: "recording", path: "r" });
   await settled();
-  await line().answer("open", {
+  await socket().answer("open", {
     ...OPENED,
     session: 2,
     status: status({ session: 2, banner: "Recorded by another build." }),
   });
-  tell({ digest: "aa" });
+  sendStatus({ digest: "aa" });
   studio.inStep = true;
   studio.toggleComparison();
   await settled();
-  await line().answer("seek", { is: "done" });
+  await socket().answer("seek", { is: "done" });
   expect(studio.comparison.isRunning).toBe(false);
   expect(studio.comparison.words).toBe(
     "Hall cannot be compared, as its states have no digests. Recorded by another build.",
   );
 });
 
-test("what is saved after a loss names the text that the page knows, not that of the file by now", async () => {
+test("saving after a loss compares with the text that the page knows, not with the file's current one", async () => {
   const draft = draftOf(session());
   await settled();
-  await line().answer("source", { is: "source", place: "s.toml", text: "a = 1", read_only: false });
+  await socket().answer("source", { is: "source", place: "s.toml", text: "a = 1", read_only: false });
   await lose();
   await back();
-  await line().answer("open", OPENED);
+  await socket().answer("open", OPENED);
   void draft.save(null, false);
   await settled();
-  expect(line().calls("save")).toEqual([{ do: "save", text: "a = 1", to: null, base: "a = 1", overwrite: false }]);
+  expect(socket().calls("save")).toEqual([{ do: "save", text: "a = 1", to: null, base: "a = 1", overwrite: false }]);
 });
 
-test("what cannot be opened again is told, and opened the next time", async () => {
+test("a session that cannot be reopened is reported, and reopened the next time", async () => {
   show(5);
   await lose();
   await back();
-  const { id } = line().asked.shift()!;
-  line().say({ id, problem: { place: "p", line: null, column: null, cause: "gone", remedy: "", is_warning: false } });
+  const { id } = socket().sent.shift()!;
+  socket().sendToPage({
+    id,
+    problem: { place: "p", line: null, column: null, cause: "gone", remedy: "", is_warning: false },
+  });
   await settled();
   expect(studio.banner!.words).toContain("1 could not be reopened");
   expect(session().client.ended).not.toBeNull();
   await lose();
   await back();
-  await line().answer("open", OPENED);
-  await line().answer("seek", { is: "done" });
+  await socket().answer("open", OPENED);
+  await socket().answer("seek", { is: "done" });
   expect([session().client.ended, session().seed]).toEqual([null, 7]);
 });

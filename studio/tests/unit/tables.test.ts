@@ -2,11 +2,11 @@
 
 import { expect, test } from "vitest";
 import { hoistConstantColumns } from "../../src/panels/tables";
-import type { Value } from "../../src/protocol";
+import type { FactValue } from "../../src/protocol";
 
-const text = (words: string): Value => ({ text: words });
+const text = (words: string): FactValue => ({ text: words });
 
-test("what is the same in all rows becomes a fact", () => {
+test("a constant column becomes a fact", () => {
   const rows = [
     [text("sonar"), text("0°")],
     [text("sonar"), text("90°")],

@@ -1,11 +1,11 @@
-/** Trails hold the places seen: in order, bounded, and true after going back. */
+/** Trails cover the displayed positions: in order, bounded, and correct after seeking back. */
 
 import { expect, test } from "vitest";
 import { Trails } from "../../src/scene/trails";
 
 const at = (...numbers: number[]): Float32Array => Float32Array.from(numbers);
 
-test("places follow each other, and standing still adds none", () => {
+test("positions are appended in order, and a body at rest adds none", () => {
   const trails = new Trails(2, 2);
   trails.push(0, at(0, 0, 9, 9));
   trails.push(1, at(1, 0, 9, 9));
@@ -18,7 +18,7 @@ test("places follow each other, and standing still adds none", () => {
   expect(trails.points(1)).toEqual([[9, 9]]);
 });
 
-test("a ring forgets the oldest place", () => {
+test("a full ring drops the oldest position", () => {
   const trails = new Trails(1, 3);
   for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0, 0));
   const way = trails.points(0);
@@ -26,7 +26,7 @@ test("a ring forgets the oldest place", () => {
   expect([way[0]![0], way.at(-1)![0]]).toEqual([5, trails.length + 4]);
 });
 
-test("going back takes away what is later, also where the ring has turned", () => {
+test("seeking back removes later positions, also after the ring has wrapped around", () => {
   const trails = new Trails(1, 2);
   for (let c = 0; c < trails.length + 5; c++) trails.push(c, at(c, 0));
   trails.push(7, at(7, 0));
@@ -39,14 +39,14 @@ test("going back takes away what is later, also where the ring has turned", () =
   expect(trails.points(0).at(-1)).toEqual([8, 1]);
 });
 
-test("a jump ahead begins anew, since nobody saw the way", () => {
+test("a jump ahead starts a new trail, as the positions between were not displayed", () => {
   const trails = new Trails(1, 2);
   trails.push(0, at(0, 0));
   trails.push(5000, at(50, 0));
   expect(trails.points(0)).toEqual([[50, 0]]);
 });
 
-test("a run that goes so fast that frames are far from each other has a trail", () => {
+test("a fast run, whose frames are far apart, has a trail", () => {
   const trails = new Trails(1, 2);
   trails.push(0, at(0, 0));
   for (let k = 1; k <= 6; k++) trails.push(75 * 2 ** k, at(k, 0));
@@ -55,14 +55,14 @@ test("a run that goes so fast that frames are far from each other has a trail", 
   expect(trails.points(0).length).toBe(9);
 });
 
-test("a jump that was sought begins anew, also in a run that went fast", () => {
+test("a seek starts a new trail, also in a fast run", () => {
   const trails = new Trails(1, 2);
   for (let k = 0; k < 5; k++) trails.push(190 * k, at(k, 0));
   trails.push(1400, at(9, 0), true);
   expect(trails.points(0)).toEqual([[9, 0]]);
 });
 
-test("many bodies have short trails, so that memory is bounded", () => {
+test("many bodies have short trails, which bounds memory", () => {
   expect(new Trails(10_000, 2).length).toBeLessThan(30);
   expect(new Trails(10, 2).length).toBe(600);
 });

@@ -1,9 +1,9 @@
-/** Waiting promises are told when it is so, at once if it is so already, and never hang. */
+/** Waits resolve once their condition holds, or when they are canceled. */
 
 import { expect, test } from "vitest";
 import { Waiters } from "../../src/state/waiters";
 
-test("what is so already is told at once, and what comes later once it is so", async () => {
+test("a condition that holds resolves at once, any other one when it holds after a change", async () => {
   const waiting = new Waiters();
   let cycle = 1;
   expect(await waiting.waitFor(() => (cycle === 1 ? "now" : null))).toBe("now");
@@ -17,7 +17,7 @@ test("what is so already is told at once, and what comes later once it is so", a
   expect(await later).toBe(3);
 });
 
-test("what never comes is let go", async () => {
+test("canceled waits resolve with null", async () => {
   const waiting = new Waiters();
   const never = waiting.waitFor(() => null);
   waiting.cancelAll();

@@ -79,14 +79,17 @@ impl ArmArgs {
 /// # Errors
 /// When a word is not a number.
 pub(crate) fn parse_numbers(option: &str, text: &str) -> Result<Vec<f64>, InputError> {
-    let words = text.split(',').map(str::trim).filter(|_| !text.trim().is_empty());
-    let number = |word: &str| {
-        word.parse().map_err(|_| {
-            let cause = format!("`{word}` is no number");
-            InputError::new(option, cause, "write numbers with commas between: 0.1,-0.2")
-        })
-    };
-    words.map(number).collect()
+    if text.trim().is_empty() {
+        return Ok(Vec::new());
+    }
+    text.split(',').map(|word| parse_number(option, word.trim())).collect()
+}
+
+fn parse_number(option: &str, word: &str) -> Result<f64, InputError> {
+    word.parse().map_err(|_| {
+        let cause = format!("`{word}` is no number");
+        InputError::new(option, cause, "write numbers with commas between: 0.1,-0.2")
+    })
 }
 
 /// The posture of an arm and the positions that follow from it.
@@ -181,9 +184,11 @@ impl ArmPositions {
         let joints: Vec<_> =
             self.joint_info.iter().map(|j| (j.name.clone(), joint_text(j))).collect();
         let last = self.connectors.len() - 1;
-        let name = |i: usize| if i == last { "tip".into() } else { format!("connector {i}") };
-        let points = self.connectors.iter().enumerate().map(|(i, p)| (name(i), format_point(p)));
-        let points: Vec<_> = points.collect();
+        let mut points = Vec::new();
+        for (i, point) in self.connectors.iter().enumerate() {
+            let name = if i == last { "tip".into() } else { format!("connector {i}") };
+            points.push((name, format_point(point)));
+        }
         format!(
             "{} from {} to {}\n{}Connectors\n{}",
             self.robot,

@@ -49,11 +49,9 @@ impl ArmPicture<'_> {
 
     /// Returns the length of all links together, which the drawn sizes follow.
     fn length_m(&self) -> f64 {
-        let distance = |pair: &[Vector]| {
-            let square = |k: usize| (pair[1][k] - pair[0][k]).powi(2);
-            (square(0) + square(1) + square(2)).sqrt()
-        };
-        self.connectors.windows(2).map(distance).sum::<f64>().max(1e-3)
+        let links = self.connectors.windows(2);
+        // A chain of length 0 would have bodies of size 0, which no picture can be fitted to.
+        links.map(|ends| distance_m(&ends[0], &ends[1])).sum::<f64>().max(1e-3)
     }
 
     fn arm(&self, length_m: f64) -> Vec<Body> {
@@ -62,23 +60,32 @@ impl ArmPicture<'_> {
             thickness_m: THICKNESS_FRACTION * length_m,
         };
         let ball = Shape::Sphere { radius_m: RADIUS_FRACTION * length_m };
-        let connector = |(part, at_m): (u32, &Vector)| {
-            Body::new(BodyKind::Connector, 0, Pose::from_position(*at_m), ball.clone())
-                .with_part(part)
-        };
-        let links = Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), line);
-        std::iter::once(links).chain((0..).zip(self.connectors).map(connector)).collect()
+        let mut bodies = vec![Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), line)];
+        for (part, at_m) in (0..).zip(self.connectors) {
+            let pose = Pose::from_position(*at_m);
+            let connector = Body::new(BodyKind::Connector, 0, pose, ball.clone());
+            bodies.push(connector.with_part(part));
+        }
+        bodies
     }
 
     fn static_bodies(&self, length_m: f64) -> Vec<Body> {
-        let sphere = |(number, obstacle): (u32, &Sphere)| {
+        let mut bodies = Vec::new();
+        for (number, obstacle) in (0..).zip(self.obstacles) {
             let ball = Shape::Sphere { radius_m: obstacle.radius_m };
-            Body::new(BodyKind::Obstacle, number, Pose::from_position(obstacle.center_m), ball)
-        };
-        let target = self.target.map(|at_m| {
+            let pose = Pose::from_position(obstacle.center_m);
+            bodies.push(Body::new(BodyKind::Obstacle, number, pose, ball));
+        }
+        if let Some(at_m) = self.target {
             let ball = Shape::Sphere { radius_m: TARGET_FRACTION * length_m };
-            Body::new(BodyKind::Goal, 0, Pose::from_position(at_m), ball).with_part(0)
-        });
-        (0..).zip(self.obstacles).map(sphere).chain(target).collect()
+            let goal = Body::new(BodyKind::Goal, 0, Pose::from_position(at_m), ball);
+            bodies.push(goal.with_part(0));
+        }
+        bodies
     }
+}
+
+fn distance_m(from: &Vector, to: &Vector) -> f64 {
+    let square = (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2) + (to[2] - from[2]).powi(2);
+    square.sqrt()
 }

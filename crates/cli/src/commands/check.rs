@@ -91,13 +91,14 @@ fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &m
         bytes + RECORDING_BYTES + RECORDING_BYTES_PER_BODY * compiled.body_count() as u64;
     contents.json["memory_bytes"] = bytes.into();
     contents.json["recorded_memory_bytes"] = recorded.into();
-    let mb = |bytes: u64| bytes.div_ceil(1_000_000);
     contents.text.push_str(&format!(
         "  A run takes about {} MB of memory, recorded up to {} MB\n",
-        mb(bytes),
-        mb(recorded)
+        bytes.div_ceil(BYTES_PER_MB),
+        recorded.div_ceil(BYTES_PER_MB)
     ));
 }
+
+const BYTES_PER_MB: u64 = 1_000_000;
 
 /// Returns the peak of this process's memory so far; `None` on systems without `/proc`.
 fn peak_bytes() -> Option<u64> {
@@ -109,6 +110,9 @@ fn peak_bytes() -> Option<u64> {
 
 /// Returns remarks as text: severity and key on a line, and the text below.
 fn format_remarks(remarks: &[Remark]) -> String {
-    let text = |r: &Remark| format!("{}: {}\n  {}\n", r.severity.name(), r.key, r.words);
-    remarks.iter().map(text).collect()
+    let mut text = String::new();
+    for Remark { severity, key, words, .. } in remarks {
+        text.push_str(&format!("{}: {key}\n  {words}\n", severity.name()));
+    }
+    text
 }

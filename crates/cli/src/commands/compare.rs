@@ -2,7 +2,7 @@
 
 use crate::console::{Console, LINE_COLS, format_columns, wrap};
 use crate::exit::{ExitCode, Failure};
-use crate::progress::StageProgress;
+use crate::progress::StageBar;
 use crate::scenario_args::{ScenarioArgs, WorkersArg, downcast_scenario};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -68,7 +68,7 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
     let (source, compiled) = args.scenario.compile()?;
     let compiled: &CompiledAirspace = downcast_scenario(compiled.as_ref(), &source, "airspace")?;
     let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
-    let stages = StageProgress::new(console);
+    let stages = StageBar::new(console);
     let comparison = Comparison {
         source: &source,
         methods: &methods,

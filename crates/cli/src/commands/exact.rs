@@ -107,9 +107,9 @@ impl ExportArgs {
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
     let compiled: &Compiled = downcast_scenario(compiled.as_ref(), &source, "robots")?;
-    // A scenario without a name is named by its file.
-    let in_file = |e: InputError| InputError::new(&source.place, e.cause(), e.remedy());
-    let model = markov_model(compiled).map_err(in_file)?;
+    // The model knows no file, so its error gets the place here.
+    let model = markov_model(compiled)
+        .map_err(|e| InputError::new(&source.place, e.cause(), e.remedy()))?;
     let policy = policy(&args.policy)?;
     let mut summary = model.summary(&args.policy, &policy, args.top)?;
     if let Some(runs) = args.runs {

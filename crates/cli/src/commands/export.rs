@@ -198,8 +198,7 @@ fn print_result(
     let shown: Vec<String> = paths.iter().map(display_path).collect();
     let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
-    let short = || names.clone();
-    console.print_result_or_short(&json, short, || {
+    console.print_result_or_short(&json, &names, || {
         let confirmed = if *is_confirmed { "  its end has the recorded digest\n" } else { "" };
         let bytes: u64 =
             paths.iter().filter_map(|path| Some(std::fs::metadata(path).ok()?.len())).sum();

@@ -14,8 +14,8 @@ use std::path::Path;
 /// When something cannot be stored.
 pub(super) fn run_to_end(run: ManagedRun, console: Console) -> Result<ExitCode, Failure> {
     let summary = run.run_to_end(&ConsoleWatcher::new(console))?;
-    let short = || format!("{}\n", summary.digest);
-    console.print_result_or_short(&summary, short, || summary_text(&summary))?;
+    let digest = format!("{}\n", summary.digest);
+    console.print_result_or_short(&summary, &digest, || summary_text(&summary))?;
     Ok(print_next_step(&summary, console))
 }
 

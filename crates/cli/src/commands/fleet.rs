@@ -106,7 +106,7 @@ fn parse_speed(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// When anything is wrong with its input, or the fleet comes to no end.
+/// When anything is wrong with its input, or the fleet fails.
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut table = FleetTable::new(console, args.watch);
     let mut end = None;
@@ -142,7 +142,7 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
 
 impl FleetArgs {
     fn job(&self) -> FleetJob {
-        let loopback = || vec![format!("{}/127.0.0.1:0", self.link.protocol())];
+        let loopback = format!("{}/127.0.0.1:0", self.link.protocol());
         FleetJob {
             common: self
                 .link
@@ -156,7 +156,7 @@ impl FleetArgs {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
             },
-            listen: if self.listen.is_empty() { loopback() } else { self.listen.clone() },
+            listen: if self.listen.is_empty() { vec![loopback] } else { self.listen.clone() },
             out: self.out.clone(),
             replace: self.replace,
             packets: self.packets,
@@ -170,44 +170,39 @@ impl FleetArgs {
         fleet: &FleetStatus,
         console: Console,
     ) -> Result<(), Failure> {
-        let text = |key: &str| summary[key].as_str().unwrap_or_default().to_string();
-        let short = || format!("{}\n", text("digest"));
-        let lines = || {
-            let mut lines =
-                vec![key_value("cycles", group_thousands(summary["cycles"].as_u64().unwrap_or(0)))];
-            lines.extend(outcome);
-            lines.extend(self.network_lines(fleet));
-            lines.push(key_value("digest", text("digest")));
-            lines.extend(summary["folder"].as_str().map(|folder| key_value("results", folder)));
-            format!("{}, seed {}\n{}", text("name"), summary["seed"], align_pairs(&lines))
-        };
+        let digest = summary["digest"].as_str().unwrap_or_default();
         let mut all = summary.clone();
         all["fleet"] = json!(fleet);
-        console.print_result_or_short(&all, short, lines)
+        console.print_result_or_short(&all, &format!("{digest}\n"), || {
+            let name = summary["name"].as_str().unwrap_or_default();
+            let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
+            let mut lines = vec![key_value("cycles", cycles)];
+            lines.extend(outcome);
+            lines.extend(self.network_lines(fleet));
+            lines.push(key_value("digest", digest));
+            lines.extend(summary["folder"].as_str().map(|folder| key_value("results", folder)));
+            format!("{name}, seed {}\n{}", summary["seed"], align_pairs(&lines))
+        })
     }
 
     fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
-        let sum = |of: fn(&sidestep_session::fleet::NodeStatus) -> u64| {
-            fleet.nodes.iter().map(of).sum::<u64>()
-        };
+        let nodes = &fleet.nodes;
         let topology = if self.topology == TopologyArg::Mesh { "mesh" } else { "star" };
         let clock = if self.clock == ClockArg::Lockstep { "lockstep" } else { "real time" };
-        let restarted = sum(|node| node.lives.saturating_sub(1));
+        let restarted: u64 = nodes.iter().map(|node| node.lives.saturating_sub(1)).sum();
+        let packets = nodes.iter().map(|node| node.packets).sum();
+        let bytes = nodes.iter().map(|node| node.bytes).sum();
         let mut lines = vec![
-            key_value("nodes", format!("{} in a {topology}, {clock}", fleet.nodes.len())),
+            key_value("nodes", format!("{} in a {topology}, {clock}", nodes.len())),
             key_value(
                 "packets",
-                format!(
-                    "{} sent, {} bytes",
-                    group_thousands(sum(|node| node.packets)),
-                    group_thousands(sum(|node| node.bytes))
-                ),
+                format!("{} sent, {} bytes", group_thousands(packets), group_thousands(bytes)),
             ),
         ];
         if self.clock == ClockArg::Realtime {
             let late = format!(
                 "{} controls, {} cycles of the server",
-                group_thousands(sum(|node| node.late)),
+                group_thousands(nodes.iter().map(|node| node.late).sum()),
                 group_thousands(fleet.late_cycles)
             );
             lines.push(key_value("late", late));

@@ -210,12 +210,9 @@ struct TopicArgs {
 
 impl TopicArgs {
     fn topic_selection(&self, scans: Option<&String>) -> Result<TopicSelection, InputError> {
-        let parse = |text: &Option<String>| text.as_deref().map(PoseTopic::parse).transpose();
-        Ok(TopicSelection {
-            odometry: parse(&self.odom)?,
-            truth: parse(&self.truth)?.ok_or_else(no_log)?,
-            scans: scans.cloned(),
-        })
+        let odometry = self.odom.as_deref().map(PoseTopic::parse).transpose()?;
+        let truth = self.truth.as_deref().map(PoseTopic::parse).transpose()?;
+        Ok(TopicSelection { odometry, truth: truth.ok_or_else(no_log)?, scans: scans.cloned() })
     }
 }
 
@@ -262,19 +259,18 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
     match &args.what {
         LearnCommand::Sensor(args) => {
             let model = learn_sensor(args)?;
-            let add = |place: &str, text: &str, name: &str| {
+            let written = args.target.add("sensors", |place, text, name| {
                 profile::with_sensor(place, text, name, &model)
-            };
-            let assumptions = || [assumptions(&model.profile), smoothing(&args.estimate)].concat();
-            print_report(&model.report, &args.target.add("sensors", add)?, assumptions, console)?;
+            })?;
+            let assumptions = [assumptions(&model.profile), smoothing(&args.estimate)].concat();
+            print_report(&model.report, &written, &assumptions, console)?;
         }
         LearnCommand::Effector(args) => {
             let model = learn_effector(args, console)?;
-            let add = |place: &str, text: &str, name: &str| {
+            let written = args.target.add("effectors", |place, text, name| {
                 profile::with_effector(place, text, name, &model)
-            };
-            let assumptions = || smoothing(&args.estimate);
-            print_report(&model.report, &args.target.add("effectors", add)?, assumptions, console)?;
+            })?;
+            print_report(&model.report, &written, &smoothing(&args.estimate), console)?;
         }
     }
     Ok(ExitCode::Done)
@@ -285,19 +281,15 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
 fn print_report(
     report: &(impl Serialize + Display),
     written: &str,
-    assumptions: impl FnOnce() -> String,
+    assumptions: &str,
     console: Console,
 ) -> Result<(), Failure> {
-    console.print_result_or_short(
-        report,
-        || written.to_owned(),
-        || {
-            if written.is_empty() {
-                return report.to_string();
-            }
-            format!("{report}\n{written}{}", assumptions())
-        },
-    )
+    console.print_result_or_short(report, written, || {
+        if written.is_empty() {
+            return report.to_string();
+        }
+        format!("{report}\n{written}{assumptions}")
+    })
 }
 
 /// Returns the facts about a sensor that a profile must state although the log does not contain them.
@@ -307,10 +299,11 @@ fn assumptions(profile: &SensorProfile) -> String {
     let range_m = profile.range_m;
     let beams =
         format!("Its beams look at {bearings} degrees, {range_m} m far (--bearings, --range).");
-    let other =
-        |(kind, class): &(String, String)| format!("It sees a {kind} as `{class}` (designates).");
-    let lines = std::iter::once(beams).chain(profile.designates.iter().map(other));
-    lines.map(|line| indented(&line)).collect()
+    let mut text = indented(&beams);
+    for (kind, class) in &profile.designates {
+        text.push_str(&indented(&format!("It sees a {kind} as `{class}` (designates).")));
+    }
+    text
 }
 
 /// Returns the line on how probabilities of the profile differ from shares of counts.
@@ -361,18 +354,27 @@ fn learn_scanner(
     sensor::from_bag(bag, &args.topics.topic_selection(args.scan.as_ref())?, &scanner, options)
 }
 
+/// Default side of a box for MRCLAM logs, in m.
+const MRCLAM_BOX_M: f64 = 0.25;
+
+/// Default side of a box for bags: moves are in meters.
+const BAG_BOX_M: f64 = 1.0;
+
 fn learn_effector(args: &EffectorArgs, console: Console) -> Result<LearnedEffector, InputError> {
     let options = args.estimate.options();
     let log = &args.log;
     if args.box_size_m.is_some() && log.mrclam.is_none() && log.bag.is_none() {
         console.warn("--box has no effect: this log gives moves in command units");
     }
-    let box_m = |default_m: f64| args.box_size_m.unwrap_or(default_m);
     match (&log.mrclam, &log.carmen, &log.bag, &log.csv, &log.run) {
-        (Some(folder), ..) => effector::from_mrclam(folder, box_m(0.25), &options),
+        (Some(folder), ..) => {
+            let box_m = args.box_size_m.unwrap_or(MRCLAM_BOX_M);
+            effector::from_mrclam(folder, box_m, &options)
+        }
         (_, Some(file), ..) => effector::from_carmen(file, &options),
         (_, _, Some(bag), ..) => {
-            effector::from_bag(bag, &args.topics.topic_selection(None)?, box_m(1.0), &options)
+            let box_m = args.box_size_m.unwrap_or(BAG_BOX_M);
+            effector::from_bag(bag, &args.topics.topic_selection(None)?, box_m, &options)
         }
         (.., Some(file), _) => effector::from_csv(file, &options),
         (.., Some(folder)) => effector::learn_csv(&csv_table(folder, "motions")?, &options),

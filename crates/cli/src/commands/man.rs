@@ -33,8 +33,9 @@ pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure>
         let remedy = "give a folder where you may write";
         InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
     })?;
-    let text = || format!("Wrote manual pages to {}.\n", folder.display());
-    console.print_result(&json!({ "folder": display_path(folder) }), text)?;
+    console.print_result(&json!({ "folder": display_path(folder) }), || {
+        format!("Wrote manual pages to {}.\n", folder.display())
+    })?;
     Ok(ExitCode::Done)
 }
 

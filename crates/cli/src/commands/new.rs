@@ -33,8 +33,12 @@ pub(crate) struct NewArgs {
 
 /// The names of the worlds, each with a description.
 pub(crate) fn world_names() -> PossibleValuesParser {
-    let value = |world: &dyn WorldType| PossibleValue::new(world.name()).help(world.about());
-    PossibleValuesParser::new(worlds().iter().map(value))
+    PossibleValuesParser::new(worlds().iter().map(world_value))
+}
+
+/// Returns a world as the value of an option.
+pub(super) fn world_value(world: &dyn WorldType) -> PossibleValue {
+    PossibleValue::new(world.name()).help(world.about())
 }
 
 /// Runs the command.
@@ -43,8 +47,7 @@ pub(crate) fn world_names() -> PossibleValuesParser {
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {
     let world = worlds().find(&args.world).expect("the parser takes these names alone");
-    let default = || PathBuf::from(format!("{}.toml", world.name()));
-    let path = args.file.clone().unwrap_or_else(default);
+    let path = args.file.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", world.name())));
     write_new(&path, world.default_scenario())?;
     let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
     let json = json!({ "file": display_path(&path), "world": args.world });
@@ -53,13 +56,15 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
 }
 
 fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
-    let refuse = |e: std::io::Error| {
-        let remedy = "give a file that is not there yet, in a folder where you may write";
-        InputError::new(path.display(), format!("cannot make the file: {e}"), remedy)
-    };
+    create_with_text(path, text).map_err(|e| {
+        let remedy = "give a file that does not exist yet, in a folder where you may write";
+        InputError::new(path.display(), format!("cannot create the file: {e}"), remedy)
+    })
+}
+
+fn create_with_text(path: &Path, text: &str) -> std::io::Result<()> {
     if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(refuse)?;
+        std::fs::create_dir_all(folder)?;
     }
-    let mut file = std::fs::File::create_new(path).map_err(refuse)?;
-    file.write_all(text.as_bytes()).map_err(refuse)
+    std::fs::File::create_new(path)?.write_all(text.as_bytes())
 }

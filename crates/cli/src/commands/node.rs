@@ -93,12 +93,12 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
     };
     run_job(&Job::Node(job), |_| {})?;
     let agent = args.agent();
-    let text =
-        || format!("The fleet has ended; {} {agent} needs its node no longer.\n", agent.noun);
     let result = match agent.part {
         None => json!({ "airplane": agent.number }),
         Some(connector) => json!({ "chain": agent.number, "connector": connector }),
     };
-    console.print_result_or_short(&result, String::new, text)?;
+    console.print_result_or_short(&result, "", || {
+        format!("The fleet has ended; {} {agent} needs no node anymore.\n", agent.noun)
+    })?;
     Ok(ExitCode::Done)
 }

@@ -86,14 +86,13 @@ fn print_end(report: &ReplayReport, is_complete: bool, console: Console) -> Resu
         "complete": is_complete,
         "wall_s": effort.wall.as_secs_f64(),
     });
-    let short = || format!("{digest}\n");
-    console.print_result_or_short(&json, short, || {
+    console.print_result_or_short(&json, &format!("{digest}\n"), || {
         let cycles = group_thousands(run.cycle());
         format!("Confirmed: {cycles} cycles give the recorded digest\n  digest {digest}\n")
     })
 }
 
-/// Lines of a state that are printed unless all are asked for: a heading, and some bodies.
+/// Lines of a state that are printed without `--all`: a heading, and some bodies.
 const MAX_STATE_LINES: usize = 11;
 
 /// Returns the first lines of a state, and the option that shows the others.
@@ -120,8 +119,7 @@ fn print_cycle(report: &ReplayReport, shows_all: bool, console: Console) -> Resu
         "compared_poses": compared_poses,
         "bodies": poses.json,
     });
-    let short = || format!("{digest}\n");
-    console.print_result_or_short(&json, short, || {
+    console.print_result_or_short(&json, &format!("{digest}\n"), || {
         let compared = match *compared_poses {
             0 => "no pose of this cycle is recorded".into(),
             n => format!("equal to the {} recorded poses", group_thousands(n as u64)),
@@ -136,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_state_is_told_by_its_beginning_and_how_many_rows_follow() {
+    fn a_long_state_is_cut_after_its_first_rows_and_the_others_are_counted() {
         let text = |rows: usize| (0..rows).map(|k| format!("  row {k}\n")).collect::<String>();
         assert_eq!(first_lines(&text(12)), text(12));
         assert_eq!(first_lines(&text(93)), text(11) + "  and 82 more rows: --all\n");

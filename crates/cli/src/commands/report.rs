@@ -99,7 +99,7 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
 }
 
 impl PrintArgs {
-    /// Returns how figures for print look; `None` if none are asked for.
+    /// Returns how figures for print look; `None` if none are requested.
     ///
     /// # Errors
     /// When a size, a label or a format is wrong.
@@ -134,12 +134,12 @@ impl PrintArgs {
         let folder = files.html.with_file_name(format!("{}-print", files.stem()));
         std::fs::create_dir_all(&folder).map_err(|e| Failure::cannot_write(&folder, &e))?;
         for SvgFile { stem, svg } in print.figures(document)? {
-            let at = |ending: &str| folder.join(format!("{stem}.{ending}"));
             if self.forms.contains(&FigureFormat::Svg) {
-                write_atomically(&at("svg"), |file| file.write_all(svg.as_bytes()))?;
+                let path = folder.join(format!("{stem}.svg"));
+                write_atomically(&path, |file| file.write_all(svg.as_bytes()))?;
             }
             if self.forms.contains(&FigureFormat::Png) {
-                write_png(&at("png"), &svg)?;
+                write_png(&folder.join(format!("{stem}.png")), &svg)?;
             }
         }
         Ok(folder)
@@ -158,8 +158,7 @@ fn check_labels(print: &PrintStyle, document: &Document) -> Result<(), InputErro
 
 /// Parses width and height in mm.
 fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
-    let side = |side: &str| side.trim().parse::<f64>().ok();
-    let sides: Vec<Option<f64>> = text.split('x').map(side).collect();
+    let sides: Vec<Option<f64>> = text.split('x').map(|side| side.trim().parse().ok()).collect();
     match sides[..] {
         [Some(width), Some(height)]
             if [width, height].iter().all(|mm| (30.0..=500.0).contains(mm)) =>

@@ -1,7 +1,7 @@
 //! `sidestep run`: scenario -> cycles -> report.
 
 use super::finish::run_to_end;
-use super::sweep::run_sweep;
+use super::sweep::{SweepRequest, run_sweep};
 use crate::console::{Console, LINE_COLS, wrap};
 use crate::exit::{ExitCode, Failure};
 use crate::foxglove;
@@ -82,9 +82,15 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             let cause = "a sweep has no single recording, and its folder is never overwritten";
             return Err(InputError::new("--mcap or --replace", cause, remedy).into());
         }
-        let workers = args.workers.count();
         let ScenarioArgs { file, changes } = &args.scenario;
-        return run_sweep(file, changes, &args.many, args.out.as_deref(), workers, console);
+        let request = SweepRequest {
+            file,
+            changes,
+            many: &args.many,
+            out: args.out.as_deref(),
+            workers: args.workers.count(),
+        };
+        return run_sweep(&request, console);
     }
     args.many.check_single_run()?;
     let (source, compiled) = args.scenario.compile()?;

@@ -1,5 +1,6 @@
 //! `sidestep schema`: the keys of scenarios as JSON Schema, for editors and other programs.
 
+use super::new::world_value;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::worlds;
@@ -7,7 +8,6 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 use sidestep::kernel::InputError;
-use sidestep::scenario::WorldType;
 use sidestep_session::display_path;
 use std::path::{Path, PathBuf};
 
@@ -45,12 +45,12 @@ fn other_files() -> Vec<(&'static str, Value)> {
 
 /// The names of the worlds and of other files.
 fn schema_names() -> PossibleValuesParser {
-    let world = |world: &dyn WorldType| PossibleValue::new(world.name()).help(world.about());
-    let other = |(name, schema): &(&'static str, Value)| {
-        PossibleValue::new(*name).help(schema["title"].as_str().unwrap_or_default().to_string())
-    };
-    let others = other_files();
-    PossibleValuesParser::new(worlds().iter().map(world).chain(others.iter().map(other)))
+    let mut values: Vec<PossibleValue> = worlds().iter().map(world_value).collect();
+    for (name, schema) in other_files() {
+        let title = schema["title"].as_str().unwrap_or_default().to_string();
+        values.push(PossibleValue::new(name).help(title));
+    }
+    PossibleValuesParser::new(values)
 }
 
 /// Runs the command.

@@ -39,7 +39,7 @@ pub(crate) struct StudioArgs {
     /// Scenarios, folders of runs and sweeps and MCAP files to open, folders to choose from, and
     /// endpoints of fleets to watch
     #[arg(value_name = "SCENARIO|DIR|FILE|ENDPOINT")]
-    named: Vec<PathBuf>,
+    targets: Vec<PathBuf>,
 
     /// Address to listen on; any but a loopback address requires a token
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
@@ -72,23 +72,25 @@ pub(crate) struct StudioArgs {
 /// Runs the command until it is interrupted.
 ///
 /// # Errors
-/// When a named file or folder is not there, a fleet does not answer, or the port cannot be had.
+/// If a given file or folder does not exist, a fleet does not answer, or the port cannot be bound.
 pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Failure> {
     interrupt::listen()?;
     let foxglove = args.foxglove.as_ref().map(ViewerAddress::with_free_port).transpose()?;
-    let (named, fleets) = fleet_watch::split_endpoints(&args.named);
-    let watch = |endpoint: &String| fleet_watch::start_watching(endpoint, args.tls.files());
-    let fleets = fleets.iter().map(watch).collect::<Result<Vec<_>, _>>()?;
+    let (targets, fleets) = fleet_watch::split_endpoints(&args.targets);
+    let mut watched = Vec::new();
+    for endpoint in &fleets {
+        watched.push(fleet_watch::start_watching(endpoint, args.tls.files())?);
+    }
     let studio = Studio::start(Options {
         worlds: worlds().clone(),
         program: format!("sidestep {}", worlds().build()),
-        named,
+        targets,
         host: args.addr.clone(),
         port: args.port,
         read_only: args.read_only,
         workers: args.workers.count(),
         foxglove: foxglove.clone(),
-        fleets,
+        fleets: watched,
     })?;
     if let Some(at) = &foxglove {
         foxglove::print_address(at, console);
@@ -104,18 +106,16 @@ fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Fail
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(
-            "others can reach this studio: whoever has its address with the token can run scenarios\n  \
+            "others can reach this studio: anyone with its address and token can run scenarios\n  \
              and read what it may read; what is sent is not encrypted",
         );
     }
     if studio.is_open_to_others() && studio.has_local_address() {
         console.note("From another machine, use this machine's host name or IP address instead.");
     }
-    console.print_result_or_short(
-        &json!({ "url": url }),
-        || format!("{url}\n"),
-        || format!("The studio is at {url}\nCtrl-C ends it.\n"),
-    )?;
+    console.print_result_or_short(&json!({ "url": url }), &format!("{url}\n"), || {
+        format!("The studio is at {url}\nCtrl-C ends it.\n")
+    })?;
     if no_open {
         return Ok(());
     }

@@ -128,7 +128,9 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
         (Some(SweepCommand::Status(args)), _) => status(args, console),
         (Some(SweepCommand::Collect(args)), _) => collect(args, console),
         (None, Some(file)) => {
-            run_sweep(file, changes, many, out.as_deref(), workers.count(), console)
+            let request =
+                SweepRequest { file, changes, many, out: out.as_deref(), workers: workers.count() };
+            run_sweep(&request, console)
         }
         (None, None) => {
             let remedy = "give a sweep file or a scenario; see `sidestep sweep --help`";
@@ -137,22 +139,26 @@ pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Fail
     }
 }
 
-/// Runs the sweep that a file and the options describe.
+/// A sweep to run: that of a file with the changes of the options.
+pub(super) struct SweepRequest<'a> {
+    pub(super) file: &'a Path,
+    pub(super) changes: &'a ChangeArgs,
+    pub(super) many: &'a ReplicationArgs,
+    /// The folder of the results; without it they are only printed.
+    pub(super) out: Option<&'a Path>,
+    pub(super) workers: usize,
+}
+
+/// Runs a sweep.
 ///
 /// # Errors
-/// When the sweep or the folder is wrong, or results cannot be stored.
-pub(super) fn run_sweep(
-    file: &Path,
-    changes: &ChangeArgs,
-    many: &ReplicationArgs,
-    out: Option<&Path>,
-    workers: usize,
-    console: Console,
-) -> Result<ExitCode, Failure> {
-    let planned = many.sweep(file, changes)?;
+/// If the sweep or the folder is wrong, or results cannot be stored.
+pub(super) fn run_sweep(request: &SweepRequest<'_>, console: Console) -> Result<ExitCode, Failure> {
+    let workers = request.workers;
+    let planned = request.many.sweep(request.file, request.changes)?;
     interrupt::listen()?;
     let watch = ConsoleWatcher::new(console);
-    let Some(out) = out else {
+    let Some(out) = request.out else {
         let (plan, end) = sweep::run_in_memory(worlds(), &planned, workers, &watch)?;
         return print_results(SweepOutput { plan: &plan, folder: None, console }, end, "");
     };
@@ -196,8 +202,7 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
         "cells": plan.runs(),
         "agents": plan.agents,
     });
-    console
-        .print_result_or_short(&json, String::new, || align_pairs(&plan_lines(plan, &args.out)))?;
+    console.print_result_or_short(&json, "", || align_pairs(&plan_lines(plan, &args.out)))?;
     Ok(ExitCode::Done)
 }
 

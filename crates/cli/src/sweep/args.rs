@@ -73,12 +73,11 @@ impl ReplicationArgs {
     /// When the file or an option is wrong.
     pub(crate) fn sweep(&self, file: &Path, changes: &ChangeArgs) -> Result<Sweep, InputError> {
         let sweep = Sweep::read(file)?;
-        let factor = |text: &String| Factor::parse(text);
         let baseline =
             (!self.baseline.is_empty()).then(|| parse_baseline(&self.baseline)).transpose()?;
         sweep.with_overrides(SweepOverrides {
             fixed: parse_settings(&changes.settings())?,
-            factors: self.vary.iter().map(factor).collect::<Result<_, _>>()?,
+            factors: self.vary.iter().map(|text| Factor::parse(text)).collect::<Result<_, _>>()?,
             until: self.until.clone(),
             replicates: self.replicate,
             max_runs: self.max,

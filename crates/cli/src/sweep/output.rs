@@ -4,12 +4,11 @@ use crate::console::{
     Console, LINE_COLS, align_pairs, format_columns, format_duration, group_thousands, wrap,
 };
 use crate::exit::{ExitCode, Failure};
-use crate::progress::StageProgress;
+use crate::progress::StageBar;
 use crate::worlds;
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep::experiment::sweep::{OmittedMetric, Plan, RunTable, Shard, Summary};
-use sidestep_document::Table;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{self, Folder, SweepEnd, SweepResult, SweepTiming};
 
@@ -55,18 +54,18 @@ pub(crate) fn print_results(
         console.note(done_note);
     }
     let table = &done.table;
-    let stages = StageProgress::new(console);
+    let stages = StageBar::new(console);
     let summary =
         plan.summary_with_progress(worlds(), table, &mut |share| stages.set("intervals", share));
     stages.clear();
     let summary = summary?;
     let failed = print_failures(output, table);
     let json = done.to_json(plan, folder, &summary);
-    let short = || match folder {
+    let short = match folder {
         Some(folder) => format!("{}\n", folder.results_file().display()),
         None => tables(&summary),
     };
-    console.print_result_or_short(&json, short, || {
+    console.print_result_or_short(&json, &short, || {
         text(output, table, &summary, &variant_stops(plan, table), done.effort)
     })?;
     Ok(if failed == 0 { ExitCode::Done } else { ExitCode::Failed })
@@ -94,11 +93,12 @@ fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCod
 
 /// Returns the tables of all metrics.
 fn tables(summary: &Summary) -> String {
-    let text = |table: &Table| {
+    let mut texts = Vec::new();
+    for table in &summary.brief() {
         let title = wrap(&table.title, LINE_COLS).join("\n");
-        format!("{title}\n{}", format_columns(table))
-    };
-    summary.brief().iter().map(text).collect::<Vec<_>>().join("\n")
+        texts.push(format!("{title}\n{}", format_columns(table)));
+    }
+    texts.join("\n")
 }
 
 fn text(
@@ -218,7 +218,7 @@ pub(crate) fn print_share(
         "failed": failed,
         "took": (effort.runs > 0).then(|| effort.to_json()),
     });
-    console.print_result_or_short(&json, String::new, || {
+    console.print_result_or_short(&json, "", || {
         let time = (effort.runs > 0).then(|| ("time".to_string(), timing_text(&effort)));
         let time: Vec<_> = time.into_iter().collect();
         let runs = group_thousands(table.runs() as u64);

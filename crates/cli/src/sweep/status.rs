@@ -27,8 +27,8 @@ pub(crate) fn print_status(
         all.extend(fields);
     }
     let of = if status.until_precise && !status.is_complete { "of at most" } else { "of" };
-    let short = || format!("{} {of} {}\n", status.runs, status.total);
-    console.print_result_or_short(&json, short, || {
+    let short = format!("{} {of} {}\n", status.runs, status.total);
+    console.print_result_or_short(&json, &short, || {
         let name = if plan.name.is_empty() { &plan.world } else { &plan.name };
         let runs = group_thousands(status.runs);
         let all = format_count(status.total as usize, "run");

@@ -24,7 +24,7 @@ pub(super) fn draw(scene: &Scene<'_>, options: &PictureOptions) -> Result<String
     let top = paragraph(&mut svg, &title, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
     let (canvas, height_px) = canvas(box_m, style, top);
     let area = Rect { x: 0.0, y: top, width: style.width_px, height: height_px };
-    ShownBox { canvas: &canvas, box_m, style, taken: Vec::new() }.draw(&mut svg);
+    AxesBox { canvas: &canvas, box_m, style, taken: Vec::new() }.draw(&mut svg);
     svg.open_clip(area);
     scene.draw_space(&mut svg, &canvas);
     svg.close_group();
@@ -59,7 +59,7 @@ fn canvas(box_m: [Vec3; 2], style: &Style, top: f64) -> (Canvas, f64) {
 }
 
 /// The edges of the shown box, with the names of its axes and their numbers.
-struct ShownBox<'a> {
+struct AxesBox<'a> {
     canvas: &'a Canvas,
     box_m: [Vec3; 2],
     style: &'a Style,
@@ -73,7 +73,7 @@ struct TakenPlace {
     radius_px: f64,
 }
 
-impl ShownBox<'_> {
+impl AxesBox<'_> {
     fn draw(mut self, svg: &mut Svg) {
         let canvas = self.canvas;
         // Bit k of a corner's number is set at the upper end of axis k.

@@ -1,15 +1,16 @@
 //! Percepts and decisions of a body, and their outcome: facts for a panel, and marks for the scene.
 
-use super::body::BodyId;
+use super::body::{BodyId, BodyKind};
 use super::pose::Vec3;
 use crate::units::Cycle;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Percepts and decisions of a body in a cycle, and their outcome, in a form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The body.
-    pub who: BodyId,
+    #[serde(serialize_with = "body_fields")]
+    pub body: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
     /// The body's name for people.
@@ -56,11 +57,12 @@ pub enum FactValue {
     /// Words.
     Text(String),
     /// A body.
-    Who(BodyId),
+    #[serde(serialize_with = "body_fields")]
+    Body(BodyId),
     /// A position in meters.
     Place(Vec3),
     /// Yes or no.
-    Yes(bool),
+    Flag(bool),
     /// Nothing, or not known.
     None,
 }
@@ -145,10 +147,42 @@ pub enum MarkShape {
     },
 }
 
+/// Serializes an identity with the names of its fields; files have it as a tuple, which is shorter in long tables.
+fn body_fields<S: Serializer>(
+    &BodyId { kind, number, part }: &BodyId,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Fields {
+        kind: BodyKind,
+        number: u32,
+        part: Option<u32>,
+    }
+    Fields { kind, number, part }.serialize(serializer)
+}
+
+impl MarkRole {
+    /// All roles.
+    pub const ALL: [Self; 12] = [
+        Self::True,
+        Self::Reported,
+        Self::Wish,
+        Self::Done,
+        Self::Refused,
+        Self::Claim,
+        Self::Group,
+        Self::Predicted,
+        Self::Chosen,
+        Self::Known,
+        Self::Orbit,
+        Self::Target,
+    ];
+}
+
 impl Inspection {
     /// Creates an empty inspection.
     pub fn new(body: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
-        Self { who: body, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
+        Self { body, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
 
     /// Adds a section, unless it is empty.
@@ -280,7 +314,7 @@ impl From<String> for FactValue {
 
 impl From<BodyId> for FactValue {
     fn from(body: BodyId) -> Self {
-        Self::Who(body)
+        Self::Body(body)
     }
 }
 
@@ -292,7 +326,7 @@ impl From<Vec3> for FactValue {
 
 impl From<bool> for FactValue {
     fn from(value: bool) -> Self {
-        Self::Yes(value)
+        Self::Flag(value)
     }
 }
 

@@ -113,7 +113,7 @@ const RULE: &str = "P(nothing | subject) is 1 minus the detection rate of its ki
     nothing) is spurious readings per beam and bin without a subject; every count plus alpha";
 
 /// The counts that a camera's rows are computed from.
-pub(super) struct CameraCounts<'a> {
+pub(super) struct CameraCountTables<'a> {
     /// True kind against decoded kind.
     pub(super) kinds: &'a CountTable,
     /// Detection by kind and class.
@@ -126,7 +126,7 @@ pub(super) struct CameraCounts<'a> {
 
 /// Returns a camera that reports `nothing`, `robot` or `landmark`.
 pub(super) fn camera(
-    looks: &CameraCounts<'_>,
+    looks: &CameraCountTables<'_>,
     options: &SensorOptions,
     classes: &DistanceClasses,
 ) -> SensorProfile {
@@ -162,7 +162,7 @@ pub(super) fn camera(
 }
 
 /// Returns the row of reports in a direction where nothing stands.
-fn spurious_row(looks: &CameraCounts<'_>, options: &SensorOptions) -> Vec<f64> {
+fn spurious_row(looks: &CameraCountTables<'_>, options: &SensorOptions) -> Vec<f64> {
     let beams = looks.detection.looks as f64 * options.bearings_deg.len() as f64;
     let in_view: f64 = looks.detection.all.cells().iter().flatten().sum();
     let spurious = looks.kinds.row(NO_SUBJECT);
@@ -173,7 +173,7 @@ fn spurious_row(looks: &CameraCounts<'_>, options: &SensorOptions) -> Vec<f64> {
 }
 
 /// Returns the rows of robots and landmarks, in one class or in all.
-fn subject_rows(looks: &CameraCounts<'_>, class: Option<usize>, alpha: f64) -> [NamedRow; 2] {
+fn subject_rows(looks: &CameraCountTables<'_>, class: Option<usize>, alpha: f64) -> [NamedRow; 2] {
     [
         NamedRow::new("robot", &subject_row(looks, ROBOT, class, alpha)),
         NamedRow::new("landmark", &subject_row(looks, LANDMARK, class, alpha)),
@@ -182,7 +182,7 @@ fn subject_rows(looks: &CameraCounts<'_>, class: Option<usize>, alpha: f64) -> [
 
 /// Returns the row of reports in the direction of a robot or landmark, in one class or in all.
 fn subject_row(
-    looks: &CameraCounts<'_>,
+    looks: &CameraCountTables<'_>,
     kind: usize,
     class: Option<usize>,
     alpha: f64,
@@ -198,7 +198,12 @@ fn subject_row(
 }
 
 /// Returns the detection rate in a class; over all classes where none was in view in that one.
-fn detection_rate(looks: &CameraCounts<'_>, kind: usize, class: Option<usize>, alpha: f64) -> f64 {
+fn detection_rate(
+    looks: &CameraCountTables<'_>,
+    kind: usize,
+    class: Option<usize>,
+    alpha: f64,
+) -> f64 {
     let table = detection_table(looks, kind);
     if let Some(row) = class.and_then(|class| table.smoothed(class, alpha)) {
         return row[0];
@@ -208,11 +213,11 @@ fn detection_rate(looks: &CameraCounts<'_>, kind: usize, class: Option<usize>, a
     if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
 }
 
-fn detection_table<'a>(looks: &CameraCounts<'a>, kind: usize) -> &'a CountTable {
+fn detection_table<'a>(looks: &CameraCountTables<'a>, kind: usize) -> &'a CountTable {
     if kind == ROBOT { &looks.detection.robots } else { &looks.detection.landmarks }
 }
 
-fn assumed_detections(looks: &CameraCounts<'_>, kind: usize, name: &str) -> Vec<String> {
+fn assumed_detections(looks: &CameraCountTables<'_>, kind: usize, name: &str) -> Vec<String> {
     let mut assumed = Vec::new();
     for LowCountRow { row: class, .. } in detection_table(looks, kind).low_count_rows(1) {
         assumed.push(format!("detection of {name} in {class}: as over all classes"));

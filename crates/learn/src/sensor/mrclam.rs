@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::LearnedSensor;
-use super::camera::{CameraCounts, camera};
+use super::camera::{CameraCountTables, camera};
 use super::detection::{Detection, views};
 use super::options::{DistanceClasses, SensorOptions, THREE_EDGES_M};
 use super::report::{ErrorMoments, SensorReport};
@@ -25,7 +25,7 @@ pub(super) fn learn(
 ) -> Result<LearnedSensor, InputError> {
     let log = AssociatedLog::associate(source, dataset, classes)?;
     let report = log.report(source, options);
-    let looks = CameraCounts {
+    let looks = CameraCountTables {
         kinds: &log.labels.kinds(&log.sightings),
         detection: &log.detection(),
         distance: &distance("distance", &log.sightings, classes),

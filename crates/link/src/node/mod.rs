@@ -301,7 +301,7 @@ impl Node {
         }
     }
 
-    /// Sends the status of this node to the server once in a while, and repairs its links.
+    /// Sends the status of this node to the server at intervals, and repairs its links.
     fn report_status(&mut self) {
         let now = Instant::now();
         if now < self.report_at {

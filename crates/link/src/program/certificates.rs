@@ -63,24 +63,26 @@ fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
 }
 
 fn check_certificate(place: &str, text: &[u8]) -> Result<(), InputError> {
-    let no_certificate = |cause: String| {
-        let remedy = "give a file that begins with -----BEGIN CERTIFICATE-----";
-        InputError::new(place, cause, remedy)
-    };
     let mut has_any = false;
     for pem in Pem::iter_from_buffer(text) {
-        let pem = pem.map_err(|e| no_certificate(e.to_string()))?;
-        let certificate = pem.parse_x509().map_err(|e| no_certificate(e.to_string()))?;
+        let pem = pem.map_err(|e| no_certificate(place, &e.to_string()))?;
+        let certificate = pem.parse_x509().map_err(|e| no_certificate(place, &e.to_string()))?;
         let validity = certificate.validity();
         if !validity.is_valid() {
-            let cause = format!("it holds from {} to {}", validity.not_before, validity.not_after);
-            let remedy = "have it made again, or see whether the date of this machine is right";
+            let cause =
+                format!("it is valid from {} to {}", validity.not_before, validity.not_after);
+            let remedy = "renew the certificate, or correct the date of this machine";
             return Err(InputError::new(place, cause, remedy));
         }
         has_any = true;
     }
     if !has_any {
-        return Err(no_certificate("there is no certificate in it".into()));
+        return Err(no_certificate(place, "there is no certificate in it"));
     }
     Ok(())
+}
+
+fn no_certificate(place: &str, cause: &str) -> InputError {
+    let remedy = "give a file that begins with -----BEGIN CERTIFICATE-----";
+    InputError::new(place, cause, remedy)
 }

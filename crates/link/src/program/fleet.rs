@@ -12,6 +12,7 @@ use crate::distributed::DistributedWorld;
 use crate::hosted_run::HostedRun;
 use crate::messenger::Messenger;
 use crate::protocol::{ClockMode, PacketRecord, Topology, Welcome};
+use crate::server::histogram::Histogram;
 use crate::server::{
     FleetError, FleetView, NodeEntry, SILENCE_TIMEOUT, Server, ServerConfig, ServerHooks,
 };
@@ -95,6 +96,16 @@ fn fleet_scene(run: &dyn Simulation) -> FleetScene {
 }
 
 /// Creates the table of all packets, if the job asks for one.
+/// Returns a quantile of durations in milliseconds; `None` without durations.
+fn quantile_ms(durations: &Histogram, fraction: f64) -> Option<f64> {
+    durations.quantile(fraction).map(|s| 1e3 * s)
+}
+
+/// Returns the increase of a count; 0 for a process that was restarted meanwhile, which counts from 0.
+fn increase(last: u64, now: u64) -> f64 {
+    now.saturating_sub(last) as f64
+}
+
 fn create_packet_table(
     job: &FleetJob,
     text: &str,
@@ -242,15 +253,15 @@ impl<'a> FleetSupervisor<'a> {
             nodes.push(self.node_status(fleet, agent, node, passed_s));
         }
         let world = fleet.run.world();
-        let quantile_ms = |q: f64| fleet.metrics.decision_time.quantile(q).map(|s| 1e3 * s);
+        let decision_time = &fleet.metrics.decision_time;
         self.status = FleetStatus {
             cycle: fleet.run.cycle(),
             cycles: self.cycles,
             has_begun: fleet.has_begun,
             flown_s: self.begun_at.map_or(0.0, |begun_at| begun_at.elapsed().as_secs_f64()),
             late_cycles: fleet.metrics.late_cycles,
-            talk_p50_ms: quantile_ms(0.5),
-            talk_p99_ms: quantile_ms(0.99),
+            talk_p50_ms: quantile_ms(decision_time, 0.5),
+            talk_p99_ms: quantile_ms(decision_time, 0.99),
             noun: world.name(0).noun.into(),
             waits_for: fleet.waits_for.iter().map(|&agent| world.name(agent).to_string()).collect(),
             nodes,
@@ -268,8 +279,6 @@ impl<'a> FleetSupervisor<'a> {
         let status = &node.status;
         let last_traffic = self.traffic.insert(agent, (status.packets, status.bytes));
         let (last_packets, last_bytes) = last_traffic.unwrap_or_default();
-        // A node that is started again counts from 0.
-        let rate = |now: u64, last: u64| now.saturating_sub(last) as f64 / passed_s;
         let silent = fleet.messenger.silent_for(Peer::Node(agent));
         let state = match &node.member {
             None => "awaited",
@@ -296,8 +305,8 @@ impl<'a> FleetSupervisor<'a> {
             lives: node.joins,
             packets: status.packets,
             bytes: status.bytes,
-            packets_per_s: rate(status.packets, last_packets),
-            bytes_per_s: rate(status.bytes, last_bytes),
+            packets_per_s: increase(last_packets, status.packets) / passed_s,
+            bytes_per_s: increase(last_bytes, status.bytes) / passed_s,
             silent_s: silent.map(|silent| silent.as_secs_f64()),
         }
     }

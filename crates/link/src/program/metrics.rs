@@ -1,8 +1,8 @@
 //! Metrics in Prometheus' text format (version 0.0.4), served at an address.
 
 use crate::protocol::Status;
-use crate::server::FleetView;
 use crate::server::histogram::Histogram;
+use crate::server::{FleetView, ServerMetrics};
 use crate::wire::http_text::serve;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
@@ -81,7 +81,17 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> Stri
     let mut text = MetricsText::default();
     text.push_header("cycle", "gauge", "Cycles done.");
     text.push_sample("cycle", "", status.cycle);
-    let metrics = fleet.metrics;
+    push_cycle_times(&mut text, fleet.metrics);
+    push_refusals(&mut text, fleet.metrics);
+    text.push_header("frames_total", "counter", "Frames that the server has sent.");
+    text.push_sample("frames_total", "", fleet.messenger.stats().frames);
+    text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
+    text.push_sample("frame_bytes_total", "", fleet.messenger.stats().bytes);
+    push_node_metrics(&mut text, status, fleet);
+    text.0
+}
+
+fn push_cycle_times(text: &mut MetricsText, metrics: &ServerMetrics) {
     text.push_histogram(
         "talk_seconds",
         "Time from the percepts of a cycle to its last control.",
@@ -103,6 +113,9 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> Stri
         "Cycles that started later than a tenth of their length.",
     );
     text.push_sample("late_cycles_total", "", metrics.late_cycles);
+}
+
+fn push_refusals(text: &mut MetricsText, metrics: &ServerMetrics) {
     text.push_header(
         "absurd_controls_total",
         "counter",
@@ -113,12 +126,6 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> Stri
     for (reason, count) in &metrics.refused {
         text.push_sample("refused_total", &format_label("reason", reason), count);
     }
-    text.push_header("frames_total", "counter", "Frames that the server has sent.");
-    text.push_sample("frames_total", "", fleet.messenger.stats().frames);
-    text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
-    text.push_sample("frame_bytes_total", "", fleet.messenger.stats().bytes);
-    push_node_metrics(&mut text, status, fleet);
-    text.0
 }
 
 /// A metric with a value for each node.
@@ -225,23 +232,16 @@ fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]
 pub(super) fn node_metrics(agent: &AgentName, status: &Status) -> String {
     let mut text = MetricsText::default();
     let agent = format_label(&agent.noun, &agent.to_string());
-    let one = |value: u64| std::iter::once((agent.clone(), value as f64));
-    text.push_per_agent("node_cycle", "gauge", "The cycle that a node is in.", one(status.cycle));
-    text.push_per_agent(
-        "packets_total",
-        "counter",
-        "Packets that a node has sent.",
-        one(status.packets),
-    );
-    text.push_per_agent("packet_bytes_total", "counter", "Bytes of these.", one(status.bytes));
-    text.push_per_agent(
-        "epoch",
-        "gauge",
-        "Epoch of the coordinator that a node follows.",
-        one(status.epoch),
-    );
-    let heard = one(status.heard.len() as u64);
-    text.push_per_agent("heard", "gauge", "Other agents that a node has heard in a cycle.", heard);
+    text.push_header("node_cycle", "gauge", "The cycle that a node is in.");
+    text.push_sample("node_cycle", &agent, status.cycle as f64);
+    text.push_header("packets_total", "counter", "Packets that a node has sent.");
+    text.push_sample("packets_total", &agent, status.packets as f64);
+    text.push_header("packet_bytes_total", "counter", "Bytes of these.");
+    text.push_sample("packet_bytes_total", &agent, status.bytes as f64);
+    text.push_header("epoch", "gauge", "Epoch of the coordinator that a node follows.");
+    text.push_sample("epoch", &agent, status.epoch as f64);
+    text.push_header("heard", "gauge", "Other agents that a node has heard in a cycle.");
+    text.push_sample("heard", &agent, status.heard.len() as f64);
     push_messenger_metrics(&mut text, &[(agent.clone(), status)]);
     text.0
 }

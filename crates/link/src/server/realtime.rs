@@ -1,4 +1,4 @@
-//! Real time: every cycle is a deadline. A control that is late is not carried out, and its agent does what is safe
+//! Real time: every cycle is a deadline. A late control is not carried out, and its agent does what is safe
 //! without one.
 //!
 //! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment at which
@@ -66,9 +66,7 @@ impl Server<'_> {
         groups: &[Group],
         until: Instant,
     ) -> Result<bool, FleetError> {
-        let is_settled =
-            |server: &Self, agent| server.has_no_node(agent) || server.has_control(agent);
-        while !groups.iter().flatten().all(|&agent| is_settled(self, agent)) {
+        while self.is_any_missing(groups) {
             let remaining = until.saturating_duration_since(Instant::now());
             if remaining.is_zero() {
                 return Ok(false);
@@ -76,6 +74,12 @@ impl Server<'_> {
             self.receive(remaining)?;
         }
         Ok(true)
+    }
+
+    /// Returns whether the control of an agent that has a node is missing.
+    fn is_any_missing(&self, groups: &[Group]) -> bool {
+        let mut agents = groups.iter().flatten();
+        agents.any(|&agent| !self.has_no_node(agent) && !self.has_control(agent))
     }
 
     fn record_lateness(&mut self, lateness: Duration, cycle: Duration) {

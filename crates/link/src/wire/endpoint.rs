@@ -39,13 +39,16 @@ pub enum WireError {
 /// # Errors
 /// When the text is no endpoint.
 pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
-    let no_endpoint = || WireError::NoEndpoint(endpoint.into());
-    let (protocol, address) = endpoint.split_once('/').ok_or_else(no_endpoint)?;
-    let (host, port) = address.rsplit_once(':').ok_or_else(no_endpoint)?;
+    parse_endpoint(endpoint).ok_or_else(|| WireError::NoEndpoint(endpoint.into()))
+}
+
+fn parse_endpoint(endpoint: &str) -> Option<(&str, u16)> {
+    let (protocol, address) = endpoint.split_once('/')?;
+    let (host, port) = address.rsplit_once(':')?;
     if !["tcp", "tls"].contains(&protocol) || host.is_empty() {
-        return Err(no_endpoint());
+        return None;
     }
-    Ok((host, port.parse().map_err(|_| no_endpoint())?))
+    Some((host, port.parse().ok()?))
 }
 
 /// A port that is bound, so that no other program gets it, until a socket of this program needs it.

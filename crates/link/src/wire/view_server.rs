@@ -76,13 +76,11 @@ impl ViewServer {
     pub fn open(wire: &ZenohWire, scene: String) -> Result<Self, WireError> {
         let session = wire.session().clone();
         let latest = Arc::new(Mutex::new(LatestView::default()));
-        let closed =
-            |e: zenoh::Error| WireError::Taken { endpoint: VIEW_KEY.into(), reason: e.to_string() };
         let scenes = session
             .declare_queryable(SCENE_KEY)
             .callback(move |query| reply(&query, scene.clone()))
             .wait()
-            .map_err(closed)?;
+            .map_err(|e| closed(&e))?;
         let queried = latest.clone();
         let views = session
             .declare_queryable(VIEW_KEY)
@@ -92,7 +90,7 @@ impl ViewServer {
                 reply(&query, text);
             })
             .wait()
-            .map_err(closed)?;
+            .map_err(|e| closed(&e))?;
         Ok(Self { latest, _queryables: [scenes, views], _session: session })
     }
 
@@ -120,6 +118,10 @@ impl ViewServer {
         let latest = lock(&self.latest);
         latest.fetched == latest.number
     }
+}
+
+fn closed(error: &zenoh::Error) -> WireError {
+    WireError::Taken { endpoint: VIEW_KEY.into(), reason: error.to_string() }
 }
 
 fn reply(query: &Query, text: String) {

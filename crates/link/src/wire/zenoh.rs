@@ -14,7 +14,6 @@ use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 use zenoh::key_expr::KeyExpr;
@@ -53,7 +52,6 @@ impl ZenohConfig<'_> {
     /// Returns the keys of Zenoh's configuration, as JSON. Its queues by priority stay, although each link has eight
     /// of them with buffers: without them (`transport/unicast/qos/enabled`) links become half-open now and then.
     fn keys(&self) -> Vec<(&'static str, String)> {
-        let list = |endpoints: &[String]| serde_json::json!(endpoints).to_string();
         let connected = self.connected_within.map_or(-1, |within| within.as_millis() as i64);
         let mut keys = vec![
             ("mode", format!("{:?}", self.mode)),
@@ -64,9 +62,9 @@ impl ZenohConfig<'_> {
             // A router would stamp relayed frames with the time of its wall clock, which no code reads.
             ("timestamping/enabled", "false".into()),
             // Without the empty list a session that only connects would listen at every interface.
-            ("listen/endpoints", list(self.listen)),
+            ("listen/endpoints", serde_json::json!(self.listen).to_string()),
             ("listen/exit_on_failure", "true".into()),
-            ("connect/endpoints", list(self.connect)),
+            ("connect/endpoints", serde_json::json!(self.connect).to_string()),
             ("connect/timeout_ms", connected.to_string()),
             ("connect/exit_on_failure", self.connected_within.is_some().to_string()),
             (
@@ -82,10 +80,11 @@ impl ZenohConfig<'_> {
             keys.push(("id", format!("{id:?}")));
         }
         if let Some(tls) = self.tls {
-            let path = |path: &PathBuf| serde_json::json!(path).to_string();
-            let [certificate, key] = [path(&tls.certificate), path(&tls.key)];
+            let authority = serde_json::json!(tls.authority).to_string();
+            let certificate = serde_json::json!(tls.certificate).to_string();
+            let key = serde_json::json!(tls.key).to_string();
             keys.extend([
-                ("transport/link/tls/root_ca_certificate", path(&tls.authority)),
+                ("transport/link/tls/root_ca_certificate", authority),
                 ("transport/link/tls/listen_certificate", certificate.clone()),
                 ("transport/link/tls/listen_private_key", key.clone()),
                 ("transport/link/tls/connect_certificate", certificate),
@@ -163,6 +162,28 @@ fn peer_key(to: Peer) -> String {
     format!("sidestep/{to}")
 }
 
+/// Forwards the frames that are published under a key to the receiver of a wire; echo probes are answered on the spot.
+fn subscribe(
+    session: &Session,
+    key: &str,
+    me: Peer,
+    frames: &Sender<Vec<u8>>,
+    echoes: &EchoProbes,
+) -> Result<Subscriber<()>, String> {
+    let frames = frames.clone();
+    let is_echo = match me {
+        Peer::Node(agent) => Some(echoes.handler(agent, session.clone())),
+        Peer::Server => None,
+    };
+    let subscriber = session.declare_subscriber(key).callback(move |sample: Sample| {
+        if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
+            // An error means that the wire was dropped.
+            let _ = frames.send(sample.payload().to_bytes().into_owned());
+        }
+    });
+    subscriber.wait().map_err(|e| e.to_string())
+}
+
 impl ZenohLink {
     fn new(
         session: Session,
@@ -170,27 +191,13 @@ impl ZenohLink {
         frames: &Sender<Vec<u8>>,
         echoes: &EchoProbes,
     ) -> Result<Self, String> {
-        let subscribe = |key: &str| {
-            let frames = frames.clone();
-            let is_echo = match me {
-                Peer::Node(agent) => Some(echoes.handler(agent, session.clone())),
-                Peer::Server => None,
-            };
-            let on_sample = move |sample: Sample| {
-                if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
-                    // An error means that the wire was dropped.
-                    let _ = frames.send(sample.payload().to_bytes().into_owned());
-                }
-            };
-            session.declare_subscriber(key).callback(on_sample).wait().map_err(|e| e.to_string())
-        };
         let mut subscribers = Vec::new();
         // Other sessions learn of the subscriptions in this order: so one that can reach this peer by its own key reaches it
         // with broadcasts, too. Broadcasts are for nodes only.
         if me != Peer::Server {
-            subscribers.push(subscribe(BROADCAST_KEY)?);
+            subscribers.push(subscribe(&session, BROADCAST_KEY, me, frames, echoes)?);
         }
-        subscribers.push(subscribe(&peer_key(me))?);
+        subscribers.push(subscribe(&session, &peer_key(me), me, frames, echoes)?);
         Ok(Self { keys: BTreeMap::new(), _subscribers: subscribers, session })
     }
 
@@ -203,10 +210,9 @@ impl ZenohLink {
 
     /// Returns whether there is a link to another node that shows signs of life, even if nothing else arrives through it.
     fn is_open_to(&self, member: &Member) -> bool {
-        let is_member = |id: zenoh::session::ZenohId| {
-            u128::from_le_bytes(id.to_le_bytes()) & ZENOH_ID_MASK == zenoh_id(member)
-        };
-        self.session.info().peers_zid().wait().any(is_member)
+        let wanted = zenoh_id(member);
+        let mut peers = self.session.info().peers_zid().wait();
+        peers.any(|id| u128::from_le_bytes(id.to_le_bytes()) & ZENOH_ID_MASK == wanted)
     }
 
     /// Sends a frame to all nodes that this session reaches, except itself.

@@ -124,7 +124,7 @@ fn certificates_that_are_none_or_out_of_date_are_refused_before_anything_starts(
     refused(Tls { certificate: folder.path().join("s.toml"), ..ours.clone() }, "no certificate");
     refused(Tls { key: ours.certificate.clone(), ..ours.clone() }, "no private key");
     let Some(old) = certificate(folder.path(), "ours", "old", -1) else { return };
-    refused(old, "it holds from");
+    refused(old, "it is valid from");
     let mut open = fleet(folder.path(), Some(ours));
     open.listen = vec!["tcp/127.0.0.1:0".into()];
     let (code, failed) = LinkProcess::start(&Job::Fleet(open)).end();

@@ -11,9 +11,16 @@ struct BodyIdentity {
     kind: BodyKind,
     number: u32,
     part: Option<u32>,
-    /// Things that are moved look different from those that stand still.
+    /// Moving obstacles look different from those at rest.
     moves: bool,
     shape: u32,
+}
+
+impl BodyIdentity {
+    /// Returns what decides the appearance of a body: its kind, its color's index, and whether it is moved.
+    fn appearance_group(&self) -> (BodyKind, usize, bool) {
+        (self.kind, self.number as usize % BODY_COLORS.len(), self.moves)
+    }
 }
 
 /// The bodies of a body table, in the order of the frames.
@@ -57,14 +64,17 @@ impl BodySet {
 
     /// Returns whether the given bodies are its own, in their order, with the same shapes.
     pub(super) fn matches(&self, bodies: &[Body]) -> bool {
-        let is_same = |(member, body): (&BodyIdentity, &Body)| {
-            member.kind == body.kind
-                && member.number == body.number
-                && member.part == body.part
-                && member.moves == body.is_moving()
-                && self.forms[member.shape as usize] == shape_key(&body.shape, self.is_flat)
-        };
-        self.members.len() == bodies.len() && self.members.iter().zip(bodies).all(is_same)
+        self.members.len() == bodies.len()
+            && self.members.iter().zip(bodies).all(|(member, body)| self.is_same(member, body))
+    }
+
+    /// Returns whether a body has the identity and the shape of a member.
+    fn is_same(&self, member: &BodyIdentity, body: &Body) -> bool {
+        member.kind == body.kind
+            && member.number == body.number
+            && member.part == body.part
+            && member.moves == body.is_moving()
+            && self.forms[member.shape as usize] == shape_key(&body.shape, self.is_flat)
     }
 
     /// Returns its table, as the page gets it.
@@ -76,16 +86,21 @@ impl BodySet {
         names: &BTreeMap<(BodyKind, u32), String>,
     ) -> BodyTable {
         let (kinds, kind) = index_distinct(self.members.iter().map(|member| member.kind));
-        let group = |m: &BodyIdentity| (m.kind, m.number as usize % BODY_COLORS.len(), m.moves);
-        let (groups, appearance) = index_distinct(self.members.iter().map(group));
-        let first = |of: &_| bodies.iter().zip(&self.members).find(|(_, m)| group(m) == *of);
-        let appearances = groups
-            .iter()
-            .filter_map(first)
-            .map(|(body, _)| appearances(body, if self.is_flat { 2 } else { 3 }));
-        let name = |(index, m): (u32, &BodyIdentity)| {
-            names.get(&(m.kind, m.number)).map(|name| (index, name.clone()))
-        };
+        let (groups, appearance) =
+            index_distinct(self.members.iter().map(BodyIdentity::appearance_group));
+        let dimensions = if self.is_flat { 2 } else { 3 };
+        let mut group_appearances = Vec::new();
+        for group in &groups {
+            // All bodies of a group look alike, so the first one stands for them.
+            let first = self.members.iter().position(|member| member.appearance_group() == *group);
+            group_appearances.extend(first.map(|k| appearances(&bodies[k], dimensions)));
+        }
+        let mut own_names = Vec::new();
+        for (index, member) in (0..).zip(&self.members) {
+            if let Some(name) = names.get(&(member.kind, member.number)) {
+                own_names.push((index, name.clone()));
+            }
+        }
         BodyTable {
             session,
             id,
@@ -95,9 +110,9 @@ impl BodySet {
             part: self.members.iter().map(|m| m.part.map_or(-1, |part| part as i32)).collect(),
             shapes: self.shapes.iter().map(convert::shape).collect(),
             shape: self.members.iter().map(|member| member.shape).collect(),
-            appearances: appearances.collect(),
+            appearances: group_appearances,
             appearance,
-            names: (0..).zip(&self.members).filter_map(name).collect(),
+            names: own_names,
             is_agent: self.members.iter().map(|member| member.kind.is_agent()).collect(),
         }
     }
@@ -105,15 +120,17 @@ impl BodySet {
 
 /// Returns all different items in the order in which they first occur, and the number of each item among them.
 fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec<u16>) {
-    let (mut all, mut known) = (Vec::new(), BTreeMap::new());
-    let number = |item: T| {
-        *known.entry(item).or_insert_with(|| {
-            all.push(item);
-            all.len() as u16 - 1
-        })
-    };
-    let numbers = items.map(number).collect();
-    (all, numbers)
+    let mut distinct = Vec::new();
+    let mut numbers = Vec::new();
+    let mut number_of = BTreeMap::new();
+    for item in items {
+        let number = *number_of.entry(item).or_insert_with(|| {
+            distinct.push(item);
+            distinct.len() as u16 - 1
+        });
+        numbers.push(number);
+    }
+    (distinct, numbers)
 }
 
 /// Returns the appearance of a body in each condition.

@@ -8,7 +8,6 @@ use sidestep_kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
-    let still = |body: &Body| static_body(body, scenery);
     Scene {
         name: scenery.name.clone(),
         world: world.into(),
@@ -16,16 +15,17 @@ pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: b
         dimensions: scenery.dimensions,
         cycle_s: scenery.cycle_s,
         floor: scenery.floor.as_ref().map(occupancy_grid),
-        bodies: scenery.bodies.iter().map(still).collect(),
+        bodies: scenery.bodies.iter().map(|body| static_body(body, scenery)).collect(),
         is_recording,
     }
 }
 
 fn static_body(body: &Body, scenery: &Scenery) -> StaticBody {
-    let own = |(kind, number, _): &&(_, u32, String)| (*kind, *number) == (body.kind, body.number);
+    let mut names = scenery.names.iter();
+    let own = names.find(|(kind, number, _)| *kind == body.kind && *number == body.number);
     StaticBody {
         id: body_id(&body.id()),
-        name: scenery.names.iter().find(own).map(|(_, _, name)| name.clone()),
+        name: own.map(|(_, _, name)| name.clone()),
         at_m: body.pose.at_m,
         orientation: body.pose.turn,
         shape: shape(&body.shape),
@@ -76,17 +76,21 @@ pub(crate) fn body_id(id: &view::BodyId) -> BodyId {
 
 /// Returns a scan.
 pub(crate) fn scan(scan: &view::Scan) -> Scan {
-    let in_range = |range_m: &f64| range_m.is_finite().then_some(*range_m);
     Scan {
         body: body_id(&scan.of),
         sensor: scan.sensor.clone(),
         at_m: scan.pose.at_m,
         orientation: scan.pose.turn,
         bearings_rad: scan.bearings_rad.clone(),
-        ranges_m: scan.ranges_m.iter().map(in_range).collect(),
-        true_m: scan.true_m.iter().map(in_range).collect(),
+        ranges_m: finite_or_null(&scan.ranges_m),
+        true_m: finite_or_null(&scan.true_m),
         range_m: scan.range_m,
     }
+}
+
+/// Returns ranges with `None` for nothing in range, as JSON has no infinity.
+fn finite_or_null(ranges_m: &[f64]) -> Vec<Option<f64>> {
+    ranges_m.iter().map(|range_m| range_m.is_finite().then_some(*range_m)).collect()
 }
 
 /// Returns an event.
@@ -119,16 +123,20 @@ pub(crate) fn body(id: &BodyId) -> Option<view::BodyId> {
 pub(crate) fn problem(error: &InputError) -> Problem {
     let (line, column) = error.position().unzip();
     let (end_line, end_column) = error.end().unzip();
-    let number = |n: Option<usize>| n.and_then(|n| u32::try_from(n).ok());
     Problem {
         place: error.place().into(),
-        line: number(line),
-        column: number(column),
-        end_line: number(end_line),
-        end_column: number(end_column),
+        line: small(line),
+        column: small(column),
+        end_line: small(end_line),
+        end_column: small(end_column),
         key: error.key().map(Into::into),
         cause: error.cause().into(),
         remedy: error.remedy().into(),
         is_warning: false,
     }
+}
+
+/// Returns a line or column of a text, whose limit of bytes is far below 4 GiB.
+fn small(number: Option<usize>) -> Option<u32> {
+    number.and_then(|number| u32::try_from(number).ok())
 }

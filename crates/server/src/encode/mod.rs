@@ -3,7 +3,7 @@
 mod body_set;
 mod convert;
 
-pub(crate) use convert::{body, body_id, event, problem, scan, scene};
+pub(crate) use convert::{body, event, problem, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
@@ -35,9 +35,10 @@ impl Encoder {
 
     /// Switches to another run; the numbering of body tables continues.
     pub fn restart(&mut self, scenery: &Scenery) {
-        let named =
-            |(kind, number, name): &(BodyKind, u32, String)| ((*kind, *number), name.clone());
-        self.names = scenery.names.iter().map(named).collect();
+        self.names.clear();
+        for (kind, number, name) in &scenery.names {
+            self.names.insert((*kind, *number), name.clone());
+        }
         self.dimensions = scenery.dimensions;
         self.body_set = None;
     }

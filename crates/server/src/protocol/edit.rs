@@ -68,13 +68,12 @@ impl From<Edit> for sidestep_scenario::Edit {
             Edit::Move { key, to } => Self::Move { key, to: to as usize },
             Edit::Rename { key, to } => Self::Rename { key, to },
             Edit::Paint { key, cells } => {
-                let cell = |(row, column, mark): (u32, u32, char)| CharEdit {
-                    row: row as usize,
-                    column: column as usize,
-                    mark,
-                };
-                Self::Paint { key, cells: cells.into_iter().map(cell).collect() }
+                Self::Paint { key, cells: cells.into_iter().map(char_edit).collect() }
             }
         }
     }
+}
+
+fn char_edit((row, column, mark): (u32, u32, char)) -> CharEdit {
+    CharEdit { row: row as usize, column: column as usize, mark }
 }

@@ -1,4 +1,4 @@
-//! Fleets: agents that are flown by processes elsewhere, as a page sees them.
+//! Fleets: agents that run in processes of their own, as a page shows them.
 
 use super::BodyId;
 use serde::Serialize;

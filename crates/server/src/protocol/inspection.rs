@@ -1,152 +1,105 @@
-//! Percepts, decisions and deeds of a body, for a panel and for marks on the canvas. Names no world.
+//! TypeScript's types of an inspection, which the server sends as the kernel has it.
+//!
+//! The kernel derives no types for the page, as it would compile `ts-rs` for every user. They are written by hand in
+//! `inspection.ts` instead, and checked here against what the kernel serializes.
 
-use super::BodyId;
-use serde::Serialize;
+use serde_json::json;
+use sidestep_kernel::view::{
+    BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
+};
 
-/// Facts and marks of a body: its percepts, decisions and deeds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Inspection {
-    /// The body.
-    pub body: BodyId,
-    /// Cycles done.
-    pub cycle: f64,
-    /// The body's name.
-    pub title: String,
-    /// Facts, by subject.
-    pub sections: Vec<Section>,
-    /// Marks to draw of it.
-    pub marks: Vec<Mark>,
+/// The declarations.
+pub(super) const TYPES: &str = include_str!("inspection.ts");
+
+/// Returns the declaration of a variant; a variant that is new in the kernel does not compile without one.
+fn declared_value(value: &FactValue) -> &'static str {
+    match value {
+        FactValue::Number { .. } => r#"{ "number": { value: number, unit: string, } }"#,
+        FactValue::Share(_) => r#"{ "share": number }"#,
+        FactValue::Text(_) => r#"{ "text": string }"#,
+        FactValue::Body(_) => r#"{ "body": BodyId }"#,
+        FactValue::Place(_) => r#"{ "place": [number, number, number] }"#,
+        FactValue::Flag(_) => r#"{ "flag": boolean }"#,
+        FactValue::None => r#""none""#,
+    }
 }
 
-/// Facts on one subject.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Section {
-    /// The subject.
-    pub title: String,
-    /// The facts.
-    pub facts: Vec<Fact>,
-    /// A table, where facts are many of a kind.
-    pub table: Option<Table>,
+/// Returns the declaration of a variant.
+fn declared_shape(shape: &MarkShape) -> &'static str {
+    match shape {
+        MarkShape::Line { .. } => r#""type": "line", points_m: Array<[number, number, number]>"#,
+        MarkShape::Area { .. } => r#""type": "area", corners_m: Array<[number, number, number]>"#,
+        MarkShape::Point { .. } => r#""type": "point", at_m: [number, number, number]"#,
+        MarkShape::Circle { .. } => {
+            r#""type": "circle", at_m: [number, number, number], radius_m: number"#
+        }
+    }
 }
 
-/// A fact.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Fact {
-    /// Its name, in words.
-    pub label: String,
-    /// Its value.
-    pub value: Value,
+fn body() -> BodyId {
+    BodyId::new(BodyKind::Connector, 3, Some(1))
 }
 
-/// The value of a fact.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(rename_all = "kebab-case")]
-pub enum Value {
-    /// A number.
-    Number {
-        /// The number.
-        value: f64,
-        /// Its unit; may be empty.
-        unit: String,
-    },
-    /// A share or a probability, from 0 to 1.
-    Share(f64),
-    /// Words.
-    Text(String),
-    /// A body.
-    Body(BodyId),
-    /// A place, in meters.
-    Place([f64; 3]),
-    /// Yes or no.
-    Flag(bool),
-    /// Nothing.
-    None,
+#[test]
+fn every_value_is_declared_as_it_is_serialized() {
+    for (value, expected) in [
+        (FactValue::number(1.5, "m"), json!({ "number": { "value": 1.5, "unit": "m" } })),
+        (FactValue::Share(0.5), json!({ "share": 0.5 })),
+        (FactValue::text("left"), json!({ "text": "left" })),
+        (body().into(), json!({ "body": { "kind": "connector", "number": 3, "part": 1 } })),
+        (FactValue::Place([1.0, 2.0, 3.0]), json!({ "place": [1.0, 2.0, 3.0] })),
+        (FactValue::Flag(true), json!({ "flag": true })),
+        (FactValue::None, json!("none")),
+    ] {
+        assert!(TYPES.contains(declared_value(&value)), "{value:?}");
+        assert_eq!(serde_json::to_value(&value).expect("JSON"), expected);
+    }
 }
 
-/// Facts in rows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Table {
-    /// The heads of the columns.
-    pub columns: Vec<String>,
-    /// The rows, each with a value for each column.
-    pub rows: Vec<Vec<Value>>,
+#[test]
+fn every_shape_and_role_of_a_mark_is_declared_as_it_is_serialized() {
+    let at_m = [1.0, 2.0, 3.0];
+    for (shape, expected) in [
+        (MarkShape::Line { points_m: vec![at_m] }, json!({ "type": "line", "points_m": [at_m] })),
+        (MarkShape::Area { corners_m: vec![at_m] }, json!({ "type": "area", "corners_m": [at_m] })),
+        (MarkShape::Point { at_m }, json!({ "type": "point", "at_m": at_m })),
+        (
+            MarkShape::Circle { at_m, radius_m: 4.0 },
+            json!({ "type": "circle", "at_m": at_m, "radius_m": 4.0 }),
+        ),
+    ] {
+        assert!(TYPES.contains(declared_shape(&shape)), "{shape:?}");
+        assert_eq!(serde_json::to_value(&shape).expect("JSON"), expected);
+    }
+    for role in MarkRole::ALL {
+        let name = serde_json::to_value(role).expect("JSON").to_string();
+        assert!(TYPES.contains(&format!("{name} |")) || TYPES.contains(&format!("| {name};")));
+    }
 }
 
-/// Something to draw over the scene while the body is selected.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub struct Mark {
-    /// Its meaning.
-    pub role: Role,
-    /// The same in words.
-    pub label: String,
-    /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
-    pub weight: f64,
-    /// Its shape.
-    pub shape: MarkShape,
-}
-
-/// The meaning of a mark.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// The world as it is.
-    True,
-    /// A sensor's report.
-    Reported,
-    /// The agent's wish.
-    Wish,
-    /// The action carried out.
-    Done,
-    /// A thing that was refused.
-    Refused,
-    /// Room that is claimed.
-    Claim,
-    /// The bodies in conflict.
-    Group,
-    /// A prediction.
-    Predicted,
-    /// The choice.
-    Chosen,
-    /// Knowledge of others.
-    Known,
-    /// The orbit that it can always fall back to.
-    Orbit,
-    /// A destination.
-    Target,
-}
-
-/// The shape of a mark.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(tag = "type", rename_all = "lowercase")]
-pub enum MarkShape {
-    /// A polyline.
-    Line {
-        /// Its points, in meters.
-        points_m: Vec<[f64; 3]>,
-    },
-    /// A polygon.
-    Area {
-        /// Its corners, in meters.
-        corners_m: Vec<[f64; 3]>,
-    },
-    /// A point.
-    Point {
-        /// Its place, in meters.
-        at_m: [f64; 3],
-    },
-    /// A circle, parallel to the ground.
-    Circle {
-        /// Its center, in meters.
-        at_m: [f64; 3],
-        /// Its radius, in meters.
-        radius_m: f64,
-    },
+#[test]
+fn an_inspection_has_the_declared_fields() {
+    let mut table = FactTable::new(["other"]);
+    table.push_row([body().into()]);
+    let mut inspection = Inspection::new(body(), 7, "head");
+    inspection.add_section(FactSection::new("sees").fact("near", true).table(table));
+    inspection.add_mark(MarkRole::Wish, "ahead", MarkShape::Point { at_m: [0.0; 3] });
+    let id = json!({ "kind": "connector", "number": 3, "part": 1 });
+    let expected = json!({
+        "body": id,
+        "cycle": 7,
+        "title": "head",
+        "sections": [{
+            "title": "sees",
+            "facts": [{ "label": "near", "value": { "flag": true } }],
+            "table": { "columns": ["other"], "rows": [[{ "body": id }]] },
+        }],
+        "marks": [{
+            "role": "wish",
+            "label": "ahead",
+            "weight": 1.0,
+            "shape": { "type": "point", "at_m": [0.0, 0.0, 0.0] },
+        }],
+    });
+    assert_eq!(serde_json::to_value(&inspection).expect("JSON"), expected);
 }

@@ -27,6 +27,7 @@
 
 mod edit;
 mod fleet;
+#[cfg(test)]
 mod inspection;
 mod reply;
 mod request;
@@ -36,7 +37,6 @@ mod typescript;
 
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
-pub use inspection::{Fact, Inspection, Mark, MarkShape, Role, Section, Table, Value};
 pub use reply::{
     FileEntry, FileKind, MetricName, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
     SessionState, SessionStatus, SweepRun, TargetRef,

@@ -1,7 +1,9 @@
 //! The server's messages: replies, and notices without a request.
 
-use super::{BodyTable, Fleet, Inspection, RunEvent, Scene, SessionId, Speed};
+use super::{BodyTable, Fleet, RunEvent, Scene, SessionId, Speed};
 use serde::Serialize;
+use sidestep_kernel::view::Inspection;
+use sidestep_scenario::Editing;
 
 /// The reply to a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,16 +49,16 @@ pub enum ReplyBody {
         /// Its state.
         status: SessionStatus,
     },
-    /// Facts and marks of a body: its percepts, decisions and deeds.
-    Inspection(Inspection),
+    /// Facts and marks of a body: its percepts, decisions and actions.
+    Inspection(#[cfg_attr(test, ts(type = "Inspection"))] Inspection),
     /// Samples of all metrics.
     Metrics {
         /// The metrics.
         names: Vec<MetricName>,
-        /// Number of the first sample here: the one that was asked for, or the number of all samples.
+        /// Number of the first sample here: the requested one, or the number of all samples.
         first: u32,
-        /// The number of times that the samples were thinned by half, and numbered anew, since the session began:
-        /// ask from 0 whenever it has changed.
+        /// How often every second sample was dropped, which renumbers the samples, since the session started:
+        /// request from 0 whenever it has changed.
         thinned: u32,
         /// The cycle of each sample.
         cycles: Vec<f64>,
@@ -112,8 +114,8 @@ pub enum ReplyBody {
         /// The table of the text: dates are strings; numbers that JSON cannot hold are null.
         #[cfg_attr(test, ts(type = "unknown"))]
         value: serde_json::Value,
-        /// Files that a key of the text can name, written as it would name them: those below its folder, and those
-        /// elsewhere that it names.
+        /// Files that a key of the text can refer to, by the paths that it would use: those below its folder, and those
+        /// outside that it refers to.
         files: Vec<String>,
     },
     /// The text is in a file.
@@ -151,13 +153,13 @@ pub struct Problem {
     pub end_line: Option<u32>,
     /// Column after its end, from 1.
     pub end_column: Option<u32>,
-    /// Key of the scenario that is wrong, as `--set` names it: `robots.1.at.0`.
+    /// Key of the scenario that is wrong, as `--set` takes it: `robots.1.at.0`.
     pub key: Option<Box<str>>,
     /// The cause.
     pub cause: Box<str>,
     /// The remedy: the right way to write or to do it.
     pub remedy: Box<str>,
-    /// Whether the text is valid all the same.
+    /// Whether it is a warning: the text is valid.
     pub is_warning: bool,
 }
 
@@ -294,7 +296,7 @@ pub struct SessionStatus {
     pub cycles_per_s: f64,
     /// The seed, in decimal digits, because it may be larger than any exact integer of JavaScript.
     pub seed: String,
-    /// Digest of the state, while the run stands still.
+    /// Digest of the state, while the run is paused or over.
     pub digest: Option<String>,
     /// The verdict on a recording: whether its digest was confirmed, or will be.
     pub banner: Option<String>,
@@ -311,13 +313,13 @@ pub enum SessionState {
     Playing,
     /// It is paused.
     Paused,
-    /// It is on its way to a cycle that was asked for.
+    /// It seeks a requested cycle.
     Seeking,
-    /// It runs elsewhere, and is only watched here.
+    /// It runs in other processes, and is only watched here.
     Watched,
-    /// It has come to its end.
+    /// The run has ended.
     Over,
-    /// It cannot go on; the notice [`ServerNotification::Ended`] gives the reason.
+    /// It has failed; the notice [`ServerNotification::Ended`] gives the reason.
     Failed,
 }
 

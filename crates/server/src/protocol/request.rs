@@ -3,8 +3,8 @@
 use super::{Edit, SessionId};
 use serde::{Deserialize, Serialize};
 
-/// A request; its reply has the same number, chosen by the page from 1 on: a request that cannot be read is answered with
-/// number 0.
+/// A request. Its reply has the same number, which the page chooses from 1 on: 0 is that of the reply to a request
+/// whose number cannot be read.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[cfg_attr(test, ts(untagged))]
@@ -13,7 +13,7 @@ pub enum ClientRequest {
     Server {
         /// The number of the request.
         id: u32,
-        /// What is asked.
+        /// The method and its arguments.
         call: ServerMethod,
     },
     /// A request to a session of the page.
@@ -22,7 +22,7 @@ pub enum ClientRequest {
         id: u32,
         /// The session.
         session: SessionId,
-        /// What is asked.
+        /// The method and its arguments.
         call: SessionMethod,
     },
 }
@@ -32,7 +32,7 @@ pub enum ClientRequest {
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ServerMethod {
-    /// Lists a folder below those named at start (all of those if none is given).
+    /// Lists a folder below those given at start; without one, those given at start.
     Files {
         /// Its path, as a listing gave it.
         folder: Option<String>,
@@ -54,6 +54,11 @@ pub enum ServerMethod {
         /// The world's name.
         world: String,
     },
+}
+
+impl ServerMethod {
+    /// The names of all methods.
+    pub const NAMES: [&str; 4] = ["files", "open", "runs", "schema"];
 }
 
 /// A query or a command for a session.
@@ -81,10 +86,17 @@ pub enum SessionMethod {
         /// The text.
         text: String,
     },
-    /// Passed on to the session's thread. The methods above are answered elsewhere, so that none waits for a cycle that the
-    /// run is computing.
-    #[serde(untagged)]
+    /// A method of the run, which the session's thread answers. The methods above are answered by other threads, so that
+    /// none waits for a cycle that the run is computing.
+    // An untagged variant would be read by trial, and a mistake in it reported as "data did not match any variant".
+    #[serde(skip_deserializing)]
+    #[cfg_attr(test, ts(untagged))]
     Run(RunMethod),
+}
+
+impl SessionMethod {
+    /// The names of the methods that are not the run's.
+    pub const NAMES: [&str; 4] = ["close", "check", "edit", "model"];
 }
 
 /// A query or a command for the run of a session.
@@ -99,19 +111,19 @@ pub enum RunMethod {
     },
     /// Pauses a session.
     Pause {},
-    /// Advances by some cycles and stays paused; answered there. While a seek or a step is under way, counted from its
-    /// end; the request for that one is then answered at once.
+    /// Advances by some cycles and stays paused; answered on arrival. During a seek or a step it counts from the end of
+    /// that one, whose request is then answered at once.
     Step {
         /// Number of cycles.
         cycles: u32,
     },
-    /// Goes to a cycle, earlier or later, and stays paused; answered there. A problem means that another request has
-    /// changed the destination meanwhile.
+    /// Seeks to a cycle, earlier or later, and stays paused; answered on arrival. A problem means that another request
+    /// has changed the destination meanwhile.
     Seek {
         /// The cycle; a run that is over before it stays at its end.
         cycle: u64,
     },
-    /// Starts anew, with another seed and another text where given. Answered by
+    /// Restarts the run, with another seed and another text where given. Answered by
     /// [`Opened`](super::ReplyBody::Opened), with the session's own number; the run before stays if the text is wrong.
     Restart {
         /// Another seed.
@@ -169,6 +181,25 @@ pub enum RunMethod {
     },
 }
 
+impl RunMethod {
+    /// The names of all methods.
+    pub const NAMES: [&str; 13] = [
+        "play",
+        "pause",
+        "step",
+        "seek",
+        "restart",
+        "select-scans",
+        "credit",
+        "inspect",
+        "metrics",
+        "events",
+        "source",
+        "tables",
+        "save",
+    ];
+}
+
 /// A thing that can be opened.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -189,9 +220,9 @@ pub enum OpenTarget {
         /// Its path, as a listing gave it.
         path: String,
     },
-    /// A fleet that flies elsewhere: it is watched, not controlled.
+    /// A fleet that runs in other processes: it is watched, not controlled.
     Fleet {
-        /// The endpoint that the command line named.
+        /// The endpoint, as given on the command line.
         path: String,
     },
 }

@@ -19,7 +19,7 @@ pub struct Scene {
     pub cycle_s: f64,
     /// The floor, where it is known box by box.
     pub floor: Option<OccupancyGrid>,
-    /// Walls, obstacles that stand still, starts and goals.
+    /// Walls, obstacles at rest, starts and goals.
     pub bodies: Vec<StaticBody>,
     /// Whether a recorded run is computed again.
     pub is_recording: bool,
@@ -43,7 +43,7 @@ pub struct OccupancyGrid {
     pub runs: Vec<u32>,
 }
 
-/// A body that stands still.
+/// A body that never moves.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct StaticBody {
@@ -146,7 +146,7 @@ pub struct BodyTable {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct FrameText {
-    /// The scans of the bodies that were asked for.
+    /// The scans of the selected bodies.
     pub scans: Vec<Scan>,
     /// The last events since the frame before.
     pub events: Vec<RunEvent>,

@@ -40,8 +40,10 @@ async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Respo
     let workers = state.deps.workers;
     let name = spec.file_name(&path);
     let media = spec.media;
-    let job = move |cancel: &CancelToken| write_export(&worlds, &path, &spec, workers, cancel);
-    let bytes = state.jobs.run(job).await?;
+    let export = state
+        .jobs
+        .run(move |cancel: &CancelToken| write_export(&worlds, &path, &spec, workers, cancel));
+    let bytes = export.await?;
     let disposition = format!("attachment; filename=\"{name}\"");
     let about = [
         (CONTENT_TYPE, media),
@@ -62,10 +64,15 @@ struct ExportSpec {
 
 impl ExportSpec {
     fn from_fields(fields: &QueryFields) -> Result<Self, ResultError> {
-        let table = || fields.require("table").map(String::from);
         let (format, media) = match fields.require("as")? {
-            "csv" => (Format::Csv(Some(table()?)), "text/csv; charset=utf-8"),
-            "parquet" => (Format::Parquet(Some(table()?)), "application/vnd.apache.parquet"),
+            "csv" => {
+                let table = fields.require("table")?.to_string();
+                (Format::Csv(Some(table)), "text/csv; charset=utf-8")
+            }
+            "parquet" => {
+                let table = fields.require("table")?.to_string();
+                (Format::Parquet(Some(table)), "application/vnd.apache.parquet")
+            }
             "mcap" => (Format::Mcap, "application/octet-stream"),
             "svg" => (Format::Svg, "image/svg+xml"),
             "png" => (Format::Png { width_px: None }, "image/png"),
@@ -102,8 +109,7 @@ fn no_such_cycle(text: &str) -> Problem {
 
 /// Returns a name of a file that needs no quoting anywhere.
 pub(super) fn plain_file_name(name: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    let name: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
+    let name = name.replace(|c: char| !c.is_ascii_alphanumeric() && !"-_.".contains(c), "-");
     if name.starts_with('.') || name.is_empty() { format!("run{name}") } else { name }
 }
 

@@ -74,17 +74,13 @@ impl JobQueue {
         &self,
         job: impl FnOnce(&CancelToken) -> Result<T, ResultError> + Send + 'static,
     ) -> Result<T, ResultError> {
-        let bug = || {
-            let problem =
-                Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
-            ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
-        };
         // The semaphore is never closed.
-        let _turn = self.turn.acquire().await.map_err(|_| bug())?;
+        let _turn = self.turn.acquire().await.map_err(|_| internal_error())?;
         let guard = CancelOnDrop(CancelToken::default());
         let cancel = guard.0.clone();
         let done = spawn_blocking(move || catch_unwind(AssertUnwindSafe(|| job(&cancel)))).await;
-        done.map_err(|_| bug())?.map_err(|_| bug())?
+        // The outer error is that of a canceled task, the inner one a panic.
+        done.map_err(|_| internal_error())?.map_err(|_| internal_error())?
     }
 
     /// Keeps a report as the last one.
@@ -99,6 +95,12 @@ impl JobQueue {
             .filter(|(last_path, _)| last_path == path)
             .map(|(_, rendered)| rendered.clone())
     }
+}
+
+/// Returns the error of a job that panicked.
+fn internal_error() -> ResultError {
+    let problem = Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
+    ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
 }
 
 /// Converts an error of a job.

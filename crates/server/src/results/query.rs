@@ -29,8 +29,10 @@ impl QueryFields {
     /// # Errors
     /// When it is missing.
     pub(super) fn require(&self, name: &str) -> Result<&str, ResultError> {
-        let missing = || Problem::new("address", format!("it has no `{name}`"), "name one");
-        self.get(name).ok_or_else(|| missing().into())
+        self.get(name).ok_or_else(|| {
+            let remedy = format!("add it to the address: ?{name}=...");
+            Problem::new("address", format!("it has no `{name}`"), remedy).into()
+        })
     }
 }
 

@@ -11,7 +11,7 @@ use axum::http::header::{
     CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
     VARY, X_FRAME_OPTIONS,
 };
-use axum::http::{HeaderMap, Uri};
+use axum::http::{HeaderMap, HeaderValue, Uri};
 use axum::response::{IntoResponse, Response};
 use sidestep_report::{RenderedReport, SvgFile, render};
 use sidestep_scenario::Worlds;
@@ -50,16 +50,17 @@ async fn report_response(
     // The report itself is rendered anew each time: its run or sweep may have grown.
     let cached = state.jobs.cached_report(&path).filter(|_| part.is_some());
     let folder = path.clone();
-    let job = move |cancel: &CancelToken| match cached {
+    let rendering = state.jobs.run(move |cancel: &CancelToken| match cached {
         Some(report) => Ok(report),
         None => render_report(&worlds, &folder, cancel).map(Arc::new),
-    };
-    let report = state.jobs.run(job).await?;
+    });
+    let report = rendering.await?;
     state.jobs.cache_report(path.clone(), report.clone());
     // A job, because gzip of a large report takes some time.
-    let job =
-        move |_: &CancelToken| ReportPart::from_report(&report, &path, part.as_deref(), is_zipped);
-    Ok(state.jobs.run(job).await?.into_response())
+    let extraction = state.jobs.run(move |_: &CancelToken| {
+        ReportPart::from_report(&report, &path, part.as_deref(), is_zipped)
+    });
+    Ok(extraction.await?.into_response())
 }
 
 fn render_report(
@@ -130,21 +131,18 @@ impl IntoResponse for ReportPart {
     fn into_response(self) -> Response {
         let mut response = self.bytes.into_response();
         let headers = response.headers_mut();
-        let mut set = |name, value: &str| {
-            if let Ok(value) = value.parse() {
-                headers.insert(name, value);
-            }
-        };
-        set(CONTENT_TYPE, self.media);
-        set(CACHE_CONTROL, "no-store");
-        set(VARY, "accept-encoding");
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(self.media));
+        headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        headers.insert(VARY, HeaderValue::from_static("accept-encoding"));
         if self.is_zipped {
-            set(CONTENT_ENCODING, "gzip");
+            headers.insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
         }
-        set(CONTENT_SECURITY_POLICY, REPORT_POLICY);
-        set(X_FRAME_OPTIONS, "SAMEORIGIN");
-        if let Some(file) = self.file {
-            set(CONTENT_DISPOSITION, &format!("attachment; filename=\"{file}\""));
+        headers.insert(CONTENT_SECURITY_POLICY, HeaderValue::from_static(REPORT_POLICY));
+        headers.insert(X_FRAME_OPTIONS, HeaderValue::from_static("SAMEORIGIN"));
+        if let Some(file) = self.file
+            && let Ok(disposition) = format!("attachment; filename=\"{file}\"").parse()
+        {
+            headers.insert(CONTENT_DISPOSITION, disposition);
         }
         response
     }

@@ -17,26 +17,29 @@ pub(crate) fn runs(path: &Path) -> Result<ReplyBody, Problem> {
     let FinishedRuns { table, is_complete } = read_finished(&folder).map_err(|e| problem(&e))?;
     let plan = folder.plan();
     let names = plan.names();
-    let number = |name: &str, row: usize| table.column(name)?.values.number(row);
-    let run = |row: usize| {
-        let trial = plan.trial_of(number("cell", row)? as u64)?;
+    let all = table.runs();
+    let mut runs = Vec::new();
+    for row in 0..all.min(MAX_RUNS) {
+        let id = table.column("cell").and_then(|column| column.values.number(row));
+        let Some(trial) = id.and_then(|id| plan.trial_of(id as u64)) else { continue };
+        let Some(variant) = names.get(trial.variant as usize) else { continue };
         let failure = table.column("failure").map_or_else(String::new, |c| c.values.text(row));
-        let recording = folder.run_folder(trial.id);
-        // A run that is not recorded is its variant's scenario run with its seed.
-        let (kind, replay) = if recording.join("run.json").is_file() {
-            ("recording", recording)
-        } else {
-            ("scenario", folder.scenario(trial.variant))
-        };
-        Some(SweepRun {
-            variant: names.get(trial.variant as usize)?.clone(),
+        runs.push(SweepRun {
+            variant: variant.clone(),
             seed: trial.seed.to_string(),
             failure,
-            replay: TargetRef { kind: kind.into(), path: replay.display().to_string() },
-        })
-    };
-    let all = table.runs();
-    let runs = (0..all.min(MAX_RUNS)).filter_map(run).collect();
+            replay: replay_target(&folder, trial.id, trial.variant),
+        });
+    }
     let left_out = all.saturating_sub(MAX_RUNS) as u64;
     Ok(ReplyBody::Runs { name: plan.name.clone(), is_complete, runs, left_out })
+}
+
+/// Returns the target that shows a run: its recording, or its variant's scenario, to be run with its seed.
+fn replay_target(folder: &Folder, trial: u64, variant: u32) -> TargetRef {
+    let recording = folder.run_folder(trial);
+    let is_recorded = recording.join("run.json").is_file();
+    let kind = if is_recorded { "recording" } else { "scenario" };
+    let path = if is_recorded { recording } else { folder.scenario(variant) };
+    TargetRef { kind: kind.into(), path: path.display().to_string() }
 }

@@ -12,7 +12,7 @@ use crate::protocol::{
 };
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::Frame;
-use sidestep_session::fleet::{FleetFrame, FleetScene};
+use sidestep_session::fleet::FleetScene;
 use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
@@ -99,10 +99,10 @@ impl FleetSession {
     fn take_view(&mut self) -> FeedSnapshot {
         let snapshot = self.feed.snapshot();
         let is_same_fleet = Arc::ptr_eq(&snapshot.scene, &self.fleet_scene);
-        let is_new = |view: &&Arc<FleetFrame>| is_same_fleet && view.number != self.number;
-        let Some(view) = snapshot.view.as_ref().filter(is_new) else {
+        let Some(view) = &snapshot.view else { return snapshot };
+        if !is_same_fleet || view.number == self.number {
             return snapshot;
-        };
+        }
         self.number = view.number;
         // Where only the state of nodes has changed, the page needs no frame.
         if self.frame.cycle != view.frame.cycle || self.frame.bodies.is_empty() {
@@ -141,7 +141,7 @@ impl FleetSession {
                 self.page_view.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
-            // A fleet has no scans, and the page selects bodies all the same.
+            // A fleet has no scans, but the page selects bodies of every session.
             RunMethod::SelectScans { bodies: _ } => Ok(ReplyBody::Done),
             RunMethod::Events { from, until, skip, limit } => {
                 Ok(self.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
@@ -156,7 +156,7 @@ impl FleetSession {
             | RunMethod::Metrics { .. }
             | RunMethod::Source {}
             | RunMethod::Save { .. } => {
-                let remedy = "steer it where it was started; what it records can be replayed";
+                let remedy = "control it where it was started; its recording can be replayed";
                 let place = self.feed.endpoint.as_str();
                 Err(Problem::new(place, "a fleet is only watched here", remedy))
             }

@@ -109,7 +109,7 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // The cycle under way is abandoned: nobody will see its result.
+        // The cycle in progress is abandoned: nobody will see its result.
         self.interrupt.raise();
     }
 }

@@ -209,9 +209,9 @@ impl OpenRun {
         if self.recorded.is_some() {
             return Err(recording_is_read_only(&self.source.place));
         }
-        let is_toml = |path: &str| path.to_ascii_lowercase().ends_with(".toml");
         let path = match to {
-            Some(to) if !is_toml(&to) => {
+            // Other endings could replace files that are no scenarios.
+            Some(to) if !to.to_ascii_lowercase().ends_with(".toml") => {
                 return Err(Problem::new(to, "is no name of a scenario", "end it in .toml"));
             }
             Some(to) => to,

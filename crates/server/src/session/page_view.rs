@@ -119,7 +119,7 @@ impl PageView {
         self.send_frame(&frame, log);
     }
 
-    /// Sends a frame made elsewhere, whose events are recorded already, if one is due and there is credit.
+    /// Forwards a frame of another process, whose events are recorded already, if one is due and there is credit.
     pub(super) fn forward_frame(&mut self, frame: &Frame, log: &mut EventStore, now: Instant) {
         if self.is_due(now) && self.spend_credit(now) {
             self.send_frame(frame, log);
@@ -151,10 +151,12 @@ impl PageView {
         let text = FrameText { scans, events, events_left_out };
         let (bodies, bytes) = self.encoder.encode(frame, &text, self.left_out);
         let bodies = bodies.map(ServerNotification::Bodies);
-        match self.outbox.send_frame(self.session, bodies.as_ref(), bytes) {
-            // It replaces one that has cost its credit.
-            true => self.left_out = self.left_out.saturating_add(1),
-            false => self.credit -= 1,
+        let replaces_unsent = self.outbox.send_frame(self.session, bodies.as_ref(), bytes);
+        if replaces_unsent {
+            // The replaced frame has already cost its credit.
+            self.left_out = self.left_out.saturating_add(1);
+        } else {
+            self.credit -= 1;
         }
     }
 
@@ -164,7 +166,7 @@ impl PageView {
         self.events_due = now + EVENTS_INTERVAL;
     }
 
-    /// Reports the status, if it has changed and the last report is some time ago; a change of the session's activity, or of
+    /// Reports the status, if it has changed and a report is due; a change of the session's activity, or of
     /// the cycle at which it is paused, is reported at once.
     pub(super) fn report_status(&mut self, status: SessionStatus, now: Instant) {
         let is_same = self.last_status.as_ref() == Some(&status);

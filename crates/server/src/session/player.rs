@@ -197,19 +197,21 @@ impl Player {
                 let limit = limit.min(MAX_EVENTS);
                 Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit))
             }
-            RunMethod::Source {} => {
-                let source = &self.open_run.source;
-                Ok(ReplyBody::Source {
-                    place: source.place.clone(),
-                    text: source.text.clone(),
-                    read_only: self.open_run.is_read_only(),
-                })
-            }
+            RunMethod::Source {} => Ok(self.source()),
             RunMethod::Tables {} => self.open_run.tables().map(|names| ReplyBody::Tables { names }),
             RunMethod::Save { text, to, base, overwrite } => {
                 self.open_run.save(text, to, SaveOptions { base, overwrite })
             }
         })
+    }
+
+    fn source(&self) -> ReplyBody {
+        let source = &self.open_run.source;
+        ReplyBody::Source {
+            place: source.place.clone(),
+            text: source.text.clone(),
+            read_only: self.open_run.is_read_only(),
+        }
     }
 
     fn select_scans(&mut self, bodies: Vec<BodyId>) -> Result<ReplyBody, Problem> {
@@ -358,8 +360,9 @@ impl Player {
         let has_digest = is_paused && self.open_run.is_computed();
         let digest = self.digest.as_ref().filter(|(of, _)| has_digest && *of == cycle);
         let banner = self.open_run.recorded.as_ref().map(|_| {
-            let pending = || "Computed again; the digest is compared at the end.".into();
-            self.verdict.clone().unwrap_or_else(pending)
+            self.verdict
+                .clone()
+                .unwrap_or_else(|| "Computed again; the digest is compared at the end.".into())
         });
         SessionStatus {
             session: self.session,

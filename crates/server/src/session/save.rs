@@ -93,11 +93,11 @@ pub(super) fn write_scenario(
     let own = own.filter(|own| is_same_file(&own.path, target)).map(|own| own.text.as_str());
     // A reconnected page knows a different text from the one that its new session has read.
     let known = options.base.as_deref().or(own);
-    let may_replace = |found: Option<&str>| match found {
+    let kept = replace_file(target, text, own.is_some(), |found| match found {
         None => true,
         Some(found) => options.overwrite || known == Some(found) || found == text,
-    };
-    match replace_file(target, text, own.is_some(), may_replace)? {
+    })?;
+    match kept {
         None => Ok(ReplyBody::Saved { place: target.path.display().to_string() }),
         Some(text) => Ok(ReplyBody::Differs { text }),
     }

@@ -87,7 +87,7 @@ fn what_is_told_of_a_body_is_what_then_comes() {
             let after = places(&mut *run);
             for told in &all {
                 let next = told.value("Outcome", "next place");
-                let Some(now) = after.get(&told.who) else {
+                let Some(now) = after.get(&told.body) else {
                     assert_eq!(next, Some(&FactValue::None), "{} is gone", told.title);
                     continue;
                 };
@@ -101,7 +101,7 @@ fn what_is_told_of_a_body_is_what_then_comes() {
                     source.text
                 );
                 compared += 1;
-                moved += usize::from(before.get(&told.who) != Some(now));
+                moved += usize::from(before.get(&told.body) != Some(now));
             }
             run.advance(3);
         }
@@ -115,7 +115,7 @@ fn what_is_told_can_be_shown() {
         let mut run = start(&source, 1);
         run.advance(3);
         for told in inspect_all(&mut *run) {
-            assert!(!told.title.is_empty() && told.cycle == 3, "{:?}", told.who);
+            assert!(!told.title.is_empty() && told.cycle == 3, "{:?}", told.body);
             let titles: Vec<&str> = told.sections.iter().map(|s| s.title.as_str()).collect();
             assert!(titles.contains(&"Now") && titles.contains(&"Outcome"), "{titles:?}");
             let tables = told.sections.iter().filter_map(|section| section.table.as_ref());

@@ -210,7 +210,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
             table.push_row([
                 FactValue::count(turn + 1),
-                FactValue::Who(BodyId::new(BodyKind::Rods, slot, None)),
+                FactValue::Body(BodyId::new(BodyKind::Rods, slot, None)),
             ]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);

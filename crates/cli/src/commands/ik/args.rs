@@ -186,11 +186,10 @@ impl GoalArgs {
 
     /// Returns the part of a target's pose that counts.
     fn pose_constraint(&self, is_turned: bool) -> Result<PoseMask, InputError> {
-        let is_free = |axis: FreeAxis| self.free.contains(&axis);
         PoseMask::with_free(
             is_turned,
-            FreeAxis::TRANSLATIONS.map(is_free),
-            FreeAxis::ROTATIONS.map(is_free),
+            FreeAxis::TRANSLATIONS.map(|axis| self.free.contains(&axis)),
+            FreeAxis::ROTATIONS.map(|axis| self.free.contains(&axis)),
         )
     }
 }

@@ -43,15 +43,20 @@ struct Solution {
     error_rad: Option<f64>,
 }
 
+impl Solution {
+    /// Creates the output of a solution; a goal without an orientation has no error of it.
+    fn new(solution: &IkSolution, is_turned: bool) -> Self {
+        Self {
+            joints: solution.values.clone(),
+            error_m: solution.error_m,
+            error_rad: is_turned.then_some(solution.error_rad),
+        }
+    }
+}
+
 impl IkOutput {
     pub(super) fn new(arm: &Arm, goal: &ArmGoal, result: IkResult, remarks: Vec<String>) -> Self {
         let is_turned = goal.asked.turn != OrientationMask::Free;
-        let angle = |error_rad: f64| is_turned.then_some(error_rad);
-        let solution = |posture: &IkSolution| Solution {
-            joints: posture.values.clone(),
-            error_m: posture.error_m,
-            error_rad: angle(posture.error_rad),
-        };
         let first = IkSolution {
             values: result.values.clone(),
             error_m: result.error_m,
@@ -61,14 +66,14 @@ impl IkOutput {
         Self {
             reached: result.reached,
             error_m: result.error_m,
-            error_rad: angle(result.error_rad),
+            error_rad: is_turned.then_some(result.error_rad),
             reason: result.reason.map(|reason| reason.to_string()),
             target: goal.target.origin_m,
             target_quaternion: is_turned.then(|| goal.target.quaternion()),
             engine: result.engine.name(),
             iterations: result.iterations,
             starts: result.starts,
-            solutions: all.map(solution).collect(),
+            solutions: all.map(|solution| Solution::new(solution, is_turned)).collect(),
             remarks,
             requested: goal.solutions,
             positions: arm.positions(&result.values),

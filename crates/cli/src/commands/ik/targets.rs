@@ -126,10 +126,9 @@ impl IkTable {
 /// Reads the targets.
 fn read_targets(path: &Path) -> Result<Vec<TipTarget>, InputError> {
     let table = CsvTable::read(path)?;
-    let turns =
-        |names: &[&str]| names[POSITION_COLUMNS.len()..].iter().any(|n| table.find(n).is_some());
-    let has_rpy = turns(&RPY_COLUMNS);
-    let has_quaternions = turns(&QUATERNION_COLUMNS);
+    let rotation_columns = POSITION_COLUMNS.len()..;
+    let has_rpy = has_any_column(&table, &RPY_COLUMNS[rotation_columns.clone()]);
+    let has_quaternions = has_any_column(&table, &QUATERNION_COLUMNS[rotation_columns]);
     if has_rpy && has_quaternions {
         let cause = "the header has both angles and quaternions";
         let remedy = "keep roll,pitch,yaw or qx,qy,qz,qw";
@@ -141,29 +140,40 @@ fn read_targets(path: &Path) -> Result<Vec<TipTarget>, InputError> {
         read_quaternion_targets(&table)
     } else {
         let position = table.columns(POSITION_COLUMNS)?;
-        let target = |row| Ok(TipTarget::from_position(values(&table, row, position)?));
-        table.rows().map(target).collect()
+        let mut targets = Vec::new();
+        for row in table.rows() {
+            targets.push(TipTarget::from_position(values(&table, row, position)?));
+        }
+        Ok(targets)
     }
+}
+
+fn has_any_column(table: &CsvTable, names: &[&str]) -> bool {
+    names.iter().any(|name| table.find(name).is_some())
 }
 
 fn read_rpy_targets(table: &CsvTable) -> Result<Vec<TipTarget>, InputError> {
     let [x, y, z, roll, pitch, yaw] = table.columns(RPY_COLUMNS)?;
-    let target = |row| {
+    let mut targets = Vec::new();
+    for row in table.rows() {
         let position_m = values(table, row, [x, y, z])?;
-        Ok(TipTarget::from_rpy(position_m, values(table, row, [roll, pitch, yaw])?))
-    };
-    table.rows().map(target).collect()
+        targets.push(TipTarget::from_rpy(position_m, values(table, row, [roll, pitch, yaw])?));
+    }
+    Ok(targets)
 }
 
 fn read_quaternion_targets(table: &CsvTable) -> Result<Vec<TipTarget>, InputError> {
     let [x, y, z, quaternion @ ..] = table.columns(QUATERNION_COLUMNS)?;
-    let target = |row: CsvRow| {
+    let mut targets = Vec::new();
+    for row in table.rows() {
         let place = row.field(quaternion[0]);
         let position_m = values(table, row, [x, y, z])?;
-        TipTarget::from_quaternion(table.place(), position_m, values(table, row, quaternion)?)
-            .map_err(|error| error.with_position(place.line, place.column))
-    };
-    table.rows().map(target).collect()
+        let rotation = values(table, row, quaternion)?;
+        let target = TipTarget::from_quaternion(table.place(), position_m, rotation)
+            .map_err(|error| error.with_position(place.line, place.column))?;
+        targets.push(target);
+    }
+    Ok(targets)
 }
 
 fn values<const N: usize>(

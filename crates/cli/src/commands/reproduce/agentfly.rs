@@ -4,12 +4,12 @@ use super::{EXAMPLES, PaperResults, check_vacant, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::link;
-use crate::progress::StageProgress;
+use crate::progress::StageBar;
 use crate::worlds;
 use clap::Args;
 use sidestep_papers::agentfly::{self, AgentflyConfig, FlightMeasurement, SocketMeasurements};
 use sidestep_session::fleet::{
-    ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, NodeStatus, Topology,
+    ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, Topology,
 };
 use std::path::{Path, PathBuf};
 
@@ -45,12 +45,15 @@ fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeas
     let folder =
         tempfile::tempdir().map_err(|e| Failure::cannot_write(&std::env::temp_dir(), &e))?;
     let file = folder.path().join("superconflict.toml");
-    let stages = StageProgress::new(console);
-    let mut fly = |text: &str| -> Result<FlightMeasurement, Failure> {
-        std::fs::write(&file, text).map_err(|e| Failure::cannot_write(&file, &e))?;
-        measure_fleet(&file)
-    };
-    let measured = agentfly::measure(plan, &mut fly, &mut |what, share| stages.set(what, share));
+    let stages = StageBar::new(console);
+    let measured = agentfly::measure(
+        plan,
+        &mut |text: &str| -> Result<FlightMeasurement, Failure> {
+            std::fs::write(&file, text).map_err(|e| Failure::cannot_write(&file, &e))?;
+            measure_fleet(&file)
+        },
+        &mut |what, share| stages.set(what, share),
+    );
     stages.clear();
     measured
 }
@@ -60,10 +63,13 @@ fn measure_fleet(file: &Path) -> Result<FlightMeasurement, Failure> {
     let mut measured = FlightMeasurement::default();
     link::run_job(&Job::Fleet(fleet_job(file)), |message| {
         if let LinkMessage::Ended { fleet, .. } = message {
-            let sum = |of: fn(&NodeStatus) -> u64| fleet.nodes.iter().map(of).sum::<u64>() as f64;
-            let messages = sum(|node| node.packets);
-            let bytes = sum(|node| node.bytes);
-            measured = FlightMeasurement { elapsed_s: fleet.flown_s, messages, bytes };
+            let messages: u64 = fleet.nodes.iter().map(|node| node.packets).sum();
+            let bytes: u64 = fleet.nodes.iter().map(|node| node.bytes).sum();
+            measured = FlightMeasurement {
+                elapsed_s: fleet.flown_s,
+                messages: messages as f64,
+                bytes: bytes as f64,
+            };
         }
     })?;
     Ok(measured)
@@ -98,7 +104,7 @@ pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCod
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }
-    let stages = StageProgress::new(console);
+    let stages = StageBar::new(console);
     let report = agentfly::run(&plan, &mut |what, share| stages.set(what, share));
     stages.clear();
     let report = report?.with_sockets(measure_sockets(&plan, console)?);

@@ -4,7 +4,7 @@ use super::{EXAMPLES, PaperResults, check_vacant, scene_picture, store_and_print
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
-use crate::progress::StageProgress;
+use crate::progress::StageBar;
 use clap::Args;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_document::document::Picture;
@@ -89,7 +89,7 @@ fn run(
     recorders: &mut NewRecorder<'_>,
     console: Console,
 ) -> Result<LoriaReport, Failure> {
-    let stages = StageProgress::new(console);
+    let stages = StageBar::new(console);
     let report = run_recorded(plan, recorders, &mut |what, share| stages.set(what, share));
     stages.clear();
     report.map_err(|e| match e {
@@ -108,24 +108,42 @@ fn run_with_recordings(
     let timed = folder.join("timed-runs");
     let had_folder = folder.exists();
     std::fs::create_dir_all(&timed).map_err(|e| Failure::cannot_write(&timed, &e))?;
-    let recordings = timed.clone();
-    let parent = folder.to_path_buf();
-    let clean_up = move |has_failed: bool| {
-        let _ = std::fs::remove_dir_all(&recordings);
-        if has_failed && !had_folder {
-            let _ = std::fs::remove_dir(&parent);
-        }
+    let recordings = TimedRecordings {
+        folder: timed,
+        created_folder: (!had_folder).then(|| folder.to_path_buf()),
     };
-    let clean_up_after_interrupt = clean_up.clone();
-    interrupt::on_interrupt(move || clean_up_after_interrupt(true))?;
+    let interrupted = recordings.clone();
+    interrupt::on_interrupt(move || interrupted.remove(true))?;
     let mut count = 0;
-    let mut new_recorder = |schemas: &[TableSchema]| {
-        count += 1;
-        recorder(&timed.join(format!("{count:04}")), schemas)
-    };
-    let report = run(plan, &mut new_recorder, console);
-    clean_up(report.is_err());
+    let report = run(
+        plan,
+        &mut |schemas: &[TableSchema]| {
+            count += 1;
+            recorder(&recordings.folder.join(format!("{count:04}")), schemas)
+        },
+        console,
+    );
+    recordings.remove(report.is_err());
     report
+}
+
+/// Recordings that are written only because writing is timed.
+#[derive(Clone)]
+struct TimedRecordings {
+    folder: PathBuf,
+    /// The folder of the results, if it was created for this run.
+    created_folder: Option<PathBuf>,
+}
+
+impl TimedRecordings {
+    /// Deletes the recordings; after a failure also the folder that was created, which is empty then.
+    fn remove(&self, has_failed: bool) {
+        // Leftovers harm nothing, and the error of the run matters more.
+        let _ = std::fs::remove_dir_all(&self.folder);
+        if let Some(folder) = self.created_folder.as_deref().filter(|_| has_failed) {
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
 }
 
 fn recorder(folder: &Path, schemas: &[TableSchema]) -> Result<Box<dyn Recorder>, RecordError> {

@@ -3,7 +3,7 @@
 use super::{EXAMPLES, PaperResults, check_vacant, scene_picture, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use crate::progress::StageProgress;
+use crate::progress::StageBar;
 use clap::Args;
 use sidestep_document::document::Picture;
 use sidestep_papers::serpentine::{self, SerpentineConfig};
@@ -43,7 +43,7 @@ pub(super) fn reproduce(args: &SerpentineArgs, console: Console) -> Result<ExitC
     if let Some(folder) = &args.out {
         check_vacant(folder)?;
     }
-    let stages = StageProgress::new(console);
+    let stages = StageBar::new(console);
     let report = serpentine::run(&args.plan(), &mut |what, share| stages.set(what, share));
     stages.clear();
     let report = report?;

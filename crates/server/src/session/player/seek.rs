@@ -5,7 +5,7 @@ use crate::protocol::{Problem, ReplyBody, SessionState, Speed};
 use sidestep_kernel::Cycle;
 use std::time::Instant;
 
-/// A seek under way.
+/// A seek in progress.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seek {
     /// The request that is answered at the target; none for a viewer's.
@@ -24,7 +24,7 @@ impl Player {
         }
     }
 
-    /// Advances by some cycles from the present one, or from the target of a seek under way: so steps that are requested
+    /// Advances by some cycles from the present one, or from the target of a seek in progress: so steps that are requested
     /// faster than they are computed add up.
     pub(super) fn step(&mut self, id: u32, cycles: u32) {
         let from = self.seek.map_or(self.cycle(), |seek| seek.target);

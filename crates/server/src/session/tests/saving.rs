@@ -70,7 +70,8 @@ fn nothing_elsewhere_is_read_by_a_text_that_is_saved_and_opened() {
     let reads = SessionDeps { read_only: true, ..deps(&inside, 1) };
     assert_eq!(open(reads)["answer"]["is"], "opened", "no page can have written it");
     let own = deps(&inside, 1);
-    let named = SessionDeps { files: own.files.with_files_named_by([&*stolen].into_iter()), ..own };
+    let named =
+        SessionDeps { files: own.files.with_files_referenced_by([&*stolen].into_iter()), ..own };
     assert_eq!(open(named)["answer"]["is"], "opened", "it was named at start");
 }
 

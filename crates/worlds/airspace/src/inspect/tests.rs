@@ -104,7 +104,7 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
                 continue;
             }
             kept += 1;
-            let Some(FactValue::Who(BodyId {
+            let Some(FactValue::Body(BodyId {
                 kind: BodyKind::Airplane,
                 number: other,
                 part: None,

@@ -346,7 +346,7 @@ fn who_looks_at_a_connector_sees_the_order_that_is_ahead() {
     assert_eq!(told.value("Wish", "what"), Some(&"go, as ordered".into()));
     assert_eq!(
         told.value("Wish", "of"),
-        Some(&FactValue::Who(BodyId::new(BodyKind::Connector, 0, Some(5))))
+        Some(&FactValue::Body(BodyId::new(BodyKind::Connector, 0, Some(5))))
     );
     assert_eq!(told.value("Ladder", "rung"), Some(&"as wanted".into()));
     assert_eq!(run.digest(), digest);

@@ -27,7 +27,7 @@ fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
     run.advance(20);
     let told = told(&*run, 2);
     let head: BodyId = BodyId::new(BodyKind::Connector, 0, Some(0));
-    assert_eq!(told.value("Veto", "by"), Some(&FactValue::Who(head)));
+    assert_eq!(told.value("Veto", "by"), Some(&FactValue::Body(head)));
     assert_eq!(told.value("Veto", "reason"), Some(&"target-blocked".into()));
     let disc = BodyId::new(BodyKind::Obstacle, 0, None);
     assert_eq!(told.value("Veto", "because of"), Some(&FactValue::from(Some(disc))));
@@ -40,7 +40,7 @@ fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
     };
     assert!((0.0..0.07).contains(far_m), "less than a step, and not {far_m} m");
     assert_eq!(told.value("Outcome", "next place"), told.value("Now", "place"));
-    assert_eq!(told.value("Wish", "of"), Some(&FactValue::Who(head)));
+    assert_eq!(told.value("Wish", "of"), Some(&FactValue::Body(head)));
     assert_eq!(told.marks_with_role(MarkRole::Wish).count(), 1);
     assert_eq!(told.value("Moves", "connectors"), Some(&FactValue::count(0)));
 }

@@ -43,7 +43,7 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
     assert_eq!(second.value("Conflict group", "turn"), Some(&FactValue::count(2)));
     let order = second.section("Conflict group").and_then(|s| s.table.as_ref()).expect("an order");
     let turns: Vec<_> = order.column("body").expect("a column").collect();
-    assert_eq!(turns, [&FactValue::Who(robot(0)), &FactValue::Who(robot(1))]);
+    assert_eq!(turns, [&FactValue::Body(robot(0)), &FactValue::Body(robot(1))]);
     assert_eq!(second.value("Outcome", "cut by"), Some(&FactValue::from(Some(robot(0)))));
     assert_eq!(second.value("Outcome", "steps made"), Some(&FactValue::count(0)));
     assert_eq!(second.value("Outcome", "probability"), Some(&FactValue::Share(1.0)));
@@ -103,7 +103,7 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
                     for (now, next) in [("place", "next place"), ("heading", "next heading")] {
                         let (now, next) = (then.value("Now", now), told.value("Outcome", next));
                         // A body that goes straight is reported so before it turns at its next decision.
-                        assert_eq!(now, next, "{rule}, {policy}: {:?}", told.who);
+                        assert_eq!(now, next, "{rule}, {policy}: {:?}", told.body);
                     }
                     moved += usize::from(told.value("Now", "place") != then.value("Now", "place"));
                 }
