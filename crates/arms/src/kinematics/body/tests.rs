@@ -103,12 +103,13 @@ proptest! {
         let target = chain.forward(&there).tip.origin_m;
         let sphere = Sphere { center_m: [at[0], at[1], 1.0], radius_m: 0.2 };
         let is_clear = |values: &[f64]| {
-            let mut placed = Vec::new();
-            body.place_shapes(&chain.forward(values), values, &mut placed);
+            let mut shapes = Vec::new();
+            body.place_shapes(&chain.forward(values), values, &mut shapes);
+            let placed = PlacedBody { body: &body, shapes: &shapes };
             let Sphere { center_m, radius_m } = sphere;
-            let in_ball =
-                |part| body.ball_proximity(&placed, part, center_m, radius_m, 0.0).is_some();
-            body.overlaps(&chain, values).is_empty() && !(0..body.len()).any(in_ball)
+            let mut parts = 0..body.len();
+            body.overlaps(&chain, values).is_empty()
+                && !parts.any(|part| placed.ball_proximity(part, center_m, radius_m, 0.0).is_some())
         };
         let goal = ArmGoal {
             body: Some(body.clone()),
