@@ -67,7 +67,7 @@ def test_frogs_take_orders(tmp_path):
 def test_a_sweep_varies_ponds(tmp_path):
     run(
         """
-        swept = sidestep.sweep(POND, vary={"pond.frogs": [3, 5]}, replicate=2, metrics=["hops"])
+        swept = sidestep.sweep(POND, vary={"pond.frogs": [3, 5]}, replicate=2)
         assert len(swept.results) == 4
         """,
         tmp_path,

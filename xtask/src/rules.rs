@@ -3,6 +3,8 @@
 use crate::imports;
 use crate::workspace::{self, Package};
 use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 /// Packages that only some crates may depend on: each is heavy, or the one way to a format or a network.
 /// `cargo deny` could hold them, but not everybody who runs the tests has it.
@@ -31,6 +33,16 @@ const KNOWS_WORLDS: [&str; 8] = [
     "sidestep-pond-python",
     "sidestep-python",
     "sidestep-python-native",
+];
+
+/// Code outside of these crates that serves any world: what it needs of one, the world declares (its `facts.rs`).
+const SERVES_ANY_WORLD: [&str; 6] = [
+    "crates/session/src/fleet.rs",
+    "python/sidestep/envs",
+    "python/sidestep/plot.py",
+    "studio/src/edit/canvas-editor.svelte.ts",
+    "studio/src/edit/import.ts",
+    "studio/src/edit/tools",
 ];
 
 fn packages() -> Vec<Package> {
@@ -62,6 +74,34 @@ fn worlds_are_known_to_the_facade_and_its_users_alone() {
         .map(|package| package.name())
         .collect();
     assert_eq!(knows, BTreeSet::from(KNOWS_WORLDS));
+}
+
+/// Returns the file, or the files of the folder.
+fn files_at(path: &Path) -> Vec<PathBuf> {
+    match fs::read_dir(path) {
+        Ok(entries) => entries.map(|entry| entry.unwrap().path()).filter(|p| p.is_file()).collect(),
+        Err(_) => vec![path.to_path_buf()],
+    }
+}
+
+#[test]
+fn code_that_serves_any_world_names_none() {
+    let packages = packages();
+    let worlds = packages.iter().filter(|package| package.is_in(WORLDS));
+    let worlds: Vec<&str> =
+        worlds.filter_map(|package| package.name().strip_prefix("sidestep-")).collect();
+    assert!(worlds.contains(&"robots"), "{worlds:?}");
+    for path in SERVES_ANY_WORLD.iter().flat_map(|path| files_at(&crate::root().join(path))) {
+        let text = fs::read_to_string(&path).unwrap();
+        // Examples in documentation are of some world.
+        let is_example = |line: &&str| {
+            ["///", ">>>", "...", "*"].iter().any(|mark| line.trim_start().starts_with(mark))
+        };
+        for line in text.lines().filter(|line| !is_example(line)) {
+            let named = worlds.iter().find(|world| line.contains(&format!("\"{world}\"")));
+            assert_eq!(named, None, "{}: {line}", path.display());
+        }
+    }
 }
 
 #[test]

@@ -16,11 +16,12 @@ import {
 import { brushCells, floodCells, lineCells, rectangleCells, rectOf, type Cell } from "./cells";
 import type { Draft } from "./draft.svelte";
 import { valueAt, type Path } from "./keypath";
-import { airplaneItems, putAirplane, putWayPoint } from "./tools/airspace";
-import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "./tools/chain";
+import { restrictionOn, toolsOf, type EditAction, type ItemSource, type Tool } from "./editing";
+import { bodyItems, goalItems, lowerLeftAround, putBody, putDoor, putGoal, sideOfNewBody } from "./tools/boxes";
 import { insert, remove, set, type Item } from "./tools/item";
-import { lowerLeftAround, putBody, putDoor, putGoal, robotItems, robotSide } from "./tools/robots";
-import { restrictionOn, toolsOf, type Tool, type ToolId } from "./tools/tools";
+import { obstacleItems, putBall, putBox, putPatrol, putPolygon, putWall, startItems } from "./tools/obstacles";
+import { pointItems, putPoint } from "./tools/points";
+import { putRoute, putWayPoint, routeItems } from "./tools/routes";
 
 /** A press in progress: its start, its current position, and the boxes between. */
 export interface Stroke {
@@ -35,7 +36,8 @@ export interface Stroke {
 export class CanvasEditor {
   readonly draft: Draft;
   readonly session: Session;
-  tool = $state<ToolId>("select");
+  /** The id of the active tool. */
+  tool = $state("select");
   char = $state<MapChar>("#");
   /** Side of the brush in boxes. */
   side = $state(1);
@@ -47,29 +49,31 @@ export class CanvasEditor {
     this.session = draft.session;
   }
 
-  readonly map = $derived.by(() =>
-    this.session.run.scene.world === "robots" ? AsciiMap.fromModel(this.draft.model) : null,
-  );
+  readonly #ownTools = $derived.by(() => toolsOf(this.draft.editing, this.session.run.scene));
+  /** Returns whether tools draw the boxes of a map in this world. */
+  readonly #paintsMap = $derived.by(() => this.#ownTools.some(({ action }) => action.do === "paint"));
+  readonly map = $derived.by(() => (this.#paintsMap ? AsciiMap.fromModel(this.draft.model) : null));
   readonly ground = $derived.by((): GridPlacement | null => placementOf(this.map, this.session.run.scene.floor));
-  readonly items = $derived.by((): Item[] => this.#items());
+  readonly items = $derived.by((): Item[] => this.draft.editing.items.flatMap((source) => this.#itemsOf(source)));
   readonly selected = $derived.by(() => this.items.find(({ path }) => isSame(path, this.draft.selected)) ?? null);
   readonly tools = $derived.by((): Tool[] =>
-    toolsOf(this.session.run.scene).filter((tool) => this.map !== null || !tool.paints),
+    this.#ownTools.filter(({ action }) => this.map !== null || action.do !== "paint"),
+  );
+  /** The effect of the active tool. */
+  readonly action = $derived.by(
+    (): EditAction => this.tools.find(({ id }) => id === this.tool)?.action ?? { do: "select" },
   );
   readonly restriction = $derived.by(() => {
-    const model = this.draft.model ?? {};
-    const has = (path: Path): boolean => valueAt(model, path) !== undefined;
-    return restrictionOn(this.session.run.scene, this.map, {
-      file: has(["map", "file"]),
-      office: has(["map", "office"]),
-      airplanes: has(["airplanes"]),
-    });
+    const { model, world, editing } = this.draft;
+    // Without the world's answer nobody knows yet what can be edited.
+    if (world === null && !this.session.run.scene.is_recording) return "";
+    return restrictionOn(editing, this.session.run.scene, model ?? {});
   });
   /** Returns whether the shown map can become a drawn one. */
   readonly canInlineMap = $derived.by(() => {
-    const { world, floor } = this.session.run.scene;
+    const { floor } = this.session.run.scene;
     return (
-      world === "robots" &&
+      this.#paintsMap &&
       this.map === null &&
       this.draft.model !== null &&
       floor !== null &&
@@ -77,14 +81,26 @@ export class CanvasEditor {
     );
   });
 
-  #items(): Item[] {
+  #itemsOf(source: ItemSource): Item[] {
     const { model } = this.draft;
-    const { world, dimensions } = this.session.run.scene;
     if (!model) return [];
-    if (world === "chain") return chainItems(model, this.m_per_px, dimensions === 3 ? 3 : 2);
-    if (dimensions !== 2) return [];
-    if (world === "robots") return this.ground ? robotItems(model, this.ground) : [];
-    return world === "airspace" ? airplaneItems(model, this.m_per_px) : [];
+    const { m_per_px, ground } = this;
+    const dimensions = this.session.run.scene.dimensions === 3 ? 3 : 2;
+    const format = { dimensions, m_per_px } as const;
+    if (source.of === "obstacles") return obstacleItems(model, source.section, format);
+    if (source.of === "starts") return startItems(model, source.section, source.noun, format);
+    // All others have two coordinates.
+    if (dimensions === 3) return [];
+    switch (source.of) {
+      case "points":
+        return pointItems(model, source.section, source.noun, m_per_px);
+      case "routes":
+        return routeItems(model, source.section, source.noun, m_per_px);
+      case "bodies":
+        return ground ? bodyItems(model, source, ground) : [];
+      case "goals":
+        return ground ? goalItems(model, source.section, ground) : [];
+    }
   }
 
   /** The boxes between two positions. */
@@ -98,7 +114,9 @@ export class CanvasEditor {
     const { map, ground } = this;
     if (!map || !ground) return [];
     const [from, to] = [stroke.from, stroke.to].map(([x, y]) => cellOf(ground, x, y)) as [Cell, Cell];
-    switch (this.tool) {
+    if (this.action.do === "add-door") return rectangleCells(from, to, true);
+    if (this.action.do !== "paint") return [];
+    switch (this.action.area) {
       case "brush":
       case "eraser":
         return brushCells([...stroke.trail, to], this.side);
@@ -108,21 +126,17 @@ export class CanvasEditor {
         return rectangleCells(from, to, stroke.isFilled);
       case "fill":
         return floodCells(to, map.width, map.height, (cell) => map.charAt(cell));
-      case "door":
-        return rectangleCells(from, to, true);
-      default:
-        return [];
     }
   }
 
   /** The boxes of a body that would be placed there. */
   bodyCells(to: Point3): Cell[] {
-    const { ground } = this;
+    const { ground, action } = this;
     const { model } = this.draft;
-    if (!ground || !model || (this.tool !== "robot" && this.tool !== "person" && this.tool !== "goal")) return [];
+    if (!ground || !model || (action.do !== "add-body" && action.do !== "add-goal")) return [];
     const cell = cellOf(ground, to[0], to[1]);
-    if (this.tool === "goal") return [cell];
-    const side = robotSide(model, this.tool === "robot" ? "robots" : "people", this.draft.selected);
+    if (action.do === "add-goal") return [cell];
+    const side = sideOfNewBody(model, action.section, this.draft.selected);
     const [column, row] = lowerLeftAround(cell, side);
     return rectangleCells([column, row], [column + side - 1, row + side - 1], true);
   }
@@ -135,22 +149,30 @@ export class CanvasEditor {
   #edits(stroke: Stroke): Edit[] {
     const { model, selected: chosen } = this.draft;
     const { from, to } = stroke;
+    const { action, m_per_px } = this;
     if (!model) return [];
-    switch (this.tool) {
-      case "ball":
-        return putBall(from, Math.max(Math.hypot(to[0] - from[0], to[1] - from[1]), 8 * this.m_per_px), this.m_per_px);
-      case "wall":
-        return putWall(from, to, this.m_per_px);
-      case "box":
-        return putBox(from, to, this.m_per_px);
-      case "polygon":
-        return putPolygon(model, from, to, chosen, this.m_per_px);
-      case "patrol":
-        return putPatrol(model, to, chosen, this.m_per_px);
-      case "airplane":
-        return putAirplane(from, this.#routeEnd(from, to), this.m_per_px);
-      case "way-point":
-        return putWayPoint(model, to, chosen, this.m_per_px);
+    switch (action.do) {
+      case "add-ball":
+        return putBall(
+          action.section,
+          from,
+          Math.max(Math.hypot(to[0] - from[0], to[1] - from[1]), 8 * m_per_px),
+          m_per_px,
+        );
+      case "add-wall":
+        return putWall(action.section, from, to, m_per_px);
+      case "add-box":
+        return putBox(action.section, from, to, m_per_px);
+      case "add-polygon":
+        return putPolygon({ model, section: action.section, chosen, m_per_px }, from, to);
+      case "add-patrol":
+        return putPatrol({ model, section: action.section, chosen, m_per_px }, to);
+      case "add-point":
+        return putPoint(action.section, to, m_per_px);
+      case "add-route":
+        return putRoute(action.section, from, this.#routeEnd(from, to), m_per_px);
+      case "add-way-point":
+        return putWayPoint({ model, section: action.section, chosen, m_per_px }, to);
       default:
         return this.ground ? this.#boxEdits(stroke, this.ground) : [];
     }
@@ -159,15 +181,17 @@ export class CanvasEditor {
   #boxEdits(stroke: Stroke, ground: GridPlacement): Edit[] {
     const model = this.draft.model ?? {};
     const { selected: chosen } = this.draft;
+    const { action } = this;
     const cell = cellOf(ground, stroke.to[0], stroke.to[1]);
-    if (this.tool === "robot" || this.tool === "person") {
-      const key = this.tool === "robot" ? "robots" : "people";
-      return putBody(model, key, lowerLeftAround(cell, robotSide(model, key, chosen)), chosen);
+    if (action.do === "add-body") {
+      const side = sideOfNewBody(model, action.section, chosen);
+      return putBody(model, action, lowerLeftAround(cell, side), chosen);
     }
-    if (this.tool === "goal") return putGoal(model, cell, chosen);
-    if (this.tool === "door")
-      return putDoor(model, this.map, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
-    const painted = this.map?.paint(this.cells(stroke), this.tool === "eraser" ? "." : this.char);
+    if (action.do === "add-goal") return putGoal(model, action.section, cell, chosen);
+    if (action.do === "add-door")
+      return putDoor(model, action, this.map, rectOf(cellOf(ground, stroke.from[0], stroke.from[1]), cell));
+    if (action.do !== "paint") return [];
+    const painted = this.map?.paint(this.cells(stroke), action.area === "eraser" ? "." : this.char);
     return painted ? [painted] : [];
   }
 

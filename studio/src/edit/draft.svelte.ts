@@ -4,6 +4,7 @@ import { RequestError } from "../connection";
 import type { ReplyBody, Edit, Problem } from "../protocol";
 import type { Session } from "../state/session.svelte";
 import { TextHistory } from "./history";
+import { editingOf, NO_EDITING, type Editing } from "./editing";
 import { isTable, isWithin, normalizedPath, type Path, type TomlTable } from "./keypath";
 import { WorldSchema } from "./schema";
 
@@ -26,6 +27,8 @@ export class Draft {
   /** The values of the last text that could be parsed. */
   model = $state.raw<TomlTable | null>(null);
   world = $state.raw<WorldSchema | null>(null);
+  /** The tools that its world declares. */
+  editing = $state.raw<Editing>(NO_EDITING);
   canUndo = $state(false);
   canRedo = $state(false);
   /** The item selected on the canvas and shown in the forms. */
@@ -87,7 +90,9 @@ export class Draft {
       this.#running = this.session.run.text ?? answer.text;
       this.#history = new TextHistory(this.#running);
       this.#onTextChange(false);
-      await Promise.all([this.#loadSchema(), this.#checkNow()]);
+      // The schema brings the tools of the canvas: once a draft is checked, they are there.
+      await this.#loadSchema();
+      await this.#checkNow();
     } catch (error) {
       this.#onFailure(error);
     }
@@ -96,7 +101,9 @@ export class Draft {
   async #loadSchema(): Promise<void> {
     try {
       const answer = await this.session.client.schema(this.session.run.scene.world);
-      if (answer.is === "schema" && isTable(answer.schema)) this.world = new WorldSchema(answer.schema);
+      if (answer.is !== "schema") return;
+      if (isTable(answer.schema)) this.world = new WorldSchema(answer.schema);
+      this.editing = editingOf(answer.editing);
     } catch (error) {
       // Without a schema the text can still be edited.
       if (!(error instanceof RequestError)) throw error;

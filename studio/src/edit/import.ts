@@ -1,11 +1,9 @@
 /** Foreign files that a scenario uses: maps, and sensors and effectors learned from logs. */
 
 import type { Edit, FileEntry } from "../protocol";
-import { valueAt, type TomlTable } from "./keypath";
+import { valueOf, type Editing, type FileUse } from "./editing";
+import { partsOf, type TomlTable } from "./keypath";
 import { insert, remove, set } from "./tools/item";
-
-/** Default side of an image's pixels. */
-const DEFAULT_PIXEL_M = 0.05;
 
 /** A path relative to the folder of a scenario. */
 export function relativePath(folder: string, file: string): string {
@@ -21,33 +19,26 @@ export function folderOf(place: string, first: string): string {
   return place.includes("/") ? place.replace(/\/[^/]*$/, "") || "/" : first;
 }
 
-/** Returns whether a scenario of a world can use a file. */
-export function canImport(world: string, { kind, name }: FileEntry): boolean {
-  if (world === "robots") return kind === "profile" || (kind === "map" && !name.endsWith(".world"));
-  return world === "chain" && kind === "map" && /\.(yaml|yml|world)$/i.test(name);
+/** The use of a file in scenarios of a world, if they can use it. */
+export function useOf(editing: Editing, { kind, name }: FileEntry): FileUse | undefined {
+  const lower = name.toLowerCase();
+  const fits = ({ endings }: FileUse): boolean => endings.length === 0 || endings.some((end) => lower.endsWith(end));
+  return editing.files.find((use) => use.kind === kind && fits(use));
 }
 
-/** The edits that make a scenario use a file, in place of its map. */
-export function importEdits(model: TomlTable, world: string, { kind, name }: FileEntry, path: string): Edit[] {
-  const removals = (section: string, keys: string[]): Edit[] =>
-    keys.filter((key) => valueAt(model, [section, key]) !== undefined).map((key) => remove([section, key]));
-  if (kind === "profile") {
-    const known = model["profiles"];
-    if (!Array.isArray(known)) return [set(["profiles"], [path])];
-    return known.includes(path) ? [] : [insert(["profiles"], path)];
+/** The edits that make a scenario use a file: in place of another, or beside others in a list. */
+export function importEdits(model: TomlTable, use: FileUse, path: string): Edit[] {
+  const key = partsOf(use.key);
+  if (use.is_list) {
+    const known = valueOf(model, use.key);
+    if (!Array.isArray(known)) return [set(key, [path])];
+    return known.includes(path) ? [] : [insert(key, path)];
   }
-  if (world === "chain") {
-    const key = name.endsWith(".world") ? "stage" : "map";
-    return [
-      ...removals("ground", ["corridor", "map", "stage", ...(key === "stage" ? ["unknown"] : [])]),
-      set(["ground", key], path),
-    ];
-  }
-  const isImage = /\.(png|pgm)$/i.test(name);
-  const hasPixels = valueAt(model, ["map", "resolution_m"]) !== undefined;
+  const replaced = use.replaces.filter((other) => valueOf(model, other) !== undefined);
+  const missing = use.defaults.filter(([other]) => valueOf(model, other) === undefined);
   return [
-    ...removals("map", ["ascii", "office", "file", ...(isImage ? [] : ["resolution_m"])]),
-    set(["map", "file"], path),
-    ...(isImage && !hasPixels ? [set(["map", "resolution_m"], DEFAULT_PIXEL_M)] : []),
+    ...replaced.map((other) => remove(partsOf(other))),
+    set(key, path),
+    ...missing.map(([other, value]) => set(partsOf(other), value)),
   ];
 }

@@ -18,6 +18,7 @@ import type {
   SweepRun,
 } from "../../src/protocol";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
+import { declaredEditing } from "./editing";
 import { encodeFrame } from "./encode";
 import { airplanes, chain, robots, type FakeWorld } from "./scenes";
 
@@ -347,7 +348,7 @@ export class FakeServer {
       run.goTo(0);
       return { is: "opened", session: run.id, scene: world.scene, status: run.status() };
     }
-    return { is: "schema", schema: SCHEMA };
+    return { is: "schema", schema: SCHEMA, editing: declaredEditing(call.world) };
   }
 
   #answerSession(session: number, call: SessionMethod, say: (words: unknown) => void): ReplyBody {

@@ -1,7 +1,9 @@
 /** Paths of imported files are relative to the scenario's folder, and replace earlier ones. */
 
 import { expect, test } from "vitest";
-import { folderOf, importEdits, canImport, relativePath } from "../../src/edit/import";
+import type { TomlTable } from "../../src/edit/keypath";
+import { folderOf, importEdits, relativePath, useOf } from "../../src/edit/import";
+import { declaredEditing } from "../fake/editing";
 import type { FileEntry } from "../../src/protocol";
 
 const entry = (kind: FileEntry["kind"], name: string): FileEntry => ({ kind, name, path: name, about: "" });
@@ -24,7 +26,7 @@ test("each world accepts its kinds of files", () => {
       entry("profile", "d.toml"),
       entry("scenario", "e.toml"),
     ]
-      .filter((one) => canImport(world, one))
+      .filter((one) => useOf(declaredEditing(world), one))
       .map(({ name }) => name);
   expect(names("robots")).toEqual(["a.yaml", "b.png", "d.toml"]);
   expect(names("chain")).toEqual(["a.yaml", "c.world"]);
@@ -32,30 +34,31 @@ test("each world accepts its kinds of files", () => {
 });
 
 test("a map replaces the previous one, and a profile is added to others", () => {
+  const editsFor = (model: TomlTable, world: string, file: FileEntry): ReturnType<typeof importEdits> =>
+    importEdits(model, useOf(declaredEditing(world), file)!, file.name);
   const keys = (edits: ReturnType<typeof importEdits>): string[] => edits.map(({ op, key }) => `${op} ${key}`);
   const drawn = { map: { ascii: "##", box_size_m: 0.5, resolution_m: 0.1 } };
-  expect(keys(importEdits(drawn, "robots", entry("map", "a.yaml"), "a.yaml"))).toEqual([
+  expect(keys(editsFor(drawn, "robots", entry("map", "a.yaml")))).toEqual([
     "remove map.ascii",
     "remove map.resolution_m",
     "set map.file",
   ]);
-  expect(keys(importEdits(drawn, "robots", entry("map", "a.png"), "a.png"))).toEqual([
-    "remove map.ascii",
-    "set map.file",
-  ]);
-  expect(importEdits({}, "robots", entry("map", "a.png"), "a.png").at(-1)).toEqual({
+  expect(keys(editsFor(drawn, "robots", entry("map", "a.png")))).toEqual(["remove map.ascii", "set map.file"]);
+  expect(editsFor({}, "robots", entry("map", "a.png")).at(-1)).toEqual({
     op: "set",
     key: "map.resolution_m",
     value: 0.05,
   });
-  expect(
-    keys(importEdits({ ground: { corridor: {}, unknown: "solid" } }, "chain", entry("map", "a.world"), "a.world")),
-  ).toEqual(["remove ground.corridor", "remove ground.unknown", "set ground.stage"]);
-  expect(importEdits({}, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([
+  expect(keys(editsFor({ ground: { corridor: {}, unknown: "solid" } }, "chain", entry("map", "a.world")))).toEqual([
+    "remove ground.corridor",
+    "remove ground.unknown",
+    "set ground.stage",
+  ]);
+  expect(editsFor({}, "robots", entry("profile", "p.toml"))).toEqual([
     { op: "set", key: "profiles", value: ["p.toml"] },
   ]);
-  expect(importEdits({ profiles: ["q.toml"] }, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([
+  expect(editsFor({ profiles: ["q.toml"] }, "robots", entry("profile", "p.toml"))).toEqual([
     { op: "insert", key: "profiles", at: null, value: "p.toml" },
   ]);
-  expect(importEdits({ profiles: ["p.toml"] }, "robots", entry("profile", "p.toml"), "p.toml")).toEqual([]);
+  expect(editsFor({ profiles: ["p.toml"] }, "robots", entry("profile", "p.toml"))).toEqual([]);
 });

@@ -2,13 +2,43 @@ import { describe, expect, test } from "vitest";
 import { dragAlong, axisAt, handlesAt } from "../../src/edit/axes";
 import { AsciiMap, placementOf } from "../../src/edit/ascii-map";
 import type { TomlTable } from "../../src/edit/keypath";
-import { airplaneItems, headingTo, putAirplane, putWayPoint } from "../../src/edit/tools/airspace";
-import { chainItems, putBall, putBox, putPatrol, putPolygon, putWall } from "../../src/edit/tools/chain";
+import { toolsOf } from "../../src/edit/editing";
+import { bodyItems, goalItems, lowerLeftAround, putBody, putDoor, putGoal } from "../../src/edit/tools/boxes";
+import {
+  obstacleItems,
+  putBall,
+  putBox,
+  putPatrol,
+  putPolygon,
+  putWall,
+  startItems,
+} from "../../src/edit/tools/obstacles";
+import { pointItems, putPoint } from "../../src/edit/tools/points";
+import { headingTo, putRoute, putWayPoint, routeItems } from "../../src/edit/tools/routes";
 import { SpaceCamera } from "../../src/scene/camera";
-import { lowerLeftAround, putBody, putDoor, putGoal, robotItems } from "../../src/edit/tools/robots";
+import type { Item } from "../../src/edit/tools/item";
+import type { Scene } from "../../src/protocol";
+import { declaredEditing } from "../fake/editing";
 
 const map = new AsciiMap("######\n#....#\n#....#\n######\n", 0.5);
 const ground = placementOf(map, null)!;
+
+/** The section and the template of a tool that adds a body. */
+function templateOf(id: string): { section: string; template: TomlTable } {
+  const { action } = declaredEditing("robots").tools.find((tool) => tool.id === id)!;
+  if (action.do !== "add-body" && action.do !== "add-door") throw new Error(`${id} adds no body`);
+  return action;
+}
+
+/** All items of a world without boxes. */
+function itemsIn(world: string, model: TomlTable, m_per_px: number, dimensions: 2 | 3 = 2): Item[] {
+  return declaredEditing(world).items.flatMap((source) => {
+    const format = { dimensions, m_per_px };
+    if (source.of === "obstacles") return obstacleItems(model, source.section, format);
+    if (source.of === "starts") return startItems(model, source.section, source.noun, format);
+    return source.of === "routes" ? routeItems(model, source.section, source.noun, m_per_px) : [];
+  });
+}
 
 describe("robots", () => {
   const model: TomlTable = {
@@ -25,7 +55,10 @@ describe("robots", () => {
     ],
     people: { at: [[1, 2]], size: [1, 2] },
   };
-  const items = robotItems(model, ground);
+  const items = declaredEditing("robots").items.flatMap((source) => {
+    if (source.of === "goals") return goalItems(model, source.section, ground);
+    return source.of === "bodies" ? bodyItems(model, source, ground) : [];
+  });
   const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
 
   test("are placed around the middle of their boxes", () => {
@@ -61,10 +94,10 @@ describe("robots", () => {
   });
 
   test("are added to the section of the selected one, unless it is given by a count", () => {
-    expect(putBody(model, "robots", [2, 2], null)).toEqual([
+    expect(putBody(model, templateOf("robot"), [2, 2], null)).toEqual([
       { op: "insert", key: "robots.0.at", at: null, value: [2, 2] },
     ]);
-    const [first] = putBody({ robots: { count: 4 } }, "robots", [2, 2], null);
+    const [first] = putBody({ robots: { count: 4 } }, templateOf("robot"), [2, 2], null);
     expect(first).toMatchObject({ op: "insert", key: "robots", value: { at: [[2, 2]], size: 2 } });
     expect(lowerLeftAround([5, 5], 2)).toEqual([5, 5]);
     expect(lowerLeftAround([5, 5], 3)).toEqual([4, 4]);
@@ -72,7 +105,7 @@ describe("robots", () => {
 
   test("a door removes the wall that it is in, and joins the section of its size", () => {
     const rect = { column: 5, row: 1, width: 1, height: 2 };
-    const [way, door] = putDoor(model, map, rect);
+    const [way, door] = putDoor(model, templateOf("door"), map, rect);
     expect(way).toEqual({
       op: "paint",
       key: "map.ascii",
@@ -82,19 +115,24 @@ describe("robots", () => {
       ],
     });
     expect(door).toMatchObject({ op: "insert", key: "doors", value: { at: [[5, 1]], size: [1, 2] } });
-    const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, map, rect);
+    const more = putDoor({ doors: { at: [[0, 1]], size: [1, 2] } }, templateOf("door"), map, rect);
     expect(more[1]).toEqual({ op: "insert", key: "doors.at", at: null, value: [5, 1] });
   });
 
   test("a way-point is added to the goals, or becomes the first goal", () => {
-    expect(putGoal(model, [2, 1], null)).toEqual([
+    expect(putGoal(model, "robots", [2, 1], null)).toEqual([
       { op: "insert", key: "robots.0.behaviour.goals", at: null, value: [2, 1] },
     ]);
-    expect(putGoal(model, [2, 1], ["robots", 1])).toEqual([
+    expect(putGoal(model, "robots", [2, 1], ["robots", 1])).toEqual([
       { op: "set", key: "robots.1.behaviour", value: { kind: "goto", goals: [[2, 1]], repeat: true } },
     ]);
   });
 });
+
+/** The text that a tool edits. */
+function at(section: string, model: TomlTable, chosen: (string | number)[] | null, m_per_px = 0.01) {
+  return { model, section, chosen, m_per_px };
+}
 
 describe("chains", () => {
   const model: TomlTable = {
@@ -118,7 +156,7 @@ describe("chains", () => {
     ],
     chains: { at_m: [0, 0], tasks: [{ kind: "targets", targets_m: [[12, 0]] }] },
   };
-  const items = chainItems(model, 0.01);
+  const items = itemsIn("chain", model, 0.01);
   const item = (key: string) => items.find(({ path }) => path.join(".") === key)!;
 
   test("balls, walls, boxes, polygons, starts and targets can be picked", () => {
@@ -154,10 +192,10 @@ describe("chains", () => {
   });
 
   test("new obstacles are written with short numbers", () => {
-    expect(putBall([1.23456, 2, 0], 0.5, 0.01)).toEqual([
+    expect(putBall("obstacles", [1.23456, 2, 0], 0.5, 0.01)).toEqual([
       { op: "insert", key: "obstacles", at: null, value: { at_m: [1.23, 2], radius_m: 0.5 } },
     ]);
-    expect(putWall([0, 0, 0], [1, 1, 0], 0.01)[0]).toMatchObject({
+    expect(putWall("obstacles", [0, 0, 0], [1, 1, 0], 0.01)[0]).toMatchObject({
       value: {
         ends_m: [
           [0, 0],
@@ -165,13 +203,15 @@ describe("chains", () => {
         ],
       },
     });
-    expect(putBox([0, 2, 0], [1, 0, 0], 0.01)[0]).toMatchObject({ value: { at_m: [0.5, 1], size_m: [1, 2] } });
-    expect(putBox([0, 0, 0], [1, 0, 0], 0.01)).toEqual([]);
-    expect(putWall([0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
+    expect(putBox("obstacles", [0, 2, 0], [1, 0, 0], 0.01)[0]).toMatchObject({
+      value: { at_m: [0.5, 1], size_m: [1, 2] },
+    });
+    expect(putBox("obstacles", [0, 0, 0], [1, 0, 0], 0.01)).toEqual([]);
+    expect(putWall("obstacles", [0, 0, 0], [0, 0, 0], 0.01)).toEqual([]);
   });
 
   test("a polygon starts as a triangle, and a new corner splits the nearest edge", () => {
-    const [triangle] = putPolygon(model, [0, 0, 0], [2, 0, 0], null, 0.01);
+    const [triangle] = putPolygon(at("obstacles", model, null), [0, 0, 0], [2, 0, 0]);
     expect(triangle).toEqual({
       op: "insert",
       key: "obstacles",
@@ -184,16 +224,16 @@ describe("chains", () => {
         ],
       },
     });
-    expect(putPolygon(model, [0, 0, 0], [0, 0, 0], null, 0.01)).toEqual([]);
+    expect(putPolygon(at("obstacles", model, null), [0, 0, 0], [0, 0, 0])).toEqual([]);
     const corner = (x: number, y: number) =>
-      putPolygon(model, [x, y, 0], [x, y, 0], ["obstacles", 3, "corners_m", 1], 0.01);
+      putPolygon(at("obstacles", model, ["obstacles", 3, "corners_m", 1]), [x, y, 0], [x, y, 0]);
     expect(corner(0.5, -0.2)).toEqual([{ op: "insert", key: "obstacles.3.corners_m", at: 1, value: [0.5, -0.2] }]);
     expect(corner(0.7, 0.7)).toMatchObject([{ at: 2 }]);
     expect(corner(-0.3, 0.5)).toMatchObject([{ at: 3 }]);
   });
 
   test("a patrol starts at the obstacle, grows with each click, and replaces a velocity", () => {
-    expect(putPatrol(model, [5, 2, 0], ["obstacles", 0], 0.01)).toEqual([
+    expect(putPatrol(at("obstacles", model, ["obstacles", 0]), [5, 2, 0])).toEqual([
       {
         op: "set",
         key: "obstacles.0.patrol_m",
@@ -214,7 +254,7 @@ describe("chains", () => {
         ],
       },
     };
-    expect(putPatrol(moving, [3, 3, 0], null, 0.01)).toEqual([
+    expect(putPatrol(at("obstacles", moving, null), [3, 3, 0])).toEqual([
       { op: "insert", key: "obstacles.patrol_m", at: null, value: [3, 3] },
     ]);
     const straight: TomlTable = {
@@ -228,24 +268,26 @@ describe("chains", () => {
         },
       ],
     };
-    expect(putPatrol(straight, [3, 3, 0], ["obstacles", 1], 0.01).map((edit) => edit.op)).toEqual([
+    expect(putPatrol(at("obstacles", straight, ["obstacles", 1]), [3, 3, 0]).map((edit) => edit.op)).toEqual([
       "remove",
       "set",
       "set",
     ]);
     expect(
       putPatrol(
-        {
-          obstacles: {
-            ends_m: [
-              [0, 0],
-              [1, 1],
-            ],
+        at(
+          "obstacles",
+          {
+            obstacles: {
+              ends_m: [
+                [0, 0],
+                [1, 1],
+              ],
+            },
           },
-        },
+          null,
+        ),
         [3, 3, 0],
-        null,
-        0.01,
       ),
     ).toEqual([]);
   });
@@ -266,7 +308,7 @@ describe("chains in space", () => {
     ],
     chains: { at_m: [0, 0, 1], tasks: [{ kind: "reach", targets_m: [[5, 6, 7]] }] },
   };
-  const items = chainItems(model, 0.01, 3);
+  const items = itemsIn("chain", model, 0.01, 3);
   const item = (key: string): (typeof items)[number] => items.find(({ path }) => path.join(".") === key)!;
 
   test("positions keep three coordinates when moved", () => {
@@ -305,7 +347,7 @@ describe("chains in space", () => {
       [-1, 1],
       [-2, 4],
     ]);
-    expect(chainItems({ obstacles: [{ at_m: [1, 2], radius_m: 1 }] }, 0.01, 3)).toEqual([]);
+    expect(itemsIn("chain", { obstacles: [{ at_m: [1, 2], radius_m: 1 }] }, 0.01, 3)).toEqual([]);
   });
 
   test("a handle moves only its own coordinate, by the pointer's distance along the axis", () => {
@@ -345,7 +387,7 @@ describe("airplanes", () => {
   };
 
   test("have starts and way-points; recorded ones have none", () => {
-    const items = airplaneItems(model, 20);
+    const items = itemsIn("airspace", model, 20);
     expect(items.map(({ path }) => path.join("."))).toEqual([
       "airplanes.0",
       "airplanes.0.way_points_m.0",
@@ -360,15 +402,37 @@ describe("airplanes", () => {
   test("fly from the start of the drag to its end, with headings counterclockwise from east", () => {
     expect(headingTo([0, 0, 0], [0, 10, 0])).toBe(90);
     expect(headingTo([0, 0, 0], [-10, 0, 0])).toBe(180);
-    expect(putAirplane([0, 0, 0], [0, 3000.4, 0], 20)).toEqual([
+    expect(putRoute("airplanes", [0, 0, 0], [0, 3000.4, 0], 20)).toEqual([
       { op: "insert", key: "airplanes", at: null, value: { at_m: [0, 0], heading_deg: 90, way_points_m: [[0, 3000]] } },
     ]);
   });
 
   test("a way-point is added to the selected airplane, else to the last that is not recorded", () => {
-    expect(putWayPoint(model, [1, 2, 0], null, 1)).toEqual([
+    expect(putWayPoint(at("airplanes", model, null, 1), [1, 2, 0])).toEqual([
       { op: "insert", key: "airplanes.0.way_points_m", at: null, value: [1, 2] },
     ]);
-    expect(putWayPoint({}, [1, 2, 0], null, 1)).toEqual([]);
+    expect(putWayPoint(at("airplanes", {}, null, 1), [1, 2, 0])).toEqual([]);
+  });
+});
+
+describe("a world that the page does not know", () => {
+  test("has points that are added, moved and removed", () => {
+    const model: TomlTable = { reeds: [{ at_m: [1.5, 2.5] }, {}] };
+    const [reed, ...others] = pointItems(model, "reeds", "reed", 0.01);
+    expect(others).toEqual([]);
+    expect([reed!.words, reed!.at_m]).toEqual(["reed 1", [1.5, 2.5, 0]]);
+    expect(reed!.move([2.004, 1, 0])).toEqual([{ op: "set", key: "reeds.0.at_m", value: [2, 1] }]);
+    expect(reed!.remove()).toEqual([{ op: "remove", key: "reeds.0" }]);
+    expect(putPoint("reeds", [3.5, 0.5, 0], 0.01)).toEqual([
+      { op: "insert", key: "reeds", at: null, value: { at_m: [3.5, 0.5] } },
+    ]);
+  });
+
+  test("has the tools that it declares, in space others than in the plane", () => {
+    const ids = (world: string, dimensions: number): string[] =>
+      toolsOf(declaredEditing(world), { dimensions } as Scene).map(({ id }) => id);
+    expect(ids("airspace", 2)).toEqual(["select", "airplane", "way-point"]);
+    expect(ids("airspace", 3)).toEqual([]);
+    expect(ids("chain", 3)).toEqual(["select"]);
   });
 });

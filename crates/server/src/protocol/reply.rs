@@ -3,6 +3,7 @@
 use super::{BodyTable, Fleet, RunEvent, Scene, SessionId, Speed};
 use serde::Serialize;
 use sidestep_kernel::view::Inspection;
+use sidestep_scenario::Editing;
 
 /// The reply to a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,6 +3,7 @@
 //! `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol` writes them.
 
 use super::*;
+use serde_json::json;
 use std::path::Path;
 use ts_rs::{Config, TS};
 
@@ -13,6 +14,10 @@ const HEADER: &str = "\
 // Written from crates/server/src/protocol by
 // `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
 ";
+
+/// The file with the editing of the worlds, for tests of the page.
+const EDITING_PATH: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../studio/tests/fake/editing.json");
 
 /// Returns the declaration of a type, with its documentation.
 fn declaration<T: TS>(config: &Config) -> String {
@@ -65,15 +70,27 @@ fn types() -> String {
     lines.lines().map(|line| line.trim_end().to_string() + "\n").collect()
 }
 
-#[test]
-fn the_page_has_the_types_of_the_protocol() {
-    let (path, expected) = (Path::new(TYPES_PATH), types());
+/// Checks that a file has this text, and writes it where that is asked for.
+fn check_written(path: &Path, expected: &str) {
     if std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "protocol") {
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
-        std::fs::write(path, &expected).expect("written");
+        std::fs::write(path, expected).expect("written");
     }
     let found = std::fs::read_to_string(path).unwrap_or_default();
     assert!(found == expected, "to write {}: see the head of {}", path.display(), file!());
+}
+
+#[test]
+fn the_page_has_the_types_of_the_protocol() {
+    check_written(Path::new(TYPES_PATH), &types());
+}
+
+#[test]
+fn tests_of_the_page_have_the_editing_of_the_worlds() {
+    let worlds = sidestep::worlds::WORLDS.iter();
+    let editing = worlds.map(|world| (world.name().to_string(), json!(world.editing()))).collect();
+    let text = serde_json::to_string_pretty(&serde_json::Value::Object(editing)).expect("JSON");
+    check_written(Path::new(EDITING_PATH), &(text + "\n"));
 }
 
 #[test]

@@ -10,6 +10,7 @@ use sidestep::worlds::WORLDS;
 use std::time::Instant;
 
 mod fleets;
+mod ponds;
 mod recordings;
 mod saving;
 mod seeks;

@@ -1,4 +1,4 @@
-/** Airplanes with their routes. */
+/** Routes: starts with headings, and way-points. */
 
 import type { Edit, Point3 } from "../../protocol";
 import { numbersOf, sectionsOf, type Json, type Path, type TomlTable } from "../keypath";
@@ -9,7 +9,7 @@ function pointOf(value: Json | undefined): Point3 | null {
   return numbers ? [numbers[0]!, numbers[1]!, 0] : null;
 }
 
-/** The way-points of an airplane, with their numbers in the text. */
+/** The way-points of a route, with their numbers in the text. */
 function routeOf(value: TomlTable): { at: Point3; index: number }[] {
   const given = Array.isArray(value["way_points_m"]) ? value["way_points_m"] : [];
   return given.flatMap((one, index) => {
@@ -23,11 +23,12 @@ export function headingTo([x0, y0]: Point3, [x1, y1]: Point3): number {
   return Math.round((Math.atan2(y1 - y0, x1 - x0) * 180) / Math.PI);
 }
 
-export function airplaneItems(model: TomlTable, m_per_px: number): Item[] {
-  return sectionsOf(model, "airplanes").flatMap(({ path, value }, i) => {
+/** All routes of a kind of sections. */
+export function routeItems(model: TomlTable, section: string, noun: string, m_per_px: number): Item[] {
+  return sectionsOf(model, section).flatMap(({ path, value }, i) => {
     const start = pointOf(value["at_m"]);
     if (!start) return [];
-    const words = typeof value["callsign"] === "string" ? value["callsign"] : `airplane ${i + 1}`;
+    const words = typeof value["callsign"] === "string" ? value["callsign"] : `${noun} ${i + 1}`;
     const round = ([x, y]: Point3): number[] => [roundTo(x, m_per_px), roundTo(y, m_per_px)];
     const route = routeOf(value);
     const own: Item = {
@@ -60,18 +61,27 @@ export function airplaneItems(model: TomlTable, m_per_px: number): Item[] {
   });
 }
 
-/** Adds an airplane that flies from one position to another. */
-export function putAirplane(from: Point3, to: Point3, m_per_px: number): Edit[] {
+/** Adds a route from one position to another. */
+export function putRoute(section: string, from: Point3, to: Point3, m_per_px: number): Edit[] {
   const round = ([x, y]: Point3): number[] => [roundTo(x, m_per_px), roundTo(y, m_per_px)];
-  return [insert(["airplanes"], { at_m: round(from), heading_deg: headingTo(from, to), way_points_m: [round(to)] })];
+  return [insert([section], { at_m: round(from), heading_deg: headingTo(from, to), way_points_m: [round(to)] })];
 }
 
-/** Adds a way-point to the selected airplane, else to the last one. */
-export function putWayPoint(model: TomlTable, at: Point3, chosen: Path | null, m_per_px: number): Edit[] {
-  const all = sectionsOf(model, "airplanes").filter(({ value }) => value["at_m"] !== undefined);
-  const section = all.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? all.at(-1);
-  if (!section) return [];
+/** The text that a tool edits, and what is selected in it. */
+export interface RouteEdit {
+  model: TomlTable;
+  /** The sections of the routes. */
+  section: string;
+  chosen: Path | null;
+  m_per_px: number;
+}
+
+/** Adds a way-point to the selected route, else to the last one. */
+export function putWayPoint({ model, section, chosen, m_per_px }: RouteEdit, at: Point3): Edit[] {
+  const all = sectionsOf(model, section).filter(({ value }) => value["at_m"] !== undefined);
+  const host = all.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? all.at(-1);
+  if (!host) return [];
   const place = [roundTo(at[0], m_per_px), roundTo(at[1], m_per_px)];
-  const path = [...section.path, "way_points_m"];
-  return [Array.isArray(section.value["way_points_m"]) ? insert(path, place) : set(path, [place])];
+  const path = [...host.path, "way_points_m"];
+  return [Array.isArray(host.value["way_points_m"]) ? insert(path, place) : set(path, [place])];
 }

@@ -1,4 +1,4 @@
-/** Obstacles, starts and targets of chains; tools that add new ones work in the plane only. */
+/** Obstacles, starts and targets; tools that add new ones work in the plane only. */
 
 import type { Edit, Point3 } from "../../protocol";
 import { isWithin, numbersOf, sectionsOf, valueAt, type Json, type Path, type TomlTable } from "../keypath";
@@ -8,7 +8,7 @@ import { box, insert, remove, removeFrom, ring, roundTo, set, type Item } from "
 const MIN_PICK_RADIUS_M = 0.02;
 
 /** The format of positions in the scenario: number of coordinates and precision. */
-interface CoordinateFormat {
+export interface CoordinateFormat {
   dimensions: 2 | 3;
   m_per_px: number;
 }
@@ -48,17 +48,20 @@ function pointItem(
   };
 }
 
-/** All items of a chain scenario with a position of their own. */
-export function chainItems(model: TomlTable, m_per_px: number, dimensions: 2 | 3 = 2): Item[] {
-  const format = { dimensions, m_per_px };
-  const obstacles = sectionsOf(model, "obstacles").flatMap(({ path, value }, i) =>
-    obstacleItems(path, value, i, format),
-  );
-  const chains = sectionsOf(model, "chains").flatMap(({ path, value }, i) => startItems(path, value, i, format));
-  return [...obstacles, ...chains];
+/** All obstacles of a kind of sections, with their corners and patrols. */
+export function obstacleItems(model: TomlTable, section: string, format: CoordinateFormat): Item[] {
+  return sectionsOf(model, section).flatMap(({ path, value }, i) => itemsOfObstacle(path, value, i, format));
 }
 
-function obstacleItems(path: Path, value: TomlTable, number: number, format: CoordinateFormat): Item[] {
+/** All starts of a kind of sections, with the targets of their tasks. */
+export function startItems(model: TomlTable, section: string, noun: string, format: CoordinateFormat): Item[] {
+  return sectionsOf(model, section).flatMap(({ path, value }, i) => {
+    const words = typeof value["name"] === "string" ? value["name"] : `${noun} ${i + 1}`;
+    return itemsOfStart(path, value, words, format);
+  });
+}
+
+function itemsOfObstacle(path: Path, value: TomlTable, number: number, format: CoordinateFormat): Item[] {
   const words = `obstacle ${number + 1}`;
   const removal = (): Edit[] => [remove(path)];
   const patrol = pointsOf(value["patrol_m"], format).map((at, i) =>
@@ -168,8 +171,7 @@ function cornerItems(
   );
 }
 
-function startItems(path: Path, value: TomlTable, number: number, format: CoordinateFormat): Item[] {
-  const words = typeof value["name"] === "string" ? value["name"] : `chain ${number + 1}`;
+function itemsOfStart(path: Path, value: TomlTable, words: string, format: CoordinateFormat): Item[] {
   const at = pointOf(value["at_m"], format);
   const start = at
     ? [pointItem([...path, "at_m"], `start of ${words}`, "start", at, format, () => [remove(path)])]
@@ -188,9 +190,9 @@ function startItems(path: Path, value: TomlTable, number: number, format: Coordi
 }
 
 /** Adds a ball around a position. */
-export function putBall(at: Point3, radius_m: number, m_per_px: number): Edit[] {
+export function putBall(section: string, at: Point3, radius_m: number, m_per_px: number): Edit[] {
   return [
-    insert(["obstacles"], {
+    insert([section], {
       at_m: [roundTo(at[0], m_per_px), roundTo(at[1], m_per_px)],
       radius_m: roundTo(radius_m, m_per_px),
     }),
@@ -198,23 +200,36 @@ export function putBall(at: Point3, radius_m: number, m_per_px: number): Edit[] 
 }
 
 /** Adds a box between two corners. */
-export function putBox(a: Point3, b: Point3, m_per_px: number): Edit[] {
+export function putBox(section: string, a: Point3, b: Point3, m_per_px: number): Edit[] {
   const round = (value: number): number => roundTo(value, m_per_px);
   const size_m = [round(Math.abs(b[0] - a[0])), round(Math.abs(b[1] - a[1]))];
   if (size_m.some((side) => side <= 0)) return [];
-  return [insert(["obstacles"], { at_m: [round((a[0] + b[0]) / 2), round((a[1] + b[1]) / 2)], size_m })];
+  return [insert([section], { at_m: [round((a[0] + b[0]) / 2), round((a[1] + b[1]) / 2)], size_m })];
 }
 
 /** Adds a wall from one position to another. */
-export function putWall(a: Point3, b: Point3, m_per_px: number): Edit[] {
+export function putWall(section: string, a: Point3, b: Point3, m_per_px: number): Edit[] {
   const round = ([x, y]: Point3): number[] => [roundTo(x, m_per_px), roundTo(y, m_per_px)];
   if (Math.hypot(b[0] - a[0], b[1] - a[1]) < m_per_px) return [];
-  return [insert(["obstacles"], { ends_m: [round(a), round(b)], radius_m: 0.1 })];
+  return [insert([section], { ends_m: [round(a), round(b)], radius_m: 0.1 })];
+}
+
+/** The text that a tool edits, and what is selected in it. */
+export interface ObstacleEdit {
+  model: TomlTable;
+  /** The sections of the obstacles. */
+  section: string;
+  chosen: Path | null;
+  m_per_px: number;
 }
 
 /** The obstacle that a tool edits: the selected one, or that of the selected point. */
-function chosenObstacle(model: TomlTable, chosen: Path | null): { path: Path; value: TomlTable } | undefined {
-  return chosen ? sectionsOf(model, "obstacles").find(({ path }) => isWithin(chosen, path)) : undefined;
+function chosenObstacle(
+  model: TomlTable,
+  section: string,
+  chosen: Path | null,
+): { path: Path; value: TomlTable } | undefined {
+  return chosen ? sectionsOf(model, section).find(({ path }) => isWithin(chosen, path)) : undefined;
 }
 
 /** The distance of a position from a segment of an outline. */
@@ -235,9 +250,9 @@ function nearestEdge(at: Point3, corners: Point3[]): number {
 }
 
 /** Adds a corner to the selected polygon, in its nearest edge; else a triangle along the drag. */
-export function putPolygon(model: TomlTable, a: Point3, b: Point3, chosen: Path | null, m_per_px: number): Edit[] {
+export function putPolygon({ model, section, chosen, m_per_px }: ObstacleEdit, a: Point3, b: Point3): Edit[] {
   const round = ([x, y]: readonly number[]): number[] => [roundTo(x!, m_per_px), roundTo(y!, m_per_px)];
-  const host = chosenObstacle(model, chosen);
+  const host = chosenObstacle(model, section, chosen);
   const corners = pointsOf(host?.value["corners_m"], { dimensions: 2, m_per_px });
   if (host && corners.length >= 3) {
     return [{ ...insert([...host.path, "corners_m"], round(b)), at: nearestEdge(b, corners) } as Edit];
@@ -246,16 +261,16 @@ export function putPolygon(model: TomlTable, a: Point3, b: Point3, chosen: Path 
   const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
   // The third corner lies to the left, so that all sides are about equally long.
   const third = [a[0] + 0.5 * dx - 0.8 * dy, a[1] + 0.5 * dy + 0.8 * dx];
-  return [insert(["obstacles"], { corners_m: [round(a), round(b), round(third)] })];
+  return [insert([section], { corners_m: [round(a), round(b), round(third)] })];
 }
 
 /** Adds a way-point to the selected obstacle's patrol; the first one makes it move there and back. */
-export function putPatrol(model: TomlTable, to: Point3, chosen: Path | null, m_per_px: number): Edit[] {
+export function putPatrol({ model, section, chosen, m_per_px }: ObstacleEdit, to: Point3): Edit[] {
   const place = [roundTo(to[0], m_per_px), roundTo(to[1], m_per_px)];
   const canPatrol = ({ value }: { value: TomlTable }): boolean =>
     value["at_m"] !== undefined && value["corners_m"] === undefined;
-  const own = chosenObstacle(model, chosen);
-  const host = own && canPatrol(own) ? own : sectionsOf(model, "obstacles").filter(canPatrol).at(-1);
+  const own = chosenObstacle(model, section, chosen);
+  const host = own && canPatrol(own) ? own : sectionsOf(model, section).filter(canPatrol).at(-1);
   const from = host ? numbersOf(host.value["at_m"], 2) : null;
   if (!host || !from) return [];
   if (Array.isArray(host.value["patrol_m"])) return [insert([...host.path, "patrol_m"], place)];

@@ -1,4 +1,4 @@
-/** Robots, people, doors and way-points on the boxes of a floor. */
+/** Bodies, doors and way-points on the boxes of a floor. */
 
 import type { Edit, Point3 } from "../../protocol";
 import { cellOf, cornerPosition, type AsciiMap, type GridPlacement } from "../ascii-map";
@@ -6,23 +6,32 @@ import { rectangleCells, type Cell, type Rect } from "../cells";
 import { numbersOf, sectionsOf, valueAt, type Path, type TomlTable } from "../keypath";
 import { insert, remove, removeFrom, set, type Item } from "./item";
 
-/** Sides in boxes of the bodies of a section. */
-function sizeOf(key: string, section: TomlTable): [number, number] {
+/** Sides in boxes of the bodies of a section: one number for a square. */
+function sizeOf(section: TomlTable): [number, number] {
   const { size } = section;
-  if (key === "robots") return typeof size === "number" ? [size, size] : [1, 1];
+  if (typeof size === "number") return [size, size];
   const sides = numbersOf(size, 2);
   return sides ? [sides[0]!, sides[1]!] : [1, 1];
 }
 
-const SINGULAR: Record<string, string> = { robots: "robot", people: "person", doors: "door" };
+/** Bodies with a position of their own. */
+export interface BodySource {
+  /** Their sections. */
+  section: string;
+  /** The noun for one of them. */
+  noun: string;
+  /** Whether they have headings. */
+  turns: boolean;
+}
 
-/** All items of a robots scenario with a position of their own. */
-export function robotItems(model: TomlTable, ground: GridPlacement): Item[] {
-  const bodies = ["robots", "people", "doors"].flatMap((key) =>
-    sectionsOf(model, key).flatMap(({ path, value }) => bodyItems(key, path, value, ground)),
-  );
-  const goals = sectionsOf(model, "robots").flatMap(({ path, value }) => goalItems(path, value, ground));
-  return [...goals, ...bodies];
+/** All bodies of a kind of sections. */
+export function bodyItems(model: TomlTable, source: BodySource, ground: GridPlacement): Item[] {
+  return sectionsOf(model, source.section).flatMap(({ path, value }) => itemsOfSection(source, path, value, ground));
+}
+
+/** All way-points and areas of a kind of sections. */
+export function goalItems(model: TomlTable, section: string, ground: GridPlacement): Item[] {
+  return sectionsOf(model, section).flatMap(({ path, value }) => goalsOfSection(path, value, ground));
 }
 
 function outlineOf(ground: GridPlacement, { column, row, width, height }: Rect): Point3[] {
@@ -37,8 +46,8 @@ function anchor(ground: GridPlacement, [x, y]: Point3, [width, height]: [number,
   return cellOf(ground, x - c * dx + s * dy + 1e-9, y - s * dx - c * dy + 1e-9);
 }
 
-function bodyItems(key: string, section: Path, value: TomlTable, ground: GridPlacement): Item[] {
-  const size = sizeOf(key, value);
+function itemsOfSection({ noun, turns }: BodySource, section: Path, value: TomlTable, ground: GridPlacement): Item[] {
+  const size = sizeOf(value);
   const name = typeof value["name"] === "string" && value["name"] !== "" ? ` (${value["name"]})` : "";
   const list = Array.isArray(value["at"]) ? value["at"] : [];
   return list.flatMap((given, i): Item[] => {
@@ -50,23 +59,25 @@ function bodyItems(key: string, section: Path, value: TomlTable, ground: GridPla
     return [
       {
         path,
-        words: `${SINGULAR[key]}${name} at column ${column}, row ${row}`,
+        words: `${noun}${name} at column ${column}, row ${row}`,
         kind: "body",
         outline_m: outlineOf(ground, rect),
         isClosed: true,
         at_m: cornerPosition(ground, column + size[0] / 2, row + size[1] / 2),
         move: (to) => [set(path, [...anchor(ground, to, size), ...(heading === undefined ? [] : [heading])])],
         remove: () => removeFrom(section, "at", i, value),
-        ...(key === "robots" ? { turn: () => [set(path, [column, row, ((heading ?? -1) + 1) % 4])] } : {}),
+        ...(turns ? { turn: () => [set(path, [column, row, ((heading ?? -1) + 1) % 4])] } : {}),
       },
     ];
   });
 }
 
 /** Goals, ends of shuttles, and regions for random positions. */
-function goalItems(section: Path, value: TomlTable, ground: GridPlacement): Item[] {
+function goalsOfSection(section: Path, value: TomlTable, ground: GridPlacement): Item[] {
   const name =
-    typeof value["name"] === "string" && value["name"] !== "" ? value["name"] : `robots ${Number(section[1] ?? 0) + 1}`;
+    typeof value["name"] === "string" && value["name"] !== ""
+      ? value["name"]
+      : `${section[0]} ${Number(section[1] ?? 0) + 1}`;
   const behaviour = [...section, "behaviour"];
   const goals = valueAt(value, ["behaviour", "goals"]);
   const points = (Array.isArray(goals) ? goals : []).flatMap((given, i): Item[] => {
@@ -113,47 +124,53 @@ function areaItem(section: Path, below: string[], value: TomlTable, name: string
   ];
 }
 
-const NEW_SECTIONS: Record<string, TomlTable> = {
-  robots: { size: 2, sensors: ["sonar-ring"], effector: "nomad", behaviour: { kind: "wander" } },
-  people: { size: [2, 2], period: 3 },
-  doors: { periodic: { open: 60, closed: 20 } },
-};
-
 /** The section that a new body is added to: the selected one, else the last one with explicit positions. */
-export function targetSection(
-  model: TomlTable,
-  key: string,
-  chosen: Path | null,
-): { path: Path; value: TomlTable } | null {
+function targetSection(model: TomlTable, key: string, chosen: Path | null): { path: Path; value: TomlTable } | null {
   const hosts = sectionsOf(model, key).filter(
     ({ value }) => Array.isArray(value["at"]) && value["count"] === undefined,
   );
   return hosts.find(({ path }) => chosen && path.every((part, i) => part === chosen[i])) ?? hosts.at(-1) ?? null;
 }
 
+/** A kind of sections, and the other keys of a new one. */
+export interface SectionTemplate {
+  section: string;
+  template: TomlTable;
+}
+
 /** The edits that add a body with its lower-left box at a cell. */
-export function putBody(model: TomlTable, key: "robots" | "people", cell: Cell, chosen: Path | null): Edit[] {
-  const host = targetSection(model, key, chosen);
+export function putBody(
+  model: TomlTable,
+  { section, template }: SectionTemplate,
+  cell: Cell,
+  chosen: Path | null,
+): Edit[] {
+  const host = targetSection(model, section, chosen);
   if (host) return [insert([...host.path, "at"], [...cell])];
-  return [insert([key], { ...NEW_SECTIONS[key]!, at: [[...cell]] })];
+  return [insert([section], { ...template, at: [[...cell]] })];
 }
 
 /** The edits that add a door in a rectangle, and clear the walls there. */
-export function putDoor(model: TomlTable, map: AsciiMap | null, { column, row, width, height }: Rect): Edit[] {
+export function putDoor(
+  model: TomlTable,
+  { section, template }: SectionTemplate,
+  map: AsciiMap | null,
+  { column, row, width, height }: Rect,
+): Edit[] {
   const clearing = map?.paint(rectangleCells([column, row], [column + width - 1, row + height - 1], true), ".");
-  const sameSize = sectionsOf(model, "doors").find(({ value }) => {
-    const [w, h] = sizeOf("doors", value);
+  const sameSize = sectionsOf(model, section).find(({ value }) => {
+    const [w, h] = sizeOf(value);
     return Array.isArray(value["at"]) && w === width && h === height;
   });
   const door = sameSize
     ? insert([...sameSize.path, "at"], [column, row])
-    : insert(["doors"], { at: [[column, row]], size: [width, height], ...NEW_SECTIONS["doors"]! });
+    : insert([section], { at: [[column, row]], size: [width, height], ...template });
   return clearing ? [clearing, door] : [door];
 }
 
-/** The edits that add a way-point to the selected robots, else to the first. */
-export function putGoal(model: TomlTable, cell: Cell, chosen: Path | null): Edit[] {
-  const all = sectionsOf(model, "robots");
+/** The edits that add a way-point to the selected bodies, else to the first. */
+export function putGoal(model: TomlTable, section: string, cell: Cell, chosen: Path | null): Edit[] {
+  const all = sectionsOf(model, section);
   const { path, value } = all.find((one) => chosen && one.path.every((part, i) => part === chosen[i])) ?? all[0] ?? {};
   if (!path || !value) return [];
   const goals = valueAt(value, ["behaviour", "goals"]);
@@ -168,7 +185,7 @@ export function lowerLeftAround([column, row]: Cell, side: number): Cell {
 }
 
 /** Side of the bodies that the tool would add. */
-export function robotSide(model: TomlTable, key: "robots" | "people", chosen: Path | null): number {
-  const host = targetSection(model, key, chosen);
-  return host ? sizeOf(key, host.value)[0] : 2;
+export function sideOfNewBody(model: TomlTable, section: string, chosen: Path | null): number {
+  const host = targetSection(model, section, chosen);
+  return host ? sizeOf(host.value)[0] : 2;
 }
