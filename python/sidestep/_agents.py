@@ -50,7 +50,8 @@ class _Members:
         self._members = members
 
     def __call__(self, observed: dict[str, NDArray[Any]], state: Any) -> Any:
-        names, rows = tuple(observed), zip(*observed.values(), strict=True)
+        names = tuple(observed)
+        rows = zip(*observed.values(), strict=True)
         decisions = [
             member.decide(dict(zip(names, row, strict=True))) for member, row in zip(self._members, rows, strict=True)
         ]

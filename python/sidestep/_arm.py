@@ -72,7 +72,7 @@ def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Fk
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
     values = arm.posture() if joints is None else joints
-    return FkResult(**arm.forward(_rows("joints", values)))
+    return arm.forward(_rows("joints", values))
 
 
 def ik(
@@ -153,7 +153,7 @@ def ik(
         "ignore_limits": ignore_limits,
         "workers": checked_int("workers", workers, 1, 1024),
     }
-    return IkResult(**arm.inverse(np.ascontiguousarray(poses), starts, options))
+    return arm.inverse(np.ascontiguousarray(poses), starts, options)
 
 
 def _rows(name: str, values: ArrayLike) -> _Floats:

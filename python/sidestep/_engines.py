@@ -16,33 +16,47 @@ from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ._errors import EngineError, SidestepError, input_error
 from ._native import run_task
 
 #: Engines that run the trials of a sweep.
 Engine: TypeAlias = Literal["local", "ray"] | Executor | Callable[[], Executor]
-#: Number, variant, replicate and seed of a trial.
-Trial: TypeAlias = tuple[int, int, int, int]
 #: The text of a scenario, and its files by name.
 Bundle: TypeAlias = tuple[str, list[tuple[str, bytes]]]
 #: Requests scenarios by the number of their variant, and yields outcomes.
 Steps: TypeAlias = Generator[int | list[str], Bundle | None, None]
 
-#: Target duration of a task in seconds.
+#: Target duration of a task in seconds: long beside the milliseconds that sending one takes on a cluster, and short
+#: enough that a lost worker costs little.
 TASK_S = 1.0
-#: Maximum number of trials of a task.
+#: Maximum number of trials of a task, so that the outcomes of very short trials are stored from time to time.
 MAX_TRIALS = 1000
-#: Times that a task, or a pool, may fail without any outcome in between.
+#: Times that a task, or a pool, may fail without any outcome in between: a worker that is lost once is normal on a
+#: cluster, and a trial that always ends its worker must not go on forever.
 MAX_ATTEMPTS = 3
-#: A task is slow when it takes this many times as long as expected, and at least `MIN_SLOW_S`.
+#: A task is slow when it takes this many times as long as expected, and at least `MIN_SLOW_S`: durations of trials
+#: differ, and those of short tasks are mostly the time of sending.
 SLOW_FACTOR = 3.0
 MIN_SLOW_S = 2.0
 #: Seconds between two checks for slow tasks.
 POLL_INTERVAL_S = 0.2
-#: Maximum number of cached scenarios.
+#: Maximum number of cached scenarios: each holds all its files.
 MAX_CACHED_SCENARIOS = 256
+
+
+class Trial(NamedTuple):
+    """A run of a sweep."""
+
+    #: Its number in the plan.
+    id: int
+    #: Number of its variant.
+    variant: int
+    #: Number of the run among those of its variant.
+    replicate: int
+    #: The seed of its scenario.
+    seed: int
 
 
 @dataclass
@@ -118,7 +132,7 @@ class TaskPool:
 
     def _send(self, build: str, task: _Task) -> Steps:
         scenarios = []
-        for variant in sorted({trial[1] for trial in task.trials}):
+        for variant in sorted({trial.variant for trial in task.trials}):
             if variant not in self._scenarios:
                 bundle = yield variant
                 assert bundle is not None

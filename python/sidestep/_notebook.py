@@ -20,8 +20,10 @@ MAX_ROWS = 6
 MAX_MEASUREMENTS = 12
 #: Metrics shown of a sweep.
 MAX_METRICS = 8
-#: Width of the drawing of an interval, and its margin, in pixels.
-WIDTH_PX, MARGIN_PX = 240.0, 12.0
+#: Width of the drawing of an interval in pixels.
+WIDTH_PX = 240.0
+#: Its margin in pixels: the circle of the mean and the text below 0 stay inside.
+MARGIN_PX = 12.0
 
 
 def rows(heads: Iterable[str], cells: Iterable[Iterable[Any]], caption: str = "") -> str:
@@ -111,7 +113,8 @@ def comparison(it: Mapping[str, Any]) -> str:
 
 
 def _estimate(value: Mapping[str, Any]) -> str:
-    middle, interval = value.get("mean", value.get("share")), value.get("interval")
+    middle = value.get("mean", value.get("share"))
+    interval = value.get("interval")
     if middle is None or interval is None:
         return _text(middle)
     low, high = interval
@@ -129,7 +132,9 @@ def paired(it: Paired) -> str:
 
 
 def _interval(low: float, middle: float, high: float) -> str:
-    start, end = min(low, 0.0), max(high, 0.0)
+    # The drawing always contains 0, because the question is whether the interval does.
+    start = min(low, 0.0)
+    end = max(high, 0.0)
     scale = (WIDTH_PX - 2 * MARGIN_PX) / ((end - start) or 1.0)
     zero, left, right, dot = (MARGIN_PX + (at - start) * scale for at in (0.0, low, high, middle))
     return (

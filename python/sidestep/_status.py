@@ -72,4 +72,4 @@ def sweep_status(folder: str | os.PathLike[str]) -> SweepStatus:
     >>> status.is_complete, status.runs, status.total, status.failed
     (True, 3, 3, 0)
     """
-    return SweepStatus(**_native.sweep_status(folder))
+    return _native.sweep_status(folder)

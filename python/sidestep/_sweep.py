@@ -94,7 +94,7 @@ def sweep(
 ) -> Sweep:
     """Runs many variants of a scenario, each with many seeds, as ``sidestep sweep`` does, with the same bits.
 
-    ``sweep`` is a sweep file, a dict of the keys of one, or a scenario of any sort. ``vary`` has a list of values for each
+    ``sweep`` is a sweep file, a dict of the keys of one, or a scenario in any form. ``vary`` has a list of values for each
     key, and every combination is a variant; ``set`` and ``cycles`` apply to all variants. Each is run ``replicate``
     times (10), or ``until`` the 95 % intervals of means are narrow: ``"ci=0.05"``, a fraction of the mean, or ``"abs=2.5"``,
     in the unit of the metric, and at most ``max_runs`` (1000) times. Replicate `k` of every variant has the seed ``seed + k``.
@@ -149,9 +149,9 @@ def sweep(
         raise input_error("record", "there is no folder to record runs to", "give one as `out`")
     pool = _engines.task_pool(engine, workers)
     if pool is None:
-        return Sweep(*run_sweep(sweep, options, out, workers or 0, None))
+        return run_sweep(sweep, options, out, workers or 0, None)
     try:
-        return Sweep(*run_sweep(sweep, options, out, pool.at_once, pool.run))
+        return run_sweep(sweep, options, out, pool.at_once, pool.run)
     finally:
         pool.close()
 

@@ -100,14 +100,14 @@ def minimize(
             raise input_error("objective", "an objective needs numbers of strategies and no tables", "give strategies=")
         if options["estimator"] == "exact":
             raise input_error("estimator", "an objective has no closed form", 'give estimator="sampled"')
-        return MinimizeResult(**_native.minimize_objective(list(strategies), objective, options))
+        return _native.minimize_objective(list(strategies), objective, options)
     if own is None or strategies is not None:
         raise input_error(
             "own", "tables need each player's own costs", "give own=, zeros if there are none; or an objective"
         )
     costs = [_table(f"own[{k}]", table, 1) for k, table in enumerate(own)]
     both = [(*ab, _table(f"pairs[{ab}]", table, 2)) for ab, table in (pairs or {}).items()]
-    return MinimizeResult(**_native.minimize_pairs(costs, both, options))
+    return _native.minimize_pairs(costs, both, options)
 
 
 def _table(name: str, values: ArrayLike, dimensions: int) -> NDArray[np.float64]:

@@ -57,8 +57,7 @@ def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learne
     >>> "[effectors.mine]" in learned.profile("mine")
     True
     """
-    text, run = _table(moves, MOTIONS)
-    return _native.learn_effector(text, run, alpha, hold_out)
+    return _native.learn_effector(_options(moves, MOTIONS, alpha, hold_out))
 
 
 def sensor(
@@ -90,7 +89,6 @@ def sensor(
     >>> one["row"], one["column"], one["count"], one["of"]
     ('nothing', 'nothing', 1.0, 1.0)
     """
-    text, run = _table(readings, READINGS)
     shape = {
         "edges_m": None if edges_m is None else [float(edge) for edge in edges_m],
         "classes": list(classes),
@@ -98,13 +96,21 @@ def sensor(
         "range_m": range_m,
         "sensor": name,
     }
-    return _native.learn_sensor(text, run, shape, alpha, hold_out)
+    return _native.learn_sensor(_options(readings, READINGS, alpha, hold_out), shape)
 
 
-def _table(columns: Columns, known: Sequence[str]) -> tuple[str | None, str | None]:
-    """Returns a table as CSV text, or the folder that contains it."""
+def _options(columns: Columns, known: Sequence[str], alpha: float, hold_out: int) -> dict[str, Any]:
+    """Returns a table, as CSV text or as the folder that contains it, and how to learn from it."""
+    options: dict[str, Any] = {"text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out}
     if isinstance(columns, str | os.PathLike):
-        return None, os.fspath(columns)
+        options["run"] = os.fspath(columns)
+    else:
+        options["text"] = _csv(columns, known)
+    return options
+
+
+def _csv(columns: Mapping[str, Any] | Any, known: Sequence[str]) -> str:
+    """Returns the columns that are known as CSV text."""
     names = [name for name in known if _has(columns, name)]
     if not names:
         raise input_error("columns", f"there is none of {', '.join(known)}", "give a dict of columns or a data frame")
@@ -117,7 +123,7 @@ def _table(columns: Columns, known: Sequence[str]) -> tuple[str | None, str | No
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
     writer.writerows([_word(cell) for cell in row] for row in zip(*lists, strict=True))
-    return text.getvalue(), None
+    return text.getvalue()
 
 
 def _has(columns: Any, name: str) -> bool:

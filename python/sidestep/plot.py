@@ -118,7 +118,8 @@ def _of_boxes(table: Table, columns: dict[str, Any], cycle: NDArray[np.int64], k
         if ids := about.get(f"ids_{kind}"):
             first, last = map(int, ids.split("-"))
             selected |= (first <= body) & (body <= last)
-    box_m, yaw_rad = float(about["box_m"]), float(about["yaw_rad"])
+    box_m = float(about["box_m"])
+    yaw_rad = float(about["yaw_rad"])
     east_m, north_m = (np.asarray(table[axis], dtype=np.float64) * box_m for axis in columns["axes"])
     x_m = float(about["origin_x_m"]) + np.cos(yaw_rad) * east_m - np.sin(yaw_rad) * north_m
     y_m = float(about["origin_y_m"]) + np.sin(yaw_rad) * east_m + np.cos(yaw_rad) * north_m

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,10 +147,6 @@ def _values(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return np.ascontiguousarray(array)
 
 
-def _interval(ends: tuple[float, float] | None) -> Interval | None:
-    return None if ends is None else Interval(*ends)
-
-
 def mean(values: ArrayLike) -> Mean:
     """Returns the mean of values of the shape (n,), with its intervals.
 
@@ -162,8 +158,7 @@ def mean(values: ArrayLike) -> Mean:
     >>> stats.mean([2, 2, 2]).interval
     Interval(low=2.0, high=2.0)
     """
-    center, sd, student, bootstrap, n, missing = _native.stats_mean(_values("values", values))
-    return Mean(center, sd, _interval(student), _interval(bootstrap), n, missing)
+    return _native.stats_mean(_values("values", values))
 
 
 def proportion(successes: int, n: int) -> Share:
@@ -177,8 +172,7 @@ def proportion(successes: int, n: int) -> Share:
     """
     if successes < 0 or n < 0:
         raise input_error("proportion", f"{successes} of {n} is impossible", "give numbers from 0 on")
-    wilson, exact = _native.stats_share(successes, n)
-    return Share(successes / n if n else None, Interval(*wilson), Interval(*exact))
+    return _native.stats_share(successes, n)
 
 
 def share(successes: int, n: int) -> Share:
@@ -200,8 +194,7 @@ def quantile(values: ArrayLike, q: float) -> Quantile:
     """
     if not 0.0 < q < 1.0:
         raise input_error("q", f"is {q}", "give a number between 0 and 1")
-    value, interval, coverage = _native.stats_quantile(_values("values", values), q)
-    return Quantile(value, _interval(interval), coverage)
+    return _native.stats_quantile(_values("values", values), q)
 
 
 def paired(a: ArrayLike, b: ArrayLike) -> Paired:
@@ -217,9 +210,7 @@ def paired(a: ArrayLike, b: ArrayLike) -> Paired:
     >>> pairs.difference, pairs.interval.high < 0
     (-2.0, True)
     """
-    counts, intervals, p_values, signs, ratio = _native.stats_paired(_values("a", a), _values("b", b))
-    student, bootstrap = map(_interval, intervals)
-    return Paired(*counts, student, bootstrap, *p_values, *signs, ratio[0], _interval(ratio[1]))
+    return _native.stats_paired(_values("a", a), _values("b", b))
 
 
 def holm(p_values: Sequence[float | None]) -> list[float | None]:
@@ -239,13 +230,13 @@ def correlation(a: ArrayLike, b: ArrayLike) -> Correlation | None:
     >>> stats.correlation([1, 2, 3, 4], [1, 4, 9, 16]).value
     1.0
     """
-    first, second = _values("a", a), _values("b", b)
+    first = _values("a", a)
+    second = _values("b", b)
     if first.shape != second.shape:
         raise input_error(
             "correlation", f"{len(first)} and {len(second)} values are not pairs", "give two values of each case"
         )
-    result: Any = _native.stats_correlation(first, second)
-    return None if result is None else Correlation(result[0], _interval(result[1]), result[2])
+    return _native.stats_correlation(first, second)
 
 
 @dataclass(frozen=True)
@@ -283,6 +274,4 @@ class StoppingRule:
         >>> stats.StoppingRule(1.0, relative=False, max_runs=20).next([1.0, 9.0] * 5)
         StopDecision(runs=20, reason=None)
         """
-        values = [_values("columns", column) for column in columns]
-        runs = (self.min_runs, self.max_runs)
-        return StopDecision(*_native.stats_next(self.half_width, self.relative, runs, values))
+        return _native.stats_next(self, [_values("columns", column) for column in columns])

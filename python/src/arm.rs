@@ -1,11 +1,13 @@
 //! Arms of robot models: forward and inverse kinematics of many postures and targets at once.
 
+use crate::choice::choose;
 use crate::error::{self, argument_error};
 use crate::json::to_list;
+use crate::result::{Fields, ResultClass};
 use crate::watch::run_polling;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyList;
 use sidestep::arms::ik::Engine;
 use sidestep::arms::kinematics::{
     ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
@@ -39,6 +41,43 @@ fn option_error(e: &InputError) -> PyErr {
     }
 }
 
+/// Words for the method that finds the joint values.
+const ENGINES: [(&str, Engine); 3] =
+    [("auto", Engine::Auto), ("chain", Engine::Chain), ("dls", Engine::Dls)];
+/// Words for the collision model of an arm.
+const BODIES: [(&str, CollisionModel); 3] = [
+    ("rods", CollisionModel::Rods),
+    ("shapes", CollisionModel::Shapes),
+    ("own", CollisionModel::OwnShapes),
+];
+/// Words for the axes of a target that may be ignored: of its position, and of its orientation.
+const AXES: [(&str, Axis); 6] = [
+    ("x", Axis::Along(0)),
+    ("y", Axis::Along(1)),
+    ("z", Axis::Along(2)),
+    ("rx", Axis::About(0)),
+    ("ry", Axis::About(1)),
+    ("rz", Axis::About(2)),
+];
+
+/// The parts of an arm that must not touch obstacles.
+#[derive(Clone, Copy, PartialEq)]
+enum CollisionModel {
+    /// The rods between its connectors.
+    Rods,
+    /// The collision shapes of its links.
+    Shapes,
+    /// These shapes, which must not touch each other either.
+    OwnShapes,
+}
+
+/// An axis of a target, by number from 0.
+#[derive(Clone, Copy)]
+enum Axis {
+    Along(usize),
+    About(usize),
+}
+
 /// Returns the rows of an array of this width.
 fn matrix_rows(
     name: &str,
@@ -55,13 +94,11 @@ fn matrix_rows(
         ));
     }
     let rows: Vec<Vec<f64>> = array.rows().into_iter().map(|row| row.to_vec()).collect();
-    match rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
-        None => Ok(rows),
-        Some(k) => {
-            let cause = format!("row {k} is {:?}", rows[k]);
-            Err(argument_error(name, cause, "give finite numbers"))
-        }
+    if let Some(k) = rows.iter().position(|row| !row.iter().all(|x| x.is_finite())) {
+        let cause = format!("row {k} is {:?}", rows[k]);
+        return Err(argument_error(name, cause, "give finite numbers"));
     }
+    Ok(rows)
 }
 
 fn row_vector(row: &[f64]) -> Vector {
@@ -130,10 +167,14 @@ impl Arm {
     /// Lowest and highest values, of the shape (joints, 2); infinite where a joint has no limits.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let free = [f64::NEG_INFINITY, f64::INFINITY];
-        let of = |limits: &sidestep::import::urdf::Limits| [limits.lower, limits.upper];
         let variables = &self.0.chain.variables;
-        let flat = variables.iter().flat_map(|v| v.limits.as_ref().map_or(free, of)).collect();
+        let mut flat = Vec::with_capacity(2 * variables.len());
+        for variable in variables {
+            match &variable.limits {
+                Some(limits) => flat.extend([limits.lower, limits.upper]),
+                None => flat.extend([f64::NEG_INFINITY, f64::INFINITY]),
+            }
+        }
         to_array(py, flat, vec![variables.len(), 2])
     }
 
@@ -164,26 +205,28 @@ impl Arm {
         &self,
         py: Python<'py>,
         joints: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let chain = &self.0.chain;
         let rows = matrix_rows("joints", &joints, chain.variables.len())?;
         let skeleton = chain.skeleton();
         let frames: Vec<Frames> = py.detach(|| rows.iter().map(|row| chain.forward(row)).collect());
         let n = rows.len();
-        let dict = PyDict::new(py);
-        let flat = |of: &dyn Fn(&Frames) -> Vec<f64>| frames.iter().flat_map(of).collect();
-        dict.set_item("tip", to_array(py, flat(&|f| f.tip.origin_m.to_vec()), vec![n, 3])?)?;
-        let rotation = flat(&|f| f.tip.rotation.concat());
-        dict.set_item("rotation", to_array(py, rotation, vec![n, 3, 3])?)?;
-        let quaternion = flat(&|f| f.tip.quaternion().to_vec());
-        dict.set_item("quaternion", to_array(py, quaternion, vec![n, 4])?)?;
-        let connectors = flat(&|f| chain.connectors(&skeleton, f).concat());
+        let tip = frames.iter().flat_map(|f| f.tip.origin_m).collect();
+        let rotation = frames.iter().flat_map(|f| f.tip.rotation.concat()).collect();
+        let quaternion = frames.iter().flat_map(|f| f.tip.quaternion()).collect();
+        let connectors =
+            frames.iter().flat_map(|f| chain.connectors(&skeleton, f).concat()).collect();
+        // Counted in a posture that always exists, because there may be no rows.
         let count = chain.connectors(&skeleton, &chain.forward(&chain.rest_values())).len();
-        dict.set_item("connectors", to_array(py, connectors, vec![n, count, 3])?)?;
-        let is_inside: Vec<bool> =
+        let inside_limits: Vec<bool> =
             rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
-        dict.set_item("inside_limits", is_inside.to_pyarray(py))?;
-        Ok(dict)
+        Fields::new(py)
+            .with("tip", to_array(py, tip, vec![n, 3])?)?
+            .with("rotation", to_array(py, rotation, vec![n, 3, 3])?)?
+            .with("quaternion", to_array(py, quaternion, vec![n, 4])?)?
+            .with("connectors", to_array(py, connectors, vec![n, count, 3])?)?
+            .with("inside_limits", inside_limits.to_pyarray(py))?
+            .build(ResultClass("sidestep._arm", "FkResult"))
     }
 
     /// Inverse kinematics: the native part of `sidestep.ik`. Targets of the shape (n, 3), (n, 6) with roll, pitch and
@@ -194,7 +237,7 @@ impl Arm {
         targets: PyReadonlyArray2<'py, f64>,
         start: PyReadonlyArray2<'py, f64>,
         options: IkOptions,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let chain = &self.0.chain;
         let targets = matrix_rows("targets", &targets, targets.as_array().ncols())?;
         let start = matrix_rows("start", &start, chain.variables.len())?;
@@ -208,15 +251,19 @@ impl Arm {
         let numbers: Vec<usize> = (0..goals.len()).collect();
         let solved = run_polling(py, |watcher| {
             let mut solved: Vec<(usize, IkResult)> = Vec::with_capacity(goals.len());
-            let solve = |k: &usize| {
-                let start = &start[if start.len() == 1 { 0 } else { *k }];
-                let result = || chain.solve(&goals[*k], start).map(|result| (*k, result));
-                watcher.should_continue().then(result)
-            };
-            run_trials(&numbers, options.workers.max(1), solve, &mut |result| {
-                solved.push(result);
-                Ok::<_, InputError>(())
-            })?;
+            run_trials(
+                &numbers,
+                options.workers.max(1),
+                |&k| {
+                    let start = &start[if start.len() == 1 { 0 } else { k }];
+                    let solve = || chain.solve(&goals[k], start).map(|result| (k, result));
+                    watcher.should_continue().then(solve)
+                },
+                &mut |result| {
+                    solved.push(result);
+                    Ok::<_, InputError>(())
+                },
+            )?;
             // Results arrive in the order of their completion, which depends on the workers.
             solved.sort_by_key(|(k, _)| *k);
             Ok(solved.into_iter().map(|(_, result)| result).collect::<Vec<_>>())
@@ -252,19 +299,11 @@ struct IkOptions {
 impl IkOptions {
     /// Returns the part of the goal that all targets share, and remarks on the arm's body.
     fn common_goal(&self, arm: &ArmSelection) -> PyResult<(ArmGoal, Vec<String>)> {
-        let engine = match self.engine.as_str() {
-            "auto" => Engine::Auto,
-            "chain" => Engine::Chain,
-            "dls" => Engine::Dls,
-            other => return Err(unknown_value("engine", other, "auto, chain or dls")),
-        };
+        let engine = choose("engine", &self.engine, &ENGINES)?;
+        let model = choose("body", &self.body, &BODIES)?;
+        let is_own = model == CollisionModel::OwnShapes;
         // Without obstacles and without the arm's own links, no shape can be touched: none is read.
-        let (is_own, has_shapes) = match self.body.as_str() {
-            "rods" => (false, false),
-            "shapes" => (false, !self.obstacles.is_empty()),
-            "own" => (true, true),
-            other => return Err(unknown_value("body", other, "rods, shapes or own")),
-        };
+        let has_shapes = is_own || model == CollisionModel::Shapes && !self.obstacles.is_empty();
         let (body, remarks) = match has_shapes.then(|| arm.body()) {
             Some((body, remarks)) => (Some(body), remarks),
             None => (None, Vec::new()),
@@ -274,8 +313,6 @@ impl IkOptions {
             let remedy = "give the links boxes, cylinders, spheres or STL meshes";
             return Err(argument_error("body", cause.concat().join("; "), remedy));
         }
-        let sphere =
-            |[x, y, z, radius_m]: &[f64; 4]| Sphere { center_m: [*x, *y, *z], radius_m: *radius_m };
         let goal = ArmGoal {
             engine,
             tolerance_m: self.tolerance_m,
@@ -314,22 +351,23 @@ impl IkOptions {
                     .map_err(|e| option_error(&e))?
             }
         };
-        let is_free = |name: &str| self.free.iter().any(|free| free == name);
-        if let Some(other) =
-            self.free.iter().find(|f| !["x", "y", "z", "rx", "ry", "rz"].contains(&f.as_str()))
-        {
-            return Err(unknown_value("free", other, "x, y, z, rx, ry, rz"));
+        let mut along = [false; 3];
+        let mut about = [false; 3];
+        for name in &self.free {
+            match choose("free", name, &AXES)? {
+                Axis::Along(axis) => along[axis] = true,
+                Axis::About(axis) => about[axis] = true,
+            }
         }
-        let along = ["x", "y", "z"].map(is_free);
-        let about = ["rx", "ry", "rz"].map(is_free);
         let asked =
             PoseMask::with_free(target.len() > 3, along, about).map_err(|e| option_error(&e))?;
         Ok(ArmGoal { target: target_pose, asked, ..goal.clone() })
     }
 }
 
-fn unknown_value(name: &str, value: &str, known: &str) -> PyErr {
-    argument_error(name, format!("`{value}` is none of {known}"), format!("give {known}"))
+/// Returns the sphere of a row of x, y, z and radius in m.
+fn sphere(&[x, y, z, radius_m]: &[f64; 4]) -> Sphere {
+    Sphere { center_m: [x, y, z], radius_m }
 }
 
 /// Returns results as arrays, one row for each target.
@@ -338,35 +376,38 @@ fn result_arrays<'py>(
     results: Vec<IkResult>,
     width: usize,
     remarks: Vec<String>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    let n = results.len();
+) -> PyResult<Bound<'py, PyAny>> {
     let joints = results.iter().flat_map(|result| result.values.clone()).collect();
-    dict.set_item("joints", to_array(py, joints, vec![n, width])?)?;
     let reached: Vec<bool> = results.iter().map(|result| result.reached).collect();
-    dict.set_item("reached", reached.to_pyarray(py))?;
-    for (name, of) in
-        [("error_m", (|a| a.error_m) as fn(&IkResult) -> f64), ("error_rad", |a| a.error_rad)]
-    {
-        dict.set_item(name, PyArray1::from_iter(py, results.iter().map(of)))?;
-    }
-    for (name, of) in
-        [("iterations", (|a| a.iterations) as fn(&IkResult) -> usize), ("starts", |a| a.starts)]
-    {
-        dict.set_item(name, PyArray1::from_iter(py, results.iter().map(|a| of(a) as i64)))?;
-    }
-    dict.set_item(
-        "reasons",
-        to_list(py, results.iter().map(|a| a.reason.as_ref().map(ToString::to_string)))?,
-    )?;
+    let reasons = results.iter().map(|result| result.reason.as_ref().map(ToString::to_string));
+    Fields::new(py)
+        .with("joints", to_array(py, joints, vec![results.len(), width])?)?
+        .with("reached", reached.to_pyarray(py))?
+        .with("error_m", PyArray1::from_iter(py, results.iter().map(|result| result.error_m)))?
+        .with("error_rad", PyArray1::from_iter(py, results.iter().map(|result| result.error_rad)))?
+        .with(
+            "iterations",
+            PyArray1::from_iter(py, results.iter().map(|result| result.iterations as i64)),
+        )?
+        .with("starts", PyArray1::from_iter(py, results.iter().map(|result| result.starts as i64)))?
+        .with("reasons", to_list(py, reasons)?)?
+        .with("others", other_postures(py, &results, width)?)?
+        .with("remarks", remarks)?
+        .build(ResultClass("sidestep._arm", "IkResult"))
+}
+
+/// Returns the further postures of each target, one per row.
+fn other_postures<'py>(
+    py: Python<'py>,
+    results: &[IkResult],
+    width: usize,
+) -> PyResult<Bound<'py, PyList>> {
     let others = PyList::empty(py);
-    for result in &results {
+    for result in results {
         let flat: Vec<f64> = result.others.iter().flat_map(|other| other.values.clone()).collect();
         let rows: Bound<'_, PyArray2<f64>> =
             PyArray1::from_vec(py, flat).reshape([result.others.len(), width])?;
         others.append(rows)?;
     }
-    dict.set_item("others", others)?;
-    dict.set_item("remarks", remarks)?;
-    Ok(dict)
+    Ok(others)
 }

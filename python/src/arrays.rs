@@ -29,20 +29,21 @@ impl FromPyObject<'_, '_> for UnsignedArg {
 
 /// Returns the ids of agents; truth values are no ids, although they are integers in Python.
 pub(crate) fn agent_ids(py: Python<'_>, agents: &Bound<'_, PyAny>) -> PyResult<Vec<EntityId>> {
-    let error = || {
-        error::OrderError::new_err(
-            "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`",
-        )
-    };
     let array = py.import("numpy")?.call_method1("atleast_1d", (agents,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let is_empty = array.len()? == 0;
     match kind.as_str() {
-        "i" | "u" => array.call_method0("tolist")?.extract().map_err(|_| error()),
+        "i" | "u" => array.call_method0("tolist")?.extract().map_err(|_| not_ids()),
         // NumPy gives an empty list the type of floats.
         _ if is_empty => Ok(Vec::new()),
-        _ => Err(error()),
+        _ => Err(not_ids()),
     }
+}
+
+fn not_ids() -> PyErr {
+    error::OrderError::new_err(
+        "`agents` must be ids: whole numbers; of a mask, `team.agents[mask]`",
+    )
 }
 
 /// Returns the values of an order as floats, one agent after the other: an array with a row for each agent, or one number
@@ -54,12 +55,14 @@ pub(crate) fn order_values(
     agents: usize,
     shape: Option<&[usize]>,
 ) -> PyResult<Vec<f64>> {
-    let refused =
-        |cause: String| error::OrderError::new_err(format!("the order `{order}` {cause}"));
     let float = py.import("numpy")?.getattr("float64")?;
     let array = py.import("numpy")?.call_method1("asarray", (values, float));
-    let array = array.map_err(|e| refused(format!("must be numbers: {}", e.value(py))))?;
-    let array = array.cast::<PyArrayDyn<f64>>().map_err(|e| refused(e.to_string()))?;
+    let array = array.map_err(|e| {
+        let cause = format!("must be numbers: {}", e.value(py));
+        refused_order(order, &cause)
+    })?;
+    let array =
+        array.cast::<PyArrayDyn<f64>>().map_err(|e| refused_order(order, &e.to_string()))?;
     // The run refuses an unknown order, with the names of the known ones.
     let Some(shape) = shape else { return Ok(array.to_vec().unwrap_or_default()) };
     let expected: Vec<usize> = [agents].iter().chain(shape).copied().collect();
@@ -70,13 +73,18 @@ pub(crate) fn order_values(
     if array.shape() != expected {
         let found = PyTuple::new(py, array.shape())?;
         let expected = PyTuple::new(py, &expected)?;
-        return Err(refused(format!("needs an array of the shape {expected}, not {found}")));
+        let cause = format!("needs an array of the shape {expected}, not {found}");
+        return Err(refused_order(order, &cause));
     }
     let array = array.readonly();
     // Contiguous values are copied as one block.
     Ok(array
         .as_slice()
         .map_or_else(|_| array.as_array().iter().copied().collect(), <[f64]>::to_vec))
+}
+
+fn refused_order(order: &str, cause: &str) -> PyErr {
+    error::OrderError::new_err(format!("the order `{order}` {cause}"))
 }
 
 /// Returns a dict for each of `names`: the k-th one has the k-th cell of each column, by its name. This is the form

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 /// Time after which Python is asked for signals, between two cycles: too short for users to notice.
 const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Largest number of worlds. Without it, a number from a mistaken unit would take all memory before anything could be
-/// reported.
+/// Largest number of worlds. A world of one robot on five boxes takes 4 KiB, so that as many take 4 GiB: without a bound a
+/// mistaken number would take all memory before anything could be reported.
 const MAX_WORLDS: usize = 1 << 20;
 /// Largest number of workers, as for a sweep.
 const MAX_WORKERS: usize = 1024;
@@ -30,7 +30,7 @@ const MAX_WORKERS: usize = 1024;
 /// Each world has the bits of a `Simulation` with its seed, for any number of workers; nothing is recorded.
 ///
 /// Python's lock is released while worlds advance, and Ctrl-C stops them between two cycles, all at the same one. A world that
-/// breaks off (which is a bug) is named in the error, and the others go on once it has been reset.
+/// breaks off (which is a bug) is named in the error, and the others continue once it has been reset.
 ///
 /// Examples of its methods continue from here:
 ///
@@ -53,7 +53,7 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Works with the worlds while other threads of Python go on.
+    /// Works with the worlds while other threads of Python run.
     fn with_worlds<T: Send>(
         &self,
         py: Python<'_>,
@@ -348,9 +348,12 @@ impl Batch {
     ) -> PyResult<()> {
         let seeds = self.parse_seeds(seeds)?;
         let mask = self.parse_mask(mask)?;
-        let is_reset = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
-        let seeds: Vec<Option<u64>> =
-            seeds.into_iter().enumerate().map(|(k, seed)| is_reset(k).then_some(seed)).collect();
+        let mut seeds: Vec<Option<u64>> = seeds.into_iter().map(Some).collect();
+        if let Some(mask) = mask {
+            for (seed, is_reset) in seeds.iter_mut().zip(mask) {
+                *seed = seed.filter(|_| is_reset);
+            }
+        }
         self.with_worlds(py, |batch| batch.restart(&seeds))
     }
 

@@ -1,11 +1,13 @@
 //! Probability collectives: games of tables, or of an objective in Python.
 
+use crate::choice::choose;
 use crate::error::argument_error;
 use crate::json::to_list;
+use crate::result::{Fields, ResultClass};
 use crate::watch::{catch_interrupt, run_interruptible};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::PyList;
 use sidestep::collectives::{
     Choice, Estimator, Game, OptimizeResult, OptimizerConfig, PairwiseGame, StopCriterion, Update,
     UpdateOrder, Utility, optimize,
@@ -37,14 +39,6 @@ pub(crate) struct MinimizeOptions {
     seed: u64,
 }
 
-fn parse_choice<T: Copy>(name: &str, word: &str, known: &[(&str, T)]) -> PyResult<T> {
-    let value = known.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
-    value.ok_or_else(|| {
-        let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
-        argument_error(name, format!("`{word}` is not known"), format!("give {names}"))
-    })
-}
-
 /// Refuses a number outside of (0, 1].
 fn check_fraction(name: &str, value: f64) -> PyResult<f64> {
     if value > 0.0 && value <= 1.0 {
@@ -68,22 +62,18 @@ impl MinimizeOptions {
         let newton = Update::NearestNewton { step };
         let brouwer = Update::Brouwer { step };
         Ok(OptimizerConfig {
-            estimator: parse_choice(
+            estimator: choose(
                 "estimator",
                 &self.estimator,
                 &[("exact", Estimator::Exact), ("sampled", sampled)],
             )?,
-            update: parse_choice(
-                "update",
-                &self.update,
-                &[("newton", newton), ("brouwer", brouwer)],
-            )?,
-            order: parse_choice(
+            update: choose("update", &self.update, &[("newton", newton), ("brouwer", brouwer)])?,
+            order: choose(
                 "order",
                 &self.order,
                 &[("parallel", UpdateOrder::Parallel), ("sequence", UpdateOrder::Sequence)],
             )?,
-            utility: parse_choice(
+            utility: choose(
                 "utility",
                 &self.utility,
                 &[("joint", Utility::Joint), ("private", Utility::Private)],
@@ -94,7 +84,7 @@ impl MinimizeOptions {
                 calm_rounds: self.calm_rounds.max(1),
                 max_rounds: self.max_rounds,
             },
-            choice: parse_choice(
+            choice: choose(
                 "choice",
                 &self.choice,
                 &[("argmax", Choice::Argmax), ("draw", Choice::Draw)],
@@ -121,7 +111,7 @@ pub(crate) fn minimize_pairs<'py>(
     own: Vec<PyReadonlyArray1<'py, f64>>,
     pairs: Vec<(usize, usize, PyReadonlyArray2<'py, f64>)>,
     options: MinimizeOptions,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Bound<'py, PyAny>> {
     let own: Vec<Vec<f64>> = own.iter().map(|costs| costs.as_array().to_vec()).collect();
     let sizes: Vec<usize> = own.iter().map(Vec::len).collect();
     if own.is_empty() || sizes.contains(&0) {
@@ -150,7 +140,7 @@ pub(crate) fn minimize_pairs<'py>(
     let uniform = options.uniform();
     let outcome = run_interruptible(py, || optimize(&game, &settings, uniform))?;
     let cost = game.cost(&outcome.joint);
-    result_dict(py, &outcome, cost)
+    minimize_result(py, &outcome, cost)
 }
 
 /// A game with a cost that Python computes.
@@ -164,8 +154,8 @@ struct Objective {
 impl Objective {
     fn evaluate(&self, joint: &[usize]) -> PyResult<f64> {
         Python::attach(|py| {
-            let joint: Vec<i64> = joint.iter().map(|k| *k as i64).collect();
-            let cost: f64 = self.cost.bind(py).call1((joint.to_pyarray(py),))?.extract()?;
+            let joint = integers(joint).to_pyarray(py);
+            let cost: f64 = self.cost.bind(py).call1((joint,))?.extract()?;
             if cost.is_nan() {
                 return Err(argument_error(
                     "objective",
@@ -186,7 +176,7 @@ impl Game for Objective {
     fn cost(&self, joint: &[usize]) -> f64 {
         self.evaluate(joint).unwrap_or_else(|error| {
             *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            // Unwinds out of the optimizer, whose games have no errors: there is no cost to go on with.
+            // Unwinds out of the optimizer, whose games have no errors: there is no cost to continue with.
             self.interrupt.raise();
             interrupt::check();
             f64::NAN
@@ -201,7 +191,7 @@ pub(crate) fn minimize_objective<'py>(
     strategies: Vec<usize>,
     objective: Py<PyAny>,
     options: MinimizeOptions,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Bound<'py, PyAny>> {
     if strategies.is_empty() || strategies.contains(&0) {
         let remedy = "give a number of strategies for each player, 1 or more";
         return Err(argument_error("strategies", "a player has no strategy", remedy));
@@ -222,23 +212,29 @@ pub(crate) fn minimize_objective<'py>(
     let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
     raised.map_or(Ok(()), Err)?;
     let (outcome, cost) = result.ok_or_else(interrupted_error)?;
-    result_dict(py, &outcome, cost)
+    minimize_result(py, &outcome, cost)
 }
 
-fn result_dict<'py>(
+fn minimize_result<'py>(
     py: Python<'py>,
     outcome: &OptimizeResult,
     cost: f64,
-) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    let joint: Vec<i64> = outcome.joint.iter().map(|k| *k as i64).collect();
-    dict.set_item("joint", joint.to_pyarray(py))?;
-    dict.set_item("cost", cost)?;
-    let arrays =
-        |rows: &[Vec<f64>]| to_list(py, rows.iter().map(|row| PyArray1::from_slice(py, row)));
-    dict.set_item("q", arrays(&outcome.q)?)?;
-    dict.set_item("expected", arrays(&outcome.expected)?)?;
-    dict.set_item("rounds", outcome.rounds)?;
-    dict.set_item("converged", outcome.converged)?;
-    Ok(dict)
+) -> PyResult<Bound<'py, PyAny>> {
+    Fields::new(py)
+        .with("joint", integers(&outcome.joint).to_pyarray(py))?
+        .with("cost", cost)?
+        .with("q", to_arrays(py, &outcome.q)?)?
+        .with("expected", to_arrays(py, &outcome.expected)?)?
+        .with("rounds", outcome.rounds)?
+        .with("converged", outcome.converged)?
+        .build(ResultClass("sidestep.collectives", "MinimizeResult"))
+}
+
+/// Returns the numbers of strategies in the type that NumPy uses for indices.
+fn integers(joint: &[usize]) -> Vec<i64> {
+    joint.iter().map(|k| *k as i64).collect()
+}
+
+fn to_arrays<'py>(py: Python<'py>, rows: &[Vec<f64>]) -> PyResult<Bound<'py, PyList>> {
+    to_list(py, rows.iter().map(|row| PyArray1::from_slice(py, row)))
 }

@@ -64,7 +64,7 @@ pub(crate) fn record_error(error: &ports::RecordError) -> PyErr {
     RecordError::new_err(error.to_string())
 }
 
-/// Returns the exception of a run that does not go on from a checkpoint.
+/// Returns the exception of a run that cannot continue from a checkpoint.
 pub(crate) fn restore_error(error: &RestoreError) -> PyErr {
     match error {
         RestoreError::Record(error) => record_error(error),

@@ -45,9 +45,10 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Val
         return Ok(toml::Value::Float(value.extract()?));
     }
     if value.is_instance_of::<PyInt>() {
-        let too_large =
-            |_| argument_error(key, format!("{value} is too large"), "give at most 2^63 - 1");
-        return Ok(toml::Value::Integer(value.extract().map_err(too_large)?));
+        let number = value.extract().map_err(|_| {
+            argument_error(key, format!("{value} is too large"), "give at most 2^63 - 1")
+        })?;
+        return Ok(toml::Value::Integer(number));
     }
     if let Ok(mapping) = value.cast::<PyMapping>() {
         return to_toml_table(mapping, key).map(toml::Value::Table);

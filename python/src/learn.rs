@@ -40,8 +40,8 @@ impl Learned {
             Model::Sensor(model) => serde_json::to_value(&model.report),
             Model::Effector(model) => serde_json::to_value(&model.report),
         };
-        let bug = |e: serde_json::Error| error::RecordError::new_err(e.to_string());
-        to_python(py, &value.map_err(bug)?)
+        let value = value.map_err(|e| error::RecordError::new_err(e.to_string()))?;
+        to_python(py, &value)
     }
 
     /// Returns the text of a profile with it under this name: a new one, or `text` with it added or replaced.
@@ -72,34 +72,38 @@ impl Learned {
     }
 }
 
-/// Returns a table, from its text, or as recorded by a run.
-fn read_table(
-    text: Option<&str>,
+/// A table, and how to learn from it, as passed by `sidestep.learn`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct LearnOptions {
+    /// The table as CSV text.
+    text: Option<String>,
+    /// Or the folder of a run that recorded it.
     run: Option<PathBuf>,
-    name: &str,
-) -> Result<CsvTable, InputError> {
-    match (text, run) {
-        (_, Some(run)) => csv_table(&run, name),
-        (text, None) => CsvTable::parse(&name, text.unwrap_or_default()),
-    }
+    alpha: f64,
+    hold_out_every: usize,
 }
 
-fn estimate_options(alpha: f64, hold_out_every: usize) -> EstimateOptions {
-    EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
+impl LearnOptions {
+    /// Returns the table; `name` is its name among those of a run.
+    fn read_table(&self, name: &str) -> Result<CsvTable, InputError> {
+        match &self.run {
+            Some(run) => csv_table(run, name),
+            None => CsvTable::parse(&name, self.text.as_deref().unwrap_or_default()),
+        }
+    }
+
+    fn estimate(&self) -> EstimateOptions {
+        let Self { alpha, hold_out_every, .. } = *self;
+        EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
+    }
 }
 
 /// Learns an effector: the native part of `sidestep.learn.effector`.
 #[pyfunction]
-pub(crate) fn learn_effector(
-    py: Python<'_>,
-    text: Option<String>,
-    run: Option<PathBuf>,
-    alpha: f64,
-    hold_out_every: usize,
-) -> PyResult<Learned> {
-    let options = estimate_options(alpha, hold_out_every);
-    let learned =
-        py.detach(|| effector::learn_csv(&read_table(text.as_deref(), run, "motions")?, &options));
+pub(crate) fn learn_effector(py: Python<'_>, options: LearnOptions) -> PyResult<Learned> {
+    let estimate = options.estimate();
+    let learned = py.detach(|| effector::learn_csv(&options.read_table("motions")?, &estimate));
     let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Effector(Box::new(model))))
 }
@@ -119,15 +123,12 @@ pub(crate) struct SensorShape {
 #[pyfunction]
 pub(crate) fn learn_sensor(
     py: Python<'_>,
-    text: Option<String>,
-    run: Option<PathBuf>,
+    options: LearnOptions,
     shape: SensorShape,
-    alpha: f64,
-    hold_out_every: usize,
 ) -> PyResult<Learned> {
     let default = SensorOptions::default();
-    let options = SensorOptions {
-        estimate: estimate_options(alpha, hold_out_every),
+    let sensor_options = SensorOptions {
+        estimate: options.estimate(),
         distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
         distance_classes: shape.classes,
         bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
@@ -135,7 +136,7 @@ pub(crate) fn learn_sensor(
         sensor: shape.sensor,
     };
     let learned =
-        py.detach(|| sensor::learn_csv(&read_table(text.as_deref(), run, "readings")?, &options));
+        py.detach(|| sensor::learn_csv(&options.read_table("readings")?, &sensor_options));
     let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Sensor(Box::new(model))))
 }

@@ -11,6 +11,7 @@
 //! arm.rs         kinematics of arms         learn.rs        error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells
+//! result.rs      results, by name           choice.rs       words that choose a value
 //! error.rs       the exceptions             watch.rs        Ctrl-C
 //! worlds.rs      the list of worlds, and what each declares
 //! ```
@@ -23,6 +24,7 @@ mod arm;
 mod arrays;
 mod batch;
 mod blocks;
+mod choice;
 mod collectives;
 mod error;
 mod json;
@@ -30,6 +32,7 @@ mod learn;
 mod notebook;
 mod policy;
 mod read;
+mod result;
 mod scenario;
 mod simulation;
 mod space;

@@ -25,13 +25,7 @@ pub(crate) trait PolicyRun {
     /// Returns the observations of a team.
     fn observed<'py>(&self, py: Python<'py>, team: &IndexedTeam) -> PyResult<Bound<'py, PyDict>>;
     /// Gives an order to all agents of a team.
-    fn give_order(
-        &self,
-        py: Python<'_>,
-        order: &str,
-        values: &Bound<'_, PyAny>,
-        team: &Team,
-    ) -> PyResult<()>;
+    fn give_order(&self, order: &str, values: &Bound<'_, PyAny>, team: &Team) -> PyResult<()>;
     /// Advances by one cycle.
     fn advance(&self, py: Python<'_>) -> PyResult<()>;
 }
@@ -135,11 +129,11 @@ impl<'py> TeamPolicy<'py> {
                 let message = format!("the agents of team `{}` decide for themselves", team.name);
                 return Err(OrderError::new_err(message));
             };
-            return run.give_order(py, &first.name, &decided, team);
+            return run.give_order(&first.name, &decided, team);
         };
         for entry in by_name.items()?.iter() {
             let (order, values): (String, Bound<'_, PyAny>) = entry.extract()?;
-            run.give_order(py, &order, &values, team)?;
+            run.give_order(&order, &values, team)?;
         }
         Ok(())
     }

@@ -36,11 +36,10 @@ pub(crate) fn read<'py>(
     if Folder::is_at(&folder) {
         return read_sweep_folder(py, &folder, tables.as_ref());
     }
-    let read = || {
+    let read: Result<Vec<_>, InputError> = py.detach(|| {
         let names = tables.map_or_else(|| tables_of(&folder), Ok)?;
         names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
-    };
-    let read: Result<Vec<_>, InputError> = py.detach(read);
+    });
     let dict = PyDict::new(py);
     for (name, table) in read.map_err(|e| error::input_error(&e))? {
         dict.set_item(name, Table::new(table.schema, table.columns)?)?;

@@ -61,7 +61,7 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// Starts a scenario while other threads of Python go on.
+    /// Starts a scenario while other threads of Python run.
     fn start(
         py: Python<'_>,
         scenario: Arc<LoadedScenario>,
@@ -92,7 +92,7 @@ impl Simulation {
         Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
     }
 
-    /// Works with the run while other threads of Python go on.
+    /// Works with the run while other threads of Python run.
     fn with_run<T: Send>(
         &self,
         py: Python<'_>,
@@ -164,10 +164,10 @@ impl Simulation {
     /// Returns the team of an agent; the first one for an agent that is in none, whose order the run then refuses with a
     /// reason.
     fn team_of(&self, agent: Option<EntityId>) -> PyResult<IndexedTeam> {
-        let has = |team: &Arc<control::Team>| {
-            agent.is_some_and(|id| team.agents.binary_search(&id).is_ok())
-        };
-        let number = self.teams.iter().position(has).unwrap_or(0);
+        let position = agent.and_then(|id| {
+            self.teams.iter().position(|team| team.agents.binary_search(&id).is_ok())
+        });
+        let number = position.unwrap_or(0);
         team_at(&self.teams, number).map(|(number, team)| (number, Arc::clone(team)))
     }
 
@@ -188,12 +188,12 @@ impl Simulation {
     /// Gives an order to agents of a team.
     fn order_agents(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         agents: &[EntityId],
         team: &control::Team,
     ) -> PyResult<()> {
+        let py = values.py();
         let shape =
             team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
         let values = order_values(py, order, values, agents.len(), shape)?;
@@ -261,6 +261,10 @@ struct SliceOutcome {
     done: u64,
     /// Whether the goal is reached, or the run is over.
     is_last: bool,
+}
+
+fn condition_name(body: &Body) -> String {
+    format!("{:?}", body.state).to_lowercase()
 }
 
 fn draw_error(error: &DrawError) -> PyErr {
@@ -447,19 +451,18 @@ impl Simulation {
     #[pyo3(signature = (name, values, *, agents=None, team=None))]
     fn order(
         &self,
-        py: Python<'_>,
         name: &str,
         values: &Bound<'_, PyAny>,
         agents: Option<&Bound<'_, PyAny>>,
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let agents = agents.map(|agents| agent_ids(py, agents)).transpose()?;
+        let agents = agents.map(|agents| agent_ids(agents.py(), agents)).transpose()?;
         let (_, team) = match (team, &agents) {
             (None, Some(agents)) => self.team_of(agents.first().copied())?,
             (team, _) => self.find_team(team)?,
         };
         let agents = agents.as_deref().unwrap_or(&team.agents);
-        self.order_agents(py, name, values, agents, &team)
+        self.order_agents(name, values, agents, &team)
     }
 
     /// Returns the state as bytes, for `restore`; run folders of the same scenario hold such checkpoints.
@@ -470,7 +473,7 @@ impl Simulation {
         Ok(PyBytes::new(py, &self.checkpoint_bytes(py)?))
     }
 
-    /// Goes on from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
+    /// Continues from a checkpoint of the same scenario. Rows kept in memory lose those of its cycle and of later ones:
     /// `tables` gives the rows of a run that never went there. Rows that `tables` has already given are up to you.
     ///
     /// Raises CheckpointError when it is damaged, or belongs to another scenario or version. Recorded rows have one
@@ -535,8 +538,7 @@ impl Simulation {
         dict.set_item("at_m", body_rows(py, bodies, |body| body.pose.at_m)?)?;
         dict.set_item("turn", body_rows(py, bodies, |body| body.pose.turn)?)?;
         dict.set_item("velocity_m_s", body_rows(py, bodies, |body| body.velocity_m_s)?)?;
-        let condition = |body: &Body| format!("{:?}", body.state).to_lowercase();
-        dict.set_item("condition", body_texts(py, bodies, condition)?)?;
+        dict.set_item("condition", body_texts(py, bodies, condition_name)?)?;
         Ok(dict)
     }
 
@@ -782,12 +784,11 @@ impl PolicyRun for Simulation {
 
     fn give_order(
         &self,
-        py: Python<'_>,
         order: &str,
         values: &Bound<'_, PyAny>,
         team: &control::Team,
     ) -> PyResult<()> {
-        self.order_agents(py, order, values, &team.agents, team)
+        self.order_agents(order, values, &team.agents, team)
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {

@@ -143,15 +143,16 @@ impl Team {
     }
 
     fn __repr__(&self) -> String {
-        let names = |spaces: &[control::Space]| {
-            spaces.iter().map(|space| space.name.as_str()).collect::<Vec<_>>().join(", ")
-        };
         let control::Team { name, agents, observation_spaces, action_spaces } = &*self.0;
         let n = agents.len();
-        let observed = names(observation_spaces);
-        let ordered = names(action_spaces);
+        let observed = joined_names(observation_spaces);
+        let ordered = joined_names(action_spaces);
         format!("Team({name}, {n} agents, observed: {observed}; ordered: {ordered})")
     }
+}
+
+fn joined_names(spaces: &[control::Space]) -> String {
+    spaces.iter().map(|space| space.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Returns a team by number or name, the first one without either, with its number.
@@ -193,6 +194,12 @@ enum Buffer {
 }
 
 impl Buffer {
+    /// Returns a buffer for a quantity of this many agents.
+    fn zeroed(space: &control::Space, agents: usize) -> Self {
+        let n = agents * space.width();
+        if space.is_integer() { Self::Whole(vec![0; n]) } else { Self::Real(vec![0.0; n]) }
+    }
+
     fn as_buffer_mut(&mut self) -> BufferMut<'_> {
         match self {
             Self::Whole(values) => BufferMut::Integer(values),
@@ -204,11 +211,8 @@ impl Buffer {
 impl ObservationBuffers {
     /// Returns buffers for the observations of `team`.
     pub(crate) fn from_team(team: &control::Team) -> Self {
-        let buffer = |space: &control::Space| {
-            let n = team.agents.len() * space.width();
-            if space.is_integer() { Buffer::Whole(vec![0; n]) } else { Buffer::Real(vec![0.0; n]) }
-        };
-        Self(team.observation_spaces.iter().map(buffer).collect())
+        let spaces = team.observation_spaces.iter();
+        Self(spaces.map(|space| Buffer::zeroed(space, team.agents.len())).collect())
     }
 
     /// Returns the buffers to write into.

@@ -1,7 +1,9 @@
 //! Sweeps: the plan, the journal and the stopping rule of the command, with runs on threads or by an executor in Python.
 
+use crate::choice::choose;
 use crate::error::{self, argument_error};
 use crate::json::{to_python, to_toml};
+use crate::result::{Fields, ResultClass};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, run_polling};
@@ -11,7 +13,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
-    BaselineSpec, Factor, Outcome, Plan, RunColumn, Setting, Sweep, SweepOverrides, Trial,
+    BaselineSpec, Factor, Outcome, Plan, Precision, RunColumn, Setting, Sweep, SweepOverrides,
+    Trial,
 };
 use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
@@ -54,11 +57,21 @@ struct SweepRequest {
 
 fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Setting>> {
     let Some(mapping) = mapping else { return Ok(Vec::new()) };
-    let setting = |entry: Bound<'_, PyAny>| {
+    let mut settings = Vec::new();
+    for entry in mapping.items()?.iter() {
         let (key, value): (String, Bound<'_, PyAny>) = entry.extract()?;
-        Ok(Setting { value: to_toml(&value, &key)?, key })
-    };
-    mapping.items()?.iter().map(setting).collect()
+        settings.push(Setting { value: to_toml(&value, &key)?, key });
+    }
+    Ok(settings)
+}
+
+/// Returns the precision that ends a sweep.
+fn parse_precision(text: &str) -> PyResult<Precision> {
+    text.parse().map_err(|cause: String| {
+        let remedy =
+            "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
+        argument_error("until", cause, remedy)
+    })
 }
 
 impl SweepOptions<'_> {
@@ -68,11 +81,6 @@ impl SweepOptions<'_> {
     }
 
     fn changes(&self) -> PyResult<SweepOverrides> {
-        let until = |text: &String| {
-            let remedy =
-                "write \"ci=0.05\" (half width as a share of the mean) or \"abs=2.5\" (in units)";
-            text.parse().map_err(|cause: String| argument_error("until", cause, remedy))
-        };
         let has_baseline = self.baseline.is_some() || self.baseline_name.is_some();
         let baseline = BaselineSpec {
             name: self.baseline_name.clone(),
@@ -81,7 +89,7 @@ impl SweepOptions<'_> {
         Ok(SweepOverrides {
             fixed: parse_settings(self.set.as_ref())?,
             factors: self.factors()?,
-            until: self.until.as_ref().map(until).transpose()?,
+            until: self.until.as_deref().map(parse_precision).transpose()?,
             replicates: self.replicate,
             max_runs: self.max_runs,
             metrics: self.metrics.clone(),
@@ -170,10 +178,9 @@ fn sweep_result(
     done: &sweep::SweepResult,
 ) -> Result<SweepResult, InputError> {
     let summary = plan.summary(worlds::list(), &done.table)?;
-    let cloned = |columns: Vec<&RunColumn>| columns.into_iter().cloned().collect();
     Ok(SweepResult {
-        results: cloned(done.table.results()),
-        timings: cloned(done.table.timings()),
+        results: done.table.results().into_iter().cloned().collect(),
+        timings: done.table.timings().into_iter().cloned().collect(),
         summary: done.to_json(plan, folder, &summary),
         world: plan.world.clone(),
     })
@@ -190,8 +197,18 @@ struct PyExecutor {
     raised: Mutex<Option<PyErr>>,
 }
 
-/// A trial in the form used in Python: its number, variant, replicate and seed.
+/// A trial in the form used in Python, a named tuple of these: its number, variant, replicate and seed.
 type TrialTuple = (u64, u32, u32, u64);
+
+/// Returns a trial as `sidestep._engines.Trial`.
+fn to_python_trial<'py>(py: Python<'py>, trial: &Trial) -> PyResult<Bound<'py, PyAny>> {
+    Fields::new(py)
+        .with("id", trial.id)?
+        .with("variant", trial.variant)?
+        .with("replicate", trial.replicate)?
+        .with("seed", trial.seed)?
+        .build(ResultClass("sidestep._engines", "Trial"))
+}
 
 impl PyExecutor {
     /// Drives the generator: it yields the number of a variant to request its scenario, or a list of outcomes. Scenarios are
@@ -202,8 +219,8 @@ impl PyExecutor {
         batch: &TrialBatch<'_>,
         store: &mut OutcomeSink<'_>,
     ) -> PyResult<()> {
-        let tuple = |trial: &Trial| (trial.id, trial.variant, trial.replicate, trial.seed);
-        let trials: Vec<TrialTuple> = batch.trials().iter().map(tuple).collect();
+        let trials = batch.trials().iter().map(|trial| to_python_trial(py, trial));
+        let trials = trials.collect::<PyResult<Vec<_>>>()?;
         let generator = self.begin.bind(py).call1((worlds::list().build(), trials))?;
         let mut answer = py.None();
         loop {
@@ -247,20 +264,17 @@ impl TrialExecutor for PyExecutor {
     }
 }
 
-/// Tables of results and of timings, and the summary.
-type SweepTables<'py> = (Table, Table, Bound<'py, PyAny>);
-
 /// Runs a sweep on threads, all processors if `workers` is 0, or by an executor: the native part of `sidestep.sweep`.
 #[pyfunction]
 #[pyo3(signature = (sweep, options, out, workers, begin))]
 pub(crate) fn run_sweep<'py>(
-    py: Python<'py>,
     sweep: &Bound<'py, PyAny>,
     options: SweepOptions<'py>,
     out: Option<PathBuf>,
     workers: usize,
     begin: Option<Py<PyAny>>,
-) -> PyResult<SweepTables<'py>> {
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = sweep.py();
     let workers = if workers == 0 { available_workers() } else { workers };
     let request = options.request(sweep)?;
     let sweep = &request.sweep;
@@ -282,7 +296,11 @@ pub(crate) fn run_sweep<'py>(
     let result = result.map_err(|e| error::session_error(&e))?;
     let results = Table::from_runs("results", result.results, &result.world)?;
     let timings = Table::from_runs("timings", result.timings, &result.world)?;
-    Ok((results, timings, to_python(py, &result.summary)?.into_bound(py)))
+    Fields::new(py)
+        .with("results", results)?
+        .with("timings", timings)?
+        .with("output", to_python(py, &result.summary)?)?
+        .build(ResultClass("sidestep._sweep", "Sweep"))
 }
 
 /// Runs some trials of a sweep that another process drives, and returns their outcomes as JSON: the function that
@@ -296,46 +314,52 @@ pub(crate) fn run_task(
     scenarios: Vec<(u32, Bundle)>,
     trials: Vec<TrialTuple>,
 ) -> PyResult<Vec<String>> {
-    let resolved = |(variant, (text, files))| (variant, ResolvedScenario { text, files });
-    let trial = |(id, variant, replicate, seed)| Trial { id, variant, replicate, seed };
-    let task = Task {
-        build,
-        scenarios: scenarios.into_iter().map(resolved).collect(),
-        trials: trials.into_iter().map(trial).collect(),
-    };
+    let scenarios = scenarios
+        .into_iter()
+        .map(|(variant, (text, files))| (variant, ResolvedScenario { text, files }))
+        .collect();
+    let trials = trials
+        .into_iter()
+        .map(|(id, variant, replicate, seed)| Trial { id, variant, replicate, seed })
+        .collect();
+    let task = Task { build, scenarios, trials };
     let outcomes = run_polling(py, |watcher| task.run(worlds::list(), watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
-    let text = |outcome: &Outcome| {
-        serde_json::to_string(outcome)
-            .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
-    };
-    outcomes.iter().map(text).collect()
+    outcomes.iter().map(outcome_text).collect()
+}
+
+/// Returns an outcome as JSON, for [`parse_outcome`].
+fn outcome_text(outcome: &Outcome) -> PyResult<String> {
+    serde_json::to_string(outcome)
+        .map_err(|e| error::RecordError::new_err(format!("an outcome cannot be sent: {e}")))
 }
 
 /// Returns the state of the sweep in a folder: the native part of `sidestep.sweep_status`.
 ///
 /// Raises InputError when there is no sweep, or something in it cannot be read.
 #[pyfunction]
-pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Py<PyAny>> {
+pub(crate) fn sweep_status(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let status = py.detach(|| sweep::read_status(&Folder::open(&folder)?));
     let status = status.map_err(|e: InputError| error::input_error(&e))?;
-    to_python(py, &serde_json::to_value(&status).unwrap_or_default())
+    let status = serde_json::to_value(&status).unwrap_or_default();
+    Fields::from_json(py, &status)?.build(ResultClass("sidestep._status", "SweepStatus"))
 }
 
 /// Compares methods of collision avoidance on the same air traffic: the native part of `sidestep.compare`.
 #[pyfunction]
 pub(crate) fn compare_methods(
-    py: Python<'_>,
     scenario: &Bound<'_, PyAny>,
     methods: Vec<String>,
     runs: usize,
     seed: Option<u64>,
     workers: usize,
 ) -> PyResult<Py<PyAny>> {
+    let py = scenario.py();
     let loaded = load(scenario)?;
     let source = loaded.source()?;
-    let methods =
-        methods.iter().map(|name| find_method(name)).collect::<PyResult<Vec<Method>>>()?;
+    let known = Method::ALL.map(|method| (method.name(), method));
+    let methods = methods.iter().map(|name| choose("methods", name, &known));
+    let methods = methods.collect::<PyResult<Vec<Method>>>()?;
     let Some(compiled) = loaded.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
         let cause = "methods of collision avoidance are of the world `airspace` alone";
         return Err(argument_error("scenario", cause, "give a scenario with world = \"airspace\""));
@@ -358,14 +382,7 @@ pub(crate) fn compare_methods(
     to_python(py, &json!({ "name": compiled.name, "seed": seeds.first, "methods": results }))
 }
 
-fn find_method(name: &str) -> PyResult<Method> {
-    Method::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
-        let known = Method::ALL.map(Method::name).join(", ");
-        argument_error("methods", format!("there is no method `{name}`"), known)
-    })
-}
-
-/// Goes on unwinding, unless the interrupt has caused it: then the caller raises the exception of the signal and uses no
+/// Resumes unwinding, unless the interrupt has caused it: then the caller raises the exception of the signal and uses no
 /// result.
 fn resume_unless<T>(
     payload: Box<dyn Any + Send>,

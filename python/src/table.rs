@@ -59,23 +59,21 @@ impl Table {
     /// Returns a table of a sweep's runs; numbers are not copied.
     pub(crate) fn from_runs(name: &str, columns: Vec<RunColumn>, world: &str) -> PyResult<Self> {
         let infos = worlds::list().find(world).map_or(&[][..], |world| world.metric_infos());
-        let spec = |column: &RunColumn| ColumnSpec {
+        let specs = columns.iter().map(|column| ColumnSpec {
             is_nullable: true,
             ..ColumnSpec::new(&column.name, column.values.ty(), &column_description(column, infos))
-        };
-        let schema = TableSchema::new(name, columns.iter().map(spec).collect());
+        });
+        let schema = TableSchema::new(name, specs.collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())
     }
 
     fn column_index(&self, name: &str) -> PyResult<usize> {
-        let known = || {
-            let names: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
-            names.join(", ")
-        };
         let position = self.schema.columns.iter().position(|column| column.name == name);
         position.ok_or_else(|| {
             let table = &self.schema.name;
-            PyKeyError::new_err(format!("no column `{name}` in `{table}`; it has {}", known()))
+            let known: Vec<_> = self.schema.columns.iter().map(|c| c.name.as_str()).collect();
+            let known = known.join(", ");
+            PyKeyError::new_err(format!("no column `{name}` in `{table}`; it has {known}"))
         })
     }
 }
@@ -175,11 +173,12 @@ impl Table {
         for (array, spec) in first.columns().iter().zip(&self.schema.columns) {
             columns.push(to_python_values(py, array, spec.ty)?);
         }
-        let row = |k: usize| {
+        let mut head = Vec::with_capacity(rows);
+        for k in 0..rows {
             let cells = columns.iter().map(|column: &Bound<'_, PyList>| column.get_item(k));
-            PyTuple::new(py, cells.collect::<PyResult<Vec<_>>>()?)
-        };
-        (0..rows).map(row).collect()
+            head.push(PyTuple::new(py, cells.collect::<PyResult<Vec<_>>>()?)?);
+        }
+        Ok(head)
     }
 
     /// The schema as an Arrow capsule.

@@ -1,4 +1,4 @@
-//! Ctrl-C: between two slices of a run, or while work goes on in other threads, Python is checked for signals.
+//! Ctrl-C: between two slices of a run, or while other threads work, Python is checked for signals.
 
 use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;
@@ -91,11 +91,11 @@ impl Watcher for PolledWatcher {
 
 /// Does work that an interrupt can stop; returns `None` if it did.
 pub(crate) fn catch_interrupt<T>(interrupt: &Interrupt, work: impl FnOnce() -> T) -> Option<T> {
-    let attached_work = || {
+    let result = catch_unwind(AssertUnwindSafe(|| {
         let _attached = interrupt.attach();
         work()
-    };
-    match catch_unwind(AssertUnwindSafe(attached_work)) {
+    }));
+    match result {
         Ok(done) => Some(done),
         Err(payload) if interrupt.caused(payload.as_ref()) => None,
         Err(payload) => resume_unwind(payload),

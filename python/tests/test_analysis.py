@@ -1,6 +1,9 @@
 """Kinematics, learning, statistics and collectives: the command's answers, from arrays to arrays."""
 
+import inspect
 import json
+import pickle
+import re
 import subprocess
 
 import numpy as np
@@ -238,7 +241,7 @@ GAME_ERRORS = [
     ({"own": [[1.0, np.inf]]}, "a cost that is not finite"),
     ({"own": [[1.0]], "step": 0.0}, "step: is 0"),
     ({"own": [[1.0]], "cooling": 2.0}, "cooling: is 2"),
-    ({"own": [[1.0]], "update": "slow"}, "`slow` is not known"),
+    ({"own": [[1.0]], "update": "slow"}, "`slow` is none of newton or brouwer"),
     ({"objective": len}, "an objective needs numbers of strategies"),
     ({"objective": len, "strategies": [2], "estimator": "exact"}, "has no closed form"),
     ({"strategies": [2]}, "tables need each player's own costs"),
@@ -250,6 +253,43 @@ def test_games_that_are_none_are_errors(options, words):
     with pytest.raises(sidestep.InputError) as caught:
         collectives.minimize(**options)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(("name", "kind"), [(name, "ik") for name in ("engine", "body")] + [
+    (name, "minimize") for name in ("estimator", "update", "order", "utility", "choice")
+])  # fmt: skip
+def test_the_words_of_an_argument_are_those_of_its_type(name, kind, urdf):
+    function = {"ik": sidestep.ik, "minimize": collectives.minimize}[kind]
+    given = {"ik": {"arm": urdf, "targets": [0, 0, 1]}, "minimize": {"own": [[0.0, 1.0]]}}[kind]
+    words = [word for word in re.findall(r"\w+", str(inspect.signature(function).parameters[name].annotation))]
+    words = [word for word in words if word not in ("Literal", "None")]
+    with pytest.raises(sidestep.InputError) as caught:
+        function(**given, **{name: "no such word"})
+    listed = f"{', '.join(words[:-1])} or {words[-1]}"
+    assert f"`no such word` is none of {listed}" in str(caught.value)
+
+
+RESULTS = [
+    lambda arm: stats.mean([1.0, 2.0, 4.0]),
+    lambda arm: stats.proportion(3, 4),
+    lambda arm: stats.quantile(range(100), 0.5),
+    lambda arm: stats.paired([1.0, 2.0, 4.0], [2.0, 3.0, 6.0]),
+    lambda arm: stats.correlation([1, 2, 3, 5], [1, 4, 9, 2]),
+    lambda arm: stats.StoppingRule(1.0).next([1.0, 2.0]),
+    lambda arm: sidestep.fk(arm),
+    lambda arm: sidestep.ik(arm, [0.0, 0.0, 0.9], restarts=1),
+    lambda arm: collectives.minimize([[0.0, 1.0]]),
+]
+
+
+@pytest.mark.parametrize("make", RESULTS)
+def test_results_have_named_fields_that_cannot_be_set_and_are_unpacked_in_order(make, urdf):
+    result = make(urdf)
+    fields = type(result)._fields
+    assert all(value is getattr(result, name) for name, value in zip(fields, result, strict=True))
+    with pytest.raises(AttributeError):
+        setattr(result, fields[0], None)
+    assert len(pickle.loads(pickle.dumps(result))) == len(fields)
 
 
 def test_numbers_out_of_range_are_told_with_the_range(urdf):

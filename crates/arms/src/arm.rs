@@ -6,10 +6,12 @@ use sidestep_rods::geometry::{Point, sub, with_dimensions};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
 use std::f64::consts::PI;
 
-/// Least length of rods with a joint that can bring their ends together.
+/// Least length of rods with a joint that can bring their ends together: a rod of no length has no direction.
 const MIN_ROD_M: f64 = 1e-6;
-/// Greatest length of rods with a joint without limits.
+/// Greatest length of rods with a joint without limits: the greatest that a chain allows.
 const MAX_ROD_M: f64 = 1e6;
+/// Least bend limit of a connector, rad: a joint whose limits meet would give 0, which a chain refuses.
+const MIN_BEND_RAD: f64 = 1e-9;
 
 /// An arm: its joints, its connectors, and the place of its base.
 #[derive(Debug)]
@@ -41,25 +43,26 @@ impl Arm {
     /// When its connectors make no chain, e.g. because a rod has length 0.
     pub fn chain(&self, radius_m: f64, rod_radius_m: f64) -> Result<Chain<3>, InputError> {
         let points: Vec<Vector> = self.connector_positions(&self.values);
+        let mut connectors = vec![Connector::free(radius_m); points.len()];
+        connectors[0].mobility = Mobility::Fixed;
+        // The bend at the first connector is measured from the base's axis, which is no rod of the chain.
         let limits = self.serial.bend_limits(&self.skeleton);
-        let connector = |k: usize| {
-            let exact = limits[k].as_ref().filter(|limit| limit.is_exact && k > 0);
-            let max_bend_rad = exact.map_or(PI, |limit| limit.max_bend_rad.max(1e-9));
-            let mobility = if k == 0 { Mobility::Fixed } else { Mobility::Free };
-            Connector { mobility, max_bend_rad, ..Connector::free(radius_m) }
-        };
+        for (connector, limit) in connectors.iter_mut().zip(limits).skip(1) {
+            let exact = limit.filter(|limit| limit.is_exact);
+            connector.max_bend_rad = exact.map_or(PI, |limit| limit.max_bend_rad.max(MIN_BEND_RAD));
+        }
         let rods = self.skeleton.rods.iter().map(|rod| Rod {
             min_m: rod.min_m.max(MIN_ROD_M),
             max_m: rod.max_m.clamp(MIN_ROD_M, MAX_ROD_M),
             radius_m: rod_radius_m,
         });
-        Chain::new(points.clone(), (0..points.len()).map(connector).collect(), rods.collect())
+        Chain::new(points, connectors, rods.collect())
     }
 
     /// Returns the places of the connectors in the world at these joint values.
     pub fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
-        let in_world = |p: &Vector| with_dimensions(self.to_world(*p));
-        self.follower.connector_positions(values).iter().map(in_world).collect()
+        let in_base = self.follower.connector_positions(values);
+        in_base.into_iter().map(|p| with_dimensions(self.to_world(p))).collect()
     }
 
     /// Returns a place of the world in the frame of the base.

@@ -12,7 +12,9 @@ use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
 
-/// Longest side of a picture, pixels.
+/// Shortest side of a picture, pixels: of a long and narrow world, too.
+const MIN_FRAME_PX: u32 = 32;
+/// Longest side of a picture, pixels: four bytes a pixel are then 64 MiB a frame.
 const MAX_FRAME_PX: u32 = 4096;
 /// Height of the line of text under the picture, pixels.
 const CAPTION_HEIGHT_PX: u32 = 24;
@@ -103,16 +105,19 @@ fn view(scenery: &Scenery, box_m: [Vec3; 2], width_px: u32) -> (Canvas, Rect) {
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
     let px_per_m = f64::from(width_px) / size_m[0].max(size_m[1]);
-    let even = |length_m: f64| {
-        f64::from(((length_m * px_per_m / 2.0).round() as u32).clamp(16, MAX_FRAME_PX / 2) * 2)
-    };
-    let window = Rect { x: 0.0, y: 0.0, width: even(size_m[0]), height: even(size_m[1]) };
+    let [width, height] = size_m.map(|length_m| even_px(length_m * px_per_m));
+    let window = Rect { x: 0.0, y: 0.0, width, height };
     let depths_m = Camera::range(camera.to_eye, box_m);
     let canvas = Canvas { camera, px_per_m, zero: (0.0, window.height), origin_m: lo, depths_m };
     (canvas, window)
 }
 
-/// One picture of a film: opaque, from the upper left pixel on.
+/// Returns the nearest even number of pixels within the limits, because video encoders take no odd sizes.
+fn even_px(length_px: f64) -> f64 {
+    f64::from(((length_px / 2.0).round() as u32).clamp(MIN_FRAME_PX / 2, MAX_FRAME_PX / 2) * 2)
+}
+
+/// One picture of an animation: opaque, from the upper left pixel on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnimationFrame(Pixmap);
 

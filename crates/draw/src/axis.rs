@@ -139,20 +139,26 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// Ends a log range at powers of ten, or at 1, 2, 5 times one if it spans less than three decades.
 fn round_log((low, high): (f64, f64)) -> (f64, f64) {
     let digits: &[f64] = if high / low > 1000.0 { &[1.0, 10.0] } else { &[1.0, 2.0, 5.0, 10.0] };
-    let round = |value: f64| {
-        let power = pow(10.0, floor(log10(value) + 1e-12));
-        digits.iter().map(move |digit| digit * power)
-    };
-    let below = round(low).take_while(|v| *v <= low * (1.0 + 1e-9)).last().unwrap_or(low);
-    let above = round(high).find(|v| *v >= high * (1.0 - 1e-9)).unwrap_or(high);
+    let low_power = power_of_ten(low);
+    let below = digits.iter().map(|digit| digit * low_power);
+    // The slack keeps an end that is such a number up to rounding.
+    let below = below.take_while(|v| *v <= low * (1.0 + 1e-9)).last().unwrap_or(low);
+    let high_power = power_of_ten(high);
+    let mut above = digits.iter().map(|digit| digit * high_power);
+    let above = above.find(|v| *v >= high * (1.0 - 1e-9)).unwrap_or(high);
     if below < above { (below, above) } else { (below / 2.0, above * 2.0) }
+}
+
+/// Returns the greatest power of ten that is at most `value`, up to rounding.
+fn power_of_ten(value: f64) -> f64 {
+    pow(10.0, floor(log10(value) + 1e-12))
 }
 
 fn clip_ticks(mut ticks: Ticks, low: f64, high: f64) -> Ticks {
     let slack = 1e-9 * (high - low);
-    let keep = |v: f64| v >= low - slack && v <= high + slack;
-    ticks.major.retain(|(v, _)| keep(*v));
-    ticks.minor.retain(|v| keep(*v));
+    let kept = low - slack..=high + slack;
+    ticks.major.retain(|(v, _)| kept.contains(v));
+    ticks.minor.retain(|v| kept.contains(v));
     ticks
 }
 

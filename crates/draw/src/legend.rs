@@ -28,24 +28,30 @@ impl Marker {
     /// Draws the marker around `(x, y)`, `radius` pixels large.
     pub(crate) fn draw(self, svg: &mut Svg, (x, y): (f64, f64), radius: f64, color: &str) {
         let rim = format!(r##"fill="{color}" stroke="#FFFFFF" stroke-width="0.8""##);
-        let polygon = |corners: &[(f64, f64)]| {
-            let at = |(dx, dy): &(f64, f64)| {
-                format!("{} {}", SvgNumber(x + dx * radius), SvgNumber(y + dy * radius))
-            };
-            format!("M{}Z", corners.iter().map(at).collect::<Vec<_>>().join("L"))
-        };
         match self {
             Self::Circle => svg.circle((x, y), radius, rim),
-            Self::Square => {
-                svg.path(&polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]), rim)
+            Self::Square => svg.path(
+                &polygon((x, y), radius, &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
+                rim,
+            ),
+            Self::Triangle => {
+                svg.path(&polygon((x, y), radius, &[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), rim)
             }
-            Self::Triangle => svg.path(&polygon(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), rim),
-            Self::Diamond => {
-                svg.path(&polygon(&[(0.0, -1.3), (1.2, 0.0), (0.0, 1.3), (-1.2, 0.0)]), rim)
-            }
-            Self::Cross => svg.path(&polygon(&CROSS), rim),
+            Self::Diamond => svg.path(
+                &polygon((x, y), radius, &[(0.0, -1.3), (1.2, 0.0), (0.0, 1.3), (-1.2, 0.0)]),
+                rim,
+            ),
+            Self::Cross => svg.path(&polygon((x, y), radius, &CROSS), rim),
         }
     }
+}
+
+/// Returns the path of a polygon around a point, whose corners are given for a radius of 1.
+fn polygon((x, y): (f64, f64), radius: f64, corners: &[(f64, f64)]) -> String {
+    let places = corners
+        .iter()
+        .map(|(dx, dy)| format!("{} {}", SvgNumber(x + dx * radius), SvgNumber(y + dy * radius)));
+    format!("M{}Z", places.collect::<Vec<_>>().join("L"))
 }
 
 /// An upright cross with bars 0.8 radii wide.
@@ -213,8 +219,11 @@ pub(crate) fn arrowhead(
     let length = hypot(x - from.0, y - from.1);
     let ux = head_px * (x - from.0) / length;
     let uy = head_px * (y - from.1) / length;
-    let wing = |side: f64| (x - ux + side * 0.5 * uy, y - uy - side * 0.5 * ux);
-    let [(ax, ay), (bx, by)] = [wing(1.0), wing(-1.0)].map(|(x, y)| (SvgNumber(x), SvgNumber(y)));
+    let [(ax, ay), (bx, by)] = [1.0, -1.0].map(|side| {
+        let wing_x = x - ux + side * 0.5 * uy;
+        let wing_y = y - uy - side * 0.5 * ux;
+        (SvgNumber(wing_x), SvgNumber(wing_y))
+    });
     let data = format!("M{ax} {ay}L{} {}L{bx} {by}Z", SvgNumber(x), SvgNumber(y));
     let rim = r##"stroke="#FFFFFF" stroke-width="0.6""##;
     svg.path(&data, format_args!(r#"class="direction" fill="{color}" {rim}"#));

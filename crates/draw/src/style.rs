@@ -41,14 +41,15 @@ pub(crate) fn series_dash(index: usize) -> &'static str {
 
 /// Returns the dashes of the trails of bodies with these numbers, which differ where colors repeat.
 pub(crate) fn body_dashes(numbers: &BTreeSet<u32>) -> BTreeMap<u32, &'static str> {
-    let color = |number: u32| number as usize % BODY_COLORS.len();
+    // Number of bodies so far that have each color.
     let mut times = [0; BODY_COLORS.len()];
-    let dash = |&number: &u32| {
-        let time = &mut times[color(number)];
+    let mut dashes = BTreeMap::new();
+    for &number in numbers {
+        let time = &mut times[number as usize % BODY_COLORS.len()];
+        dashes.insert(number, DASHES[*time % DASHES.len()]);
         *time += 1;
-        (number, DASHES[(*time - 1) % DASHES.len()])
-    };
-    numbers.iter().map(dash).collect()
+    }
+    dashes
 }
 
 /// Returns the opacity of the bars of a series, and the color of their rim: bars of one color differ in
@@ -99,16 +100,16 @@ impl Style {
 
     /// Refuses sizes that give no picture or an absurd one.
     pub(crate) fn check(&self) -> Result<(), DrawError> {
-        let refuse = |what, value, must| Err(DrawError::Value { what, value, must });
-        for (what, side) in
+        for (what, value) in
             [("picture width in px", self.width_px), ("picture height in px", self.height_px)]
         {
-            if !(100.0..=20_000.0).contains(&side) {
-                return refuse(what, side, "100 to 20000");
+            if !(100.0..=20_000.0).contains(&value) {
+                return Err(DrawError::Value { what, value, must: "100 to 20000" });
             }
         }
         if !(4.0..=100.0).contains(&self.font_px) {
-            return refuse("text size in px", self.font_px, "4 to 100");
+            let what = "text size in px";
+            return Err(DrawError::Value { what, value: self.font_px, must: "4 to 100" });
         }
         Ok(())
     }

@@ -76,11 +76,16 @@ pub(crate) fn shorten(text: &str, size_px: f64, weight: Weight, room_px: f64) ->
     }
     let room_px = room_px - width("…", size_px, weight);
     let mut used_px = 0.0;
-    let fits = |c: &char| {
+    let mut shortened = String::new();
+    for c in text.chars() {
         used_px += width(c.encode_utf8(&mut [0; 4]), size_px, weight);
-        used_px <= room_px
-    };
-    text.chars().take_while(fits).chain(['…']).collect()
+        if used_px > room_px {
+            break;
+        }
+        shortened.push(c);
+    }
+    shortened.push('…');
+    shortened
 }
 
 #[cfg(test)]

@@ -14,8 +14,8 @@ pub(crate) struct Ticks {
 impl Ticks {
     /// Returns labeled marks at exactly these values.
     pub(crate) fn from_values(places: &[f64]) -> Self {
-        let round_trips = |digits: &usize| places.iter().all(|v| is_exact(*v, *digits));
-        let digits = (0..6).find(round_trips).unwrap_or(6);
+        let mut exact = (0..6).filter(|&digits| places.iter().all(|v| is_exact(*v, digits)));
+        let digits = exact.next().unwrap_or(6);
         Self { major: places.iter().map(|&v| (v, label(v, digits))).collect(), minor: vec![] }
     }
 
@@ -26,8 +26,8 @@ impl Ticks {
         let digits = decimals(step);
         let first = -floor(1e-9 - low / step);
         let count = (floor(high / step + 1e-9) - first).clamp(0.0, 100.0) as u32;
-        let value = |k: u32| (first + f64::from(k)) * step;
-        let major = (0..=count).map(value).map(|v| (v, label(v, digits))).collect();
+        let values = (0..=count).map(|k| (first + f64::from(k)) * step);
+        let major = values.map(|v| (v, label(v, digits))).collect();
         Self { major, minor: vec![] }
     }
 
@@ -88,11 +88,12 @@ impl DecadeRange {
     fn multiples(&self, digits: &[u8], stride: i32) -> Vec<f64> {
         let first = floor(log10(self.low)) as i32;
         let last = floor(log10(self.high)) as i32;
-        let inside = |v: &f64| *v >= self.low * (1.0 - 1e-9) && *v <= self.high * (1.0 + 1e-9);
+        // The slack keeps a mark at an end that rounding has moved out of the range.
+        let inside = self.low * (1.0 - 1e-9)..=self.high * (1.0 + 1e-9);
         (first..=last)
             .filter(|exponent| exponent.rem_euclid(stride) == 0)
             .flat_map(|exponent| digits.iter().map(move |&d| f64::from(d) * power(exponent)))
-            .filter(inside)
+            .filter(|v| inside.contains(v))
             .collect()
     }
 }
@@ -110,9 +111,9 @@ fn power(exponent: i32) -> f64 {
 pub(crate) fn nice_step(span: f64, most: usize) -> f64 {
     let raw = span / most.max(1) as f64;
     let exponent = floor(log10(raw)) as i32;
-    let enough = |step: &f64| *step >= raw * (1.0 - 1e-9);
     let steps = [1.0, 2.0, 5.0].map(|digit| digit * power(exponent));
-    steps.into_iter().find(enough).unwrap_or_else(|| power(exponent + 1))
+    let mut enough = steps.into_iter().filter(|step| *step >= raw * (1.0 - 1e-9));
+    enough.next().unwrap_or_else(|| power(exponent + 1))
 }
 
 /// Returns the number of decimals that multiples of `step` need.
@@ -123,8 +124,11 @@ pub(crate) fn decimals(step: f64) -> usize {
 fn log_labels(marks: &[f64]) -> Vec<(f64, String)> {
     // One form for all labels of an axis: decimals while the longest has at most five digits.
     let is_plain = marks.iter().all(|v| (0.000_999..=10_001.0).contains(v));
-    let label_of = |v: f64| if is_plain { decimal_label(v) } else { scientific(v, 0) };
-    marks.iter().map(|&v| (v, label_of(v))).collect()
+    let mut labels = Vec::with_capacity(marks.len());
+    for &v in marks {
+        labels.push((v, if is_plain { decimal_label(v) } else { scientific(v, 0) }));
+    }
+    labels
 }
 
 /// Returns a value as a decimal number, down to its first digit.
@@ -189,15 +193,19 @@ fn minus(number: &str) -> String {
 }
 
 fn superscript(exponent: i32) -> String {
-    let raise = |c| match c {
+    exponent.to_string().chars().map(raised).collect()
+}
+
+/// Returns the superscript of a digit or a minus.
+fn raised(c: char) -> char {
+    match c {
         '1' => '¹',
         '2' => '²',
         '3' => '³',
         '-' => '⁻',
         // The other superscripts are consecutive: ⁰, ⁴ to ⁹.
         digit => char::from_u32(0x2070 + u32::from(digit) - u32::from('0')).unwrap_or(digit),
-    };
-    exponent.to_string().chars().map(raise).collect()
+    }
 }
 
 fn is_exact(value: f64, digits: usize) -> bool {

@@ -1,15 +1,18 @@
 //! The experiments of three papers, run again, and the verdicts on their claims.
 //!
 //! ```text
-//! agentfly.rs   the source paper of the airspace world; agentfly/ has its flights over real sockets
-//! loria/        the source paper of the robots world
-//! serpentine/   the source of the chain world
-//! methods.rs    methods of the airspace world on the same traffic
-//! study.rs      a sweep file and its scenario -> the table of its runs
-//! scene.rs      the content of a picture
-//! case_results.rs the table of runs -> results of every case: as JSON, a table, points of figures
-//! claims.rs     verdicts over results
+//! agentfly.rs      the source paper of the airspace world; agentfly/ has its flights over real sockets
+//! loria/           the source paper of the robots world
+//! serpentine/      the source of the chain world
+//! methods.rs       methods of the airspace world on the same traffic
+//! study.rs         a sweep file and its scenario -> the table of its runs
+//! scene.rs         the content of a picture
+//! case_results.rs  the table of runs -> results of every case: as JSON, a table, points of figures
+//! claims.rs        verdicts over results
 //! ```
+//!
+//! Beside the sources stand the data: `scenarios/` with scenarios and sweeps, `claims/` with the claims of each paper, the rules
+//! by which they are judged, and the numbers with which rules compare. Each experiment has one constant table of its columns.
 //!
 //! Nothing here draws a figure or writes a file: results are data, reports are documents.
 

@@ -80,6 +80,14 @@ pub(crate) fn rename(from: &Path, to: &Path) -> Result<(), RecordError> {
         .map_err(|e| RecordError::new(to.display(), e))
 }
 
+/// Returns the paths of the files and folders in a folder, in no particular order.
+pub(crate) fn list(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
+    let entries = fs::read_dir(folder).and_then(|entries| {
+        entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()
+    });
+    entries.map_err(|e| RecordError::new(folder.display(), e))
+}
+
 /// The folder that holds `path`.
 pub(crate) fn parent(path: &Path) -> &Path {
     match path.parent() {

@@ -256,25 +256,28 @@ fn check_is_run(path: &Path) -> Result<(), InputError> {
 
 /// Refuses a path at which a new run must not be created.
 pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
-    let refuse = |cause, remedy: &str| Err(InputError::new(path.display(), cause, remedy));
     let mut entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(_) if !path.exists() => return Ok(()),
         Err(e) => return Err(disk::cannot_create(path, e)),
     };
-    match (entries.next().is_some(), is_run(path), existing) {
-        (false, _, _) | (true, true, IfExists::Replace) => Ok(()),
-        (true, true, IfExists::Refuse) => refuse(
+    if entries.next().is_none() {
+        return Ok(());
+    }
+    match (is_run(path), existing) {
+        (true, IfExists::Replace) => Ok(()),
+        (true, IfExists::Refuse) => Err(InputError::new(
+            path.display(),
             "the folder holds a run already",
             "resume that run, give another folder, or replace the old run (--replace)",
-        ),
-        (true, false, _) => {
+        )),
+        (false, _) => {
             let cause = if path.join(manifest::SWEEP_MANIFEST).is_file() {
                 "the folder holds a sweep"
             } else {
                 "the folder holds something else than a run"
             };
-            refuse(cause, "give a new or empty folder")
+            Err(InputError::new(path.display(), cause, "give a new or empty folder"))
         }
     }
 }

@@ -62,11 +62,13 @@ impl FromStr for FormatVersion {
     type Err = BadFormatVersion;
 
     fn from_str(text: &str) -> Result<Self, BadFormatVersion> {
-        let bad = || BadFormatVersion(text.to_string());
-        let (major, minor) = text.split_once('.').ok_or_else(bad)?;
-        let number = |digits: &str| digits.parse().map_err(|_| bad());
-        Ok(Self { major: number(major)?, minor: number(minor)? })
+        parse_version(text).ok_or_else(|| BadFormatVersion(text.to_string()))
     }
+}
+
+fn parse_version(text: &str) -> Option<FormatVersion> {
+    let (major, minor) = text.split_once('.')?;
+    Some(FormatVersion { major: major.parse().ok()?, minor: minor.parse().ok()? })
 }
 
 impl TryFrom<String> for FormatVersion {

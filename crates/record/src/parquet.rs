@@ -60,8 +60,8 @@ impl ParquetRecorder {
         cycle: u64,
     ) -> Result<Self, RecordError> {
         schemas.iter().try_for_each(check_schema)?;
-        let open = |schema: &TableSchema| TableWriter::open(folder, schema, origin, cycle);
-        Ok(Self { tables: schemas.iter().map(open).collect::<Result<_, _>>()?, broken: None })
+        let tables = schemas.iter().map(|schema| TableWriter::open(folder, schema, origin, cycle));
+        Ok(Self { tables: tables.collect::<Result<_, _>>()?, broken: None })
     }
 
     /// Does `work` unless rows are missing already, and remembers a failure.
@@ -115,8 +115,8 @@ impl TableWriter {
         origin: &Provenance,
         cycle: u64,
     ) -> Result<Self, RecordError> {
-        let failed = |e| RecordError::new(&schema.name, error_cause(e));
-        let parquet_schema = parquet_schema(schema).map_err(failed)?;
+        let parquet_schema =
+            parquet_schema(schema).map_err(|e| RecordError::new(&schema.name, error_cause(e)))?;
         let folder = parent.join(&schema.name);
         rewind(&folder, cycle)?;
         Ok(Self {
@@ -202,12 +202,10 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
         // The run was stopped after this table was finished, but before the last one was.
         disk::rename(folder, &partial)?;
     }
-    let failed = |e| RecordError::new(partial.display(), e);
-    fs::create_dir_all(&partial).map_err(failed)?;
+    fs::create_dir_all(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
     // This check must come before anything is deleted.
     check_sealed(&partial, cycle)?;
-    for entry in fs::read_dir(&partial).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
+    for path in disk::list(&partial)? {
         if is_stale(&path, cycle) {
             fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
         }
@@ -238,10 +236,8 @@ fn is_stale(path: &Path, cycle: u64) -> bool {
 
 /// Returns the complete parts in `folder`, in the order of their rows.
 pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
-    let failed = |e| RecordError::new(folder.display(), e);
     let mut parts = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
+    for path in disk::list(folder)? {
         if let Some(cycle) = path.file_name().and_then(|n| n.to_str()).and_then(first_cycle) {
             parts.push((cycle, path));
         }

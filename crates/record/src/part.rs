@@ -50,10 +50,9 @@ impl PartWriter {
             .set_key_value_metadata(Some(key_values))
             .build();
         let partial = disk::partial_path(&path);
-        let failed = |cause: String| RecordError::new(partial.display(), cause);
-        let file = File::create(&partial).map_err(|e| failed(e.to_string()))?;
+        let file = File::create(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
         let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
-            .map_err(|e| failed(error_cause(e)))?;
+            .map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
         Ok(Self { path, file, checksums: Vec::new() })
     }
 
@@ -79,18 +78,18 @@ impl PartWriter {
             file.append_key_value_metadata(KeyValue::new(key.to_string(), value));
         }
         let partial = disk::partial_path(&path);
-        let failed = |cause: String| RecordError::new(partial.display(), cause);
-        let file = file.into_inner().map_err(|e| failed(error_cause(e)))?;
-        file.sync_all().map_err(|e| failed(e.to_string()))?;
+        let file =
+            file.into_inner().map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
+        file.sync_all().map_err(|e| RecordError::new(partial.display(), e))?;
         disk::rename(&partial, &path)
     }
 }
 
 /// Returns the first cycle after the complete part at `path`; `None` at the end of a run.
 pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, RecordError> {
-    let failed = |cause: String| RecordError::new(path.display(), cause);
-    let file = File::open(path).map_err(|e| failed(e.to_string()))?;
-    let file = SerializedFileReader::new(file).map_err(|e| failed(error_cause(e)))?;
+    let file = File::open(path).map_err(|e| RecordError::new(path.display(), e))?;
+    let file = SerializedFileReader::new(file)
+        .map_err(|e| RecordError::new(path.display(), error_cause(e)))?;
     let text = schema::key_value(file.metadata(), schema::NEXT_CYCLE);
     Ok(text.and_then(|cycle| cycle.parse().ok()))
 }

@@ -14,7 +14,7 @@ use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::statistics::Statistics;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::table::Texts;
-use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, RecordError, TableSchema, Values};
 
 use crate::disk;
 use crate::format::FormatVersion;
@@ -128,12 +128,8 @@ pub fn for_each_block<E: From<InputError>>(
 /// # Errors
 /// When the folder cannot be read.
 pub fn tables(folder: &Path) -> Result<Vec<String>, InputError> {
-    let unreadable = |e: std::io::Error| {
-        InputError::new(folder.display(), e.to_string(), "make the folder readable")
-    };
     let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
+    for path in disk::list(folder).map_err(|e| unreadable(folder, &e))? {
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
         if path.is_dir() && parts(&path).is_ok_and(|parts| !parts.is_empty()) {
             names.push(name.strip_suffix(".partial").unwrap_or(name).to_string());
@@ -161,6 +157,11 @@ fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputEr
     let found = parts(if complete { &table } else { &partial })
         .map_err(|e| InputError::new(e.place, e.cause, "make the folder readable"))?;
     Ok((found, complete))
+}
+
+/// Returns the error of a folder that cannot be read.
+pub(crate) fn unreadable(folder: &Path, error: &RecordError) -> InputError {
+    InputError::new(folder.display(), error.cause.clone(), "make the folder readable")
 }
 
 pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
@@ -215,19 +216,21 @@ impl<'a> PartReader<'a> {
         let bytes = File::open(path).map_err(|e| decode_error(path, e))?;
         let file = bytes.try_clone().map_err(|e| decode_error(path, e))?;
         let file = SerializedFileReader::new(file).map_err(|e| damaged(path, error_cause(e)))?;
-        let text = |key| required_value(path, file.metadata(), key);
-        let format: FormatVersion =
-            text(schema::FORMAT)?.parse().map_err(|e| decode_error(path, e))?;
+        // The format first: a file of another major version may have other keys.
+        let format = required_value(path, file.metadata(), schema::FORMAT)?;
+        let format: FormatVersion = format.parse().map_err(|e| decode_error(path, e))?;
         format.check_readable(path.display())?;
-        let columns = schema::columns_from_json(&text(schema::COLUMNS)?)
-            .map_err(|e| decode_error(path, e))?;
+        let columns = required_value(path, file.metadata(), schema::COLUMNS)?;
+        let columns = schema::columns_from_json(&columns).map_err(|e| decode_error(path, e))?;
+        let seed = required_value(path, file.metadata(), schema::SEED)?;
         let origin = Provenance {
-            program_version: text(schema::VERSION)?,
-            scenario: text(schema::SCENARIO)?,
-            seed: text(schema::SEED)?.parse().map_err(|e| decode_error(path, e))?,
+            program_version: required_value(path, file.metadata(), schema::VERSION)?,
+            scenario: required_value(path, file.metadata(), schema::SCENARIO)?,
+            seed: seed.parse().map_err(|e| decode_error(path, e))?,
         };
-        let checksums = schema::checksums_from_text(&text(schema::CHECKSUMS)?)
-            .map_err(|e| decode_error(path, e))?;
+        let checksums = required_value(path, file.metadata(), schema::CHECKSUMS)?;
+        let checksums =
+            schema::checksums_from_text(&checksums).map_err(|e| decode_error(path, e))?;
         let about = match schema::key_value(file.metadata(), schema::ABOUT) {
             Some(json) => schema::about_from_json(json).map_err(|e| decode_error(path, e))?,
             // Files of earlier versions have none.
@@ -242,15 +245,15 @@ impl<'a> PartReader<'a> {
     /// Checks that the columns have the types that the key-value pairs declare.
     fn check_types(&self) -> Result<(), InputError> {
         let stored = self.file.metadata().file_metadata().schema_descr();
-        let fits = |(i, c): (usize, &ColumnSpec)| {
-            let column = stored.column(i);
-            column.name() == c.name
-                && column.physical_type() == schema::physical_type(c.ty)
-                && column.max_def_level() == i16::from(c.is_nullable)
-                && column.max_rep_level() == 0
-        };
         let columns = &self.schema.columns;
-        if stored.num_columns() == columns.len() && columns.iter().enumerate().all(fits) {
+        let all_fit = stored.num_columns() == columns.len()
+            && columns.iter().zip(stored.columns()).all(|(spec, column)| {
+                column.name() == spec.name
+                    && column.physical_type() == schema::physical_type(spec.ty)
+                    && column.max_def_level() == i16::from(spec.is_nullable)
+                    && column.max_rep_level() == 0
+            });
+        if all_fit {
             return Ok(());
         }
         Err(damaged(self.path, format!("its columns are not those of `{}`", schema::COLUMNS)))
@@ -291,15 +294,16 @@ impl<'a> PartReader<'a> {
         check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
         let group = self.file.get_row_group(group)?;
         let rows = group.metadata().num_rows();
-        let column = |(i, spec): (usize, &ColumnSpec)| {
+        let mut columns = Vec::with_capacity(self.schema.columns.len());
+        for (i, spec) in self.schema.columns.iter().enumerate() {
             let values = read_column(group.get_column_reader(i)?, spec)?;
             if i64::try_from(values.len()) != Ok(rows) {
                 let cause = format!("column `{}` has not {rows} rows", spec.name);
                 return Err(ParquetError::General(cause));
             }
-            Ok(values)
-        };
-        self.schema.columns.iter().enumerate().map(column).collect()
+            columns.push(values);
+        }
+        Ok(columns)
     }
 }
 
@@ -327,30 +331,36 @@ pub(crate) fn check_bytes(
     group: usize,
     checksums: &[u32],
 ) -> ParquetResult<()> {
-    let wrong = |cause: &str| ParquetError::General(format!("row group {group} {cause}"));
-    let (start, length) =
-        extent(metadata.row_group(group)).ok_or_else(|| wrong("has no place in the file"))?;
+    let Some((start, length)) = extent(metadata.row_group(group)) else {
+        return Err(group_error(group, "has no place in the file"));
+    };
     // Checked before that much memory is allocated.
     if start + length > Length::len(bytes) {
-        return Err(wrong("reaches beyond the end of the file"));
+        return Err(group_error(group, "reaches beyond the end of the file"));
     }
     let bytes = bytes.get_bytes(start, length as usize)?;
     if checksums.get(group) != Some(&crc32fast::hash(&bytes)) {
-        return Err(wrong("does not match its checksum"));
+        return Err(group_error(group, "does not match its checksum"));
     }
     Ok(())
+}
+
+fn group_error(group: usize, cause: &str) -> ParquetError {
+    ParquetError::General(format!("row group {group} {cause}"))
+}
+
+/// Returns the start of a column's bytes: the dictionary comes first, if there is one.
+fn chunk_start(column: &ColumnChunkMetaData) -> Option<u64> {
+    u64::try_from(column.dictionary_page_offset().unwrap_or(column.data_page_offset())).ok()
 }
 
 /// Returns start and length of a row group's bytes; `None` unless its columns are contiguous, as
 /// they were written.
 fn extent(group: &RowGroupMetaData) -> Option<(u64, u64)> {
-    let begin = |c: &ColumnChunkMetaData| {
-        u64::try_from(c.dictionary_page_offset().unwrap_or(c.data_page_offset())).ok()
-    };
-    let start = begin(group.columns().first()?)?;
+    let start = chunk_start(group.columns().first()?)?;
     let mut end = start;
     for column in group.columns() {
-        if begin(column)? != end {
+        if chunk_start(column)? != end {
             return None;
         }
         end = end.checked_add(column.compressed_size().try_into().ok()?)?;

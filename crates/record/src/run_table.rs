@@ -20,7 +20,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{FileReader, RowGroupReader};
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::{Type, TypePtr};
+use parquet::schema::types::{ColumnDescriptor, Type, TypePtr};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -89,27 +89,31 @@ impl TableStream {
         program_version: &str,
         extra: &[(&str, String)],
     ) -> Result<Self, RecordError> {
-        let partial = disk::partial_path(path);
-        let hash = SharedChecksum::default();
-        let create = || {
-            let sink = HashingWriter { file: File::create(&partial)?, hash: hash.clone() };
-            let pairs = key_values(columns, program_version, extra)?;
-            let schema = parquet_schema(columns)?;
-            let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
-            writer.flush()?;
-            Ok(writer)
-        };
-        let writer = create();
-        hash.take();
         let mut table = Self {
             path: path.into(),
-            partial: partial.clone(),
-            hash,
+            partial: disk::partial_path(path),
+            hash: SharedChecksum::default(),
             checksums: Vec::new(),
             writer: None,
         };
-        table.writer = Some(writer.map_err(|e: ParquetError| table.write_error(e))?);
+        let pairs = key_values(columns, program_version, extra);
+        let writer = pairs.and_then(|pairs| table.start(columns, pairs));
+        table.writer = Some(writer.map_err(|e| table.write_error(e))?);
+        // The checksum of a group is that of its own bytes, without those before the first one.
+        table.hash.take();
         Ok(table)
+    }
+
+    fn start<R>(
+        &self,
+        columns: &[&RoleColumn<R>],
+        pairs: Vec<KeyValue>,
+    ) -> ParquetResult<SerializedFileWriter<HashingWriter>> {
+        let sink = HashingWriter { file: File::create(&self.partial)?, hash: self.hash.clone() };
+        let schema = parquet_schema(columns)?;
+        let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
+        writer.flush()?;
+        Ok(writer)
     }
 
     /// Appends rows, in the columns with which it was created.
@@ -175,39 +179,43 @@ fn key_values<R: Serialize>(
     program_version: &str,
     extra: &[(&str, String)],
 ) -> ParquetResult<Vec<KeyValue>> {
-    let json = |e: serde_json::Error| ParquetError::External(Box::new(e));
-    let entry = |c: &&RoleColumn<R>| {
-        Ok(RoleColumnEntry { name: c.name.clone(), role: serde_json::to_value(&c.role)? })
-    };
-    let entries = columns.iter().map(entry).collect::<Result<Vec<_>, _>>().map_err(json)?;
-    let entries = serde_json::to_string(&entries).map_err(json)?;
-    let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
+    let entries = entries_json(columns).map_err(|e| ParquetError::External(Box::new(e)))?;
     let mut pairs = vec![
-        pair(FORMAT, format::CURRENT.to_string()),
-        pair(VERSION, program_version.to_string()),
-        pair(COLUMNS, entries),
+        KeyValue::new(FORMAT.to_string(), format::CURRENT.to_string()),
+        KeyValue::new(VERSION.to_string(), program_version.to_string()),
+        KeyValue::new(COLUMNS.to_string(), entries),
     ];
-    pairs.extend(extra.iter().map(|(key, value)| pair(key, value.clone())));
+    pairs.extend(extra.iter().map(|(key, value)| KeyValue::new(key.to_string(), value.clone())));
     Ok(pairs)
 }
 
+fn entries_json<R: Serialize>(columns: &[&RoleColumn<R>]) -> serde_json::Result<String> {
+    let mut entries = Vec::with_capacity(columns.len());
+    for column in columns {
+        let role = serde_json::to_value(&column.role)?;
+        entries.push(RoleColumnEntry { name: column.name.clone(), role });
+    }
+    serde_json::to_string(&entries)
+}
+
 fn parquet_schema<R>(columns: &[&RoleColumn<R>]) -> ParquetResult<TypePtr> {
-    let field = |column: &&RoleColumn<R>| {
-        let (physical, logical) = match column.values.ty() {
-            ColumnType::I64 => (PhysicalType::INT64, None),
-            ColumnType::F64 => (PhysicalType::DOUBLE, None),
-            ColumnType::Bool => (PhysicalType::BOOLEAN, None),
-            ColumnType::Text => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
-            other => return Err(wrong_type(&column.name, other)),
-        };
-        let field = Type::primitive_type_builder(&column.name, physical)
-            .with_repetition(Repetition::OPTIONAL)
-            .with_logical_type(logical)
-            .build()?;
-        Ok(Arc::new(field))
-    };
-    let fields = columns.iter().map(field).collect::<ParquetResult<_>>()?;
+    let fields = columns.iter().map(|column| field(column)).collect::<ParquetResult<_>>()?;
     Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
+}
+
+fn field<R>(column: &RoleColumn<R>) -> ParquetResult<TypePtr> {
+    let (physical, logical) = match column.values.ty() {
+        ColumnType::I64 => (PhysicalType::INT64, None),
+        ColumnType::F64 => (PhysicalType::DOUBLE, None),
+        ColumnType::Bool => (PhysicalType::BOOLEAN, None),
+        ColumnType::Text => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+        other => return Err(wrong_type(&column.name, other)),
+    };
+    let field = Type::primitive_type_builder(&column.name, physical)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(logical)
+        .build()?;
+    Ok(Arc::new(field))
 }
 
 fn wrong_type(column: &str, ty: ColumnType) -> ParquetError {
@@ -220,8 +228,9 @@ fn write_column<R>(
     RoleColumn { name, values, .. }: &RoleColumn<R>,
     rows: Range<usize>,
 ) -> ParquetResult<()> {
-    let too_few = || ParquetError::General("a column more than the schema has".into());
-    let mut column = group.next_column()?.ok_or_else(too_few)?;
+    let Some(mut column) = group.next_column()? else {
+        return Err(ParquetError::General("a column more than the schema has".into()));
+    };
     let levels: Vec<i16> = match values.valid() {
         None => vec![1; rows.len()],
         Some(valid) => valid[rows.clone()].iter().map(|valid| i16::from(*valid)).collect(),
@@ -311,39 +320,72 @@ pub fn read_blocks<R: DeserializeOwned + Clone>(
     path: &Path,
     mut each: impl FnMut(LoadedTable<R>),
 ) -> Result<(), InputError> {
-    let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
-    let failed = |e| damaged(path, error_cause(e));
-    let copy = bytes.try_clone().map_err(|e| failed(e.into()))?;
-    let file = SerializedFileReader::new(copy).map_err(failed)?;
-    let text = |key| required_value(path, file.metadata(), key);
-    let wrong = |e: &dyn std::fmt::Display| damaged(path, e.to_string());
-    let format: FormatVersion = text(FORMAT)?.parse().map_err(|e| wrong(&e))?;
-    format.check_readable(path.display())?;
-    let program_version = text(VERSION)?;
-    let entries: Vec<RoleColumnEntry> =
-        serde_json::from_str(&text(COLUMNS)?).map_err(|e| wrong(&e))?;
-    let checksums = schema::checksums_from_text(&text(CHECKSUMS)?).map_err(|e| wrong(&e))?;
-    let empty = empty_values(&file, &entries).map_err(failed)?;
-    let roles: Vec<Option<R>> =
-        entries.iter().map(|entry| serde_json::from_value(entry.role.clone()).ok()).collect();
-    let mut pass_on = |values: Vec<Values>| {
-        let column = |((entry, role), values): ((&RoleColumnEntry, &Option<R>), Values)| {
-            Some(RoleColumn { name: entry.name.clone(), role: role.clone()?, values })
-        };
-        let columns = entries.iter().zip(&roles).zip(values).filter_map(column).collect();
-        each(LoadedTable { columns, program_version: program_version.clone() });
-    };
-    if file.num_row_groups() == 0 {
-        pass_on(empty.clone());
+    let reader = TableReader::open(path)?;
+    if reader.file.num_row_groups() == 0 {
+        each(reader.table(reader.empty.clone()));
     }
-    for group in 0..file.num_row_groups() {
-        let mut values = empty.clone();
-        check_bytes(&bytes, file.metadata(), group, &checksums).map_err(failed)?;
-        read_group(file.get_row_group(group).map_err(failed)?.as_ref(), &mut values)
-            .map_err(failed)?;
-        pass_on(values);
+    for group in 0..reader.file.num_row_groups() {
+        let values = reader.read_group(group).map_err(|e| damaged(path, error_cause(e)))?;
+        each(reader.table(values));
     }
     Ok(())
+}
+
+/// An open table, with the description of its columns.
+struct TableReader<R> {
+    bytes: File,
+    file: SerializedFileReader<File>,
+    program_version: String,
+    checksums: Vec<u32>,
+    names: Vec<String>,
+    /// The role of each column; `None` for those that this version does not have, which are left out.
+    roles: Vec<Option<R>>,
+    /// A column without rows for each of the file.
+    empty: Vec<Values>,
+}
+
+impl<R: DeserializeOwned + Clone> TableReader<R> {
+    fn open(path: &Path) -> Result<Self, InputError> {
+        let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
+        let copy = bytes.try_clone().map_err(|e| damaged(path, e.to_string()))?;
+        let file = SerializedFileReader::new(copy).map_err(|e| damaged(path, error_cause(e)))?;
+        let format = required_value(path, file.metadata(), FORMAT)?;
+        let format: FormatVersion = format.parse().map_err(|e| wrong_value(path, e))?;
+        format.check_readable(path.display())?;
+        let program_version = required_value(path, file.metadata(), VERSION)?;
+        let entries = required_value(path, file.metadata(), COLUMNS)?;
+        let entries: Vec<RoleColumnEntry> =
+            serde_json::from_str(&entries).map_err(|e| wrong_value(path, e))?;
+        let checksums = required_value(path, file.metadata(), CHECKSUMS)?;
+        let checksums =
+            schema::checksums_from_text(&checksums).map_err(|e| wrong_value(path, e))?;
+        let empty = empty_values(&file, &entries).map_err(|e| damaged(path, error_cause(e)))?;
+        let roles =
+            entries.iter().map(|entry| serde_json::from_value(entry.role.clone()).ok()).collect();
+        let names = entries.into_iter().map(|entry| entry.name).collect();
+        Ok(Self { bytes, file, program_version, checksums, names, roles, empty })
+    }
+
+    fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
+        check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
+        let mut values = self.empty.clone();
+        read_group(self.file.get_row_group(group)?.as_ref(), &mut values)?;
+        Ok(values)
+    }
+
+    fn table(&self, values: Vec<Values>) -> LoadedTable<R> {
+        let mut columns = Vec::new();
+        for ((name, role), values) in self.names.iter().zip(&self.roles).zip(values) {
+            if let Some(role) = role.clone() {
+                columns.push(RoleColumn { name: name.clone(), role, values });
+            }
+        }
+        LoadedTable { columns, program_version: self.program_version.clone() }
+    }
+}
+
+fn wrong_value(path: &Path, error: impl std::fmt::Display) -> InputError {
+    damaged(path, error.to_string())
 }
 
 /// Returns the values of key-value pairs of the table in the file at `path`, as far as it has them.
@@ -357,8 +399,7 @@ pub(crate) fn read_key_values<const N: usize>(
     let bytes = File::open(path).map_err(|e| cannot_open(path, &e))?;
     let file = SerializedFileReader::new(bytes).map_err(|e| damaged(path, error_cause(e)))?;
     let pairs = file.metadata().file_metadata().key_value_metadata();
-    let value = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.clone();
-    Ok(keys.map(value))
+    Ok(keys.map(|key| pairs?.iter().find(|pair| pair.key == key)?.value.clone()))
 }
 
 fn cannot_open(path: &Path, e: &io::Error) -> InputError {
@@ -371,25 +412,28 @@ fn empty_values(
     entries: &[RoleColumnEntry],
 ) -> ParquetResult<Vec<Values>> {
     let stored = file.metadata().file_metadata().schema_descr();
-    let wrong = || ParquetError::General(format!("its columns are not those of `{COLUMNS}`"));
     if stored.num_columns() != entries.len() {
-        return Err(wrong());
+        return Err(columns_differ());
     }
-    let values = |(i, entry): (usize, &RoleColumnEntry)| {
-        let column = stored.column(i);
-        if column.name() != entry.name || column.max_def_level() != 1 || column.max_rep_level() != 0
-        {
-            return Err(wrong());
-        }
-        match column.physical_type() {
-            PhysicalType::INT64 => Ok(Values::empty(ColumnType::I64)),
-            PhysicalType::DOUBLE => Ok(Values::empty(ColumnType::F64)),
-            PhysicalType::BOOLEAN => Ok(Values::empty(ColumnType::Bool)),
-            PhysicalType::BYTE_ARRAY => Ok(Values::empty(ColumnType::Text)),
-            _ => Err(wrong()),
-        }
-    };
-    entries.iter().enumerate().map(values).collect()
+    let columns = entries.iter().zip(stored.columns());
+    columns.map(|(entry, column)| empty_column(entry, column)).collect()
+}
+
+fn empty_column(entry: &RoleColumnEntry, column: &ColumnDescriptor) -> ParquetResult<Values> {
+    if column.name() != entry.name || column.max_def_level() != 1 || column.max_rep_level() != 0 {
+        return Err(columns_differ());
+    }
+    match column.physical_type() {
+        PhysicalType::INT64 => Ok(Values::empty(ColumnType::I64)),
+        PhysicalType::DOUBLE => Ok(Values::empty(ColumnType::F64)),
+        PhysicalType::BOOLEAN => Ok(Values::empty(ColumnType::Bool)),
+        PhysicalType::BYTE_ARRAY => Ok(Values::empty(ColumnType::Text)),
+        _ => Err(columns_differ()),
+    }
+}
+
+fn columns_differ() -> ParquetError {
+    ParquetError::General(format!("its columns are not those of `{COLUMNS}`"))
 }
 
 fn read_group(group: &dyn RowGroupReader, columns: &mut [Values]) -> ParquetResult<()> {

@@ -73,23 +73,30 @@ mod type_name {
 /// Refuses a schema that cannot become a file: a name that is not a plain file name, no columns,
 /// two columns with the same name, two labels with the same text.
 pub(crate) fn check_schema(schema: &TableSchema) -> std::result::Result<(), RecordError> {
-    let wrong = |cause: String| Err(RecordError::new(&schema.name, cause));
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if schema.name.is_empty() || !schema.name.chars().all(plain) {
-        return wrong("a table's name has letters, digits, `_` and `-` only".into());
+    match schema_fault(schema) {
+        Some(cause) => Err(RecordError::new(&schema.name, cause)),
+        None => Ok(()),
+    }
+}
+
+fn schema_fault(schema: &TableSchema) -> Option<String> {
+    let mut characters = schema.name.chars();
+    let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    if schema.name.is_empty() || !is_plain {
+        return Some("a table's name has letters, digits, `_` and `-` only".into());
     }
     if schema.columns.is_empty() {
-        return wrong("a table has at least one column".into());
+        return Some("a table has at least one column".into());
     }
     if let Some(name) = first_duplicate(schema.columns.iter().map(|c| &c.name)) {
-        return wrong(format!("two columns are named `{name}`"));
+        return Some(format!("two columns are named `{name}`"));
     }
     for column in &schema.columns {
         if let Some(label) = first_duplicate(column.labels.iter()) {
-            return wrong(format!("column `{}` has the label `{label}` twice", column.name));
+            return Some(format!("column `{}` has the label `{label}` twice", column.name));
         }
     }
-    Ok(())
+    None
 }
 
 /// Returns the first text, in sorted order, that occurs more than once.
@@ -136,15 +143,15 @@ pub(crate) fn physical_type(ty: ColumnType) -> PhysicalType {
 
 /// Returns the key-value pairs of a file of `schema`.
 pub(crate) fn key_values(schema: &TableSchema, origin: &Provenance) -> Vec<KeyValue> {
-    let pair = |key: &str, value: String| KeyValue::new(key.to_string(), value);
-    vec![
-        pair(FORMAT, format::CURRENT.to_string()),
-        pair(VERSION, origin.program_version.clone()),
-        pair(SCENARIO, origin.scenario.clone()),
-        pair(SEED, origin.seed.to_string()),
-        pair(COLUMNS, columns_to_json(&schema.columns)),
-        pair(ABOUT, about_to_json(&schema.about)),
-    ]
+    let pairs = [
+        (FORMAT, format::CURRENT.to_string()),
+        (VERSION, origin.program_version.clone()),
+        (SCENARIO, origin.scenario.clone()),
+        (SEED, origin.seed.to_string()),
+        (COLUMNS, columns_to_json(&schema.columns)),
+        (ABOUT, about_to_json(&schema.about)),
+    ];
+    pairs.into_iter().map(|(key, value)| KeyValue::new(key.to_string(), value)).collect()
 }
 
 /// Returns the value of `key` in a file's footer.
@@ -154,14 +161,14 @@ pub(crate) fn key_value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<
 }
 
 fn columns_to_json(columns: &[ColumnSpec]) -> String {
-    let entry = |c: &ColumnSpec| ColumnEntry {
+    let entries = columns.iter().map(|c| ColumnEntry {
         name: c.name.clone(),
         ty: c.ty,
         meaning: c.meaning.clone(),
         labels: c.labels.clone(),
         nullable: c.is_nullable,
-    };
-    let entries: Vec<_> = columns.iter().map(entry).collect();
+    });
+    let entries: Vec<_> = entries.collect();
     serde_json::to_string(&entries).expect("texts and lists always become JSON")
 }
 
@@ -171,14 +178,14 @@ fn columns_to_json(columns: &[ColumnSpec]) -> String {
 /// Text that is not a list of columns.
 pub(crate) fn columns_from_json(text: &str) -> serde_json::Result<Vec<ColumnSpec>> {
     let entries: Vec<ColumnEntry> = serde_json::from_str(text)?;
-    let spec = |e: ColumnEntry| ColumnSpec {
+    let specs = entries.into_iter().map(|e| ColumnSpec {
         name: e.name,
         ty: e.ty,
         meaning: e.meaning,
         labels: e.labels,
         is_nullable: e.nullable,
-    };
-    Ok(entries.into_iter().map(spec).collect())
+    });
+    Ok(specs.collect())
 }
 
 fn about_to_json(about: &[(String, String)]) -> String {
@@ -192,8 +199,11 @@ fn about_to_json(about: &[(String, String)]) -> String {
 /// Text that is not an object of texts.
 pub(crate) fn about_from_json(text: &str) -> serde_json::Result<Vec<(String, String)>> {
     let facts: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text)?;
-    let fact = |(name, value)| Ok((name, serde_json::from_value(value)?));
-    facts.into_iter().map(fact).collect()
+    let mut about = Vec::with_capacity(facts.len());
+    for (name, value) in facts {
+        about.push((name, serde_json::from_value(value)?));
+    }
+    Ok(about)
 }
 
 /// Returns the value of [`CHECKSUMS`].

@@ -48,21 +48,21 @@ impl StagingFolder {
     /// Moves the folder to its place, replacing anything there.
     pub(crate) fn commit(mut self) -> Result<(), InputError> {
         let target = &self.target;
-        let failed = |e| cannot_create(target, e);
+        // The old folder is kept beside the new one until that is in place: a failure leaves one of them whole.
         let old = hidden_sibling(target, "old")?;
-        remove_if_exists(&old).map_err(failed)?;
+        remove_if_exists(&old).map_err(|e| cannot_create(target, e))?;
         let replaces = target.exists();
         if replaces {
-            fs::rename(target, &old).map_err(failed)?;
+            fs::rename(target, &old).map_err(|e| cannot_create(target, e))?;
         }
         if let Err(e) = disk::rename(&self.path, target) {
             if replaces {
                 let _ = fs::rename(&old, target);
             }
-            return Err(failed(io::Error::other(e.cause)));
+            return Err(cannot_create(target, e.cause));
         }
         self.made.clear();
-        remove_if_exists(&old).map_err(failed)
+        remove_if_exists(&old).map_err(|e| cannot_create(target, e))
     }
 }
 
@@ -87,9 +87,9 @@ pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
     if !target.is_symlink() {
         return Ok(target);
     }
-    let to_nowhere =
-        |e: io::Error| io::Error::new(e.kind(), format!("a link to what is not there ({e})"));
-    target.canonicalize().map_err(to_nowhere)
+    target
+        .canonicalize()
+        .map_err(|e| io::Error::new(e.kind(), format!("a link to what is not there ({e})")))
 }
 
 /// Returns a hidden name in the same folder that no other process uses.

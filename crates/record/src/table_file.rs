@@ -31,8 +31,8 @@ impl TableFileWriter {
         origin: &Provenance,
     ) -> Result<Self, RecordError> {
         check_schema(schema)?;
-        let failed = |e| RecordError::new(&schema.name, error_cause(e));
-        let stored = parquet_schema(schema).map_err(failed)?;
+        let stored =
+            parquet_schema(schema).map_err(|e| RecordError::new(&schema.name, error_cause(e)))?;
         Ok(Self {
             group: RowGroup::new(schema, &stored),
             part: Some(PartWriter::create(path.to_path_buf(), stored, key_values(schema, origin))?),

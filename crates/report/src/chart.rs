@@ -63,10 +63,9 @@ const HALF_RANGE_FRACTION: f64 = 0.54;
 /// Returns a plot with axes of the same range, around the middle of the trajectories: otherwise angles would be distorted.
 fn trajectory_plot(figure: &Figure) -> Plot {
     let plot = plot(figure, Mark::Path);
-    let points = || figure.series.iter().flat_map(|s| &s.points);
-    let (Some(x), Some(y)) = (extent(points().map(|p| p.x)), extent(points().map(|p| p.y))) else {
-        return plot;
-    };
+    let points = figure.series.iter().flat_map(|s| &s.points);
+    let Some(x) = extent(points.clone().map(|p| p.x)) else { return plot };
+    let Some(y) = extent(points.map(|p| p.y)) else { return plot };
     let half = HALF_RANGE_FRACTION * (x.1 - x.0).max(y.1 - y.0);
     if half <= 0.0 || !half.is_finite() {
         return plot;

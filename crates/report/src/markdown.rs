@@ -42,9 +42,16 @@ pub fn table(table: &Table) -> String {
 
 /// Returns cells that are Markdown already, in their columns.
 fn grid(columns: &[String], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-    let rule = format!("|{}\n", "---|".repeat(columns.len()));
-    std::iter::once(line(columns)).chain([rule]).chain(rows.map(|row| line(&row))).collect()
+    let mut text = grid_line(columns);
+    text += &format!("|{}\n", "---|".repeat(columns.len()));
+    for row in rows {
+        text += &grid_line(&row);
+    }
+    text
+}
+
+fn grid_line(cells: &[String]) -> String {
+    format!("| {} |\n", cells.join(" | "))
 }
 
 fn claims_table(claims: &[Claim]) -> String {
@@ -74,8 +81,8 @@ fn claim_row(claim: &Claim, has_figure: bool) -> Vec<String> {
 }
 
 fn fact_list(facts: &[(String, Text)]) -> String {
-    let line = |(name, value): &(String, Text)| format!("- {}: {}", escaped(name), spans(value));
-    facts.iter().map(line).collect::<Vec<_>>().join("\n")
+    let lines = facts.iter().map(|(name, value)| format!("- {}: {}", escaped(name), spans(value)));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 fn picture_block(title: &str, note: &str, folder: &str, picture: Option<&SvgFile>) -> String {
@@ -127,8 +134,7 @@ fn plain_cell(words: &str) -> String {
 /// Returns text in which Markdown and its HTML find no markup.
 fn escaped(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
-    let is_word = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
-    let mut before = None;
+    let mut before: Option<char> = None;
     let mut rest = words.chars().peekable();
     while let Some(c) = rest.next() {
         let next = rest.peek().copied();
@@ -138,7 +144,11 @@ fn escaped(words: &str) -> String {
             '<' => text.push_str("&lt;"),
             // An underscore inside a word is not markup; brackets are markup only before an
             // address.
-            '_' if is_word(before) && is_word(next) => text.push(c),
+            '_' if before.is_some_and(char::is_alphanumeric)
+                && next.is_some_and(char::is_alphanumeric) =>
+            {
+                text.push(c);
+            }
             ']' if !matches!(next, Some('(' | '[' | ':')) => text.push(c),
             '\\' | '`' | '*' | '_' | ']' | '~' => text.extend(['\\', c]),
             _ => text.push(c),

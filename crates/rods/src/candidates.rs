@@ -75,11 +75,12 @@ pub(super) fn clamped(d: f64, min_m: f64, max_m: f64) -> f64 {
     if t < max_m { t } else { max_m }
 }
 
-/// Most alternating projections onto a box and onto the allowed lengths of the rod. They converge slowly
-/// where the two sets only touch.
+/// Largest number of alternating projections onto a box and onto the allowed lengths of the rod. They converge
+/// slowly where the two sets only touch; then the slave objects, although there may be a place.
 const MAX_BOX_ROUNDS: usize = 200;
 
-/// Relative rounding of distances.
+/// Relative margin beyond which a direction is skipped without a check because it is too far: well above rounding, so
+/// that none is skipped that the check itself would accept.
 const ROUNDING: f64 = 1e-9;
 
 /// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
@@ -105,12 +106,9 @@ impl<const D: usize> MotionContext<'_, D> {
             return self.place_on_line(step, scratch);
         }
         let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
-        let objection = match self.check_place(step, guided) {
-            Ok(()) => {
-                scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
-                return Ok(());
-            }
-            Err(objection) => objection,
+        let Err(objection) = self.check_place(step, guided) else {
+            scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
+            return Ok(());
         };
         if objection.reason == VetoReason::Mobility
             && let Some(at) = self.place_in_box(step, guided)
@@ -203,26 +201,10 @@ impl<const D: usize> MotionContext<'_, D> {
         scratch: &mut CandidateScratch<D>,
     ) -> Result<(), PendingVeto> {
         self.collect_blocks(step, distance(step.mn, guided), scratch);
-        let rod = [step.mn, guided];
-        let hit = scratch
-            .blocks
-            .iter()
-            .map(|b| (b.core.nearest_to_segment(rod), b.radius_m + step.rod.radius_m, b.name))
-            .filter(|(nearest, radius_m, _)| nearest.distance_m < *radius_m)
-            .min_by(|(a, _, a_name), (b, _, b_name)| {
-                let a_m = distance(a.on_body, step.mn);
-                let b_m = distance(b.on_body, step.mn);
-                a_m.total_cmp(&b_m).then(a_name.cmp(b_name))
-            });
-        let length_m = distance(step.mn, guided);
-        let at = hit
-            .and_then(|(nearest, radius_m, _)| {
-                let to = sub(nearest.on_core, step.mn);
-                let cosine = cosine_of_half_angle(norm(to), radius_m, length_m, false)?;
-                let u = direction_off(guide_line(step), normalized(to)?, cosine);
-                Some(add_scaled(step.mn, u, length_m))
-            })
-            .unwrap_or(guided);
+        let hits = scratch.blocks.iter().filter_map(|block| RodHit::find(step, guided, block));
+        let first = hits
+            .min_by(|a, b| a.from_master_m.total_cmp(&b.from_master_m).then(a.name.cmp(&b.name)));
+        let at = first.and_then(|hit| hit.tangent_place(step, guided)).unwrap_or(guided);
         if !self.may_be_at(step.slave, at) {
             return Err(PendingVeto::new(VetoReason::Mobility));
         }
@@ -241,6 +223,8 @@ impl<const D: usize> MotionContext<'_, D> {
     ) -> Result<(), PendingVeto> {
         let Rod { min_m, max_m, .. } = step.rod;
         self.collect_blocks(step, max_m, scratch);
+        // The present length first, because it is nearly always free and moves the slave least. Of all others in the
+        // interval these three stand for a short, a long and a middle one.
         let own_m = distance(step.mn, guided);
         let lengths_m = [own_m, min_m, max_m, 0.5 * (min_m + max_m)];
         let n = if min_m < max_m { 4 } else { 1 };
@@ -271,26 +255,12 @@ impl<const D: usize> MotionContext<'_, D> {
         let u0 = guide_line(step);
         let CandidateScratch { blocks, arcs, found, has_other_side, .. } = scratch;
         let finds_all = scratch.all_lengths || scratch.both_sides;
-        let mut add = |u: Point<D>, informative: &mut Option<PendingVeto>| {
-            let at = add_scaled(step.mn, u, length_m);
-            match self.check_place(step, at) {
-                Ok(()) => {
-                    found.push(Candidate { at, rotated: true, turn_rad: angle_rad(u0, u) });
-                    true
-                }
-                Err(objection) => {
-                    keep_informative(informative, objection);
-                    false
-                }
-            }
-        };
+        let mut turns = TurnedPlaces { context: self, step, length_m, u0, found, informative };
         if D == 2 {
             let plane = PlanarRod { step, length_m, u0: to_plane(u0), blocks };
             let mut sides = plane.free_directions(arcs);
-            while let Some(u) = sides.next(|u| {
-                informative.is_some() && self.is_too_far(step, add_scaled(step.mn, u, length_m))
-            }) {
-                if add(u, informative) && !finds_all {
+            while let Some(u) = sides.next(|u| turns.is_useless(u)) {
+                if turns.add(u) && !finds_all {
                     *has_other_side = sides.has_more();
                     break;
                 }
@@ -301,12 +271,11 @@ impl<const D: usize> MotionContext<'_, D> {
         let inside = blocks.iter().filter(|b| contains_master(step, b)).map(|b| b.name).min();
         blocks.retain(|b| !contains_master(step, b));
         let search = DirectionSearch { step, length_m, blocks };
-        let turned = search.turn_away(u0);
-        if !turned.is_some_and(|u| add(u, informative)) {
-            let is_good = |u| self.check_place(step, add_scaled(step.mn, u, length_m)).is_ok();
-            if let Some(u) = search.rings(u0, is_good) {
-                add(u, informative);
-            }
+        if search.turn_away(u0).is_some_and(|u| turns.add(u)) {
+            return inside;
+        }
+        if let Some(u) = search.rings(u0, |u| turns.is_valid(u)) {
+            turns.add(u);
         }
         inside
     }
@@ -335,6 +304,80 @@ impl<const D: usize> MotionContext<'_, D> {
     }
 }
 
+/// An obstacle that a rod meets in the direction of its guide line.
+struct RodHit<const D: usize> {
+    /// The point of the obstacle's core that is nearest to the rod.
+    on_core: Point<D>,
+    radius_m: f64,
+    /// Distance from the master at which the rod meets it.
+    from_master_m: f64,
+    name: BlockOwner,
+}
+
+impl<const D: usize> RodHit<D> {
+    fn find(step: &SlaveStep<D>, guided: Point<D>, block: &Block<D>) -> Option<Self> {
+        let nearest = block.core.nearest_to_segment([step.mn, guided]);
+        let radius_m = block.radius_m + step.rod.radius_m;
+        (nearest.distance_m < radius_m).then(|| Self {
+            on_core: nearest.on_core,
+            radius_m,
+            from_master_m: distance(nearest.on_body, step.mn),
+            name: block.name,
+        })
+    }
+
+    /// Returns the slave's place when the rod has turned to the tangent of the obstacle.
+    fn tangent_place(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
+        let length_m = distance(step.mn, guided);
+        let to = sub(self.on_core, step.mn);
+        let cosine = cosine_of_half_angle(norm(to), self.radius_m, length_m, false)?;
+        let u = direction_off(guide_line(step), normalized(to)?, cosine);
+        Some(add_scaled(step.mn, u, length_m))
+    }
+}
+
+/// The places of a slave found by turning its rod, at one length of it.
+struct TurnedPlaces<'a, const D: usize> {
+    context: &'a MotionContext<'a, D>,
+    step: &'a SlaveStep<D>,
+    length_m: f64,
+    /// Direction of the guide line.
+    u0: Point<D>,
+    found: &'a mut Vec<Candidate<D>>,
+    informative: &'a mut Option<PendingVeto>,
+}
+
+impl<const D: usize> TurnedPlaces<'_, D> {
+    fn place(&self, u: Point<D>) -> Point<D> {
+        add_scaled(self.step.mn, u, self.length_m)
+    }
+
+    fn is_valid(&self, u: Point<D>) -> bool {
+        self.context.check_place(self.step, self.place(u)).is_ok()
+    }
+
+    /// Returns whether a direction, and any farther from the guide line, neither gives a place nor a better reason.
+    fn is_useless(&self, u: Point<D>) -> bool {
+        self.informative.is_some() && self.context.is_too_far(self.step, self.place(u))
+    }
+
+    /// Adds the place in a direction if it is valid; returns whether it is.
+    fn add(&mut self, u: Point<D>) -> bool {
+        let at = self.place(u);
+        match self.context.check_place(self.step, at) {
+            Ok(()) => {
+                let turn_rad = angle_rad(self.u0, u);
+                self.found.push(Candidate { at, rotated: true, turn_rad });
+                true
+            }
+            Err(objection) => {
+                keep_informative(self.informative, objection);
+                false
+            }
+        }
+    }
+}
+
 /// Keeps the first informative objection: a direction free of obstacles that fails for another reason.
 #[inline]
 fn keep_informative(informative: &mut Option<PendingVeto>, objection: PendingVeto) {
@@ -352,8 +395,9 @@ fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [Candidate<D>]) {
     // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
     // first.
     found.sort_by(|a, b| {
-        let travel_m = |c: &Candidate<D>| distance(c.at, step.so);
-        travel_m(a).total_cmp(&travel_m(b)).then(a.turn_rad.total_cmp(&b.turn_rad))
+        let a_m = distance(a.at, step.so);
+        let b_m = distance(b.at, step.so);
+        a_m.total_cmp(&b_m).then(a.turn_rad.total_cmp(&b.turn_rad))
     });
 }
 
@@ -433,7 +477,7 @@ impl<const D: usize> PlanarRod<'_, D> {
 
 /// An iterator over the free directions on both sides, the nearer one first.
 ///
-/// Only blocks that are met on the way are turned into arcs: a direction that is the first outside
+/// Only blocks that the rod meets while it turns become arcs: a direction that is the first outside
 /// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
 /// all blocks.
 struct FreeDirections<'a, const D: usize> {

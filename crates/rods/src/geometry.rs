@@ -62,6 +62,7 @@ fn between_interiors<const D: usize>(
     let c = dot(d1, r);
     let f = dot(d2, r);
     let s = (bb * f - c * ee) / (aa * ee - bb * bb);
+    // In the plane two segments whose insides are nearest cross, so their distance is exactly zero.
     if D == 2 {
         return segments_cross([p, q], [a, b]).then(|| {
             let part = if s.is_finite() { s.clamp(0.0, 1.0) } else { 0.5 };
@@ -133,11 +134,12 @@ impl<const D: usize> Cuboid<D> {
 
     /// Returns half the slope of the squared distance at a fraction of the segment.
     fn slope(&self, from: Point<D>, d: Point<D>, fraction: f64) -> f64 {
-        let outside = |i: usize| {
+        let terms = (0..D).map(|i| {
             let x = from[i] + d[i] * fraction;
-            x - x.clamp(-self.half_m[i], self.half_m[i])
-        };
-        (0..D).map(|i| outside(i) * d[i]).sum()
+            let outside = x - x.clamp(-self.half_m[i], self.half_m[i]);
+            outside * d[i]
+        });
+        terms.sum()
     }
 
     /// Returns the fraction of the segment at which the squared distance is least.
@@ -174,13 +176,12 @@ impl<const D: usize> Cuboid<D> {
 
     /// Returns the outline of a plane box, counterclockwise.
     pub fn edges_2d(&self) -> [[Point<D>; 2]; 4] {
-        let corner = |sx: f64, sy: f64| {
+        let c = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[sx, sy]| {
             let mut local = [0.0; D];
             local[0] = sx * self.half_m[0];
             local[1] = sy * self.half_m[1];
             self.to_world(local)
-        };
-        let c = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        });
         [[c[0], c[1]], [c[1], c[2]], [c[2], c[3]], [c[3], c[0]]]
     }
 }

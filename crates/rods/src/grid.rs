@@ -2,10 +2,12 @@
 
 use super::geometry::{Bounds, Point};
 
-/// Boxes, and for every cell the list of the boxes that meet it.
+/// Boxes, and for every cell the list of the boxes that meet it. The lists lie one after the other in one vector, so
+/// that a new grid allocates nothing once its vectors are large enough.
 #[derive(Debug, Clone, Default)]
 pub struct Grid<const D: usize> {
     cells: CellLayout<D>,
+    /// Start of the list of every cell in `entries`, and the end of the last one.
     starts: Vec<u32>,
     entries: Vec<u32>,
     bounds: Vec<Bounds<D>>,
@@ -14,10 +16,23 @@ pub struct Grid<const D: usize> {
 }
 
 /// Largest mean number of entries per box; beyond it the grid gets coarser, so that a few large boxes among
-/// many small ones do not fill the memory.
+/// many small ones do not fill the memory. With 64 the lists take at most 256 bytes a box, a few times the box itself;
+/// cells of half the mean box need about 9 entries a box in the plane and 27 in space, so that only very unequal
+/// boxes reach the bound. The value was not tuned.
 const MAX_ENTRIES_PER_BOX: usize = 64;
-/// Largest number of cells per box, so that a few boxes far apart do not either.
+/// Largest number of cells per box, so that a few boxes far apart do not fill it either.
 const MAX_CELLS_PER_BOX: usize = 64;
+/// Side of a cell as a fraction of the mean extent of a box: most boxes then meet few cells.
+const CELL_PER_BOX: f64 = 0.5;
+/// Side of a cell as a fraction of the reach of queries: a query then visits a few cells along each axis.
+const CELL_PER_REACH: f64 = 0.7;
+/// Least side of a cell as a fraction of the whole extent: the number of cells along an axis stays far below the range of
+/// its type.
+const MIN_CELL_FRACTION: f64 = 1e-4;
+/// Least side of a cell, meters, for boxes without extent and queries without reach.
+const MIN_CELL_M: f64 = 1e-6;
+/// Factor by which cells grow until they are few enough.
+const GROWTH: f64 = 1.5;
 
 impl<const D: usize> Grid<D> {
     /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which determines
@@ -33,6 +48,9 @@ impl<const D: usize> Grid<D> {
 
     /// Lists the boxes of every cell by counting sort: `starts` holds the counts first, then the
     /// next write positions, and in the end the start of each list.
+    ///
+    /// `starts` is two longer than the number of cells, and shifted: while the lists are written the element after a
+    /// cell's own is its write position, which ends as the start of the next list.
     fn fill(&mut self) {
         let Self { cells, starts, entries, bounds, first } = self;
         first.clear();
@@ -79,6 +97,11 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// Returns the longest side of a box, meters.
+fn extent_m<const D: usize>(b: &Bounds<D>) -> f64 {
+    (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max)
+}
+
 /// A cell's number along every axis.
 type CellIndex<const D: usize> = [u32; D];
 
@@ -101,21 +124,32 @@ impl<const D: usize> CellLayout<D> {
     fn choose(bounds: &[Bounds<D>], reach_m: f64) -> Self {
         let n = bounds.len();
         let around = bounds.iter().fold(Bounds::empty(), |all, b| all.joined(b));
-        let extent = |b: &Bounds<D>| (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max);
-        let mean_m = bounds.iter().map(extent).sum::<f64>() / n as f64;
-        let mut cell_m = (0.5 * mean_m).max(0.7 * reach_m).max(extent(&around) * 1e-4).max(1e-6);
+        let mean_m = bounds.iter().map(extent_m).sum::<f64>() / n as f64;
+        let mut cell_m = (CELL_PER_BOX * mean_m)
+            .max(CELL_PER_REACH * reach_m)
+            .max(extent_m(&around) * MIN_CELL_FRACTION)
+            .max(MIN_CELL_M);
         loop {
-            let per_m = 1.0 / cell_m;
-            let along = |i: usize| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1;
-            let cells = Self { origin: around.lo, per_m, n: std::array::from_fn(along) };
-            let entries = || bounds.iter().map(|b| cells.count_cells(b)).sum::<usize>();
+            let cells = Self::cover(&around, cell_m);
             if cells.len() <= MAX_CELLS_PER_BOX * (n + 1)
-                && entries() <= MAX_ENTRIES_PER_BOX * (n + 1)
+                && cells.count_entries(bounds) <= MAX_ENTRIES_PER_BOX * (n + 1)
             {
                 return cells;
             }
-            cell_m *= 1.5;
+            cell_m *= GROWTH;
         }
+    }
+
+    /// Returns the cells of a side that cover a box.
+    fn cover(around: &Bounds<D>, cell_m: f64) -> Self {
+        let per_m = 1.0 / cell_m;
+        let n = std::array::from_fn(|i| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1);
+        Self { origin: around.lo, per_m, n }
+    }
+
+    /// Returns the number of cells that boxes meet, summed over the boxes.
+    fn count_entries(&self, bounds: &[Bounds<D>]) -> usize {
+        bounds.iter().map(|b| self.count_cells(b)).sum()
     }
 
     fn len(&self) -> usize {

@@ -209,14 +209,17 @@ fn block_tip_by_capsule(
         borders.add_disc(b, radius_m, t);
         borders.add_edges(a, b, radius_m, t);
     }
-    let is_blocked = |angle_rad: f64| {
-        let tip = [t * math::cos(angle_rad), t * math::sin(angle_rad)];
-        norm(sub(tip, nearest_on_segment(tip, a, b))) < radius_m
-    };
-    borders.arcs_where(is_blocked, arcs);
+    borders.arcs_where(
+        |angle_rad| {
+            let tip = [t * math::cos(angle_rad), t * math::sin(angle_rad)];
+            norm(sub(tip, nearest_on_segment(tip, a, b))) < radius_m
+        },
+        arcs,
+    );
 }
 
-/// Directions in which the circle of the tip crosses the border of a capsule.
+/// Directions in which the circle of the tip crosses the border of a capsule: at most twice each of its two end discs
+/// and two edges.
 #[derive(Default)]
 struct BorderAngles {
     angles_rad: [f64; 8],
@@ -248,8 +251,8 @@ impl BorderAngles {
         for side in [-radius_m, radius_m] {
             let cosine = (height_m + side) / t;
             if cosine.abs() < 1.0 {
-                let (middle_rad, half_rad) =
-                    (math::atan2(normal[1], normal[0]), math::acos(cosine));
+                let middle_rad = math::atan2(normal[1], normal[0]);
+                let half_rad = math::acos(cosine);
                 self.push(middle_rad - half_rad);
                 self.push(middle_rad + half_rad);
             }
@@ -316,7 +319,8 @@ pub(super) fn min_turn_rad(
     side: TurnDirection,
 ) -> Option<f64> {
     let mut turn_rad = 0.0;
-    // Each round passes at least one arc for good.
+    // Each round passes at least one arc for good, and an arc that contains the start may be met a second time after a
+    // full turn.
     for _ in 0..=2 * arcs.len() {
         let mut next_rad: f64 = turn_rad;
         for arc in arcs {

@@ -1,9 +1,14 @@
 #![deny(clippy::disallowed_methods)]
 #![doc = include_str!("../README.md")]
 
+// The fixtures that this crate shares with others call it by this name.
+#[cfg(test)]
+extern crate self as sidestep_rods;
+
 mod candidates;
 mod chain;
 #[cfg(test)]
+#[path = "../../testing/include/chains.rs"]
 mod fixtures;
 pub mod geometry;
 mod grid;

@@ -17,10 +17,10 @@ const NEIGHBORS: usize = 2;
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;
 /// Distance up to which parts are searched, in lengths of the longest rod: a longer search finds more
-/// parts, a shorter one is soon repeated.
+/// parts, a shorter one is soon repeated. The value trades these off, and was not tuned.
 const SEARCH_LENGTHS: f64 = 1.5;
-/// Fewest rods for which it is worth the effort; also, between the ends of fewer than three no distance
-/// would be measured.
+/// Least number of rods for which it is worth the effort: a shorter chain has few pairs to test, and fewer than three
+/// rods have none whose distance is measured. The value was not tuned.
 const MIN_RODS: usize = 8;
 /// Reading at which the odometer starts again, meters, long before rounding matters.
 const MAX_ODOMETER_M: f64 = 1e5;
@@ -54,11 +54,8 @@ impl<const D: usize> MotionBounds<D> {
         if self.points.len() != chain.points().len() || self.odometer_m > MAX_ODOMETER_M {
             self.reset(chain);
         } else if self.points != chain.points() {
-            let travel2 = |(old, new): (&Point<D>, &Point<D>)| {
-                let moved = sub(*new, *old);
-                dot(moved, moved)
-            };
-            let farthest2 = self.points.iter().zip(chain.points()).map(travel2).fold(0.0, f64::max);
+            let moves = self.points.iter().zip(chain.points()).map(|(old, new)| sub(*new, *old));
+            let farthest2 = moves.map(|moved| dot(moved, moved)).fold(0.0, f64::max);
             self.add_travel(farthest2.sqrt());
             self.points.copy_from_slice(chain.points());
         }
@@ -125,13 +122,13 @@ impl<const D: usize> MotionBounds<D> {
             self.built_at_m = self.odometer_m;
         }
         let points = chain.points();
-        let ends = |k: usize| [points[k], points[k + 1]];
+        let ends = [points[rod], points[rod + 1]];
         let mut clearance_m = search_m.min(end_distance_m(points, rod));
-        let near =
-            Bounds::from_points(&ends(rod)).grown(search_m + self.odometer_m - self.built_at_m);
+        let near = Bounds::from_points(&ends).grown(search_m + self.odometer_m - self.built_at_m);
         self.tree.visit(&near, |other| {
-            if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends(rod), ends(other), clearance_m) {
-                clearance_m = clearance_m.min(between_segments(ends(rod), ends(other)).distance_m);
+            let other_ends = [points[other], points[other + 1]];
+            if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends, other_ends, clearance_m) {
+                clearance_m = clearance_m.min(between_segments(ends, other_ends).distance_m);
             }
         });
         clearance_m
@@ -153,10 +150,12 @@ fn is_beyond<const D: usize>(
 /// Returns the distance of a rod from the connectors nearest to it that may not touch it: those
 /// beyond its neighbors' far ends.
 fn end_distance_m<const D: usize>(points: &[Point<D>], rod: usize) -> f64 {
-    let ends = [points[rod], points[rod + 1]];
-    let from = |k: Option<usize>| {
-        let p = k.and_then(|k| points.get(k));
-        p.map_or(f64::INFINITY, |p| distance(*p, nearest_on_segment(*p, ends[0], ends[1])))
-    };
-    from(rod.checked_sub(NEIGHBORS)).min(from(Some(rod + NEIGHBORS + 1)))
+    let before = rod.checked_sub(NEIGHBORS).and_then(|k| points.get(k));
+    let after = points.get(rod + NEIGHBORS + 1);
+    let mut least_m = f64::INFINITY;
+    for p in [before, after].into_iter().flatten() {
+        let nearest = nearest_on_segment(*p, points[rod], points[rod + 1]);
+        least_m = least_m.min(distance(*p, nearest));
+    }
+    least_m
 }

@@ -13,10 +13,11 @@ use super::veto::VetoReason;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Clearance that a turn aims at, meters. It is a hundred times the tolerance: with equal values a master
-/// that touches a wall counts as inside it in the next step, which is a veto.
+/// Clearance that a turn aims at, meters. It is a hundred times the tolerance: a master that touches a wall blocks a
+/// half-plane of directions, and with equal values it counts as inside the wall in the next step, which is a veto.
 pub const SKIN_M: f64 = 1e-7;
-/// Penetration that counts as contact, meters.
+/// Penetration that counts as contact, meters: distances of segments are exact to about 1e-15 m of their coordinates, so
+/// rounding is no contact.
 pub const TOLERANCE_M: f64 = 1e-9;
 /// Tolerance of bend limits, rad.
 pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
@@ -200,17 +201,6 @@ impl<'a, const D: usize> MotionContext<'a, D> {
     /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
     /// Neighbors are exempt because they touch by construction, or nearly so in a tight bend.
     fn own_blocks(&self, other: usize, rod: Option<usize>, tip: usize) -> [Option<Block<D>>; 3] {
-        let connectors = self.chain.connectors();
-        let connector = |c: usize| {
-            let is_far_from_rod = rod.is_some_and(|r| c + 1 < r || c > r + 2);
-            Block {
-                core: Core::Point(self.position(c)),
-                radius_m: connectors[c].radius_m,
-                name: BlockOwner::OwnConnector(c),
-                stops_rod: is_far_from_rod,
-                stops_tip: c.abs_diff(tip) > 1,
-            }
-        };
         let own_rod = Block {
             core: Core::Segment([self.position(other), self.position(other + 1)]),
             radius_m: self.chain.rods()[other].radius_m,
@@ -218,9 +208,22 @@ impl<'a, const D: usize> MotionContext<'a, D> {
             stops_rod: rod.is_some_and(|r| other.abs_diff(r) > 2),
             stops_tip: tip + 1 < other || tip > other + 2,
         };
-        let is_last = other + 2 == connectors.len();
-        [Some(own_rod), Some(connector(other)), is_last.then(|| connector(other + 1))]
-            .map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
+        // Each rod stands for the connector at its lower end, so that none is visited twice.
+        let is_last = other + 2 == self.chain.connectors().len();
+        let lower = self.own_connector(other, rod, tip);
+        let upper = is_last.then(|| self.own_connector(other + 1, rod, tip));
+        [Some(own_rod), Some(lower), upper].map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
+    }
+
+    #[inline]
+    fn own_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> Block<D> {
+        Block {
+            core: Core::Point(self.position(c)),
+            radius_m: self.chain.connectors()[c].radius_m,
+            name: BlockOwner::OwnConnector(c),
+            stops_rod: rod.is_some_and(|r| c + 1 < r || c > r + 2),
+            stops_tip: c.abs_diff(tip) > 1,
+        }
     }
 
     /// Checks whether the slave may be at `s`; returns the first objection otherwise.
@@ -239,6 +242,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         let travel_m = step.sweep(s).max_travel_m();
         self.visit_blocks(&near, Some(rod), step.slave, |block| {
             if let Some((depth_m, reason)) = depth_and_reason(step, s, travel_m, block) {
+                // Of equal depths the lower name counts, because blocks come in no particular order.
                 let is_deeper = worst
                     .is_none_or(|(w, name, _)| depth_m > w || (depth_m == w && block.name < name));
                 if is_deeper {

@@ -57,21 +57,19 @@ impl<const D: usize> Obstacle<D> {
 
     /// Refuses numbers that are not finite or out of range.
     pub fn check(&self) -> Result<(), InputError> {
-        let wrong = |cause: String, remedy: &str| {
-            Err(InputError::new(format!("obstacle {}", self.id), cause, remedy))
-        };
+        let place = format!("obstacle {}", self.id);
         if !self.core.is_finite() || !geometry::is_finite(&self.velocity_m_s) {
-            return wrong(
-                "has a coordinate that is no finite number".into(),
-                "give finite numbers",
-            );
+            let cause = "has a coordinate that is no finite number";
+            return Err(InputError::new(place, cause, "give finite numbers"));
         }
         if !(0.0..=MAX_EXTENT_M).contains(&self.radius_m) {
-            return wrong(format!("has radius {} m", self.radius_m), "give 0 to 1e7 m");
+            let cause = format!("has radius {} m", self.radius_m);
+            return Err(InputError::new(place, cause, "give 0 to 1e7 m"));
         }
-        let box_ = self.bounds();
-        if box_.lo.iter().chain(&box_.hi).any(|x| x.abs() > MAX_EXTENT_M) {
-            return wrong("lies further than 1e7 m from the origin".into(), "move it nearer");
+        let bounds = self.bounds();
+        if bounds.lo.iter().chain(&bounds.hi).any(|x| x.abs() > MAX_EXTENT_M) {
+            let cause = "lies further than 1e7 m from the origin";
+            return Err(InputError::new(place, cause, "move it nearer"));
         }
         Ok(())
     }
@@ -80,12 +78,12 @@ impl<const D: usize> Obstacle<D> {
 /// Returns the walls of a plane polygon, all with one id. They guard its inside: a chain that
 /// starts outside never gets in.
 pub fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
-    let wall =
-        |k: usize| Obstacle::capsule(id, [corners[k], corners[(k + 1) % corners.len()]], radius_m);
-    (0..corners.len()).map(wall).collect()
+    let walls = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
+    walls.map(|ends| Obstacle::capsule(id, ends, radius_m)).collect()
 }
 
-/// Largest coordinate: beyond it, rounding is no longer small against the tolerances.
+/// Largest coordinate: beyond it, rounding is no longer small against the tolerances. It is ten times that of
+/// connectors, so that an obstacle around a whole world may reach beyond its parts.
 const MAX_EXTENT_M: f64 = 1e7;
 
 /// All obstacles of a world. A copy shares the static ones with the original and has its own moving
@@ -106,7 +104,8 @@ struct StillObstacles<const D: usize> {
     grid: Grid<D>,
 }
 
-/// Number of moving obstacles up to which a linear scan is faster than a grid.
+/// Number of moving obstacles up to which a linear scan is taken for faster than a grid, which is built anew whenever
+/// they move. No result depends on it.
 const MAX_LINEAR_SCAN: usize = 12;
 
 impl<const D: usize> Obstacles<D> {

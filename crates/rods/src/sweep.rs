@@ -21,17 +21,17 @@ pub struct Sweep<const D: usize> {
 /// Fraction of the distance at rest that a rod keeps on its path in space. Any value above 0 rules out
 /// tunneling; the whole distance would forbid turns past an obstacle that the rod may touch.
 const KEPT_FRACTION: f64 = 0.5;
-/// Steps of conservative advancement before a path counts as blocked.
+/// Steps of conservative advancement before a path counts as blocked. They get short only where the rod passes at hardly
+/// more than the distance that it keeps; a veto there is safe.
 const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> Sweep<D> {
     /// Returns the longest distance that any point of the rod moves, meters.
     pub(super) fn max_travel_m(&self) -> f64 {
-        let travel2 = |end: usize| {
-            let moved = sub(self.to[end], self.from[end]);
-            dot(moved, moved)
-        };
-        travel2(0).max(travel2(1)).sqrt()
+        // The distance of a point is a convex function of its place on the rod, so the farthest is an end.
+        let master = sub(self.to[0], self.from[0]);
+        let slave = sub(self.to[1], self.from[1]);
+        dot(master, master).max(dot(slave, slave)).sqrt()
     }
 
     /// Returns whether the rod passes no point of the core on its path; in space, whether it stays half as

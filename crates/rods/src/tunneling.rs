@@ -38,10 +38,10 @@ pub fn find_tunneling<const D: usize>(
 ) -> Option<TunneledRod> {
     let speeds_m_s = obstacles.moving().iter().map(|o| norm(o.velocity_m_s));
     let furthest_m = dt_s * speeds_m_s.fold(0.0, f64::max);
+    let after = chain.points();
     (0..chain.rods().len().min(before.len().saturating_sub(1))).find_map(|rod| {
-        let ends = |points: &[Point<D>]| [points[rod], points[rod + 1]];
-        let from = ends(before);
-        let to = ends(chain.points());
+        let from = [before[rod], before[rod + 1]];
+        let to = [after[rod], after[rod + 1]];
         let radius_m = chain.rods()[rod].radius_m;
         let near =
             Bounds::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);
@@ -75,13 +75,15 @@ pub fn blocking_obstacle<const D: usize>(
     let mut hit: Option<u32> = None;
     obstacles.visit(&near, |o| {
         let keep_m = o.radius_m + radius_m;
-        let gap_m = |ends| o.core.nearest_to_segment(ends).distance_m - keep_m;
-        let least_m = gap_m(from).min(0.0) - ROUNDING_M;
+        let gap_before_m = o.core.nearest_to_segment(from).distance_m - keep_m;
+        // A part that starts inside may get out; only deeper it must not go.
+        let least_m = gap_before_m.min(0.0) - ROUNDING_M;
         let is_blocked = if is_ball {
             // The path of a ball is itself a capsule, so one distance is exact.
-            gap_m([from[0], to[0]]) < least_m
+            o.core.nearest_to_segment([from[0], to[0]]).distance_m - keep_m < least_m
         } else {
-            gap_m(to) < least_m || !Sweep { from, to }.is_clear(&o.core, keep_m)
+            o.core.nearest_to_segment(to).distance_m - keep_m < least_m
+                || !Sweep { from, to }.is_clear(&o.core, keep_m)
         };
         if is_blocked && hit.is_none_or(|id| o.id < id) {
             hit = Some(o.id);

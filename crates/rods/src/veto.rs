@@ -1,4 +1,4 @@
-//! Requests to move, and their outcomes: a move, or a veto that names the objecting part and the reason.
+//! Requests to move, and their outcomes: a move, or a veto with the objecting part and the reason.
 //!
 //! A veto is an outcome, not an error (slides R1, R6 to R9). The source of the request decides the next
 //! step: an autonomous mover plans again, a planner or an operator gets a report.
@@ -19,12 +19,12 @@ pub enum RequestSource {
     Operator,
 }
 
-/// Effect of a veto on the way.
+/// Effect of a veto before the end of the path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VetoEffect {
-    /// All of the way, or nothing of it.
+    /// The motion takes place as a whole or not at all.
     Exact,
-    /// The way up to the veto.
+    /// The part of the path before the veto is kept.
     AsFarAsPossible,
 }
 
@@ -54,7 +54,7 @@ pub struct Request<const D: usize> {
     pub motion: Motion<D>,
     /// The source of the request.
     pub source: RequestSource,
-    /// Effect of a veto on the way.
+    /// Effect of a veto before the end of the path.
     pub mode: VetoEffect,
 }
 
@@ -92,7 +92,7 @@ pub enum VetoReason {
     SelfCollision,
     /// A slave would have to move farther in one step than it may.
     StepLimit,
-    /// The search for a way out reached its limit and was given up.
+    /// The search for a detour reached its limit and was given up.
     Limit,
     /// No posture of the chain reaches the target, or none was found.
     OutOfReach,

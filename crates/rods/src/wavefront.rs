@@ -6,7 +6,7 @@
 //! independent, so the compiler vectorizes them, and each computes the same bits as the motions one
 //! after the other.
 //!
-//! [`DeferredMotions`] collects motions of a chain until they fill the lanes or somebody reads it.
+//! [`DeferredMotions`] collects motions of a chain until they fill the lanes or its points are read.
 
 #![expect(
     clippy::needless_range_loop,
@@ -22,7 +22,8 @@ use super::veto::Request;
 use super::{Obstacles, Rules};
 use sidestep_kernel::InputError;
 
-/// Motions at once: enough to keep the units for roots and divisions busy.
+/// Motions at once: enough to keep the units for roots and divisions busy. A connector takes 19 ns one motion at a time,
+/// 6 ns with 4 lanes and 3.8 ns with 8; twelve are a multiple of the 4 numbers of a vector register.
 pub const LANES: usize = 12;
 
 /// Length in meters above which no move is lost to rounding: coordinates of up to 1e6 m are sums of numbers with
@@ -79,8 +80,8 @@ pub struct WavefrontMeasures {
 
 /// Motions of connector 0 of a plain chain that the other connectors have yet to follow.
 ///
-/// Where nothing can object, a chain follows its initiator in one way only, so it does not matter when
-/// it does: to follow several motions at once gives the same bits, and is much faster. Until then only
+/// Where nothing can object, the motion of a chain follows from that of its initiator, so it does not matter when
+/// it moves: to follow several motions at once gives the same bits, and is much faster. Until then only
 /// connector 0 of the chain is where it should be.
 #[derive(Debug, Clone, Default)]
 pub struct DeferredMotions<const D: usize> {
@@ -321,13 +322,22 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     }
 
     fn measures(&self) -> WavefrontMeasures {
-        let max = |by_lane: &[f64]| by_lane[..self.n].iter().copied().fold(0.0, f64::max);
         WavefrontMeasures {
             changed: self.changed,
-            longest_m: max(&self.longest2).sqrt(),
-            max_rod_violation_m: max(&self.violation_m),
+            longest_m: max_of(&self.longest2[..self.n]).sqrt(),
+            max_rod_violation_m: max_of(&self.violation_m[..self.n]),
         }
     }
+}
+
+fn max_of(by_lane: &[f64]) -> f64 {
+    by_lane.iter().copied().fold(0.0, f64::max)
+}
+
+/// Returns a position for step `j`, past the last connector: it differs from the one before, so that no rod of an unused
+/// lane has length zero.
+fn beyond_last<const D: usize>(j: usize) -> Point<D> {
+    super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64)
 }
 
 /// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
@@ -343,10 +353,7 @@ fn pull_lanes<const D: usize, const MEASURES: bool>(
     let mut now = LanePositions::far_apart();
     let mut next = LanePositions::far_apart();
     for j in 0..points.len() + n - 1 {
-        // Past the last connector: a place that differs from the one before, so that no rod of an unused
-        // lane has length zero.
-        let beyond = || super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64);
-        now.set(0, points.get(j).copied().unwrap_or_else(beyond));
+        now.set(0, points.get(j).copied().unwrap_or_else(|| beyond_last(j)));
         motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(unused));
         motions.react(&now, &mut next, j);
         if let Some(head) = heads.get(j) {

@@ -92,19 +92,25 @@ impl Source {
     }
 
     /// Refuses keys that have no effect in the section at a span, because their author expects something of
-    /// them. Each comes with whether it is given without effect; `because` is that of [`Self::unused_key`].
+    /// them. Each comes with whether it is given, and whether it has an effect there; `because` is that of
+    /// [`Self::unused_key`].
     ///
     /// # Errors
     /// At the first such key.
     pub fn refuse_unused_keys(
         &self,
         section: Range<usize>,
-        keys: &[(&str, bool)],
+        keys: &[(&str, bool, bool)],
         because: &str,
     ) -> Result<(), InputError> {
-        let Some((key, _)) = keys.iter().find(|(_, is_unused)| *is_unused) else { return Ok(()) };
-        let span = self.key_span(section, &[key]);
-        Err(self.error(span, format!("`{key}` does nothing {because}"), "leave it out"))
+        for &(key, is_given, has_effect) in keys {
+            if is_given && !has_effect {
+                let span = self.key_span(section, &[key]);
+                let cause = format!("`{key}` does nothing {because}");
+                return Err(self.error(span, cause, "leave it out"));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -232,7 +238,7 @@ mod tests {
         let source = Source::new("s.toml", TEXT, "");
         let start = TEXT.rfind("[[robots]]").expect("a section");
         let second = start..start + "[[robots]]".len();
-        let keys = [("count", false), ("at", true), ("b", true)];
+        let keys = [("count", true, true), ("at", true, false), ("b", true, false)];
         let refused = source.refuse_unused_keys(second.clone(), &keys, "beside `scen`");
         let error = refused.expect_err("`at` is unused");
         assert_eq!(

@@ -180,6 +180,7 @@ fn find_info<'a>(infos: &'a [MetricInfo], name: &'a str) -> Option<(&'a MetricIn
 }
 
 #[cfg(test)]
+#[expect(unreachable_pub, reason = "the macro declares structs that others see")]
 mod tests {
     use super::*;
 

@@ -209,7 +209,8 @@ class Batch:
         self.worlds.observe(self._number, out=self._raw[self._now])
 
     def _observed(self, copy: bool = False) -> Observations:
-        raw, as_float32 = self._raw[self._now], self._as_float32[self._now]
+        raw = self._raw[self._now]
+        as_float32 = self._as_float32[self._now]
         for name in self._reals:
             np.copyto(as_float32[name], raw[name], casting="same_kind")
         observations = {**raw, **as_float32}
@@ -223,7 +224,8 @@ class Batch:
             self.worlds.order(self._orders[0].name, np.asarray(actions), team=self._number)
             return
         known = {space.name for space in self._orders}
-        unknown, missing = sorted(set(actions) - known), sorted(known - set(actions))
+        unknown = sorted(set(actions) - known)
+        missing = sorted(known - set(actions))
         if unknown or missing:
             cause = f"there is no order `{unknown[0]}`" if unknown else f"`{missing[0]}` is missing"
             raise input_error("actions", cause, f"give {', '.join(sorted(known))}")

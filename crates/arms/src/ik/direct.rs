@@ -54,11 +54,16 @@ fn fit_lengths(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
     } else {
         return;
     };
-    let end_m = |i: usize| if shortens == Some(i) { spans[i].min_m } else { spans[i].max_m };
-    let room_m: f64 = (0..lengths_m.len()).map(|i| (end_m(i) - lengths_m[i]).abs()).sum();
+    // The length toward which each rod may change.
+    let mut ends_m: Vec<f64> = spans.iter().map(|span| span.max_m).collect();
+    if let Some(i) = shortens {
+        ends_m[i] = spans[i].min_m;
+    }
+    let changes = ends_m.iter().zip(&*lengths_m).map(|(end_m, length_m)| (end_m - length_m).abs());
+    let room_m: f64 = changes.sum();
     let part = if room_m > 0.0 { (missing_m / room_m).min(1.0) } else { 0.0 };
     for i in 0..lengths_m.len() {
-        lengths_m[i] = spans[i].nearest_m(lengths_m[i] + part * (end_m(i) - lengths_m[i]));
+        lengths_m[i] = spans[i].nearest_m(lengths_m[i] + part * (ends_m[i] - lengths_m[i]));
     }
 }
 
@@ -66,11 +71,13 @@ fn fit_lengths(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
 fn middle_rod(lengths_m: &[f64]) -> usize {
     let half_m = 0.5 * lengths_m.iter().sum::<f64>();
     let mut until_m = 0.0;
-    let holds = |length_m: &f64| {
+    for (i, length_m) in lengths_m.iter().enumerate() {
         until_m += length_m;
-        until_m >= half_m
-    };
-    lengths_m.iter().position(holds).unwrap_or(lengths_m.len() - 1)
+        if until_m >= half_m {
+            return i;
+        }
+    }
+    lengths_m.len() - 1
 }
 
 /// Returns the corner of a triangle over a base line of `base_m` along `u`, on the side of `side`,

@@ -86,20 +86,21 @@ impl<const D: usize> Limb<D> {
     }
 }
 
-/// Returns the connector nearest to `k` on the way to `base` that never moves: the effective base.
+/// Returns the connector nearest to `k` between it and `base` that never moves: the effective base.
 pub(super) fn nearest_fixed<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
-    let still = |&i: &usize| i != k && chain.connectors()[i].is_still();
-    let lo = base.min(k);
-    let hi = base.max(k);
-    let found = if k > base { (lo..=hi).rev().find(still) } else { (lo..=hi).find(still) };
-    found.unwrap_or(base)
+    let inward = path(k, base).skip(1);
+    let mut still = inward.filter(|&i| chain.connectors()[i].is_still());
+    still.next().unwrap_or(base)
 }
 
 /// Returns whether all connectors except the base move and bend without limit.
 pub(super) fn is_unconstrained<const D: usize>(chain: &Chain<D>, base: usize) -> bool {
-    let is_plain = |i: usize| {
-        let c = &chain.connectors()[i];
-        c.mobility == Mobility::Free && !c.failed && c.max_bend_rad >= std::f64::consts::PI
-    };
-    chain.is_plain() || (0..chain.connectors().len()).all(|i| i == base || is_plain(i))
+    let mut all = chain.connectors().iter().enumerate();
+    chain.is_plain()
+        || all.all(|(i, c)| {
+            i == base
+                || c.mobility == Mobility::Free
+                    && !c.failed
+                    && c.max_bend_rad >= std::f64::consts::PI
+        })
 }

@@ -8,14 +8,18 @@ use sidestep_rods::geometry::{
 };
 use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach};
 
-/// Headings to either side of the target's, in rad.
+/// Headings to either side of the target's, in rad: a fan of the directions from ahead to somewhat back, in steps of 23
+/// degrees, because an obstacle in the way is mostly passed on one of its sides.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
-/// Steps without approach of the tip before the motion is given up.
+/// Steps without approach of the tip before the motion is given up: a detour leads away from the target for a few steps.
 const MAX_IDLE_STEPS: usize = 10;
-/// Most attempts to move, over all steps.
+/// Largest number of attempts to move, over all steps; each is a whole reach, and a posture found by search is then
+/// quicker.
 const MAX_ATTEMPTS: usize = 120;
-/// Length of a step of the tip, as a part of the shortest rod.
+/// Length of a step of the tip, as a fraction of the shortest rod: from there on a return pass nearly always succeeds.
 const STEP_FRACTION: f64 = 0.5;
+/// Fraction of a step by which the tip may miss its place, and by which it must come nearer to count as an approach.
+const STEP_TOLERANCE: f64 = 0.01;
 
 /// Result of a motion; the chain is where it ended.
 pub(super) struct MotionResult<const D: usize> {
@@ -39,23 +43,31 @@ pub(super) fn move_to_goal<const D: usize>(
     }
     let step_m = STEP_FRACTION * chain.rods().iter().map(|r| r.min_m).fold(f64::INFINITY, f64::min);
     let mut best = chain.clone();
+    let mut best_m = distance_left_m(chain, goal);
     let mut idle = 0;
-    let left_m = |chain: &Chain<D>| distance(chain.points()[goal.k], goal.target);
     while idle < MAX_IDLE_STEPS && motion.attempts < MAX_ATTEMPTS {
-        if left_m(chain) <= step_m && motion.step(chain, goal.target, goal.tolerance_m)? {
+        let left_m = distance_left_m(chain, goal);
+        if left_m <= step_m && motion.step(chain, goal.target, goal.tolerance_m)? {
             return Ok(motion.result(true));
         }
-        if !motion.try_fan(chain, step_m.min(left_m(chain)))? {
+        if !motion.try_fan(chain, step_m.min(left_m))? {
             break;
         }
         idle += 1;
-        if left_m(chain) < left_m(&best) - 0.01 * step_m {
+        let left_m = distance_left_m(chain, goal);
+        if left_m < best_m - STEP_TOLERANCE * step_m {
             best = chain.clone();
+            best_m = left_m;
             idle = 0;
         }
     }
     *chain = best;
     Ok(motion.result(false))
+}
+
+/// Returns the distance of the tip from its target, meters.
+fn distance_left_m<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> f64 {
+    distance(chain.points()[goal.k], goal.target)
 }
 
 struct StepwiseMotion<'a, const D: usize> {
@@ -95,7 +107,7 @@ impl<const D: usize> StepwiseMotion<'_, D> {
     fn try_fan(&mut self, chain: &mut Chain<D>, step_m: f64) -> Result<bool, InputError> {
         let from = chain.points()[self.goal.k];
         let ahead = normalized(sub(self.goal.target, from)).unwrap_or(first_axis());
-        let tolerance_m = (0.01 * step_m).max(self.goal.tolerance_m);
+        let tolerance_m = (STEP_TOLERANCE * step_m).max(self.goal.tolerance_m);
         if self.step(chain, add_scaled(from, ahead, step_m), tolerance_m)? {
             return Ok(true);
         }
@@ -114,7 +126,7 @@ impl<const D: usize> StepwiseMotion<'_, D> {
     }
 }
 
-/// Returns directions across `u`: two in the plane, four in space; the one named by `sign` first.
+/// Returns directions across `u`: two in the plane, four in space; the one on the side of `sign` first.
 fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
     let e = scaled(perpendicular(u), sign);
     let other = (D == 3).then(|| -> Point<D> {

@@ -15,10 +15,13 @@ use sidestep_rods::geometry::{
 };
 use std::f64::consts::PI;
 
-/// Most rounds before relaxation is given up.
+/// Largest number of rounds before relaxation is given up.
 const MAX_ROUNDS: usize = 400;
 /// Rounds without a new best before relaxation is given up.
 const MAX_IDLE_ROUNDS: usize = 60;
+/// Fraction of the least violation so far below which a round is a new best: smaller gains may be the slow drift of a
+/// posture that never gets free.
+const IMPROVEMENT: f64 = 0.98;
 /// Extra distance by which bodies are pushed, as a fraction of the longest rod.
 const MARGIN: f64 = 1e-3;
 /// Margin below its limit to which a bend is pushed.
@@ -26,6 +29,9 @@ const BEND_MARGIN_RAD: f64 = 2e-3;
 /// Length of a push as a fraction of the depth; more than 1 (over-relaxation), because the projection to
 /// whole rods undoes some of it.
 const PUSH_FACTOR: f64 = 1.3;
+
+/// Least displacement of a rod's nearest point per unit of push.
+const MIN_RESPONSE: f64 = 1e-3;
 
 /// Result of a start.
 pub(super) struct RelaxResult<const D: usize> {
@@ -58,7 +64,7 @@ pub(super) fn relax<const D: usize>(
             return RelaxResult { rounds: round + 1, veto };
         }
         pusher.push(points);
-        if pusher.violation_m < 0.98 * best_m {
+        if pusher.violation_m < IMPROVEMENT * best_m {
             best_m = pusher.violation_m;
             best_round = round;
         }
@@ -200,7 +206,7 @@ impl<const D: usize> Pusher<'_, D> {
         if nearest.distance_m < keep_m {
             self.violation_m += depth_m;
         }
-        if square > 1e-3 {
+        if square > MIN_RESPONSE {
             points[i] = add_scaled(points[i], away, PUSH_FACTOR * depth_m * weights[0] / square);
             if j != i {
                 points[j] =

@@ -11,6 +11,10 @@ use sidestep_rods::geometry::{Point, add, add_scaled, dot, first_axis, normalize
 /// Random draws for starts.
 const START: Purpose = Purpose(0x1C);
 
+/// Lengths of the random vector that is added to the direction of each rod: from nearly straight limbs, which go past
+/// obstacles, to coiled ones, which fit between them.
+const SPREADS: [f64; 4] = [0.15, 0.4, 0.8, 1.5];
+
 /// Returns start number `index`: 0 is the present posture, 1 its mirror image across the line from
 /// base to target, the others are random walks of random stiffness.
 pub(super) fn start<const D: usize>(
@@ -45,7 +49,7 @@ fn random_walk<const D: usize>(
     index: usize,
 ) {
     let mut draws = Streams::new(Seed(goal.seed)).draws(0, index as u64, START);
-    let spread = [0.15, 0.4, 0.8, 1.5][draws.uniform_below(4) as usize];
+    let spread = SPREADS[draws.uniform_below(SPREADS.len() as u32) as usize];
     let mut u = random_direction(&mut draws);
     let mut inner = goal.base;
     for i in limb::path(goal.base, end).skip(1) {

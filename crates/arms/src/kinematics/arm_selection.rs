@@ -56,12 +56,14 @@ impl ArmFiles {
             let (base, tip) = semantics.ends("--group", name, model)?;
             return SerialChain::new(model, base, tip, "--group");
         }
-        let link = |option, name: &Option<String>, otherwise| match name {
-            Some(name) => model.link(option, name),
-            None => Ok(otherwise),
+        let base = match &self.base {
+            Some(name) => model.link("--base", name)?,
+            None => model.root,
         };
-        let base = link("--base", &self.base, model.root)?;
-        let tip = link("--tip", &self.tip, model.default_tip())?;
+        let tip = match &self.tip {
+            Some(name) => model.link("--tip", name)?,
+            None => model.default_tip(),
+        };
         let place = match (&self.tip, &self.base) {
             (Some(_), _) => "--tip".into(),
             (None, Some(_)) => "--base".into(),

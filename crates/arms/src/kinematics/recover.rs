@@ -16,13 +16,16 @@ use sidestep_import::urdf::Limits;
 use sidestep_kernel::geometry::{add, cross, dot, norm, rejection, scaled, sub};
 use sidestep_kernel::math::{atan2, wrap_angle};
 
-/// Largest distance between a connector and its nearest possible place, as a share of the reach.
+/// Largest distance between a connector and its nearest possible place, as a fraction of the reach: positions in single
+/// precision fit.
 const FIT_TOLERANCE: f64 = 1e-6;
 
-/// Distance from an axis, as a share of the reach, within which a point is on it: no turn moves it.
+/// Distance from an axis, as a fraction of the reach, within which a point is on it: no turn moves it, and nearer to the
+/// axis the angle is lost in rounding.
 const ON_AXIS_TOLERANCE: f64 = 1e-10;
 
-/// Joint values tried before the search gives up; an arm of 7 joints needs at most some 20.
+/// Joint values tried before the search gives up; an arm of 7 joints needs at most some 20. Each pair of axes may double
+/// their number, so that a made-up arm could keep the search busy without end.
 const MAX_TRIES: usize = 20_000;
 
 /// Joint values that reproduce the connectors' positions.
@@ -111,9 +114,10 @@ impl SerialChain {
         if finite != expected || positions_m.len() != expected {
             return Err(RecoverError::WrongCount { found: finite, expected });
         }
-        let mimics = |(i, j): &(usize, &MovingJoint)| !j.drive.is_own() || j.drive.variable != *i;
-        if let Some((_, joint)) = self.joints.iter().enumerate().find(mimics) {
-            return Err(RecoverError::Mimics { joint: joint.name.clone() });
+        for (i, joint) in self.joints.iter().enumerate() {
+            if !joint.drive.is_own() || joint.drive.variable != i {
+                return Err(RecoverError::Mimics { joint: joint.name.clone() });
+            }
         }
         self.check_solvable(skeleton)?;
         let mut search = JointSearch {
@@ -200,7 +204,7 @@ impl JointSearch<'_> {
         false
     }
 
-    /// Decides the joints from `known` on, and goes on from there.
+    /// Decides the joints from `known` on, and continues with the next connector.
     fn try_values(
         &mut self,
         connector: usize,
@@ -320,20 +324,18 @@ impl JointSearch<'_> {
         let at_zero = link.compose(&inner.origin);
         let second = outer.line(&at_zero);
         let p_m = at_zero.compose(&outer.origin).transform_point(p_m);
-        let pair = |z: Vector| {
+        let mut found = Vec::new();
+        for mut z in meeting_points(&first, target_m, &second, p_m) {
             let q1 = self.solve_turn(inner, &first, [z, target_m], reference[0]);
-            // An open first turn is at its reference, and the second has to fit it.
-            let back = inner.transform(-q1.value);
-            let z = if q1.is_open {
-                at_zero.transform_point(
-                    back.transform_point(at_zero.inverse_transform_point(target_m)),
-                )
-            } else {
-                z
-            };
-            vec![q1, self.solve_turn(outer, &second, [p_m, z], reference[1])]
-        };
-        meeting_points(&first, target_m, &second, p_m).into_iter().map(pair).collect()
+            if q1.is_open {
+                // An open first turn is at its reference, and the second has to fit it.
+                let back = inner.transform(-q1.value);
+                let local = at_zero.inverse_transform_point(target_m);
+                z = at_zero.transform_point(back.transform_point(local));
+            }
+            found.push(vec![q1, self.solve_turn(outer, &second, [p_m, z], reference[1])]);
+        }
+        found
     }
 
     fn finish(self) -> RecoveredJoints {
@@ -387,12 +389,13 @@ fn outside_limits_error(joint: &MovingJoint, value: f64, limits: Limits) -> Reco
 fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f64 {
     let nearest = reference_rad + wrap_angle(angle_rad - reference_rad);
     let turns = [nearest, nearest - TAU, nearest + TAU];
-    let is_allowed = |value: &f64| limits.is_none_or(|limits| limits.contains(*value));
-    turns.into_iter().find(is_allowed).unwrap_or_else(|| {
-        // Distant references end up here: bring the angle near to the middle of the limits.
-        let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
-        middle + wrap_angle(angle_rad - middle)
-    })
+    let mut allowed = turns.into_iter().filter(|&value| limits.is_none_or(|l| l.contains(value)));
+    if let Some(turn) = allowed.next() {
+        return turn;
+    }
+    // Distant references end up here: bring the angle near to the middle of the limits.
+    let middle = limits.map_or(0.0, |limits| 0.5 * (limits.lower + limits.upper));
+    middle + wrap_angle(angle_rad - middle)
 }
 
 /// Returns the points where the circle about `first` through `a` meets that about `second` through
@@ -425,6 +428,6 @@ fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vect
     // The point of the line {n1 x = d1, n2 x = 0} that is nearest to the center.
     let nearest = scaled(cross(n2, along), d1 / square);
     let half_chord = ((radius * radius - dot(nearest, nearest)).max(0.0) / square).sqrt();
-    let at = |t: f64| add(center, add(nearest, scaled(along, t)));
-    if half_chord == 0.0 { vec![at(0.0)] } else { vec![at(half_chord), at(-half_chord)] }
+    let turns = if half_chord == 0.0 { vec![0.0] } else { vec![half_chord, -half_chord] };
+    turns.into_iter().map(|t| add(center, add(nearest, scaled(along, t)))).collect()
 }

@@ -189,7 +189,7 @@ impl SerialChain {
         Ok(())
     }
 
-    /// Returns how a joint of the model, on the way to the tip or beside it, follows the variables;
+    /// Returns how a joint of the model, between base and tip or beside them, follows the variables;
     /// none if it does not.
     pub(super) fn coupling(&self, model: &Model, joint: usize) -> Option<JointCoupling> {
         let (driver, multiplier, offset) = mimic_source(model, joint);
@@ -218,17 +218,21 @@ impl SerialChain {
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
     /// rest. Of several values for one joint the last one holds.
     pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
-        let given = |variable: &Dof| {
-            posture.iter().rfind(|(joint, _)| model.joints[*joint].name == variable.name)
-        };
-        let at_rest = self.variables.iter().zip(self.rest_values());
-        at_rest.map(|(variable, rest)| given(variable).map_or(rest, |(_, value)| *value)).collect()
+        let mut values = self.rest_values();
+        for (value, variable) in values.iter_mut().zip(&self.variables) {
+            let mut given = posture.iter().rev();
+            let last = given.find(|(joint, _)| model.joints[*joint].name == variable.name);
+            if let Some((_, last)) = last {
+                *value = *last;
+            }
+        }
+        values
     }
 
     /// Returns the values nearest to zero that are inside the limits.
     pub fn rest_values(&self) -> Vec<f64> {
-        let nearest = |v: &Dof| v.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
-        self.variables.iter().map(nearest).collect()
+        let limits = self.variables.iter().map(|v| v.limits);
+        limits.map(|limits| limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper))).collect()
     }
 
     /// Checks that there is a finite value for each variable. `place` names the source of the
@@ -248,13 +252,11 @@ impl SerialChain {
             let remedy = format!("give a value for each of: {}", names.join(", "));
             return Err(InputError::new(place, cause, remedy));
         }
-        match values.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(i) => {
-                let cause = format!("`{}` is {}", names[i], values[i]);
-                Err(InputError::new(place, cause, "give finite numbers"))
-            }
+        if let Some(i) = values.iter().position(|value| !value.is_finite()) {
+            let cause = format!("`{}` is {}", names[i], values[i]);
+            return Err(InputError::new(place, cause, "give finite numbers"));
         }
+        Ok(())
     }
 
     /// Checks that all joints, including mimicking ones, are inside their limits. `place` names the
@@ -263,15 +265,13 @@ impl SerialChain {
     /// # Errors
     /// When one is outside, with its name and its limits.
     pub fn check_limits(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
-        match self.outside(values).next() {
-            None => Ok(()),
-            Some((name, motion, limits, value)) => {
-                let unit = motion.unit();
-                let cause = format!("joint `{name}` cannot be at {value} {unit}");
-                let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
-                Err(InputError::new(place, cause, remedy))
-            }
+        if let Some((name, motion, limits, value)) = self.outside(values).next() {
+            let unit = motion.unit();
+            let cause = format!("joint `{name}` cannot be at {value} {unit}");
+            let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
+            return Err(InputError::new(place, cause, remedy));
         }
+        Ok(())
     }
 
     /// Returns the names of the joints outside their limits, including mimicking ones, each once.

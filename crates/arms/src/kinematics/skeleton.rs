@@ -5,11 +5,12 @@
 //! the one farthest out that shares a link with the last one, so that points between which no joint
 //! bends (such as the elbow offsets of a Panda) drop out.
 
-use super::serial::{Frames, JointMotion, SerialChain};
+use super::serial::{Frames, JointMotion, MovingJoint, SerialChain};
 use super::transform::{Line, Transform, Vector};
 use sidestep_kernel::geometry::{add, dot, norm, rejection, scaled, sub};
 
-/// Points nearer to each other than this share of the arm's reach count as one.
+/// Points nearer to each other than this fraction of the arm's reach count as one: models are written with some ten
+/// digits, and a rod between two such points would have no direction.
 const SAME_POINT_TOLERANCE: f64 = 1e-9;
 
 /// An arm as a chain of rods.
@@ -85,12 +86,16 @@ impl SerialChain {
     }
 
     fn reach_m(&self) -> f64 {
-        let slide = |j: &super::serial::MovingJoint| match (j.motion, j.limits) {
-            (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
-            _ => 0.0,
-        };
-        let links = self.joints.iter().map(|joint| norm(joint.origin.origin_m) + slide(joint));
+        let links = self.joints.iter().map(|j| norm(j.origin.origin_m) + slide_limit_m(j));
         links.sum::<f64>() + norm(self.to_tip.origin_m)
+    }
+}
+
+/// Returns the farthest that a joint slides within its limits; 0 of a joint that turns, or without limits.
+fn slide_limit_m(joint: &MovingJoint) -> f64 {
+    match (joint.motion, joint.limits) {
+        (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+        _ => 0.0,
     }
 }
 
@@ -138,8 +143,8 @@ impl SkeletonBuilder<'_> {
         let Some(first) = self.lines.first() else { return Vec::new() };
         let mut candidates = Vec::new();
         let mut entry = first.through_m;
-        let is_slide = |joint: usize| self.chain.joints[joint].motion == JointMotion::Slide;
-        if self.lines.len() == 1 || is_slide(0) {
+        // A first joint that slides carries the next axis away from the base, so a point on its own axis stays there.
+        if self.lines.len() == 1 || self.chain.joints[0].motion == JointMotion::Slide {
             candidates.push(self.anchor(entry, 0));
         }
         for (joint, pair) in self.lines.windows(2).enumerate() {
@@ -154,19 +159,21 @@ impl SkeletonBuilder<'_> {
 
     /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
     fn anchor(&self, p_m: Vector, link: usize) -> Anchor {
-        let on_axis = |joint: usize| {
-            self.chain.joints[joint].motion == JointMotion::Turn
-                && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
-        };
         let mut first = link;
         let mut last = link;
-        while first > 0 && on_axis(first - 1) {
+        while first > 0 && self.is_on_axis(p_m, first - 1) {
             first -= 1;
         }
-        while last < self.lines.len() && on_axis(last) {
+        while last < self.lines.len() && self.is_on_axis(p_m, last) {
             last += 1;
         }
         Anchor { point_m: self.frames.links[first].inverse_transform_point(p_m), first, last }
+    }
+
+    /// Returns whether a turn of the joint leaves the point where it is.
+    fn is_on_axis(&self, p_m: Vector, joint: usize) -> bool {
+        self.chain.joints[joint].motion == JointMotion::Turn
+            && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
     }
 
     /// Returns whether a rod can join two points: fixed in one link, or on either side of a slide.
@@ -199,11 +206,11 @@ impl SkeletonBuilder<'_> {
         let joint = &self.chain.joints[joint];
         // The frames of the builder have every variable at zero, a mimic joint at its offset.
         let zero = joint.drive.offset;
-        let length_m = |q: f64| norm([offset_m, dot(v, axis) + q - zero, 0.0]);
         let Some(limits) = joint.limits else {
             return SkeletonRod { min_m: offset_m, max_m: f64::INFINITY };
         };
-        let ends = [length_m(limits.lower), length_m(limits.upper)];
+        let ends =
+            [limits.lower, limits.upper].map(|q| norm([offset_m, dot(v, axis) + q - zero, 0.0]));
         let passes = (limits.lower..=limits.upper).contains(&(zero - dot(v, axis)));
         SkeletonRod {
             min_m: if passes { offset_m } else { ends[0].min(ends[1]) },

@@ -5,6 +5,9 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{Point, add, cross, dot, norm, scaled, sub};
 use sidestep_kernel::math::{cos, sin};
 
+/// Largest error of the products of a rotation's rows: a matrix in single precision passes.
+const ROTATION_TOLERANCE: f64 = 1e-6;
+
 /// A point or a direction.
 pub type Vector = Point<3>;
 
@@ -25,9 +28,11 @@ impl Transform {
     /// Returns the frame that a URDF's `<origin>` describes.
     pub fn from_origin(origin: &Origin) -> Self {
         let [roll, pitch, yaw] = origin.rpy_rad;
-        let about = |axis, angle_rad| Self::from_axis_angle(axis, angle_rad).rotation;
         let [x, y, z] = Self::IDENTITY.rotation;
-        let rotation = multiply(&multiply(&about(z, yaw), &about(y, pitch)), &about(x, roll));
+        let about_x = Self::from_axis_angle(x, roll).rotation;
+        let about_y = Self::from_axis_angle(y, pitch).rotation;
+        let about_z = Self::from_axis_angle(z, yaw).rotation;
+        let rotation = multiply(&multiply(&about_z, &about_y), &about_x);
         Self { rotation, origin_m: origin.xyz_m }
     }
 
@@ -83,9 +88,14 @@ impl Transform {
     /// Returns whether its rotation is one, to 1e-6: three orthogonal unit vectors that form a right hand.
     pub(super) fn has_valid_rotation(&self) -> bool {
         let [x, y, z] = self.rotation;
-        let is_near = |a: f64, b: f64| (a - b).abs() <= 1e-6;
-        let units = [x, y, z].iter().all(|row| is_near(dot(*row, *row), 1.0));
-        units && is_near(dot(x, y), 0.0) && is_near(dot(cross(x, y), z), 1.0)
+        let errors = [
+            dot(x, x) - 1.0,
+            dot(y, y) - 1.0,
+            dot(z, z) - 1.0,
+            dot(x, y),
+            dot(cross(x, y), z) - 1.0,
+        ];
+        errors.iter().all(|error| error.abs() <= ROTATION_TOLERANCE)
     }
 
     /// Returns the inverse: the outer frame in this one.

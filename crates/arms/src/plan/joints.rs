@@ -3,22 +3,34 @@
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
 use crate::ik::constraints::ConstraintChecker;
-use crate::kinematics::{ArmGoal, Dof, JointMotion};
+use crate::kinematics::{ArmGoal, JointMotion};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Veto};
 use std::f64::consts::PI;
 
-/// Most distinct postures at a target that are sought.
+/// Largest number of distinct postures at a target that are sought: an arm of six joints with a spherical wrist has
+/// up to eight, some of them in obstacles.
 const MAX_SOLUTIONS: usize = 12;
-/// Random postures from which that search starts.
+/// Random postures from which that search starts: five for each posture sought.
 const MAX_RESTARTS: usize = 60;
-/// Most of those from which the second tree grows.
+/// Largest number of those from which the second tree grows, the nearest first: some may be cut off from the present one.
 const MAX_GOALS: usize = 4;
-/// Least step between two postures that are checked, as a fraction of the arm's reach: tiny connectors
-/// would make checks of a path endless.
+/// Least step between two postures that are checked, as a fraction of the arm's reach. The step is otherwise a quarter of
+/// the least rod or radius, and tiny connectors would make checks of a path endless; thinner obstacles may then be missed
+/// between two checks. With 1e-3 a stride of a tree takes about a thousand checks at most. The value trades these off, and
+/// was not tuned.
 const MIN_STEP: f64 = 1e-3;
+
+/// An arm at a posture.
+#[derive(Debug, Clone, Copy)]
+pub struct JointPosture<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// A value for each of its joints, rad or m.
+    pub joints: &'a [f64],
+}
 
 /// The postures of one arm among obstacles: a value for each of its joints.
 pub struct JointSpace<'a, const D: usize> {
@@ -31,19 +43,18 @@ pub struct JointSpace<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> JointSpace<'a, D> {
-    /// Returns the postures that bring connector `k` to places. `chain` is the arm's chain at its `present` joint
-    /// values.
+    /// Returns the postures that bring connector `k` to places. `chain` is the arm's chain at its present posture.
     pub fn new(
-        arm: &'a Arm,
-        present: &'a [f64],
+        present: JointPosture<'a>,
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
         self_collision: bool,
         k: usize,
     ) -> Self {
+        let JointPosture { arm, joints } = present;
         let checker = ConstraintChecker { chain, obstacles, self_collision };
         let step_m = chain.step_m().max(MIN_STEP * arm.skeleton.reach_m);
-        Self { arm, present, checker, k, step_m }
+        Self { arm, present: joints, checker, k, step_m }
     }
 
     /// Returns the objection to the places of an arm's connectors, if there is one.
@@ -111,7 +122,10 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     }
 
     fn sample(&self, draws: &mut Draws) -> Vec<f64> {
-        let draw = |(variable, [lower, upper]): (&Dof, &[f64; 2])| {
+        let mut values = Vec::new();
+        for (variable, [lower, upper]) in
+            self.arm.serial.variables.iter().zip(self.arm.follower.limits())
+        {
             // A joint that turns without limits gets everywhere within half a turn to either side; slides without
             // limits go as far as the arm is long.
             let max = match variable.motion {
@@ -121,9 +135,8 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
             };
             let lower = lower.max(-max);
             let upper = upper.min(max);
-            lower + draws.uniform() * (upper - lower)
-        };
-        let variables = self.arm.serial.variables.iter();
-        variables.zip(self.arm.follower.limits()).map(draw).collect()
+            values.push(lower + draws.uniform() * (upper - lower));
+        }
+        values
     }
 }

@@ -17,17 +17,17 @@ mod tests;
 mod tree;
 
 use super::ik::{ChainIkGoal, IkSolver};
-pub use joints::JointSpace;
+pub use joints::{JointPosture, JointSpace};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Rules};
 pub use space::RodSpace;
 
-/// Most postures at the target from which the second tree grows: some may be cut off from the present
+/// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.
 const MAX_GOALS: usize = 4;
-/// Most searches for them.
+/// Largest number of searches for them.
 const MAX_SEARCHES: usize = 12;
 /// Restarts of the search for one of them.
 const MAX_RESTARTS: usize = 25;

@@ -33,9 +33,10 @@ impl<'a, const D: usize> RodSpace<'a, D> {
         k: usize,
     ) -> Result<Self, InputError> {
         let n = chain.points().len();
-        let is_still = |i: &usize| chain.connectors()[*i].is_still();
-        let below = (0..k).rev().find(is_still);
-        let limb = match (below, (k + 1..n).find(is_still)) {
+        let connectors = chain.connectors();
+        let below = (0..k).rev().find(|&i| connectors[i].is_still());
+        let above = (k + 1..n).find(|&i| connectors[i].is_still());
+        let limb = match (below, above) {
             (Some(base), _) => (base..n).collect(),
             (None, Some(base)) => (0..=base).rev().collect(),
             (None, None) => {
@@ -138,7 +139,8 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
 /// Longest move of a connector between two postures that are checked, in steps: with linear interpolation
 /// of directions, the middle of a wide turn is faster than its ends.
 const MAX_STEPS: f64 = 3.0;
-/// The largest angle by which a rod of a random posture may differ in direction from the one before.
+/// Largest angles by which a rod of a random posture may differ in direction from the one before, as fractions of half a
+/// turn: from nearly straight postures, which reach far, to any.
 const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {

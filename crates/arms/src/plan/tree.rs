@@ -4,9 +4,10 @@ use super::ConfigurationSpace;
 use sidestep_kernel::interrupt;
 use sidestep_kernel::stream::Draws;
 
-/// Most random postures that the trees grow toward.
+/// Largest number of random postures that the trees grow toward.
 const MAX_SAMPLES: usize = 2_000;
-/// Longest move of a connector between two postures of a tree, in lengths of the chain.
+/// Longest move of a connector between two postures of a tree, in lengths of the chain. The path of a stride is checked in
+/// far shorter steps, so it sets only how dense the trees are.
 const MAX_STRIDE: f64 = 0.1;
 /// Longest straight move of a connector, in lengths of the chain: what a growth of one tree may add.
 const MAX_SEGMENT: f64 = 4.0;
@@ -26,9 +27,9 @@ impl<S: ConfigurationSpace> Tree<S> {
 
     /// Returns the posture nearest to another; of equal ones the first.
     fn nearest(&self, space: &S, to: &S::Posture) -> usize {
-        let spread2 = |i: usize| space.squared_spread(&self.postures[i], to);
-        let all = (0..self.postures.len()).map(|i| (spread2(i), i));
-        all.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, i)| i)
+        let spreads = self.postures.iter().map(|posture| space.squared_spread(posture, to));
+        let nearest = spreads.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
+        nearest.map_or(0, |(i, _)| i)
     }
 
     /// Grows toward a posture stride by stride, as far as the path is free; returns the last posture

@@ -28,6 +28,12 @@ impl Bar {
         Self { value, interval: None }
     }
 
+    /// Returns the values that it reaches.
+    fn heights(&self) -> [f64; 3] {
+        let (low, high) = self.interval.unwrap_or((self.value, self.value));
+        [low, self.value, high]
+    }
+
     /// Adds an error bar from `low` to `high`, e.g. a 95 % confidence interval.
     #[must_use]
     pub fn with_interval(mut self, low: f64, high: f64) -> Self {
@@ -140,21 +146,18 @@ impl BarChart {
     /// Returns all values that the axis must show, including zero, where bars start.
     fn heights(&self) -> impl Iterator<Item = f64> {
         let bars = self.series.iter().flat_map(|series| &series.bars);
-        let reach = |bar: &Bar| {
-            let (low, high) = bar.interval.unwrap_or((bar.value, bar.value));
-            [low, bar.value, high]
-        };
-        bars.flat_map(reach).chain([0.0])
+        bars.flat_map(Bar::heights).chain([0.0])
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |(index, series): (usize, &BarSeries)| {
+        let mut entries = Vec::with_capacity(self.series.len());
+        for (index, series) in self.series.iter().enumerate() {
             let (opacity, rim) = series_fill(index);
             let fill = series_color(index).into();
             let symbol = LegendSymbol::Swatch { fill, rim: rim.into(), opacity };
-            LegendEntry::new(symbol, &series.label)
-        };
-        self.series.iter().enumerate().map(entry).collect()
+            entries.push(LegendEntry::new(symbol, &series.label));
+        }
+        entries
     }
 
     fn draw_series(&self, frame: &mut ChartFrame, index: usize, series: &BarSeries) {

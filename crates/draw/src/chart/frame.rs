@@ -11,7 +11,13 @@ const TICK_PX: f64 = 5.0;
 const EDGE_PX: f64 = 10.0;
 const LABEL_GAP_PX: f64 = 5.0;
 const NOTE_GAP_PX: f64 = 8.0;
-/// Least part of the picture's height for the data; the picture grows to provide it.
+/// Gap between the names of two categories.
+const SLOT_GAP_PX: f64 = 6.0;
+/// Gap beside an upright name.
+const UPRIGHT_GAP_PX: f64 = 4.0;
+/// Largest fraction of the picture's height that upright names take; longer ones are cut off.
+const MAX_UPRIGHT_FRACTION: f64 = 0.4;
+/// Least fraction of the picture's height for the data; the picture grows to provide it.
 const MIN_AREA_FRACTION: f64 = 0.55;
 
 /// The content of the horizontal axis.
@@ -98,18 +104,22 @@ impl SlotNames {
     fn wrap(style: &Style, across: &XAxis<'_>, width: f64) -> Self {
         let XAxis::Categories(names) = across else { return Self::default() };
         let size = style.small_px();
-        let slot_px = width / names.len().max(1) as f64 - 6.0;
-        let measure = |text: &str| text::width(text, size, Weight::Regular);
-        let too_wide = |name: &String| name.split(' ').any(|word| measure(word) > slot_px);
-        if names.iter().any(too_wide) {
-            let most = 0.4 * style.height_px;
-            let short = |name: &String| vec![text::shorten(name, size, Weight::Regular, most)];
-            let names: Vec<_> = names.iter().map(short).collect();
-            let height_px = names.iter().flatten().map(|name| measure(name)).fold(0.0, f64::max);
-            return Self { names, upright: true, height_px: height_px + 4.0 };
+        let slot_px = width / names.len().max(1) as f64 - SLOT_GAP_PX;
+        let mut words = names.iter().flat_map(|name| name.split(' '));
+        // A word that is wider than its slot cannot be broken, so all names stand upright.
+        if words.any(|word| text::width(word, size, Weight::Regular) > slot_px) {
+            let most = MAX_UPRIGHT_FRACTION * style.height_px;
+            let names: Vec<_> = names
+                .iter()
+                .map(|name| vec![text::shorten(name, size, Weight::Regular, most)])
+                .collect();
+            let heights_px =
+                names.iter().flatten().map(|name| text::width(name, size, Weight::Regular));
+            let height_px = heights_px.fold(0.0, f64::max) + UPRIGHT_GAP_PX;
+            return Self { names, upright: true, height_px };
         }
-        let lines = |name: &String| text::wrap(name, size, Weight::Regular, slot_px);
-        let names: Vec<_> = names.iter().map(lines).collect();
+        let names: Vec<_> =
+            names.iter().map(|name| text::wrap(name, size, Weight::Regular, slot_px)).collect();
         let most_lines = names.iter().map(Vec::len).max().unwrap_or(0);
         Self { names, upright: false, height_px: most_lines as f64 * size * 1.35 }
     }
@@ -125,8 +135,9 @@ impl ChartFrame {
     ) -> Self {
         let least_height = MIN_AREA_FRACTION * style.height_px;
         let y = text::wrap(words.y_label, style.font_px, Weight::Regular, least_height);
-        let measure = |label: &str| text::width(label, style.small_px(), Weight::Regular);
-        let ticks_px = up.ticks.max_label_px(measure) + TICK_PX + 8.0;
+        let labels_px =
+            up.ticks.max_label_px(|label| text::width(label, style.small_px(), Weight::Regular));
+        let ticks_px = labels_px + TICK_PX + 8.0;
         let left = EDGE_PX + y.len() as f64 * line_px(style) + ticks_px;
         let width = (style.width_px - left - EDGE_PX - right_room(style, across)).max(60.0);
         let labels = WrappedLabels::wrap(style, &words, across, y, width);

@@ -11,6 +11,8 @@ use crate::style::{FAINT_INK, Style, series_color, series_dash};
 use crate::svg::Svg;
 use sidestep_kernel::math::hypot;
 
+/// Distance below which two points of a line cannot be distinguished, pixels.
+const MIN_POINT_DISTANCE_PX: f64 = 0.5;
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_LINE_SEGMENTS: u32 = 64;
 /// Longest series with a marker at each point; longer ones show only their line.
@@ -213,8 +215,11 @@ impl Plot {
             };
             LegendEntry::new(symbol, &series.label)
         });
-        let ideal = |label| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, label);
-        series.chain(self.ideals.iter().map(|line| ideal(&line.label))).collect()
+        let ideals = self
+            .ideals
+            .iter()
+            .map(|line| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, &line.label));
+        series.chain(ideals).collect()
     }
 
     fn draw_series(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
@@ -264,9 +269,8 @@ impl Plot {
     /// Fills the area between the ends of the intervals, over each run of points that have them.
     fn draw_band(&self, frame: &mut ChartFrame, x: Scale, color: &str, series: &Series) {
         let y = frame.y;
-        let is_out = |p: &Point| !self.contains(p) || bounds(p).is_none();
-        for run in series.points.split(is_out).filter(|run| run.len() > 1) {
-            let ends = |p: &Point| bounds(p).unwrap_or((p.y, p.y));
+        let runs = series.points.split(|p| !self.contains(p) || bounds(p).is_none());
+        for run in runs.filter(|run| run.len() > 1) {
             let upper = run.iter().map(|p| (x.px(p.x), y.px(ends(p).1)));
             let lower = run.iter().rev().map(|p| (x.px(p.x), y.px(ends(p).0)));
             let data = polyline(upper.chain(lower)) + "Z";
@@ -278,6 +282,11 @@ impl Plot {
 /// Returns a point's interval, if it can be drawn.
 fn bounds(point: &Point) -> Option<(f64, f64)> {
     point.interval.filter(|(low, high)| low.is_finite() && high.is_finite())
+}
+
+/// Returns the ends of a point's interval; without one both are its value.
+fn ends(point: &Point) -> (f64, f64) {
+    bounds(point).unwrap_or((point.y, point.y))
 }
 
 /// Returns the vertical values that a point covers.
@@ -294,9 +303,10 @@ fn decimate(points: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = (f
     std::iter::from_fn(move || {
         loop {
             let point = points.next()?;
-            let far =
-                |last: (f64, f64)| (point.0 - last.0).abs().max((point.1 - last.1).abs()) >= 0.5;
-            if kept.is_none_or(far) || points.peek().is_none() {
+            let is_apart = kept.is_none_or(|last| {
+                (point.0 - last.0).abs().max((point.1 - last.1).abs()) >= MIN_POINT_DISTANCE_PX
+            });
+            if is_apart || points.peek().is_none() {
                 kept = Some(point);
                 return kept;
             }
@@ -330,8 +340,10 @@ type Px = (f64, f64);
 fn draw_ends(svg: &mut Svg, places: &[Px], color: &str, head_px: f64) {
     let [start, .., end] = places else { return };
     start_mark(svg, *start, 0.4 * head_px, color);
-    let is_apart = |p: &&Px| hypot(p.0 - end.0, p.1 - end.1) > 0.5;
-    if let Some(before) = places.iter().rev().find(is_apart) {
+    let mut backward = places.iter().rev();
+    // Two points at one place have no direction.
+    if let Some(before) = backward.find(|p| hypot(p.0 - end.0, p.1 - end.1) > MIN_POINT_DISTANCE_PX)
+    {
         arrowhead(svg, *before, *end, head_px, color);
     }
 }

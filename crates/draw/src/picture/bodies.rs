@@ -74,12 +74,14 @@ pub(super) fn draw_layers(
     bodies: &[Body],
     layers: std::ops::RangeInclusive<u8>,
 ) {
-    let layer = |body: &Body| body.appearance(scene.scenery.dimensions).layer;
-    let mut shown: Vec<&Body> =
-        bodies.iter().filter(|body| layers.contains(&layer(body)) && !is_wall(body)).collect();
-    // The sort is stable: in a layer, the body named first is drawn first.
-    shown.sort_by_key(|body| layer(body));
-    shown.into_iter().for_each(|body| draw_body(svg, scene, canvas, body));
+    let mut shown: Vec<(u8, &Body)> = bodies
+        .iter()
+        .map(|body| (body.appearance(scene.scenery.dimensions).layer, body))
+        .filter(|(layer, body)| layers.contains(layer) && !is_wall(body))
+        .collect();
+    // The sort is stable: in a layer, the body that comes first is drawn first.
+    shown.sort_by_key(|(layer, _)| *layer);
+    shown.into_iter().for_each(|(_, body)| draw_body(svg, scene, canvas, body));
 }
 
 /// A body in space, or one segment of a line with many points.
@@ -101,23 +103,19 @@ pub(super) fn draw_by_depth<'a>(
     for body in bodies {
         match &body.shape {
             Shape::Line { points_m, .. } => {
-                let depth_m =
-                    |pair: &[Vec3]| 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
-                let pairs = points_m.windows(2).enumerate();
-                let part = |(k, pair)| DepthItem { depth_m: depth_m(pair), body, from: Some(k) };
-                parts.extend(pairs.map(part));
+                for (k, pair) in points_m.windows(2).enumerate() {
+                    let depth_m = 0.5 * (depth(canvas, pair[0]) + depth(canvas, pair[1]));
+                    parts.push(DepthItem { depth_m, body, from: Some(k) });
+                }
             }
             _ => parts.push(DepthItem { depth_m: depth(canvas, body.pose.at_m), body, from: None }),
         }
     }
-    // The sort is stable: of bodies at the same depth, the one named first is drawn first.
+    // The sort is stable: of bodies at the same depth, the one that comes first is drawn first.
     parts.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
     let are_many = parts.iter().filter(|part| is_ball(part.body)).count() > MAX_SEPARATE_BALLS;
-    let like = |a: &Body, b: &Body| {
-        is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
-    };
     svg.push_raw(format_args!(r#"<g class="parts" {LINE_ATTRIBUTES}>"#));
-    for alike in parts.chunk_by(|a, b| are_many && like(a.body, b.body)) {
+    for alike in parts.chunk_by(|a, b| are_many && are_like_balls(canvas, a.body, b.body)) {
         match alike {
             [first, ..] if are_many && is_ball(first.body) => draw_dots(svg, canvas, alike),
             _ => alike.iter().for_each(|part| draw_part(svg, scene, canvas, part)),
@@ -205,24 +203,36 @@ fn darker(color: Color) -> Color {
     color.map(|byte| (0.66 * f64::from(byte)) as u8)
 }
 
+/// Returns the attributes of a line around a body.
+fn outline_attributes(color: Color, width: f64) -> String {
+    format!(r#"stroke="{}" stroke-width="{width}""#, hex(color))
+}
+
+/// Returns whether two bodies are balls that look the same.
+fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
+    is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
+}
+
 /// Returns the line around a body.
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
-    let line =
-        |color: Color, width: f64| format!(r#"stroke="{}" stroke-width="{width}""#, hex(color));
     let white = [0xFF; 3];
     match body.kind {
         BodyKind::Door if body.state == Condition::Open => {
-            format!(r#"{} stroke-dasharray="3 2""#, line(color, 1.0))
+            format!(r#"{} stroke-dasharray="3 2""#, outline_attributes(color, 1.0))
         }
-        BodyKind::Obstacle if canvas.is_above() => line(darker(color), 0.8),
-        BodyKind::Obstacle => format!(r#"{} stroke-opacity="0.5""#, line(darker(color), 0.6)),
-        BodyKind::Zone => format!(r#"{} stroke-opacity="0.6""#, line(color, 0.8)),
-        BodyKind::Start => format!(r#"{} stroke-dasharray="5 3""#, line(color, 1.0)),
-        BodyKind::Goal | BodyKind::Person | BodyKind::Door => line(darker(color), 1.0),
-        BodyKind::Connector if canvas.is_above() => line(white, 0.6),
-        BodyKind::Airplane => line(white, 0.6),
-        BodyKind::Robot => line(UNTRACED_COLOR, 0.8),
-        BodyKind::Connector if is_seamed(canvas, body) => line(white, SEAM_PX),
+        BodyKind::Obstacle if canvas.is_above() => outline_attributes(darker(color), 0.8),
+        BodyKind::Obstacle => {
+            format!(r#"{} stroke-opacity="0.5""#, outline_attributes(darker(color), 0.6))
+        }
+        BodyKind::Zone => format!(r#"{} stroke-opacity="0.6""#, outline_attributes(color, 0.8)),
+        BodyKind::Start => format!(r#"{} stroke-dasharray="5 3""#, outline_attributes(color, 1.0)),
+        BodyKind::Goal | BodyKind::Person | BodyKind::Door => {
+            outline_attributes(darker(color), 1.0)
+        }
+        BodyKind::Connector if canvas.is_above() => outline_attributes(white, 0.6),
+        BodyKind::Airplane => outline_attributes(white, 0.6),
+        BodyKind::Robot => outline_attributes(UNTRACED_COLOR, 0.8),
+        BodyKind::Connector if is_seamed(canvas, body) => outline_attributes(white, SEAM_PX),
         BodyKind::Connector | BodyKind::Rods => String::new(),
     }
 }
@@ -302,18 +312,19 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
 
 /// Draws marks over everything: the targets of moving things, and the leaders.
 pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
-    let bodies = || scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    for body in bodies().filter(|body| body.kind == BodyKind::Obstacle && body.is_moving()) {
+    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    for body in bodies.clone().filter(|body| body.kind == BodyKind::Obstacle && body.is_moving()) {
         let from = middle(body);
         let to = std::array::from_fn(|k| from[k] + ARROW_TIME_S * body.velocity_m_s[k]);
         arrow(svg, canvas.px(from), canvas.px(to));
     }
-    let goals = || bodies().filter(|body| body.kind == BodyKind::Goal && body.part.is_some());
-    let are_few = goals().count() <= MAX_NUMBERED_TARGETS;
-    for goal in goals() {
+    let goals: Vec<&Body> =
+        bodies.clone().filter(|body| body.kind == BodyKind::Goal && body.part.is_some()).collect();
+    let are_few = goals.len() <= MAX_NUMBERED_TARGETS;
+    for goal in goals {
         draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
     }
-    for body in bodies().filter(|body| is_leader(body)) {
+    for body in bodies.filter(|body| is_leader(body)) {
         if let Shape::Sphere { radius_m } = body.shape {
             let least_px = MIN_LEADER_PX[usize::from(!canvas.is_above())];
             let radius_px = (0.7 * radius_m * canvas.px_per_m).max(least_px);
@@ -360,20 +371,22 @@ fn middle(body: &Body) -> Vec3 {
 fn faces(pose: &Pose, size_m: Vec3, canvas: &Canvas) -> Vec<[Vec3; 4]> {
     let half = size_m.map(|side_m| 0.5 * side_m);
     let corners = corners([half.map(|m| -m), half]).map(|corner| pose.transform_point(corner));
-    let turn = |k: usize| {
+    let mut faces = Vec::new();
+    for k in 0..3 {
         let mut axis = [0.0; 3];
         axis[k] = 1.0;
-        dot(pose.rotate(axis), canvas.camera.to_eye)
-    };
-    // A face that is seen edge-on has no extent.
-    let facing = (0..3).map(|k| (k, turn(k))).filter(|(_, turn)| turn.abs() > 1e-9);
-    let face = |(k, turn): (usize, f64)| {
+        let toward_eye = dot(pose.rotate(axis), canvas.camera.to_eye);
+        // A face that is seen edge-on has no extent.
+        if toward_eye.abs() <= 1e-9 {
+            continue;
+        }
         let i = (k + 1) % 3;
         let j = (k + 2) % 3;
-        let side = usize::from(turn > 0.0) << k;
-        [0, 1 << i, 1 << i | 1 << j, 1 << j].map(|bits: usize| corners[side | bits])
-    };
-    facing.map(face).collect()
+        // Bit k of a corner's number says on which side of the box it is along axis k.
+        let side = usize::from(toward_eye > 0.0) << k;
+        faces.push([0, 1 << i, 1 << i | 1 << j, 1 << j].map(|bits: usize| corners[side | bits]));
+    }
+    faces
 }
 
 /// Returns a circle that lies flat.

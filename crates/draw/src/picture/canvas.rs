@@ -7,7 +7,8 @@ use sidestep_kernel::view::Vec3;
 /// A point in pixels, y downward.
 pub(crate) type Px = (f64, f64);
 
-/// Limit of drawing outside a picture, pixels.
+/// Limit of drawing outside a picture, pixels: renderers work in single precision, which would lose the digits of places
+/// farther away.
 const MAX_OFFSET_PX: f64 = 1e5;
 
 /// The direction of view.
@@ -72,8 +73,13 @@ impl Canvas {
 
     pub(crate) fn px(&self, place: Vec3) -> Px {
         let [right_m, up_m] = self.camera.project(place);
-        let px = |m: f64| (m * self.px_per_m).clamp(-MAX_OFFSET_PX, MAX_OFFSET_PX);
-        (self.zero.0 + px(right_m - self.origin_m[0]), self.zero.1 - px(up_m - self.origin_m[1]))
+        let right_px = self.offset_px(right_m - self.origin_m[0]);
+        let up_px = self.offset_px(up_m - self.origin_m[1]);
+        (self.zero.0 + right_px, self.zero.1 - up_px)
+    }
+
+    fn offset_px(&self, length_m: f64) -> f64 {
+        (length_m * self.px_per_m).clamp(-MAX_OFFSET_PX, MAX_OFFSET_PX)
     }
 
     pub(crate) fn is_above(&self) -> bool {

@@ -7,14 +7,23 @@ use sidestep_kernel::view::{Body, BodyKind, Frame, OccupancyGrid, Scenery, Shape
 
 /// Most boxes of a map: 16384 x 16384.
 const MAX_BOXES: u64 = 1 << 28;
-/// Most bodies, their points, and points of trails together.
+/// Largest number of bodies, their points, and points of trails together: a picture of as many is some hundred megabytes
+/// of SVG.
 const MAX_PARTS: u64 = 1 << 22;
 /// Largest coordinate, meters: beyond it, pictures show nothing useful.
 const MAX_COORDINATE_M: f64 = 1e9;
-/// Margin around the shown area, as a part of its longest side.
+/// Margin around the shown area, as a fraction of its longest side.
 const MARGIN_FRACTION: f64 = 0.03;
-/// Least length of a side, as a part of the longest.
+/// Least length of a side, as a fraction of the longest: bodies in a row would otherwise make a picture of no height.
 const MIN_SIDE_FRACTION: f64 = 0.2;
+
+/// Returns the number of points that a body is drawn with.
+fn point_count(body: &Body) -> usize {
+    match &body.shape {
+        Shape::Line { points_m, .. } => points_m.len(),
+        _ => 1,
+    }
+}
 
 /// Refuses content that no picture can be drawn of.
 pub(crate) fn check_content(
@@ -25,17 +34,13 @@ pub(crate) fn check_content(
     if let Some(floor) = &scenery.floor {
         check_floor(floor)?;
     }
-    let bodies = || scenery.bodies.iter().chain(&frame.bodies);
-    let points = |body: &Body| match &body.shape {
-        Shape::Line { points_m, .. } => points_m.len(),
-        _ => 1,
-    };
-    let found = bodies().map(points).sum::<usize>();
+    let mut bodies = scenery.bodies.iter().chain(&frame.bodies);
+    let found = bodies.clone().map(point_count).sum::<usize>();
     let found = (found + trails.iter().map(|trail| trail.points.len()).sum::<usize>()) as u64;
     if found > MAX_PARTS {
         return Err(DrawError::TooLarge { what: "bodies", found, limit: MAX_PARTS });
     }
-    bodies().try_for_each(check_body)?;
+    bodies.try_for_each(check_body)?;
     trails.iter().flat_map(|trail| &trail.points).try_for_each(|(_, at)| check_place(at))
 }
 
@@ -185,12 +190,13 @@ impl BoundingBox {
         if self.lo[0] > self.hi[0] {
             return Ok([[0.0; 3], [1.0; 3]]);
         }
-        let side_m = |k: usize| self.hi[k] - self.lo[k];
-        let longest_m = (0..3).map(side_m).fold(0.0, f64::max);
+        let sides_m: Vec3 = std::array::from_fn(|k| self.hi[k] - self.lo[k]);
+        let longest_m = sides_m.into_iter().fold(0.0, f64::max);
         let least_m = if longest_m > 0.0 { MIN_SIDE_FRACTION * longest_m } else { 1.0 };
-        let by_m = |k: usize| MARGIN_FRACTION * longest_m + 0.5 * (least_m - side_m(k)).max(0.0);
-        let lo: Vec3 = std::array::from_fn(|k| self.lo[k] - by_m(k));
-        let hi: Vec3 = std::array::from_fn(|k| self.hi[k] + by_m(k));
+        let by_m =
+            sides_m.map(|side_m| MARGIN_FRACTION * longest_m + 0.5 * (least_m - side_m).max(0.0));
+        let lo: Vec3 = std::array::from_fn(|k| self.lo[k] - by_m[k]);
+        let hi: Vec3 = std::array::from_fn(|k| self.hi[k] + by_m[k]);
         for side_m in std::array::from_fn::<f64, 3, _>(|k| hi[k] - lo[k]) {
             DrawError::positive("extent of what is shown in m", side_m)?;
         }

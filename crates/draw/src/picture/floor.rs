@@ -7,7 +7,7 @@ use crate::style::hex;
 use crate::svg::{Svg, SvgNumber};
 use sidestep_kernel::view::{Occupancy, OccupancyGrid, UNKNOWN_COLOR, WALL_COLOR};
 
-/// Most rectangles of a floor (some megabytes of SVG); with more it is drawn at a coarser grain.
+/// Largest number of rectangles of a floor (some megabytes of SVG); with more it is drawn at a coarser grain.
 const MAX_RECTANGLES: usize = 100_000;
 
 /// A run of columns over a span of rows.
@@ -34,10 +34,9 @@ pub(super) fn draw(svg: &mut Svg, floor: &OccupancyGrid, canvas: &Canvas) {
         r#"<g transform="translate({x} {y}) scale({box_px} -{box_px}){turn}">"#
     ));
     for (occupancy, color) in [(Occupancy::Unknown, UNKNOWN_COLOR), (Occupancy::Wall, WALL_COLOR)] {
-        let is = |col: u32, row: u32| {
+        let data = path_data(floor.width, floor.height, &|col, row| {
             floor.boxes[row as usize * floor.width as usize + col as usize] == occupancy
-        };
-        let data = path_data(floor.width, floor.height, &is);
+        });
         if !data.is_empty() {
             svg.path(&data, format_args!(r#"fill="{}""#, hex(color)));
         }
@@ -52,12 +51,12 @@ pub(super) fn draw(svg: &mut Svg, floor: &OccupancyGrid, canvas: &Canvas) {
 fn path_data(width: u32, height: u32, is: &dyn Fn(u32, u32) -> bool) -> String {
     let mut grain = 1;
     loop {
-        let any = |col: u32, row: u32| {
-            let rows = row * grain..((row + 1) * grain).min(height);
-            rows.into_iter()
-                .any(|r| (col * grain..((col + 1) * grain).min(width)).any(|c| is(c, r)))
-        };
-        match merged(width.div_ceil(grain), height.div_ceil(grain), &any) {
+        let blocks = merged(width.div_ceil(grain), height.div_ceil(grain), &|col, row| {
+            let mut rows = row * grain..((row + 1) * grain).min(height);
+            let cols = col * grain..((col + 1) * grain).min(width);
+            rows.any(|r| cols.clone().any(|c| is(c, r)))
+        });
+        match blocks {
             Some(blocks) => return write(&blocks, grain, width, height),
             None => grain *= 2,
         }

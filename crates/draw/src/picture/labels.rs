@@ -10,9 +10,9 @@ use crate::text::{self, Weight};
 use sidestep_kernel::math::hypot;
 use sidestep_kernel::view::{Body, BodyKind, Shape};
 
-/// Most trails in a picture with names: with more there is no space.
+/// Largest number of trails in a picture with names: with more there is no space.
 const MAX_LABELS: usize = 12;
-/// Distance between a name and the named body.
+/// Distance between a name and its body.
 const GAP_PX: f64 = 4.0;
 /// Radius of the mark at the start of a line, and length of the head that shows its direction.
 const LINE_START_PX: f64 = 2.6;
@@ -68,27 +68,26 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, area: Rect
 
 /// Returns the rectangles of bodies that no name may cover.
 fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
-    let matters = |body: &&Body| {
+    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    let kept_free = bodies.filter(|body| {
         body.kind.is_agent()
             || matches!(body.kind, BodyKind::Person | BodyKind::Start | BodyKind::Goal)
-    };
-    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies).filter(matters);
-    bodies.map(|body| square_around(canvas.px(body.pose.at_m), radius_m(body) * canvas.px_per_m))
+    });
+    kept_free.map(|body| square_around(canvas.px(body.pose.at_m), radius_m(body) * canvas.px_per_m))
 }
 
 /// Draws an arrowhead in the middle of a line, which shows where it goes.
 fn draw_direction(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas, color: &str) {
     let points: Vec<Px> = trail.points.iter().map(|&(_, at)| canvas.px(at)).collect();
-    let length = |pair: &[Px]| hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
-    let half = 0.5 * points.windows(2).map(length).sum::<f64>();
+    let half = 0.5 * points.windows(2).map(length_px).sum::<f64>();
     // A short line has no space for a head.
     if half < 3.0 * HEAD_PX {
         return;
     }
     let mut passed = 0.0;
     let middle = points.windows(2).find(|pair| {
-        passed += length(pair);
-        passed >= half && length(pair) > 0.0
+        passed += length_px(pair);
+        passed >= half && length_px(pair) > 0.0
     });
     let Some(&[(x0, y0), (x, y)]) = middle else { return };
     arrowhead(svg, (x0, y0), (x, y), HEAD_PX, color);
@@ -145,12 +144,18 @@ fn write_label(svg: &mut Svg, label: Label<'_>, area: Rect, taken: &mut Vec<Rect
         ]
     });
     let mut rects = places.map(|(x, y)| Rect { x, y, width, height });
-    let is_free =
-        |rect: &Rect| is_within(*rect, area) && taken.iter().all(|t| is_disjoint(*t, *rect));
-    if let Some(rect) = rects.find(is_free) {
+    let free = rects.find(|rect| {
+        is_within(*rect, area) && taken.iter().all(|other| is_disjoint(*other, *rect))
+    });
+    if let Some(rect) = free {
         svg.text(rect.x, rect.y + 0.5 * height + text_style.middle_px(), words, &text_style);
         taken.push(rect);
     }
+}
+
+/// Returns the length of a segment between two points.
+fn length_px(pair: &[Px]) -> f64 {
+    hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)
 }
 
 fn is_within(rect: Rect, area: Rect) -> bool {

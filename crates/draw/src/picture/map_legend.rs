@@ -8,10 +8,10 @@ use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{body_dashes, hex};
 use crate::ticks::group_thousands;
 use sidestep_kernel::view::{
-    Body, BodyKind, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
+    BodyKind, Color, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
 };
 
-/// Most things with a color of their own in the legend; more share one line.
+/// Largest number of things with a color of their own in the legend; more share one line.
 const MAX_NAMED: usize = 10;
 /// Color of a symbol that stands for things of all colors.
 const ANY_COLOR: [u8; 3] = [0x70, 0x70, 0x70];
@@ -46,18 +46,12 @@ fn plural(kind: BodyKind, n: usize) -> String {
 
 /// Returns the legend: only entries for things in the picture.
 pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
-    let swatch = |color, opacity| LegendSymbol::Swatch {
-        fill: hex(color).into(),
-        rim: if opacity < 0.5 { hex(color).into() } else { "none".into() },
-        opacity,
-    };
-    let floor = scene.scenery.floor.as_ref();
-    let has = |occupancy| floor.is_some_and(|floor| floor.boxes.contains(&occupancy));
+    let boxes = scene.scenery.floor.as_ref().map_or(&[][..], |floor| &floor.boxes);
     let mut entries = Vec::new();
-    if has(Occupancy::Wall) {
+    if boxes.contains(&Occupancy::Wall) {
         entries.push(LegendEntry::new(swatch(WALL_COLOR, 1.0), "wall"));
     }
-    if has(Occupancy::Unknown) {
+    if boxes.contains(&Occupancy::Unknown) {
         // Unknown ground is nearly white: without a rim its swatch would not be visible.
         let swatch = LegendSymbol::Swatch {
             fill: hex(UNKNOWN_COLOR).into(),
@@ -90,19 +84,32 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     entries
 }
 
+/// Returns a filled square; a pale one has a rim, without which it would not be visible.
+fn swatch(color: Color, opacity: f64) -> LegendSymbol {
+    LegendSymbol::Swatch {
+        fill: hex(color).into(),
+        rim: if opacity < 0.5 { hex(color).into() } else { "none".into() },
+        opacity,
+    }
+}
+
 /// Returns an entry for everything with a color of its own: agents with a trail, and chains.
 fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     let trails = scene.trails.iter().map(|trail| (trail.of.number, (trail.of.kind, trail.width_m)));
-    let is_first = |body: &&Body| body.kind == BodyKind::Connector && body.part == Some(0);
-    let chains = scene.frame.bodies.iter().filter(is_first);
-    let chains = chains
+    // Each chain once, by its first connector.
+    let chains = scene
+        .frame
+        .bodies
+        .iter()
+        .filter(|body| body.kind == BodyKind::Connector && body.part == Some(0))
         .filter(|body| {
             scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
         })
         .map(|body| (body.number, (body.kind, None)));
     let all: BTreeMap<u32, (BodyKind, Option<f64>)> = chains.chain(trails).collect();
     let dashes = body_dashes(&all.keys().copied().collect());
-    let entry = |(&number, &(kind, width_m)): (&u32, &(BodyKind, Option<f64>))| {
+    let mut entries = Vec::new();
+    for (&number, &(kind, width_m)) in all.iter().take(MAX_NAMED) {
         let color = hex(body_color(number)).into();
         let symbol = match width_m {
             Some(_) => {
@@ -110,9 +117,8 @@ fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
             }
             None => LegendSymbol::Line { color, marker: None, dash: dashes[&number] },
         };
-        LegendEntry::new(symbol, display_name(scene, kind, number))
-    };
-    let mut entries: Vec<LegendEntry> = all.iter().take(MAX_NAMED).map(entry).collect();
+        entries.push(LegendEntry::new(symbol, display_name(scene, kind, number)));
+    }
     if all.len() > MAX_NAMED {
         let symbol = LegendSymbol::Line { color: hex(ANY_COLOR).into(), marker: None, dash: "" };
         entries.push(LegendEntry::new(symbol, format!("and {} more", all.len() - MAX_NAMED)));

@@ -72,11 +72,9 @@ impl Sheet {
         let [x0, y0] = area.origin_m;
         let [width, height] = area.size_m;
         let unit = unit(width.max(height));
-        let edge = |from: f64, length: f64, room_px| {
-            SheetEdge::new(from / unit.1, length / unit.1, length * px, room_px)
-        };
-        let across = edge(x0, width, 6.0 * size);
-        let upward = edge(y0, height, 4.0 * size);
+        let (_, unit_m) = unit;
+        let across = SheetEdge::new(x0 / unit_m, width / unit_m, width * px, 6.0 * size);
+        let upward = SheetEdge::new(y0 / unit_m, height / unit_m, height * px, 4.0 * size);
         let labels = upward.ticks.max_label_px(|label| text::width(label, size, Weight::Regular));
         let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
         let map_width = width * px;

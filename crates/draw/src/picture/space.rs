@@ -163,13 +163,14 @@ fn longest_side_m([lo, hi]: [Vec3; 2]) -> f64 {
 /// Describes the extent of the shown box in words.
 fn describe_box([lo, hi]: [Vec3; 2]) -> String {
     let (unit, unit_m) = unit(longest_side_m([lo, hi]));
-    let axis = |k: usize| {
+    let mut axes = Vec::new();
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
         let from = lo[k] / unit_m;
         let to = hi[k] / unit_m;
         let digits = decimals(nice_step(to - from, 100));
-        format!("{} {} to {} {unit}", ["x", "y", "z"][k], label(from, digits), label(to, digits))
-    };
-    format!("Shown: {}, {}, {}.", axis(0), axis(1), axis(2))
+        axes.push(format!("{name} {} to {} {unit}", label(from, digits), label(to, digits)));
+    }
+    format!("Shown: {}.", axes.join(", "))
 }
 
 #[cfg(test)]

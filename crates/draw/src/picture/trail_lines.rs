@@ -67,10 +67,11 @@ fn decimate(points: impl Iterator<Item = (usize, Px)>) -> Vec<(usize, Px)> {
     let mut kept: Vec<(usize, Px)> = Vec::new();
     let mut last = None;
     for (shade, (x, y)) in points {
-        let is_apart =
-            |&(_, (a, b)): &(usize, Px)| (x - a).abs().max((y - b).abs()) >= MIN_POINT_DISTANCE_PX;
+        let is_apart = kept
+            .last()
+            .is_none_or(|&(_, (a, b))| (x - a).abs().max((y - b).abs()) >= MIN_POINT_DISTANCE_PX);
         last = Some((shade, (x, y)));
-        if kept.last().is_none_or(is_apart) {
+        if is_apart {
             kept.extend(last.take());
         }
     }
@@ -109,8 +110,7 @@ fn path_data(points: &[(usize, Px)]) -> [String; SHADES] {
 }
 
 fn hundredths((x, y): Px) -> CentiPxPoint {
-    let whole = |v: f64| (v * 100.0).round() as i64;
-    (whole(x), whole(y))
+    ((x * 100.0).round() as i64, (y * 100.0).round() as i64)
 }
 
 /// Leaves out points on the straight line between their neighbors.
@@ -129,19 +129,21 @@ fn corners(points: &[CentiPxPoint]) -> Vec<CentiPxPoint> {
 
 /// Returns whether the path from `a` over `b` to `c` is straight and does not turn back.
 fn is_straight(a: CentiPxPoint, b: CentiPxPoint, c: CentiPxPoint) -> bool {
-    let step = |from: CentiPxPoint, to: CentiPxPoint| {
-        (i128::from(to.0 - from.0), i128::from(to.1 - from.1))
-    };
-    let (ax, ay) = step(a, b);
-    let (bx, by) = step(b, c);
+    let (ax, ay) = difference(a, b);
+    let (bx, by) = difference(b, c);
     ax * by == ay * bx && ax * bx + ay * by > 0
 }
 
+/// Returns the step between two points, in a type in which products of two steps do not overflow.
+fn difference(from: CentiPxPoint, to: CentiPxPoint) -> (i128, i128) {
+    (i128::from(to.0 - from.0), i128::from(to.1 - from.1))
+}
+
 fn write_piece(data: &mut String, points: &[CentiPxPoint]) {
-    let show = |(x, y): CentiPxPoint| (SvgNumber(x as f64 / 100.0), SvgNumber(y as f64 / 100.0));
     // Writing into a String cannot fail.
     for (index, &point) in points.iter().enumerate() {
-        let (x, y) = show(point);
+        let x = SvgNumber(point.0 as f64 / 100.0);
+        let y = SvgNumber(point.1 as f64 / 100.0);
         let command = if index == 0 { 'M' } else { 'L' };
         let _ = write!(data, "{command}{x} {y}");
     }

@@ -9,13 +9,13 @@ use sidestep_kernel::view::{
     Trail, Vec3, body_color,
 };
 
-/// Most lines in a picture: they are thin, so more of them than there are colors can be
+/// Largest number of lines in a picture: they are thin, so more of them than there are colors can be
 /// distinguished.
 const MAX_LINES: usize = 60;
 /// Lengths of ribbons in cycles, the longest first: shorter ones are for crowds, where long ones
 /// would cover each other.
 const RIBBON_LENGTHS_CYCLES: [Cycle; 4] = [400, 200, 100, 50];
-/// Largest share of the covered area that may be covered twice before ribbons are shortened.
+/// Largest fraction of the covered area that may be covered twice before ribbons are shortened.
 const MAX_OVERLAP_FRACTION: f64 = 0.3;
 
 /// A trail that is drawn.
@@ -68,19 +68,20 @@ pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
 /// if it is not present.
 pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u32)> {
     // Robots that are parts of a chain keep to its connectors.
-    let acts = |body: &&Body| {
+    let acting = frame.bodies.iter().filter(|body| {
         body.kind.is_agent() && (body.kind == BodyKind::Connector || body.part.is_none())
-    };
-    let here = frame.bodies.iter().filter(acts).map(|body| (body.kind, body.number));
+    });
+    let here = acting.map(|body| (body.kind, body.number));
     let starts = scenery.bodies.iter().filter(|body| body.kind == BodyKind::Start);
     here.chain(starts.map(|start| (BodyKind::Airplane, start.number))).collect()
 }
 
 /// Returns the leader of a chain, or its first connector, and the other end.
 fn chain_ends(frame: &Frame, number: u32) -> Vec<BodyId> {
-    let is_its = |body: &&Body| body.kind == BodyKind::Connector && body.number == number;
-    let mut parts = frame.bodies.iter().filter(is_its).map(Body::id);
-    let leader = frame.bodies.iter().filter(is_its).find(|body| body.state == Condition::Leading);
+    let all = frame.bodies.iter();
+    let connectors = all.filter(|body| body.kind == BodyKind::Connector && body.number == number);
+    let leader = connectors.clone().find(|body| body.state == Condition::Leading);
+    let mut parts = connectors.map(Body::id);
     let first = parts.next();
     let leader = leader.map(Body::id).or(first);
     let last = parts.next_back().filter(|last| Some(*last) != leader).or(first);
@@ -94,8 +95,9 @@ fn one_per_color(numbers: &[u32]) -> Vec<u32> {
     let mut chosen: Vec<u32> = Vec::new();
     for k in 0..most {
         let from = k * numbers.len() / most;
-        let is_new = |n: &&u32| chosen.iter().all(|c| body_color(*c) != body_color(**n));
-        chosen.extend(numbers[from..].iter().chain(&numbers[..from]).find(is_new));
+        let mut candidates = numbers[from..].iter().chain(&numbers[..from]);
+        let new = candidates.find(|n| chosen.iter().all(|c| body_color(*c) != body_color(**n)));
+        chosen.extend(new);
     }
     chosen.sort_unstable();
     chosen
@@ -109,21 +111,25 @@ pub(super) fn drawn_trails<'a>(
 ) -> Vec<DrawnTrail<'a>> {
     let chosen = bodies_with_trails(scenery, frame);
     let sizes = sizes(scenery, frame);
-    let drawn = |trail: &'a Trail| DrawnTrail {
-        of: trail.of,
-        points: &trail.points,
-        color: body_color(trail.of.number),
-        width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
-        span: [0, 0],
-        dash: "",
-    };
-    let is_shown = |trail: &&Trail| chosen.contains(&trail.of) && !trail.points.is_empty();
-    let mut shown: Vec<DrawnTrail<'_>> = trails.iter().filter(is_shown).map(drawn).collect();
+    let mut shown = Vec::new();
+    for trail in trails {
+        if chosen.contains(&trail.of) && !trail.points.is_empty() {
+            shown.push(DrawnTrail {
+                of: trail.of,
+                points: &trail.points,
+                color: body_color(trail.of.number),
+                width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
+                // Both follow from all shown trails, below.
+                span: [0, 0],
+                dash: "",
+            });
+        }
+    }
     if let Some(floor) = scenery.floor.as_ref().filter(|_| !sizes.is_empty()) {
         shorten_ribbons(&mut shown, floor, &sizes);
     }
-    let cycles = || shown.iter().flat_map(|trail| trail.points).map(|(cycle, _)| *cycle);
-    let span = [cycles().min().unwrap_or(0), cycles().max().unwrap_or(0)];
+    let cycles = shown.iter().flat_map(|trail| trail.points).map(|(cycle, _)| *cycle);
+    let span = [cycles.clone().min().unwrap_or(0), cycles.max().unwrap_or(0)];
     let dashes = body_dashes(&shown.iter().map(|trail| trail.of.number).collect());
     for trail in &mut shown {
         trail.span = span;
@@ -139,12 +145,17 @@ fn sizes(scenery: &Scenery, frame: &Frame) -> BTreeMap<BodyId, [f64; 2]> {
     if scenery.floor.is_none() {
         return BTreeMap::new();
     }
-    let size = |body: &Body| match body.shape {
+    let mut sizes = BTreeMap::new();
+    for body in frame.bodies.iter().filter(|body| body.kind.is_agent()) {
         // A body without extent leaves no ribbon.
-        Shape::Cuboid { size_m: [x, y, _] } if x > 0.0 && y > 0.0 => Some((body.id(), [x, y])),
-        _ => None,
-    };
-    frame.bodies.iter().filter(|body| body.kind.is_agent()).filter_map(size).collect()
+        if let Shape::Cuboid { size_m: [x, y, _] } = body.shape
+            && x > 0.0
+            && y > 0.0
+        {
+            sizes.insert(body.id(), [x, y]);
+        }
+    }
+    sizes
 }
 
 /// Keeps the longest last part of the trails that leaves them distinguishable.
@@ -157,8 +168,8 @@ fn shorten_ribbons(
     let now = now.unwrap_or(0);
     for length in RIBBON_LENGTHS_CYCLES {
         for trail in trails.iter_mut() {
-            let is_before = |(cycle, _): &(Cycle, Vec3)| cycle + length < now;
-            trail.points = &trail.points[trail.points.partition_point(is_before)..];
+            let first = trail.points.partition_point(|(cycle, _)| cycle + length < now);
+            trail.points = &trail.points[first..];
         }
         if overlap_fraction(trails, floor, sizes) <= MAX_OVERLAP_FRACTION {
             return;
@@ -166,7 +177,20 @@ fn shorten_ribbons(
     }
 }
 
-/// Returns the share of the covered boxes that two bodies or more have covered.
+/// Returns the number of boxes along a side of a body. Bodies larger than the floor cover all of it.
+fn side_boxes(side_m: f64, box_m: f64, floor_boxes: u32) -> i64 {
+    ((side_m / box_m).round() as i64).clamp(1, i64::from(floor_boxes))
+}
+
+/// Returns the box at the lower corner of a body whose middle is at a place.
+fn lower_corner([x, y, _]: Vec3, size_m: [f64; 2], floor: &OccupancyGrid) -> (i64, i64) {
+    let middle_m = floor.plane.inverse_transform_point([x, y]);
+    let col = (middle_m[0] - 0.5 * size_m[0]) / floor.box_m;
+    let row = (middle_m[1] - 0.5 * size_m[1]) / floor.box_m;
+    (col.round() as i64, row.round() as i64)
+}
+
+/// Returns the fraction of the covered boxes that two bodies or more have covered.
 fn overlap_fraction(
     trails: &[DrawnTrail<'_>],
     floor: &OccupancyGrid,
@@ -176,18 +200,10 @@ fn overlap_fraction(
     let mut covered_by = BTreeMap::<(i64, i64), u64>::new();
     for (index, trail) in trails.iter().enumerate() {
         let Some(size_m) = sizes.get(&trail.of) else { continue };
-        // Bodies larger than the floor cover all of it.
-        let boxes = |k: usize, most: u32| {
-            ((size_m[k] / floor.box_m).round() as i64).clamp(1, i64::from(most))
-        };
-        let width = boxes(0, floor.width);
-        let height = boxes(1, floor.height);
-        let corner = |&(_, [x, y, _]): &(Cycle, Vec3)| {
-            let middle_m = floor.plane.inverse_transform_point([x, y]);
-            let low = |k: usize| ((middle_m[k] - 0.5 * size_m[k]) / floor.box_m).round() as i64;
-            (low(0), low(1))
-        };
-        let corners: BTreeSet<(i64, i64)> = trail.points.iter().map(corner).collect();
+        let width = side_boxes(size_m[0], floor.box_m, floor.width);
+        let height = side_boxes(size_m[1], floor.box_m, floor.height);
+        let corners: BTreeSet<(i64, i64)> =
+            trail.points.iter().map(|&(_, at)| lower_corner(at, *size_m, floor)).collect();
         for (col, row) in corners {
             let boxes = (0..height).flat_map(|y| (0..width).map(move |x| (col + x, row + y)));
             boxes.for_each(|at| *covered_by.entry(at).or_default() |= 1 << (index % 64));

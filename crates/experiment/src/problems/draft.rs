@@ -17,11 +17,15 @@ impl TextEdit {
     /// Returns the place before the change of a place after it; within an insertion, the start of the
     /// removed bytes, or their end.
     fn map_back(&self, offset: usize, is_end: bool) -> usize {
-        match offset {
-            _ if offset < self.at || (is_end && offset == self.at) => offset,
-            _ if offset < self.at + self.inserted && !is_end => self.at,
-            _ if offset <= self.at + self.inserted && is_end => self.at + self.removed,
-            _ => offset - self.inserted + self.removed,
+        let inserted_end = self.at + self.inserted;
+        if offset < self.at || (is_end && offset == self.at) {
+            offset
+        } else if is_end && offset <= inserted_end {
+            self.at + self.removed
+        } else if !is_end && offset < inserted_end {
+            self.at
+        } else {
+            offset - self.inserted + self.removed
         }
     }
 }
@@ -51,11 +55,12 @@ impl Draft {
     /// TOML then.
     pub(super) fn with_replacements(&self, mut parts: Vec<(Range<usize>, String)>) -> Option<Self> {
         let mut draft = self.clone();
+        // From the last to the first, so that the places of the others stay right.
         parts.sort_by_key(|(part, _)| std::cmp::Reverse(part.start));
         for (part, text) in parts {
-            let (at, removed, inserted) = (part.start, part.len(), text.len());
+            let edit = TextEdit { at: part.start, removed: part.len(), inserted: text.len() };
             draft.source.text.replace_range(part, &text);
-            draft.changes.push(TextEdit { at, removed, inserted });
+            draft.changes.push(edit);
         }
         DeTable::parse(&draft.source.text).is_ok().then_some(draft)
     }
@@ -67,12 +72,14 @@ impl Draft {
         };
         let start = offset(self.text(), start);
         let end = error.end().map_or(start, |end| offset(self.text(), end));
-        let back = |offset: usize, is_end: bool| {
-            self.changes.iter().rev().fold(offset, |offset, change| change.map_back(offset, is_end))
-        };
-        let start = back(start, false);
-        let end = if end > start { back(end, true).max(start) } else { start };
+        let start = self.map_back(start, false);
+        let end = if end > start { self.map_back(end, true).max(start) } else { start };
         given.error(start..end, error.cause(), error.remedy())
+    }
+
+    /// Returns the place in the given text of a place in this one.
+    fn map_back(&self, offset: usize, is_end: bool) -> usize {
+        self.changes.iter().rev().fold(offset, |offset, change| change.map_back(offset, is_end))
     }
 }
 

@@ -21,9 +21,9 @@ use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{Source, Worlds};
 
-/// Most errors that are reported.
+/// Largest number of errors that are reported: a screen full.
 pub const MAX_PROBLEMS: usize = 20;
-/// Most compilations of drafts, because some take long.
+/// Largest number of compilations of drafts, because some take long.
 const MAX_DRAFTS: usize = 150;
 
 /// Returns the errors of a scenario, in the order of its text and at most [`MAX_PROBLEMS`]; none if it
@@ -31,15 +31,15 @@ const MAX_DRAFTS: usize = 150;
 /// repaired.
 pub fn problems(worlds: &Worlds, source: &Source) -> Vec<InputError> {
     let Err(first) = worlds.compile(source) else { return Vec::new() };
-    let mut told = source.syntax_errors();
-    if told.is_empty() {
-        let mut search = ErrorRecovery::new(worlds, source);
-        search.run(first);
-        told = search.reported;
+    let mut errors = source.syntax_errors();
+    if errors.is_empty() {
+        let mut recovery = ErrorRecovery::new(worlds, source);
+        recovery.run(first);
+        errors = recovery.reported;
     }
-    told.sort_by_key(|error| error.position());
-    told.truncate(MAX_PROBLEMS);
-    told
+    errors.sort_by_key(|error| error.position());
+    errors.truncate(MAX_PROBLEMS);
+    errors
 }
 
 /// The search for further errors.
@@ -79,20 +79,21 @@ impl<'a> ErrorRecovery<'a> {
 
     /// Reports an error, unless it was reported before or may follow from a guess in a draft.
     fn report(&mut self, draft: &Draft, error: &InputError) {
-        let told = draft.map_error_back(self.source, error);
-        let follows = self.guessed.iter().any(|guess| guess.may_lead_to(error));
-        let place = |one: &InputError| (one.place().to_string(), one.position(), one.end());
-        let is_known = |one: &InputError| {
-            one == &told || (told.position().is_some() && place(one) == place(&told))
-        };
-        if !follows && !self.reported.iter().any(is_known) {
-            self.reported.push(told);
+        if self.guessed.iter().any(|guess| guess.may_lead_to(error)) {
+            return;
+        }
+        let error = draft.map_error_back(self.source, error);
+        let is_known =
+            self.reported.iter().any(|one| *one == error || is_at_same_place(one, &error));
+        if !is_known {
+            self.reported.push(error);
         }
     }
 
     /// Returns a draft in which an error is repaired; none if there is no such draft. Of all repairs
     /// the first is taken from which nothing seems to follow.
     fn repair(&mut self, draft: &Draft, error: &InputError) -> Option<DraftStep> {
+        // The first repair that does remove the error, though another one may follow from it: the last resort.
         let mut forced: Option<(Repair, DraftStep)> = None;
         for repair in repairs(draft, error, &self.schema(draft)) {
             let Some(draft) = repair.applied_to(draft) else { continue };
@@ -127,5 +128,14 @@ impl<'a> ErrorRecovery<'a> {
 
 /// Returns whether two drafts have the same error, wherever it stands.
 fn is_same_error(one: &InputError, other: &InputError) -> bool {
-    (one.key(), one.cause()) == (other.key(), other.cause())
+    one.key() == other.key() && one.cause() == other.cause()
+}
+
+/// Returns whether two errors with a position are about the same part of the text: the second one of a value is of its
+/// repair.
+fn is_at_same_place(one: &InputError, other: &InputError) -> bool {
+    other.position().is_some()
+        && one.place() == other.place()
+        && one.position() == other.position()
+        && one.end() == other.end()
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use sidestep_kernel::InputError;
 use sidestep_scenario::schema;
 
-/// Most examples that are tried for a key.
+/// Largest number of examples that are tried for a key: each costs a compilation.
 const MAX_EXAMPLES: usize = 3;
 
 /// A change to a draft.
@@ -54,11 +54,11 @@ fn suggested_repair(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Re
         return Vec::new();
     };
     let what = if own.last().is_some_and(|name| name == wrong) {
-        let is_there = find(draft.text(), &[&own[..own.len() - 1], &[meant.to_string()]].concat());
-        match is_there {
-            Some(_) => return Vec::new(),
-            None => RepairKind::Rename(toml_edit::Key::new(meant).display_repr().into_owned()),
+        let renamed = [&own[..own.len() - 1], &[meant.to_string()]].concat();
+        if find(draft.text(), &renamed).is_some() {
+            return Vec::new();
         }
+        RepairKind::Rename(toml_edit::Key::new(meant).display_repr().into_owned())
     } else {
         RepairKind::Replace(toml::Value::from(meant).to_string())
     };
@@ -189,17 +189,21 @@ impl Guess {
         if error.cause().contains("does nothing") && key.starts_with(table) {
             return true;
         }
-        let is_name = |part: &&String| part.parse::<usize>().is_err() && !key.contains(part);
-        self.key.iter().filter(is_name).any(|name| mentions(error, name))
+        // Names of its own key are in the error anyway, and numbers of elements are no names.
+        let mut names =
+            self.key.iter().filter(|part| part.parse::<usize>().is_err() && !key.contains(part));
+        names.any(|name| mentions(error, name))
     }
 }
 
 fn mentions(error: &InputError, name: &str) -> bool {
-    let is_part = |c: char| c.is_alphanumeric() || "_-".contains(c);
-    let says = |text: &str| text.split(|c| !is_part(c)).any(|word| word == name);
     // A remedy of the reader's names the world, and sections may have its name.
     let is_of_the_reader = error.remedy().starts_with("see what");
-    says(error.cause()) || (!is_of_the_reader && says(error.remedy()))
+    has_word(error.cause(), name) || (!is_of_the_reader && has_word(error.remedy(), name))
+}
+
+fn has_word(text: &str, word: &str) -> bool {
+    text.split(|c: char| !c.is_alphanumeric() && !"_-".contains(c)).any(|one| one == word)
 }
 
 #[cfg(test)]

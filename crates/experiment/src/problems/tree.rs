@@ -25,19 +25,19 @@ pub(super) fn key_path(key: &str) -> Vec<String> {
     parts.iter().map(|part| part.get().to_string()).collect()
 }
 
-/// Returns the parts of the text at a key; none if it is not there. The empty way is the whole text.
-pub(super) fn find(text: &str, way: &[String]) -> Option<KeyNode> {
+/// Returns the parts of the text at a key; none if it is not there. The empty path is the whole text.
+pub(super) fn find(text: &str, path: &[String]) -> Option<KeyNode> {
     let root = DeTable::parse(text).ok()?;
     let root = Spanned::new(0..0, DeValue::Table(root.into_inner()));
     let tree = Tree { text, headers: headers(text, &root) };
-    let mut place = PathStep { name: None, value: &root, parent: None };
-    for part in way {
-        place = child(place, part)?;
+    let mut step = PathStep { name: None, value: &root, parent: None };
+    for part in path {
+        step = child(step, part)?;
     }
-    Some(tree.node(&place))
+    Some(tree.node(&step))
 }
 
-/// A value on the way.
+/// A value on the path to a key.
 #[derive(Clone, Copy)]
 struct PathStep<'t, 'i> {
     name: Option<&'t Spanned<std::borrow::Cow<'i, str>>>,
@@ -51,6 +51,7 @@ fn child<'t, 'i>(place: PathStep<'t, 'i>, part: &str) -> Option<PathStep<'t, 'i>
         (DeValue::Array(many), Ok(index)) => {
             many.get(index).map(|value| PathStep { name: None, value, parent })
         }
+        // Overrides may leave out the index of a section that stands alone.
         (DeValue::Array(many), Err(_)) if many.len() == 1 => {
             child(PathStep { name: None, value: many.first()?, parent }, part)
         }
@@ -65,7 +66,7 @@ fn child<'t, 'i>(place: PathStep<'t, 'i>, part: &str) -> Option<PathStep<'t, 'i>
     }
 }
 
-/// The look of a value in the text.
+/// The form of a value in the text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ValueStyle {
     /// A value in a line, also a table in braces.
@@ -168,7 +169,9 @@ impl Tree<'_> {
                 }
             }
             DeValue::Array(many) => {
-                many.iter().for_each(|v| self.collect_parts(None, v, false, parts))
+                for value in many.iter() {
+                    self.collect_parts(None, value, false, parts);
+                }
             }
             _ => {}
         }
@@ -201,13 +204,15 @@ impl Tree<'_> {
             (DeValue::Table(table), _) | (DeValue::Array(_), Some(DeValue::Table(table))) => table,
             _ => return Vec::new(),
         };
-        let lists = table.iter().map(|(_, one)| one).filter(|one| {
-            let is_list = matches!(one.get_ref(), DeValue::Array(_));
-            is_list
-                && value_style(self.text, one) == ValueStyle::Inline
-                && one.span() != value.span()
-        });
-        lists.map(|one| self.text[one.span()].to_string()).collect()
+        let mut lists = Vec::new();
+        for (_, other) in table.iter() {
+            let is_list = matches!(other.get_ref(), DeValue::Array(_))
+                && value_style(self.text, other) == ValueStyle::Inline;
+            if is_list && other.span() != value.span() {
+                lists.push(self.text[other.span()].to_string());
+            }
+        }
+        lists
     }
 }
 

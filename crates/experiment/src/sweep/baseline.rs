@@ -60,33 +60,33 @@ pub(super) struct BaselineMatcher<'a> {
 }
 
 impl BaselineMatcher<'_> {
-    /// Returns the baseline; `name_of` names a variant, `word` a setting.
+    /// Returns the baseline; `variant_name` and `setting_name` give the names of a variant and of a setting.
     ///
     /// # Errors
     /// When no variant is the baseline, or no other variant corresponds to one.
     pub(super) fn baseline(
         &self,
-        name_of: impl Fn(usize) -> String,
-        word: impl Fn(&Setting) -> String,
+        variant_name: impl Fn(usize) -> String,
+        setting_name: impl Fn(&Setting) -> String,
     ) -> Result<Option<Baseline>, InputError> {
         let BaselineSpec { name, settings } = self.wanted;
         if name.is_none() && settings.is_empty() {
             return Ok(None);
         }
         let defaults = self.defaults();
-        let fits: Vec<bool> =
+        let matching: Vec<bool> =
             self.variants.iter().map(|v| self.matches_spec(v, &defaults)).collect();
-        let found: Vec<usize> = (0..fits.len()).filter(|&k| fits[k]).collect();
+        let found: Vec<usize> = (0..matching.len()).filter(|&k| matching[k]).collect();
         match found[..] {
             [] => Err(self.no_match_error(&defaults)),
             [one] => {
-                let of = (0..fits.len()).map(|k| (k != one).then_some(one as u32)).collect();
-                Ok(Some(Baseline { name: name_of(one), of, alone: 0 }))
+                let of = (0..matching.len()).map(|k| (k != one).then_some(one as u32)).collect();
+                Ok(Some(Baseline { name: variant_name(one), of, alone: 0 }))
             }
             _ => {
-                let words = name.iter().cloned().chain(settings.iter().map(word));
-                let name = words.collect::<Vec<_>>().join(", ");
-                self.paired_baseline(name, &fits, &defaults).map(Some)
+                let names = name.iter().cloned().chain(settings.iter().map(setting_name));
+                let name = names.collect::<Vec<_>>().join(", ");
+                self.paired_baseline(name, &matching, &defaults).map(Some)
             }
         }
     }
@@ -96,21 +96,26 @@ impl BaselineMatcher<'_> {
     fn paired_baseline(
         &self,
         name: String,
-        fits: &[bool],
+        matching: &[bool],
         defaults: &Defaults,
     ) -> Result<Baseline, InputError> {
-        let others = self.unmatched_keys();
-        let rest = |k: usize| -> Vec<String> {
-            let value = |key: &&String| value_of(&self.variants[k], key, defaults);
-            others.iter().map(|key| value(key).map_or_else(String::new, canonical)).collect()
-        };
-        let mut places: BTreeMap<Vec<String>, u32> = BTreeMap::new();
-        for k in (0..fits.len()).filter(|&k| fits[k]) {
-            places.entry(rest(k)).or_insert(k as u32);
+        let other_keys = self.unmatched_keys();
+        let mut baselines: BTreeMap<Vec<String>, u32> = BTreeMap::new();
+        for k in (0..matching.len()).filter(|&k| matching[k]) {
+            // Samples of whole numbers may coincide; the first one is the baseline then.
+            baselines.entry(self.values_of(k, &other_keys, defaults)).or_insert(k as u32);
         }
-        let of_one = |k: usize| if fits[k] { None } else { places.get(&rest(k)).copied() };
-        let of: Vec<Option<u32>> = (0..fits.len()).map(of_one).collect();
-        let alone = (0..fits.len()).filter(|&k| !fits[k] && of[k].is_none()).count();
+        let mut of = Vec::with_capacity(matching.len());
+        let mut alone = 0;
+        for (k, is_baseline) in matching.iter().enumerate() {
+            if *is_baseline {
+                of.push(None);
+                continue;
+            }
+            let baseline = baselines.get(&self.values_of(k, &other_keys, defaults)).copied();
+            alone += usize::from(baseline.is_none());
+            of.push(baseline);
+        }
         if of.iter().all(Option::is_none) {
             let cause = format!("no variant differs from the baseline `{name}` in that alone");
             let remedy = "give the value of every key that is varied, to compare with one variant";
@@ -119,20 +124,34 @@ impl BaselineMatcher<'_> {
         Ok(Baseline { name, of, alone })
     }
 
-    /// Returns the keys of which the baseline says nothing; the name of a listed variant speaks for
+    /// Returns a variant's values of some keys, in a form in which equal numbers are equal.
+    fn values_of(&self, variant: usize, keys: &[&String], defaults: &Defaults) -> Vec<String> {
+        let values = keys.iter().map(|key| value_of(&self.variants[variant], key, defaults));
+        values.map(|value| value.map_or_else(String::new, canonical)).collect()
+    }
+
+    /// Returns the keys to which the baseline gives no value; the name of a listed variant stands for
     /// all keys of the list.
     fn unmatched_keys(&self) -> Vec<&String> {
-        let named = self.variants.iter().filter(|_| self.wanted.name.is_some());
-        let of_list = named.flat_map(|v| &v.settings[..v.named]).map(|s| s.key.as_str());
-        let own = self.wanted.settings.iter().map(|s| s.key.as_str());
-        let own: BTreeSet<&str> = of_list.chain(own).collect();
-        self.parameters.iter().filter(|key| !own.contains(key.as_str())).collect()
+        let mut matched: BTreeSet<&str> = BTreeSet::new();
+        if self.wanted.name.is_some() {
+            for variant in self.variants {
+                matched.extend(variant.settings[..variant.named].iter().map(|s| s.key.as_str()));
+            }
+        }
+        matched.extend(self.wanted.settings.iter().map(|s| s.key.as_str()));
+        self.parameters.iter().filter(|key| !matched.contains(key.as_str())).collect()
     }
 
     /// Returns the scenario's own values of the parameters.
     fn defaults(&self) -> Defaults {
-        let value = |key: &String| Some((key.clone(), self.base.source.value(key)?));
-        self.parameters.iter().filter_map(value).collect()
+        let mut defaults = Defaults::new();
+        for key in self.parameters {
+            if let Some(value) = self.base.source.value(key) {
+                defaults.insert(key.clone(), value);
+            }
+        }
+        defaults
     }
 
     fn matches_spec(&self, variant: &Variant, defaults: &Defaults) -> bool {
@@ -151,40 +170,55 @@ impl BaselineMatcher<'_> {
         if value.as_str() == Some(DEFAULT_LABEL) {
             return self.parameters.contains(key) && variant.value(key).is_none();
         }
-        let is_value = |own: &Value| canonical(own) == canonical(value);
-        self.parameters.contains(key) && value_of(variant, key, defaults).is_some_and(is_value)
+        let own = value_of(variant, key, defaults);
+        self.parameters.contains(key) && own.is_some_and(|own| canonical(own) == canonical(value))
     }
 
     /// Returns the error that names the setting that no variant has, and the existing ones instead.
     fn no_match_error(&self, defaults: &Defaults) -> InputError {
-        let wrong = |cause: String, remedy: String| InputError::new(self.place, cause, remedy);
         let names: Vec<&str> = self.variants.iter().filter_map(|v| v.name.as_deref()).collect();
         if let Some(name) = &self.wanted.name
             && !names.contains(&name.as_str())
         {
-            let remedy = match names.is_empty() {
-                true => "give a value, e.g. regime=both, or give the variants of the sweep's file",
-                false => &suggestion(name, &names),
-            };
-            return wrong(format!("no variant has the name `{name}`"), remedy.into());
+            return self.unknown_name_error(name, &names);
         }
-        let is_missing =
-            |s: &&Setting| !self.variants.iter().any(|v| self.has_setting(v, s, defaults));
-        let Some(Setting { key, value }) = self.wanted.settings.iter().find(is_missing) else {
-            let cause = "no variant has all of the baseline at once";
-            return wrong(cause.into(), "give what one variant has".into());
+        for setting in &self.wanted.settings {
+            if !self.variants.iter().any(|v| self.has_setting(v, setting, defaults)) {
+                return self.unknown_setting_error(setting, defaults);
+            }
+        }
+        let cause = "no variant has all of the baseline at once";
+        InputError::new(self.place, cause, "give what one variant has")
+    }
+
+    fn unknown_name_error(&self, name: &str, names: &[&str]) -> InputError {
+        let cause = format!("no variant has the name `{name}`");
+        let remedy = if names.is_empty() {
+            "give a value, e.g. regime=both, or give the variants of the sweep's file".to_string()
+        } else {
+            suggestion(name, names)
         };
+        InputError::new(self.place, cause, remedy)
+    }
+
+    fn unknown_setting_error(
+        &self,
+        Setting { key, value }: &Setting,
+        defaults: &Defaults,
+    ) -> InputError {
         if self.parameters.contains(key) {
             let values = self.values(key, defaults).join(", ");
             let cause = format!("the baseline has `{key}` = {value}, which no variant has");
-            return wrong(cause, format!("it is varied over {values}"));
+            return InputError::new(self.place, cause, format!("it is varied over {values}"));
         }
+        let cause = format!("the baseline has `{key}`, which is not varied");
         let known: Vec<&str> = self.parameters.iter().map(String::as_str).collect();
-        let remedy = match known.is_empty() {
-            true => format!("vary it, e.g. --vary {key}={value},..."),
-            false => suggestion(key, &known),
+        let remedy = if known.is_empty() {
+            format!("vary it, e.g. --vary {key}={value},...")
+        } else {
+            suggestion(key, &known)
         };
-        wrong(format!("the baseline has `{key}`, which is not varied"), remedy)
+        InputError::new(self.place, cause, remedy)
     }
 
     /// Returns the first values of a key, as an error lists them.

@@ -23,20 +23,21 @@ const MAX_SERIES: usize = 8;
 /// Names of the thirds of a sample, from its least values on.
 const THIRD_NAMES: [&str; 3] = ["lower", "middle", "upper"];
 
-/// Largest number of steps of a distribution.
+/// Largest number of steps of a distribution: more are finer than a pixel.
 const MAX_STEPS: usize = 200;
 
 pub(super) fn figures(groups: &RunGroups<'_>, metric: &RunColumn) -> Vec<Figure> {
     if is_sampled(groups) {
         return sample_figures(groups, metric);
     }
-    let over = |p| parameter_figure(groups, metric, p);
-    let over: Vec<Figure> = (0..groups.parameters.len()).filter_map(over).collect();
-    match (groups.parameters.len(), groups.variants.len()) {
-        (0, 0) => Vec::new(),
-        (0, 1) => distribution_figure(groups, metric).into_iter().collect(),
-        (0, _) => vec![variant_figure(groups, metric)],
-        _ => over,
+    let parameters = 0..groups.parameters.len();
+    if !parameters.is_empty() {
+        return parameters.filter_map(|p| parameter_figure(groups, metric, p)).collect();
+    }
+    match groups.variants.len() {
+        0 => Vec::new(),
+        1 => distribution_figure(groups, metric).into_iter().collect(),
+        _ => vec![variant_figure(groups, metric)],
     }
 }
 
@@ -44,13 +45,18 @@ pub(super) fn figures(groups: &RunGroups<'_>, metric: &RunColumn) -> Vec<Figure>
 /// and some number is another in each of them, as in a Latin hypercube with other sides that are whole numbers.
 pub(super) fn is_sampled(groups: &RunGroups<'_>) -> bool {
     let numeric = numeric_parameters(groups);
+    if numeric.len() < 2 {
+        return false;
+    }
     let variants = groups.variants.len();
-    let alone = |p: &usize| {
-        group_by_levels(groups, &other_parameters(groups, *p)).values().all(|g| g.len() < 2)
-    };
-    let is_own = |p: &usize| groups.parameters[*p].levels.len() == variants;
-    let is_sampled = variants > MAX_SERIES && numeric.iter().any(is_own);
-    numeric.len() > 1 && (is_sampled || numeric.iter().all(alone))
+    let has_own_numbers = numeric.iter().any(|p| groups.parameters[*p].levels.len() == variants);
+    if variants > MAX_SERIES && has_own_numbers {
+        return true;
+    }
+    numeric.iter().all(|p| {
+        let lines = group_by_levels(groups, &other_parameters(groups, *p));
+        lines.values().all(|line| line.len() < 2)
+    })
 }
 
 /// Returns the parameters that are numbers.
@@ -79,11 +85,9 @@ fn group_by_levels(
 /// would be too many, and an average would mix.
 fn series_parameters(groups: &RunGroups<'_>, parameter: usize) -> Option<Vec<usize>> {
     let all = other_parameters(groups, parameter);
-    let words: Vec<usize> =
-        all.iter().copied().filter(|p| !groups.parameters[*p].numeric).collect();
-    let balanced = groups.is_balanced(parameter);
     let mut choices = vec![all.clone()];
-    if balanced {
+    if groups.is_balanced(parameter) {
+        let words = all.into_iter().filter(|p| !groups.parameters[*p].numeric).collect();
         choices.extend([words, Vec::new()]);
     }
     choices.into_iter().find(|choice| group_by_levels(groups, choice).len() <= MAX_SERIES)
@@ -95,39 +99,58 @@ fn parameter_figure(
     parameter: usize,
 ) -> Option<Figure> {
     let axis = &groups.parameters[parameter];
-    let scattered = || axis.numeric.then(|| scatter_figure(groups, metric, parameter));
-    let Some(apart) = series_parameters(groups, parameter) else { return scattered() };
-    let lines = group_by_levels(groups, &apart);
+    let Some(series_parameters) = series_parameters(groups, parameter) else {
+        return scatter_figure(groups, metric, parameter);
+    };
+    let lines = group_by_levels(groups, &series_parameters);
+    // Series of one point each would be a scatter figure in many colors.
     if lines.values().all(|variants| variants.len() < 2) {
-        return scattered();
+        return scatter_figure(groups, metric, parameter);
     }
-    let series = lines.iter().map(|(key, variants)| {
-        let named = apart.iter().zip(key).map(|(p, level)| {
+    let mut series = Vec::with_capacity(lines.len());
+    for (levels, variants) in &lines {
+        let mut names = Vec::with_capacity(levels.len());
+        for (p, level) in series_parameters.iter().zip(levels) {
             let other = &groups.parameters[*p];
-            format!("{} = {}", other.name, other.levels[*level].name())
-        });
-        let points = (0..axis.levels.len()).filter_map(|level| {
-            let at = |v: &&usize| axis.of_variant[**v] == level;
-            let group: Vec<usize> = variants.iter().filter(at).copied().collect();
-            (!group.is_empty()).then_some(())?;
-            groups.mean_over(metric, &group).point(level_position(groups, parameter, level))
-        });
-        Series { name: named.collect::<Vec<_>>().join(", "), points: points.collect() }
-    });
+            names.push(format!("{} = {}", other.name, other.levels[*level].name()));
+        }
+        let points = line_points(groups, metric, parameter, variants);
+        series.push(Series { name: names.join(", "), points });
+    }
     let kind = if axis.numeric {
         FigureKind::Lines
     } else {
         FigureKind::Bars { categories: axis.levels.iter().map(|l| l.name()).collect() }
     };
-    let averaged = apart.len() + 1 < groups.parameters.len();
     let over = Label::from_name(&axis.name);
     let title = format!("{} over {}", capitalized(&groups.label(metric)), over.text);
-    let note = match averaged {
-        true => format!("{} Means over the other parameters, too.", means_note(groups)),
-        false => means_note(groups),
-    };
+    let mut note = means_note(groups);
+    let is_averaged = series_parameters.len() + 1 < groups.parameters.len();
+    if is_averaged {
+        note += " Means over the other parameters, too.";
+    }
     let figure = figure(groups, metric, title, over.to_string());
-    Some(Figure { note, kind, series: series.collect(), ..figure })
+    Some(Figure { note, kind, series, ..figure })
+}
+
+/// Returns the means of some variants at each level of a parameter.
+fn line_points(
+    groups: &RunGroups<'_>,
+    metric: &RunColumn,
+    parameter: usize,
+    variants: &[usize],
+) -> Vec<Point> {
+    let axis = &groups.parameters[parameter];
+    let mut points = Vec::new();
+    for level in 0..axis.levels.len() {
+        let at_level = variants.iter().filter(|v| axis.of_variant[**v] == level);
+        let group: Vec<usize> = at_level.copied().collect();
+        if !group.is_empty() {
+            let position = level_position(groups, parameter, level);
+            points.extend(groups.mean_over(metric, &group).point(position));
+        }
+    }
+    points
 }
 
 /// Returns the position of a level on the axis.
@@ -138,32 +161,37 @@ fn level_position(groups: &RunGroups<'_>, parameter: usize, level: usize) -> f64
     }
 }
 
-/// Returns a figure with one point per variant.
-fn scatter_figure(groups: &RunGroups<'_>, metric: &RunColumn, parameter: usize) -> Figure {
+/// Returns a figure with one point per variant; `None` over a parameter of words, which has no positions.
+fn scatter_figure(groups: &RunGroups<'_>, metric: &RunColumn, parameter: usize) -> Option<Figure> {
     let axis = &groups.parameters[parameter];
-    let point = |variant: usize| {
+    if !axis.numeric {
+        return None;
+    }
+    let mut points = Vec::with_capacity(groups.variants.len());
+    for variant in 0..groups.variants.len() {
         let x = level_position(groups, parameter, axis.of_variant[variant]);
-        groups.mean_over(metric, &[variant]).point(x)
-    };
-    let points = (0..groups.variants.len()).filter_map(point).collect();
+        points.extend(groups.mean_over(metric, &[variant]).point(x));
+    }
     let over = Label::from_name(&axis.name);
     let title = format!("{} over {}", capitalized(&groups.label(metric)), over.text);
     let note = format!("A point is a variant. {}", means_note(groups));
     let series = vec![Series { name: String::new(), points }];
     let figure = figure(groups, metric, title, over.to_string());
-    Figure { note, kind: FigureKind::Points, series, ..figure }
+    Some(Figure { note, kind: FigureKind::Points, series, ..figure })
 }
 
 /// Returns samples of a box of parameters as figures: the box itself, if it has two sides, and the metric
 /// over each side.
 fn sample_figures(groups: &RunGroups<'_>, metric: &RunColumn) -> Vec<Figure> {
     let sides = numeric_parameters(groups);
-    let over = sides.iter().map(|p| scatter_figure(groups, metric, *p));
-    let plane = match sides[..] {
-        [across, upward] => sample_plane_figure(groups, metric, [across, upward]),
-        _ => None,
-    };
-    plane.into_iter().chain(over).collect()
+    let mut figures = Vec::new();
+    if let [across, upward] = sides[..] {
+        figures.extend(sample_plane_figure(groups, metric, [across, upward]));
+    }
+    for side in sides {
+        figures.extend(scatter_figure(groups, metric, side));
+    }
+    figures
 }
 
 /// Returns the samples where they are in a box of two sides: thirds of the metric are series of their
@@ -173,19 +201,28 @@ fn sample_plane_figure(
     metric: &RunColumn,
     sides: [usize; 2],
 ) -> Option<Figure> {
-    let value = |v: usize| Some((groups.mean_over(metric, &[v]).mean?, v));
-    let mut values: Vec<(f64, usize)> = (0..groups.variants.len()).filter_map(value).collect();
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let third = values.len().div_ceil(THIRD_NAMES.len()).max(1);
-    let at = |v: usize, p: usize| level_position(groups, p, groups.parameters[p].of_variant[v]);
-    let point = |&(_, v): &(f64, usize)| Point::new(at(v, sides[0]), at(v, sides[1]));
-    let series = values.chunks(third).zip(THIRD_NAMES).map(|(part, words)| {
-        let (low, high) = (part[0].0, part[part.len() - 1].0);
-        let name = format!("{words} third: {} to {}", short_number(low), short_number(high));
-        Series { name, points: part.iter().map(point).collect() }
-    });
-    let series: Vec<Series> = series.collect();
+    let mut means = Vec::with_capacity(groups.variants.len());
+    for variant in 0..groups.variants.len() {
+        if let Some(mean) = groups.mean_over(metric, &[variant]).mean {
+            means.push((mean, variant));
+        }
+    }
+    means.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let third = means.len().div_ceil(THIRD_NAMES.len()).max(1);
+    let mut series = Vec::with_capacity(THIRD_NAMES.len());
+    for (part, third_name) in means.chunks(third).zip(THIRD_NAMES) {
+        let low = short_number(part[0].0);
+        let high = short_number(part[part.len() - 1].0);
+        let mut points = Vec::with_capacity(part.len());
+        for (_, variant) in part {
+            let [x, y] =
+                sides.map(|p| level_position(groups, p, groups.parameters[p].of_variant[*variant]));
+            points.push(Point::new(x, y));
+        }
+        series.push(Series { name: format!("{third_name} third: {low} to {high}"), points });
+    }
     let [across, upward] = sides.map(|p| Label::from_name(&groups.parameters[p].name));
+    // Of a few samples there may be no three thirds.
     (series.len() == THIRD_NAMES.len()).then(|| Figure {
         title: format!("{} where the samples are", capitalized(&groups.label(metric))),
         note: "A point is a variant; its mark says in which third of all variants its mean is."
@@ -205,8 +242,9 @@ fn short_number(value: f64) -> String {
 }
 
 fn variant_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Figure {
-    let point = |variant: usize| groups.mean_over(metric, &[variant]).point(variant as f64);
-    let points = (0..groups.variants.len()).filter_map(point).collect();
+    let points = (0..groups.variants.len())
+        .filter_map(|variant| groups.mean_over(metric, &[variant]).point(variant as f64))
+        .collect();
     let figure = figure(groups, metric, capitalized(&groups.label(metric)), "variant".into());
     let kind = FigureKind::Bars { categories: groups.variants.clone() };
     let series = vec![Series { name: String::new(), points }];
@@ -221,15 +259,14 @@ fn distribution_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Fig
     let sorted = Sample::from_runs(groups.values(metric, 0)).sorted();
     let n = sorted.len();
     let steps = n.min(MAX_STEPS);
-    let point = |k: usize| {
+    let mut points = Vec::with_capacity(steps);
+    for k in 0..steps {
         let below = ((k + 1) * n).div_ceil(steps);
         let interval = wilson(below as f64, n as f64);
-        Point::new(sorted[below - 1], below as f64 / n as f64)
-            .with_interval(Some((interval.low, interval.high)))
-            .with_runs(n)
-    };
+        let point = Point::new(sorted[below - 1], below as f64 / n as f64);
+        points.push(point.with_interval(Some((interval.low, interval.high))).with_runs(n));
+    }
     let label = groups.label(metric);
-    let points = (0..steps).map(point).collect();
     Some(Figure {
         title: format!("Distribution of {label} over runs"),
         note: format!("95 % intervals, n = {n}."),
@@ -255,12 +292,12 @@ fn means_note(groups: &RunGroups<'_>) -> String {
 
 /// Returns the number of runs of the variants as text.
 fn run_counts(groups: &RunGroups<'_>) -> String {
-    let of = |v| groups.runs_of(v);
-    let all = 0..groups.variants.len();
-    let (least, most) = (all.clone().map(of).min().unwrap_or(0), all.map(of).max().unwrap_or(0));
-    if least == most {
-        format!("{most} run{} a variant", if most == 1 { "" } else { "s" })
+    let runs = (0..groups.variants.len()).map(|variant| groups.runs_of(variant));
+    let min = runs.clone().min().unwrap_or(0);
+    let max = runs.max().unwrap_or(0);
+    if min == max {
+        format!("{max} run{} a variant", if max == 1 { "" } else { "s" })
     } else {
-        format!("{least} to {most} runs a variant")
+        format!("{min} to {max} runs a variant")
     }
 }

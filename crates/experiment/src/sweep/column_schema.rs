@@ -18,7 +18,7 @@ pub(super) const CYCLES: &str = "cycles_run";
 #[derive(Debug, Clone, Default)]
 pub struct ColumnSchema(BTreeMap<(Role, String), ColumnStats>);
 
-/// The findings about a column, of the outcomes so far.
+/// The type and the place of a column, by the outcomes so far.
 #[derive(Debug, Clone, Copy)]
 struct ColumnStats {
     /// Its type, once it has a value.
@@ -35,7 +35,7 @@ pub(super) struct ColumnOrder {
 }
 
 impl ColumnSchema {
-    /// Takes note of an outcome.
+    /// Adds the columns of an outcome.
     pub fn add(&mut self, outcome: &Outcome) {
         for_each_field(outcome, |role, name, value, place| {
             let trial = if value.is_null() { u64::MAX } else { outcome.trial };
@@ -43,7 +43,7 @@ impl ColumnSchema {
         });
     }
 
-    /// Takes note of a column of which values were seen.
+    /// Adds a column, with the type of its values if there are any.
     pub(super) fn add_column(
         &mut self,
         role: Role,
@@ -51,18 +51,20 @@ impl ColumnSchema {
         ty: Option<ColumnType>,
         first: ColumnOrder,
     ) {
-        let seen = self.0.entry((role, name.to_string())).or_insert(ColumnStats { ty, first });
-        *seen = ColumnStats { ty: common_type(seen.ty, ty), first: seen.first.min(first) };
+        let stats = self.0.entry((role, name.to_string())).or_insert(ColumnStats { ty, first });
+        stats.ty = common_type(stats.ty, ty);
+        stats.first = stats.first.min(first);
     }
 
     /// Returns role, name and type of the columns, in the order of the table.
     pub(super) fn columns(&self) -> Vec<(Role, &str, ColumnType)> {
         let mut columns: Vec<_> = self.0.iter().collect();
-        columns.sort_by_key(|((role, name), seen)| (*role, seen.first, name));
-        columns
-            .into_iter()
-            .map(|((role, name), seen)| (*role, name.as_str(), seen.ty.unwrap_or(ColumnType::F64)))
-            .collect()
+        columns.sort_by_key(|((role, name), stats)| (*role, stats.first, name));
+        let mut typed = Vec::with_capacity(columns.len());
+        for ((role, name), stats) in columns {
+            typed.push((*role, name.as_str(), stats.ty.unwrap_or(ColumnType::F64)));
+        }
+        typed
     }
 }
 
@@ -116,8 +118,11 @@ pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
         }
         ColumnType::F64 => Values::F64((0..n).map(|row| values.number(row)).collect()),
         _ => {
-            let text = |row| (!values.is_missing(row)).then(|| value_text(&values.json(row)));
-            Values::Text((0..n).map(text).collect())
+            let texts = (0..n).map(|row| {
+                let is_missing = values.is_missing(row);
+                (!is_missing).then(|| value_text(&values.json(row)))
+            });
+            Values::Text(texts.collect())
         }
     }
 }

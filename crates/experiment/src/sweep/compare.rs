@@ -64,23 +64,38 @@ pub(super) fn comparisons(
     bootstrap: Option<&Bootstrap>,
 ) -> Vec<Comparison> {
     let is_share = matches!(metric.values, Values::Bool(_));
-    let pairs_of = |variant: usize| {
-        let baseline = reference.of[variant]?;
-        let (own, base) =
-            (groups.by_replicate(metric, variant), groups.by_replicate(metric, baseline));
-        // Where seeds change neither, there is one pair; replicates that neither has are none.
-        let seedless = groups.seedless[variant] && groups.seedless[baseline];
-        let most = if seedless { 1 } else { usize::MAX };
-        let there = own.iter().zip(&base).take(most).filter(|(a, b)| a.is_some() || b.is_some());
-        let (own, base): (Vec<_>, Vec<_>) = there.map(|(a, b)| (*a, *b)).unzip();
+    let mut all = Vec::new();
+    for variant in 0..groups.variants.len() {
+        let Some(baseline) = reference.of[variant] else { continue };
+        let pairs = pairs_of(groups, metric, variant, baseline);
         let names = [variant, baseline].map(|v| groups.variants[v].clone());
-        let compared = compare_pairs(names, &Pairs::from_columns(&own, &base), is_share, bootstrap);
-        Some(Comparison { seedless, ..compared })
-    };
-    let mut all: Vec<Comparison> = (0..groups.variants.len()).filter_map(pairs_of).collect();
+        let comparison = compare_pairs(names, &pairs, is_share, bootstrap);
+        let seedless = groups.seedless[variant] && groups.seedless[baseline];
+        all.push(Comparison { seedless, ..comparison });
+    }
+    // Of many variants without any effect, some differ by chance: Holm's method holds the chance of a single wrong
+    // finding among the comparisons of a metric.
     let adjusted = holm(&all.iter().map(|c| c.p).collect::<Vec<_>>());
-    all.iter_mut().zip(adjusted).for_each(|(c, p)| c.p_holm = p);
+    for (comparison, p) in all.iter_mut().zip(adjusted) {
+        comparison.p_holm = p;
+    }
     all
+}
+
+/// Returns the values of a variant and its baseline, replicate by replicate. Where seeds change neither, there is one
+/// pair; replicates that neither has are none.
+fn pairs_of(groups: &RunGroups<'_>, metric: &RunColumn, variant: usize, baseline: usize) -> Pairs {
+    let seedless = groups.seedless[variant] && groups.seedless[baseline];
+    let max_pairs = if seedless { 1 } else { usize::MAX };
+    let of_variant = groups.by_replicate(metric, variant);
+    let of_baseline = groups.by_replicate(metric, baseline);
+    let (of_variant, of_baseline): (Vec<_>, Vec<_>) = of_variant
+        .into_iter()
+        .zip(of_baseline)
+        .take(max_pairs)
+        .filter(|(a, b)| a.is_some() || b.is_some())
+        .unzip();
+    Pairs::from_columns(&of_variant, &of_baseline)
 }
 
 fn compare_pairs(
@@ -106,6 +121,7 @@ fn compare_pairs(
         lower,
         equal,
         higher,
+        // Differences of yes and no are far from normal; the exact sign test (McNemar's) needs no distribution.
         p: if is_share { pairs.sign_p_value() } else { pairs.p_value() },
         p_holm: None,
         p_sign: pairs.sign_p_value(),

@@ -6,7 +6,7 @@ use sidestep_kernel::{InputError, Seed, stream::Purpose, stream::Streams};
 use std::collections::BTreeSet;
 use toml::Value;
 
-/// Largest number of variants of a sweep.
+/// Largest number of variants of a sweep: each is compiled and has a scenario of its own in the folder.
 pub const MAX_VARIANTS: usize = 1_000_000;
 
 /// The random stream of a hypercube's permutations and places.
@@ -30,16 +30,28 @@ impl Factor {
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let place = format!("--vary {text}");
         let remedy = "write --vary key=value,value, e.g. --vary robots.count=10,20,40";
-        let wrong = |cause: &str| InputError::new(&place, cause, remedy);
-        let (key, values) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
+        let Some((key, values)) = text.split_once('=') else {
+            return Err(InputError::new(place, "there is no `=`", remedy));
+        };
         let key = key.trim();
         if key.is_empty() || key.split('.').any(str::is_empty) {
-            return Err(wrong("a part of the key is empty"));
+            return Err(InputError::new(place, "a part of the key is empty", remedy));
         }
         if values.trim().is_empty() {
-            return Err(wrong("there is no value"));
+            return Err(InputError::new(place, "there is no value", remedy));
         }
         Ok(Self { key: key.into(), values: parse_values(values) })
+    }
+}
+
+impl Factor {
+    /// Returns a variant for each value.
+    fn variants(&self) -> Vec<Variant> {
+        let mut variants = Vec::with_capacity(self.values.len());
+        for value in &self.values {
+            variants.push(vec![Setting { key: self.key.clone(), value: value.clone() }].into());
+        }
+        variants
     }
 }
 
@@ -81,19 +93,22 @@ pub struct ParameterRange {
 }
 
 impl ParameterRange {
-    /// Returns the value at `share` (0 included, 1 excluded) of the way from `low` to `high`.
+    /// Returns the value at `share` (0 included, 1 excluded) of the range from `low` to `high`.
     fn value_at(&self, share: f64) -> Value {
+        let low = self.low;
         // Each whole number gets an equal part of the range.
-        let (low, high) =
-            if self.is_integer { (self.low, self.high + 1.0) } else { (self.low, self.high) };
-        let value = match self.is_log {
-            true => exp(ln(low) + share * (ln(high) - ln(low))),
-            false => low + share * (high - low),
+        let high = if self.is_integer { self.high + 1.0 } else { self.high };
+        let value = if self.is_log {
+            exp(ln(low) + share * (ln(high) - ln(low)))
+        } else {
+            low + share * (high - low)
         };
+        // Rounding must not leave the range.
         let value = value.clamp(self.low, self.high);
-        match self.is_integer {
-            true => Value::Integer(value.floor().clamp(self.low, self.high) as i64),
-            false => Value::Float(value),
+        if self.is_integer {
+            Value::Integer(value.floor().clamp(self.low, self.high) as i64)
+        } else {
+            Value::Float(value)
         }
     }
 }
@@ -102,31 +117,31 @@ impl LatinHypercube {
     /// Returns all samples, in order.
     fn samples(&self) -> Vec<Variant> {
         let streams = Streams::new(Seed(self.seed));
-        let sides: Vec<Vec<Value>> = (0u32..)
-            .zip(&self.ranges)
-            .map(|(side, range)| {
-                // One stream per side and sample, because a stream has 2^18 words and there may be
-                // more samples.
-                let mut parts: Vec<usize> = (0..self.samples).collect();
-                for k in (1..self.samples).rev() {
-                    let mut draws = streams.draws(side, 2 * k as u64, SAMPLE_STREAM);
-                    parts.swap(k, draws.uniform_below(k as u32 + 1) as usize);
-                }
-                let place = |(k, part): (usize, usize)| {
-                    let u = streams.draws(side, 2 * k as u64 + 1, SAMPLE_STREAM).uniform();
-                    range.value_at((part as f64 + u) / self.samples as f64)
-                };
-                parts.into_iter().enumerate().map(place).collect()
-            })
-            .collect();
-        let setting = |k: usize, (range, side): (&ParameterRange, &Vec<Value>)| Setting {
-            key: range.key.clone(),
-            value: side[k].clone(),
-        };
-        (0..self.samples)
-            .map(|k| self.ranges.iter().zip(&sides).map(|pair| setting(k, pair)).collect())
-            .map(|settings: Vec<Setting>| settings.into())
-            .collect()
+        let mut settings: Vec<Vec<Setting>> = vec![Vec::new(); self.samples];
+        for (side, range) in (0u32..).zip(&self.ranges) {
+            for (sample, value) in settings.iter_mut().zip(self.side_values(&streams, side, range))
+            {
+                sample.push(Setting { key: range.key.clone(), value });
+            }
+        }
+        settings.into_iter().map(Variant::from).collect()
+    }
+
+    /// Returns the value of one side in every sample.
+    fn side_values(&self, streams: &Streams, side: u32, range: &ParameterRange) -> Vec<Value> {
+        // A random permutation of the parts (Fisher and Yates). One stream per side and sample, because a stream has
+        // 2^18 words and there may be more samples; even cycles permute, odd ones place.
+        let mut parts: Vec<usize> = (0..self.samples).collect();
+        for k in (1..self.samples).rev() {
+            let mut draws = streams.draws(side, 2 * k as u64, SAMPLE_STREAM);
+            parts.swap(k, draws.uniform_below(k as u32 + 1) as usize);
+        }
+        let mut values = Vec::with_capacity(self.samples);
+        for (k, part) in parts.into_iter().enumerate() {
+            let u = streams.draws(side, 2 * k as u64 + 1, SAMPLE_STREAM).uniform();
+            values.push(range.value_at((part as f64 + u) / self.samples as f64));
+        }
+        values
     }
 }
 
@@ -155,21 +170,10 @@ impl Design {
     /// # Errors
     /// When a key is set twice in a variant, or there are more than [`MAX_VARIANTS`].
     pub fn variants(&self, place: &str) -> Result<Vec<Variant>, InputError> {
-        let wrong = |cause: String, remedy: &str| InputError::new(place, cause, remedy);
-        match self.len() {
-            Some(1..=MAX_VARIANTS) => {}
-            Some(0) => return Err(wrong("a key has no values".into(), "give at least one")),
-            n => {
-                let n = n.map_or("too many".into(), |n| n.to_string());
-                let cause = format!("there are {n} variants");
-                return Err(wrong(cause, "vary less: at most a million variants"));
-            }
-        }
+        self.check_len(place)?;
         self.check_unique().map_err(|what| {
-            wrong(
-                format!("{what} is there twice"),
-                "give every value once; --replicate runs it again",
-            )
+            let cause = format!("{what} is there twice");
+            InputError::new(place, cause, "give every value once; --replicate runs it again")
         })?;
         let mut variants = self.list.clone();
         if variants.is_empty() {
@@ -179,18 +183,29 @@ impl Design {
             variants = cross_product(variants, &hypercube.samples());
         }
         for factor in &self.factors {
-            let setting = |value: &Value| {
-                vec![Setting { key: factor.key.clone(), value: value.clone() }].into()
-            };
-            variants =
-                cross_product(variants, &factor.values.iter().map(setting).collect::<Vec<_>>());
+            variants = cross_product(variants, &factor.variants());
         }
         for variant in &variants {
             check_keys(&variant.settings).map_err(|key| {
-                wrong(format!("`{key}` is set twice in one variant"), "vary every key in one place")
+                let cause = format!("`{key}` is set twice in one variant");
+                InputError::new(place, cause, "vary every key in one place")
             })?;
         }
         Ok(variants)
+    }
+
+    /// Checks the number of variants before any is made: a few factors of many values are more than fit into memory.
+    fn check_len(&self, place: &str) -> Result<(), InputError> {
+        let count = match self.len() {
+            Some(1..=MAX_VARIANTS) => return Ok(()),
+            Some(0) => {
+                return Err(InputError::new(place, "a key has no values", "give at least one"));
+            }
+            Some(count) => count.to_string(),
+            None => "too many".to_string(),
+        };
+        let cause = format!("there are {count} variants");
+        Err(InputError::new(place, cause, "vary less: at most a million variants"))
     }
 }
 
@@ -208,18 +223,21 @@ impl Design {
 
     /// Returns a key of this kind that variants set, if every variant sets one.
     pub(super) fn common_key(&self, is_such: impl Fn(&str) -> bool) -> Option<&str> {
-        self.shared_keys().find(|key| is_such(key)).or_else(|| {
-            // Every variant has the settings of one entry of the list.
-            let keys = self.list.iter().map(|entry| entry.keys().find(|key| is_such(key)));
-            keys.collect::<Option<Vec<_>>>()?.first().copied()
-        })
+        if let Some(key) = self.shared_keys().find(|key| is_such(key)) {
+            return Some(key);
+        }
+        // Every variant has the settings of one entry of the list.
+        let keys = self.list.iter().map(|entry| entry.keys().find(|key| is_such(key)));
+        keys.collect::<Option<Vec<_>>>()?.first().copied()
     }
 
     /// Checks that nothing is requested twice. Samples of a hypercube may coincide, because whole
     /// numbers are few.
     fn check_unique(&self) -> Result<(), String> {
-        let words = |v: &Variant| v.settings.iter().map(Setting::to_override).collect::<Vec<_>>();
-        let listed = self.list.iter().map(|variant| words(variant).join(", "));
+        let listed = self.list.iter().map(|variant| {
+            let settings: Vec<String> = variant.settings.iter().map(Setting::to_override).collect();
+            settings.join(", ")
+        });
         if let Some(twice) = first_duplicate(listed) {
             return Err(format!("the variant `{twice}`"));
         }
@@ -249,11 +267,12 @@ fn cross_product(firsts: Vec<Variant>, seconds: &[Variant]) -> Vec<Variant> {
 
 /// Checks that no key is set twice; the error is the first such key.
 fn check_keys(variant: &[Setting]) -> Result<(), &str> {
-    let twice = |k: &usize| variant[..*k].iter().any(|s| s.key == variant[*k].key);
-    match (0..variant.len()).find(twice) {
-        Some(k) => Err(&variant[k].key),
-        None => Ok(()),
+    for (k, setting) in variant.iter().enumerate() {
+        if variant[..k].iter().any(|earlier| earlier.key == setting.key) {
+            return Err(&setting.key);
+        }
     }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A sweep file: the scenario, its variants, and the number of runs.
 
 use super::baseline::BaselineSpec;
-use super::design::{self, Design, Factor, LatinHypercube};
+use super::design::{Design, Factor, LatinHypercube, ParameterRange};
 use super::variant::{Setting, Variant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -63,10 +63,10 @@ pub struct Precision {
 impl Precision {
     /// Checks that the half width is one that an interval can have.
     pub(super) fn check(&self) -> Result<(), String> {
-        match self.half_width > 0.0 && self.half_width.is_finite() {
-            true => Ok(()),
-            false => Err(format!("a precision of {}", self.half_width)),
+        if self.half_width > 0.0 && self.half_width.is_finite() {
+            return Ok(());
         }
+        Err(format!("a precision of {}", self.half_width))
     }
 }
 
@@ -75,20 +75,22 @@ impl FromStr for Precision {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
+        parse_precision(text).ok_or_else(|| {
             format!("`{text}` is no precision: write ci=0.05 (of the mean) or abs=2.5 (in units)")
-        };
-        let (kind, number) = text.split_once('=').ok_or_else(wrong)?;
-        let half_width: f64 = number.trim().parse().map_err(|_| wrong())?;
-        let is_relative = match kind.trim() {
-            "ci" => true,
-            "abs" => false,
-            _ => return Err(wrong()),
-        };
-        let until = Self { half_width, is_relative, metrics: Vec::new() };
-        until.check().map_err(|_| wrong())?;
-        Ok(until)
+        })
     }
+}
+
+fn parse_precision(text: &str) -> Option<Precision> {
+    let (kind, number) = text.split_once('=')?;
+    let half_width: f64 = number.trim().parse().ok()?;
+    let is_relative = match kind.trim() {
+        "ci" => true,
+        "abs" => false,
+        _ => return None,
+    };
+    let precision = Precision { half_width, is_relative, metrics: Vec::new() };
+    precision.check().is_ok().then_some(precision)
 }
 
 /// The keys of the file.
@@ -232,8 +234,8 @@ impl Sweep {
         let source = Source::read(path, &[])?;
         let table: toml::Table = source.parse()?;
         // A file with a misspelled `scenario` gets a better error from the reader of sweeps.
-        let is_sweep = |t: &toml::Table| SWEEP_KEYS.iter().any(|key| t.contains_key(*key));
-        if table.contains_key("scenario") || (!table.contains_key("world") && is_sweep(&table)) {
+        let has_sweep_key = SWEEP_KEYS.iter().any(|key| table.contains_key(*key));
+        if table.contains_key("scenario") || (!table.contains_key("world") && has_sweep_key) {
             Self::parse(&source)
         } else {
             Ok(Self::from_scenario(path))
@@ -254,35 +256,22 @@ impl Sweep {
         let reader = SweepReader { source };
         let until = file.until.as_ref().map(|section| reader.precision(section)).transpose()?;
         let replicates = reader.replicates(&file)?;
+        let design = reader.design(&file)?;
+        let baseline = match &file.baseline {
+            Some(baseline) => reader.baseline(baseline)?,
+            None => BaselineSpec::default(),
+        };
         Ok(Self {
             place: source.place.clone(),
             scenario: source.path(&file.scenario),
             given: None,
             fixed: settings(&file.set),
-            design: Design {
-                list: file
-                    .variant
-                    .iter()
-                    .map(|t| reader.listed_variant(t))
-                    .collect::<Result<_, _>>()?,
-                hypercube: file
-                    .latin_hypercube
-                    .as_ref()
-                    .map(|s| reader.hypercube(s))
-                    .transpose()?,
-                factors: file
-                    .vary
-                    .as_ref()
-                    .map_or(Ok(Vec::new()), |table| reader.factors(table))?,
-            },
+            design,
             replicates,
             first_seed: file.first_seed,
             until,
             metrics: file.metrics,
-            baseline: file
-                .baseline
-                .as_ref()
-                .map_or(Ok(BaselineSpec::default()), |b| reader.baseline(b))?,
+            baseline,
             name: file.name,
             record: file.record,
         })
@@ -323,11 +312,28 @@ fn leaves(table: &toml::Table, is_leaf: &impl Fn(&toml::Table) -> bool) -> Vec<(
     found
 }
 
+/// Returns whether a table is the range of a key; a key that ends in `.low` would be a table there.
+fn is_range(table: &toml::Table) -> bool {
+    table.contains_key("low") && !table["low"].is_table()
+}
+
 struct SweepReader<'a> {
     source: &'a Source,
 }
 
 impl SweepReader<'_> {
+    fn design(&self, file: &SweepFile) -> Result<Design, InputError> {
+        let listed = file.variant.iter().map(|table| self.listed_variant(table));
+        let list = listed.collect::<Result<_, _>>()?;
+        let hypercube = file.latin_hypercube.as_ref().map(|section| self.hypercube(section));
+        let hypercube = hypercube.transpose()?;
+        let factors = match &file.vary {
+            Some(table) => self.factors(table)?,
+            None => Vec::new(),
+        };
+        Ok(Design { list, hypercube, factors })
+    }
+
     /// Returns how often each variant is run, at most.
     fn replicates(&self, file: &SweepFile) -> Result<u32, InputError> {
         match (&file.replicates, &file.until) {
@@ -346,19 +352,22 @@ impl SweepReader<'_> {
     }
 
     fn factors(&self, table: &Spanned<toml::Table>) -> Result<Vec<Factor>, InputError> {
-        let factor = |(key, value): (String, Value)| match value {
-            Value::Array(values) if !values.is_empty() => Ok(Factor { key, values }),
-            _ => {
-                let cause = format!("`{key}` has no list of values");
-                let remedy = "give a list, e.g. robots.count = [10, 20]; what does not vary \
-                              belongs under [set]";
-                Err(self.source.error(Some(table.span()), cause, remedy))
+        let mut factors = Vec::new();
+        for (key, value) in leaves(table.get_ref(), &|_| false) {
+            match value {
+                Value::Array(values) if !values.is_empty() => factors.push(Factor { key, values }),
+                _ => {
+                    let cause = format!("`{key}` has no list of values");
+                    let remedy = "give a list, e.g. robots.count = [10, 20]; what does not vary \
+                                  belongs under [set]";
+                    return Err(self.source.error(Some(table.span()), cause, remedy));
+                }
             }
-        };
-        leaves(table.get_ref(), &|_| false).into_iter().map(factor).collect()
+        }
+        Ok(factors)
     }
 
-    /// Returns an entry of the list; its `name` names it, and is no setting.
+    /// Returns an entry of the list; its `name` is no setting.
     fn listed_variant(&self, table: &Spanned<toml::Table>) -> Result<Variant, InputError> {
         let mut own = table.get_ref().clone();
         match own.remove("name") {
@@ -390,37 +399,46 @@ impl SweepReader<'_> {
 
     fn hypercube(&self, section: &Spanned<HypercubeSection>) -> Result<LatinHypercube, InputError> {
         let HypercubeSection { samples, seed, range } = section.get_ref();
-        let is_range = |t: &toml::Table| t.contains_key("low") && !t["low"].is_table();
         let found = leaves(range.get_ref(), &is_range);
-        let wrong = |cause: String, remedy: &str| {
-            self.source.error(Some(range.span()), cause, remedy.to_string())
-        };
         if found.is_empty() {
-            return Err(wrong(
-                "no key has a range".into(),
-                "give e.g. a.b = { low = 1, high = 5 }",
-            ));
+            let remedy = "give e.g. a.b = { low = 1, high = 5 }";
+            return Err(self.source.error(Some(range.span()), "no key has a range", remedy));
         }
-        let one = |(key, value): (String, Value)| {
-            let section: RangeSection = value.try_into().map_err(|e: toml::de::Error| {
-                let remedy = "give { low = 1, high = 5 }, with log = true or integer = true";
-                wrong(format!("the range of `{key}`: {}", e.message()), remedy)
-            })?;
-            let RangeSection { low, high, log: is_log, integer: is_integer } = section;
-            let is_right = low < high && low.is_finite() && high.is_finite();
-            if !is_right || (is_log && low <= 0.0) {
-                let remedy = "low is below high, and above 0 where log = true";
-                return Err(wrong(format!("the range of `{key}` is {low} to {high}"), remedy));
-            }
-            if is_integer && (low.fract() != 0.0 || high.fract() != 0.0) {
-                let cause = format!("the range of `{key}` is {low} to {high}, with integer = true");
-                return Err(wrong(cause, "give whole numbers; both ends are included"));
-            }
-            Ok(design::ParameterRange { key, low, high, is_log, is_integer })
-        };
-        let ranges = found.into_iter().map(one).collect::<Result<_, _>>()?;
+        let mut ranges = Vec::new();
+        for (key, value) in found {
+            ranges.push(self.parameter_range(range.span(), key, value)?);
+        }
         let samples = self.count(*samples.get_ref(), samples.span(), "samples")? as usize;
         Ok(LatinHypercube { samples, seed: *seed, ranges })
+    }
+
+    fn parameter_range(
+        &self,
+        span: Range<usize>,
+        key: String,
+        value: Value,
+    ) -> Result<ParameterRange, InputError> {
+        let section: RangeSection = match value.try_into() {
+            Ok(section) => section,
+            Err(e) => {
+                let cause = format!("the range of `{key}`: {}", e.message());
+                let remedy = "give { low = 1, high = 5 }, with log = true or integer = true";
+                return Err(self.source.error(Some(span), cause, remedy));
+            }
+        };
+        let RangeSection { low, high, log: is_log, integer: is_integer } = section;
+        let is_ordered = low < high && low.is_finite() && high.is_finite();
+        if !is_ordered || (is_log && low <= 0.0) {
+            let cause = format!("the range of `{key}` is {low} to {high}");
+            let remedy = "low is below high, and above 0 where log = true";
+            return Err(self.source.error(Some(span), cause, remedy));
+        }
+        if is_integer && (low.fract() != 0.0 || high.fract() != 0.0) {
+            let cause = format!("the range of `{key}` is {low} to {high}, with integer = true");
+            let remedy = "give whole numbers; both ends are included";
+            return Err(self.source.error(Some(span), cause, remedy));
+        }
+        Ok(ParameterRange { key, low, high, is_log, is_integer })
     }
 
     fn precision(&self, section: &Spanned<UntilSection>) -> Result<Precision, InputError> {
@@ -433,10 +451,11 @@ impl SweepReader<'_> {
                 return Err(self.source.error(Some(section.span()), "no single precision", remedy));
             }
         };
-        let until = Precision { half_width, is_relative, metrics: metrics.clone() };
-        let wrong = |cause| self.source.error(Some(section.span()), cause, "give a number above 0");
-        until.check().map_err(wrong)?;
-        Ok(until)
+        let precision = Precision { half_width, is_relative, metrics: metrics.clone() };
+        precision.check().map_err(|cause| {
+            self.source.error(Some(section.span()), cause, "give a number above 0")
+        })?;
+        Ok(precision)
     }
 
     fn count(&self, n: u64, span: Range<usize>, key: &str) -> Result<u32, InputError> {

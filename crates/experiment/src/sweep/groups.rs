@@ -12,7 +12,8 @@ use sidestep_scenario::{MetricInfo, metric_label};
 use sidestep_statistics::{Sample, wilson};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most characters of a value in the name of a level that stands for several parameters.
+/// Largest number of characters of a value in the name of a level that stands for several parameters: it is the name of
+/// a bar.
 const MAX_LEVEL_NAME_CHARS: usize = 40;
 
 /// A value of a parameter.
@@ -68,50 +69,46 @@ pub(super) struct RunGroups<'a> {
 }
 
 impl<'a> RunGroups<'a> {
-    /// Groups the runs of `table`, of which the options give the names, tell the variants in which seeds
-    /// change nothing, and have the metrics in words.
+    /// Groups the runs of `table`. The options have the names of variants, those in which seeds change nothing, and the
+    /// metrics in words.
     pub(super) fn from_table(
         table: &'a RunTable,
         options: &SummaryOptions,
     ) -> Result<Self, InputError> {
         table.check()?;
-        let runs = row_order(table);
-        let label = |run: usize| variant_name(table, run, options.names.as_deref());
-        let replicate = table.columns_with_role(Role::Replicate).next();
+        let replicate_column = table.columns_with_role(Role::Replicate).next();
         let mut variants: Vec<String> = Vec::new();
-        let mut places: BTreeMap<String, usize> = BTreeMap::new();
+        let mut index_of: BTreeMap<String, usize> = BTreeMap::new();
         let mut counts: Vec<i64> = Vec::new();
         let mut run_of = BTreeMap::new();
-        for run in runs {
-            let name = label(run);
-            let variant = *places.entry(name.clone()).or_insert_with(|| {
+        for run in row_order(table) {
+            let name = variant_name(table, run, options.names.as_deref());
+            let variant = *index_of.entry(name.clone()).or_insert_with(|| {
                 variants.push(name.clone());
                 counts.push(0);
                 variants.len() - 1
             });
-            let number =
-                replicate.and_then(|c| c.values.number(run)).map_or(counts[variant], |v| v as i64);
+            // Without numbers of replicates, runs are numbered as they come.
+            let replicate = match replicate_column.and_then(|c| c.values.number(run)) {
+                Some(number) => number as i64,
+                None => counts[variant],
+            };
             counts[variant] += 1;
-            if run_of.insert((variant, number), run).is_some() {
-                let cause = format!("variant `{name}` has two runs of replicate {number}");
+            if run_of.insert((variant, replicate), run).is_some() {
+                let cause = format!("variant `{name}` has two runs of replicate {replicate}");
                 let remedy = "number the replicates of a variant, each run once";
                 return Err(InputError::new("the table of runs", cause, remedy));
             }
         }
-        let replicates: BTreeSet<i64> = run_of.keys().map(|(_, r)| *r).collect();
-        let parameters = parameters(table, &run_of, variants.len());
-        let paired = replicate.is_some();
-        let replicates = replicates.into_iter().collect();
-        let seedless = variants.iter().map(|name| options.seedless.contains(name)).collect();
-        let meanings = options.meanings;
+        let replicates: BTreeSet<i64> = run_of.keys().map(|(_, replicate)| *replicate).collect();
         Ok(Self {
             table,
+            replicates: replicates.into_iter().collect(),
+            paired: replicate_column.is_some(),
+            parameters: parameters(table, &run_of, variants.len()),
+            meanings: options.meanings,
+            seedless: variants.iter().map(|name| options.seedless.contains(name)).collect(),
             variants,
-            replicates,
-            paired,
-            parameters,
-            meanings,
-            seedless,
             run: run_of,
         })
     }
@@ -138,17 +135,21 @@ impl<'a> RunGroups<'a> {
 
     /// Returns the values of a variant, one for each of its runs; one where seeds change nothing.
     pub(super) fn values(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        let most = if self.seedless[variant] { 1 } else { usize::MAX };
-        self.rows(variant).take(most).map(|run| metric.values.number(run)).collect()
+        let max_runs = if self.seedless[variant] { 1 } else { usize::MAX };
+        self.rows(variant).take(max_runs).map(|run| metric.values.number(run)).collect()
     }
 
     /// Returns the values of a variant, one for each replicate of the whole table. Where seeds change
     /// nothing, all have that of the first run.
     pub(super) fn by_replicate(&self, metric: &RunColumn, variant: usize) -> Vec<Option<f64>> {
-        let same = self.rows(variant).next().filter(|_| self.seedless[variant]);
-        let run_of = |r: &i64| same.or_else(|| self.run.get(&(variant, *r)).copied());
-        let value = |r: &i64| metric.values.number(run_of(r)?);
-        self.replicates.iter().map(value).collect()
+        let first_run = self.rows(variant).next();
+        let mut values = Vec::with_capacity(self.replicates.len());
+        for replicate in &self.replicates {
+            let own_run = self.run.get(&(variant, *replicate)).copied();
+            let run = if self.seedless[variant] { first_run } else { own_run };
+            values.push(run.and_then(|run| metric.values.number(run)));
+        }
+        values
     }
 
     /// Returns the mean over a group of variants.
@@ -166,14 +167,14 @@ impl<'a> RunGroups<'a> {
             return Estimate::from_values(values);
         }
         let columns: Vec<_> = group.iter().map(|v| self.by_replicate(metric, *v)).collect();
-        let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
-        let mean = |r: usize| {
-            let of_all: Option<Vec<f64>> = columns.iter().map(|c| finite(c[r])).collect();
-            sidestep_statistics::mean(&of_all?)
-        };
         // Where all are seedless, every replicate gives the same number.
-        let all = if group.iter().all(|v| self.seedless[*v]) { 1 } else { usize::MAX };
-        Estimate::from_values((0..self.replicates.len().min(all)).map(mean))
+        let are_all_seedless = group.iter().all(|v| self.seedless[*v]);
+        let max_replicates = if are_all_seedless { 1 } else { usize::MAX };
+        Estimate::from_values((0..self.replicates.len().min(max_replicates)).map(|replicate| {
+            let values = columns.iter().map(|column| column[replicate].filter(|v| v.is_finite()));
+            let of_all: Option<Vec<f64>> = values.collect();
+            sidestep_statistics::mean(&of_all?)
+        }))
     }
 
     /// Returns whether every level of `parameter` occurs with the same levels of all others, as in a full
@@ -181,13 +182,15 @@ impl<'a> RunGroups<'a> {
     pub(super) fn is_balanced(&self, parameter: usize) -> bool {
         let mut others = vec![Vec::new(); self.parameters[parameter].levels.len()];
         for variant in 0..self.variants.len() {
-            let rest: Vec<usize> = (0..self.parameters.len())
+            let other_levels: Vec<usize> = (0..self.parameters.len())
                 .filter(|p| *p != parameter)
                 .map(|p| self.parameters[p].of_variant[variant])
                 .collect();
-            others[self.parameters[parameter].of_variant[variant]].push(rest);
+            others[self.parameters[parameter].of_variant[variant]].push(other_levels);
         }
-        others.iter_mut().for_each(|o| o.sort());
+        for of_level in &mut others {
+            of_level.sort();
+        }
         others.windows(2).all(|pair| pair[0] == pair[1])
     }
 
@@ -200,8 +203,10 @@ impl<'a> RunGroups<'a> {
 
 fn proportion(values: &[Option<f64>], seedless: bool) -> Estimate {
     let values = Sample::from_runs(values.iter().copied()).values;
-    let (yes, n) = (values.iter().sum::<f64>(), values.len());
+    let yes: f64 = values.iter().sum();
+    let n = values.len();
     let mut share = Estimate::from_values(values.into_iter().map(Some));
+    // Student's interval may leave 0 to 1, and has no width where all runs agree; Wilson's does not.
     share.interval = (n > 0 && !seedless).then(|| wilson(yes, n as f64));
     share
 }
@@ -222,9 +227,13 @@ fn row_order(table: &RunTable) -> Vec<usize> {
 /// has their numbers.
 fn variant_name(table: &RunTable, run: usize, names: Option<&[String]>) -> String {
     if let Some(column) = table.columns_with_role(Role::Variant).next() {
-        let number = || column.values.number(run).map(|n| n as usize);
-        let named = names.and_then(|names| names.get(number()?).cloned());
-        return named.unwrap_or_else(|| column.values.text(run));
+        let number = column.values.number(run).map(|number| number as usize);
+        if let Some(names) = names
+            && let Some(name) = number.and_then(|number| names.get(number))
+        {
+            return name.clone();
+        }
+        return column.values.text(run);
     }
     let parts: Vec<String> = table
         .columns_with_role(Role::Parameter)
@@ -239,58 +248,72 @@ fn parameters(
     run_of: &BTreeMap<(usize, i64), usize>,
     variants: usize,
 ) -> Vec<Parameter> {
-    let varied = |column: &RunColumn| {
-        let mut of_variant: Vec<Option<String>> = vec![None; variants];
-        let mut numbers: Vec<Option<f64>> = vec![None; variants];
-        for ((variant, _), run) in run_of {
-            let text = column.values.text(*run);
-            if of_variant[*variant].as_ref().is_some_and(|first| *first != text) {
-                return None;
-            }
-            numbers[*variant] = column.values.number(*run).filter(|v| v.is_finite());
-            of_variant[*variant] = Some(text);
+    let columns = table.columns_with_role(Role::Parameter);
+    merge_confounded(columns.filter_map(|column| parameter(column, run_of, variants)))
+}
+
+/// Returns the parameter of a column; `None` where it has one value, or differs within a variant.
+fn parameter(
+    column: &RunColumn,
+    run_of: &BTreeMap<(usize, i64), usize>,
+    variants: usize,
+) -> Option<Parameter> {
+    let mut texts: Vec<Option<String>> = vec![None; variants];
+    let mut numbers: Vec<Option<f64>> = vec![None; variants];
+    for ((variant, _), run) in run_of {
+        let text = column.values.text(*run);
+        if texts[*variant].as_ref().is_some_and(|first| *first != text) {
+            return None;
         }
-        let numeric = column.values.is_numeric() && numbers.iter().all(Option::is_some);
-        let level = |variant: usize| match numbers[variant] {
+        numbers[*variant] = column.values.number(*run).filter(|v| v.is_finite());
+        texts[*variant] = Some(text);
+    }
+    let numeric = column.values.is_numeric() && numbers.iter().all(Option::is_some);
+    let mut level_of: Vec<Level> = Vec::with_capacity(variants);
+    for (text, number) in texts.into_iter().zip(numbers) {
+        level_of.push(match number {
             Some(number) if numeric => Level::Number(number),
-            _ => Level::Text(of_variant[variant].clone().unwrap_or_default()),
-        };
-        let mut levels: Vec<Level> = Vec::new();
-        for variant in 0..variants {
-            let level = level(variant);
-            if !levels.contains(&level) {
-                levels.push(level);
-            }
+            _ => Level::Text(text.unwrap_or_default()),
+        });
+    }
+    let mut levels: Vec<Level> = Vec::new();
+    for level in &level_of {
+        if !levels.contains(level) {
+            levels.push(level.clone());
         }
-        if let [Level::Number(_), ..] = levels[..] {
-            levels.sort_by(|a, b| match (a, b) {
-                (Level::Number(a), Level::Number(b)) => a.total_cmp(b),
-                _ => std::cmp::Ordering::Equal,
-            });
-        }
-        let place = |variant| levels.iter().position(|l| *l == level(variant)).unwrap_or(0);
-        let of_variant = (0..variants).map(place).collect();
-        let name = column.name.clone();
-        (levels.len() > 1).then_some(Parameter { name, numeric, levels, of_variant })
-    };
-    merge_confounded(table.columns_with_role(Role::Parameter).filter_map(varied))
+    }
+    // Numbers are positions on an axis; words stay in the order in which the sweep has them.
+    if let [Level::Number(_), ..] = levels[..] {
+        levels.sort_by(|a, b| match (a, b) {
+            (Level::Number(a), Level::Number(b)) => a.total_cmp(b),
+            _ => std::cmp::Ordering::Equal,
+        });
+    }
+    let indices = level_of.iter().map(|level| levels.iter().position(|l| l == level).unwrap_or(0));
+    let of_variant = indices.collect();
+    (levels.len() > 1).then_some(Parameter {
+        name: column.name.clone(),
+        numeric,
+        levels,
+        of_variant,
+    })
 }
 
 /// Returns the parameters, of which those that always change together are one: their variants are the
 /// same, and share an axis. Numbers stay apart, because each is an axis of its own.
 fn merge_confounded(parameters: impl Iterator<Item = Parameter>) -> Vec<Parameter> {
-    let mut apart: Vec<Parameter> = Vec::new();
+    let mut merged: Vec<Parameter> = Vec::new();
     for parameter in parameters {
-        match apart.iter_mut().find(|other| other.is_confounded_with(&parameter)) {
+        match merged.iter_mut().find(|other| other.is_confounded_with(&parameter)) {
             Some(other) => other.absorb(&parameter),
-            None => apart.push(parameter),
+            None => merged.push(parameter),
         }
     }
-    apart
+    merged
 }
 
 impl Parameter {
-    /// Returns whether two parameters, not both of them numbers, tell the same variants apart.
+    /// Returns whether two parameters, not both of them numbers, distinguish the same variants.
     fn is_confounded_with(&self, other: &Self) -> bool {
         let mut pairs: Vec<_> = self.of_variant.iter().zip(&other.of_variant).collect();
         pairs.sort_unstable();
@@ -302,16 +325,17 @@ impl Parameter {
 
     /// Adds the values of a parameter that changes together with this one.
     fn absorb(&mut self, other: &Self) {
-        let level = |l: usize| {
-            let own = self.levels[l].name();
-            let variant = self.of_variant.iter().position(|of| *of == l);
+        let mut levels = Vec::with_capacity(self.levels.len());
+        for (index, level) in self.levels.iter().enumerate() {
+            let own = level.name();
+            let variant = self.of_variant.iter().position(|of| *of == index);
             let others =
                 variant.map_or(String::new(), |v| other.levels[other.of_variant[v]].name());
             // A whole list of things is no name of a bar.
             let is_short = !others.is_empty() && others.chars().count() <= MAX_LEVEL_NAME_CHARS;
-            Level::Text(if is_short { format!("{own}, {others}") } else { own })
-        };
-        self.levels = (0..self.levels.len()).map(level).collect();
+            levels.push(Level::Text(if is_short { format!("{own}, {others}") } else { own }));
+        }
+        self.levels = levels;
         self.name = format!("{}, {}", self.name, other.name);
         self.numeric = false;
     }

@@ -41,12 +41,19 @@ impl Sweep {
         self.fixed.extend(changes.fixed);
         if let Some(until) = changes.until {
             // It replaces the precision alone; the other keys of the file's `until` stay.
-            let metrics = self.until.take().map(|of_file| of_file.metrics);
-            self.replicates = if metrics.is_some() { self.replicates } else { DEFAULT_MAX_RUNS };
-            self.until = Some(Precision { metrics: metrics.unwrap_or_default(), ..until });
+            let metrics = match self.until.take() {
+                Some(of_file) => of_file.metrics,
+                None => {
+                    // The file's `replicates` is a number of runs, not a limit.
+                    self.replicates = DEFAULT_MAX_RUNS;
+                    Vec::new()
+                }
+            };
+            self.until = Some(Precision { metrics, ..until });
         }
-        if let Some(n) = changes.replicates {
-            (self.until, self.replicates) = (None, n);
+        if let Some(replicates) = changes.replicates {
+            self.until = None;
+            self.replicates = replicates;
         }
         if let Some(max) = changes.max_runs {
             if self.until.is_none() {
@@ -68,19 +75,20 @@ impl Sweep {
         let Some(varied) = self.design.common_key(|varied| is_same_or_below(key, varied)) else {
             return Ok(());
         };
-        let remedy = "leave it out, or take the key out of the sweep: what a variant says counts";
+        let remedy = "leave it out, or take the key out of the sweep: what a variant sets counts";
         let cause = format!("`{varied}` is varied by the sweep");
         Err(InputError::new(format!("{key} = {value}"), cause, remedy))
     }
 
     /// Sets the metrics to report, which the precision applies to as well if it names none.
     fn set_metrics(&mut self, metrics: Vec<String>) {
-        let is_asked = !metrics.is_empty();
-        if is_asked {
+        let are_requested = !metrics.is_empty();
+        if are_requested {
             self.metrics = metrics;
         }
-        let applies_to = |until: &Precision| until.metrics.is_empty() || is_asked;
-        if let Some(until) = self.until.as_mut().filter(|until| applies_to(until)) {
+        if let Some(until) = &mut self.until
+            && (until.metrics.is_empty() || are_requested)
+        {
             until.metrics.clone_from(&self.metrics);
         }
     }
@@ -89,8 +97,8 @@ impl Sweep {
 /// Returns whether a key is this one, or lies below it. A table that stands alone in an array needs no index:
 /// `robots.count` may be `robots.0.count`.
 fn is_same_or_below(key: &str, above: &str) -> bool {
-    let parts = |key: &str| key.split('.').filter(|part| *part != "0").map(String::from).collect();
-    let [key, above]: [Vec<String>; 2] = [key, above].map(parts);
+    let key: Vec<&str> = key.split('.').filter(|part| *part != "0").collect();
+    let above: Vec<&str> = above.split('.').filter(|part| *part != "0").collect();
     key.starts_with(&above)
 }
 

@@ -117,14 +117,14 @@ impl Plan {
         sweep: &Sweep,
         base: BaseScenario<'_>,
     ) -> Result<Option<Baseline>, InputError> {
-        let search = BaselineMatcher {
+        let matcher = BaselineMatcher {
             wanted: &sweep.baseline,
             variants: &self.variants,
             parameters: &self.parameters,
             base,
             place: &sweep.place,
         };
-        search.baseline(|k| self.names().swap_remove(k), |setting| self.short_setting(setting))
+        matcher.baseline(|k| self.names().swap_remove(k), |setting| self.short_setting(setting))
     }
 
     /// Checks that the parts of the plan fit together, as they do in every plan that [`Plan::new`] makes.
@@ -132,7 +132,8 @@ impl Plan {
     /// # Errors
     /// The cause, in words.
     pub fn check(&self) -> Result<(), String> {
-        let (variants, replicates) = (self.variants.len(), u64::from(self.replicates));
+        let variants = self.variants.len();
+        let replicates = u64::from(self.replicates);
         if variants == 0 || replicates == 0 {
             return Err(format!("a plan of {variants} variants with {replicates} runs each"));
         }
@@ -150,8 +151,10 @@ impl Plan {
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> =
             self.variants.iter().map(|v| v.label(|s| self.short_setting(s))).collect();
-        let plain = if names.len() == 1 { "all runs" } else { "as in the scenario" };
-        names.iter_mut().filter(|name| name.is_empty()).for_each(|name| *name = plain.into());
+        let unchanged = if names.len() == 1 { "all runs" } else { "as in the scenario" };
+        for name in names.iter_mut().filter(|name| name.is_empty()) {
+            *name = unchanged.into();
+        }
         number_duplicates(&mut names);
         names
     }
@@ -159,9 +162,9 @@ impl Plan {
     /// Returns a setting in short, `method=pc`: with the whole path of its key only where another
     /// parameter ends like it.
     fn short_setting(&self, Setting { key, value }: &Setting) -> String {
-        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
-        let alike = self.parameters.iter().filter(|k| last(k) == last(key)).count();
-        let key = if alike > 1 { key.clone() } else { last(key) };
+        let end = last_part(key);
+        let with_same_end = self.parameters.iter().filter(|other| last_part(other) == end).count();
+        let key = if with_same_end > 1 { key.as_str() } else { end };
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
         format!("{key}={value}")
     }
@@ -216,16 +219,19 @@ impl Plan {
 
     /// Returns the trial with this number, if it exists.
     pub fn trial_of(&self, id: u64) -> Option<Trial> {
+        if id >= self.len() {
+            return None;
+        }
         let replicates = u64::from(self.replicates);
-        let trial = || self.trial((id / replicates) as u32, (id % replicates) as u32);
-        (id < self.len()).then(trial)
+        Some(self.trial((id / replicates) as u32, (id % replicates) as u32))
     }
 
     /// Returns the trials of a share, in the order in which they are run: every `count`-th trial,
     /// counted over variants and replicates alike, so that no share gets all the expensive
     /// variants.
     pub fn shard_trials(&self, shard: Shard) -> impl Iterator<Item = Trial> + '_ {
-        let (index, count) = (u64::from(shard.index), u64::from(shard.count));
+        let index = u64::from(shard.index);
+        let count = u64::from(shard.count);
         let variants = self.variants.len() as u32;
         let trials = (0..self.replicates)
             .flat_map(move |replicate| (0..variants).map(move |v| self.trial(v, replicate)));
@@ -241,10 +247,16 @@ impl Plan {
 /// # Errors
 /// The cause, in words.
 pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
-    match first.checked_add(runs.saturating_sub(1)).is_some_and(|last| last <= i64::MAX as u64) {
-        true => Ok(()),
-        false => Err(format!("{runs} seeds from {first} on exceed 2^63 - 1")),
+    let last = first.checked_add(runs.saturating_sub(1));
+    if last.is_some_and(|last| last <= i64::MAX as u64) {
+        return Ok(());
     }
+    Err(format!("{runs} seeds from {first} on exceed 2^63 - 1"))
+}
+
+/// Returns the last part of a dotted key.
+fn last_part(key: &str) -> &str {
+    key.rsplit('.').next().unwrap_or(key)
 }
 
 /// Numbers equal names from the second on, because samples of whole numbers may coincide.
@@ -278,12 +290,17 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no share: write I/N with I from 0 to N-1, e.g. 0/4");
-        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
-        let number = |t: &str| t.trim().parse::<u32>().map_err(|_| wrong());
-        let shard = Self { index: number(index)?, count: number(count)? };
-        if shard.index < shard.count { Ok(shard) } else { Err(wrong()) }
+        parse_shard(text).ok_or_else(|| {
+            format!("`{text}` is no share: write I/N with I from 0 to N-1, e.g. 0/4")
+        })
     }
+}
+
+fn parse_shard(text: &str) -> Option<Shard> {
+    let (index, count) = text.split_once('/')?;
+    let index = index.trim().parse().ok()?;
+    let count = count.trim().parse().ok()?;
+    (index < count).then_some(Shard { index, count })
 }
 
 impl fmt::Display for Shard {

@@ -8,6 +8,7 @@ use super::summary::Summary;
 use super::table::RunTable;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{WorldType, Worlds};
+use std::collections::{BTreeMap, BTreeSet};
 
 impl Plan {
     /// Returns the summary of the runs of this plan, of one of `worlds`, with its metrics and baseline.
@@ -30,16 +31,22 @@ impl Plan {
     ) -> Result<Summary, InputError> {
         let names = self.names();
         let world = worlds.find(&self.world);
-        let same = seeds::seedless_variants(self, runs);
+        let mut seedless = BTreeSet::new();
+        for (name, is_seedless) in names.iter().zip(seeds::seedless_variants(self, runs)) {
+            if is_seedless {
+                seedless.insert(name.clone());
+            }
+        }
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
-            seedless: (0..names.len()).filter(|k| same[*k]).map(|k| names[k].clone()).collect(),
+            seedless,
             against: self.baseline.as_ref().map(|baseline| baseline_choice(baseline, &names)),
             meanings: world.map_or(&[], WorldType::metric_infos),
             names: Some(names),
             ..SummaryOptions::default()
         };
         let mut summary = Summary::from_table_with_progress(runs, &options, progress)?;
+        // First, because they say why there may be no intervals at all.
         summary.notes.splice(0..0, seeds::seed_notes(self, runs, world));
         Ok(summary)
     }
@@ -47,8 +54,11 @@ impl Plan {
 
 /// Returns the baseline by the names of variants.
 fn baseline_choice(baseline: &Baseline, names: &[String]) -> BaselineChoice {
-    let name = |k: usize| names.get(k).cloned();
-    let pair = |(k, of): (usize, &Option<u32>)| Some((name(k)?, name((*of)? as usize)?));
-    let of = baseline.of.iter().enumerate().filter_map(pair).collect();
+    let mut of = BTreeMap::new();
+    for (variant, baseline) in names.iter().zip(&baseline.of) {
+        if let Some(baseline) = baseline.and_then(|baseline| names.get(baseline as usize)) {
+            of.insert(variant.clone(), baseline.clone());
+        }
+    }
     BaselineChoice::Matched { name: baseline.name.clone(), of, alone: baseline.alone }
 }

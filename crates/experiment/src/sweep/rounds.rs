@@ -8,7 +8,8 @@ use serde::Serialize;
 use sidestep_statistics::{StopDecision, StopReason, StoppingRule};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of runs of each variant before the first check.
+/// Number of runs of each variant before the first check: with fewer, a standard deviation that is small by chance would
+/// end the runs.
 const MIN_RUNS: usize = 10;
 
 /// The metrics of the variants so far: the decision depends on nothing else.
@@ -76,17 +77,20 @@ impl<'a> Rounds<'a> {
                 trials.extend(open.map(|replicate| self.plan.trial(variant, replicate)));
             }
         }
+        // As all sweeps are run: the first results are a small complete experiment.
         trials.sort_by_key(|trial| (trial.replicate, trial.variant));
         trials
     }
 
     /// Returns the reasons why variants are done.
     pub fn variant_stops(&self) -> Vec<VariantStop> {
-        let of = |variant: u32| match self.decide(variant) {
-            StopDecision::Enough(runs, reason) => Some(VariantStop { variant, runs, reason }),
-            StopDecision::Run(_) => None,
-        };
-        (0..self.plan.variants.len() as u32).filter_map(of).collect()
+        let mut stops = Vec::new();
+        for variant in 0..self.plan.variants.len() as u32 {
+            if let StopDecision::Enough(runs, reason) = self.decide(variant) {
+                stops.push(VariantStop { variant, runs, reason });
+            }
+        }
+        stops
     }
 
     fn decide(&self, variant: u32) -> StopDecision {
@@ -101,41 +105,52 @@ impl<'a> Rounds<'a> {
         };
         let done = &self.done[variant as usize];
         // Only runs without a gap count: an interrupted round is completed first.
-        let whole = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
-        let column = |values: &Values| -> Vec<Option<f64>> {
-            (0..whole as u32).map(|k| values.get(&k).copied().flatten()).collect()
-        };
-        let of_variant = &self.values[variant as usize];
-        let named = !self.until.metrics.is_empty();
-        let there: Vec<_> = of_variant
-            .iter()
-            .filter(|(_, values)| named || first_round(values).any(is_present))
-            .collect();
-        let asks = |name: &str| named || self.varies(name);
-        // If nothing varies, it takes as many runs to believe that as for a single metric.
-        let any_asks = there.iter().any(|(name, _)| asks(name));
-        let asking = there.iter().filter(|(name, _)| !any_asks || asks(name));
-        let columns: Vec<Vec<Option<f64>>> = asking.map(|(_, values)| column(values)).collect();
+        let complete = (0u32..).zip(done).take_while(|(k, replicate)| k == *replicate).count();
+        let mut columns: Vec<Vec<Option<f64>>> = Vec::new();
+        for values in self.deciding_metrics(variant) {
+            columns.push((0..complete as u32).map(|k| values.get(&k).copied().flatten()).collect());
+        }
         if columns.is_empty() {
             let first = MIN_RUNS.min(rule.max_runs);
-            return match whole >= first {
-                true => StopDecision::Enough(first, StopReason::NoValues),
-                false => StopDecision::Run(first),
-            };
+            if complete >= first {
+                return StopDecision::Enough(first, StopReason::NoValues);
+            }
+            return StopDecision::Run(first);
         }
         let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
         rule.decide_columns(&columns)
     }
 
+    /// Returns the values of the metrics that decide for a variant: those requested; without any, those that vary.
+    /// Which these are is seen in the first round and stays, so that no later run changes what an earlier one decided.
+    fn deciding_metrics(&self, variant: u32) -> Vec<&Values> {
+        let of_variant = &self.values[variant as usize];
+        if !self.until.metrics.is_empty() {
+            return of_variant.values().collect();
+        }
+        let mut present = Vec::new();
+        let mut varying = Vec::new();
+        for (name, values) in of_variant {
+            if first_round(values).any(Option::is_some) {
+                present.push(values);
+                if self.varies(name) {
+                    varying.push(values);
+                }
+            }
+        }
+        // If nothing varies, it takes as many runs to believe that as for a single metric.
+        if varying.is_empty() { present } else { varying }
+    }
+
     /// Returns whether a metric differs between two runs of a variant's first round, for any variant: a
     /// rare event is then looked for also in variants that have not had it.
     fn varies(&self, name: &str) -> bool {
-        let differ = |values: &Values| {
+        let mut of_variants = self.values.iter().filter_map(|of_variant| of_variant.get(name));
+        of_variants.any(|values| {
             let mut all = first_round(values);
-            let one = all.next();
-            all.any(|value| Some(value) != one)
-        };
-        self.values.iter().filter_map(|of_variant| of_variant.get(name)).any(differ)
+            let first = all.next();
+            all.any(|value| Some(value) != first)
+        })
     }
 }
 
@@ -145,10 +160,6 @@ type Values = BTreeMap<u32, Option<f64>>;
 /// Returns the values of the first round.
 fn first_round(values: &Values) -> impl Iterator<Item = &Option<f64>> {
     (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
-}
-
-fn is_present(value: &Option<f64>) -> bool {
-    value.is_some()
 }
 
 #[cfg(test)]

@@ -4,12 +4,11 @@ use super::column_schema::{
     CYCLES, ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text,
     widened,
 };
-use super::plan::{Plan, Shard};
+use super::plan::{Plan, Shard, Trial};
 use super::seeds::PilotRuns;
 use super::table::{Role, RunColumn, RunTable};
 use super::trial::Outcome;
-use super::variant::Variant;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnType, Values};
 use std::collections::BTreeMap;
@@ -60,11 +59,12 @@ impl RunTableBuilder {
             self.columns.push(ColumnBuilder { column, first });
             self.columns.len() - 1
         });
-        let growing = &mut self.columns[k];
+        let builder = &mut self.columns[k];
+        // A missing value says nothing about the place of its column, see [`ColumnOrder`].
         let trial = if value.is_null() { u64::MAX } else { trial };
-        growing.first = growing.first.min(ColumnOrder { trial, place });
-        growing.column.values.resize(row);
-        push_value(&mut growing.column.values, value);
+        builder.first = builder.first.min(ColumnOrder { trial, place });
+        builder.column.values.resize(row);
+        push_value(&mut builder.column.values, value);
     }
 
     /// Returns the table of all runs, sorted by trial: numbers of trial, variant and replicate, seed,
@@ -74,24 +74,25 @@ impl RunTableBuilder {
     /// When a trial has two outcomes that differ, because they come from different programs or
     /// machines.
     pub fn build(self, plan: &Plan) -> Result<RunTable, InputError> {
-        let (shape, mut pilots) = (self.schema(), PilotRuns::new(plan));
+        let schema = self.schema();
+        let mut pilots = PilotRuns::new(plan);
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         for (row, trial) in self.trials.iter().enumerate() {
             let end = digest.map_or_else(String::new, |c| c.column.values.text(row));
             pilots.add_digest(Some(*trial), end);
         }
-        self.build_block(plan, &shape, &pilots)
+        self.build_block(plan, &schema, &pilots)
     }
 
     /// Returns the columns of these outcomes alone.
     fn schema(&self) -> ColumnSchema {
-        let mut shape = ColumnSchema::default();
+        let mut schema = ColumnSchema::default();
         for ColumnBuilder { column, first } in &self.columns {
             let values = &column.values;
             let has_values = (0..values.len()).any(|row| !values.is_missing(row));
-            shape.add_column(column.role, &column.name, has_values.then(|| values.ty()), *first);
+            schema.add_column(column.role, &column.name, has_values.then(|| values.ty()), *first);
         }
-        shape
+        schema
     }
 
     /// Returns a part of the table of all runs: the rows of these outcomes, sorted by trial, in the columns of all
@@ -103,28 +104,32 @@ impl RunTableBuilder {
     pub fn build_block(
         mut self,
         plan: &Plan,
-        shape: &ColumnSchema,
+        schema: &ColumnSchema,
         pilots: &PilotRuns<'_>,
     ) -> Result<RunTable, InputError> {
         let rows = self.trials.len();
-        self.columns.iter_mut().for_each(|c| c.column.values.resize(rows));
+        for builder in &mut self.columns {
+            builder.column.values.resize(rows);
+        }
         let mut order: Vec<usize> = (0..rows).collect();
         order.retain(|&row| plan.trial_of(self.trials[row]).is_some());
         order.sort_by_key(|&row| (self.trials[row], row));
+        // Shares that overlap may have run a trial twice.
         self.check_duplicates(&order)?;
         order.dedup_by_key(|row| self.trials[*row]);
         order.retain(|&row| {
             plan.trial_of(self.trials[row]).is_some_and(|trial| pilots.needs(&trial))
         });
         let mut columns = identity_columns(plan, order.iter().map(|&row| self.trials[row]));
-        for (role, name, ty) in shape.columns() {
+        for (role, name, ty) in schema.columns() {
             let mut values = match self.index.get(&(role, name.to_string())) {
-                // Let go of at once, so that no value stands in the memory twice.
-                Some(k) => std::mem::replace(
-                    &mut self.columns[*k].column.values,
-                    Values::empty(ColumnType::F64),
-                )
-                .pick(&order),
+                Some(k) => {
+                    // Moved out, so that no value stands in the memory twice.
+                    let builder = &mut self.columns[*k];
+                    let empty = Values::empty(ColumnType::F64);
+                    let unsorted = std::mem::replace(&mut builder.column.values, empty);
+                    unsorted.pick(&order)
+                }
                 None => Values::empty(ty),
             };
             values.resize(order.len());
@@ -137,10 +142,11 @@ impl RunTableBuilder {
     fn check_duplicates(&self, order: &[usize]) -> Result<(), InputError> {
         let digest = self.columns.iter().find(|c| c.column.role == Role::Digest);
         let Some(digest) = digest else { return Ok(()) };
-        let text = |row: usize| digest.column.values.text(row);
+        let digests = &digest.column.values;
         for pair in order.windows(2) {
-            let trial = self.trials[pair[0]];
-            if trial == self.trials[pair[1]] && text(pair[0]) != text(pair[1]) {
+            let [first, second] = [pair[0], pair[1]];
+            let trial = self.trials[first];
+            if trial == self.trials[second] && digests.text(first) != digests.text(second) {
                 let cause = format!("two runs of trial {trial} differ");
                 let remedy = "run all shares with the same build of the program";
                 return Err(InputError::new("the shares", cause, remedy));
@@ -163,30 +169,39 @@ impl RunTable {
 
     /// Passes on the outcomes that the rows of a share's table stand for.
     pub fn for_each_outcome(&self, mut each: impl FnMut(Outcome)) {
-        let number = |row: usize, column: Option<&RunColumn>| match column.map(|c| &c.values) {
-            Some(Values::I64(values)) => values.get(row).and_then(|n| u64::try_from(*n).ok()),
-            _ => None,
-        };
-        let trial = self.columns_with_role(Role::Trial).next();
-        let digest = self.columns_with_role(Role::Digest).next();
-        let failure = self.column(FAILURE);
+        let trials = self.columns_with_role(Role::Trial).next();
+        let digests = self.columns_with_role(Role::Digest).next();
+        let failures = self.column(FAILURE);
+        let cycles = self.column(CYCLES);
         for row in 0..self.runs() {
-            let Some(trial) = number(row, trial) else { continue };
-            let fields = |role: Role| {
-                let own = |c: &&RunColumn| ![CYCLES, FAILURE].contains(&c.name.as_str());
-                let columns = self.columns_with_role(role).filter(own);
-                columns.map(|c| (c.name.clone(), c.values.json(row))).collect()
-            };
+            let Some(trial) = whole_number(trials, row) else { continue };
             each(Outcome {
                 trial,
-                cycles: number(row, self.column(CYCLES)).unwrap_or(0),
-                digest: digest.map_or_else(String::new, |c| c.values.text(row)),
-                failure: failure.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
-                metrics: fields(Role::Metric),
-                costs: fields(Role::Cost),
+                cycles: whole_number(cycles, row).unwrap_or(0),
+                digest: digests.map_or_else(String::new, |c| c.values.text(row)),
+                failure: failures.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
+                metrics: self.fields(Role::Metric, row),
+                costs: self.fields(Role::Cost, row),
             });
         }
     }
+
+    /// Returns the fields of a row that an outcome has by name.
+    fn fields(&self, role: Role, row: usize) -> Map<String, Value> {
+        let mut fields = Map::new();
+        for column in self.columns_with_role(role) {
+            // Fields of their own in an outcome.
+            if ![CYCLES, FAILURE].contains(&column.name.as_str()) {
+                fields.insert(column.name.clone(), column.values.json(row));
+            }
+        }
+        fields
+    }
+}
+
+fn whole_number(column: Option<&RunColumn>, row: usize) -> Option<u64> {
+    let Values::I64(values) = &column?.values else { return None };
+    u64::try_from(*values.get(row)?).ok()
 }
 
 /// Returns the table of all trials of a plan: one row for each future run.
@@ -198,36 +213,46 @@ pub fn trial_table(plan: &Plan) -> RunTable {
 
 /// Returns the identity of runs: the columns that follow from their trials.
 fn identity_columns(plan: &Plan, trials: impl Iterator<Item = u64>) -> Vec<RunColumn> {
-    let trials: Vec<_> = trials.filter_map(|id| plan.trial_of(id)).collect();
-    let ints = |name: &str, role, value: fn(&super::Trial) -> u64| RunColumn {
-        name: name.into(),
-        role,
-        values: Values::I64(trials.iter().map(|trial| value(trial) as i64).collect()),
-    };
+    let trials: Vec<Trial> = trials.filter_map(|id| plan.trial_of(id)).collect();
     let mut columns = vec![
-        ints("cell", Role::Trial, |trial| trial.id),
-        ints("variant", Role::Variant, |trial| trial.variant.into()),
-        ints("replicate", Role::Replicate, |trial| trial.replicate.into()),
-        ints("seed", Role::Seed, |c| c.seed),
+        integer_column("cell", Role::Trial, trials.iter().map(|trial| trial.id)),
+        integer_column("variant", Role::Variant, trials.iter().map(|trial| trial.variant.into())),
+        integer_column(
+            "replicate",
+            Role::Replicate,
+            trials.iter().map(|trial| trial.replicate.into()),
+        ),
+        integer_column("seed", Role::Seed, trials.iter().map(|trial| trial.seed)),
     ];
     for name in &plan.parameters {
         let levels = levels(plan, name);
+        // The type of all variants of the plan, also of those without a row here: all blocks of a table have it.
         let ty = levels.iter().map(type_of).fold(None, common_type).unwrap_or(ColumnType::F64);
         let mut values = Values::empty(ColumnType::F64);
-        trials.iter().for_each(|trial| push_value(&mut values, &levels[trial.variant as usize]));
+        for trial in &trials {
+            push_value(&mut values, &levels[trial.variant as usize]);
+        }
         let values = widened(values, ty);
         columns.push(RunColumn { name: name.clone(), role: Role::Parameter, values });
     }
     columns
 }
 
+fn integer_column(name: &str, role: Role, values: impl Iterator<Item = u64>) -> RunColumn {
+    let values = Values::I64(values.map(|value| value as i64).collect());
+    RunColumn { name: name.into(), role, values }
+}
+
 /// Returns the parameter's value in every variant: if numbers and words mix, all are words.
 fn levels(plan: &Plan, name: &str) -> Vec<Value> {
-    let of = |variant: &Variant| variant.value(name).map_or(Value::Null, json);
-    let levels: Vec<Value> = plan.variants.iter().map(of).collect();
-    let has_words = levels.iter().any(Value::is_string);
-    let level = |v: Value| if has_words && !v.is_null() { value_text(&v).into() } else { v };
-    levels.into_iter().map(level).collect()
+    let values = plan.variants.iter().map(|variant| variant.value(name));
+    let mut levels: Vec<Value> = values.map(|value| value.map_or(Value::Null, json)).collect();
+    if levels.iter().any(Value::is_string) {
+        for level in levels.iter_mut().filter(|level| !level.is_null()) {
+            *level = value_text(level).into();
+        }
+    }
+    levels
 }
 
 /// Returns numbers, truth values and text unchanged; anything else as TOML.

@@ -2,7 +2,7 @@
 
 use sidestep_kernel::workers;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Takes a result: once it returns, the trial is finished.
 pub type ResultSink<'a, T, E> = dyn FnMut(T) -> Result<(), E> + Send + 'a;
@@ -26,24 +26,31 @@ pub fn run_trials<C: Sync, T: Send, E: Send>(
 ) -> Result<(), E> {
     let next = AtomicUsize::new(0);
     let shared = Mutex::new(SharedState { take, failure: None });
-    // A worker that panicked outside of a run has left the values intact.
-    let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut crew = vec![(); at_once.clamp(1, trials.len().max(1))];
-    workers::run(&mut crew, |_, ()| {
+    // Workers have no state of their own.
+    let mut states = vec![(); at_once.clamp(1, trials.len().max(1))];
+    workers::run(&mut states, |_, ()| {
         while let Some(trial) = trials.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if lock(&shared).failure.is_some() {
+                return;
+            }
             // No thread holds the lock while a run is in progress.
-            let is_broken = lock().failure.is_some();
-            let result = if is_broken { None } else { run(trial) };
-            let Some(result) = result else { return };
-            let mut shared = lock();
+            let Some(result) = run(trial) else { return };
+            let mut shared = lock(&shared);
             if let Err(failure) = result.and_then(|result| (shared.take)(result)) {
                 shared.failure.get_or_insert(failure);
                 return;
             }
         }
     });
-    let failure = lock().failure.take();
-    failure.map_or(Ok(()), Err)
+    match lock(&shared).failure.take() {
+        Some(failure) => Err(failure),
+        None => Ok(()),
+    }
+}
+
+/// Locks, also after a worker has panicked: one that panics outside of a run has left the values intact.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

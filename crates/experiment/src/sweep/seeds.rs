@@ -1,6 +1,6 @@
-//! Variants in which seeds change nothing: one run says all.
+//! Variants in which seeds change nothing: one run is enough.
 //!
-//! Where a scenario draws no random number, its world says so, and there is one run. Where draws
+//! Where a scenario draws no random number, its world reports it, and there is one run. Where draws
 //! only guide a search, the first two runs decide: if they end in the same state to the bit, with
 //! the same cycles, seeds are taken to change nothing, and there are no more runs.
 
@@ -30,14 +30,11 @@ impl<'a> PilotRuns<'a> {
     /// Returns the pilots of a table of runs.
     pub(super) fn from_table(plan: &'a Plan, runs: &RunTable) -> Self {
         let mut pilots = Self::new(plan);
-        if let (Some(trials), Some(digests)) = (
-            runs.columns_with_role(Role::Trial).next(),
-            runs.columns_with_role(Role::Digest).next(),
-        ) {
-            for row in 0..runs.runs() {
-                let trial = trials.values.number(row).map(|id| id as u64);
-                pilots.add_digest(trial, digests.values.text(row));
-            }
+        let Some(trials) = runs.columns_with_role(Role::Trial).next() else { return pilots };
+        let Some(digests) = runs.columns_with_role(Role::Digest).next() else { return pilots };
+        for row in 0..runs.runs() {
+            let trial = trials.values.number(row).map(|id| id as u64);
+            pilots.add_digest(trial, digests.values.text(row));
         }
         pilots
     }
@@ -49,9 +46,11 @@ impl<'a> PilotRuns<'a> {
 
     pub(super) fn add_digest(&mut self, trial: Option<u64>, digest: String) {
         let Some(trial) = trial.and_then(|id| self.plan.trial_of(id)) else { return };
-        let asks =
+        // A precision has a rule of its own for variants without spread.
+        let has_pilots =
             self.plan.until.is_none() && self.plan.seeds(trial.variant) == SeedEffect::Perhaps;
-        if asks && trial.replicate < PILOT_RUNS && !digest.is_empty() {
+        // A failed run has no digest, and settles nothing.
+        if has_pilots && trial.replicate < PILOT_RUNS && !digest.is_empty() {
             self.ends.entry(trial.variant).or_default().insert(trial.replicate, digest);
         }
     }
@@ -71,19 +70,22 @@ impl<'a> PilotRuns<'a> {
 
     /// Returns the trials to run next: those of which the others may depend, if there are any.
     pub fn next_trials(&self, open: Vec<Trial>) -> Vec<Trial> {
-        let cannot_tell = |v: u32| self.plan.seeds(v) == SeedEffect::Perhaps;
-        if !open.iter().any(|trial| trial.replicate < PILOT_RUNS && cannot_tell(trial.variant)) {
-            return open.into_iter().filter(|trial| self.needs(trial)).collect();
+        let has_open_pilots = open.iter().any(|trial| {
+            trial.replicate < PILOT_RUNS && self.plan.seeds(trial.variant) == SeedEffect::Perhaps
+        });
+        if has_open_pilots {
+            return open.into_iter().filter(|trial| trial.replicate < PILOT_RUNS).collect();
         }
-        open.into_iter().filter(|trial| trial.replicate < PILOT_RUNS).collect()
+        open.into_iter().filter(|trial| self.needs(trial)).collect()
     }
 }
 
 /// Returns for each variant whether seeds change nothing in it.
 pub(super) fn seedless_variants(plan: &Plan, runs: &RunTable) -> Vec<bool> {
     let pilots = PilotRuns::from_table(plan, runs);
-    let is_same = |v: u32| plan.seeds(v) == SeedEffect::Nothing || pilots.is_settled(v);
-    (0..plan.variants.len() as u32).map(is_same).collect()
+    (0..plan.variants.len() as u32)
+        .map(|v| plan.seeds(v) == SeedEffect::Nothing || pilots.is_settled(v))
+        .collect()
 }
 
 /// Returns the notes that a reader must know about the seeds of these runs.
@@ -93,30 +95,24 @@ pub(super) fn seed_notes(
     world: Option<&dyn WorldType>,
 ) -> Vec<String> {
     let pilots = PilotRuns::from_table(plan, runs);
-    let all = plan.variants.len() as u32;
-    let count = |holds: &dyn Fn(u32) -> bool| (0..all).filter(|v| holds(*v)).count();
-    let of_all = |n: usize| match n == all as usize {
-        true => String::new(),
-        false => format!(" in {n} of {all} variants"),
-    };
+    let variants = 0..plan.variants.len() as u32;
     let mut notes = Vec::new();
-    let undrawn = count(&|v| plan.seeds(v) == SeedEffect::Nothing);
+    let undrawn = variants.clone().filter(|v| plan.seeds(*v) == SeedEffect::Nothing).count();
     if undrawn > 0 {
         notes.push(format!(
             "Seeds change nothing{}: no random number is drawn. So there is one run of each, and no \
              interval.",
-            of_all(undrawn)
+            in_variants(plan, undrawn)
         ));
     }
-    let settled = count(&|v| pilots.is_settled(v));
+    let settled = variants.filter(|v| pilots.is_settled(*v)).count();
     if settled > 0 {
-        let seeds = [plan.first_seed, plan.first_seed + 1];
         notes.push(format!(
             "Seeds are taken to change nothing{}: the runs with the seeds {} and {} ended in the same \
              state, to the bit. So there are no more runs, and no interval.",
-            of_all(settled),
-            seeds[0],
-            seeds[1]
+            in_variants(plan, settled),
+            plan.first_seed,
+            plan.first_seed + 1
         ));
     }
     let unchanged = unchanged_variants(plan, runs);
@@ -124,13 +120,19 @@ pub(super) fn seed_notes(
         notes.push(format!(
             "All runs{} ended in the same state, to the bit: seeds changed nothing there, and \
              intervals say nothing.",
-            of_all(unchanged)
+            in_variants(plan, unchanged)
         ));
     }
     if !notes.is_empty() {
         notes.extend(world.and_then(seed_remedy));
     }
     notes
+}
+
+/// Returns the number of variants in words; nothing if it is all of them.
+fn in_variants(plan: &Plan, count: usize) -> String {
+    let all = plan.variants.len();
+    if count == all { String::new() } else { format!(" in {count} of {all} variants") }
 }
 
 /// Returns the features to ask for in a scenario of a world so that its seeds change something; `None` where the
@@ -142,18 +144,15 @@ pub fn seed_remedy(world: &dyn WorldType) -> Option<String> {
 
 /// Returns the number of variants of which all runs ended alike, although seeds might decide.
 fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
-    let (Some(trials), Some(digests)) =
-        (runs.columns_with_role(Role::Trial).next(), runs.columns_with_role(Role::Digest).next())
-    else {
-        return 0;
-    };
+    let Some(trials) = runs.columns_with_role(Role::Trial).next() else { return 0 };
+    let Some(digests) = runs.columns_with_role(Role::Digest).next() else { return 0 };
     let mut ends: BTreeMap<u32, (BTreeSet<String>, usize)> = BTreeMap::new();
     for row in 0..runs.runs() {
         let trial = trials.values.number(row).and_then(|id| plan.trial_of(id as u64));
-        let decided = |trial: &Trial| plan.seeds(trial.variant) == SeedEffect::Decide;
+        let Some(trial) = trial else { continue };
         let digest = digests.values.text(row);
-        // A failed run has no end.
-        if let Some(trial) = trial.filter(decided).filter(|_| !digest.is_empty()) {
+        // A failed run has no digest.
+        if plan.seeds(trial.variant) == SeedEffect::Decide && !digest.is_empty() {
             let (different, count) = ends.entry(trial.variant).or_default();
             different.insert(digest);
             *count += 1;

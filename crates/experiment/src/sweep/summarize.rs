@@ -28,8 +28,8 @@ use sidestep_statistics::{
 };
 use std::collections::BTreeMap;
 
-/// Number of runs of a variant above which no bootstrap is drawn: Student's interval is as good
-/// there.
+/// Number of runs of a variant above which no bootstrap is drawn: a mean of so many runs is as good as normal (central
+/// limit theorem), so Student's interval is as good, and thousands of resamples of each metric would take long.
 const BOOTSTRAP_RUNS: usize = 10_000;
 
 impl Summary {
@@ -55,27 +55,31 @@ impl Summary {
         let groups = RunGroups::from_table(table, options)?;
         let (columns, left_out) = select_metrics(&groups, options)?;
         let reference = baseline_index(&groups, options)?;
-        let metric = |(k, c): (usize, &&RunColumn)| {
-            let within = &mut |share| progress((k as f64 + share) / columns.len() as f64);
-            summarize_metric(&groups, c, reference.as_ref(), &options.bootstrap, within)
+        let mut metrics = Vec::with_capacity(columns.len());
+        let mut figures: Vec<(String, Figure)> = Vec::new();
+        let context = MetricContext {
+            groups: &groups,
+            reference: reference.as_ref(),
+            bootstrap: bootstrap_for(&groups, &options.bootstrap),
         };
-        let metrics: Vec<MetricSummary> = columns.iter().enumerate().map(metric).collect();
-        let named = |c: &&RunColumn, f: Figure| (c.name.clone(), f);
-        let figures = columns
-            .iter()
-            .flat_map(|c| charts::figures(&groups, c).into_iter().map(move |f| named(c, f)))
-            .collect();
+        for (k, column) in columns.iter().enumerate() {
+            metrics.push(summarize_metric(&context, column, &mut |share| {
+                progress((k as f64 + share) / columns.len() as f64);
+            }));
+            for figure in charts::figures(&groups, column) {
+                figures.push((column.name.clone(), figure));
+            }
+        }
+        // In other designs a parameter has few levels, and figures and tables over them show more than a coefficient.
+        let trends =
+            if charts::is_sampled(&groups) { trends(&groups, &columns) } else { Vec::new() };
         let mut summary = Self {
             runs: table.runs(),
             variants: (0..groups.variants.len()).map(|v| variant_summary(&groups, v)).collect(),
             baseline: reference.map(|r| r.name),
             metrics,
             left_out,
-            trends: if charts::is_sampled(&groups) {
-                trends(&groups, &columns)
-            } else {
-                Vec::new()
-            },
+            trends,
             notes: Vec::new(),
             figures,
             parameters: groups.parameters.clone(),
@@ -85,24 +89,42 @@ impl Summary {
     }
 }
 
-/// Returns how each metric goes with each parameter that is a number.
+/// What all metrics are summarized with.
+struct MetricContext<'a> {
+    groups: &'a RunGroups<'a>,
+    reference: Option<&'a BaselineIndex>,
+    bootstrap: Option<&'a Bootstrap>,
+}
+
+/// Returns the bootstrap, unless a variant has too many runs for it.
+fn bootstrap_for<'a>(groups: &RunGroups<'_>, bootstrap: &'a Bootstrap) -> Option<&'a Bootstrap> {
+    let max_runs = (0..groups.variants.len()).map(|v| groups.runs_of(v)).max().unwrap_or(0);
+    (max_runs <= BOOTSTRAP_RUNS).then_some(bootstrap)
+}
+
+/// Returns the correlation of each metric with each parameter that is a number.
 fn trends(groups: &RunGroups<'_>, columns: &[&RunColumn]) -> Vec<Trend> {
-    let parameters = charts::numeric_parameters(groups);
-    let trend = |column: &&RunColumn, p: usize| {
-        let parameter = &groups.parameters[p];
-        let pair = |v: usize| match parameter.levels[parameter.of_variant[v]] {
-            Level::Number(x) => Some((x, groups.mean_over(column, &[v]).mean?)),
-            Level::Text(_) => None,
-        };
-        let pairs: Vec<(f64, f64)> = (0..groups.variants.len()).filter_map(pair).collect();
-        Trend {
-            metric: column.name.clone(),
-            parameter: parameter.name.clone(),
-            rank_correlation: rank_correlation(&pairs),
-            n: pairs.len(),
+    let mut trends = Vec::new();
+    for column in columns {
+        for p in charts::numeric_parameters(groups) {
+            let parameter = &groups.parameters[p];
+            let mut pairs = Vec::new();
+            for variant in 0..groups.variants.len() {
+                if let Level::Number(x) = parameter.levels[parameter.of_variant[variant]]
+                    && let Some(mean) = groups.mean_over(column, &[variant]).mean
+                {
+                    pairs.push((x, mean));
+                }
+            }
+            trends.push(Trend {
+                metric: column.name.clone(),
+                parameter: parameter.name.clone(),
+                rank_correlation: rank_correlation(&pairs),
+                n: pairs.len(),
+            });
         }
-    };
-    columns.iter().flat_map(|column| parameters.iter().map(move |p| trend(column, *p))).collect()
+    }
+    trends
 }
 
 fn variant_summary(groups: &RunGroups<'_>, variant: usize) -> VariantSummary {
@@ -118,15 +140,14 @@ fn baseline_index(
     groups: &RunGroups<'_>,
     options: &SummaryOptions,
 ) -> Result<Option<BaselineIndex>, InputError> {
-    let variants = groups.variants.len();
-    let all_with = |one: usize| BaselineIndex {
-        name: groups.variants[one].clone(),
-        of: (0..variants).map(|v| (v != one).then_some(one)).collect(),
-    };
     let Some(against) = &options.against else {
-        let is_compared =
-            groups.paired && variants > 1 && !is_grid(groups) && !charts::is_sampled(groups);
-        return Ok(is_compared.then(|| all_with(0)));
+        // In a grid or among samples the first variant is like no other: no comparison with it would be of one
+        // parameter alone.
+        let is_compared = groups.paired
+            && groups.variants.len() > 1
+            && !is_grid(groups)
+            && !charts::is_sampled(groups);
+        return Ok(is_compared.then(|| single_baseline(groups, 0)));
     };
     if !groups.paired {
         let cause = "the table has no column of replicates, so runs have no counterparts";
@@ -139,15 +160,27 @@ fn baseline_index(
                 let cause = format!("there is no variant `{name}`");
                 InputError::new(format!("baseline {name}"), cause, suggestion(name, &known))
             })?;
-            Ok(Some(all_with(found)))
+            Ok(Some(single_baseline(groups, found)))
         }
         BaselineChoice::Matched { name, of, .. } => {
-            let places: BTreeMap<&String, usize> = groups.variants.iter().zip(0..).collect();
-            // A sweep in progress may have no run of a baseline yet.
-            let of_one = |variant| places.get(of.get(variant)?).copied();
-            let of = groups.variants.iter().map(of_one).collect();
-            Ok(Some(BaselineIndex { name: name.clone(), of }))
+            let index_of: BTreeMap<&String, usize> = groups.variants.iter().zip(0..).collect();
+            let mut baselines = Vec::with_capacity(groups.variants.len());
+            for variant in &groups.variants {
+                // A sweep in progress may have no run of a baseline yet.
+                let baseline = of.get(variant).and_then(|baseline| index_of.get(baseline));
+                baselines.push(baseline.copied());
+            }
+            Ok(Some(BaselineIndex { name: name.clone(), of: baselines }))
         }
+    }
+}
+
+/// Returns the index in which all other variants are compared with one.
+fn single_baseline(groups: &RunGroups<'_>, one: usize) -> BaselineIndex {
+    let variants = 0..groups.variants.len();
+    BaselineIndex {
+        name: groups.variants[one].clone(),
+        of: variants.map(|v| (v != one).then_some(one)).collect(),
     }
 }
 
@@ -176,11 +209,12 @@ fn select_metrics<'a>(
             None => shown.push((explained_variance(groups, column).unwrap_or(0.0), column)),
         }
     }
+    // A stable sort, so that ties stay in the order of the columns.
     shown.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    let beyond = shown.split_off(options.max_metrics.min(shown.len()));
-    let reason = format!("beyond the {} most informative metrics", options.max_metrics);
-    let beyond = beyond.into_iter().map(|(_, c)| c.name.clone());
-    left_out.extend(beyond.map(|metric| OmittedMetric { metric, reason: reason.clone() }));
+    for (_, column) in shown.split_off(options.max_metrics.min(shown.len())) {
+        let reason = format!("beyond the {} most informative metrics", options.max_metrics);
+        left_out.push(OmittedMetric { metric: column.name.clone(), reason });
+    }
     Ok((shown.into_iter().map(|(_, column)| column).collect(), left_out))
 }
 
@@ -191,23 +225,25 @@ fn metrics_by_name<'a>(
     let known: Vec<&str> = all.iter().map(|c| c.name.as_str()).collect();
     let mut shown: Vec<&RunColumn> = Vec::new();
     for name in names {
-        let place = || format!("metrics {name}");
         let Some(column) = all.iter().find(|c| c.name == *name) else {
             let cause = format!("there is no metric `{name}`");
-            return Err(InputError::new(place(), cause, suggestion(name, &known)));
+            let remedy = suggestion(name, &known);
+            return Err(InputError::new(format!("metrics {name}"), cause, remedy));
         };
         if matches!(column.values, Values::Text(_)) {
             let cause = format!("the metric `{name}` is words, not numbers");
-            return Err(InputError::new(place(), cause, "leave it out"));
+            return Err(InputError::new(format!("metrics {name}"), cause, "leave it out"));
         }
         if !shown.iter().any(|c| c.name == *name) {
             shown.push(column);
         }
     }
-    let others = all.iter().filter(|c| !names.contains(&c.name));
-    let left_out =
-        |c: &&RunColumn| OmittedMetric { metric: c.name.clone(), reason: NOT_REQUESTED.into() };
-    Ok((shown, others.map(left_out).collect()))
+    let mut left_out = Vec::new();
+    for column in all.iter().filter(|c| !names.contains(&c.name)) {
+        let reason = NOT_REQUESTED.into();
+        left_out.push(OmittedMetric { metric: column.name.clone(), reason });
+    }
+    Ok((shown, left_out))
 }
 
 /// Returns the reason why a metric is uninformative, if it is.
@@ -217,58 +253,59 @@ fn omission_reason(column: &RunColumn) -> Option<String> {
     }
     let runs = column.values.len();
     let sample = Sample::from_runs((0..runs).map(|run| column.values.number(run)));
-    match sample.values.first() {
-        None => Some(format!("no run has a value (n = {runs})")),
-        // One run tells its own values, and nothing of their variation.
-        Some(first)
-            if runs > 1 && sample.missing == 0 && sample.values.iter().all(|v| v == first) =>
-        {
-            Some(format!("{} in all runs (n = {runs})", column.values.text(0)))
-        }
-        Some(_) => None,
-    }
+    let Some(first) = sample.values.first() else {
+        return Some(format!("no run has a value (n = {runs})"));
+    };
+    // The values of a single run are results, though they vary with nothing.
+    let is_constant = runs > 1 && sample.missing == 0 && sample.values.iter().all(|v| v == first);
+    is_constant.then(|| format!("{} in all runs (n = {runs})", column.values.text(0)))
 }
 
 /// Returns epsilon squared of a metric over the variants, at least 0; `None` without degrees of
 /// freedom within.
 fn explained_variance(groups: &RunGroups<'_>, column: &RunColumn) -> Option<f64> {
-    let of = |variant| Sample::from_runs(groups.values(column, variant)).values;
-    let samples: Vec<Vec<f64>> = (0..groups.variants.len()).map(of).collect();
-    let samples: Vec<&Vec<f64>> = samples.iter().filter(|s| !s.is_empty()).collect();
-    let all: Vec<f64> = samples.iter().flat_map(|s| s.iter().copied()).collect();
-    let within = all.len().checked_sub(samples.len()).filter(|f| *f > 0)? as f64;
-    let total = sample_sd(&all).filter(|sd| *sd > 0.0 && sd.is_finite() && samples.len() > 1)?;
+    let mut samples: Vec<Vec<f64>> = (0..groups.variants.len())
+        .map(|variant| Sample::from_runs(groups.values(column, variant)).values)
+        .collect();
+    samples.retain(|sample| !sample.is_empty());
+    if samples.len() < 2 {
+        return None;
+    }
+    let all = samples.concat();
+    let degrees_within = all.len() - samples.len();
+    let total_sd = sample_sd(&all).filter(|sd| *sd > 0.0 && sd.is_finite())?;
+    if degrees_within == 0 {
+        return None;
+    }
     // Computed in units of the total spread, so that squares keep their digits.
-    let square = |s: &&Vec<f64>| {
-        let relative = sample_sd(s).unwrap_or(0.0) / total;
-        relative * relative * (s.len() as f64 - 1.0)
-    };
-    let mean_square_within = samples.iter().map(square).sum::<f64>() / within;
+    let squares = samples.iter().map(|sample| {
+        let relative = sample_sd(sample).unwrap_or(0.0) / total_sd;
+        relative * relative * (sample.len() as f64 - 1.0)
+    });
+    let mean_square_within = squares.sum::<f64>() / degrees_within as f64;
+    // Below 0 where variants differ by less than chance makes them.
     Some((1.0 - mean_square_within).max(0.0))
 }
 
 fn summarize_metric(
-    groups: &RunGroups<'_>,
+    context: &MetricContext<'_>,
     column: &RunColumn,
-    reference: Option<&BaselineIndex>,
-    bootstrap: &Bootstrap,
     progress: &mut dyn FnMut(f64),
 ) -> MetricSummary {
+    let MetricContext { groups, reference, bootstrap } = *context;
     let count = groups.variants.len();
-    let variants = 0..count;
-    let most = variants.clone().map(|v| groups.runs_of(v)).max().unwrap_or(0);
-    let bootstrap = (most <= BOOTSTRAP_RUNS).then_some(bootstrap);
-    let describe = |v| {
-        progress(v as f64 / count as f64);
-        metric_values(groups, column, v, bootstrap)
-    };
+    let mut variants = Vec::with_capacity(count);
+    for variant in 0..count {
+        progress(variant as f64 / count as f64);
+        variants.push(metric_values(groups, column, variant, bootstrap));
+    }
     MetricSummary {
         name: column.name.clone(),
         label: groups.label(column),
         meaning: groups.meaning(column),
         is_share: matches!(column.values, Values::Bool(_)),
         explained: explained_variance(groups, column),
-        variants: variants.map(describe).collect(),
+        variants,
         comparisons: reference.map_or(Vec::new(), |r| comparisons(groups, column, r, bootstrap)),
         effects: effects(groups, column),
     }
@@ -305,22 +342,25 @@ fn proportion(values: &[f64], seedless: bool) -> Proportion {
 fn numeric_summary(sample: &Sample, bootstrap: Option<&Bootstrap>) -> NumericSummary {
     let values = &sample.values;
     let sorted = sample.sorted();
-    let quantile = |q: &f64| {
-        let value = percentile(&sorted, *q)?;
-        Some(Quantile { q: *q, value, interval: quantile_interval(&sorted, *q) })
-    };
-    let (center, sd) = (mean(values), sample_sd(values));
+    let mut quantiles = Vec::new();
+    for q in QUANTILES {
+        if let Some(value) = percentile(&sorted, q) {
+            quantiles.push(Quantile { q, value, interval: quantile_interval(&sorted, q) });
+        }
+    }
+    let mean = mean(values);
+    let sd = sample_sd(values);
     NumericSummary {
-        mean: center,
+        mean,
         sd,
         interval: mean_interval(values),
         bootstrap: bootstrap.and_then(|b| b.mean(values)),
-        quantiles: QUANTILES.iter().filter_map(quantile).collect(),
+        quantiles,
         min: sorted.first().copied(),
         max: sorted.last().copied(),
-        runs_for_5_percent: center
+        runs_for_5_percent: mean
             .zip(sd.filter(|sd| *sd > 0.0))
-            .and_then(|(center, sd)| runs_for_half_width(sd, 0.05 * center.abs())),
+            .and_then(|(mean, sd)| runs_for_half_width(sd, 0.05 * mean.abs())),
     }
 }
 
@@ -329,21 +369,24 @@ fn effects(groups: &RunGroups<'_>, column: &RunColumn) -> Vec<Effect> {
     if groups.parameters.len() < 2 {
         return Vec::new();
     }
-    let effect = |p: usize| {
-        let parameter = &groups.parameters[p];
-        let level = |l: usize| {
+    let mut effects = Vec::new();
+    for (p, parameter) in groups.parameters.iter().enumerate() {
+        let is_averaged = groups.with_level(p, 0).len() > 1;
+        if !groups.is_balanced(p) || !is_averaged {
+            continue;
+        }
+        let mut levels = Vec::with_capacity(parameter.levels.len());
+        for (l, level) in parameter.levels.iter().enumerate() {
             let group = groups.with_level(p, l);
-            EffectLevel {
-                level: parameter.levels[l].clone(),
+            levels.push(EffectLevel {
+                level: level.clone(),
                 variants: group.len(),
                 estimate: groups.mean_over(column, &group),
-            }
-        };
-        let levels = (0..parameter.levels.len()).map(level).collect();
-        Effect { parameter: parameter.name.clone(), levels }
-    };
-    let balanced = (0..groups.parameters.len()).filter(|p| groups.is_balanced(*p));
-    balanced.filter(|p| groups.with_level(*p, 0).len() > 1).map(effect).collect()
+            });
+        }
+        effects.push(Effect { parameter: parameter.name.clone(), levels });
+    }
+    effects
 }
 
 /// Returns the note that a reader must know about the comparisons.
@@ -354,7 +397,8 @@ fn baseline_note(groups: &RunGroups<'_>, against: Option<&BaselineChoice>) -> Op
              compared."
         )),
         None if groups.paired && is_grid(groups) => {
-            let (name, level) = (&groups.parameters[0].name, groups.parameters[0].levels[0].name());
+            let name = &groups.parameters[0].name;
+            let level = groups.parameters[0].levels[0].name();
             Some(format!(
                 "Nothing is compared: several keys vary. A baseline is compared within the others, \
                  e.g. --baseline {name}={level}"
@@ -371,10 +415,9 @@ fn notes(
 ) -> Vec<String> {
     let mut notes = Vec::new();
     notes.extend(baseline_note(groups, against));
-    let hidden: Vec<&OmittedMetric> =
-        summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).collect();
-    if !hidden.is_empty() {
-        notes.push(format!("{} more metrics vary and are not shown.", hidden.len()));
+    let hidden = summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).count();
+    if hidden > 0 {
+        notes.push(format!("{hidden} more metrics vary and are not shown."));
     }
     let not_finite: usize =
         summary.metrics.iter().flat_map(|m| &m.variants).map(|v| v.not_finite).sum();

@@ -86,9 +86,9 @@ pub struct VariantMetric {
     pub variant: String,
     /// Number of runs with a value.
     pub n: usize,
-    /// Number of runs, among those without a value, with a value that is infinite or not a number.
+    /// Number of runs without a value, or with one that is infinite or not a number.
     pub missing: usize,
-    /// Number of those runs without a value that have an infinite one, or one that is not a number.
+    /// Number of runs among these with a value that is infinite or not a number.
     pub not_finite: usize,
     /// Whether seeds change nothing in the variant.
     pub seedless: bool,

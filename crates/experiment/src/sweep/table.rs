@@ -59,17 +59,18 @@ impl RunTable {
     /// # Errors
     /// When a column is wrong; the error names the first.
     pub fn check(&self) -> Result<(), InputError> {
-        let wrong =
-            |cause: String, remedy: &str| Err(InputError::new("the table of runs", cause, remedy));
+        let place = "the table of runs";
         let runs = self.runs();
         for (i, column) in self.columns.iter().enumerate() {
-            let (name, rows) = (&column.name, column.values.len());
+            let name = &column.name;
+            let rows = column.values.len();
             if rows != runs {
                 let cause = format!("the column `{name}` has {rows} rows, others have {runs}");
-                return wrong(cause, "write one row for every run");
+                return Err(InputError::new(place, cause, "write one row for every run"));
             }
             if self.columns[..i].iter().any(|c| c.name == *name && c.role == column.role) {
-                return wrong(format!("there are two columns `{name}`"), "rename one");
+                let cause = format!("there are two columns `{name}`");
+                return Err(InputError::new(place, cause, "rename one"));
             }
         }
         Ok(())

@@ -5,7 +5,7 @@ use super::compare::Comparison;
 use super::label::capitalized;
 use super::summary::{
     MetricSection, MetricSummary, MetricValues, NOT_REQUESTED, NumericSummary, OmittedMetric,
-    Proportion, Quantile, Summary, VariantMetric,
+    Proportion, QUANTILES, Quantile, Summary, VariantMetric,
 };
 use sidestep_document::{Estimate, Figure, Table};
 use sidestep_kernel::math;
@@ -25,10 +25,7 @@ impl Summary {
     /// Returns the whole summary in one table: of every metric and variant the mean, the difference from
     /// the baseline, p and n; of samples of a box of parameters how each metric goes with each of them.
     pub fn overview(&self) -> Table {
-        match self.trends.is_empty() {
-            true => overview(self),
-            false => trends(self),
-        }
+        if self.trends.is_empty() { overview(self) } else { trends(self) }
     }
 
     /// Returns the notes that all tables of metrics have in common, to be given once.
@@ -38,19 +35,18 @@ impl Summary {
 
     /// Returns the summary metric by metric.
     pub fn sections(&self) -> Vec<MetricSection> {
-        let section = |metric: &MetricSummary| MetricSection {
-            name: metric.name.clone(),
-            title: capitalized(&metric.label),
-            meaning: metric.meaning,
-            figures: self
-                .figures
-                .iter()
-                .filter(|(of, _)| *of == metric.name)
-                .map(|(_, f)| f.clone())
-                .collect(),
-            tables: metric_tables(self, metric).into_iter().map(Table::folded).collect(),
-        };
-        self.metrics.iter().map(section).collect()
+        let mut sections = Vec::with_capacity(self.metrics.len());
+        for metric in &self.metrics {
+            let figures = self.figures.iter().filter(|(name, _)| *name == metric.name);
+            sections.push(MetricSection {
+                name: metric.name.clone(),
+                title: capitalized(&metric.label),
+                meaning: metric.meaning,
+                figures: figures.map(|(_, figure)| figure.clone()).collect(),
+                tables: metric_tables(self, metric).into_iter().map(Table::folded).collect(),
+            });
+        }
+        sections
     }
 
     /// Returns the metrics that are not shown, if there are any.
@@ -79,18 +75,20 @@ fn brief(summary: &Summary) -> Vec<Table> {
 const MAX_HEADING_CHARS: usize = 24;
 
 fn brief_table(summary: &Summary, metric: &MetricSummary) -> Table {
-    let minus = summary.baseline.as_ref().map(|name| format!("minus {name}"));
-    let titled = format!("{}: {}", capitalized(&metric.label), metric.name);
-    // A long name stands in the title.
-    let is_long = |words: &&String| words.chars().count() > MAX_HEADING_CHARS;
-    let (title, against) = match minus.as_ref().filter(is_long) {
-        Some(words) => (format!("{titled}, difference: {words}"), Some("difference".into())),
-        None => (titled, minus),
-    };
+    let mut title = format!("{}: {}", capitalized(&metric.label), metric.name);
+    let mut difference_heading = summary.baseline.as_ref().map(|name| format!("minus {name}"));
+    // A long name stands in the title, because a column is as wide as its heading.
+    if let Some(heading) = &mut difference_heading
+        && heading.chars().count() > MAX_HEADING_CHARS
+    {
+        title = format!("{title}, difference: {heading}");
+        *heading = "difference".to_string();
+    }
     let mean = if metric.is_share { "share of runs" } else { "mean" };
     let mut columns = vec!["variant", "n", mean];
-    columns.extend(against.as_deref());
-    columns.extend(against.as_ref().map(|_| "p (Holm)"));
+    if let Some(heading) = &difference_heading {
+        columns.extend([heading.as_str(), "p (Holm)"]);
+    }
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
         let mut row =
@@ -185,11 +183,10 @@ fn trends(summary: &Summary) -> Table {
 /// Returns the notes that the tables of all metrics have in common.
 fn footnotes(summary: &Summary) -> Vec<&'static str> {
     let mut notes = Vec::new();
-    let has = |is_share: bool| summary.metrics.iter().any(|m| m.is_share == is_share);
-    if has(false) {
+    if summary.metrics.iter().any(|metric| !metric.is_share) {
         notes.push(INTERVALS_NOTE);
     }
-    if has(true) {
+    if summary.metrics.iter().any(|metric| metric.is_share) {
         notes.push(PROPORTIONS_NOTE);
     }
     if summary.baseline.is_some() {
@@ -267,33 +264,41 @@ fn numbers(metric: &MetricSummary) -> Table {
 
 fn number_row(variant: &VariantMetric, numbers: &NumericSummary) -> Vec<String> {
     let width = numbers.interval.map(|i| i.half_width());
-    let plain = |value: Option<f64>| value.map_or("-".into(), |v| format_number(v, width));
-    let quantile = |k: usize| numbers.quantiles.get(k).map_or("-".into(), |q| quantile(q, width));
-    let bootstrap = numbers.bootstrap.map_or("-".into(), format_interval);
-    let needed = numbers.runs_for_5_percent.map_or("-".into(), |n| n.to_string());
+    let quantiles: [String; QUANTILES.len()] =
+        std::array::from_fn(|k| format_quantile(numbers.quantiles.get(k), width));
+    let [low, lower_quartile, median, upper_quartile, high] = quantiles;
     vec![
         variant.variant.clone(),
         variant.n.to_string(),
         center_with_interval(variant),
-        quantile(2),
-        plain(numbers.sd),
-        plain(numbers.min),
-        plain(numbers.max),
-        bootstrap,
-        quantile(0),
-        quantile(1),
-        quantile(3),
-        quantile(4),
+        median,
+        format_optional(numbers.sd, width),
+        format_optional(numbers.min, width),
+        format_optional(numbers.max, width),
+        format_optional_interval(numbers.bootstrap),
+        low,
+        lower_quartile,
+        upper_quartile,
+        high,
         variant.missing.to_string(),
-        needed,
+        numbers.runs_for_5_percent.map_or("-".into(), |n| n.to_string()),
     ]
 }
 
-fn quantile(quantile: &Quantile, width: Option<f64>) -> String {
+fn format_quantile(quantile: Option<&Quantile>, width: Option<f64>) -> String {
+    let Some(quantile) = quantile else { return "-".into() };
     match quantile.interval {
         Some(found) => with_interval(Some(quantile.value), Some(found.interval)),
         None => format!("{} [-]", format_number(quantile.value, width)),
     }
+}
+
+fn format_optional(value: Option<f64>, width: Option<f64>) -> String {
+    value.map_or("-".into(), |value| format_number(value, width))
+}
+
+fn format_optional_interval(interval: Option<Interval>) -> String {
+    interval.map_or("-".into(), format_interval)
 }
 
 fn proportions(metric: &MetricSummary) -> Table {
@@ -302,14 +307,12 @@ fn proportions(metric: &MetricSummary) -> Table {
     let mut table = Table::new(title, "", &columns);
     for variant in &metric.variants {
         if let MetricValues::Share(Proportion { yes, .. }) = variant.values {
-            let [n, yes, missing] =
-                [variant.n, yes, variant.missing].map(|count| count.to_string());
             table.push_row([
                 variant.variant.clone(),
-                n,
+                variant.n.to_string(),
                 center_with_interval(variant),
-                yes,
-                missing,
+                yes.to_string(),
+                variant.missing.to_string(),
             ]);
         }
     }
@@ -331,23 +334,23 @@ fn differences(metric: &MetricSummary, baseline: &str) -> Table {
     ];
     let mut table =
         Table::new(format!("{}: against {baseline}", capitalized(&metric.label)), "", &columns);
-    metric.comparisons.iter().for_each(|c| table.push_row(difference_row(c)));
+    for comparison in &metric.comparisons {
+        table.push_row(difference_row(comparison));
+    }
     table
 }
 
 fn difference_row(comparison: &Comparison) -> Vec<String> {
-    let interval = |i: Option<Interval>| i.map_or("-".into(), format_interval);
-    let of_pairs = |count: usize| format!("{count} of {}", comparison.pairs);
     vec![
         comparison.variant.clone(),
         comparison.pairs.to_string(),
         difference(comparison),
         comparison.p_holm.map_or("-".into(), format_p_value),
-        of_pairs(comparison.lower),
-        of_pairs(comparison.higher),
+        format!("{} of {}", comparison.lower, comparison.pairs),
+        format!("{} of {}", comparison.higher, comparison.pairs),
         with_interval(comparison.ratio, comparison.ratio_interval),
-        interval(comparison.bootstrap),
-        interval(comparison.ratio_bootstrap),
+        format_optional_interval(comparison.bootstrap),
+        format_optional_interval(comparison.ratio_bootstrap),
         comparison.incomplete.to_string(),
     ]
 }
@@ -369,12 +372,12 @@ fn effects(metric: &MetricSummary) -> Table {
 /// Returns the reasons why metrics are not shown, if there are such metrics.
 fn omitted_metrics(summary: &Summary) -> Option<Table> {
     let mut table = Table::new("Metrics not shown", "", &["metric", "why"]);
-    let asked = |l: &&OmittedMetric| l.reason != NOT_REQUESTED;
-    summary
-        .left_out
-        .iter()
-        .filter(asked)
-        .for_each(|l| table.push_row([l.metric.clone(), l.reason.clone()]));
+    for OmittedMetric { metric, reason } in &summary.left_out {
+        // A reader who requested some metrics needs no list of the others.
+        if reason != NOT_REQUESTED {
+            table.push_row([metric.clone(), reason.clone()]);
+        }
+    }
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -391,8 +394,8 @@ pub(super) fn with_interval(value: Option<f64>, interval: Option<Interval>) -> S
 }
 
 fn format_interval(interval: Interval) -> String {
-    let end = |value| format_number(value, Some(interval.half_width()));
-    format!("[{}, {}]", end(interval.low), end(interval.high))
+    let width = Some(interval.half_width());
+    format!("[{}, {}]", format_number(interval.low, width), format_number(interval.high, width))
 }
 
 /// Formats a number with two digits of the half width of its interval: more would be noise, fewer

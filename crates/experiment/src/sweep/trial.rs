@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
 use sidestep_scenario::{Source, Worlds};
 
-/// Cycles between two checks whether to go on.
+/// Cycles between two checks whether to continue.
 const INTERRUPT_CHECK_CYCLES: Cycle = 256;
 
 /// Endings of the names of metrics that a clock measured: they are kept beside the results, because
@@ -74,11 +74,11 @@ impl TrialRun {
         self
     }
 
-    /// Runs to the end; returns `None` as soon as `go_on` returns false.
-    pub fn run(mut self, go_on: &dyn Fn() -> bool) -> Option<Outcome> {
+    /// Runs to the end; returns `None` as soon as `should_continue` returns false.
+    pub fn run(mut self, should_continue: &dyn Fn() -> bool) -> Option<Outcome> {
         let simulation = self.simulation.as_mut();
         while simulation.cycle() < self.until && !simulation.is_over() {
-            if !go_on() {
+            if !should_continue() {
                 return None;
             }
             simulation.advance(INTERRUPT_CHECK_CYCLES.min(self.until - simulation.cycle()));

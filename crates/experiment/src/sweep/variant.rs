@@ -36,11 +36,12 @@ impl Setting {
     /// When `=` or the key is missing.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let remedy = "write key=value, e.g. robots.count=20";
-        let wrong = |cause: &str| InputError::new(text, cause, remedy);
-        let (key, value) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
+        let Some((key, value)) = text.split_once('=') else {
+            return Err(InputError::new(text, "there is no `=`", remedy));
+        };
         let key = key.trim();
         if key.split('.').any(str::is_empty) {
-            return Err(wrong("a part of the key is empty"));
+            return Err(InputError::new(text, "a part of the key is empty", remedy));
         }
         Ok(Self { key: key.into(), value: parse_value(value.trim()) })
     }
@@ -54,9 +55,10 @@ impl Setting {
 
 /// Returns a TOML value, or otherwise a word.
 pub(super) fn parse_value(word: &str) -> Value {
-    let table = format!("v = {word}").parse::<toml::Table>().ok();
-    let only = table.filter(|t| t.len() == 1).and_then(|mut t| t.remove("v"));
-    only.unwrap_or_else(|| Value::String(word.into()))
+    let table = format!("v = {word}").parse::<toml::Table>().unwrap_or_default();
+    // A word with a line break could hold a second key.
+    let only_value = if table.len() == 1 { table.get("v").cloned() } else { None };
+    only_value.unwrap_or_else(|| Value::String(word.into()))
 }
 
 /// One variant of the scenario.
@@ -97,10 +99,10 @@ impl Variant {
         if let Some(Setting { key, .. }) = settings.iter().find(|s| !parameters.contains(&s.key)) {
             return Err(format!("a variant sets `{key}`, which is no parameter of the plan"));
         }
-        match *named <= settings.len() {
-            true => Ok(()),
-            false => Err(format!("a name stands for {named} of {} settings", settings.len())),
+        if *named > settings.len() {
+            return Err(format!("a name stands for {named} of {} settings", settings.len()));
         }
+        Ok(())
     }
 
     /// Returns the keys that it sets.
@@ -119,10 +121,10 @@ impl Variant {
         Self { settings, ..self.clone() }
     }
 
-    /// Returns its name and the settings beside it, each written by `word`.
-    pub(super) fn label(&self, word: impl Fn(&Setting) -> String) -> String {
-        let words = self.settings[self.named..].iter().map(word);
-        self.name.iter().cloned().chain(words).collect::<Vec<_>>().join(", ")
+    /// Returns its name and the settings beside it, each written by `setting_name`.
+    pub(super) fn label(&self, setting_name: impl Fn(&Setting) -> String) -> String {
+        let settings = self.settings[self.named..].iter().map(setting_name);
+        self.name.iter().cloned().chain(settings).collect::<Vec<_>>().join(", ")
     }
 }
 

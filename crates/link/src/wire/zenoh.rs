@@ -22,7 +22,9 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::{Locality, Sample};
 use zenoh::{Config, Session, Wait};
 
-/// Time without a sign of life after which Zenoh gives up a link, in milliseconds; its own default is ten seconds.
+/// Time without a sign of life after which Zenoh gives up a link, in milliseconds. Its own default is ten seconds, as is that
+/// of `--lease`: a node would be taken for gone before its broken link could be opened anew, which takes up to
+/// [`OPEN_TIMEOUT_MS`].
 const LEASE_MS: u64 = 2_000;
 
 /// Time that opening a link may take at either end, in milliseconds. With Zenoh's own limit, ten seconds, returning after

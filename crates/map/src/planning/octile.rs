@@ -89,18 +89,27 @@ fn neighbors(
     (col, row): (u32, u32),
     length: PathLength,
 ) -> impl Iterator<Item = ((u32, u32), PathLength)> {
-    let neighbor =
-        move |east, north| (col.wrapping_add_signed(east), row.wrapping_add_signed(north));
-    let is_free = move |(col, row): (u32, u32)| free.is_free(col, row);
     let after_straight = PathLength { straight: length.straight + 1, ..length };
     let after_diagonal = PathLength { diagonal: length.diagonal + 1, ..length };
-    let straight =
-        STEPS.into_iter().map(move |(east, north)| (neighbor(east, north), after_straight));
+    let straight = STEPS.into_iter().map(move |step| (stepped((col, row), step), after_straight));
+    // A diagonal step sweeps the corners of both boxes beside it, so these must be free as well.
     let diagonal = DIAGONAL_STEPS
         .into_iter()
-        .filter(move |&(east, north)| is_free(neighbor(east, 0)) && is_free(neighbor(0, north)))
-        .map(move |(east, north)| (neighbor(east, north), after_diagonal));
-    straight.chain(diagonal).filter(move |&(position, _)| is_free(position))
+        .filter(move |&(east, north)| {
+            is_free(free, stepped((col, row), (east, 0)))
+                && is_free(free, stepped((col, row), (0, north)))
+        })
+        .map(move |step| (stepped((col, row), step), after_diagonal));
+    straight.chain(diagonal).filter(move |&(position, _)| is_free(free, position))
+}
+
+/// Returns the box one step away; beyond the lower edges the number wraps, and such a box is never free.
+fn stepped((col, row): (u32, u32), (east, north): (i32, i32)) -> (u32, u32) {
+    (col.wrapping_add_signed(east), row.wrapping_add_signed(north))
+}
+
+fn is_free(free: &FreeSpace, (col, row): (u32, u32)) -> bool {
+    free.is_free(col, row)
 }
 
 #[cfg(test)]

@@ -100,10 +100,9 @@ impl ColumnEncoder {
     /// Appends values that fit into the page.
     fn extend(&mut self, values: &Values, range: Range<usize>) {
         let Some(levels) = &mut self.levels else { return self.encoder.extend(values, range) };
-        let is_there = |row: &usize| !values.is_missing(*row);
-        let flags: Vec<u32> = range.clone().map(|row| u32::from(is_there(&row))).collect();
+        let flags: Vec<u32> = range.clone().map(|row| u32::from(!values.is_missing(row))).collect();
         levels.extend(&flags);
-        let present: Vec<usize> = range.filter(is_there).collect();
+        let present: Vec<usize> = range.filter(|&row| !values.is_missing(row)).collect();
         self.encoder.extend(&values.pick(&present), 0..present.len());
     }
 
@@ -185,8 +184,9 @@ fn put_doubles(values: &[f64], page: &mut Vec<u8>) {
 
 /// Packs eight values per byte, the first in the lowest bit.
 fn pack_bools(values: &[bool]) -> Vec<u8> {
-    let byte = |eight: &[bool]| {
-        (0..).zip(eight).fold(0, |byte, (bit, &value)| byte | u8::from(value) << bit)
-    };
-    values.chunks(8).map(byte).collect()
+    let mut bytes = Vec::with_capacity(values.len().div_ceil(8));
+    for eight in values.chunks(8) {
+        bytes.push((0..).zip(eight).fold(0, |byte, (bit, &value)| byte | u8::from(value) << bit));
+    }
+    bytes
 }

@@ -118,6 +118,15 @@ fn put_narrow_block(deltas: &[i32; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     }
 }
 
+/// Returns the number of bits for each value of a group: as many as the largest needs, or 64, because the packer takes
+/// values of up to 32 bits.
+fn group_width(group: &[u64; PACK]) -> u8 {
+    match bits(group.iter().fold(0, |all, v| all | v)) {
+        narrow @ 0..=32 => narrow,
+        _ => 64,
+    }
+}
+
 /// Appends a block with some difference of more than 32 bits. Groups that need it are stored with
 /// 64 bits: this is rare, so speed and size matter little.
 fn put_wide_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
@@ -125,13 +134,9 @@ fn put_wide_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     let above = deltas.map(|d| d.wrapping_sub(least) as u64);
     put_zigzag(least, out);
     let (groups, _) = above.as_chunks::<PACK>();
-    let width = |group: &[u64; PACK]| match bits(group.iter().fold(0, |all, v| all | v)) {
-        narrow @ 0..=32 => narrow,
-        _ => 64,
-    };
-    out.extend(groups.iter().map(width));
+    out.extend(groups.iter().map(group_width));
     for group in groups {
-        match width(group) {
+        match group_width(group) {
             64 => out.extend(group.iter().flat_map(|v| v.to_le_bytes())),
             narrow => packer.pack(&group.map(|v| v as u32), narrow, out),
         }

@@ -51,10 +51,9 @@ impl BagWriter {
     /// An I/O error.
     pub fn create(folder: &Path, version: &str) -> Result<Self, RecordError> {
         let path = folder.join(FILE);
-        let failed = |cause: String| RecordError::new(path.display(), cause);
-        let file = File::create(&path).map_err(|e| failed(e.to_string()))?;
+        let file = File::create(&path).map_err(|e| RecordError::new(path.display(), e))?;
         let writer = write_options(version).profile("ros2").create(BufWriter::new(file));
-        let writer = writer.map_err(|e| failed(error_text(e)))?;
+        let writer = writer.map_err(|e| RecordError::new(path.display(), error_text(e)))?;
         let folder = folder.to_path_buf();
         Ok(Self { folder, writer, topics: BTreeMap::new(), span_ns: None })
     }
@@ -121,17 +120,17 @@ impl BagWriter {
     fn metadata(&self) -> String {
         let (first, last) = self.span_ns.unwrap_or_default();
         let messages: u32 = self.topics.values().map(|topic| topic.messages).sum();
-        let span = |indent: &str, name: &str| {
+        // Once for the bag and once for its only file.
+        let [of_bag, of_file] = ["  ", "      "].map(|indent| {
             format!(
-                "{indent}duration:\n{indent}  nanoseconds: {}\n{indent}{name}:\n\
+                "{indent}duration:\n{indent}  nanoseconds: {}\n{indent}starting_time:\n\
                  {indent}  nanoseconds_since_epoch: {first}\n{indent}message_count: {messages}\n",
                 last - first
             )
-        };
+        });
         let mut yaml = format!(
-            "rosbag2_bagfile_information:\n  version: {METADATA_VERSION}\n  storage_identifier: mcap\n{}  \
-             topics_with_message_count:\n",
-            span("  ", "starting_time")
+            "rosbag2_bagfile_information:\n  version: {METADATA_VERSION}\n  storage_identifier: mcap\n{of_bag}  \
+             topics_with_message_count:\n"
         );
         for (name, topic) in &self.topics {
             // Writing to a string cannot fail.
@@ -144,8 +143,7 @@ impl BagWriter {
         }
         yaml += &format!(
             "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {FILE}\n  \
-             files:\n    - path: {FILE}\n{}",
-            span("      ", "starting_time")
+             files:\n    - path: {FILE}\n{of_file}"
         );
         yaml
     }

@@ -1,4 +1,4 @@
-//! Frames for viewers that watch while a run goes on.
+//! Frames for viewers that watch while a run advances.
 //!
 //! The server is the library's, with the library's threads: viewers and their delays affect only those. It keeps some
 //! messages for each viewer and drops the oldest, so that frames are passed on without waiting.
@@ -30,7 +30,7 @@ const MAX_BACKLOG_MESSAGES: usize = 1024;
 /// The request of a viewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaybackRequest {
-    /// Whether the run is to go on.
+    /// Whether the run is to continue.
     pub play: bool,
     /// Simulated seconds per second; any number at all, because it comes from outside.
     pub speed: f64,
@@ -41,7 +41,7 @@ pub struct PlaybackRequest {
 /// The state of the run, as reported to viewers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
-    /// Whether it goes on.
+    /// Whether it advances.
     pub playing: PlaybackPhase,
     /// Simulated seconds.
     pub time_s: f64,
@@ -51,10 +51,10 @@ pub struct Playback {
     pub did_seek: bool,
 }
 
-/// Whether a run goes on.
+/// Whether a run advances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlaybackPhase {
-    /// It goes on.
+    /// It advances.
     Playing,
     /// It stands still.
     Paused,

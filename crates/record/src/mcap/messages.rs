@@ -9,8 +9,8 @@ use foxglove::messages::{
     line_primitive, log, packed_element_field, scene_entity_deletion,
 };
 use sidestep_kernel::view::{
-    Body, BodyKind, Frame, Isometry2, Occupancy, OccupancyGrid, Pose as ViewPose, Scan, Scenery,
-    Severity, Shape, Vec3,
+    Body, BodyKind, Frame, Isometry2, LogEvent, Occupancy, OccupancyGrid, Pose as ViewPose, Scan,
+    Scenery, Severity, Shape, Vec3,
 };
 
 use super::WORLD;
@@ -60,8 +60,8 @@ pub(super) fn read_pose(read: Option<&Pose>) -> ViewPose {
 }
 
 fn color([r, g, b]: [u8; 3], a: f64) -> Option<Color> {
-    let part = |byte: u8| f64::from(byte) / 255.0;
-    Some(Color { r: part(r), g: part(g), b: part(b), a })
+    let [r, g, b] = [r, g, b].map(|byte| f64::from(byte) / 255.0);
+    Some(Color { r, g, b, a })
 }
 
 fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
@@ -69,14 +69,18 @@ fn color_of(body: &Body, dimensions: u8) -> Option<Color> {
     color(appearance.color, appearance.opacity)
 }
 
-/// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
-pub(super) fn grid(floor: &OccupancyGrid) -> Grid {
-    let byte = |occupancy: &Occupancy| match occupancy {
+/// Returns the byte of a box in ROS occupancy grids: the probability of a wall in percent, and -1 for unknown.
+fn occupancy_byte(occupancy: &Occupancy) -> u8 {
+    match occupancy {
         Occupancy::Free => 0,
         Occupancy::Wall => 100,
         Occupancy::Unknown => 255,
-    };
-    let data: Vec<u8> = floor.boxes.iter().map(byte).collect();
+    }
+}
+
+/// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
+pub(super) fn grid(floor: &OccupancyGrid) -> Grid {
+    let data: Vec<u8> = floor.boxes.iter().map(occupancy_byte).collect();
     let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = floor.plane;
     Grid {
         timestamp: timestamp(0),
@@ -119,12 +123,13 @@ pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>)
         }
     }
     let here: BTreeSet<String> = entities.iter().map(|entity| entity.id.clone()).collect();
-    let deletion = |name: &String| SceneEntityDeletion {
+    let gone = shown.difference(&here);
+    let deletions = gone.map(|name| SceneEntityDeletion {
         timestamp: timestamp(now_ns),
         r#type: scene_entity_deletion::Type::MatchingId as i32,
         id: name.clone(),
-    };
-    let deletions = shown.difference(&here).map(deletion).collect();
+    });
+    let deletions = deletions.collect();
     *shown = here;
     SceneUpdate { deletions, entities }
 }
@@ -229,14 +234,14 @@ fn agents(frame: &Frame) -> impl Iterator<Item = &Body> {
 /// Returns the pose of each agent, as the frame of reference of its name.
 pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
     let now = timestamp(to_ns(frame.time_s));
-    let transform = |body: &Body| FrameTransform {
+    let transforms = agents(frame).map(|body| FrameTransform {
         timestamp: now,
         parent_frame_id: WORLD.into(),
         child_frame_id: body.name(),
         translation: vector(body.pose.at_m),
         rotation: rotation(&body.pose),
-    };
-    FrameTransforms { transforms: agents(frame).map(transform).collect() }
+    });
+    FrameTransforms { transforms: transforms.collect() }
 }
 
 /// Returns the poses of the agents of a kind; `None` if there are none.
@@ -265,27 +270,36 @@ pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
 
 /// Returns the events of a frame, and how many are left out.
 pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
-    let level = |level: Severity| match level {
+    let mut logs: Vec<Log> = frame.log.iter().map(|event| event_log(event, cycle_s)).collect();
+    if frame.log_left_out > 0 {
+        logs.push(Log {
+            timestamp: timestamp(to_ns(frame.time_s)),
+            level: log_level(Severity::Warning),
+            message: format!("{} more events are not told", frame.log_left_out),
+            name: "log".into(),
+            ..Log::default()
+        });
+    }
+    logs
+}
+
+fn event_log(event: &LogEvent, cycle_s: f64) -> Log {
+    Log {
+        timestamp: timestamp(to_ns(event.cycle as f64 * cycle_s)),
+        level: log_level(event.level),
+        message: format!("{} {}", event.name(), event.words),
+        name: event.name(),
+        ..Log::default()
+    }
+}
+
+fn log_level(level: Severity) -> i32 {
+    let level = match level {
         Severity::Info => log::Level::Info,
         Severity::Warning => log::Level::Warning,
         Severity::Error => log::Level::Error,
     };
-    let entry = |time_s: f64, of: Severity, name: String, message: String| Log {
-        timestamp: timestamp(to_ns(time_s)),
-        level: level(of) as i32,
-        message,
-        name,
-        ..Log::default()
-    };
-    let events = frame.log.iter().map(|event| {
-        let words = format!("{} {}", event.name(), event.words);
-        entry(event.cycle as f64 * cycle_s, event.level, event.name(), words)
-    });
-    let left_out = (frame.log_left_out > 0).then(|| {
-        let words = format!("{} more events are not told", frame.log_left_out);
-        entry(frame.time_s, Severity::Warning, "log".into(), words)
-    });
-    events.chain(left_out).collect()
+    level as i32
 }
 
 #[cfg(test)]

@@ -66,37 +66,49 @@ impl McapRunInfo {
     pub fn open(path: &Path) -> Result<Self, InputError> {
         let mut source = McapFile::open(path)?;
         let summary = source.summary()?;
-        let said = describe_run(&mut source, &summary)?;
-        let text = |key: &str| {
-            said.get(key).ok_or_else(|| damaged(path, format!("its metadata has no `{key}`")))
-        };
-        let number = |key: &str| -> Result<u64, InputError> {
-            let value = text(key)?;
-            value.parse().map_err(|_| damaged(path, format!("`{key}` is `{value}`")))
-        };
-        let format: FormatVersion = text("format")?.parse().map_err(|e| damaged(path, e))?;
+        let metadata = RunMetadata { path, values: describe_run(&mut source, &summary)? };
+        let format: FormatVersion =
+            metadata.text("format")?.parse().map_err(|e| damaged(path, e))?;
         format.check_readable(path.display())?;
         let mut files = source.attachments(&summary)?;
         let at = files.iter().position(|(name, _)| name == SCENARIO);
         let (_, scenario) = files.remove(at.ok_or_else(|| not_a_recording(path))?);
         let scenario = String::from_utf8(scenario).map_err(|e| damaged(path, e))?;
-        let is_complete = text("status")? == "complete";
+        let is_complete = metadata.text("status")? == "complete";
         Ok(Self {
             path: path.to_path_buf(),
             format,
-            program_version: text("program_version")?.clone(),
-            build: said.get("build").cloned(),
-            world: text("world")?.clone(),
-            seed: number("seed")?,
+            program_version: metadata.text("program_version")?.clone(),
+            build: metadata.values.get("build").cloned(),
+            world: metadata.text("world")?.clone(),
+            seed: metadata.number("seed")?,
             status: if is_complete { Status::Complete } else { Status::Incomplete },
-            cycles_done: number("cycles_done")?,
-            cycles_planned: number("cycles_planned")?,
-            every: number("every")?,
-            digest: text("digest")?.clone(),
+            cycles_done: metadata.number("cycles_done")?,
+            cycles_planned: metadata.number("cycles_planned")?,
+            every: metadata.number("every")?,
+            digest: metadata.text("digest")?.clone(),
             scenario,
             files,
             messages: message_counts(&summary),
         })
+    }
+}
+
+/// A recording's description of its run.
+struct RunMetadata<'a> {
+    path: &'a Path,
+    values: BTreeMap<String, String>,
+}
+
+impl RunMetadata<'_> {
+    fn text(&self, key: &str) -> Result<&String, InputError> {
+        let value = self.values.get(key);
+        value.ok_or_else(|| damaged(self.path, format!("its metadata has no `{key}`")))
+    }
+
+    fn number(&self, key: &str) -> Result<u64, InputError> {
+        let value = self.text(key)?;
+        value.parse().map_err(|_| damaged(self.path, format!("`{key}` is `{value}`")))
     }
 }
 

@@ -96,17 +96,19 @@ impl McapSceneReader {
         let limit = usize::try_from(most).unwrap_or(usize::MAX);
         let options = options.include_topics([topic]).with_record_length_limit(limit);
         let path = self.source.path.clone();
-        let wrong = |e: &dyn std::fmt::Display| damaged(&path, e);
-        let mut reader =
-            IndexedReader::new_with_options(&self.summary, options).map_err(|e| wrong(&e))?;
+        let mut reader = IndexedReader::new_with_options(&self.summary, options)
+            .map_err(|e| damaged(&path, e))?;
         while let Some(event) = reader.next_event() {
-            match event.map_err(|e| wrong(&e))? {
+            match event.map_err(|e| damaged(&path, e))? {
                 IndexedReadEvent::ReadChunkRequest { offset, length } => {
                     let bytes = self.source.record(offset, length as u64)?;
-                    reader.insert_chunk_record_data(offset, &bytes).map_err(|e| wrong(&e))?;
+                    reader
+                        .insert_chunk_record_data(offset, &bytes)
+                        .map_err(|e| damaged(&path, e))?;
                 }
                 IndexedReadEvent::Message { data, .. } => {
-                    if take(T::decode(data).map_err(|e| wrong(&e))?).is_break() {
+                    let message = T::decode(data).map_err(|e| damaged(&path, e))?;
+                    if take(message).is_break() {
                         break;
                     }
                 }
@@ -119,11 +121,12 @@ impl McapSceneReader {
 /// Returns the bodies that an entity shows; those of a chain are its connectors, in their order.
 fn bodies(entity: &SceneEntity) -> Vec<Body> {
     let Some(BodyId { kind, number, .. }) = parse_body_id(&entity.id) else { return Vec::new() };
-    let shapes = shapes(entity).into_iter().enumerate();
-    let part = |k: usize| (kind == BodyKind::Connector).then_some(k as u32);
-    shapes
-        .map(|(k, (pose, shape))| Body { part: part(k), ..Body::new(kind, number, pose, shape) })
-        .collect()
+    let mut bodies = Vec::new();
+    for (k, (pose, shape)) in (0u32..).zip(shapes(entity)) {
+        let part = (kind == BodyKind::Connector).then_some(k);
+        bodies.push(Body { part, ..Body::new(kind, number, pose, shape) });
+    }
+    bodies
 }
 
 /// Returns the poses and shapes of an entity's primitives. Arrows are bodies only where there is nothing else; else

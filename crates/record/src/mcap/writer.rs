@@ -75,15 +75,15 @@ impl McapRecorder {
     /// # Errors
     /// Something is there that may not be replaced, or that is not a file.
     pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
-        let refuse = |cause, remedy| Err(InputError::new(path.display(), cause, remedy));
-        match fs::metadata(path) {
-            Ok(found) if !found.is_file() => refuse("this is no file", "give a new file"),
+        let (cause, remedy) = match fs::metadata(path) {
+            Ok(found) if !found.is_file() => ("this is no file", "give a new file"),
             Ok(_) if existing == IfExists::Refuse => {
-                refuse("the file exists already", "give another file, or replace it (--replace)")
+                ("the file exists already", "give another file, or replace it (--replace)")
             }
-            _ if path.file_name().is_none() => refuse("this is no file name", "give a new file"),
-            _ => Ok(()),
-        }
+            _ if path.file_name().is_none() => ("this is no file name", "give a new file"),
+            _ => return Ok(()),
+        };
+        Err(InputError::new(path.display(), cause, remedy))
     }
 
     /// Starts the file that is called `path` once it is complete, with the scenario and everything
@@ -97,11 +97,11 @@ impl McapRecorder {
         scenery: &Scenery,
     ) -> Result<Self, RecordError> {
         let partial = disk::partial_path(path);
-        let failed = |cause: String| RecordError::new(path.display(), cause);
         let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&partial));
-        let file = file.map_err(|e| failed(e.to_string()))?;
+        let file = file.map_err(|e| RecordError::new(path.display(), e))?;
         let options = write_options(&origin.origin.program_version);
-        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(error_text(e)));
+        let writer = options.create(BufWriter::new(file));
+        let writer = writer.map_err(|e| RecordError::new(path.display(), error_text(e)));
         let writer = writer.inspect_err(|_| drop(fs::remove_file(&partial)))?;
         let output = FileOutput {
             path: path.to_path_buf(),
@@ -245,9 +245,10 @@ impl FileOutput {
         &mut self,
         work: impl FnOnce(&mut Writer<BufWriter<File>>) -> Result<T, McapError>,
     ) -> Result<T, RecordError> {
-        let failed = |cause: String| RecordError::new(self.path.display(), cause);
-        let writer = self.writer.as_mut().ok_or_else(|| failed("the recording is over".into()))?;
-        work(writer).map_err(|e| failed(error_text(e)))
+        let Some(writer) = &mut self.writer else {
+            return Err(RecordError::new(self.path.display(), "the recording is over"));
+        };
+        work(writer).map_err(|e| RecordError::new(self.path.display(), error_text(e)))
     }
 }
 

@@ -175,8 +175,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             let remedy = "put it back, or sweep into a new folder";
             InputError::new(path.display(), format!("cannot be read: {e}"), remedy)
         })?;
-        let is_scenario = |(name, _): &(String, Vec<u8>)| name == SCENARIO;
-        let scenario = files.iter().position(is_scenario).map(|k| files.swap_remove(k).1);
+        let position = files.iter().position(|(name, _)| name == SCENARIO);
+        let scenario = position.map(|k| files.swap_remove(k).1);
         let found = fingerprint(&scenario.unwrap_or_default(), &files);
         if self.manifest.fingerprints.get(variant as usize) == Some(&found) {
             return Ok(());
@@ -203,9 +203,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// An I/O error.
     pub fn temp_folder(&self) -> Result<TempFolder, RecordError> {
         let path = self.path.join(TEMP_FOLDER);
-        let failed = |e: std::io::Error| RecordError::new(path.display(), e);
         if path.exists() {
-            fs::remove_dir_all(&path).map_err(failed)?;
+            fs::remove_dir_all(&path).map_err(|e| RecordError::new(path.display(), e))?;
         }
         make_folder(&path)?;
         Ok(TempFolder(path))
@@ -217,10 +216,16 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
 pub fn fingerprint(scenario: &[u8], files: &[(String, Vec<u8>)]) -> String {
     let mut sorted: Vec<_> = files.iter().collect();
     sorted.sort();
-    let print = |bytes: &[u8]| Digest::hash_bytes(bytes).to_string();
-    let files = sorted.into_iter().flat_map(|(name, bytes)| [name.clone(), print(bytes)]);
-    let all: Vec<String> = std::iter::once(print(scenario)).chain(files).collect();
-    print(all.join("\n").as_bytes())
+    let mut all = vec![hex_digest(scenario)];
+    for (name, bytes) in sorted {
+        all.push(name.clone());
+        all.push(hex_digest(bytes));
+    }
+    hex_digest(all.join("\n").as_bytes())
+}
+
+fn hex_digest(bytes: &[u8]) -> String {
+    Digest::hash_bytes(bytes).to_string()
 }
 
 /// Reads all files below a folder, by their path in it.
@@ -229,18 +234,15 @@ fn read_files(
     under: &str,
     files: &mut Vec<(String, Vec<u8>)>,
 ) -> Result<(), (PathBuf, std::io::Error)> {
-    let failed = |path: &Path| {
-        let path = path.to_path_buf();
-        move |e| (path, e)
-    };
-    for entry in fs::read_dir(folder).map_err(failed(folder))? {
-        let path = entry.map_err(failed(folder))?.path();
+    for entry in fs::read_dir(folder).map_err(|e| (folder.to_path_buf(), e))? {
+        let path = entry.map_err(|e| (folder.to_path_buf(), e))?.path();
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
         let name = format!("{under}{}", name.unwrap_or_default());
         if path.is_dir() {
             read_files(&path, &format!("{name}/"), files)?;
         } else {
-            files.push((name, fs::read(&path).map_err(failed(&path))?));
+            let bytes = fs::read(&path).map_err(|e| (path.clone(), e))?;
+            files.push((name, bytes));
         }
     }
     Ok(())

@@ -66,17 +66,13 @@ impl Journal {
         of: SweepIdentity<'_>,
         each: impl FnMut(T),
     ) -> Result<Self, InputError> {
-        let failed = |e: std::io::Error| {
-            let remedy = "make the folder writable, and see that the disk has space";
-            InputError::new(path.display(), e.to_string(), remedy)
-        };
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
-        let file = file.map_err(failed)?;
+        let file = file.map_err(|e| unwritable(path, &e))?;
         lock(&file, path)?;
         let length = read_complete_lines(path, of, each)?;
-        file.set_len(length).map_err(failed)?;
+        file.set_len(length).map_err(|e| unwritable(path, &e))?;
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
-        journal.file.seek(SeekFrom::End(0)).map_err(failed)?;
+        journal.file.seek(SeekFrom::End(0)).map_err(|e| unwritable(path, &e))?;
         if length == 0 {
             let header = JournalHeader {
                 format: format::CURRENT,
@@ -178,33 +174,43 @@ fn read_complete_lines<T: DeserializeOwned>(
     of: SweepIdentity<'_>,
     mut each: impl FnMut(T),
 ) -> Result<u64, InputError> {
-    let damaged = |line: usize, cause: String| {
-        let remedy = "the file is damaged: delete it, and its runs are made again";
-        InputError::new(path.display(), cause, remedy).with_position(line, 1)
-    };
-    let file = File::open(path).map_err(|e| damaged(1, e.to_string()))?;
+    let file = File::open(path).map_err(|e| damaged(path, 1, e.to_string()))?;
     let mut reader = BufReader::new(file);
     let mut bytes = Vec::new();
     let mut length = 0;
     for number in 1.. {
         bytes.clear();
-        let n = reader.read_until(b'\n', &mut bytes).map_err(|e| damaged(number, e.to_string()))?;
+        let n = reader
+            .read_until(b'\n', &mut bytes)
+            .map_err(|e| damaged(path, number, e.to_string()))?;
         let Some(json) = json(&bytes) else {
             // A kill leaves an incomplete line at the end and nowhere else.
             let is_last = reader.fill_buf().is_ok_and(<[u8]>::is_empty);
             if is_last {
                 break;
             }
-            return Err(damaged(number, "the line does not match its checksum".into()));
+            return Err(damaged(path, number, "the line does not match its checksum".into()));
         };
         if number == 1 {
             check_header(path, json, of)?;
         } else {
-            each(serde_json::from_slice(json).map_err(|e| damaged(number, e.to_string()))?);
+            let entry =
+                serde_json::from_slice(json).map_err(|e| damaged(path, number, e.to_string()))?;
+            each(entry);
         }
         length += n as u64;
     }
     Ok(length)
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> InputError {
+    let remedy = "make the folder writable, and see that the disk has space";
+    InputError::new(path.display(), error.to_string(), remedy)
+}
+
+fn damaged(path: &Path, line: usize, cause: String) -> InputError {
+    let remedy = "the file is damaged: delete it, and its runs are made again";
+    InputError::new(path.display(), cause, remedy).with_position(line, 1)
 }
 
 /// Returns the text of a line if the line is complete.

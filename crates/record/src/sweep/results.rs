@@ -59,10 +59,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             .map_err(|e| RecordError::new(self.path().display(), e))?;
         let extra = [(PLAN, plan), (FINGERPRINT, self.fingerprint())];
         let version = &self.manifest().program_version;
-        let table = |name: &str, columns| {
-            TableStream::create(&self.path().join(name), columns, version, &extra)
-        };
-        Ok(ResultsWriter { timings: table(TIMINGS, timings)?, results: table(RESULTS, results)? })
+        let timings = TableStream::create(&self.path().join(TIMINGS), timings, version, &extra)?;
+        let results = TableStream::create(&self.path().join(RESULTS), results, version, &extra)?;
+        Ok(ResultsWriter { timings, results })
     }
 
     /// Returns whether the table of all runs exists.
@@ -116,8 +115,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let [plan, fingerprint] = run_table::read_key_values(path, [PLAN, FINGERPRINT])?;
         // Compared as it is read: another version may have written the same plan in other words.
         let read = plan.and_then(|text| serde_json::from_str::<P>(&text).ok());
-        let value = |plan: &P| serde_json::to_value(plan).ok();
-        let is_same_plan = read.is_some_and(|read| value(&read) == value(self.plan()));
+        let own = serde_json::to_value(self.plan()).ok();
+        let is_same_plan = read.is_some_and(|read| serde_json::to_value(&read).ok() == own);
         if is_same_plan && fingerprint == Some(self.fingerprint()) {
             return Ok(());
         }

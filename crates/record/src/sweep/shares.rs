@@ -10,6 +10,8 @@ use sidestep_kernel::ports::{RecordError, RoleColumn};
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use super::journal::{Journal, SweepIdentity, is_locked, read_journal};
+use crate::disk;
+use crate::read::unreadable;
 use crate::run_table::{self, LoadedTable};
 
 /// A share of the cells: number `index` of `count`.
@@ -167,13 +169,10 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Returns the shares that have a file with this extension, in order.
     fn shares_with(&self, extension: &str) -> Result<Vec<Share>, InputError> {
         let folder = self.path().join(SHARES);
-        let failed = |e: std::io::Error| {
-            InputError::new(folder.display(), e.to_string(), "make the folder readable")
-        };
         let mut shares = Vec::new();
-        for entry in fs::read_dir(&folder).map_err(failed)? {
-            let name = entry.map_err(failed)?.file_name();
-            shares.extend(name.to_str().and_then(|name| share_of(name, extension)));
+        for path in disk::list(&folder).map_err(|e| unreadable(&folder, &e))? {
+            let name = path.file_name().and_then(|name| name.to_str());
+            shares.extend(name.and_then(|name| share_of(name, extension)));
         }
         shares.sort();
         Ok(shares)

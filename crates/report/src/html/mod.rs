@@ -92,18 +92,14 @@ impl<'a> PageSection<'a> {
         let mut sections = vec![Self { title: None, id: String::new(), blocks: Vec::new() }];
         let mut pictures = pictures.iter();
         for (k, block) in document.blocks.iter().enumerate() {
-            let id = |title: &str| format!("{}-{}", slug(title), k + 1);
             if let Block::Section(title) = block {
-                sections.push(Self {
-                    title: Some(title.as_str()),
-                    id: id(title),
-                    blocks: Vec::new(),
-                });
+                let id = anchor_id(title, k);
+                sections.push(Self { title: Some(title.as_str()), id, blocks: Vec::new() });
                 continue;
             }
             let has_picture = matches!(block, Block::Figure(_) | Block::Picture(_));
             let picture = if has_picture { pictures.next() } else { None };
-            let id = id(title_of(block).unwrap_or("part"));
+            let id = anchor_id(title_of(block).unwrap_or("part"), k);
             if let Some(section) = sections.last_mut() {
                 section.blocks.push(PageBlock { block, id, picture });
             }
@@ -136,8 +132,16 @@ fn title_of(block: &Block) -> Option<&str> {
     }
 }
 
+/// Returns the anchor of the block with an index. The number tells blocks of the same title apart.
+fn anchor_id(title: &str, index: usize) -> String {
+    format!("{}-{}", slug(title), index + 1)
+}
+
+fn link(id: &str, title: &str) -> Markup {
+    html! { a href={ "#" (id) } { (title) } }
+}
+
 fn table_of_contents(sections: &[PageSection<'_>]) -> Markup {
-    let link = |id: &str, title: &str| html! { a href={ "#" (id) } { (title) } };
     html! {
         nav .contents aria-label="Contents" {
             ol {

@@ -60,11 +60,13 @@ fn class(is_number: bool) -> Option<&'static str> {
     is_number.then_some("number")
 }
 
+/// Returns whether a part of a name is a word that a separator follows.
+fn ends_word(part: &str) -> bool {
+    part.ends_with(['_', '.', '/']) && part.starts_with(|c: char| c.is_ascii_alphabetic())
+}
+
 /// Returns a name that may break between its words; numbers never do.
 fn breakable_name(name: &str) -> Markup {
-    let ends_word = |part: &str| {
-        part.ends_with(['_', '.', '/']) && part.starts_with(|c: char| c.is_ascii_alphabetic())
-    };
     html! {
         @for part in name.split_inclusive(['_', '.', '/']) {
             (part) @if ends_word(part) { wbr; }
@@ -90,12 +92,14 @@ pub(super) fn wide_table(name: &str, inside: Markup) -> Markup {
 
 /// Returns whether every cell that is not empty starts like a number, or like a bound of one: `< 0.0001`.
 fn is_numeric_column(table: &Table, k: usize) -> bool {
-    let cells = || table.rows.iter().filter_map(|row| row.get(k));
-    let is_number = |cell: &str| {
-        let digits = cell.trim_start_matches(['<', ' ', '-', '+', '\u{2212}']);
-        cell.is_empty() || cell == "-" || digits.starts_with(|c: char| c.is_ascii_digit())
-    };
-    cells().any(|cell| !cell.is_empty()) && cells().all(|cell| is_number(cell))
+    let mut cells = table.rows.iter().filter_map(|row| row.get(k));
+    let has_any = cells.clone().any(|cell| !cell.is_empty());
+    has_any && cells.all(|cell| is_numeric_cell(cell))
+}
+
+fn is_numeric_cell(cell: &str) -> bool {
+    let digits = cell.trim_start_matches(['<', ' ', '-', '+', '\u{2212}']);
+    cell.is_empty() || cell == "-" || digits.starts_with(|c: char| c.is_ascii_digit())
 }
 
 /// Returns the claims, below how many have each verdict.

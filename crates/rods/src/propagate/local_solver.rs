@@ -49,6 +49,17 @@ pub struct MasterMotion<const D: usize> {
     pub all_lengths: bool,
 }
 
+/// A slave, and the part of the chain beyond it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlavePosition<const D: usize> {
+    /// Its position before the motion.
+    pub so: Point<D>,
+    /// The rod to its master.
+    pub rod: Rod,
+    /// The connector beyond it, and the rod to that one; `None` at the end of the chain.
+    pub next: Option<(Point<D>, Rod)>,
+}
+
 /// A slave's reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reaction<const D: usize> {
@@ -101,22 +112,20 @@ impl<const D: usize> LocalSolver<D> {
         self.rules.rotation == Rotation::Union
     }
 
-    /// Returns its reaction as a slave at `so` on a rod to its master. `next` is the connector beyond
-    /// it, and the rod to that one.
+    /// Returns its reaction as a slave to the motion of its master.
     ///
     /// # Errors
     /// The constraint because of which it objects.
     pub fn react(
         &mut self,
-        so: Point<D>,
-        rod: Rod,
-        next: Option<(Point<D>, Rod)>,
+        slave: &SlavePosition<D>,
         obstacles: &Obstacles<D>,
         pull: &MasterMotion<D>,
     ) -> Result<Reaction<D>, PendingVeto> {
         if pull.is_open {
-            return Ok(self.free_reaction(so, rod, next, pull));
+            return Ok(self.free_reaction(slave, pull));
         }
+        let SlavePosition { so, rod, next } = *slave;
         self.chain.points_mut()[SELF_INDEX] = so;
         let Self { chain, rules, scratch, tentative, own_rods } = self;
         scratch.all_lengths = pull.all_lengths;
@@ -137,7 +146,8 @@ impl<const D: usize> LocalSolver<D> {
         context.candidates(&step, scratch)?;
         let chosen = scratch.found[0];
         let stays = distance(chosen.at, so) <= chain.min_move_m();
-        let is_next_good = |(next_at, next_rod): (Point<D>, Rod)| {
+        // The same test as that of a whole chain (`Propagator::may_stop`), with this connector as the master.
+        let may_stop = next.is_none_or(|(next_at, next_rod)| {
             let next_step = SlaveStep {
                 mo: so,
                 mn: so,
@@ -149,10 +159,10 @@ impl<const D: usize> LocalSolver<D> {
             };
             is_length_allowed(next_rod, distance(next_at, so))
                 && next_step.is_bend_allowed_at(next_at)
-        };
+        });
         Ok(Reaction {
             at: if stays { so } else { chosen.at },
-            ends: stays && next.is_none_or(is_next_good),
+            ends: stays && may_stop,
             rotated: chosen.rotated,
             has_others: scratch.found.len() > 1 || scratch.has_other_side,
             has_turned: scratch.has_turned,
@@ -160,16 +170,12 @@ impl<const D: usize> LocalSolver<D> {
     }
 
     /// Returns its reaction where nothing can object.
-    fn free_reaction(
-        &self,
-        so: Point<D>,
-        rod: Rod,
-        next: Option<(Point<D>, Rod)>,
-        pull: &MasterMotion<D>,
-    ) -> Reaction<D> {
+    fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> Reaction<D> {
+        let SlavePosition { so, rod, next } = *slave;
         let at = guide([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
-        let is_good = |(beyond, rod): (Point<D>, Rod)| is_length_allowed(rod, distance(so, beyond));
-        let ends = at == so && next.is_none_or(is_good);
+        let is_next_allowed =
+            next.is_none_or(|(beyond, rod)| is_length_allowed(rod, distance(so, beyond)));
+        let ends = at == so && is_next_allowed;
         Reaction { at, ends, rotated: false, has_others: false, has_turned: false }
     }
 

@@ -38,7 +38,6 @@ use proptest::prelude::*;
 mod apart;
 mod degenerate;
 mod laws;
-mod random_worlds;
 mod symmetry;
 mod tunnel;
 

@@ -41,7 +41,7 @@ impl Task {
             sources.push((*variant, source));
         }
         let source = |variant: u32| find_source(&sources, variant);
-        // One worker, because the cluster runs as many tasks on a node as it has cores.
+        // One worker: the executor decides how many tasks a node runs at once.
         let engine = Engine::Workers(1);
         let runner =
             TrialRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };

@@ -13,8 +13,8 @@ const MARGIN_M: f64 = 1e-9;
 pub(crate) struct PartClearance<const D: usize> {
     /// Gap between the connector and the nearest obstacle, meters; negative inside it.
     pub(crate) gap_m: f64,
-    /// The way from the connector's middle to that obstacle's surface; zero if nothing is near.
-    pub(crate) way: Point<D>,
+    /// The vector from the connector's middle to that obstacle's surface; zero if nothing is near.
+    pub(crate) to_surface: Point<D>,
     /// Gap between the rod and the obstacle nearest to it, meters.
     pub(crate) rod_gap_m: f64,
 }
@@ -29,7 +29,7 @@ pub(crate) fn part_clearance<const D: usize>(
 ) -> PartClearance<D> {
     let points = chain.points();
     let connectors = chain.connectors();
-    let mut near = PartClearance { gap_m: look_m, way: [0.0; D], rod_gap_m: look_m };
+    let mut near = PartClearance { gap_m: look_m, to_surface: [0.0; D], rod_gap_m: look_m };
     // One query serves a rod and its ends, because obstacles near one of them are mostly near all.
     let end = if with_rods { (k + 1).min(points.len() - 1) } else { k };
     let at = points[k];
@@ -45,7 +45,7 @@ pub(crate) fn part_clearance<const D: usize>(
             near.gap_m = gap_m;
             // From the core back to the surface; without a direction if the connector's middle lies on the core.
             let part = 1.0 - o.radius_m / nearest.distance_m;
-            near.way =
+            near.to_surface =
                 if part.is_finite() { scaled(sub(nearest.on_core, at), part) } else { [0.0; D] };
         }
         let rod_gap_m = o.core.nearest_to_segment([at, points[end]]).distance_m - rod_radius_m;
@@ -218,9 +218,9 @@ mod tests {
         let obstacles = Obstacles::new(vec![disc, wall], 1.0).unwrap();
         let told = |k| part_clearance(&chain, &obstacles, k, 0.6, true);
         assert!((told(0).gap_m - 0.4).abs() < 1e-12);
-        assert_eq!(told(0).way, [-0.5, 0.0]);
+        assert_eq!(told(0).to_surface, [-0.5, 0.0]);
         assert!((told(0).rod_gap_m - 0.25).abs() < 1e-12, "half way along it");
-        assert_eq!((told(1).gap_m, told(1).way), (0.6, [0.0, 0.0]), "nothing is near");
+        assert_eq!((told(1).gap_m, told(1).to_surface), (0.6, [0.0, 0.0]), "nothing is near");
         let (least_m, part) = min_clearance(&chain, &obstacles, 0.6, true);
         assert!((least_m - 0.25).abs() < 1e-12 && part == 0);
         assert!((min_clearance(&chain, &obstacles, 0.6, false).0 - 0.4).abs() < 1e-12);

@@ -48,9 +48,9 @@ pub enum EventKind {
     Done,
     /// A task was given up, or ended with none of its targets reached; the value is its number.
     GivenUp,
-    /// A planner has found a way to a target; the value is the number of its straight pieces.
+    /// A planner has found a path to a target; the value is the number of its straight pieces.
     Planned,
-    /// A planner has found no way to a target; the value is the target's number.
+    /// A planner has found no path to a target; the value is the target's number.
     NotPlanned,
     /// A neighbor no longer hears the connector, and the chain stands; the value is the neighbor.
     Unheard,

@@ -174,7 +174,7 @@ impl<const D: usize> ChainWorld<D> {
             (0..n).map(|k| part_clearance(chain, obstacles, k, self.look_m, is_whole)).collect();
         row.push_reals(chain.points().as_flattened().iter().copied());
         row.push_reals(all.iter().map(|near| near.gap_m));
-        row.push_reals(all.iter().flat_map(|near| near.way));
+        row.push_reals(all.iter().flat_map(|near| near.to_surface));
         row.push_reals(all[..n - 1].iter().map(|near| near.rod_gap_m));
         let leads =
             self.current_task(id, body).filter(|task| !matches!(task.driver, TaskKind::Rest));

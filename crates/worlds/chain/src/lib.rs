@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! motion/: after a veto, out of the way                  script/: a turtle language for initiators
-//! agents/: the program aboard a connector                deploy/: agents on a network in memory; remote_agents.rs
+//! agents/: the program of a connector                    deploy/: agents on a network in memory; remote_agents.rs
 //! ground/: sources of obstacles                          swarm/:  robots on wheels that follow a leader
 //!
 //! scenario.rs -> world.rs (immutable), state.rs (bodies), driver.rs (tasks)
@@ -62,7 +62,7 @@ pub use motion::escape::{
 pub use motion::recovery::{
     DirectMover, RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation,
 };
-pub use state::{Body, ChainState};
+pub use state::{Body, BodyRef, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};
 pub use world_type::Chains;

@@ -10,7 +10,8 @@ use sidestep_rods::{CompletedMotion, VetoReason};
 use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
-/// Depth in an obstacle beyond which a part counts as a penetration, meters.
+/// Depth in an obstacle beyond which a part counts as a penetration, meters: far more than the tolerance of the rules,
+/// 1e-9, and far less than anything that a user would see.
 pub const PENETRATION_THRESHOLD_M: f64 = 1e-6;
 
 /// Counts for one chain that a run keeps beside its state.

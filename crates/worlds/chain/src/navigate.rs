@@ -1,4 +1,4 @@
-//! An initiator on wheels that finds its way with a laser, and its goal (slides N1 to N6).
+//! An initiator on wheels that navigates with a laser, and its goal (slides N1 to N6).
 
 use super::swarm::drive::DifferentialDrive;
 use super::swarm::leader::{Leader, TurnMode};
@@ -20,7 +20,7 @@ pub(crate) struct Navigator {
     pub(crate) leader: Leader,
     /// Its wheels.
     pub(crate) drive: DifferentialDrive,
-    /// Its destination; without a goal it goes on and on.
+    /// Its destination; without one it never stops.
     pub(crate) goal: Option<NavigationGoal>,
 }
 

@@ -36,7 +36,6 @@ use sidestep_scenario::{
 };
 pub(crate) use spec::ScenarioSpec;
 use std::borrow::Cow;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Largest length, time or coordinate of a scenario.
@@ -512,23 +511,5 @@ impl<const D: usize> Compiler<'_, D> {
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
             step_m: section.step_m.map(f64::from),
         }
-    }
-
-    /// Refuses a key that is given and has no effect; the arguments are the key, whether it is
-    /// given, and whether it has an effect.
-    fn check_unused_key(
-        &self,
-        keys: &[(&str, bool, bool)],
-        of: &str,
-        at: Range<usize>,
-    ) -> Result<(), InputError> {
-        for &(key, is_given, has_effect) in keys {
-            if is_given && !has_effect {
-                let remedy = "leave it out, or give what it belongs to";
-                let at = self.source.key_span(at, &[key]);
-                return Err(self.source.error(at, format!("`{key}` does nothing {of}"), remedy));
-            }
-        }
-        Ok(())
     }
 }

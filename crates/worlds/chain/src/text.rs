@@ -12,25 +12,33 @@ use sidestep_kernel::text::{
 
 /// Returns the contents of a compiled scenario.
 pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Description {
+    Description { json: contents_json(compiled), text: align_pairs(&contents_lines(compiled)) }
+}
+
+fn contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
     let world = &compiled.world;
     let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
     let plan = compiled.plan();
-    let connectors = world.agents();
-    let json = json!({
+    json!({
         "name": plan.name,
         "seed": plan.seed,
         "cycles": plan.cycles,
         "chains": world.chains.len(),
-        "connectors": connectors,
+        "connectors": world.agents(),
         "rods": rods,
         "obstacles": world.obstacles.still().len(),
         "movers": world.movers.len(),
         "dimensions": D,
         "dt_s": world.dt_s,
         "deployment": world.deployment,
-    });
+    })
+}
+
+fn contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
+    let world = &compiled.world;
+    let plan = compiled.plan();
     let chains = group_thousands(world.chains.len() as u64);
-    let parts = group_thousands(connectors as u64);
+    let parts = group_thousands(world.agents() as u64);
     let still = group_thousands(world.obstacles.still().len() as u64);
     let moving = group_thousands(world.movers.len() as u64);
     let cycles = group_thousands(plan.cycles);
@@ -51,12 +59,10 @@ pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Descripti
                 n.deadline_s
             ),
         };
-        lines.push(key_value(
-            "deployment",
-            format!("an agent per connector; the network: {network}"),
-        ));
+        let words = format!("an agent per connector; the network: {network}");
+        lines.push(key_value("deployment", words));
     }
-    Description { json, text: align_pairs(&lines) }
+    lines
 }
 
 /// Returns the position of every connector.

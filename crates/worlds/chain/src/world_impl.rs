@@ -49,7 +49,7 @@ impl<const D: usize> ChainScenario<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
         let collector = Collector { rows: Rows::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunStart { config: plan, state, collector: collector };
+        let start = RunStart { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 

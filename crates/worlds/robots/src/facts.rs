@@ -45,14 +45,18 @@ pub(crate) const FACTS: WorldFacts = WorldFacts {
     group_sizes: Some(GroupSizes::Metric { metric: "group_sizes" }),
 };
 
+/// Returns a tool that paints boxes of the map.
+fn paint(
+    id: &'static str,
+    sign: &'static str,
+    name: &'static str,
+    help: &'static str,
+    area: PaintArea,
+) -> EditTool {
+    EditTool { id, sign, name, help, action: EditAction::Paint { area } }
+}
+
 pub(crate) fn editing() -> Editing {
-    let paint = |id, sign, name, help, area| EditTool {
-        id,
-        sign,
-        name,
-        help,
-        action: EditAction::Paint { area },
-    };
     let robot = json!({
         "size": 2,
         "sensors": ["sonar-ring"],

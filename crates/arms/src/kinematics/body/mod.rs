@@ -80,22 +80,16 @@ impl ArmBody {
         may_touch: &[(usize, usize)],
     ) -> Self {
         let mounts = Mounts::new(model, chain);
-        let part = |solid: &Solid| {
-            let own = Transform::from_origin(&solid.origin);
-            let center = Transform { origin_m: solid.center_m, ..Transform::IDENTITY };
-            let core = core(&solid.shape)?;
-            Some(LinkShape {
-                link: model.links[solid.link].clone(),
-                mount: mounts.in_link(solid.link, own.compose(&center)),
-                radius_m: core.radius_m(),
-                core,
-            })
-        };
-        let parts: Vec<(usize, LinkShape)> =
-            solids.iter().filter_map(|solid| Some((solid.link, part(solid)?))).collect();
-        let links: Vec<usize> = parts.iter().map(|(link, _)| *link).collect();
+        let mut parts = Vec::new();
+        let mut links = Vec::new();
+        for solid in solids {
+            if let Some(part) = LinkShape::new(model, &mounts, solid) {
+                parts.push(part);
+                links.push(solid.link);
+            }
+        }
         let pairs = pairs::collision_pairs(model, &mounts, &links, may_touch);
-        Self { parts: parts.into_iter().map(|(_, part)| part).collect(), pairs }
+        Self { parts, pairs }
     }
 
     /// Returns whether it has no shapes at all.
@@ -115,13 +109,16 @@ impl ArmBody {
     /// Returns the depth in m of each pair of links that must not touch and overlaps at these joint
     /// values.
     pub fn overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
-        let mut placed = Vec::new();
-        self.place_shapes(&chain.forward(values), values, &mut placed);
-        let overlap = |&(a, b): &(usize, usize)| {
-            let near = self.proximity(&placed, a, b, 0.0).filter(|near| near.apart_m < 0.0)?;
-            Some((self.name(a), self.name(b), -near.apart_m))
-        };
-        self.pairs.iter().filter_map(overlap).collect()
+        let mut shapes = Vec::new();
+        self.place_shapes(&chain.forward(values), values, &mut shapes);
+        let placed = PlacedBody { body: self, shapes: &shapes };
+        let mut overlaps = Vec::new();
+        for &(a, b) in &self.pairs {
+            if let Some(near) = placed.proximity(a, b, 0.0).filter(|near| near.apart_m < 0.0) {
+                overlaps.push((self.name(a), self.name(b), -near.apart_m));
+            }
+        }
+        overlaps
     }
 
     /// Returns whether a link of the arm, counted as [`Frames::links`] are, has a shape.
@@ -170,38 +167,60 @@ impl ArmBody {
             PlacedShape { pose: upright, center_m: pose.origin_m }
         }));
     }
+}
 
+/// A body at a posture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlacedBody<'a> {
+    pub(super) body: &'a ArmBody,
+    /// The places of its parts.
+    pub(super) shapes: &'a [PlacedShape],
+}
+
+impl PlacedBody<'_> {
     /// Returns the relation of two parts, if they are nearer than `within_m`.
-    pub(super) fn proximity(
-        &self,
-        placed: &[PlacedShape],
-        a: usize,
-        b: usize,
-        within_m: f64,
-    ) -> Option<Proximity> {
-        let far_m = self.parts[a].radius_m + self.parts[b].radius_m + within_m;
-        if apart_m(placed[a].center_m, placed[b].center_m) > far_m {
+    pub(super) fn proximity(&self, a: usize, b: usize, within_m: f64) -> Option<Proximity> {
+        let Self { body: ArmBody { parts, .. }, shapes } = self;
+        let far_m = parts[a].radius_m + parts[b].radius_m + within_m;
+        // The balls around both are apart: far cheaper than a query of parry, and true of most pairs.
+        if apart_m(shapes[a].center_m, shapes[b].center_m) > far_m {
             return None;
         }
-        let shapes = [a, b].map(|part| self.parts[part].core.shape());
-        near(&placed[a].pose, shapes[0], &placed[b].pose, shapes[1], within_m)
+        let cores = [a, b].map(|part| parts[part].core.shape());
+        near(&shapes[a].pose, cores[0], &shapes[b].pose, cores[1], within_m)
     }
 
     /// Returns the relation of a part to a ball, if they are nearer than `within_m`.
     pub(super) fn ball_proximity(
         &self,
-        placed: &[PlacedShape],
         part: usize,
         center_m: Vector,
         radius_m: f64,
         within_m: f64,
     ) -> Option<Proximity> {
-        let far_m = self.parts[part].radius_m + radius_m + within_m;
-        if apart_m(placed[part].center_m, center_m) > far_m {
+        let LinkShape { core, radius_m: part_radius_m, .. } = &self.body.parts[part];
+        let shape = &self.shapes[part];
+        let far_m = part_radius_m + radius_m + within_m;
+        if apart_m(shape.center_m, center_m) > far_m {
             return None;
         }
         let at = ParryPose::from_parts(vector(center_m), Rotation::IDENTITY);
-        near(&placed[part].pose, self.parts[part].core.shape(), &at, &Ball::new(radius_m), within_m)
+        near(&shape.pose, core.shape(), &at, &Ball::new(radius_m), within_m)
+    }
+}
+
+impl LinkShape {
+    /// Returns a solid of a model as a part of an arm's body; `None` for shapes that are not among those of bodies.
+    fn new(model: &Model, mounts: &Mounts, solid: &Solid) -> Option<Self> {
+        let own = Transform::from_origin(&solid.origin);
+        let center = Transform { origin_m: solid.center_m, ..Transform::IDENTITY };
+        let core = core(&solid.shape)?;
+        Some(Self {
+            link: model.links[solid.link].clone(),
+            mount: mounts.in_link(solid.link, own.compose(&center)),
+            radius_m: core.radius_m(),
+            core,
+        })
     }
 }
 

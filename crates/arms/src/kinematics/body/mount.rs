@@ -51,9 +51,8 @@ pub(super) struct Mounts(Vec<Mount>);
 impl Mounts {
     pub(super) fn new(model: &Model, chain: &SerialChain) -> Self {
         let mut found: Vec<Option<Mount>> = vec![None; model.links.len()];
-        let index = |name: &str| model.links.iter().position(|link| link == name);
-        let ends = index(&chain.base).zip(index(&chain.tip));
-        let (base, tip) = ends.expect("an arm of this model");
+        let base = link_index(model, &chain.base);
+        let tip = link_index(model, &chain.tip);
         found[base] = Some(Mount { link: 0, steps: Vec::new(), last: Transform::IDENTITY });
         let mut link = 0;
         for joint in model.joint_path(base, tip).expect("an arm of this model") {
@@ -81,6 +80,10 @@ impl Mounts {
     pub(super) fn link(&self, link: usize) -> &Mount {
         &self.0[link]
     }
+}
+
+fn link_index(model: &Model, name: &str) -> usize {
+    model.links.iter().position(|link| link == name).expect("an arm of this model")
 }
 
 /// Finds the links from the base up to the root: they stand still with the base.

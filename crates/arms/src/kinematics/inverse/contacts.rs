@@ -1,6 +1,6 @@
 //! Parts of an arm that are in another body, or nearly so.
 
-use super::super::body::{self, ArmBody, Proximity};
+use super::super::body::{self, ArmBody, PlacedBody, Proximity};
 use super::super::skeleton::{Anchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::LinkTransforms;
@@ -71,13 +71,16 @@ impl<'a> ContactFinder<'a> {
     pub(super) fn new(skeleton: &'a Skeleton, goal: &'a ArmGoal) -> Self {
         let body = goal.body.as_ref().filter(|body| !body.is_empty());
         let anchors = &skeleton.connectors;
-        let is_bare = |rod: &usize| {
-            let mut links = holders(&anchors[*rod], &anchors[rod + 1]);
-            body.is_none_or(|body| !links.any(|link| body.has_shape(link)))
-        };
+        let mut rods = Vec::new();
+        for (rod, ends) in anchors.windows(2).enumerate() {
+            let mut links = holders(&ends[0], &ends[1]);
+            if body.is_none_or(|body| !links.any(|link| body.has_shape(link))) {
+                rods.push(rod);
+            }
+        }
         Self {
             anchors,
-            rods: (0..anchors.len() - 1).filter(is_bare).collect(),
+            rods,
             spheres: &goal.spheres,
             body,
             own_body: goal.own_body,
@@ -95,13 +98,14 @@ impl<'a> ContactFinder<'a> {
         let Some(body) = self.body.filter(|_| self.own_body || !self.spheres.is_empty()) else {
             return;
         };
-        let mut parts = std::mem::take(&mut touched.parts);
-        body.place_shapes_on(&placed.links, values, &mut parts);
-        self.parts_in_spheres(body, &parts, touched);
+        let mut shapes = std::mem::take(&mut touched.parts);
+        body.place_shapes_on(&placed.links, values, &mut shapes);
+        let placed_body = PlacedBody { body, shapes: &shapes };
+        self.parts_in_spheres(placed_body, touched);
         if self.own_body {
-            self.parts_in_parts(body, &parts, touched);
+            self.parts_in_parts(placed_body, touched);
         }
-        touched.parts = parts;
+        touched.parts = shapes;
     }
 
     fn rod_in_spheres(&self, rod: usize, placed: &LinkTransforms, touched: &mut ContactSet) {
@@ -120,45 +124,37 @@ impl<'a> ContactFinder<'a> {
                 [0.0, 0.0, 1.0]
             };
             let part = fraction_along(nearest, ends);
-            let pull =
-                |end: usize, share| ContactPoint { link: pair[end].first, at_m: ends[end], share };
-            let pulls = [pull(0, 1.0 - part), pull(1, part)];
+            let pulls = [
+                ContactPoint { link: pair[0].first, at_m: ends[0], share: 1.0 - part },
+                ContactPoint { link: pair[1].first, at_m: ends[1], share: part },
+            ];
             let contact = Contact { away, wanted_m: depth_m + self.margin_m, pulls };
             touched.add(contact, depth_m, || (ArmPart::Rod(rod), CollidesWith::Sphere(sphere)));
         }
     }
 
-    fn parts_in_spheres(
-        &self,
-        body: &ArmBody,
-        parts: &[body::PlacedShape],
-        touched: &mut ContactSet,
-    ) {
+    fn parts_in_spheres(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
+        let body = placed.body;
         for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             for part in 0..body.len() {
-                let near = body.ball_proximity(parts, part, center_m, radius_m, self.margin_m);
+                let near = placed.ball_proximity(part, center_m, radius_m, self.margin_m);
                 if let Some(near) = near {
                     let contact = self.contact(&near, body.link(part), 0);
-                    let hit =
-                        || (ArmPart::Link(body.name(part).into()), CollidesWith::Sphere(sphere));
-                    touched.add(contact, -near.apart_m, hit);
+                    touched.add(contact, -near.apart_m, || {
+                        (ArmPart::Link(body.name(part).into()), CollidesWith::Sphere(sphere))
+                    });
                 }
             }
         }
     }
 
-    fn parts_in_parts(
-        &self,
-        body: &ArmBody,
-        parts: &[body::PlacedShape],
-        touched: &mut ContactSet,
-    ) {
+    fn parts_in_parts(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
+        let body = placed.body;
         for &(a, b) in body.own_pairs() {
-            if let Some(near) = body.proximity(parts, a, b, self.margin_m) {
+            if let Some(near) = placed.proximity(a, b, self.margin_m) {
                 let contact = self.contact(&near, body.link(a), body.link(b));
-                let name = |part| String::from(body.name(part));
                 touched.add(contact, -near.apart_m, || {
-                    (ArmPart::Link(name(b)), CollidesWith::Link(name(a)))
+                    (ArmPart::Link(body.name(b).into()), CollidesWith::Link(body.name(a).into()))
                 });
             }
         }

@@ -3,7 +3,7 @@
 use super::super::serial::{JointMotion, SerialChain};
 use super::criteria::{Evaluation, IkCriteria};
 use super::goal::ArmGoal;
-use super::step::{JointRanges, Stepper};
+use super::step::{JointRanges, StepInput, Stepper};
 use sidestep_kernel::math::wrap_angle;
 
 /// The first damping, in parts of the mean of the matrix's diagonal: measured, as all numbers here,
@@ -16,7 +16,7 @@ const DAMPING_INCREASE: f64 = 5.0;
 /// The effort of one descent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DescentLimits {
-    /// Most steps, including those that did not help.
+    /// Largest number of steps, including those that did not help.
     steps: usize,
     /// Steps without gain before it is given up.
     patience: usize,
@@ -79,7 +79,9 @@ impl Descender<'_> {
             if is_new {
                 self.criteria.jacobian(&evaluation, n, &mut self.stepper.rows);
             }
-            self.stepper.step(&values, &evaluation.wanted, damping, &self.bounds, &mut next);
+            let wanted = &evaluation.wanted;
+            let input = StepInput { values: &values, wanted, damping, bounds: &self.bounds };
+            self.stepper.step(input, &mut next);
             self.criteria.evaluate(&next, &mut next_evaluation);
             is_new = next_evaluation.merit() < evaluation.merit();
             if is_new {

@@ -1,10 +1,11 @@
 //! Forward kinematics of many postures of one arm: values independent of the posture are computed once,
 //! and nothing is allocated per posture.
 
-use super::super::serial::{JointCoupling, JointMotion, SerialChain};
+use super::super::serial::{JointCoupling, JointMotion, MovingJoint, SerialChain};
 use super::super::transform::{Line, Transform, Vector, multiply};
 use sidestep_kernel::geometry::{add, add_scaled, dot, scaled};
 use sidestep_kernel::math::sin_cos;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// An arm, prepared.
 #[derive(Debug)]
@@ -52,27 +53,8 @@ impl LinkTransforms {
 
 impl FastFk {
     pub(super) fn new(chain: &SerialChain) -> Self {
-        let joint = |joint: &super::super::serial::MovingJoint| {
-            let rotation = joint.origin.rotation;
-            let at = |angle| {
-                joint.origin.compose(&Transform::from_axis_angle(joint.axis, angle)).rotation
-            };
-            let still = match joint.motion {
-                JointMotion::Turn => halve(&add_all(&at(0.0), &at(std::f64::consts::PI))),
-                JointMotion::Slide => rotation,
-            };
-            let minus = |a: &[Vector; 3]| add_all(a, &still.map(|row| scaled(row, -1.0)));
-            FastFkJoint {
-                motion: joint.motion,
-                drive: joint.drive,
-                cosine: minus(&rotation),
-                sine: minus(&at(std::f64::consts::FRAC_PI_2)),
-                still,
-                origin_m: joint.origin.origin_m,
-                axis: joint.origin.transform_direction(joint.axis),
-            }
-        };
-        Self { joints: chain.joints.iter().map(joint).collect(), to_tip: chain.to_tip }
+        let joints = chain.joints.iter().map(FastFkJoint::new).collect();
+        Self { joints, to_tip: chain.to_tip }
     }
 
     /// Computes the poses at these values of the variables.
@@ -130,12 +112,34 @@ impl FastFk {
 }
 
 impl FastFkJoint {
+    /// Prepares a joint. The three matrices follow from the rotations at 0, a quarter and half of a turn.
+    fn new(joint: &MovingJoint) -> Self {
+        let rotation = joint.origin.rotation;
+        let still = match joint.motion {
+            JointMotion::Turn => halve(&add_all(&rotation_at(joint, 0.0), &rotation_at(joint, PI))),
+            JointMotion::Slide => rotation,
+        };
+        let minus_still = still.map(|row| scaled(row, -1.0));
+        Self {
+            motion: joint.motion,
+            drive: joint.drive,
+            cosine: add_all(&rotation, &minus_still),
+            sine: add_all(&rotation_at(joint, FRAC_PI_2), &minus_still),
+            still,
+            origin_m: joint.origin.origin_m,
+            axis: joint.origin.transform_direction(joint.axis),
+        }
+    }
+
     fn rotation(&self, angle_rad: f64) -> [Vector; 3] {
         let (s, c) = sin_cos(angle_rad);
-        let row =
-            |i: usize| add_scaled(add_scaled(self.still[i], self.cosine[i], c), self.sine[i], s);
-        [row(0), row(1), row(2)]
+        [0, 1, 2].map(|i| add_scaled(add_scaled(self.still[i], self.cosine[i], c), self.sine[i], s))
     }
+}
+
+/// Returns the rotation of a joint's frame in the link before it, at an angle.
+fn rotation_at(joint: &MovingJoint, angle_rad: f64) -> [Vector; 3] {
+    joint.origin.compose(&Transform::from_axis_angle(joint.axis, angle_rad)).rotation
 }
 
 fn add_all(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
@@ -148,10 +152,10 @@ fn halve(a: &[Vector; 3]) -> [Vector; 3] {
 
 /// Returns the rotation by which `from` becomes `to`, as its axis times its angle in rad.
 pub(super) fn rotation_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
-    // Entries of `to * from^T`.
-    let entry = |i: usize, j: usize| dot(to[i], from[j]);
-    let skew = [entry(2, 1) - entry(1, 2), entry(0, 2) - entry(2, 0), entry(1, 0) - entry(0, 1)];
-    let twice_cosine = entry(0, 0) + entry(1, 1) + entry(2, 2) - 1.0;
+    // `to * from^T`.
+    let r = to.map(|row| from.map(|other| dot(row, other)));
+    let skew = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];
+    let twice_cosine = r[0][0] + r[1][1] + r[2][2] - 1.0;
     let twice_sine = dot(skew, skew).sqrt();
     let angle_rad = sidestep_kernel::math::atan2(twice_sine, twice_cosine);
     // Below, the angle is twice_sine / 2 to the last bit but a few; beyond, the axis is lost in the
@@ -160,19 +164,20 @@ pub(super) fn rotation_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
         return scaled(skew, 0.5);
     }
     if twice_cosine < 0.0 && twice_sine < 1e-4 {
-        return half_turn(entry, angle_rad, skew);
+        return half_turn(&r, angle_rad, skew);
     }
     scaled(skew, angle_rad / twice_sine)
 }
 
 /// Returns a turn by nearly half a turn: its axis is the largest column of `R + R^T + (1 - tr) I`.
-fn half_turn(entry: impl Fn(usize, usize) -> f64, angle_rad: f64, skew: Vector) -> Vector {
-    let trace = entry(0, 0) + entry(1, 1) + entry(2, 2);
-    let symmetric = |i: usize, j: usize| {
-        let diagonal = if i == j { 1.0 - trace } else { 0.0 };
-        entry(i, j) + entry(j, i) + diagonal
-    };
-    let columns = [0, 1, 2].map(|j| [0, 1, 2].map(|i| symmetric(i, j)));
+fn half_turn(r: &[Vector; 3], angle_rad: f64, skew: Vector) -> Vector {
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let columns = [0, 1, 2].map(|j| {
+        [0, 1, 2].map(|i| {
+            let diagonal = if i == j { 1.0 - trace } else { 0.0 };
+            r[i][j] + r[j][i] + diagonal
+        })
+    });
     let longest = columns.into_iter().max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)));
     let axis = longest.and_then(sidestep_kernel::geometry::normalized).unwrap_or([1.0, 0.0, 0.0]);
     let sign = if dot(axis, skew) < 0.0 { -1.0 } else { 1.0 };

@@ -18,6 +18,13 @@ pub struct Sphere {
     pub radius_m: f64,
 }
 
+impl Sphere {
+    fn is_in_range(&self) -> bool {
+        let mut numbers = self.center_m.iter().chain([&self.radius_m]);
+        numbers.all(|x| x.abs() <= 1e7) && self.radius_m >= 0.0
+    }
+}
+
 /// An axis of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
@@ -70,11 +77,11 @@ impl PoseMask {
         along: [bool; 3],
         about: [bool; 3],
     ) -> Result<Self, InputError> {
-        let refused = |cause: &str, remedy: &str| Err(InputError::new("--free", cause, remedy));
         let free = Axis::ALL.into_iter().zip(about).filter_map(|(axis, free)| free.then_some(axis));
         let free: Vec<Axis> = free.collect();
         if !is_turned && !free.is_empty() {
-            return refused("a turn is free, and none is asked for", "add --rpy or --quaternion");
+            let cause = "a turn is free, and none is asked for";
+            return Err(InputError::new("--free", cause, "add --rpy or --quaternion"));
         }
         let turn = match free[..] {
             _ if !is_turned => OrientationMask::Free,
@@ -83,12 +90,13 @@ impl PoseMask {
             [_, _, _] => OrientationMask::Free,
             _ => {
                 let remedy = "free one turn, which leaves the direction of its axis, or all three";
-                return refused("two turns are free", remedy);
+                return Err(InputError::new("--free", "two turns are free", remedy));
             }
         };
         let along = along.map(|free| !free);
         if along == [false; 3] && turn == OrientationMask::Free {
-            return refused("everything is free", "leave something that the tip shall do");
+            let remedy = "leave something that the tip shall do";
+            return Err(InputError::new("--free", "everything is free", remedy));
         }
         Ok(Self { along, turn })
     }
@@ -117,7 +125,7 @@ pub struct ArmGoal {
     pub restarts: usize,
     /// Random seed of these postures.
     pub seed: u64,
-    /// Number of postures wanted. From 2 on, the search goes on from posture to posture until it has
+    /// Number of postures wanted. From 2 on, the search continues from posture to posture until it has
     /// found as many that are [distinct](ArmGoal::apart), and the answer is the nearest to the start
     /// of those.
     pub solutions: usize,
@@ -191,24 +199,19 @@ impl ArmGoal {
         self.check_spheres()
     }
 
-    /// Returns whether the search goes on from posture to posture, instead of ending at the first that
+    /// Returns whether the search continues from posture to posture, instead of ending at the first that
     /// meets the goal.
     pub(super) fn is_multi_solution(&self) -> bool {
         self.solutions > 1 || self.nearest
     }
 
     fn check_spheres(&self) -> Result<(), InputError> {
-        let is_right = |s: &Sphere| {
-            s.center_m.iter().chain([&s.radius_m]).all(|x| x.abs() <= 1e7) && s.radius_m >= 0.0
-        };
-        match self.spheres.iter().position(|s| !is_right(s)) {
-            None => Ok(()),
-            Some(i) => {
-                let cause = format!("is {:?}", self.spheres[i]);
-                let remedy = "give finite coordinates and a radius that is not negative";
-                Err(InputError::new(format!("obstacle {}", i + 1), cause, remedy))
-            }
+        if let Some(i) = self.spheres.iter().position(|sphere| !sphere.is_in_range()) {
+            let cause = format!("is {:?}", self.spheres[i]);
+            let remedy = "give finite coordinates and a radius that is not negative";
+            return Err(InputError::new(format!("obstacle {}", i + 1), cause, remedy));
         }
+        Ok(())
     }
 }
 

@@ -13,7 +13,9 @@ use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules}
 const MIN_ROD_M: f64 = 1e-6;
 /// Longest length of rods without a limit, as a multiple of the target's distance and the reach.
 const MAX_LENGTH_FACTOR: f64 = 4.0;
-/// Postures of the connectors that are tried.
+/// Least bend limit of a connector, rad: a joint whose limits meet would give 0, which a chain refuses.
+const MIN_BEND_RAD: f64 = 1e-9;
+/// Postures of the connectors that are tried: only a guide, because descents from random joint values follow.
 const RESTARTS: usize = 20;
 
 /// Returns joint values inside the limits at which the connectors are at the places found by the chain
@@ -69,7 +71,7 @@ fn arm_chain(
     if !goal.ignore_limits {
         for (connector, limit) in joints.iter_mut().zip(arm.bend_limits(skeleton)) {
             let max_bend_rad = limit.map_or(std::f64::consts::PI, |l| l.max_bend_rad);
-            connector.max_bend_rad = max_bend_rad.max(1e-9);
+            connector.max_bend_rad = max_bend_rad.max(MIN_BEND_RAD);
         }
     }
     joints[0].mobility = Mobility::Fixed;

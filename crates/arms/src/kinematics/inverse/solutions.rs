@@ -7,7 +7,7 @@ use super::search::{IkSearch, SolutionSet};
 use sidestep_kernel::math::wrap_angle;
 use std::f64::consts::TAU;
 
-/// Most steps toward the start.
+/// Largest number of steps toward the start. Each halves the distance while that works, so that few are used.
 const MAX_STEPS: usize = 30;
 /// Length of the first step, as a fraction of the distance to the start.
 const FIRST_FRACTION: f64 = 0.5;

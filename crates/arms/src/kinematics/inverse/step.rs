@@ -27,9 +27,8 @@ impl JointRanges {
         for joint in &chain.joints {
             let drive = joint.drive;
             if let Some(limits) = joint.limits.filter(|_| drive.multiplier != 0.0) {
-                let value = |limit: f64| (limit - drive.offset) / drive.multiplier;
-                let a = value(limits.lower);
-                let b = value(limits.upper);
+                let a = (limits.lower - drive.offset) / drive.multiplier;
+                let b = (limits.upper - drive.offset) / drive.multiplier;
                 let [lower, upper] = &mut ranges[drive.variable];
                 *lower = lower.max(a.min(b));
                 *upper = upper.min(a.max(b));
@@ -69,17 +68,22 @@ pub(super) struct Stepper {
     y: Vec<f64>,
 }
 
+/// The posture that a step starts from, and its aim.
+#[derive(Clone, Copy)]
+pub(super) struct StepInput<'a> {
+    pub(super) values: &'a [f64],
+    /// Wanted changes of the rows.
+    pub(super) wanted: &'a [f64],
+    /// Damping as a fraction of the mean of the matrix's diagonal.
+    pub(super) damping: f64,
+    pub(super) bounds: &'a JointRanges,
+}
+
 impl Stepper {
-    /// Puts `values` after one damped step toward the wanted changes of the rows into `next`. A
+    /// Puts the values after one damped step toward the wanted changes into `next`. A
     /// variable that would leave its range stops at its end, and the others do without it.
-    pub(super) fn step(
-        &mut self,
-        values: &[f64],
-        wanted: &[f64],
-        damping: f64,
-        bounds: &JointRanges,
-        next: &mut Vec<f64>,
-    ) {
+    pub(super) fn step(&mut self, input: StepInput<'_>, next: &mut Vec<f64>) {
+        let StepInput { values, wanted, damping, bounds } = input;
         let n = values.len();
         next.clear();
         next.extend_from_slice(values);

@@ -1,6 +1,6 @@
 //! Joint values for the places of connectors: the demands of a chain's motion on an arm's joints within one cycle.
 //!
-//! A chain of rods moves in more ways than most arms: its motion is a guide. First all connectors are brought as near
+//! A chain of rods has more degrees of freedom than most arms: its motion is a guide. First all connectors are brought as near
 //! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
 //! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
 
@@ -8,20 +8,23 @@ use super::super::serial::{JointMotion, MovingJoint, SerialChain};
 use super::super::skeleton::{Anchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::{FastFk, LinkTransforms};
-use super::step::{JointRanges, Stepper};
+use super::step::{JointRanges, StepInput, Stepper};
 use sidestep_kernel::geometry::{norm, sub};
 use std::f64::consts::PI;
 
-/// Speed of joints without one in the model.
+/// Speeds of joints without one in the model: half a turn a second, as the joints of a UR5, and 1 m/s.
 const DEFAULT_SPEED_RAD_S: f64 = PI;
 const DEFAULT_SPEED_M_S: f64 = 1.0;
-/// Weight of a connector's place in the guide.
+/// Weight of a connector's place in the guide, beside 1 of those that lead: they come first, and are then met exactly in a
+/// descent of their own.
 const GUIDE_WEIGHT: f64 = 0.3;
-/// Most steps toward the guide: it need not be reached, so a few suffice.
+/// Largest number of steps toward the guide: it need not be reached, so a few suffice.
 const MAX_GUIDE_STEPS: usize = 4;
-/// Most steps toward the targets of connectors that lead, which are to be met exactly.
+/// Largest number of steps toward the targets of connectors that lead, which are to be met exactly.
 const MAX_LEAD_STEPS: usize = 24;
-/// First damping of both, in parts of the mean of the matrix's diagonal.
+/// First damping of both, as a fraction of the mean of the matrix's diagonal. Within a cycle joints are near their aims,
+/// so it is far below that of descents from any posture; the guide's is larger, because it asks for more than the joints
+/// can do.
 const GUIDE_DAMPING: f64 = 1e-2;
 const LEAD_DAMPING: f64 = 1e-4;
 /// Factors of the damping after a step that helped, and after one that did not.
@@ -29,7 +32,8 @@ const DAMPING_DECREASE: f64 = 0.1;
 const DAMPING_INCREASE: f64 = 10.0;
 /// Steps in a row that do not help, after which the descent ends.
 const MAX_IDLE_STEPS: usize = 4;
-/// Distance from its place, in parts of the reach, at which a connector counts as being there.
+/// Distance from its place, as a fraction of the reach, at which a connector counts as being there: a few hundred times the
+/// rounding of forward kinematics.
 const ARRIVAL_TOLERANCE: f64 = 1e-13;
 
 /// An arm whose joints follow the places of its connectors.
@@ -109,10 +113,11 @@ impl JointTracker {
 
     /// Returns the range of each variable within `dt_s` seconds from these values.
     pub fn reachable_ranges(&self, values: &[f64], dt_s: f64) -> Vec<[f64; 2]> {
-        let of_one = |((value, speed), [lower, upper]): ((&f64, &f64), &[f64; 2])| {
+        let variables = values.iter().zip(&self.speeds).zip(&self.limits.ranges);
+        let ranges = variables.map(|((value, speed), [lower, upper])| {
             [(value - speed * dt_s).max(*lower), (value + speed * dt_s).min(*upper)]
-        };
-        values.iter().zip(&self.speeds).zip(&self.limits.ranges).map(of_one).collect()
+        });
+        ranges.collect()
     }
 
     /// Returns the fraction, at most 1, of the path from one posture to another that all joints can move along
@@ -146,13 +151,15 @@ impl JointTracker {
         let room = JointRanges { ranges: room.to_vec() };
         let mut fit = TrackingDescent::new(self, start);
         if let Some(guide) = guide {
-            let weight = |k: &usize| {
-                if led.iter().any(|aim| aim.connector == *k) { 1.0 } else { GUIDE_WEIGHT }
-            };
-            let all = (0..guide.len()).filter(|k| self.anchors[*k].first > 0);
-            let aims = all
-                .map(|k| (ConnectorTarget { connector: k, at_m: guide[k] }, weight(&k)))
-                .collect();
+            let mut aims = Vec::new();
+            for (connector, &at_m) in guide.iter().enumerate() {
+                // Connectors fixed in the base cannot be moved.
+                if self.anchors[connector].first > 0 {
+                    let is_led = led.iter().any(|aim| aim.connector == connector);
+                    let weight = if is_led { 1.0 } else { GUIDE_WEIGHT };
+                    aims.push((ConnectorTarget { connector, at_m }, weight));
+                }
+            }
             fit.descend(aims, &room, MAX_GUIDE_STEPS, GUIDE_DAMPING);
         }
         if !led.is_empty() {
@@ -198,7 +205,8 @@ impl<'a> TrackingDescent<'a> {
             if is_new {
                 self.update_jacobian(&aims);
             }
-            self.stepper.step(&self.values, &wanted, damping, room, &mut next);
+            let input = StepInput { values: &self.values, wanted: &wanted, damping, bounds: room };
+            self.stepper.step(input, &mut next);
             let next_wanted = self.residuals(&next.clone(), &aims, Some(&mut next_placed));
             is_new = merit(&next_wanted) < merit(&wanted);
             if is_new {
@@ -223,12 +231,13 @@ impl<'a> TrackingDescent<'a> {
     ) -> Vec<f64> {
         let placed = placed.unwrap_or(&mut self.placed);
         self.arm.fast_fk.compute(values, placed);
-        let residual = |(aim, weight): &(ConnectorTarget, f64)| {
+        let mut residuals = Vec::with_capacity(3 * aims.len());
+        for (aim, weight) in aims {
             let anchor = &self.arm.anchors[aim.connector];
             let at_m = placed.links[anchor.first].transform_point(anchor.point_m);
-            sub(aim.at_m, at_m).map(|x| weight * x)
-        };
-        aims.iter().flat_map(residual).collect()
+            residuals.extend(sub(aim.at_m, at_m).map(|x| weight * x));
+        }
+        residuals
     }
 
     /// Computes the weighted velocities of connectors per unit of each variable.
@@ -256,19 +265,25 @@ fn merit(wanted: &[f64]) -> f64 {
 
 /// Returns the highest speed of each variable: joints that mimic another narrow its own.
 fn speeds(chain: &SerialChain) -> Vec<f64> {
-    let usual =
-        |motion| if motion == JointMotion::Turn { DEFAULT_SPEED_RAD_S } else { DEFAULT_SPEED_M_S };
-    let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(usual(v.motion)));
+    let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(default_speed(v.motion)));
     let mut speeds: Vec<f64> = own.collect();
     for joint in &chain.joints {
         let drive = joint.drive;
-        let usual = usual(joint.motion);
         if drive.multiplier != 0.0 {
-            let max_speed = joint.max_speed.unwrap_or(usual) / drive.multiplier.abs();
+            let own_speed = joint.max_speed.unwrap_or(default_speed(joint.motion));
+            let max_speed = own_speed / drive.multiplier.abs();
             speeds[drive.variable] = speeds[drive.variable].min(max_speed);
         }
     }
     speeds
+}
+
+/// Returns the speed of joints without one in the model, in rad/s or m/s.
+fn default_speed(motion: JointMotion) -> f64 {
+    match motion {
+        JointMotion::Turn => DEFAULT_SPEED_RAD_S,
+        JointMotion::Slide => DEFAULT_SPEED_M_S,
+    }
 }
 
 /// Returns bounds on the travel of any connector per unit of each variable: the lengths of all links between its joints
@@ -276,20 +291,21 @@ fn speeds(chain: &SerialChain) -> Vec<f64> {
 fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
     let mut levers_m = vec![0.0; chain.variables.len()];
     for (i, joint) in chain.joints.iter().enumerate() {
-        let lever_m = |anchor: &Anchor| {
-            let links = chain.joints[i + 1..anchor.first].iter();
-            let links_m = links.map(|link| norm(link.origin.origin_m) + max_slide_m(link));
-            if joint.motion == JointMotion::Slide {
-                1.0
-            } else {
-                norm(anchor.point_m) + links_m.sum::<f64>()
-            }
-        };
         let beyond = anchors.iter().filter(|anchor| anchor.first > i);
-        let lever_m = beyond.map(lever_m).fold(0.0, f64::max);
+        let lever_m = beyond.map(|anchor| lever_m(chain, i, anchor)).fold(0.0, f64::max);
         levers_m[joint.drive.variable] += lever_m * joint.drive.multiplier.abs();
     }
     levers_m
+}
+
+/// Returns a bound on the travel of a connector beyond joint `i` per unit of the joint.
+fn lever_m(chain: &SerialChain, i: usize, anchor: &Anchor) -> f64 {
+    if chain.joints[i].motion == JointMotion::Slide {
+        return 1.0;
+    }
+    let links = chain.joints[i + 1..anchor.first].iter();
+    let links_m = links.map(|link| norm(link.origin.origin_m) + max_slide_m(link));
+    norm(anchor.point_m) + links_m.sum::<f64>()
 }
 
 /// Returns the longest travel of a joint that slides; of one without limits 1 m.

@@ -13,8 +13,9 @@ use sidestep_session::fleet::{
 };
 use std::path::{Path, PathBuf};
 
-/// Seconds of silence after which an airplane is taken to be lost: long, since all processes share this machine and may wait
-/// for a processor.
+/// Seconds of silence after which an airplane is taken to be lost: six times the default of `--lease`. All processes share
+/// this machine and may wait for a processor, and an airplane that is only slow must not count as lost, because its flight
+/// would be missing in the measurement. In exchange, a process that died holds the experiment up for a minute.
 const LEASE_S: f64 = 60.0;
 
 /// The extent of the experiments.

@@ -1,8 +1,7 @@
 //! Laws that hold after every request, in worlds of every kind.
 
-use super::random_worlds::{AnyWorld, apart_m, depth_of_part_m};
 use super::*;
-use crate::fixtures::own_clearance_m;
+use crate::fixtures::{AnyWorld, apart_m, depth_of_part_m, own_clearance_m};
 
 const TOLERANCE: f64 = 1.1e-9;
 

@@ -1,7 +1,7 @@
 //! Changes that must not matter: far obstacles, scale, side of counting, place of the world.
 
-use super::random_worlds::apart_m;
 use super::*;
+use crate::fixtures::apart_m;
 use crate::geometry::first_axis;
 
 /// Returns the places that a chain reaches among balls, with other balls far away and cells of any size.

@@ -14,7 +14,7 @@ use crate::scratch::PositionBuffer;
 use crate::state::Body;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::ConnectorTarget;
-use sidestep_arms::plan::JointSpace;
+use sidestep_arms::plan::{JointPosture, JointSpace};
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
@@ -272,7 +272,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         }
         let ChainContext { world, obstacles, .. } = self.context;
         let is_solid = world.rules.self_collision;
-        let space = JointSpace::new(self.arm, self.joints, self.chain, obstacles, is_solid, k);
+        let present = JointPosture { arm: self.arm, joints: self.joints };
+        let space = JointSpace::new(present, self.chain, obstacles, is_solid, k);
         if let Some(veto) = space.find_veto(&posed.points) {
             return Some(veto);
         }

@@ -49,5 +49,5 @@ fn desired_lead<const D: usize>(
         DesiredMove::Steer(steered) => with_dimensions(steered.pose.at),
         _ => return None,
     };
-    Some(LeadMotion { k: task.agent, way_m: sub(to, chain.points()[task.agent]) })
+    Some(LeadMotion { k: task.agent, displacement_m: sub(to, chain.points()[task.agent]) })
 }

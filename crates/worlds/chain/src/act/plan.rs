@@ -7,7 +7,8 @@ use crate::scratch::PositionBuffer;
 use crate::state::{Body, MotionPlan};
 use crate::world::purpose;
 use sidestep_arms::plan::{
-    ChainPosture, ConfigurationSpace, JointSpace, PlanningQuery, RodSpace, plan, plan_joints,
+    ChainPosture, ConfigurationSpace, JointPosture, JointSpace, PlanningQuery, RodSpace, plan,
+    plan_joints,
 };
 use sidestep_kernel::InputError;
 use sidestep_rods::find_tunneling;
@@ -71,7 +72,8 @@ fn find_path<const D: usize>(
         && let Some(joints) = &body.joints
     {
         let self_collision = rules.self_collision;
-        let space = JointSpace::new(arm, joints, chain, obstacles, self_collision, query.k);
+        let present = JointPosture { arm, joints };
+        let space = JointSpace::new(present, chain, obstacles, self_collision, query.k);
         let path = plan_joints(&space, query, draws)?;
         return Ok(path.map(|path| MotionPlan::Joints(path.into())));
     }
@@ -148,8 +150,8 @@ fn follow_joints<const D: usize>(
     }
     let chain = &body.chain;
     let self_collision = world.rules.self_collision;
-    let space =
-        JointSpace::new(arm, &joints, chain, obstacles, self_collision, initiator.task.agent);
+    let present = JointPosture { arm, joints: &joints };
+    let space = JointSpace::new(present, chain, obstacles, self_collision, initiator.task.agent);
     let dt_s = world.dt_s;
     let to = path.front()?;
     let mut limits = StepLimits::from_initiator(initiator);

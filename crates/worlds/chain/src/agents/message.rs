@@ -31,7 +31,7 @@ impl network::Protocol for MotionProtocol {
     }
 }
 
-/// The message of a packet: what an agent tells a neighbor in one go.
+/// The message of a packet: all that an agent sends to a neighbor at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Packet<const D: usize> {
     /// The nearest lost connector beyond the sender, as the receiver sees it.
@@ -104,7 +104,7 @@ pub(super) struct Consent<const D: usize> {
     pub(super) changed: u32,
     /// and whose rods turn.
     pub(super) rotated: u32,
-    /// Longest way of one of them, meters.
+    /// Longest displacement of one of them, meters.
     pub(super) longest_m: f64,
 }
 
@@ -115,7 +115,7 @@ pub(super) struct VetoMessage {
     pub(super) by: u32,
     pub(super) reason: VetoReason,
     pub(super) obstacle: Option<u32>,
-    /// Whether a rod before it has found a way by turning,
+    /// Whether a rod before it has got past an obstacle by turning,
     pub(super) has_turned: bool,
     /// and whether one could go elsewhere if it tried all its lengths.
     pub(super) may_go_elsewhere: bool,

@@ -10,7 +10,7 @@ use crate::agents::side::Side;
 use crate::agents::{
     ConnectorAgent, ConnectorPercept, Control, Intention, LeaderOutcome, Role, SensedObstacle,
 };
-use crate::fixtures::random_worlds::AnyWorld;
+use crate::fixtures::chains::AnyWorld;
 use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, RecoveryOutcome, Situation};
 use proptest::prelude::*;
 use sidestep_kernel::Seed;

@@ -30,8 +30,8 @@ impl<const D: usize> StepMotion<D> {
             }
             Motion::Rod { i, to } => {
                 let from = [points[i], points[i + 1]];
-                let way_m = max_travel_m(from, to);
-                let part = if way_m <= step_m { 1.0 } else { step_m / way_m };
+                let travel_m = max_travel_m(from, to);
+                let part = if travel_m <= step_m { 1.0 } else { step_m / travel_m };
                 Self { first: i, is_rod: true, from, to: interpolate(from, to, part) }
             }
         }
@@ -58,8 +58,8 @@ impl<const D: usize> StepMotion<D> {
         let second = self.first + usize::from(self.is_rod);
         let left_m =
             distance(points[self.first], self.to[0]) + distance(points[second], self.to[1]);
-        let way_m = self.length_m();
-        if way_m > 0.0 { (1.0 - left_m / way_m).clamp(0.0, 1.0) } else { 1.0 }
+        let length_m = self.length_m();
+        if length_m > 0.0 { (1.0 - left_m / length_m).clamp(0.0, 1.0) } else { 1.0 }
     }
 }
 

@@ -22,11 +22,11 @@ pub(crate) struct SpaceRequirement {
     pub(crate) connectors: usize,
     /// Distance from each connector to the next, meters.
     pub(crate) spacing_m: f64,
-    /// Free distance around every connector's middle, and along the way, meters.
+    /// Free distance around every connector's middle, and along the path, meters.
     pub(crate) clearance_m: f64,
     /// Free distance around the straight line from each connector to the next, meters.
     pub(crate) rod_clearance_m: f64,
-    /// Length of way ahead of the leader that has to be free as well, meters.
+    /// Distance ahead of the leader that has to be free as well, meters.
     pub(crate) ahead_m: f64,
     /// Region where the leader starts; by default anywhere on the site. Many sites have blocks
     /// whose insides are free and lead nowhere.
@@ -61,15 +61,15 @@ struct PlacementFailure {
 pub(crate) fn find_placement(
     site: &Site,
     obstacles: &Obstacles<2>,
-    wanted: &SpaceRequirement,
+    required: &SpaceRequirement,
     seed: Seed,
     number: u32,
 ) -> Result<ChainPlacement, InputError> {
-    wanted.check()?;
-    let search = RouteSearch { site, obstacles, wanted };
+    required.check()?;
+    let search = RouteSearch { site, obstacles, required };
     let streams = Streams::new(seed);
     let mut failure = PlacementFailure::default();
-    let bounds = wanted.within.unwrap_or_else(|| site.bounds());
+    let bounds = required.within.unwrap_or_else(|| site.bounds());
     for place in 0..MAX_PLACES {
         // A stream for each position, so that the draws of one do not depend on the outcome of another.
         let mut draws = streams.draws(number, place, purposes::ROUTE);
@@ -91,7 +91,7 @@ pub(crate) fn find_placement(
             break;
         }
     }
-    Err(failure.error(wanted))
+    Err(failure.error(required))
 }
 
 impl SpaceRequirement {
@@ -119,23 +119,23 @@ impl SpaceRequirement {
 }
 
 impl PlacementFailure {
-    fn error(&self, wanted: &SpaceRequirement) -> InputError {
+    fn error(&self, required: &SpaceRequirement) -> InputError {
         let (cause, remedy) = if self.free_places == 0 {
             let cause = format!(
                 "no place with {} m free around it among {MAX_PLACES} random ones",
-                wanted.clearance_m
+                required.clearance_m
             );
             (cause, "make the robots smaller or the clearance less")
         } else if self.laid == 0 {
             let cause = format!(
                 "no free path for a chain of {:.1} m from {} places; the longest is {:.1} m",
-                wanted.length_m(),
+                required.length_m(),
                 self.free_places,
                 self.longest_m
             );
             (cause, "take fewer followers, a shorter spacing or less clearance")
         } else {
-            let cause = format!("nowhere {} m free ahead of the leader", wanted.ahead_m);
+            let cause = format!("nowhere {} m free ahead of the leader", required.ahead_m);
             (cause, "ask for less room ahead")
         };
         InputError::new("start", cause, remedy)
@@ -145,7 +145,7 @@ impl PlacementFailure {
 struct RouteSearch<'a> {
     site: &'a Site,
     obstacles: &'a Obstacles<2>,
-    wanted: &'a SpaceRequirement,
+    required: &'a SpaceRequirement,
 }
 
 impl RouteSearch<'_> {
@@ -154,14 +154,14 @@ impl RouteSearch<'_> {
     }
 
     fn is_free(&self, at: Point<2>) -> bool {
-        self.site.is_free(at) && self.is_clear([at; 2], self.wanted.clearance_m)
+        self.site.is_free(at) && self.is_clear([at; 2], self.required.clearance_m)
     }
 
     /// Returns a long path away from a position, straightened.
     fn route_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
-        let SpaceRequirement { spacing_m, clearance_m, .. } = *self.wanted;
+        let SpaceRequirement { spacing_m, clearance_m, .. } = *self.required;
         // On a grid of 4 neighbors a path is up to sqrt(2) times as long as in a straight line.
-        let reach_m = 1.5 * self.wanted.length_m() + spacing_m;
+        let reach_m = 1.5 * self.required.length_m() + spacing_m;
         // Boxes of half the clearance, so that no wall fits between two neighbors that are both free.
         let box_m = (0.5 * clearance_m.min(spacing_m)).max(reach_m / MAX_HALF_BOXES);
         let grid = SearchGrid { leader, half: (reach_m / box_m).ceil() as u32, box_m };
@@ -180,7 +180,7 @@ impl RouteSearch<'_> {
             // The next point is clear of itself: it is a free neighbor.
             let mut to = from + 1;
             while to + 1 < path.len()
-                && self.is_clear([path[from], path[to + 1]], self.wanted.clearance_m)
+                && self.is_clear([path[from], path[to + 1]], self.required.clearance_m)
             {
                 to += 1;
             }
@@ -193,7 +193,7 @@ impl RouteSearch<'_> {
     /// Returns connectors along a path, each at the spacing from the one before; `None` if it is too
     /// short, or a rod would come too near to an obstacle.
     fn lay_chain(&self, path: &[Point<2>]) -> Option<Vec<Point<2>>> {
-        let SpaceRequirement { connectors, spacing_m, rod_clearance_m, .. } = *self.wanted;
+        let SpaceRequirement { connectors, spacing_m, rod_clearance_m, .. } = *self.required;
         let mut points = vec![path[0]];
         // The leg on which the last connector lies, and the fraction of that leg behind it: the next one is never placed
         // farther back, where the path enters the circle around the last one again.
@@ -228,9 +228,9 @@ impl RouteSearch<'_> {
     fn placement(&self, points: Vec<Point<2>>) -> Option<ChainPlacement> {
         let at = points[0];
         let u = points.get(1).and_then(|&next| normalized(sub(at, next))).unwrap_or([1.0, 0.0]);
-        let ahead = [at, add_scaled(at, u, self.wanted.ahead_m)];
+        let ahead = [at, add_scaled(at, u, self.required.ahead_m)];
         let leader = GroundPose { at, heading_rad: atan2(u[1], u[0]) };
-        self.is_clear(ahead, self.wanted.clearance_m).then_some(ChainPlacement { leader, points })
+        self.is_clear(ahead, self.required.clearance_m).then_some(ChainPlacement { leader, points })
     }
 }
 
@@ -331,26 +331,29 @@ mod tests {
         Site::from_map(&map, UnknownPolicy::Wall)
     }
 
-    fn check(name: &str, site: &Site, wanted: &SpaceRequirement, seeds: u64) {
+    fn check(name: &str, site: &Site, required: &SpaceRequirement, seeds: u64) {
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         for seed in 0..seeds {
-            let start = find_placement(site, &obstacles, wanted, Seed(seed), 0).expect(name);
-            assert_eq!(start, find_placement(site, &obstacles, wanted, Seed(seed), 0).unwrap());
-            assert_eq!((start.points.len(), start.points[0]), (wanted.connectors, start.leader.at));
-            let within = wanted.within.unwrap_or_else(|| site.bounds());
+            let start = find_placement(site, &obstacles, required, Seed(seed), 0).expect(name);
+            assert_eq!(start, find_placement(site, &obstacles, required, Seed(seed), 0).unwrap());
+            assert_eq!(
+                (start.points.len(), start.points[0]),
+                (required.connectors, start.leader.at)
+            );
+            let within = required.within.unwrap_or_else(|| site.bounds());
             assert!(within.meets(&Bounds::from_points(&[start.leader.at])));
             for rod in start.points.windows(2) {
-                assert!((distance(rod[0], rod[1]) - wanted.spacing_m).abs() < 1e-9);
+                assert!((distance(rod[0], rod[1]) - required.spacing_m).abs() < 1e-9);
                 let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
-                assert!(apart_m >= wanted.rod_clearance_m, "{name}: rod at {apart_m}");
+                assert!(apart_m >= required.rod_clearance_m, "{name}: rod at {apart_m}");
             }
             for &p in &start.points {
                 assert!(site.is_free(p));
-                assert!(obstacles.clearance_m([p; 2], 0.0, 1.0) >= wanted.clearance_m);
+                assert!(obstacles.clearance_m([p; 2], 0.0, 1.0) >= required.clearance_m);
             }
-            let rod = Rod::fixed(wanted.spacing_m, wanted.rod_clearance_m);
-            let n = wanted.connectors;
-            let connectors = vec![Connector::free(wanted.clearance_m); n];
+            let rod = Rod::fixed(required.spacing_m, required.rod_clearance_m);
+            let n = required.connectors;
+            let connectors = vec![Connector::free(required.clearance_m); n];
             assert!(Chain::new(start.points, connectors, vec![rod; n - 1]).is_ok());
         }
     }
@@ -365,11 +368,11 @@ mod tests {
     fn starts_differ_by_seed_and_number() {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
-        let wanted = SpaceRequirement { connectors: 5, ..WANTED };
-        let start = |seed| find_placement(&site, &obstacles, &wanted, Seed(seed), 0).unwrap();
+        let required = SpaceRequirement { connectors: 5, ..WANTED };
+        let start = |seed| find_placement(&site, &obstacles, &required, Seed(seed), 0).unwrap();
         assert_ne!(start(1), start(2));
         let of_number =
-            |number| find_placement(&site, &obstacles, &wanted, Seed(1), number).unwrap();
+            |number| find_placement(&site, &obstacles, &required, Seed(1), number).unwrap();
         assert_ne!(of_number(0), of_number(1));
     }
 
@@ -377,8 +380,8 @@ mod tests {
     fn what_is_wanting_is_said() {
         let site = bent();
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
-        let cause = |wanted: SpaceRequirement| {
-            find_placement(&site, &obstacles, &wanted, Seed(1), 0).unwrap_err().cause().to_owned()
+        let cause = |required: SpaceRequirement| {
+            find_placement(&site, &obstacles, &required, Seed(1), 0).unwrap_err().cause().to_owned()
         };
         assert!(
             cause(SpaceRequirement { clearance_m: 2.0, ..WANTED }).contains("no place with 2 m")

@@ -328,8 +328,10 @@ impl RecoveryLadder {
         climb: &mut RecoveryAttempt<'_, M, D>,
         situation: &Situation,
     ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
-        let (k, way) = climb.wanted_displacement();
-        let Some(u) = normalized(way).filter(|_| !situation.keeps_heading) else { return Ok(None) };
+        let (k, displacement) = climb.wanted_displacement();
+        let Some(u) = normalized(displacement).filter(|_| !situation.keeps_heading) else {
+            return Ok(None);
+        };
         let axes = axes_across(u);
         for (plane, turn_rad) in fan(&self.memory, D - 1) {
             let turn = |v| turn_toward(v, u, axes[plane], turn_rad);
@@ -368,7 +370,7 @@ impl RecoveryLadder {
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
-        let (k, way) = climb.wanted_displacement();
+        let (k, displacement) = climb.wanted_displacement();
         let begins = self.memory.pulling_back == self.rungs.pull_back;
         if begins && self.memory.hand_overs >= self.rungs.hand_overs {
             return self.report_stuck(climb);
@@ -378,7 +380,7 @@ impl RecoveryLadder {
             return self.report_stuck(climb);
         };
         let axes = axes_across(u);
-        let step = scaled(u, norm(way));
+        let step = scaled(u, norm(displacement));
         // The good side is the initiator's, and means nothing at the other end.
         let turns = fan(&RecoveryMemory::default(), D - 1);
         for (plane, turn_rad) in std::iter::once((0, 0.0)).chain(turns) {
@@ -411,7 +413,9 @@ fn try_shorter<M: ChainMover<D>, const D: usize>(
     climb: &mut RecoveryAttempt<'_, M, D>,
 ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
     for part in STEP_FRACTIONS {
-        if let Some(moved) = climb.attempt(climb.with_displacement(|way| scaled(way, part)))? {
+        if let Some(moved) =
+            climb.attempt(climb.with_displacement(|displacement| scaled(displacement, part)))?
+        {
             return Ok(Some(RecoveryOutcome::Shorter { part, moved }));
         }
     }

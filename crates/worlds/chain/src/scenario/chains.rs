@@ -438,7 +438,7 @@ impl<const D: usize> Compiler<'_, D> {
         let arm = self.arm(arm, to_dimensions(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(LINK_RADIUS_FACTOR * radius_m));
         let solid = solid.map_err(|error| self.source.error_from(arm_span, &error))?;
-        // D is 3 here, but only the types of `D` dimensions tell the compiler so.
+        // `D` is three here, which the compiler cannot know.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let mut connectors: Vec<_> = solid.connectors().iter().map(arm_connector).collect();
         for limit in &s.limits.0 {
@@ -548,7 +548,7 @@ impl<const D: usize> Compiler<'_, D> {
                 ("along", s.along.is_some(), false),
                 ("heading_deg", s.heading_deg.is_some(), false),
             ];
-            self.check_unused_key(&keys, "beside points_m", at.clone())?;
+            self.source.refuse_unused_keys(at.clone(), &keys, "beside points_m")?;
             if given.is_empty() {
                 let at = self.source.key_span(at, &["points_m"]);
                 return Err(self.source.error(at, "points_m = []", "give one point or more"));

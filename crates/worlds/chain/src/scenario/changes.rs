@@ -148,7 +148,7 @@ impl<const D: usize> Compiler<'_, D> {
             ("may_come", s.may_come.is_some(), joins),
             ("speed_m_s", s.speed_m_s.is_some(), joins),
         ];
-        self.check_unused_key(&keys, "in this change", at)
+        self.source.refuse_unused_keys(at, &keys, "in this change")
     }
 
     /// Tries a constraint on a copy, so that it cannot fail during a run.

@@ -16,12 +16,8 @@ struct NonLocalKey {
 }
 
 impl NonLocalKey {
-    fn new(
-        key: impl Into<String>,
-        reason: impl Into<String>,
-        remedy: &'static str,
-    ) -> Option<Self> {
-        Some(Self { key: key.into(), reason: reason.into(), remedy })
+    fn new(key: impl Into<String>, reason: impl Into<String>, remedy: &'static str) -> Self {
+        Self { key: key.into(), reason: reason.into(), remedy }
     }
 }
 
@@ -55,22 +51,22 @@ fn non_local_rule(rules: &Rules, escapes: bool) -> Option<NonLocalKey> {
         let reason =
             "self_collision = true: to avoid its own parts, a chain has to know all of them";
         let remedy = "set chain.self_collision = false";
-        return NonLocalKey::new("chain.self_collision", reason, remedy);
+        return Some(NonLocalKey::new("chain.self_collision", reason, remedy));
     }
     if rules.backtracks > 0 {
         let reason = format!(
             "backtracks = {}: to step back takes the places that all before it could have taken",
             rules.backtracks
         );
-        return NonLocalKey::new("chain.backtracks", reason, "set chain.backtracks = 0");
+        return Some(NonLocalKey::new("chain.backtracks", reason, "set chain.backtracks = 0"));
     }
     if escapes {
         let reason = "escape: which parts escape first, or all at once, depends on all of them";
-        return NonLocalKey::new("chain.escape", reason, "set chain.escape = \"off\"");
+        return Some(NonLocalKey::new("chain.escape", reason, "set chain.escape = \"off\""));
     }
     if rules.slave_step_max_m == f64::INFINITY {
         let reason = "slave_step_max_m = inf: a follower may be thrown to any place";
-        return NonLocalKey::new("chain.slave_step_max_m", reason, "give a length");
+        return Some(NonLocalKey::new("chain.slave_step_max_m", reason, "give a length"));
     }
     None
 }
@@ -81,25 +77,25 @@ fn non_local_key<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NonLoc
     if spec.arm.is_some() {
         let reason = format!("an arm: the target of its tool {passes}");
         let remedy = "give a chain without a base";
-        return NonLocalKey::new(format!("chains.{s}.arm"), reason, remedy);
+        return Some(NonLocalKey::new(format!("chains.{s}.arm"), reason, remedy));
     }
     let mut connectors = spec.start.connectors().iter();
     if let Some(k) = connectors.position(|c| c.failed || c.mobility != Mobility::Free) {
         let reason = format!("connector {k} is held: a target {passes}");
         let remedy = "make all connectors free";
-        return NonLocalKey::new(format!("chains.{s}.limits"), reason, remedy);
+        return Some(NonLocalKey::new(format!("chains.{s}.limits"), reason, remedy));
     }
     for (i, task) in spec.tasks.iter().enumerate() {
         if task.plans_after_s.is_some() {
             let key = format!("chains.{s}.tasks.{i}.planner");
             let reason = "a planner: its paths are postures of the whole chain";
-            return NonLocalKey::new(key, reason, "set planner = \"none\"");
+            return Some(NonLocalKey::new(key, reason, "set planner = \"none\""));
         }
         if matches!(task.driver, TaskKind::External) {
             let key = format!("chains.{s}.tasks.{i}.kind");
             let reason =
                 "kind = \"external\": as far as it goes is found by halves, of rods as well";
-            return NonLocalKey::new(key, reason, "give another kind");
+            return Some(NonLocalKey::new(key, reason, "give another kind"));
         }
     }
     spec.changes.iter().find_map(|change| {
@@ -112,6 +108,6 @@ fn non_local_key<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NonLoc
                 "a chain that breaks: its parts find together by passes from end to end".into()
             }
         };
-        NonLocalKey::new(format!("chains.{s}.changes"), reason, "leave that change out")
+        Some(NonLocalKey::new(format!("chains.{s}.changes"), reason, "leave that change out"))
     })
 }

@@ -185,7 +185,7 @@ impl<const D: usize> Compiler<'_, D> {
             ("detects_from_m", s.detects_from_m.is_some(), seeks),
             ("needs_line_of_sight", s.needs_line_of_sight, seeks),
         ];
-        self.check_unused_key(&keys, "without target_m", section.span())
+        self.source.refuse_unused_keys(section.span(), &keys, "without target_m")
     }
 
     /// Returns the target, or the end of the scenario's corridor.

@@ -201,7 +201,7 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, "a ground lies in the plane", remedy));
         }
         let unknown = [("unknown", s.unknown.is_some(), s.map.is_some())];
-        self.check_unused_key(&unknown, "without ground.map", at.clone())?;
+        self.source.refuse_unused_keys(at.clone(), &unknown, "without ground.map")?;
         let unknown = match s.unknown.unwrap_or_default() {
             UnknownWord::Solid => UnknownPolicy::Wall,
             UnknownWord::Free => UnknownPolicy::Free,
@@ -304,7 +304,7 @@ impl<const D: usize> Compiler<'_, D> {
             ("closed", s.closed.is_some(), s.patrol_m.is_some()),
             ("speed_m_s", s.speed_m_s.is_some(), s.patrol_m.is_some()),
         ];
-        self.check_unused_key(&keys, "for this obstacle", at)
+        self.source.refuse_unused_keys(at, &keys, "for this obstacle")
     }
 
     fn add_outline(

@@ -229,12 +229,12 @@ impl<const D: usize> Compiler<'_, D> {
         ];
         let keys = keys_of_kinds.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
         let context = format!("in a task of kind {:?}", s.kind).to_lowercase();
-        self.check_unused_key(&keys, &context, at.clone())?;
+        self.source.refuse_unused_keys(at.clone(), &keys, &context)?;
         // A caller sees each veto, and decides itself when to give up; a resting chain wants nothing.
         let is_patient = !matches!(s.kind, TaskKindWord::External | TaskKindWord::Rest);
         let patience = ("patience_s", s.patience_s.is_some(), is_patient);
-        self.check_unused_key(&[patience], &context, at.clone())?;
+        self.source.refuse_unused_keys(at.clone(), &[patience], &context)?;
         let delay = ("plans_after_s", s.plans_after_s.is_some(), plans);
-        self.check_unused_key(&[delay], "without a planner", at)
+        self.source.refuse_unused_keys(at, &[delay], "without a planner")
     }
 }

@@ -25,7 +25,8 @@ impl Default for Turtle {
 
 impl Turtle {
     fn up(&self) -> [f64; 3] {
-        let ([ax, ay, az], [lx, ly, lz]) = (self.ahead, self.left);
+        let [ax, ay, az] = self.ahead;
+        let [lx, ly, lz] = self.left;
         [ay * lz - az * ly, az * lx - ax * lz, ax * ly - ay * lx]
     }
 
@@ -35,11 +36,11 @@ impl Turtle {
 
     /// Turns to the left about the upward axis.
     fn turn(&mut self, angle_rad: f64) {
-        let (s, c) = (sin(angle_rad), cos(angle_rad));
-        (self.ahead, self.left) = (
-            linear_combination(self.ahead, c, self.left, s),
-            linear_combination(self.left, c, self.ahead, -s),
-        );
+        let s = sin(angle_rad);
+        let c = cos(angle_rad);
+        let ahead = linear_combination(self.ahead, c, self.left, s);
+        self.left = linear_combination(self.left, c, self.ahead, -s);
+        self.ahead = ahead;
         self.straighten();
     }
 
@@ -255,7 +256,9 @@ fn evaluate(terms: &[Term], parameters: &[f64]) -> f64 {
             Term::Named(..) => unreachable!("names are resolved when a script is read"),
             Term::Negate => -pop(&mut stack),
             operator => {
-                let (b, a) = (pop(&mut stack), pop(&mut stack));
+                // The second operand was pushed last.
+                let b = pop(&mut stack);
+                let a = pop(&mut stack);
                 match operator {
                     Term::Add => a + b,
                     Term::Subtract => a - b,

@@ -51,7 +51,7 @@ pub struct Body<const D: usize> {
     pub(crate) missing: Vec<MissingNeighbors>,
     /// Decisions that agents in other processes have submitted for a cycle.
     pub(crate) submitted: Option<ChainControls<D>>,
-    /// Motions that the chain has yet to follow; none whenever it is read.
+    /// Motions that the chain has yet to follow; none in a body that [`ChainState::body`](super::ChainState::body) returns.
     pub(crate) deferred: DeferredMotions<D>,
 }
 

@@ -4,7 +4,7 @@ use super::ConnectorAgent;
 use crate::agents::message::{Consent, Message, Prepare, VetoMessage};
 use crate::agents::side::Side;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::local_solver::{LocalSolver, MasterMotion, Reaction};
+use sidestep_rods::local_solver::{LocalSolver, MasterMotion, Reaction, SlavePosition};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{PendingVeto, Rod, VetoReason};
 
@@ -101,6 +101,7 @@ impl<const D: usize> ConnectorAgent<D> {
     ) -> Result<Reaction<D>, PendingVeto> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
+        let slave = SlavePosition { so: self.position.base, rod, next };
         let pull = MasterMotion {
             mo: prepare.mo,
             mn: prepare.mn,
@@ -109,7 +110,7 @@ impl<const D: usize> ConnectorAgent<D> {
             is_open: prepare.is_open,
             all_lengths: prepare.all_lengths,
         };
-        self.solver.react(self.position.base, rod, next, &self.obstacles, &pull)
+        self.solver.react(&slave, &self.obstacles, &pull)
     }
 
     fn send_veto(&mut self, to: Side, refusal: PendingVeto, may_go_elsewhere: bool) {

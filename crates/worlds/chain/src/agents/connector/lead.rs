@@ -115,6 +115,7 @@ impl<const D: usize> ConnectorAgent<D> {
             return LeadPhase::Object(self.own_veto(refusal));
         }
         self.position.now = to;
+        // Above first, as where one process moves the chain, so that both make the same bits.
         LeadPhase::Ask(Side::Above, LengthChoice::Own)
     }
 

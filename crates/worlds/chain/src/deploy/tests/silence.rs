@@ -5,7 +5,7 @@ use super::{compared_on, network, talked};
 use crate::agents::{ConnectorMove, LeaderOutcome};
 use crate::chain_run;
 use crate::deploy::final_positions;
-use crate::fixtures::random_worlds::AnyWorld;
+use crate::fixtures::chains::AnyWorld;
 use proptest::prelude::*;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::network::{Network, RadioOutage, TimeWindow, UnidirectionalLink};

@@ -169,8 +169,8 @@ impl<const D: usize> LiteralEscape<D> {
         for (k, lever) in movable_connectors(tick.chain, threat.part, &near).into_iter().flatten() {
             let push_m =
                 ((threat.depth_m + PUSH_MARGIN_M) / lever).min(self.max_distance_m(tick, k));
-            for way in push_directions(near.away, mover.velocity_m_s) {
-                let to = add_scaled(tick.chain.points()[k], way, push_m);
+            for direction in push_directions(near.away, mover.velocity_m_s) {
+                let to = add_scaled(tick.chain.points()[k], direction, push_m);
                 match self.attempt(tick, which, k, to)? {
                     Ok(touched) => return Ok(Ok(touched)),
                     // A veto by the speed limit is kept: it is more informative than any other

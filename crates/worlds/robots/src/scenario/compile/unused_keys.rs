@@ -57,13 +57,13 @@ fn check_robots(
     let has_places = !s.at.is_empty();
     let has_list = s.scen.is_some();
     let beside_list = [
-        ("at", has_list && has_places),
-        ("region", has_list && s.region.is_some()),
-        ("behaviour", has_list && s.behaviour.is_some()),
+        ("at", has_places, !has_list),
+        ("region", s.region.is_some(), !has_list),
+        ("behaviour", s.behaviour.is_some(), !has_list),
     ];
     let because = "beside `scen`, which lists starts and goals";
     source.refuse_unused_keys(section.span(), &beside_list, because)?;
-    let beside_places = [("region", has_places && s.region.is_some())];
+    let beside_places = [("region", s.region.is_some(), !has_places)];
     source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
     check_phase(source, path, s.period, s.phase)?;
     match &s.behaviour {
@@ -119,7 +119,7 @@ fn check_people(
     section: &Spanned<MoverSection>,
 ) -> Result<(), InputError> {
     let s = section.get_ref();
-    let beside_places = [("region", s.region.is_some() && !s.at.is_empty())];
+    let beside_places = [("region", s.region.is_some(), s.at.is_empty())];
     source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
     check_phase(source, path, s.period, s.phase)
 }
@@ -130,10 +130,11 @@ fn check_doors(
     has_doors: bool,
 ) -> Result<(), InputError> {
     let s = section.get_ref();
-    let without_doors = [("office", s.office && !has_doors)];
+    let without_doors = [("office", s.office, has_doors)];
     let because = "on a map without doors of its own";
     source.refuse_unused_keys(section.span(), &without_doors, because)?;
-    let beside_office = [("size", s.size.is_some() && s.office && s.at.is_empty())];
+    let sizes_places = !s.office || !s.at.is_empty();
+    let beside_office = [("size", s.size.is_some(), sizes_places)];
     let because = "beside `office`, whose doors have sizes";
     source.refuse_unused_keys(section.span(), &beside_office, because)
 }

@@ -34,15 +34,15 @@ pub(super) struct Contacts<const D: usize> {
 }
 
 impl<const D: usize> Contacts<D> {
-    /// Collects the parts near obstacles that move. Connectors move by `way_m` at most.
+    /// Collects the parts near obstacles that move. Connectors move by `move_m` at most.
     pub(super) fn find_movers(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         margin: Margin,
-        way_m: f64,
+        move_m: f64,
     ) {
-        let reach_m = CONTACT_RANGE_FACTOR * way_m;
+        let reach_m = CONTACT_RANGE_FACTOR * move_m;
         collect(
             chain,
             obstacles,
@@ -52,15 +52,15 @@ impl<const D: usize> Contacts<D> {
         );
     }
 
-    /// Collects walls and own parts that connectors may reach with a displacement of `way_m`.
+    /// Collects walls and own parts that connectors may reach with a displacement of `move_m`.
     pub(super) fn find_nearby(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         own: bool,
-        way_m: f64,
+        move_m: f64,
     ) {
-        let reach_m = CONTACT_RANGE_FACTOR * way_m;
+        let reach_m = CONTACT_RANGE_FACTOR * move_m;
         self.walls.clear();
         self.pairs.clear();
         for part in parts(chain) {

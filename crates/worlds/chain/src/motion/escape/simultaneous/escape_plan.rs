@@ -8,7 +8,7 @@
 use super::super::EscapeRules;
 use super::super::threat::gap_m;
 use super::posture::ends;
-use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
+use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
 use super::solve::{EscapeSolver, direction_away};
 use super::solve_input::{ExitDirection, SolveInput};
 use serde::{Deserialize, Serialize};
@@ -111,20 +111,22 @@ impl EscapePlan {
         let mut left = rollout.ticks_for(MAX_WORK);
         let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
         // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
-        let mut best = (IMPROVEMENT_FACTOR * cost_now - 0.5, now);
-        for way in std::iter::once(None).chain(exit_candidates(input, solver).into_iter().map(Some))
+        let mut best = (IMPROVEMENT_FACTOR * cost_now - MIN_BENEFIT_TICKS, now);
+        for exit in
+            std::iter::once(None).chain(exit_candidates(input, solver).into_iter().map(Some))
         {
             if left == 0 {
                 break;
             }
-            let cost = rollout.cost(&RolloutOptions::with_exit(way), best.0, &mut left);
+            let cost = rollout.cost(&RolloutOptions::with_exit(exit), best.0, &mut left);
             if cost < best.0 {
-                best = (cost, way);
+                best = (cost, exit);
             }
         }
-        self.passing = best
-            .1
-            .map(|way| ActiveExit { obstacle: way.obstacle, toward: with_dimensions(way.toward) });
+        self.passing = best.1.map(|exit| ActiveExit {
+            obstacle: exit.obstacle,
+            toward: with_dimensions(exit.toward),
+        });
         best.1 != now
     }
 }

@@ -7,7 +7,7 @@
 //! steps among 8 discs), because leaders that turn to and fro get nowhere.
 
 use super::super::EscapeRules;
-use super::rollout::{IMPROVEMENT_FACTOR, Rollout, RolloutOptions};
+use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
 use super::solve_input::{LeadMotion, SolveInput};
 
 /// Connectors to either side of the leader that rollouts include: many more than for an exit, because the leader pulls
@@ -16,8 +16,6 @@ const SIDE_CONNECTORS: usize = 48;
 /// Limit on the work of a choice: ticks of rollouts times connectors in them. It suffices for two whole rollouts, of 150
 /// ticks each, with all 97 connectors.
 const MAX_WORK: usize = 40_000;
-/// Ticks inside that resting must save: a leader that rests for nothing gets nowhere.
-const MIN_BENEFIT_TICKS: f64 = 0.5;
 
 /// Returns whether a leader should rest.
 pub(super) fn should_rest<const D: usize>(
@@ -30,8 +28,8 @@ pub(super) fn should_rest<const D: usize>(
     let rollout = Rollout::cut(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
     let mut left = rollout.ticks_for(MAX_WORK);
-    let wanted = LeadMotion { k: lead.k - from, way_m: lead.way_m };
-    let rest = LeadMotion { way_m: [0.0; D], ..wanted };
+    let wanted = LeadMotion { k: lead.k - from, displacement_m: lead.displacement_m };
+    let rest = LeadMotion { displacement_m: [0.0; D], ..wanted };
     let wanted_cost = rollout.cost(&RolloutOptions::with_lead(wanted), f64::INFINITY, &mut left);
     let enough = IMPROVEMENT_FACTOR * wanted_cost - MIN_BENEFIT_TICKS;
     if enough <= 0.0 {

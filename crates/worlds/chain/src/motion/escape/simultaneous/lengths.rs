@@ -59,15 +59,15 @@ impl<const D: usize> LengthSolver<D> {
         self.beyond_m.clear();
         let mut worst_m = 0.0_f64;
         for (i, rod) in rods.iter().enumerate() {
-            let way = sub(posture.points[i + 1], posture.points[i]);
-            let length_m = norm(way);
+            let along = sub(posture.points[i + 1], posture.points[i]);
+            let length_m = norm(along);
             let spare_m = MAX_MARGIN_M.min(MARGIN_FRACTION * (rod.max_m - rod.min_m));
             let low_m = rod.min_m + spare_m;
             let high_m = rod.max_m - spare_m;
             let beyond_m = length_m - length_m.clamp(low_m, high_m);
             let is_free = length_m > low_m + AT_LIMIT_M && length_m < high_m - AT_LIMIT_M;
             let counts = !is_free && length_m > 0.0;
-            self.directions.push(if counts { way.map(|x| x / length_m) } else { [0.0; D] });
+            self.directions.push(if counts { along.map(|x| x / length_m) } else { [0.0; D] });
             self.beyond_m.push(if counts { beyond_m } else { 0.0 });
             worst_m = worst_m.max(beyond_m.abs());
         }

@@ -73,17 +73,17 @@ impl<const D: usize> SimultaneousEscape<D> {
         let rules = &tick.propagator.rules;
         // A step of the chain is a quarter of its thinnest part.
         let thinnest_m = 4.0 * chain.step_m();
-        let most_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
-        let steps = (most_m / thinnest_m).ceil().max(1.0);
+        let max_step_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
+        let steps = (max_step_m / thinnest_m).ceil().max(1.0);
         let mut report = EscapeReport::default();
         escape_plan.tick();
         for step in 1..=steps as usize {
-            let most_m = most_m * step as f64 / steps;
+            let max_step_m = max_step_m * step as f64 / steps;
             // Taken out, because the solve borrows the start and changes everything else.
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
-            let input = SolveInput { chain, obstacles, rules, start: &at, most_m };
+            let input = SolveInput { chain, obstacles, rules, start: &at, max_step_m };
             let has_moved = self.find_step(&input, escape_plan, &mut report);
             if has_moved {
                 chain.points_mut().copy_from_slice(&self.best);
@@ -97,7 +97,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         let longest_m = moves_m.fold(0.0, f64::max);
         report.is_pressed = report.left.is_some()
             || escape_plan.is_exiting()
-            || longest_m > PRESSED_SPEED_FRACTION * most_m;
+            || longest_m > PRESSED_SPEED_FRACTION * max_step_m;
         report
     }
 
@@ -109,8 +109,8 @@ impl<const D: usize> SimultaneousEscape<D> {
         rules: &Rules,
         lead: &LeadMotion<D>,
     ) -> bool {
-        let most_m = self.rules.max_step_m();
-        let input = SolveInput { chain, obstacles, rules, start: chain.points(), most_m };
+        let max_step_m = self.rules.max_step_m();
+        let input = SolveInput { chain, obstacles, rules, start: chain.points(), max_step_m };
         should_rest(&self.rules, &input, lead)
     }
 
@@ -186,7 +186,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         if let Some(threat) = deepest.filter(|_| gap_m < -TOUCH_M) {
             let k = threat.part.connector();
             let goes_m = distance(input.start[k], self.best[k]);
-            let is_capped = goes_m > PRESSED_SPEED_FRACTION * input.most_m;
+            let is_capped = goes_m > PRESSED_SPEED_FRACTION * input.max_step_m;
             report.vetoes = 1;
             report.capped = usize::from(is_capped);
             let reason = if is_capped { VetoReason::StepLimit } else { VetoReason::Inside };

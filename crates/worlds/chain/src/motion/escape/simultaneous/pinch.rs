@@ -71,7 +71,7 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
 fn inside(world: &World, episode: &Episode, legs: &[TimedExit], enough: usize) -> usize {
     let (mut chain, mut obstacles) = (episode.chain.clone(), (*world.obstacles).clone());
     let rules = world.escape.expect("something moves");
-    let (margin, most_m) = (rules.look_ahead_margin(), rules.speed_max_m_s * rules.dt_s);
+    let (margin, max_step_m) = (rules.look_ahead_margin(), rules.speed_max_m_s * rules.dt_s);
     let (mut solver, mut now, mut most, mut clear) = (EscapeSolver::default(), 0, 0, 0);
     for tick in 0..TICKS {
         let movers: Vec<_> = movers(world, episode, tick + 1);
@@ -82,7 +82,7 @@ fn inside(world: &World, episode: &Episode, legs: &[TimedExit], enough: usize) -
             obstacles: &obstacles,
             rules: &world.rules,
             start: &start,
-            most_m,
+            max_step_m,
         };
         if solver.find_contacts(&given, margin) {
             let leg = legs.iter().find(|leg| (leg.from..leg.to).contains(&tick));

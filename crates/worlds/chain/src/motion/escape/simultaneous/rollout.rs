@@ -15,7 +15,7 @@ pub(super) struct Rollout<'a, const D: usize> {
     obstacles: Obstacles<D>,
     margin: Margin,
     dt_s: f64,
-    most_m: f64,
+    max_step_m: f64,
     ticks: usize,
 }
 
@@ -32,6 +32,9 @@ pub(super) struct RolloutOptions<const D: usize> {
 /// Factor by which the cost of a choice must be lower than that of the present one: a chain that changes its exit whenever
 /// another is a little shorter goes to and fro and leaves by none.
 pub(super) const IMPROVEMENT_FACTOR: f64 = 0.8;
+/// Ticks inside that a choice must save beside that: where little is at stake, the factor alone would let a leader rest for
+/// nothing, or an exit change for depth alone.
+pub(super) const MIN_BENEFIT_TICKS: f64 = 0.5;
 /// Longest time of a rollout, s: farther ahead obstacles no longer move at constant velocity.
 const MAX_HORIZON_S: f64 = 3.0;
 /// Most ticks of a rollout, which limits the work where ticks are short.
@@ -49,21 +52,22 @@ struct Trial<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,
     propagator: Propagator<D>,
+    solver: EscapeSolver<D>,
 }
 
 impl<const D: usize> Trial<D> {
-    /// Leads the chain on, unless it needs its speed of `most_m` in a tick to escape. `start` holds the positions at the
+    /// Leads the chain on, unless it needs its speed, of `max_step_m` a tick, to escape. `start` holds the positions at the
     /// start of the tick.
-    fn move_leader(&mut self, lead: LeadMotion<D>, start: &[Point<D>], most_m: f64) {
-        if self.max_displacement_m(start) > PRESSED_SPEED_FRACTION * most_m {
+    fn move_leader(&mut self, lead: LeadMotion<D>, start: &[Point<D>], max_step_m: f64) {
+        if self.max_displacement_m(start) > PRESSED_SPEED_FRACTION * max_step_m {
             return;
         }
         let escaped = self.chain.points().to_vec();
-        let to = add(escaped[lead.k], lead.way_m);
+        let to = add(escaped[lead.k], lead.displacement_m);
         let request = Request::exact(lead.k, to);
         // Beyond the range of coordinates nothing is led.
         let went = self.propagator.propagate(&mut self.chain, &self.obstacles, &request);
-        if went.is_err() || self.max_displacement_m(start) > most_m {
+        if went.is_err() || self.max_displacement_m(start) > max_step_m {
             self.chain.points_mut().copy_from_slice(&escaped);
         }
     }
@@ -95,7 +99,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
         between: RangeInclusive<usize>,
     ) -> Option<Self> {
         let (from, to) = between.into_inner();
-        let SolveInput { chain, obstacles, most_m, .. } = *input;
+        let SolveInput { chain, obstacles, max_step_m, .. } = *input;
         let cut = Chain::new_broken(
             chain.points()[from..=to].to_vec(),
             chain.connectors()[from..=to].to_vec(),
@@ -120,7 +124,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
             obstacles: near,
             margin: rules.look_ahead_margin(),
             dt_s: rules.dt_s,
-            most_m,
+            max_step_m,
             ticks: (horizon_s / rules.dt_s).ceil() as usize,
         })
     }
@@ -138,19 +142,14 @@ impl<'a, const D: usize> Rollout<'a, D> {
     /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
     /// `enough`, or when no tick is `left`.
     pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut usize) -> f64 {
-        let mut trial = Trial {
-            chain: self.chain.clone(),
-            obstacles: self.obstacles.clone(),
-            propagator: self.propagator(),
-        };
-        let mut solver = EscapeSolver::default();
+        let mut trial = self.start_trial();
         let RolloutOptions { mut through, lead, clear: clear_ticks } = *tried;
         let mut cost = 0.0;
         let mut clear = 0;
         if let Some(lead) = lead {
             // The leader chooses after the escape of this cycle, so its motion comes first.
             let start = trial.chain.points().to_vec();
-            trial.move_leader(lead, &start, self.most_m);
+            trial.move_leader(lead, &start, self.max_step_m);
             trial.obstacles.advance(self.dt_s);
         }
         for _ in 0..self.ticks {
@@ -159,15 +158,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
             }
             *left -= 1;
             let start = trial.chain.points().to_vec();
-            let input = SolveInput {
-                chain: &trial.chain,
-                obstacles: &trial.obstacles,
-                rules: self.rules,
-                start: &start,
-                most_m: self.most_m,
-            };
-            let gap_m = self.tick(&input, &mut solver, &mut through);
-            trial.chain.points_mut().copy_from_slice(&solver.points);
+            let gap_m = self.escape(&mut trial, &start, &mut through);
             clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
             if clear == 0 {
                 cost += 1.0 - DEPTH_COST * gap_m;
@@ -177,20 +168,42 @@ impl<'a, const D: usize> Rollout<'a, D> {
             }
             // As in the run itself, a leader gives way while parts are inside.
             if let Some(lead) = lead.filter(|_| clear > 0) {
-                trial.move_leader(lead, &start, self.most_m);
+                trial.move_leader(lead, &start, self.max_step_m);
             }
             trial.obstacles.advance(self.dt_s);
         }
         cost
     }
 
-    fn propagator(&self) -> Propagator<D> {
-        let slave_step_max_m = self.rules.slave_step_max_m.min(self.most_m);
-        Propagator::new(Rules { slave_step_max_m, ..*self.rules })
+    fn start_trial(&self) -> Trial<D> {
+        // Slaves of the leader are no faster than escapes may be.
+        let slave_step_max_m = self.rules.slave_step_max_m.min(self.max_step_m);
+        Trial {
+            chain: self.chain.clone(),
+            obstacles: self.obstacles.clone(),
+            propagator: Propagator::new(Rules { slave_step_max_m, ..*self.rules }),
+            solver: EscapeSolver::default(),
+        }
     }
 
-    /// Makes one tick of a rollout; the solver has the new positions. Returns the least gap, meters.
-    fn tick(
+    /// Moves the chain under trial out of the way in one tick, at whose start its connectors are at `start`; returns the
+    /// least gap then, meters.
+    fn escape(
+        &self,
+        trial: &mut Trial<D>,
+        start: &[Point<D>],
+        through: &mut Option<ExitDirection<D>>,
+    ) -> f64 {
+        let Trial { chain, obstacles, solver, .. } = trial;
+        let input =
+            SolveInput { chain, obstacles, rules: self.rules, start, max_step_m: self.max_step_m };
+        let gap_m = self.find_positions(&input, solver, through);
+        chain.points_mut().copy_from_slice(&solver.points);
+        gap_m
+    }
+
+    /// Solves for the positions at the end of a tick, which the solver has then. Returns the least gap, meters.
+    fn find_positions(
         &self,
         input: &SolveInput<'_, D>,
         solver: &mut EscapeSolver<D>,

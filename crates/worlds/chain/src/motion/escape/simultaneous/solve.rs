@@ -57,12 +57,12 @@ const RESERVE_FRACTION: f64 = 1e-4;
 impl<const D: usize> EscapeSolver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
     pub(super) fn find_contacts(&mut self, input: &SolveInput<'_, D>, margin: Margin) -> bool {
-        let SolveInput { chain, obstacles, rules, most_m, .. } = *input;
-        self.contacts.find_movers(chain, obstacles, margin, most_m);
+        let SolveInput { chain, obstacles, rules, max_step_m, .. } = *input;
+        self.contacts.find_movers(chain, obstacles, margin, max_step_m);
         if self.contacts.threats.is_empty() {
             return false;
         }
-        self.contacts.find_nearby(chain, obstacles, rules.self_collision, most_m);
+        self.contacts.find_nearby(chain, obstacles, rules.self_collision, max_step_m);
         self.inverse_mass.clear();
         let connectors = chain.connectors().iter();
         self.inverse_mass.extend(connectors.map(|c| if c.is_still() { 0.0 } else { 1.0 }));
@@ -109,7 +109,7 @@ impl<const D: usize> EscapeSolver<D> {
         for (point, inverse_mass) in self.points.iter_mut().zip(&self.inverse_mass) {
             let apart_m = mover.core.nearest_to_point(*point).distance_m - mover.radius_m;
             if apart_m < EXIT_RANGE_FACTOR * longest_m {
-                *point = add_scaled(*point, through.toward, inverse_mass * input.most_m);
+                *point = add_scaled(*point, through.toward, inverse_mass * input.max_step_m);
             }
         }
     }
@@ -123,7 +123,7 @@ impl<const D: usize> EscapeSolver<D> {
     ) -> f64 {
         let Self { contacts, points, inverse_mass, .. } = self;
         let mut posture = trial_posture(points, inverse_mass);
-        let mut most_m = 0.0_f64;
+        let mut greatest_m = 0.0_f64;
         for threat in &contacts.threats {
             let mover = &input.obstacles.moving()[threat.mover];
             let ends = posture.ends(threat.part);
@@ -138,15 +138,15 @@ impl<const D: usize> EscapeSolver<D> {
                 continue;
             }
             let by = if let Some(through) = through {
-                scaled(through.toward, input.most_m)
+                scaled(through.toward, input.max_step_m)
             } else {
                 let fraction = if soft.is_some() { SOFT_FRACTION } else { 1.0 };
                 scaled(direction_away(mover, &nearest), fraction * (keep_m - gap_m))
             };
             posture.shift(threat.part, fraction_along(ends, nearest.on_body), by);
-            most_m = most_m.max(keep_m - gap_m);
+            greatest_m = greatest_m.max(keep_m - gap_m);
         }
-        most_m
+        greatest_m
     }
 
     /// Pushes parts out of walls and apart, and corrects bends; returns the greatest correction,
@@ -154,7 +154,7 @@ impl<const D: usize> EscapeSolver<D> {
     fn push_from_walls(&mut self) -> f64 {
         let Self { contacts, points, inverse_mass, bends, .. } = self;
         let mut posture = trial_posture(points, inverse_mass);
-        let mut most_m = 0.0_f64;
+        let mut greatest_m = 0.0_f64;
         for wall in &contacts.walls {
             let ends = posture.ends(wall.part);
             let nearest = wall.core.nearest_to_segment(ends);
@@ -163,7 +163,7 @@ impl<const D: usize> EscapeSolver<D> {
             if short_m > 0.0 {
                 let along_rod = fraction_along(ends, nearest.on_body);
                 posture.shift(wall.part, along_rod, scaled(away, short_m));
-                most_m = most_m.max(short_m);
+                greatest_m = greatest_m.max(short_m);
             }
         }
         for pair in &contacts.pairs {
@@ -176,10 +176,10 @@ impl<const D: usize> EscapeSolver<D> {
                 let away = normalized(sub(nearest.on_core, nearest.on_body))
                     .unwrap_or_else(|| perpendicular(first_axis()));
                 posture.separate(one, other, away, short_m);
-                most_m = most_m.max(short_m);
+                greatest_m = greatest_m.max(short_m);
             }
         }
-        bends.iter().fold(most_m, |most_m, bend| most_m.max(bend.correct(&mut posture)))
+        bends.iter().fold(greatest_m, |greatest_m, bend| greatest_m.max(bend.correct(&mut posture)))
     }
 
     /// Keeps every connector within its speed, and at a position that its mobility allows.

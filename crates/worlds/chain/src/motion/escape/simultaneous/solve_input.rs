@@ -13,14 +13,14 @@ pub(super) struct SolveInput<'a, const D: usize> {
     /// Positions from which displacements count.
     pub(super) start: &'a [Point<D>],
     /// Longest displacement of a connector, meters.
-    pub(super) most_m: f64,
+    pub(super) max_step_m: f64,
 }
 
 impl<const D: usize> SolveInput<'_, D> {
     /// Returns the distance from its start that a connector may have, meters: as far as its speed
     /// allows, or as far as it already is.
     pub(super) fn max_travel_m(&self, k: usize) -> f64 {
-        self.most_m.max(distance(self.start[k], self.chain.points()[k]))
+        self.max_step_m.max(distance(self.start[k], self.chain.points()[k]))
     }
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct LeadMotion<const D: usize> {
     /// The connector that leads.
     pub(crate) k: usize,
     /// The displacement that it wants in this tick, meters.
-    pub(crate) way_m: Point<D>,
+    pub(crate) displacement_m: Point<D>,
 }
 
 /// An exit through an obstacle: parts in it leave in one direction, even if another is shorter.

@@ -66,9 +66,9 @@ impl<const D: usize> Case<D> {
                 escape_plan,
             )
             .unwrap();
-        let most_m = escaper.rules().speed_max_m_s * DT_S;
+        let max_step_m = escaper.rules().speed_max_m_s * DT_S;
         for (k, (from, to)) in start.iter().zip(chain.points()).enumerate() {
-            assert!(distance(*from, *to) <= most_m + 1e-12, "connector {k} is too fast");
+            assert!(distance(*from, *to) <= max_step_m + 1e-12, "connector {k} is too fast");
             assert!(from == to || !chain.connectors()[k].is_still(), "connector {k} moved");
         }
         assert!(chain.max_rod_violation_m() <= 1e-9);
@@ -211,13 +211,13 @@ fn inside_by(way: Option<ExitDirection<2>>, from: usize) -> usize {
     for tick in 0..400 {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
-        let (chain_now, most_m) = (chain.clone(), DT_S);
+        let (chain_now, max_step_m) = (chain.clone(), DT_S);
         let given = SolveInput {
             chain: &chain_now,
             obstacles: &obstacles,
             rules: &SOLID,
             start: &start,
-            most_m,
+            max_step_m,
         };
         if !solver.find_contacts(&given, margin) {
             continue;
