@@ -172,14 +172,10 @@ fn omitted_text(reason: &str, metrics: &[&str]) -> String {
 /// Prints the first failed runs and how to run them again, and returns the number of all.
 fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
     let SweepOutput { plan, folder, console } = output;
-    let trial = table.column("cell");
-    let trial_of = |row: usize| {
-        let id = trial.and_then(|c| c.values.number(row)).map(|id| id as u64);
-        id.and_then(|id| plan.trial_of(id))
-    };
     let failed: Vec<usize> = sweep::failed_rows(table).collect();
     for &row in failed.iter().take(MAX_LISTED_FAILURES) {
-        let Some(trial) = trial_of(row) else { continue };
+        let id = table.column("cell").and_then(|ids| ids.values.number(row));
+        let Some(trial) = id.and_then(|id| plan.trial_of(id as u64)) else { continue };
         let again = folder.map_or_else(String::new, |folder| {
             let scenario = folder.scenario(trial.variant);
             format!("\n  again: sidestep run {} --seed {}", scenario.display(), trial.seed)

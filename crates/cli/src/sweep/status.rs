@@ -39,30 +39,34 @@ pub(crate) fn print_status(
 fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
     let path = folder.path().display();
     let mut lines: Vec<(String, String)> = Vec::new();
-    let mut line = |name: &str, value: String| lines.push((name.to_string(), value));
     for share in &status.shares {
-        line(&format!("share {}", share.share), share_text(share));
+        lines.push(line(&format!("share {}", share.share), share_text(share)));
     }
     if let Some(rate) = status.runs_per_s.filter(|_| !status.is_complete) {
-        line("rate", format!("{rate:.3} runs per second recently"));
+        lines.push(line("rate", format!("{rate:.3} runs per second recently")));
     }
     if let Some(eta_s) = status.eta_s.filter(|_| !status.is_complete) {
-        line("time left", format_duration(eta_s));
+        lines.push(line("time left", format_duration(eta_s)));
     }
-    line("failed", group_thousands(status.failed as u64));
+    lines.push(line("failed", group_thousands(status.failed as u64)));
     for failure in status.failures.iter().take(MAX_LISTED_FAILURES) {
-        line("", format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why));
+        let text = format!("{}, seed {}: {}", failure.variant, failure.seed, failure.why);
+        lines.push(line("", text));
     }
     if status.is_complete {
-        line("view it", format!("sidestep report {path}"));
+        lines.push(line("view it", format!("sidestep report {path}")));
     } else if status.is_active {
         // No advice: a second process would run the same trials again.
     } else if status.runs == status.total {
-        line("join them", format!("sidestep sweep collect {path}"));
+        lines.push(line("join them", format!("sidestep sweep collect {path}")));
     } else {
-        line("continue", format!("sidestep resume {path}"));
+        lines.push(line("continue", format!("sidestep resume {path}")));
     }
     lines
+}
+
+fn line(name: &str, value: String) -> (String, String) {
+    (name.to_string(), value)
 }
 
 fn share_text(share: &ShareStatus) -> String {
