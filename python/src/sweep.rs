@@ -20,7 +20,7 @@ use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::settings::Method;
+use sidestep::worlds::airspace::settings::BuiltInMethod;
 use sidestep_papers::methods;
 use sidestep_session::sweep::{
     self, Engine, Folder, OutcomeSink, SweepEnd, Task, TrialBatch, TrialExecutor,
@@ -357,9 +357,9 @@ pub(crate) fn compare_methods(
     let py = scenario.py();
     let loaded = load(scenario)?;
     let source = loaded.source()?;
-    let known = Method::ALL.map(|method| (method.name(), method));
+    let known = BuiltInMethod::ALL.map(|method| (method.name(), method));
     let methods = methods.iter().map(|name| choose("methods", name, &known));
-    let methods = methods.collect::<PyResult<Vec<Method>>>()?;
+    let methods = methods.collect::<PyResult<Vec<BuiltInMethod>>>()?;
     let Some(compiled) = loaded.compiled.as_any().downcast_ref::<CompiledAirspace>() else {
         let cause = "methods of collision avoidance are of the world `airspace` alone";
         return Err(argument_error("scenario", cause, "give a scenario with world = \"airspace\""));

@@ -23,6 +23,6 @@ mod testing {
 
     /// Returns the worlds whose scenarios the tests sweep.
     pub(crate) fn worlds() -> Worlds {
-        Worlds::new("tests").with(Robots::new()).with(Airspace).with(Chains)
+        Worlds::new("tests").with(Robots::new()).with(Airspace::new()).with(Chains::new())
     }
 }

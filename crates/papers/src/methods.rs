@@ -12,7 +12,7 @@ use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::settings::Method;
+use sidestep::worlds::airspace::settings::BuiltInMethod;
 use sidestep_document::estimate::format_short;
 use sidestep_document::{Estimate, Table};
 
@@ -62,7 +62,7 @@ pub struct Comparison<'a> {
     /// The scenario, of the airspace world; its own method is not used.
     pub source: &'a Source,
     /// The methods.
-    pub methods: &'a [Method],
+    pub methods: &'a [BuiltInMethod],
     /// The runs of each method.
     pub seeds: SeedSpan,
     /// Number of runs at the same time; only the time depends on it.
@@ -274,7 +274,7 @@ fn table_note(results: &[MethodResult]) -> String {
 mod tests {
     use super::*;
 
-    fn compare(source: &Source, methods: &[Method], runs: usize) -> Vec<MethodResult> {
+    fn compare(source: &Source, methods: &[BuiltInMethod], runs: usize) -> Vec<MethodResult> {
         let seeds = SeedSpan { first: 1, runs };
         let interrupt = Interrupt::default();
         let comparison = Comparison { source, methods, seeds, workers: 2, interrupt };
@@ -287,7 +287,7 @@ mod tests {
                     [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
                     [[airplanes]]\nat_m = [9000, 500]\nheading_deg = 180\nway_points_m = [[0, 500]]\n";
         let source = Source::new("two", text, "");
-        let results = compare(&source, &Method::ALL, 5);
+        let results = compare(&source, &BuiltInMethod::ALL, 5);
         let table = table("t", &results);
         for (result, row) in results.iter().zip(&table.rows) {
             assert_eq!((result.runs, result.losses.n), (1, 1), "{}", result.method);
@@ -305,7 +305,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
-        let methods = [Method::Pc, Method::None];
+        let methods = [BuiltInMethod::Pc, BuiltInMethod::None];
         let results = compare(&source, &methods, 3);
         assert_eq!((results[0].loss_free, results[1].loss_free), (3, 0));
         assert_eq!(results[0].arrived.mean, Some(1.0));
@@ -321,7 +321,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
-        let results = compare(&source, &[Method::None], 2);
+        let results = compare(&source, &[BuiltInMethod::None], 2);
         assert_eq!(results[0].loss_free, 2);
         let note = table("t", &results).note;
         assert!(note.contains("The shield changed commands of none:"), "{note}");

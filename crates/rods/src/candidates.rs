@@ -3,7 +3,7 @@
 use super::chain::{Mobility, Rod};
 use super::geometry::{
     Core, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
-    normalized, scaled, sub,
+    normalized, scaled, sub, with_dimensions,
 };
 use super::interval::{
     self, AngleInterval, MasterRod, TurnDirection, bend_forbidden_arc, block_rod, block_tip,
@@ -13,6 +13,7 @@ use super::motion_context::{
     Block, BlockOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep, is_length_allowed,
 };
 use super::obstacle::bounds_around;
+use super::reaction::{MasterMove, Reaction};
 use super::rules::Rotation;
 use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
 use super::veto::VetoReason;
@@ -106,6 +107,9 @@ impl<const D: usize> MotionContext<'_, D> {
             return self.place_on_line(step, scratch);
         }
         let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+        if let Some(reaction) = self.reaction {
+            return self.place_by_reaction(reaction, step, guided, scratch);
+        }
         let Err(objection) = self.check_place(step, guided) else {
             scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
             return Ok(());
@@ -122,6 +126,44 @@ impl<const D: usize> MotionContext<'_, D> {
             Rotation::Literal => self.rotate_once(step, guided, scratch),
             Rotation::Union => self.rotate(step, guided, objection, scratch),
         }
+    }
+
+    /// Handles a slave by a reaction of the program's own; `guided` is its place on the guide line.
+    fn place_by_reaction(
+        &self,
+        reaction: &dyn Reaction,
+        step: &SlaveStep<D>,
+        guided: Point<D>,
+        scratch: &mut CandidateScratch<D>,
+    ) -> Result<(), PendingVeto> {
+        let check = |at_m: Point<3>| {
+            let checked = self.check_rod_and_place(step, with_dimensions(at_m));
+            checked.map_err(|objection| objection.reason)
+        };
+        let percept = MasterMove {
+            at_m: with_dimensions(step.so),
+            master_from_m: with_dimensions(step.mo),
+            master_to_m: with_dimensions(step.mn),
+            behind_master_m: step.prev.map(with_dimensions),
+            guided_m: with_dimensions(guided),
+            rod_m: [step.rod.min_m, step.rod.max_m],
+            radius_m: step.tip_radius_m,
+            max_bend_rad: step.max_bend_rad,
+            check: &check,
+        };
+        let at = with_dimensions(reaction.react(&percept).map_err(PendingVeto::new)?);
+        self.check_rod_and_place(step, at)?;
+        scratch.found.push(Candidate { at, rotated: at != guided, turn_rad: 0.0 });
+        Ok(())
+    }
+
+    /// Checks a place of a slave that may be at any distance from its master.
+    fn check_rod_and_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
+        // No comparison holds for a coordinate that is no number.
+        if !is_length_allowed(step.rod, distance(step.mn, at)) {
+            return Err(PendingVeto::new(VetoReason::Mobility));
+        }
+        self.check_place(step, at)
     }
 
     /// Returns a position that the rod allows for a slave confined to a box, by alternating projections

@@ -20,6 +20,7 @@ mod open;
 mod pass;
 mod propagate;
 mod reach;
+mod reaction;
 pub mod rebuild;
 mod rod_bvh;
 mod rules;
@@ -41,6 +42,7 @@ pub use motion_context::{
 pub use obstacle::{Obstacle, Obstacles, bounds_around, outline};
 pub use propagate::{Propagator, local_solver};
 pub use reach::{ReachOutcome, ReachRequest, reach};
+pub use reaction::{MasterMove, Reaction};
 pub use rod_bvh::RodBvh;
 pub use rules::{Rotation, Rules};
 pub use sidestep_kernel::InputError;

@@ -6,6 +6,7 @@
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Bounds, Core, Point, angle_rad, distance, sub};
 use super::obstacle::{Obstacles, swept_bounds};
+use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
 use super::rules::Rules;
 use super::sweep::Sweep;
@@ -163,6 +164,8 @@ pub(super) struct MotionContext<'a, const D: usize> {
     pub(super) rules: &'a Rules,
     pub(super) tentative: &'a TentativePositions<D>,
     pub(super) own_rods: &'a RodBvh<D>,
+    /// The reaction of free connectors, unless it is the built-in one.
+    pub(super) reaction: Option<&'a dyn Reaction>,
 }
 
 impl<'a, const D: usize> MotionContext<'a, D> {

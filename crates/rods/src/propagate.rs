@@ -15,12 +15,14 @@ use super::motion_context::{
 use super::obstacle::{Obstacles, swept_bounds};
 use super::open::{self, StayRule};
 use super::pass::{Direction, MotionTally};
+use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
 use super::rules::{Rotation, Rules};
 use super::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
 use separation::ProofSchedule;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Largest number of sub-steps of a request. One that would need more is an input error: it comes from a wrong
 /// unit or from a rod of nearly no length, and would seem to hang.
@@ -35,6 +37,8 @@ const INTERRUPT_CHECK_INTERVAL: usize = 16;
 pub struct Propagator<const D: usize> {
     /// Rules by which chains react.
     pub rules: Rules,
+    /// The reaction of free connectors, unless it is the built-in one.
+    reaction: Option<Arc<dyn Reaction>>,
     tentative: TentativePositions<D>,
     own_rods: RodBvh<D>,
     motion_bounds: MotionBounds<D>,
@@ -119,6 +123,12 @@ impl<const D: usize> Propagator<D> {
         Self { rules, ..Self::default() }
     }
 
+    /// Returns the propagator with a reaction of free connectors in place of the built-in one, if one is given.
+    #[must_use]
+    pub fn with_reaction(self, reaction: Option<Arc<dyn Reaction>>) -> Self {
+        Self { reaction, ..self }
+    }
+
     /// Moves a chain as requested, in sub-steps if anything may be in the way.
     ///
     /// # Errors
@@ -139,7 +149,7 @@ impl<const D: usize> Propagator<D> {
             return Ok(Outcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
-        if self.pull_all_if_separated(chain, obstacles, &driven, n) {
+        if self.reaction.is_none() && self.pull_all_if_separated(chain, obstacles, &driven, n) {
             return Ok(Outcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
@@ -196,8 +206,10 @@ impl<const D: usize> Propagator<D> {
             return Ok(());
         }
         // From the cheapest motion to the dearest. Each gives the bits of the last one where it
-        // applies, so which of them runs is a matter of speed alone.
-        let is_open = is_open(chain, obstacles, &driven);
+        // applies, so which of them runs is a matter of speed alone. The cheap ones know the built-in
+        // reaction only.
+        let is_built_in = self.reaction.is_none();
+        let is_open = is_built_in && is_open(chain, obstacles, &driven);
         if is_open && !self.rules.self_collision {
             open::pull(chain, driven.first, driven.to[0], StayRule::Exactly, &mut self.tally);
             return Ok(());
@@ -206,7 +218,7 @@ impl<const D: usize> Propagator<D> {
             return Ok(());
         }
         if self.rules.self_collision {
-            if !is_open && self.sweep_if_separated(chain, obstacles, &driven) {
+            if is_built_in && !is_open && self.sweep_if_separated(chain, obstacles, &driven) {
                 return Ok(());
             }
             let points = chain.points();
@@ -284,7 +296,8 @@ impl<const D: usize> Propagator<D> {
         obstacles: &'a Obstacles<D>,
     ) -> MotionContext<'a, D> {
         let Self { rules, tentative, own_rods, .. } = self;
-        MotionContext { chain, obstacles, rules, tentative, own_rods }
+        let reaction = self.reaction.as_deref();
+        MotionContext { chain, obstacles, rules, tentative, own_rods, reaction }
     }
 
     /// Sweeps from a driven connector outward. Rods keep their lengths when they turn, which is cheap
@@ -362,8 +375,9 @@ impl<const D: usize> Propagator<D> {
         SweepContext { chain, obstacles, direction }: SweepContext<'_, D>,
         slave: usize,
     ) -> Result<(), PendingVeto> {
-        let Self { rules, tentative, own_rods, scratch, .. } = self;
-        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
+        let Self { rules, reaction, tentative, own_rods, scratch, .. } = self;
+        let reaction = reaction.as_deref();
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods, reaction };
         context.candidates(&context.step(slave, direction), scratch)
     }
 

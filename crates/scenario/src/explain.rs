@@ -70,7 +70,7 @@ fn last_key(path: &str) -> &str {
 }
 
 /// Returns the names in backticks in a text.
-fn quoted(text: &str) -> Vec<&str> {
+pub(crate) fn quoted(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 

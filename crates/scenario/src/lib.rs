@@ -12,6 +12,7 @@
 //! know: orders and rewards of learning agents, recorded positions, and the tools of the studio's page.
 
 mod bundle;
+mod by_name;
 mod edit;
 pub mod editing;
 mod explain;
@@ -31,6 +32,7 @@ mod spanned;
 pub mod world_type;
 
 pub use bundle::{Bundle, ResolvedScenario, SeedTemplate};
+pub use by_name::ByName;
 pub use edit::{CharEdit, Edit};
 pub use editing::Editing;
 pub use explain::suggestion;

@@ -6,4 +6,4 @@ use sidestep_scenario::Worlds;
 use std::sync::LazyLock;
 
 pub(crate) static WORLDS: LazyLock<Worlds> =
-    LazyLock::new(|| Worlds::new("tests").with(Robots::new()).with(Airspace));
+    LazyLock::new(|| Worlds::new("tests").with(Robots::new()).with(Airspace::new()));

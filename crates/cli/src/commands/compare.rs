@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::Interrupt;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
-use sidestep::worlds::airspace::settings::Method;
+use sidestep::worlds::airspace::settings::BuiltInMethod;
 use sidestep_document::Table;
 use sidestep_papers::methods::{Comparison, SeedSpan, table};
 
@@ -50,12 +50,12 @@ enum MethodName {
 }
 
 impl MethodName {
-    fn method(self) -> Method {
+    fn method(self) -> BuiltInMethod {
         match self {
-            Self::Pc => Method::Pc,
-            Self::Orca => Method::Orca,
-            Self::Mvp => Method::Mvp,
-            Self::None => Method::None,
+            Self::Pc => BuiltInMethod::Pc,
+            Self::Orca => BuiltInMethod::Orca,
+            Self::Mvp => BuiltInMethod::Mvp,
+            Self::None => BuiltInMethod::None,
         }
     }
 }
@@ -67,7 +67,7 @@ impl MethodName {
 pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, Failure> {
     let (source, compiled) = args.scenario.compile()?;
     let compiled: &CompiledAirspace = downcast_scenario(compiled.as_ref(), &source, "airspace")?;
-    let methods: Vec<Method> = args.methods.iter().map(|name| name.method()).collect();
+    let methods: Vec<BuiltInMethod> = args.methods.iter().map(|name| name.method()).collect();
     let stages = StageBar::new(console);
     let comparison = Comparison {
         source: &source,

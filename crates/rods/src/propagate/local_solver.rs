@@ -10,10 +10,12 @@ use crate::motion_context::{
     MotionContext, PendingVeto, SlaveStep, TentativePositions, is_length_allowed,
 };
 use crate::obstacle::Obstacles;
+use crate::reaction::Reaction;
 use crate::rod_bvh::RodBvh;
 use crate::rules::{Rotation, Rules};
 use crate::veto::{Motion, VetoEffect};
 use sidestep_kernel::InputError;
+use std::sync::Arc;
 
 /// Index of the connector in a chain of its own.
 const SELF_INDEX: usize = 0;
@@ -27,6 +29,8 @@ pub struct LocalSolver<const D: usize> {
     /// so that the connector decides as it would inside it.
     chain: Chain<D>,
     rules: Rules,
+    /// Its reaction, unless it is the built-in one.
+    reaction: Option<Arc<dyn Reaction>>,
     scratch: CandidateScratch<D>,
     tentative: TentativePositions<D>,
     own_rods: RodBvh<D>,
@@ -62,7 +66,7 @@ pub struct SlavePosition<const D: usize> {
 
 /// A slave's reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reaction<const D: usize> {
+pub struct SlaveReaction<const D: usize> {
     /// Its new position; the old one, bit for bit, if it stays.
     pub at: Point<D>,
     /// Whether the motion ends here, because the slave stays and everything beyond it meets its constraints.
@@ -83,10 +87,17 @@ impl<const D: usize> LocalSolver<D> {
         Self {
             chain: chain.single_connector(k),
             rules,
+            reaction: None,
             scratch: CandidateScratch::default(),
             tentative: TentativePositions::default(),
             own_rods: RodBvh::default(),
         }
+    }
+
+    /// Returns the connector with a reaction in place of the built-in one, if one is given.
+    #[must_use]
+    pub fn with_reaction(self, reaction: Option<Arc<dyn Reaction>>) -> Self {
+        Self { reaction, ..self }
     }
 
     /// Returns its bend limit, rad.
@@ -121,16 +132,17 @@ impl<const D: usize> LocalSolver<D> {
         slave: &SlavePosition<D>,
         obstacles: &Obstacles<D>,
         pull: &MasterMotion<D>,
-    ) -> Result<Reaction<D>, PendingVeto> {
-        if pull.is_open {
+    ) -> Result<SlaveReaction<D>, PendingVeto> {
+        if pull.is_open && self.reaction.is_none() {
             return Ok(self.free_reaction(slave, pull));
         }
         let SlavePosition { so, rod, next } = *slave;
         self.chain.points_mut()[SELF_INDEX] = so;
-        let Self { chain, rules, scratch, tentative, own_rods } = self;
+        let Self { chain, rules, reaction, scratch, tentative, own_rods } = self;
         scratch.all_lengths = pull.all_lengths;
         scratch.has_turned = false;
-        let context = MotionContext { chain, obstacles, rules, tentative, own_rods };
+        let reaction = reaction.as_deref();
+        let context = MotionContext { chain, obstacles, rules, tentative, own_rods, reaction };
         let connector = &chain.connectors()[SELF_INDEX];
         let step = SlaveStep {
             master: MASTER_INDEX,
@@ -160,7 +172,7 @@ impl<const D: usize> LocalSolver<D> {
             is_length_allowed(next_rod, distance(next_at, so))
                 && next_step.is_bend_allowed_at(next_at)
         });
-        Ok(Reaction {
+        Ok(SlaveReaction {
             at: if stays { so } else { chosen.at },
             ends: stays && may_stop,
             rotated: chosen.rotated,
@@ -170,13 +182,13 @@ impl<const D: usize> LocalSolver<D> {
     }
 
     /// Returns its reaction where nothing can object.
-    fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> Reaction<D> {
+    fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> SlaveReaction<D> {
         let SlavePosition { so, rod, next } = *slave;
         let at = guide([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
         let is_next_allowed =
             next.is_none_or(|(beyond, rod)| is_length_allowed(rod, distance(so, beyond)));
         let ends = at == so && is_next_allowed;
-        Reaction { at, ends, rotated: false, has_others: false, has_turned: false }
+        SlaveReaction { at, ends, rotated: false, has_others: false, has_turned: false }
     }
 
     /// Returns the number of sub-steps in which it moves to a target as an initiator.
@@ -224,7 +236,8 @@ impl<const D: usize> LocalSolver<D> {
     ) -> Result<(), PendingVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
         let Self { chain, rules, tentative, own_rods, .. } = &*self;
-        MotionContext { chain, obstacles, rules, tentative, own_rods }
+        let reaction = self.reaction.as_deref();
+        MotionContext { chain, obstacles, rules, tentative, own_rods, reaction }
             .check_initiator(SELF_INDEX, to)
     }
 }

@@ -38,6 +38,7 @@ use proptest::prelude::*;
 mod apart;
 mod degenerate;
 mod laws;
+mod reaction;
 mod symmetry;
 mod tunnel;
 

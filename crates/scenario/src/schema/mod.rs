@@ -95,6 +95,19 @@ pub fn for_world(world: &dyn WorldType) -> Value {
     Value::Object(members)
 }
 
+/// Adds names to a definition of a schema that lists built-in names: those of choices that a program adds.
+pub fn add_names<'a>(schema: &mut Value, definition: &str, names: impl Iterator<Item = &'a str>) {
+    let list = &mut schema["$defs"][definition];
+    for name in names {
+        // Where a name has a description, each is an alternative of its own.
+        if let Some(Value::Array(alternatives)) = list.get_mut("oneOf") {
+            alternatives.push(json!({ "type": "string", "const": name }));
+        } else if let Some(Value::Array(values)) = list.get_mut("enum") {
+            values.push(name.into());
+        }
+    }
+}
+
 /// Returns the schema of a file with the keys of `schema`, a title, and the descriptions of a commented scenario for
 /// the keys that both have.
 pub fn for_file(title: &str, mut schema: Value, scenario: &str) -> Value {

@@ -17,7 +17,7 @@ pub(crate) static WORLDS: LazyLock<Worlds> = LazyLock::new(|| Worlds::new(BUILD)
 
 /// Worlds that are shipped.
 pub(crate) static SHIPPED_WORLDS: LazyLock<Worlds> =
-    LazyLock::new(|| Worlds::new(BUILD).with(Robots::new()).with(Airspace));
+    LazyLock::new(|| Worlds::new(BUILD).with(Robots::new()).with(Airspace::new()));
 
 /// The build of these tests.
 pub(crate) const BUILD: &str = "0.1.0+0123456789ab";

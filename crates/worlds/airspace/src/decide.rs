@@ -10,10 +10,10 @@ use super::agents::network_traffic::NetworkTraffic;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
+use super::method::MethodKind;
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, game};
 use super::purpose;
-use super::settings::Method;
 use super::shield::TurnProfile;
 use super::world::AirspaceWorld;
 pub(super) use group_memory::max_group_bytes;
@@ -108,16 +108,18 @@ impl DecisionStrategy {
         let is_alone = group.is_empty() || group.len() + others < 2;
         match world.method {
             _ if Self::is_reactive(world) => Self::Reactive,
-            Method::Pc if is_alone => Self::Independent,
-            Method::Pc if max_group_bytes(world, group) > world.group_bytes => Self::GroupTooLarge,
-            Method::Pc => Self::Joint,
+            MethodKind::Pc if is_alone => Self::Independent,
+            MethodKind::Pc if max_group_bytes(world, group) > world.group_bytes => {
+                Self::GroupTooLarge
+            }
+            MethodKind::Pc => Self::Joint,
             _ => Self::Independent,
         }
     }
 
     /// Returns whether the method gives headings by the positions and goals of all.
     pub(super) fn is_reactive(world: &AirspaceWorld) -> bool {
-        matches!(world.method, Method::Mvp | Method::Orca)
+        matches!(world.method, MethodKind::Mvp | MethodKind::Orca | MethodKind::Own(_))
     }
 }
 
@@ -128,7 +130,7 @@ pub(super) fn candidates_alone(
     external_action: Option<&ExternalAction>,
 ) -> ManeuverCandidates {
     match world.method {
-        Method::External => external::candidates_by_action(world, known, external_action),
+        MethodKind::External => external::candidates_by_action(world, known, external_action),
         _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
 }
@@ -155,8 +157,9 @@ pub(super) fn candidates_by_velocity(
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperative],
     memory: &mut [ActiveResolutions],
+    now: Cycle,
 ) -> Vec<ManeuverCandidates> {
-    let profiles = velocity::profiles_by_velocity(world, group, non_cooperative, memory);
+    let profiles = velocity::profiles_by_velocity(world, group, non_cooperative, memory, now);
     profiles.into_iter().map(ManeuverCandidates::from_profiles).collect()
 }
 

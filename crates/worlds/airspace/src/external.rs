@@ -7,10 +7,10 @@ mod tests;
 use super::external_action::ExternalAction;
 use super::flight::KnownAircraft;
 use super::join::ControlledGroup;
+use super::method::MethodKind;
 use super::non_cooperative::NonCooperative;
 use super::perceive::{known_aircraft, non_cooperative_aircraft};
 use super::scratch::{PhaseContext, Scratch};
-use super::settings::Method;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{act, join};
@@ -42,7 +42,7 @@ impl AirspaceWorld {
     /// Returns team `k`, the first of which is named like an airplane, because most worlds have no other.
     fn team(&self, k: usize, agents: Vec<EntityId>) -> Team {
         let name = if k == 0 { Self::AGENT.into() } else { format!("{} {}", Self::AGENT, k + 1) };
-        let action_spaces = if self.method == Method::External {
+        let action_spaces = if matches!(self.method, MethodKind::External) {
             self.order_spaces(agents[0] as usize)
         } else {
             Vec::new()

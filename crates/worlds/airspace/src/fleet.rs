@@ -2,8 +2,9 @@
 
 use crate::decide::possible_profiles;
 use crate::events::EventKind;
+use crate::method::MethodKind;
 use crate::pilot::{Control, Maneuver, Percept};
-use crate::settings::{Deployment, Method};
+use crate::settings::Deployment;
 use crate::shield::TurnProfile;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
@@ -180,8 +181,10 @@ impl AirspaceWorld {
         }
         let profiles = match self.method {
             // A caller may order any heading, and a reactive method may choose any.
-            Method::Mvp | Method::Orca | Method::External => return Ok(()),
-            Method::Pc | Method::None => possible_profiles(self, own.known_aircraft()),
+            MethodKind::Mvp | MethodKind::Orca | MethodKind::External | MethodKind::Own(_) => {
+                return Ok(());
+            }
+            MethodKind::Pc | MethodKind::None => possible_profiles(self, own.known_aircraft()),
         };
         let is_known = profiles.iter().any(|profile| profile.omegas_rad_s == *omegas_rad_s);
         if is_known && (*candidate as usize) < profiles.len() {

@@ -8,9 +8,10 @@ mod start_groups;
 
 use super::flight::Airplane;
 use super::flight_plan::AirplaneSection;
+use super::method::Methods;
 use super::settings::{
-    Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise, Inflation, LevelGap,
-    LookAhead, Method, RecordSection, Rounds, Step, Tolerance, Weight,
+    BuiltInMethod, Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise,
+    Inflation, LevelGap, LookAhead, RecordSection, Rounds, Step, Tolerance, Weight,
 };
 use super::shield::Side;
 use super::state::{AirplaneRecord, PackedEnd, Snapshot};
@@ -27,7 +28,7 @@ use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{
-    Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
+    ByName, Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
 };
 use std::sync::Arc;
 
@@ -61,7 +62,7 @@ struct AirspaceFile {
 #[serde(deny_unknown_fields, default)]
 struct AirspaceSection {
     preset: Preset,
-    method: Method,
+    method: ByName<BuiltInMethod>,
     shield: Switch,
     deployment: Deployment,
     groups: Option<Spanned<Grouping>>,
@@ -102,9 +103,11 @@ struct AirspaceSection {
     error_sigmas: Option<Number<Closed<0, 100>>>,
 }
 
-/// Returns the JSON Schema of a scenario's sections.
-pub(super) fn sections() -> Value {
-    schema::for_type::<AirspaceFile>()
+/// Returns the JSON Schema of a scenario's sections; `own` are methods beside the built-in ones.
+pub(super) fn sections(own: &Methods) -> Value {
+    let mut sections = schema::for_type::<AirspaceFile>();
+    schema::add_names(&mut sections, "Method", own.keys().map(String::as_str));
+    sections
 }
 
 /// The times until which tracks may be replayed, infinity included.
@@ -154,6 +157,8 @@ struct ScenarioSource {
     source: Source,
     head: Head,
     file: AirspaceFile,
+    /// Methods beside the built-in ones.
+    own: Methods,
 }
 
 impl CompiledAirspace {
@@ -162,8 +167,17 @@ impl CompiledAirspace {
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in it.
     pub fn new(source: &Source) -> Result<Self, InputError> {
+        Self::with_methods(source, &Methods::new())
+    }
+
+    /// Compiles a scenario that may name methods beside the built-in ones.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn with_methods(source: &Source, own: &Methods) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
-        Compiler::new(&Arc::new(ScenarioSource { source: source.clone(), head, file })).compile()
+        let recipe = ScenarioSource { source: source.clone(), head, file, own: own.clone() };
+        Compiler::new(&Arc::new(recipe)).compile()
     }
 
     /// Returns the same scenario with another seed, as if compiled with that seed. Traffic that is drawn, and

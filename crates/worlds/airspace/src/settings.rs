@@ -13,7 +13,8 @@ pub(crate) use values::{
 /// The methods by which airplanes choose their actions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Method {
+#[schemars(rename = "Method")]
+pub enum BuiltInMethod {
     /// Probability collectives.
     #[default]
     Pc,
@@ -27,7 +28,7 @@ pub enum Method {
     External,
 }
 
-impl Method {
+impl BuiltInMethod {
     /// The methods by which airplanes decide themselves.
     pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
 

@@ -8,8 +8,8 @@ use super::agents::traffic_state::TrafficPicture;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{FlightSegment, Pose2};
+use super::method::MethodKind;
 use super::pilot::{Control, Memory};
-use super::settings::Method;
 use super::shield::{ExemptIds, Side};
 use super::world::AirspaceWorld;
 pub use end::{End, PackedEnd};
@@ -206,7 +206,8 @@ impl AirspaceState {
         let with_resolutions = if world.has_resolutions() { n } else { 0 };
         let has_gusts = world.shield && world.disturbance.heading_rad > 0.0;
         let with_orbit_poses = if has_gusts { n } else { 0 };
-        let with_external_actions = if world.method == Method::External { n } else { 0 };
+        let with_external_actions =
+            if matches!(world.method, MethodKind::External) { n } else { 0 };
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {

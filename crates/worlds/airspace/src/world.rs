@@ -8,9 +8,10 @@ use super::flight::{
     Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
     SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
+use super::method::MethodKind;
 use super::non_cooperative::NonCooperative;
 use super::objective::{ActionPredictions, Objective};
-use super::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
+use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
 use super::shield::{ErrorBounds, Side, common_rates};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::Teams;
@@ -37,7 +38,7 @@ pub struct AirspaceWorld {
     /// Legs to the sides, which take the place of held turns.
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
-    pub method: Method,
+    pub method: MethodKind,
     /// Settings of MVP.
     pub mvp: ReactiveSettings,
     /// Settings of ORCA.
@@ -188,7 +189,7 @@ impl AirspaceWorld {
 
     /// Returns whether airplanes remember the conflicts that they resolve.
     pub(crate) fn has_resolutions(&self) -> bool {
-        self.method == Method::Mvp
+        matches!(self.method, MethodKind::Mvp)
     }
 
     /// Returns when a cycle starts, in seconds after the start of the run.
@@ -256,12 +257,14 @@ impl AirspaceWorld {
     /// Returns how far the method looks ahead, and how much separation it asks for.
     pub(crate) fn reactive_settings(&self) -> ReactiveSettings {
         match self.method {
-            Method::Mvp => self.mvp,
-            Method::Orca => self.orca,
-            Method::Pc | Method::None | Method::External => ReactiveSettings {
-                look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
-                margin: self.objective.inflation,
-            },
+            MethodKind::Mvp => self.mvp,
+            MethodKind::Orca => self.orca,
+            MethodKind::Pc | MethodKind::None | MethodKind::External | MethodKind::Own(_) => {
+                ReactiveSettings {
+                    look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
+                    margin: self.objective.inflation,
+                }
+            }
         }
     }
 

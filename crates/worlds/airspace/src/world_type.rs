@@ -1,5 +1,6 @@
 //! The world as it appears to code that runs scenarios of any world.
 
+use super::method::{Method, Methods};
 use super::scenario::CompiledAirspace;
 use super::{AirspaceWorld, bundle, import, text};
 use sidestep_kernel::text::Description;
@@ -10,10 +11,27 @@ use sidestep_scenario::{
 };
 use std::any::Any;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Airplanes that avoid each other.
-#[derive(Debug, Clone, Copy)]
-pub struct Airspace;
+#[derive(Debug, Clone, Default)]
+pub struct Airspace {
+    own: Methods,
+}
+
+impl Airspace {
+    /// Returns the world with its own methods only.
+    pub const fn new() -> Self {
+        Self { own: Methods::new() }
+    }
+
+    /// Returns the world with a further method, which scenarios call by this name.
+    #[must_use]
+    pub fn with_method(mut self, name: impl Into<String>, method: impl Method + 'static) -> Self {
+        self.own.insert(name.into(), Arc::new(method));
+        self
+    }
+}
 
 impl WorldType for Airspace {
     fn name(&self) -> &'static str {
@@ -33,7 +51,7 @@ impl WorldType for Airspace {
     }
 
     fn sections(&self) -> serde_json::Value {
-        super::scenario::sections()
+        super::scenario::sections(&self.own)
     }
 
     fn random_quantities(&self) -> &'static str {
@@ -58,7 +76,7 @@ impl WorldType for Airspace {
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
-        Ok(Box::new(CompiledAirspace::new(source)?))
+        Ok(Box::new(CompiledAirspace::with_methods(source, &self.own)?))
     }
 }
 

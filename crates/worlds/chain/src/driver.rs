@@ -2,6 +2,7 @@
 //! destination (slides R4, R9).
 
 pub(crate) mod external;
+pub(crate) mod own_driver;
 pub(crate) mod step_motion;
 
 use super::events::EventKind;
@@ -9,6 +10,7 @@ use super::motion::recovery::RecoveryMemory;
 use super::navigate::Navigator;
 use super::script::{Script, ScriptMotion, Turtle};
 use super::swarm::leader::LeaderState;
+use own_driver::OwnDriver;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
@@ -53,11 +55,13 @@ pub(crate) enum TaskKind<const D: usize> {
     Navigate(Arc<Navigator>),
     /// Move as an external caller orders, cycle by cycle.
     External,
+    /// Move as a driver of the program's own proposes, cycle by cycle.
+    Own(OwnDriver),
 }
 
 impl<const D: usize> TaskKind<D> {
     /// Returns the name of its kind in files.
-    pub(crate) fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &str {
         match self {
             Self::Rest => "rest",
             Self::Wander(_) => "wander",
@@ -65,6 +69,7 @@ impl<const D: usize> TaskKind<D> {
             Self::Targets(_) => "targets",
             Self::Navigate(_) => "navigate",
             Self::External => "external",
+            Self::Own(own) => &own.name,
         }
     }
 }

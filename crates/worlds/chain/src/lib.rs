@@ -38,6 +38,7 @@ pub mod metrics;
 mod motion;
 mod navigate;
 mod neighbors;
+mod own_parts;
 mod perceive;
 mod progress;
 mod remarks;
@@ -56,12 +57,16 @@ mod world_impl;
 mod world_type;
 
 pub use deploy::Deployment;
+pub use driver::VetoRecord;
+pub use driver::own_driver::{Driver, DriverPercept, Drivers, Memory, NearbyObstacle, Proposal};
 pub use motion::escape::{
     EscapeMethod, EscapePlan, EscapeReport, EscapeRules, EscapeTick, Escaper,
 };
 pub use motion::recovery::{
     DirectMover, RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation,
 };
+pub use own_parts::{OwnParts, Reactions};
+pub use sidestep_rods::{MasterMove, Reaction};
 pub use state::{Body, BodyRef, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};

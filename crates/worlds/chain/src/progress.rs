@@ -18,11 +18,12 @@ impl<const D: usize> ChainWorld<D> {
 
     /// Returns the part of its present task that an initiator has finished: for scripts by motions,
     /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
-    /// its speed allows in the whole run; for resting and for orders from outside the part of the run.
+    /// its speed allows in the whole run; for resting, for orders from outside and for drivers of the
+    /// program's own the part of the run.
     pub(crate) fn fraction_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.start_time_s(body.driving.cycles) / task.lasts_s,
-            TaskKind::Rest | TaskKind::External => {
+            TaskKind::Rest | TaskKind::External | TaskKind::Own(_) => {
                 body.driving.cycles as f64 / self.cycles.max(1) as f64
             }
             TaskKind::Wander(_) => self.path_fraction(body, task),

@@ -19,6 +19,7 @@ use super::deploy::deployment::Deployment;
 use super::ground::{Movers, Site};
 use super::motion::escape::{EscapeMethod, EscapeRules};
 use super::motion::recovery::RecoveryLimits;
+use super::own_parts::OwnParts;
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use network::NetworkSection;
@@ -30,9 +31,9 @@ use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_rods::geometry::{Bounds, norm};
-use sidestep_rods::{Rotation, Rules};
+use sidestep_rods::{Reaction, Rotation, Rules};
 use sidestep_scenario::{
-    Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
+    ByName, Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
 };
 pub(crate) use spec::ScenarioSpec;
 use std::borrow::Cow;
@@ -195,9 +196,14 @@ struct ChainFile<const D: usize> {
     record: RecordSection,
 }
 
-/// Returns the JSON Schema of a scenario's sections, with places in the plane and in space.
-pub(super) fn sections() -> Value {
-    schema::widened(&schema::for_type::<ChainFile<2>>(), &schema::for_type::<ChainFile<3>>())
+/// Returns the JSON Schema of a scenario's sections, with places in the plane and in space; `own` are drivers and
+/// reactions beside the built-in ones.
+pub(super) fn sections(own: &OwnParts) -> Value {
+    let plane = schema::for_type::<ChainFile<2>>();
+    let mut sections = schema::widened(&plane, &schema::for_type::<ChainFile<3>>());
+    schema::add_names(&mut sections, "Kind", own.drivers.keys().map(String::as_str));
+    schema::add_names(&mut sections, "RotationWord", own.reactions.keys().map(String::as_str));
+    sections
 }
 
 /// The behavior of a rod that hits an obstacle, by name.
@@ -217,7 +223,7 @@ struct RulesSection {
     #[schemars(range(min = 2, max = 3))]
     _dimensions: Option<usize>,
     dt_s: Option<Measure>,
-    rotation: RotationWord,
+    rotation: ByName<RotationWord>,
     self_collision: Option<bool>,
     slave_step_max_m: Option<Number<StepLimitRule>>,
     joint_speed_m_s: Option<Number<Unbounded>>,
@@ -317,10 +323,18 @@ impl AnyChainScenario {
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in the scenario.
     pub fn new(source: &Source) -> Result<Self, InputError> {
+        Self::with_parts(source, &OwnParts::default())
+    }
+
+    /// Compiles a scenario that may name drivers and reactions beside the built-in ones.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn with_parts(source: &Source, own: &OwnParts) -> Result<Self, InputError> {
         let dimensions = source.parse::<Shape>()?.chain.dimensions;
         match dimensions.as_ref().map_or(2, |n| *n.get_ref()) {
-            2 => compile_scenario(source).map(Self::Plane),
-            3 => compile_scenario(source).map(Self::Space),
+            2 => compile_scenario(source, own).map(Self::Plane),
+            3 => compile_scenario(source, own).map(Self::Space),
             n => {
                 let span = dimensions.map(|n| n.span());
                 Err(source.error(span, format!("dimensions = {n}"), "give 2 or 3"))
@@ -329,9 +343,12 @@ impl AnyChainScenario {
     }
 }
 
-fn compile_scenario<const D: usize>(source: &Source) -> Result<ChainScenario<D>, InputError> {
+fn compile_scenario<const D: usize>(
+    source: &Source,
+    own: &OwnParts,
+) -> Result<ChainScenario<D>, InputError> {
     let (head, file) = source.parse_world()?;
-    ScenarioSpec::new(source, head, file)?.compile()
+    ScenarioSpec::new(source, head, file, own)?.compile()
 }
 
 impl<const D: usize> ChainScenario<D> {
@@ -346,7 +363,7 @@ impl<const D: usize> ChainScenario<D> {
             let cause = format!("the scenario has {dimensions} dimensions");
             return Err(source.error(None, cause, format!("set chain.dimensions to {D}")));
         }
-        compile_scenario(source)
+        compile_scenario(source, &OwnParts::default())
     }
 }
 
@@ -357,6 +374,8 @@ struct Compiler<'a, const D: usize> {
     site: Option<&'a Site>,
     /// The same world with another seed, if there is one already.
     known: Option<&'a ChainWorld<D>>,
+    /// Drivers and reactions beside the built-in ones.
+    own: &'a OwnParts,
 }
 
 impl<const D: usize> Compiler<'_, D> {
@@ -377,6 +396,7 @@ impl<const D: usize> Compiler<'_, D> {
 
     fn world(&self, cycles: u64) -> Result<ChainWorld<D>, InputError> {
         let section = &self.file.chain;
+        let reaction = self.reaction()?;
         let dt_s = section.dt_s.map_or(DEFAULT_DT_S, f64::from);
         let chains = match self.known.filter(|_| !self.file.has_random_start()) {
             Some(known) => Arc::clone(&known.chains),
@@ -402,6 +422,7 @@ impl<const D: usize> Compiler<'_, D> {
             movers: Arc::new(ground.movers),
             dt_s,
             rules,
+            reaction,
             look_m: section.look_m.map_or(LOOK_FACTOR * largest_m, f64::from),
             streams: Streams::new(Seed(self.head.seed)),
             teams: Arc::default(),
@@ -500,9 +521,11 @@ impl<const D: usize> Compiler<'_, D> {
         let section = &self.file.chain;
         Rules {
             rotation: match section.rotation {
-                RotationWord::Union => Rotation::Union,
-                RotationWord::Literal => Rotation::Literal,
-                RotationWord::Never => Rotation::Never,
+                // Predictions of leaders among obstacles that move are made by the default, for a reaction of the
+                // program's own as well.
+                ByName::BuiltIn(RotationWord::Union) | ByName::Own(_) => Rotation::Union,
+                ByName::BuiltIn(RotationWord::Literal) => Rotation::Literal,
+                ByName::BuiltIn(RotationWord::Never) => Rotation::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
             // Chosen by the caller, who knows all chains and the ground.
@@ -511,5 +534,13 @@ impl<const D: usize> Compiler<'_, D> {
             backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
             step_m: section.step_m.map(f64::from),
         }
+    }
+
+    /// Returns the reaction of the program's own that the scenario names, if it names one.
+    fn reaction(&self) -> Result<Option<Arc<dyn Reaction>>, InputError> {
+        let ByName::Own(name) = &self.file.chain.rotation else { return Ok(None) };
+        let reactions = &self.own.reactions;
+        let reaction = ByName::<RotationWord>::find_own(self.source, name, reactions)?;
+        Ok(Some(Arc::clone(reaction)))
     }
 }

@@ -63,7 +63,7 @@ impl<const D: usize> Scratch<D> {
     /// Returns empty buffers.
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
-            propagator: Propagator::new(world.rules),
+            propagator: Propagator::new(world.rules).with_reaction(world.reaction.clone()),
             escaper: world.escape.map(Escaper::new),
             nearby: NearbyObstacles::new(world),
             robot_bodies: Vec::new(),

@@ -239,6 +239,7 @@ impl<const D: usize> ChainState<D> {
             externals: self.save_component(cycle, |body| &body.external),
             missing: self.save_component(cycle, |body| &body.missing),
             submitted: self.save_component(cycle, |body| &body.submitted),
+            driver_memories: self.save_component(cycle, |body| &body.driver_memory),
         }
     }
 

@@ -16,7 +16,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot};
 use sidestep_rods::geometry::{Point, norm, with_dimensions};
 use sidestep_rods::rebuild::MovableEnd;
-use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Rules};
+use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Reaction, Rules};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -40,6 +40,8 @@ pub(crate) mod purpose {
     pub(crate) const BURST: Purpose = Purpose(8);
     /// Messages lost in a burst.
     pub(crate) const BURST_LOSS: Purpose = Purpose(9);
+    /// Drivers of a program's own.
+    pub(crate) const DRIVER: Purpose = Purpose(10);
 }
 
 /// Cutoff of a random throw, in standard deviations, so that the claim of a chain that breaks can hold all its parts.
@@ -64,6 +66,8 @@ pub struct ChainWorld<const D: usize> {
     pub(crate) cycles: Cycle,
     /// Rules by which chains react.
     pub(crate) rules: Rules,
+    /// The reaction of free connectors, unless it is the built-in one.
+    pub(crate) reaction: Option<Arc<dyn Reaction>>,
     /// Rule for getting out of the way of moving obstacles, if they do.
     pub(crate) escape: Option<EscapeRules>,
     /// Time that initiators spend on each rung of the ladder after a veto.

@@ -1,18 +1,49 @@
 //! The world's entry in the list of worlds, for code that runs scenarios without knowing any world.
 
+use super::driver::own_driver::Driver;
+use super::own_parts::OwnParts;
 use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
 use super::{bundle, remarks, text, world::ChainWorld};
 use sidestep_kernel::text::Description;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
+use sidestep_rods::Reaction;
 use sidestep_scenario::{
     CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
     Source, WorldFacts, WorldType,
 };
 use std::any::Any;
+use std::sync::Arc;
 
 /// Chains of connectors and rods, in the plane or in space.
-#[derive(Debug, Clone, Copy)]
-pub struct Chains;
+#[derive(Debug, Clone, Default)]
+pub struct Chains {
+    own: OwnParts,
+}
+
+impl Chains {
+    /// Returns the world with its own drivers and reactions only.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Returns the world with a further driver; tasks call it by this name as their `kind`.
+    #[must_use]
+    pub fn with_driver(mut self, name: impl Into<String>, driver: impl Driver + 'static) -> Self {
+        self.own.drivers.insert(name.into(), Arc::new(driver));
+        self
+    }
+
+    /// Returns the world with a further reaction of connectors; scenarios call it by this name as `chain.rotation`.
+    #[must_use]
+    pub fn with_reaction(
+        mut self,
+        name: impl Into<String>,
+        reaction: impl Reaction + 'static,
+    ) -> Self {
+        self.own.reactions.insert(name.into(), Arc::new(reaction));
+        self
+    }
+}
 
 impl WorldType for Chains {
     fn name(&self) -> &'static str {
@@ -32,7 +63,7 @@ impl WorldType for Chains {
     }
 
     fn sections(&self) -> serde_json::Value {
-        super::scenario::sections()
+        super::scenario::sections(&self.own)
     }
 
     fn random_quantities(&self) -> &'static str {
@@ -52,7 +83,7 @@ impl WorldType for Chains {
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
-        Ok(match EitherCompiled::new(source)? {
+        Ok(match EitherCompiled::with_parts(source, &self.own)? {
             EitherCompiled::Plane(compiled) => Box::new(compiled),
             EitherCompiled::Space(compiled) => Box::new(compiled),
         })

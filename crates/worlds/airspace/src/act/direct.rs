@@ -12,7 +12,7 @@ use crate::pilot::{Control, Maneuver, Memory, OptimizerStats, OwnshipState};
 use crate::scratch::PhaseContext;
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter};
 use crate::world::AirspaceWorld;
-use sidestep_kernel::Slot;
+use sidestep_kernel::{Cycle, Slot};
 
 /// Decides for the airplanes of a group. Returns the control of each, and what it has considered.
 pub(super) fn decide(
@@ -52,7 +52,7 @@ fn find_candidates(
             .map(|own| candidates_alone(world, own.known_aircraft(), own.external_action.as_ref()))
             .collect(),
         DecisionStrategy::Reactive => {
-            decide_reactively(world, &group, non_cooperative, &mut memories)
+            decide_reactively(world, &group, non_cooperative, &mut memories, now)
         }
         DecisionStrategy::Joint => {
             let decided = decide_centrally(world, &group, non_cooperative, now);
@@ -85,10 +85,11 @@ fn decide_reactively(
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperative],
     memories: &mut [Memory],
+    now: Cycle,
 ) -> Vec<ManeuverCandidates> {
     let mut resolving: Vec<_> =
         memories.iter_mut().map(|memory| std::mem::take(&mut memory.resolving)).collect();
-    let candidates = candidates_by_velocity(world, group, non_cooperative, &mut resolving);
+    let candidates = candidates_by_velocity(world, group, non_cooperative, &mut resolving, now);
     for (memory, resolving) in memories.iter_mut().zip(resolving) {
         memory.resolving = resolving;
     }

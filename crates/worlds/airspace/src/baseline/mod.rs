@@ -10,19 +10,24 @@ use sidestep_kernel::{Slot, math};
 
 /// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AircraftState {
-    pub(super) slot: Slot,
-    pub(super) at: Point,
+pub struct AircraftState {
+    /// The airplane, by its id.
+    pub slot: Slot,
+    /// Its position in meters, x east and y north.
+    pub at: Point,
     /// Heading in radians, counterclockwise from east.
-    pub(super) heading_rad: f64,
-    /// Velocity in meters per second.
-    pub(super) velocity: Point,
+    pub heading_rad: f64,
+    /// Velocity through the air in meters per second.
+    pub velocity: Point,
     /// The heading that it would have if it were alone, in radians.
-    pub(super) preferred_rad: f64,
-    pub(super) separation_m: f64,
-    pub(super) levels: Levels,
+    pub preferred_rad: f64,
+    /// Distance in meters within which no other airplane should come; of those that avoid nobody, enlarged by how far
+    /// they may fly within `dt`.
+    pub separation_m: f64,
+    /// The levels that it is on or passes.
+    pub levels: Levels,
     /// Whether it gives way to others, too.
-    pub(super) yields: bool,
+    pub yields: bool,
 }
 
 impl AircraftState {

@@ -5,6 +5,7 @@ use super::preferences::rank_straight_first;
 use super::velocity::{rank_by_similarity, step};
 use crate::external_action::ExternalAction;
 use crate::flight::KnownAircraft;
+use crate::method::Steering;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::math;
@@ -42,6 +43,8 @@ pub(super) fn candidates_by_action(
 fn turn_toward(world: &AirspaceWorld, mut known: KnownAircraft, heading_rad: f64) -> TurnProfile {
     let steps = 0..world.timing.points_per_dt();
     TurnProfile {
-        omegas_rad_s: steps.map(|_| step(world, &mut known, Some(heading_rad))).collect(),
+        omegas_rad_s: steps
+            .map(|_| step(world, &mut known, Steering::Heading(heading_rad)))
+            .collect(),
     }
 }

@@ -1,4 +1,4 @@
-//! Candidates by a method that gives each airplane a heading.
+//! Candidates by a method that steers each airplane: ORCA, MVP, or one of the program's own.
 //!
 //! Such a method considers the airplanes around it all the time: once per step of `dtau`, as its
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
@@ -6,15 +6,36 @@
 
 use super::preferences::{rank_by_turn_rate, turn_profiles};
 use crate::baseline::{AircraftState, mvp, orca};
-use crate::flight::{FlightSegment, KnownAircraft, Pose2};
+use crate::flight::{FlightSegment, KnownAircraft, Point, Pose2};
+use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperative;
-use crate::settings::Method;
+use crate::purpose;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::math;
+use sidestep_kernel::stream::Draws;
+use sidestep_kernel::{Cycle, math};
 
 /// Distance in meters of the point ahead that stands for a heading: any, because only its direction counts.
 const LOOK_AHEAD_M: f64 = 1e3;
+
+/// What a method keeps from step to step, by the place of the airplane in its group.
+struct MethodMemory<'a> {
+    /// The conflicts that airplanes resolve by MVP.
+    resolving: &'a mut [mvp::ActiveResolutions],
+    /// The random streams of a method of the program's own; no other method draws.
+    draws: Vec<Draws>,
+}
+
+/// The airplanes of a group in one step of a cycle.
+#[derive(Clone, Copy)]
+struct StepTraffic<'a> {
+    now: Cycle,
+    /// Seconds since the cycle began.
+    elapsed_s: f64,
+    group: &'a [KnownAircraft],
+    /// Those that avoid nobody.
+    others: &'a [AircraftState],
+}
 
 /// Returns the turn profiles that each airplane of a group may fly in the next `dt`: the one that the method
 /// prefers, and then the others by how little they differ from it.
@@ -22,17 +43,22 @@ pub(super) fn profiles_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperative],
-    memory: &mut [mvp::ActiveResolutions],
+    resolving: &mut [mvp::ActiveResolutions],
+    now: Cycle,
 ) -> Vec<Vec<TurnProfile>> {
     let mut ahead = group.to_vec();
     let mut preferred = vec![TurnProfile::default(); group.len()];
+    let mut memory = MethodMemory { resolving, draws: own_draws(world, group, now) };
     for k in 0..world.timing.points_per_dt() {
-        let seconds = k as f64 * world.timing.dtau_s;
-        let others: Vec<AircraftState> =
-            non_cooperative.iter().map(|one| non_cooperative_state(world, one, seconds)).collect();
-        let headings = headings(world, &ahead, &others, memory);
-        for ((known, profile), heading_rad) in ahead.iter_mut().zip(&mut preferred).zip(headings) {
-            profile.omegas_rad_s.push(step(world, known, heading_rad));
+        let elapsed_s = k as f64 * world.timing.dtau_s;
+        let others: Vec<AircraftState> = non_cooperative
+            .iter()
+            .map(|one| non_cooperative_state(world, one, elapsed_s))
+            .collect();
+        let traffic = StepTraffic { now, elapsed_s, group: &ahead, others: &others };
+        let steering = steer_group(world, traffic, &mut memory);
+        for ((known, profile), steering) in ahead.iter_mut().zip(&mut preferred).zip(steering) {
+            profile.omegas_rad_s.push(step(world, known, steering));
         }
     }
     group
@@ -40,6 +66,14 @@ pub(super) fn profiles_by_velocity(
         .zip(preferred)
         .map(|(known, profile)| rank_by_similarity(world, *known, profile))
         .collect()
+}
+
+/// Returns the random streams of a group's airplanes, if the method is one of the program's own.
+fn own_draws(world: &AirspaceWorld, group: &[KnownAircraft], now: Cycle) -> Vec<Draws> {
+    if !matches!(world.method, MethodKind::Own(_)) {
+        return Vec::new();
+    }
+    group.iter().map(|known| world.streams.draws(known.slot, now, purpose::METHOD)).collect()
 }
 
 /// Returns a turn profile, and then those of the airplane's actions by how little they differ from it.
@@ -54,67 +88,117 @@ pub(super) fn rank_by_similarity(
     [vec![profile], others].concat()
 }
 
-/// Returns the heading that the method gives each airplane; `None` for one that is to fly to its
-/// way-point, and for those that have arrived.
-fn headings(
+/// Returns what the method gives each airplane of a group for one step; those that have arrived proceed.
+fn steer_group(
     world: &AirspaceWorld,
-    ahead: &[KnownAircraft],
-    others: &[AircraftState],
-    memory: &mut [mvp::ActiveResolutions],
-) -> Vec<Option<f64>> {
+    traffic: StepTraffic<'_>,
+    memory: &mut MethodMemory<'_>,
+) -> Vec<Steering> {
+    let StepTraffic { group, others, .. } = traffic;
     let mut flying = Vec::new();
-    for (k, known) in ahead.iter().enumerate() {
+    for (k, known) in group.iter().enumerate() {
         if known.next < world.segment(known.slot, known.orders).mission.len() {
             flying.push(k);
         }
     }
-    let own = flying.iter().map(|&k| aircraft_state(world, ahead[k]));
+    let own = flying.iter().map(|&k| aircraft_state(world, group[k]));
     let all: Vec<AircraftState> = own.chain(others.iter().copied()).collect();
     let is_on_level =
         |a: &AircraftState, b: &AircraftState| a.levels.overlaps(&b.levels, world.vertical_m);
-    let mut headings = vec![None; ahead.len()];
-    if world.method == Method::Orca {
-        for (&k, own) in flying.iter().zip(&all) {
-            let others =
-                all.iter().filter(|other| other.slot != own.slot && is_on_level(own, other));
-            headings[k] = orca::heading_rad(own, others, world.orca, world.timing.dtau_s);
+    let mut steering = vec![Steering::Proceed; group.len()];
+    match &world.method {
+        MethodKind::Orca => {
+            for (&k, own) in flying.iter().zip(&all) {
+                let others =
+                    all.iter().filter(|other| other.slot != own.slot && is_on_level(own, other));
+                let heading_rad = orca::heading_rad(own, others, world.orca, world.timing.dtau_s);
+                steering[k] = heading_rad.into();
+            }
         }
-    } else {
-        let mut resolutions: Vec<mvp::ActiveResolutions> =
-            flying.iter().map(|&k| std::mem::take(&mut memory[k])).collect();
-        let found = mvp::headings(&all, &mut resolutions, world.mvp, is_on_level);
-        for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
-            headings[k] = heading_rad;
-            memory[k] = resolution;
+        MethodKind::Own(method) => {
+            for (&k, own) in flying.iter().zip(&all) {
+                let others: Vec<AircraftState> = all
+                    .iter()
+                    .filter(|other| other.slot != own.slot && is_on_level(own, other))
+                    .copied()
+                    .collect();
+                let one = OwnMethodCall { traffic, k, own, others: &others };
+                steering[k] = one.decide(world, method, &mut memory.draws[k]);
+            }
         }
+        MethodKind::Mvp => {
+            let mut resolutions: Vec<mvp::ActiveResolutions> =
+                flying.iter().map(|&k| std::mem::take(&mut memory.resolving[k])).collect();
+            let found = mvp::headings(&all, &mut resolutions, world.mvp, is_on_level);
+            for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
+                steering[k] = heading_rad.into();
+                memory.resolving[k] = resolution;
+            }
+        }
+        // These rank actions, and steer by none.
+        MethodKind::Pc | MethodKind::None | MethodKind::External => {}
     }
-    headings
+    steering
 }
 
-/// Flies one step toward a heading, or to the way-point, and returns its turn rate.
-pub(super) fn step(
-    world: &AirspaceWorld,
-    known: &mut KnownAircraft,
-    heading_rad: Option<f64>,
-) -> f64 {
+/// One airplane for which a method of the program's own decides.
+struct OwnMethodCall<'a> {
+    traffic: StepTraffic<'a>,
+    /// Its place in the group.
+    k: usize,
+    own: &'a AircraftState,
+    others: &'a [AircraftState],
+}
+
+impl OwnMethodCall<'_> {
+    fn decide(&self, world: &AirspaceWorld, method: &OwnMethod, draws: &mut Draws) -> Steering {
+        let StepTraffic { now, elapsed_s, group, .. } = self.traffic;
+        let known = group[self.k];
+        let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+        let percept = MethodPercept {
+            now,
+            elapsed_s,
+            step_s: world.timing.dtau_s,
+            own: self.own,
+            way_point_m: mission[known.next],
+            omega_max_rad_s: model.omega_max_rad_s,
+            wind_m_s: world.wind_m_s,
+            others: self.others,
+        };
+        method.decide(&percept, draws)
+    }
+}
+
+/// Flies one step as steered, and returns its turn rate.
+pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: Steering) -> f64 {
     let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
     let air = world.air();
     let pose = known.pose;
     let autopilot = air.autopilot(model, mission);
-    let omega_rad_s = match heading_rad {
-        Some(heading_rad) => {
-            let [x, y] = pose.at;
-            let aim = [
-                x + LOOK_AHEAD_M * math::cos(heading_rad),
-                y + LOOK_AHEAD_M * math::sin(heading_rad),
-            ];
-            pose.steer(aim, model.omega_max_rad_s, autopilot.dtau_s)
+    let omega_max_rad_s = model.omega_max_rad_s;
+    let omega_rad_s = match steering {
+        Steering::Proceed | Steering::Velocity([0.0, 0.0]) => {
+            air.steer(&autopilot, pose, known.next)
         }
-        None => air.steer(&autopilot, pose, known.next),
+        Steering::Heading(heading_rad) => {
+            let aim = point_ahead(pose, heading_rad);
+            pose.steer(aim, omega_max_rad_s, autopilot.dtau_s)
+        }
+        Steering::Velocity([vx, vy]) => {
+            let aim = point_ahead(pose, math::atan2(vy, vx));
+            pose.steer(aim, omega_max_rad_s, autopilot.dtau_s)
+        }
+        Steering::TurnRate(omega_rad_s) => omega_rad_s.clamp(-omega_max_rad_s, omega_max_rad_s),
     };
     known.pose = air.after_wind_step(pose.step(model.v_m_s, omega_rad_s, autopilot.dtau_s));
     known.next = autopilot.next_way_point((pose, known.pose), known.next);
     omega_rad_s
+}
+
+/// Returns a point that lies from a pose in the direction of a heading.
+fn point_ahead(pose: Pose2, heading_rad: f64) -> Point {
+    let [x, y] = pose.at;
+    [x + LOOK_AHEAD_M * math::cos(heading_rad), y + LOOK_AHEAD_M * math::sin(heading_rad)]
 }
 
 /// Returns a non-cooperative airplane after some seconds, with as much more separation as it flies in one `dt`.

@@ -5,7 +5,7 @@ use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::decide_centrally;
 use crate::events::EventKind;
 use crate::flight::{Point, Pose2};
-use crate::settings::Method;
+use crate::method::MethodKind;
 use crate::shield::{Side, TurnProfile};
 use crate::trace::InspectionTrace;
 use sidestep_kernel::view::{
@@ -25,7 +25,7 @@ impl Inspector<'_> {
         let Some(decided) = &self.trace.choice else {
             let action = self.trace.actions.first().map(|action| action.to_string());
             let action = action.unwrap_or_else(|| match self.world.method {
-                Method::External => "the turn that was ordered".into(),
+                MethodKind::External => "the turn that was ordered".into(),
                 _ => "the heading that the method gives it".into(),
             });
             return inspection.add_section(section.fact("action", action));

@@ -5,15 +5,16 @@ use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
 use crate::flight::Levels;
 use crate::flight::{Airplane, FlightTask};
 use crate::flight::{Timing, WaypointRule};
+use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
-use crate::settings::{Deployment, Disturbance, Grouping, Method, ReactiveSettings};
+use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings};
 use crate::shield::{ErrorBounds, ExemptIds, ShieldedAircraft, Side, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{SeedEffect, Source, Spanned};
+use sidestep_scenario::{ByName, SeedEffect, Source, Spanned};
 use std::sync::Arc;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
@@ -53,7 +54,7 @@ pub(super) struct Compiler<'a> {
 impl<'a> Compiler<'a> {
     /// Returns the compiler of a scenario, with its own seed.
     pub(super) fn new(recipe: &'a Arc<ScenarioSource>) -> Self {
-        let ScenarioSource { source, head, file } = &**recipe;
+        let ScenarioSource { source, head, file, .. } = &**recipe;
         Self { recipe, source, file, seed: head.seed, known: None }
     }
 
@@ -107,13 +108,17 @@ impl<'a> Compiler<'a> {
             return SeedEffect::Decide;
         }
         match world.method {
-            Method::Pc => SeedEffect::Perhaps,
-            Method::Mvp | Method::Orca | Method::None | Method::External => SeedEffect::Nothing,
+            // A method of the program's own may draw: runs show it.
+            MethodKind::Pc | MethodKind::Own(_) => SeedEffect::Perhaps,
+            MethodKind::Mvp | MethodKind::Orca | MethodKind::None | MethodKind::External => {
+                SeedEffect::Nothing
+            }
         }
     }
 
     fn world(&self) -> Result<AirspaceWorld, InputError> {
         let section = &self.file.airspace;
+        let method = self.method()?;
         let streams = Streams::new(Seed(self.seed));
         let timing = self.timing()?;
         let replay = self.replay(&timing);
@@ -129,7 +134,7 @@ impl<'a> Compiler<'a> {
             settings: self.settings()?,
             holds_s: section.holds_s.0.clone(),
             legs: self.legs()?,
-            method: section.method,
+            method,
             mvp: section.mvp.or_default(MVP),
             orca: section.orca.or_default(ORCA),
             deployment: section.deployment,
@@ -159,6 +164,17 @@ impl<'a> Compiler<'a> {
             None => Arc::new(world.find_teams()),
         };
         Ok(world)
+    }
+
+    fn method(&self) -> Result<MethodKind, InputError> {
+        match &self.file.airspace.method {
+            ByName::BuiltIn(word) => Ok((*word).into()),
+            ByName::Own(name) => {
+                let own = &self.recipe.own;
+                let method = ByName::<BuiltInMethod>::find_own(self.source, name, own)?;
+                Ok(MethodKind::Own(OwnMethod::new(name.get_ref(), method)))
+            }
+        }
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
@@ -256,7 +272,7 @@ impl<'a> Compiler<'a> {
     /// Refuses groups that need more memory at the start than allowed.
     fn check_memory(&self, compiled: &CompiledAirspace) -> Result<(), InputError> {
         let world = &compiled.world;
-        if world.method != Method::Pc {
+        if !matches!(world.method, MethodKind::Pc) {
             return Ok(());
         }
         let state = AirspaceState::restore(world, &compiled.start_snapshot());

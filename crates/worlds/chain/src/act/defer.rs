@@ -14,6 +14,7 @@ pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Bod
     let world = context.world;
     let Some(task) = context.task(body) else { return false };
     world.is_open()
+        && world.reaction.is_none()
         && world.rules.step_m.is_none()
         && context.spec.robots.is_none()
         && body.scattered.is_none()
@@ -27,7 +28,7 @@ pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Bod
 fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
     let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * dt_s;
     task.agent == 0
-        && !matches!(task.driver, TaskKind::Navigate(_) | TaskKind::External)
+        && !matches!(task.driver, TaskKind::Navigate(_) | TaskKind::External | TaskKind::Own(_))
         && chain.points()[0].iter().all(|x| x.abs() < most_m)
 }
 

@@ -3,10 +3,12 @@
 use super::bounds::EscapeContext;
 use super::joints::arrival_tolerance_m;
 use super::orders::step_from_orders;
+use super::own_driver::propose;
 use super::plan::plan_if_stuck;
 use super::wheels::{NavigatorContext, WheelStep};
 use super::{ActState, FollowMode, Initiator};
 use crate::driver::external::Orders;
+use crate::driver::own_driver::Proposal;
 use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::events::EventKind;
@@ -73,6 +75,14 @@ pub(super) fn desired_move<const D: usize>(
             navigator_move(wheeled, decision, has_fled)
         }
         TaskKind::Wander(rule) => wander_move(initiator, acting.body, rule),
+        TaskKind::Own(driver) => match propose(initiator, acting.body, driver) {
+            Proposal::Rest => DesiredMove::Rest,
+            Proposal::Done => DesiredMove::Done,
+            Proposal::GoTo(to) => {
+                let at = initiator.position(acting.body);
+                DesiredMove::Go(move_toward(at, with_dimensions(to), initiator.step_m()))
+            }
+        },
         TaskKind::Script(_) => script_move(initiator, acting.body),
         TaskKind::Targets(targets) => step_to_target(initiator, acting, targets),
     }

@@ -12,6 +12,7 @@
 //! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
 //!                      -> follow.rs -> measure.rs
 //! drive.rs     -> desired_move.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
+//!              -> own_driver.rs                                      ... by a driver of the program's own
 //!              -> lookahead.rs                                       whether it rests instead
 //!              -> wheels.rs -> initiator.rs -> joints.rs, outcome.rs -> tasks.rs
 //! initiator.rs -> defer.rs                                           where nothing can veto
@@ -33,6 +34,7 @@ mod measure;
 mod negotiation;
 mod orders;
 mod outcome;
+mod own_driver;
 mod plan;
 mod situation;
 mod tasks;

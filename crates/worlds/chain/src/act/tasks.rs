@@ -2,6 +2,7 @@
 
 use super::event_sink::EventSink;
 use super::{ChainContext, Initiator};
+use crate::driver::own_driver::Memory;
 use crate::driver::{Task, TaskKind};
 use crate::events::{Event, EventKind};
 use crate::metrics::AbandonedPart;
@@ -29,6 +30,7 @@ pub(super) fn start_next_task<const D: usize>(
     body.catch_up();
     body.plan = None;
     body.standstill = Standstill::default();
+    body.driver_memory = Memory::default();
     let driving = &mut body.driving;
     let next = context.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
     let ended = f64::from(driving.task);

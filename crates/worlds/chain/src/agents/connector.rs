@@ -133,6 +133,7 @@ impl<const D: usize> ConnectorAgent<D> {
     pub fn new(world: &ChainWorld<D>, chain: EntityId, connector: u32) -> Self {
         let spec = &world.chains[chain as usize];
         let mut agent = Self::from_chain(&spec.start, connector, &world.rules, world.rungs);
+        agent.solver = agent.solver.with_reaction(world.reaction.clone());
         agent.first_id = world.first_id(chain);
         agent.fingerprint = world.fingerprint;
         agent.members = member_digest(agent.first_id, agent.n);

@@ -626,7 +626,8 @@ fn is_endless<const D: usize>(task: &Task<D>) -> bool {
     let has_an_end = match &task.driver {
         TaskKind::Rest | TaskKind::Wander(_) | TaskKind::External => false,
         TaskKind::Navigate(navigator) => navigator.goal.is_some(),
-        TaskKind::Script(_) | TaskKind::Targets(_) => true,
+        // A driver of the program's own may say that it is done.
+        TaskKind::Script(_) | TaskKind::Targets(_) | TaskKind::Own(_) => true,
     };
     !has_an_end && task.lasts_s.is_infinite()
 }

@@ -2,6 +2,7 @@
 
 use super::{ChainFile, ChainScenario, Compiler};
 use crate::ground::Site;
+use crate::own_parts::OwnParts;
 use crate::world::ChainWorld;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -15,6 +16,8 @@ pub(crate) struct ScenarioSpec<const D: usize> {
     head: Head,
     file: ChainFile<D>,
     site: Option<Site>,
+    /// Drivers and reactions beside the built-in ones.
+    own: OwnParts,
 }
 
 impl<const D: usize> ScenarioSpec<D> {
@@ -22,9 +25,15 @@ impl<const D: usize> ScenarioSpec<D> {
     ///
     /// # Errors
     /// When the ground cannot be loaded.
-    pub(super) fn new(source: &Source, head: Head, file: ChainFile<D>) -> Result<Self, InputError> {
-        let site = Compiler { source, head: &head, file: &file, site: None, known: None }.site()?;
-        Ok(Self { source: source.clone(), head, file, site })
+    pub(super) fn new(
+        source: &Source,
+        head: Head,
+        file: ChainFile<D>,
+        own: &OwnParts,
+    ) -> Result<Self, InputError> {
+        let compiler = Compiler { source, head: &head, file: &file, site: None, known: None, own };
+        let site = compiler.site()?;
+        Ok(Self { source: source.clone(), head, file, site, own: own.clone() })
     }
 
     /// Returns whether the seed decides anything at the start: obstacles, or the place of a chain.
@@ -56,8 +65,8 @@ impl<const D: usize> ScenarioSpec<D> {
         head: &Head,
         known: Option<&ChainWorld<D>>,
     ) -> Result<ChainScenario<D>, InputError> {
-        let Self { source, file, site, .. } = self;
-        Compiler { source, head, file, site: site.as_ref(), known }.compile()
+        let Self { source, file, site, own, .. } = self;
+        Compiler { source, head, file, site: site.as_ref(), known, own }.compile()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Tasks of initiators.
 
+use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
 use super::navigators::NavigatorSection;
@@ -8,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_rods::{Chain, Mobility};
-use sidestep_scenario::Spanned;
+use sidestep_scenario::{ByName, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -57,7 +58,7 @@ enum PlannerWord {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "TaskSection")]
 pub(super) struct TaskSection<const D: usize> {
-    kind: TaskKindWord,
+    kind: ByName<TaskKindWord>,
     #[serde(default)]
     connector: usize,
     speed_m_s: Option<Measure>,
@@ -83,6 +84,22 @@ impl<const D: usize> TaskSection<D> {
         self.connector
     }
 
+    /// Returns its kind if that is a built-in one.
+    fn built_in_kind(&self) -> Option<TaskKindWord> {
+        match self.kind {
+            ByName::BuiltIn(word) => Some(word),
+            ByName::Own(_) => None,
+        }
+    }
+
+    /// Returns the name of its kind.
+    fn kind_name(&self) -> String {
+        match &self.kind {
+            ByName::BuiltIn(word) => format!("{word:?}").to_lowercase(),
+            ByName::Own(name) => name.get_ref().clone(),
+        }
+    }
+
     fn speed_m_s(&self) -> f64 {
         self.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from)
     }
@@ -92,13 +109,13 @@ impl<const D: usize> TaskSection<D> {
     fn has_planner(&self, has_base: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
-            None => has_base && self.kind == TaskKindWord::Targets,
+            None => has_base && self.built_in_kind() == Some(TaskKindWord::Targets),
         }
     }
 
     /// Returns whether it drives on wheels.
     pub(super) fn is_navigator(&self) -> bool {
-        self.kind == TaskKindWord::Navigate
+        self.built_in_kind() == Some(TaskKindWord::Navigate)
     }
 }
 
@@ -119,19 +136,36 @@ impl<const D: usize> Compiler<'_, D> {
             let at = self.source.key_span(at, &["connector"]);
             return Err(self.source.error(at, cause, remedy));
         }
-        self.check_keys(s, plans, at.clone())?;
+        let driver = match &s.kind {
+            ByName::BuiltIn(word) => {
+                self.check_keys(s, plans, at.clone())?;
+                self.driver(*word, s, at)?
+            }
+            ByName::Own(name) => {
+                // Where its kind is unknown, that is the error to report, and not that keys have no effect in it.
+                let drivers = &self.own.drivers;
+                let driver = ByName::<TaskKindWord>::find_own(self.source, name, drivers)?;
+                self.check_keys(s, plans, at)?;
+                TaskKind::Own(OwnDriver::new(name.get_ref(), driver))
+            }
+        };
         Ok(Task {
             agent: s.connector,
             speed_m_s: s.speed_m_s(),
             lasts_s: s.lasts_s.map_or(f64::INFINITY, f64::from),
             patience_s: s.patience_s.map_or(DEFAULT_PATIENCE_S, f64::from),
             plans_after_s: plans.then(|| s.plans_after_s.map_or(DEFAULT_PLAN_DELAY_S, f64::from)),
-            driver: self.driver(s, at)?,
+            driver,
         })
     }
 
-    fn driver(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<TaskKind<D>, InputError> {
-        Ok(match s.kind {
+    fn driver(
+        &self,
+        word: TaskKindWord,
+        s: &TaskSection<D>,
+        at: Range<usize>,
+    ) -> Result<TaskKind<D>, InputError> {
+        Ok(match word {
             TaskKindWord::Rest => TaskKind::Rest,
             TaskKindWord::Wander => TaskKind::Wander(Wander {
                 turn_rad: s.turn_deg.map_or(DEFAULT_TURN_DEG, f64::from).to_radians(),
@@ -227,11 +261,13 @@ impl<const D: usize> Compiler<'_, D> {
             ("navigator", s.navigator.is_some(), TaskKindWord::Navigate),
             ("planner", s.planner.is_some(), TaskKindWord::Targets),
         ];
-        let keys = keys_of_kinds.map(|(key, is_given, kind)| (key, is_given, kind == s.kind));
-        let context = format!("in a task of kind {:?}", s.kind).to_lowercase();
+        let keys = keys_of_kinds
+            .map(|(key, is_given, kind)| (key, is_given, Some(kind) == s.built_in_kind()));
+        let context = format!("in a task of kind {}", s.kind_name());
         self.source.refuse_unused_keys(at.clone(), &keys, &context)?;
         // A caller sees each veto, and decides itself when to give up; a resting chain wants nothing.
-        let is_patient = !matches!(s.kind, TaskKindWord::External | TaskKindWord::Rest);
+        let is_patient =
+            !matches!(s.built_in_kind(), Some(TaskKindWord::External | TaskKindWord::Rest));
         let patience = ("patience_s", s.patience_s.is_some(), is_patient);
         self.source.refuse_unused_keys(at.clone(), &[patience], &context)?;
         let delay = ("plans_after_s", s.plans_after_s.is_some(), plans);

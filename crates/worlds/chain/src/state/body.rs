@@ -3,6 +3,7 @@
 use crate::agents::chain_controls::ChainControls;
 use crate::deferred::DeferredMotions;
 use crate::driver::external::External;
+use crate::driver::own_driver::Memory;
 use crate::driver::{Task, TaskProgress};
 use crate::formation::{Robot, Solid};
 use crate::metrics::ChainTally;
@@ -36,6 +37,8 @@ pub struct Body<const D: usize> {
     pub tally: ChainTally,
     /// Cycles for which its navigator stands because something moves ahead.
     pub(crate) standstill: Standstill,
+    /// Memory of a driver of the program's own.
+    pub(crate) driver_memory: Memory,
     /// Its plan to leave the obstacle that caught a part of it.
     pub(crate) escape_plan: EscapePlan,
     /// The motions of the present script, derived from the position at which it started; so a snapshot does not
@@ -105,6 +108,7 @@ impl<const D: usize> Body<D> {
             scattered: None,
             tally: ChainTally::default(),
             standstill: Standstill::default(),
+            driver_memory: Memory::default(),
             escape_plan: EscapePlan::default(),
             motions: Vec::new(),
             external: External::default(),

@@ -9,6 +9,7 @@ use super::body::{
 use crate::agents::chain_controls::ChainControls;
 use crate::driver::TaskProgress;
 use crate::driver::external::External;
+use crate::driver::own_driver::Memory;
 use crate::formation::Robot;
 use crate::metrics::ChainTally;
 use crate::motion::escape::EscapePlan;
@@ -85,6 +86,8 @@ pub struct Snapshot {
     /// Decisions that agents in other processes have submitted for the next cycle; serialized, because their type
     /// depends on the number of dimensions.
     pub(crate) submitted: ComponentList<Vec<u8>>,
+    /// Memories of drivers of the program's own.
+    pub(crate) driver_memories: ComponentList<Memory>,
 }
 
 impl Component for Option<Vec<f64>> {
@@ -149,6 +152,19 @@ impl Component for Standstill {
 
     fn restore(&mut self, cycles: &u32, _: &Owner) -> Result<(), CheckpointError> {
         self.cycles = *cycles;
+        Ok(())
+    }
+}
+
+impl Component for Memory {
+    type Record = Self;
+
+    fn save(&self, _: Cycle) -> Option<Self> {
+        (*self != Self::default()).then_some(*self)
+    }
+
+    fn restore(&mut self, record: &Self, _: &Owner) -> Result<(), CheckpointError> {
+        *self = *record;
         Ok(())
     }
 }
@@ -304,7 +320,8 @@ impl Snapshot {
         restore_component(bodies, cycle, &self.waited, |body| &mut body.scattered)?;
         restore_component(bodies, cycle, &self.externals, |body| &mut body.external)?;
         restore_component(bodies, cycle, &self.missing, |body| &mut body.missing)?;
-        restore_component(bodies, cycle, &self.submitted, |body| &mut body.submitted)
+        restore_component(bodies, cycle, &self.submitted, |body| &mut body.submitted)?;
+        restore_component(bodies, cycle, &self.driver_memories, |body| &mut body.driver_memory)
     }
 
     /// Returns the digest of this state: it covers every value, by id.
@@ -320,6 +337,7 @@ impl Snapshot {
         add_any(&mut hasher, &self.externals);
         add_any(&mut hasher, &self.missing);
         add_any(&mut hasher, &self.submitted);
+        add_any(&mut hasher, &self.driver_memories);
         hasher.finish()
     }
 }

@@ -184,7 +184,9 @@ impl Pilot {
             group.push(KnownAircraft { slot: one.id, pose: one.pose, next, orders, altitude_m });
             memory.push(intent.resolving.clone());
         }
-        let mut all = candidates_by_velocity(&self.world, &group, &non_cooperative, &mut memory);
+        let now = state.percept.cycle;
+        let mut all =
+            candidates_by_velocity(&self.world, &group, &non_cooperative, &mut memory, now);
         if self.world.has_resolutions() {
             self.memory.resolving = memory.swap_remove(me);
         }

@@ -4,7 +4,7 @@ use super::ConnectorAgent;
 use crate::agents::message::{Consent, Message, Prepare, VetoMessage};
 use crate::agents::side::Side;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::local_solver::{LocalSolver, MasterMotion, Reaction, SlavePosition};
+use sidestep_rods::local_solver::{LocalSolver, MasterMotion, SlavePosition, SlaveReaction};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{PendingVeto, Rod, VetoReason};
 
@@ -59,10 +59,10 @@ impl<const D: usize> ConnectorAgent<D> {
         &mut self,
         from: Side,
         prepare: &Prepare<D>,
-        reaction: &Reaction<D>,
+        reaction: &SlaveReaction<D>,
         had_asked: bool,
     ) {
-        let Reaction { at, ends, rotated, has_others, has_turned } = *reaction;
+        let SlaveReaction { at, ends, rotated, has_others, has_turned } = *reaction;
         self.position.now = at;
         let onward = from.other();
         let asks = !ends && self.rods[onward].is_some();
@@ -98,7 +98,7 @@ impl<const D: usize> ConnectorAgent<D> {
         from: Side,
         rod: Rod,
         prepare: &Prepare<D>,
-    ) -> Result<Reaction<D>, PendingVeto> {
+    ) -> Result<SlaveReaction<D>, PendingVeto> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
         let slave = SlavePosition { so: self.position.base, rod, next };

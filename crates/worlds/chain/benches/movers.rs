@@ -1,16 +1,16 @@
 //! Sixteen robots in a chain on open ground, among discs that move.
 //!
-//! `cargo run --release -p sidestep --example chain_movers [-- RUNS [through|apart]]` prints, for numbers and
+//! `cargo bench -p sidestep-chain [-- RUNS [through|apart]]` prints, for numbers and
 //! speeds of discs, for reactions and for limits of the robots' speed, how often a part of the
 //! chain is more than 1 mm in a disc after it has reacted.
 
-use sidestep::kernel::stream::{Purpose, Streams};
-use sidestep::kernel::{InputError, Seed, math};
-use sidestep::rods::geometry::{Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub};
-use sidestep::rods::{
+use sidestep_chain::{EscapeMethod, EscapePlan, EscapeRules, EscapeTick, Escaper};
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::{InputError, Seed, math};
+use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub};
+use sidestep_rods::{
     Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, Rules,
 };
-use sidestep::worlds::chain::{EscapeMethod, EscapePlan, EscapeRules, EscapeTick, Escaper};
 use std::f64::consts::TAU;
 
 const DT_S: f64 = 0.02;
@@ -282,8 +282,10 @@ fn row(cell: &Cell, runs: u64) -> Result<(), InputError> {
 }
 
 fn main() -> Result<(), InputError> {
-    let runs = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(6);
-    let which = std::env::args().nth(2);
+    // Cargo adds an option of its own.
+    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
+    let runs = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(6);
+    let which = arguments.next();
     for keep_apart in [false, true] {
         if which.as_deref().is_some_and(|which| (which == "apart") != keep_apart) {
             continue;
