@@ -81,9 +81,17 @@
 //!
 //! # Parts of your own
 //!
-//! A behavior of robots is one trait, [`worlds::robots::decide::Behaviour`]; registered by a name, scenarios call it by
-//! that name. The list of worlds with it is all that the command line needs (`sidestep_cli::main_with`) to run, sweep
-//! and show such scenarios.
+//! Each is one trait, registered by a name that scenarios call it by:
+//!
+//! | world | trait | registered by | named in a scenario by |
+//! |---|---|---|---|
+//! | robots | [`Behaviour`](worlds::robots::decide::Behaviour) | `Robots::with_behaviour` | `robots.behaviour.kind` |
+//! | airplanes | [`Method`](worlds::airspace::method::Method) | `Airspace::with_method` | `airspace.method` |
+//! | chains | [`Driver`](worlds::chain::Driver) | `Chains::with_driver` | `chains.tasks.kind` |
+//! | chains | [`Reaction`](worlds::chain::Reaction) | `Chains::with_reaction` | `chain.rotation` |
+//!
+//! The list of worlds with such parts is all that the command line needs (`sidestep_cli::main_with`) to check, run,
+//! record, resume, sweep and show such scenarios.
 //!
 //! ```
 //! use sidestep::Scenario;
@@ -112,6 +120,39 @@
 //! Scenario::parse(&worlds, text).start()?.advance(10)?;
 //! # Ok::<(), sidestep::Error>(())
 //! ```
+//!
+//! A method sees its airplane and those around it, and the shield is over it as over all methods; a driver proposes the
+//! motion of a chain's initiator; a reaction is how each connector passes a motion on, or vetoes it:
+//!
+//! ```
+//! use sidestep::Scenario;
+//! use sidestep::rods::{VetoReason, geometry::Point};
+//! use sidestep::worlds::WORLDS;
+//! use sidestep::worlds::chain::{Chains, MasterMove, Reaction};
+//!
+//! /// Never turns a rod: a connector that is in the way of something vetoes.
+//! #[derive(Debug)]
+//! struct Straight;
+//!
+//! impl Reaction for Straight {
+//!     fn react(&self, percept: &MasterMove<'_>) -> Result<Point<3>, VetoReason> {
+//!         percept.check(percept.guided_m)?;
+//!         Ok(percept.guided_m)
+//!     }
+//! }
+//!
+//! let worlds = WORLDS.clone().with(Chains::new().with_reaction("straight", Straight));
+//! let text = r#"
+//!     format = 1
+//!     world = "chain"
+//!     chain = { rotation = "straight" }
+//!     chains = { connectors = 4, at_m = [0.0, 0.0], rod_m = 0.5, tasks = [{ kind = "wander" }] }
+//! "#;
+//! Scenario::parse(&worlds, text).start()?.advance(10)?;
+//! # Ok::<(), sidestep::Error>(())
+//! ```
+//!
+//! `crates/sidestep/examples/` has an example of each of these, of a first run, a sweep, and inverse kinematics.
 //!
 //! # Modules
 //!

@@ -177,7 +177,7 @@ impl From<ActionId> for Decision {
 }
 
 /// The rule by which a robot chooses actions. Implement it for behaviors of your own; see
-/// `crates/sidestep/examples/own_behaviour.rs`.
+/// `crates/sidestep/examples/own_behavior.rs`.
 pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// Returns the next action. It may depend only on the percept, the memory (which it may change)
     /// and the robot's random stream of this cycle, because robots decide in any order, on any worker.

@@ -1,4 +1,4 @@
-//! `cargo run -p sidestep --example own_behaviour`: robots that keep to the wall on their left.
+//! `cargo run -p sidestep --example own_behavior`: robots that keep to the wall on their left.
 
 use sidestep::kernel::stream::Draws;
 use sidestep::worlds::WORLDS;
