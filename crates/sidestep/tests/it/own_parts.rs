@@ -108,14 +108,14 @@ impl Reaction for Stiff {
     }
 }
 
-/// Follows half a millimeter beside the line to its master.
+/// Follows half a millimeter beside the line to its master, and a little nearer, where it may.
 #[derive(Debug)]
 struct Sloppy;
 
 impl Reaction for Sloppy {
     fn react(&self, percept: &MasterMove<'_>) -> Result<Point<3>, VetoReason> {
         let [x, y, _] = sub(percept.guided_m, percept.master_to_m);
-        let beside = add(percept.guided_m, scaled([-y, x, 0.0], 1e-3));
+        let beside = add(percept.master_to_m, scaled([x - 1e-3 * y, y + 1e-3 * x, 0.0], 0.9999));
         Ok(if percept.check(beside).is_ok() { beside } else { percept.guided_m })
     }
 }

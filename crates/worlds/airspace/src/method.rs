@@ -179,7 +179,7 @@ mod tests {
         let own = Methods::from([("own".to_string(), method)]);
         let mut run =
             CompiledAirspace::with_methods(&source, &own).expect("a scenario").start(&source, 1);
-        run.advance(30);
+        run.advance(90);
         run
     }
 
