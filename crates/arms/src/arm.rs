@@ -18,7 +18,7 @@ const MIN_BEND_RAD: f64 = 1e-9;
 pub struct Arm {
     /// Joints from base to tip.
     pub serial: SerialChain,
-    /// Connectors and rods.
+    /// What the joints' axes make of it, the same at every posture.
     pub skeleton: Skeleton,
     /// Position of the base's frame; its axes are those of the world.
     pub at_m: Vector,

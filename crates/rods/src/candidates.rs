@@ -114,6 +114,7 @@ impl<const D: usize> MotionContext<'_, D> {
             scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
             return Ok(());
         };
+        // Lines and planes were handled above, so it is a box that forbids the place.
         if objection.reason == VetoReason::Mobility
             && let Some(at) = self.place_in_box(step, guided)
             && self.check_slave(step, at).is_ok()
@@ -161,6 +162,7 @@ impl<const D: usize> MotionContext<'_, D> {
     fn check_rod_and_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
         // No comparison holds for a coordinate that is no number.
         if !is_length_allowed(step.rod, distance(step.mn, at)) {
+            // A rod out of its limits has no reason of its own: it limits where its slave may be.
             return Err(PendingVeto::new(VetoReason::Mobility));
         }
         self.check_place(step, at)
@@ -335,6 +337,8 @@ impl<const D: usize> MotionContext<'_, D> {
         length_m: f64,
         scratch: &mut CandidateScratch<D>,
     ) {
+        // Twice the skin that turned rods keep, so that rounding misses no block that bounds a
+        // turn.
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         scratch.blocks.clear();
         let rod = step.master.min(step.slave);
@@ -491,13 +495,13 @@ impl<const D: usize> PlanarRod<'_, D> {
     }
 
     fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
+        // More than the skin in the arcs, so that no direction in an arc looks free by rounding.
         let near_m = block.radius_m + 2.0 * SKIN_M;
         let rod = [self.step.mn, s];
         block.stops_rod && !block.core.is_clear_of_segment(rod, near_m + self.step.rod.radius_m)
             || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
     }
 
-    /// Adds all directions that one block blocks.
     fn add_block(&self, block: &Block<D>, known: &mut BlockedArcs) {
         let step = self.step;
         let reach = MasterRod { master: to_plane(step.mn), length_m: self.length_m };
@@ -579,7 +583,7 @@ fn core_to_plane<const D: usize>(core: &Core<D>) -> Core<2> {
     }
 }
 
-/// Returns the points of a segment at a given distance from `m`.
+/// Returns the points of a segment at distance `t` from `m`, the one nearer to its start first.
 fn segment_points_at<const D: usize>(
     m: Point<D>,
     t: f64,

@@ -118,7 +118,7 @@ pub struct Rod {
 }
 
 impl Rod {
-    /// Returns a rod of fixed length.
+    /// Returns a rod of one length; its radius is at most that of its connectors.
     #[inline]
     pub fn fixed(length_m: f64, radius_m: f64) -> Self {
         Self { min_m: length_m, max_m: length_m, radius_m }
@@ -254,7 +254,7 @@ impl<const D: usize> Chain<D> {
         }
     }
 
-    /// Returns the positions of the connectors.
+    /// Returns the positions of the connectors along the chain, meters.
     pub fn points(&self) -> &[Point<D>] {
         &self.points
     }
@@ -270,7 +270,8 @@ impl<const D: usize> Chain<D> {
         (&mut self.points, &self.rods)
     }
 
-    /// Returns the connectors.
+    /// Returns radius, constraints and state of the connectors; [`Self::points`] has their
+    /// positions.
     pub fn connectors(&self) -> &[Connector<D>] {
         &self.connectors
     }
@@ -286,7 +287,7 @@ impl<const D: usize> Chain<D> {
         self.rods[i.min(j)]
     }
 
-    /// Returns the length of a rod, meters.
+    /// Returns the present length of a rod, meters: the distance of its ends.
     pub fn length_m(&self, rod: usize) -> f64 {
         distance(self.points[rod], self.points[rod + 1])
     }

@@ -17,7 +17,7 @@ pub struct NearestPoints<const D: usize> {
     pub distance_m: f64,
     /// The nearest point of the segment or point in question.
     pub on_body: Point<D>,
-    /// The nearest point of the other one.
+    /// The nearest point of the core, or of the second segment.
     pub on_core: Point<D>,
 }
 
@@ -65,6 +65,7 @@ fn between_interiors<const D: usize>(
     // In the plane two segments whose insides are nearest cross, so their distance is exactly zero.
     if D == 2 {
         return segments_cross([p, q], [a, b]).then(|| {
+            // Lines that are parallel up to rounding cross at no place in particular.
             let part = if s.is_finite() { s.clamp(0.0, 1.0) } else { 0.5 };
             let at = add_scaled(p, d1, part);
             NearestPoints { distance_m: 0.0, on_body: at, on_core: at }
@@ -198,7 +199,8 @@ pub enum Core<const D: usize> {
 }
 
 impl<const D: usize> Core<D> {
-    /// Returns the nearest points of a segment and the core.
+    /// Returns the nearest points of a segment and the core; their distance is 0 where they
+    /// overlap.
     pub fn nearest_to_segment(&self, body: [Point<D>; 2]) -> NearestPoints<D> {
         match self {
             Self::Point(c) => {
@@ -209,7 +211,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Returns the nearest point of the core.
+    /// Returns the nearest point of the core: `p` itself inside a box.
     pub fn nearest_to_point(&self, p: Point<D>) -> NearestPoints<D> {
         match self {
             Self::Point(c) => NearestPoints::from_points(p, *c),
@@ -266,7 +268,7 @@ impl<const D: usize> Core<D> {
         }
     }
 
-    /// Returns the core, shifted.
+    /// Returns the core at another place, in the same orientation.
     #[must_use]
     pub fn shifted(self, by: Point<D>) -> Self {
         match self {
@@ -347,7 +349,7 @@ impl<const D: usize> Bounds<D> {
         Self { lo, hi }
     }
 
-    /// Returns the empty box.
+    /// Returns the box around nothing: joined with another it gives that one.
     pub fn empty() -> Self {
         Self { lo: [f64::INFINITY; D], hi: [f64::NEG_INFINITY; D] }
     }

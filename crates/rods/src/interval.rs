@@ -34,12 +34,11 @@ impl AngleInterval {
     }
 }
 
-/// A rod at its master.
+/// What of a rod decides in which directions an obstacle is in its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MasterRod {
     /// Position of the master.
     pub(crate) master: Point<2>,
-    /// Length of the rod, meters.
     pub(crate) length_m: f64,
 }
 

@@ -20,7 +20,7 @@ pub const SKIN_M: f64 = 1e-7;
 /// Penetration that counts as contact, meters: distances of segments are exact to about 1e-15 m of their coordinates, so
 /// rounding is no contact.
 pub const TOLERANCE_M: f64 = 1e-9;
-/// Tolerance of bend limits, rad.
+/// Tolerance of bend limits, rad: far above the rounding of angles.
 pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
 /// Distance below which a body without thickness is touched, meters. Its radius less the tolerance would
 /// be negative, and it could be passed.
@@ -97,7 +97,7 @@ impl BlockOwner {
 /// An objection, before the length of the motion is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PendingVeto {
-    /// Its reason.
+    /// The constraint that would be broken.
     pub reason: VetoReason,
     /// The obstacle in the way, if there is one.
     pub obstacle: Option<u32>,

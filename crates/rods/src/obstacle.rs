@@ -39,7 +39,7 @@ impl<const D: usize> Obstacle<D> {
         Self::still(id, Core::Segment(ends), radius_m)
     }
 
-    /// Returns whether it moves.
+    /// Returns whether it has a velocity; the grid of static obstacles leaves it out then.
     pub fn is_moving(&self) -> bool {
         self.velocity_m_s.iter().any(|&v| v != 0.0)
     }
@@ -142,7 +142,7 @@ impl<const D: usize> Obstacles<D> {
         &self.still.all
     }
 
-    /// Returns the moving obstacles, by id.
+    /// Returns the moving obstacles, by id, also those that [`Self::set_moving`] gave no velocity.
     pub fn moving(&self) -> &[Obstacle<D>] {
         &self.moving
     }
@@ -193,6 +193,7 @@ impl<const D: usize> Obstacles<D> {
     /// Returns the obstacle with the lowest id among those that a capsule overlaps.
     pub fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
+        // A negative radius asks for overlaps that are deeper than it.
         self.visit(&Bounds::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
             if apart_m < 0.0 && first.is_none_or(|id| o.id < id) {
@@ -220,7 +221,7 @@ pub(super) fn swept_bounds<const D: usize>(points: [Point<D>; 4], by_m: f64) -> 
     Bounds::from_points(&points).grown(by_m)
 }
 
-/// Returns a box of `half_m` around a point.
+/// Returns the box of a query around a point, `half_m` to every side.
 #[inline]
 pub fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
     Bounds { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }

@@ -59,7 +59,7 @@ impl Direction {
     /// Both directions, in the order in which sweeps are made.
     pub(super) const BOTH: [Self; 2] = [Self::Up, Self::Down];
 
-    /// Returns the master of a slave.
+    /// Returns the neighbor from which a sweep comes to a slave.
     #[inline]
     pub(super) fn master(self, slave: usize) -> usize {
         match self {

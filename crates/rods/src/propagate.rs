@@ -93,7 +93,6 @@ impl<const D: usize> DrivenConnectors<D> {
         [0, 1].map(|h| lerp(from[h], self.to[h], fraction))
     }
 
-    /// Returns their positions.
     fn positions(&self, chain: &Chain<D>) -> [Point<D>; 2] {
         [chain.points()[self.first], chain.points()[self.first + self.n - 1]]
     }
@@ -118,7 +117,7 @@ impl<const D: usize> SweepContext<'_, D> {
 }
 
 impl<const D: usize> Propagator<D> {
-    /// Returns a propagator for rules.
+    /// Returns a propagator with the built-in reaction of free connectors.
     pub fn new(rules: Rules) -> Self {
         Self { rules, ..Self::default() }
     }
@@ -165,7 +164,7 @@ impl<const D: usize> Propagator<D> {
         Ok(Outcome::Moved(self.completed_motion(None)))
     }
 
-    /// Returns the number of sub-steps of a request.
+    /// Returns as many sub-steps as the connector needs that goes farthest.
     fn sub_steps(
         &self,
         chain: &Chain<D>,

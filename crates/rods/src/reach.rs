@@ -32,7 +32,7 @@ const RETURN_TOLERANCE_M: f64 = 0.1 * LENGTH_TOLERANCE_M;
 pub struct ReachRequest<const D: usize> {
     /// The connector that is to move.
     pub k: usize,
-    /// Its target.
+    /// Where it is to be, meters.
     pub target: Point<D>,
     /// The connector that keeps its place even if it is free to move.
     pub base: usize,
@@ -40,7 +40,7 @@ pub struct ReachRequest<const D: usize> {
     pub tolerance_m: f64,
 }
 
-/// Outcome of a reach.
+/// Where a reach ended; only the first of them changes the chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ReachOutcome<const D: usize> {
     /// The connector is at the target.

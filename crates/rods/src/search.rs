@@ -21,9 +21,9 @@ const MAX_TURNS: usize = 24;
 const LOST_COSINE: f64 = -0.173_648;
 /// Directions on a ring, 15 degrees apart. With these rings no motion among the fields above ended in a veto.
 const AZIMUTHS: usize = 24;
-/// The narrowest ring, rad.
+/// The narrowest ring, rad: about one degree, for obstacles that hardly touch the rod.
 const MIN_RING_RAD: f64 = 0.02;
-/// The widest ring, rad.
+/// The widest ring, rad: still wider ones would throw the slave around its master.
 const MAX_RING_RAD: f64 = 2.0;
 /// Bisection steps that bring a free direction near the wanted one: to a millionth of the distance of two rings.
 const BISECTIONS: usize = 20;

@@ -22,7 +22,7 @@ impl<'de, const D: usize> Deserialize<'de> for WirePoint<D> {
     }
 }
 
-/// Writes a point; for `#[serde(with = "...")]`.
+/// Writes a point as `D` numbers without their count; for `#[serde(with = "...")]`.
 pub fn serialize<const D: usize, S: Serializer>(
     point: &Point<D>,
     serializer: S,
@@ -32,7 +32,7 @@ pub fn serialize<const D: usize, S: Serializer>(
     tuple.end()
 }
 
-/// Reads a point; for `#[serde(with = "...")]`.
+/// Reads a point of exactly `D` numbers; for `#[serde(with = "...")]`.
 pub fn deserialize<'de, const D: usize, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Point<D>, S::Error> {

@@ -13,7 +13,7 @@ use std::ops::Range;
 pub enum RequestSource {
     /// The connector itself.
     Autonomous,
-    /// A planner.
+    /// A planner, which reports a veto.
     Planner,
     /// A person.
     Operator,
@@ -31,7 +31,7 @@ pub enum VetoEffect {
 /// The motion of a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion<const D: usize> {
-    /// One connector.
+    /// One connector, which all others follow.
     Connector {
         /// Its index.
         k: usize,
@@ -50,9 +50,9 @@ pub enum Motion<const D: usize> {
 /// A request to a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request<const D: usize> {
-    /// The motion.
+    /// What is to move, and where to.
     pub motion: Motion<D>,
-    /// The source of the request.
+    /// Who asked, and handles a veto.
     pub source: RequestSource,
     /// Effect of a veto before the end of the path.
     pub mode: VetoEffect,
@@ -101,7 +101,7 @@ pub enum VetoReason {
 }
 
 impl VetoReason {
-    /// All reasons.
+    /// All reasons, by number.
     pub const ALL: [Self; 13] = [
         Self::Fixed,
         Self::Failed,
@@ -164,14 +164,14 @@ impl fmt::Display for VetoReason {
     }
 }
 
-/// An objection.
+/// A connector's objection to a motion, or to the rest of one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Veto<const D: usize> {
     /// The connector that objects; the path of the veto is from the initiator to it.
     pub by: usize,
-    /// The initiator.
+    /// The connector that was to lead the motion.
     pub from: usize,
-    /// The reason.
+    /// The constraint that `by` would break.
     pub reason: VetoReason,
     /// The obstacle concerned, if any.
     pub obstacle: Option<u32>,

@@ -150,7 +150,7 @@ impl<const D: usize> LanePositions<D> {
     }
 }
 
-/// Limits of the rods that lanes are at.
+/// Of the rods between slaves and masters, by lane.
 struct LaneLimits {
     min_m: [f64; LANES],
     max_m: [f64; LANES],
@@ -176,9 +176,8 @@ impl LaneLimits {
 
 /// The motions of a group: lane `w` makes motion `w`.
 struct LaneMotions<const D: usize, const MEASURES: bool> {
-    /// Number of motions.
+    /// Number of motions, at most [`LANES`].
     n: usize,
-    /// Number of connectors.
     connectors: usize,
     limits: LaneLimits,
     min_move_m: f64,
@@ -256,7 +255,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         }
     }
 
-    /// Measures all lanes at once.
+    /// Measures all lanes at once, each of which has a slave that moves.
     #[inline]
     fn measure(&mut self, now: &LanePositions<D>, next: &LanePositions<D>) {
         let mut move2 = [0.0; LANES];
@@ -316,7 +315,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         self.changed += u64::from(new != so);
     }
 
-    /// Returns whether all motions have ended.
+    /// Returns whether nothing is left to do before the end of the chain.
     fn have_ended(&self) -> bool {
         self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }

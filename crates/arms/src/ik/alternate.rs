@@ -61,6 +61,7 @@ fn slave_position<const D: usize>(master: Point<D>, slave: Point<D>, span: Span)
     if d > 0.0 {
         add_scaled(master, g, span.nearest_m(d) / d)
     } else {
+        // Connectors in one place give no direction; any fixed one will do.
         add_scaled(master, first_axis(), span.min_m)
     }
 }

@@ -116,6 +116,8 @@ impl<const D: usize> ConstraintSearch<'_, D> {
             Some(veto) => ChainIkFailure::Blocked { veto },
             None => ChainIkFailure::NotFound { tries },
         };
+        // The best posture is then one that the motion came to: relaxed ones are kept only if they
+        // meet the goal.
         self.result(false, SolutionKind::Motion, Some(reason))
     }
 

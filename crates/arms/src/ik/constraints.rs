@@ -64,6 +64,7 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         }
         let mut hit: Option<u32> = None;
         self.visit_near(&points[i..i + 2], i, 0.0, |o| {
+            // The least id, because the order of visits depends on how obstacles are stored.
             if hit.is_none_or(|id| o.id < id) && self.touches(points, i, o) {
                 hit = Some(o.id);
             }

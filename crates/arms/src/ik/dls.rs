@@ -198,6 +198,8 @@ pub(super) fn bow<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
     let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(first_axis()));
     let n = vectors.len() as f64;
     for (i, v) in vectors.iter_mut().enumerate() {
+        // From 1 at the base to -1 at the tip: rods alike lean to both sides equally, and the tip
+        // stays.
         let lean = 1.0 - (2 * i + 1) as f64 / n;
         *v = add_scaled(*v, side, lean * norm(*v));
     }

@@ -37,15 +37,15 @@ impl Engine {
 /// A target for a connector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainIkGoal<const D: usize> {
-    /// The connector.
+    /// The connector that is to be there, counted from 0.
     pub k: usize,
-    /// The connector that keeps its place.
+    /// The connector that keeps its place, unless one between it and `k` never moves.
     pub base: usize,
-    /// The target of `k`.
+    /// Where `k` is to be, in m.
     pub target: Point<D>,
     /// Distance at which the target counts as reached, meters.
     pub tolerance_m: f64,
-    /// The method that finds a posture.
+    /// The method to use; the result has the one that found the posture.
     pub engine: Engine,
     /// Postures to start from, besides the present one, if an obstacle is in the way.
     pub restarts: usize,
@@ -71,7 +71,7 @@ impl<const D: usize> ChainIkGoal<D> {
     }
 }
 
-/// The kind of an answer.
+/// Whether anything is known about the path to a posture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolutionKind {
     /// A motion: the chain can go there from its present posture, and every state of the path has been
@@ -81,7 +81,7 @@ pub enum SolutionKind {
     Posture,
 }
 
-/// The answer to a goal.
+/// The posture that meets a goal, or else the best one found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainIkResult<const D: usize> {
     /// Whether the posture meets the goal and all constraints.
@@ -100,7 +100,7 @@ pub struct ChainIkResult<const D: usize> {
     pub reason: Option<ChainIkFailure<D>>,
 }
 
-/// The reason why a goal is not met.
+/// Why a goal is not met: a distance that the rods rule out, before all else.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ChainIkFailure<const D: usize> {
     /// The rods are too short.

@@ -41,7 +41,7 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// Returns the shell of limbs with these rods.
+    /// Returns the distances at which these rods can hold their ends, if they bend without limit.
     pub(super) fn from_spans(spans: &[Span]) -> Self {
         let reach_m: f64 = spans.iter().map(|s| s.max_m).sum();
         // Take one rod as short as possible, against all others as long as possible.

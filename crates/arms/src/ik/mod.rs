@@ -48,7 +48,6 @@ pub struct IkSolver<const D: usize> {
     points: Vec<Point<D>>,
 }
 
-/// Result of an engine.
 struct EngineResult {
     iterations: usize,
     engine: Engine,
@@ -98,7 +97,7 @@ impl<const D: usize> IkSolver<D> {
         Ok(answer.relative_to(goal, &shell, home))
     }
 
-    /// Solves a goal without constraints.
+    /// Solves a goal within reach, which always works where nothing constrains the chain.
     fn solve_free(&mut self, chain: &Chain<D>, goal: &ChainIkGoal<D>) -> ChainIkResult<D> {
         self.points.clear();
         self.points.extend_from_slice(chain.points());

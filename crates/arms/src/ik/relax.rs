@@ -57,6 +57,8 @@ pub(super) fn relax<const D: usize>(
         limb.read(checker.chain, points, goal.base, goal.k);
         let target = sub(goal.target, home);
         let Limb { spans, vectors } = limb;
+        // Half the tolerance: the rest is for rounding in the points that are laid out from the
+        // vectors.
         let (_, left_m) = dls::solve(vectors, spans, target, 0.5 * goal.tolerance_m);
         lay_out(limb, points, checker, goal);
         veto = checker.find_veto(points, goal.k);
@@ -132,6 +134,7 @@ impl<const D: usize> Pusher<'_, D> {
         if limit_rad >= PI || bend_rad(points, i) <= limit_rad {
             return;
         }
+        // A limit that is smaller than the margin must not become negative.
         let allowed_rad = (limit_rad - BEND_MARGIN_RAD).max(0.5 * limit_rad);
         let a = distance(points[i - 1], points[i]);
         let b = distance(points[i], points[i + 1]);
@@ -203,6 +206,7 @@ impl<const D: usize> Pusher<'_, D> {
         // The displacement of the nearest point per unit of push; near an end that may not move, a push
         // would swing the other one far away.
         let square = weights[0] * (1.0 - fraction) + weights[1] * fraction;
+        // A part in the margin alone is pushed too, but violates nothing.
         if nearest.distance_m < keep_m {
             self.violation_m += depth_m;
         }
@@ -216,12 +220,11 @@ impl<const D: usize> Pusher<'_, D> {
     }
 }
 
-/// Returns a direction across a rod.
 fn across_rod<const D: usize>(rod: [Point<D>; 2]) -> Point<D> {
     perpendicular(normalized(sub(rod[1], rod[0])).unwrap_or(first_axis()))
 }
 
-/// Returns the position of a point along a segment.
+/// Returns the position of a point along a segment, in [0, 1].
 fn fraction_along<const D: usize>(p: Point<D>, [a, b]: [Point<D>; 2]) -> f64 {
     let d = sub(b, a);
     let square = dot(d, d);

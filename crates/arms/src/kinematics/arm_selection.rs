@@ -11,24 +11,24 @@ use std::path::PathBuf;
 /// command: `--base`, `--tip`, `--group`, `--posture`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ArmFiles {
-    /// The URDF file.
+    /// Path of the robot model; errors name it where no option chose the link.
     pub urdf: PathBuf,
     /// The base link; the root where it is absent.
     pub base: Option<String>,
     /// The tip link; the end of the longest arm where it is absent.
     pub tip: Option<String>,
-    /// The SRDF file.
+    /// Path of the groups, named postures and pairs that may touch; they are optional.
     pub srdf: Option<PathBuf>,
-    /// The group of the SRDF file that base and tip are taken from.
+    /// The group of the SRDF file that base and tip are taken from, in place of `base` and `tip`.
     pub group: Option<String>,
 }
 
-/// An arm that was chosen.
+/// An arm, with the model that it is a part of.
 #[derive(Debug, Clone)]
 pub struct ArmSelection {
-    /// The robot.
+    /// The whole robot, also what is beside the arm.
     pub model: Model,
-    /// The content of the SRDF file.
+    /// Groups, postures and pairs that may touch; `None` without an SRDF file.
     pub semantics: Option<Semantics>,
     /// The joints from base to tip.
     pub chain: SerialChain,

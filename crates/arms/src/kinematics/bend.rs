@@ -15,7 +15,7 @@ use sidestep_kernel::math::{acos, atan2, cos, wrap_angle};
 /// Angles that differ by less count as equal, because models are written with some ten digits.
 const ANGLE_TOLERANCE_RAD: f64 = 1e-9;
 
-/// A limit of the bend at a connector.
+/// How far a joint's limits let a connector bend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BendLimit {
     /// The joint whose limits it comes from.

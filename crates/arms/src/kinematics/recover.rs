@@ -62,7 +62,7 @@ pub enum RecoverError {
     /// A joint between base and tip mimics another, so that values are not independent.
     #[error("joint `{joint}` mimics another; values are recovered for independent joints only")]
     Mimics {
-        /// Its name.
+        /// The first such joint from the base.
         joint: String,
     },
     /// No joint values bring the connector there: a rod has a wrong length, or axes forbid it.
@@ -79,7 +79,7 @@ pub enum RecoverError {
     /// The connectors can be reached, but only with a joint outside its limits.
     #[error("joint `{joint}` would have to be at {value}, outside {lower} to {upper}")]
     OutsideLimits {
-        /// Its name.
+        /// The joint at which the best branch of the search ended.
         joint: String,
         /// Its value in rad or m.
         value: f64,
@@ -227,7 +227,7 @@ impl JointSearch<'_> {
             && self.place_connectors(connector + 1, known + found.len(), outer)
     }
 
-    /// Returns whether the joints from `known` on may have these values.
+    /// Checks limits of the joints from `known` on, and records the first one that is exceeded.
     fn are_valid(&mut self, connector: usize, known: usize, found: &[CandidateValue]) -> bool {
         for (joint, found) in self.chain.joints[known..].iter().zip(found) {
             if let Some(limits) = joint.limits.filter(|l| !l.contains(found.value)) {
@@ -362,7 +362,7 @@ struct PointPlacement<'a> {
     target_m: Vector,
 }
 
-/// A joint's value.
+/// A value that places a point; `is_open` if the point lies on the axis and any value would.
 #[derive(Debug, Clone, Copy)]
 struct CandidateValue {
     value: f64,

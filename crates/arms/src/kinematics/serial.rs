@@ -22,7 +22,7 @@ pub struct SerialChain {
     pub(super) to_tip: Transform,
 }
 
-/// A variable of a posture.
+/// A value that a posture has to give.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dof {
     /// The joint whose value it is. The joint need not be between base and tip if one that is
@@ -36,7 +36,7 @@ pub struct Dof {
     pub max_speed: Option<f64>,
 }
 
-/// The kind of a joint's motion.
+/// How a joint with one degree of freedom moves; others cannot be between base and tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointMotion {
     /// About its axis, in rad.
@@ -63,7 +63,7 @@ impl JointMotion {
         }
     }
 
-    /// Returns the unit of its values.
+    /// Returns the unit of values and limits, for messages.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Turn => "rad",
@@ -104,7 +104,7 @@ impl JointCoupling {
 }
 
 impl MovingJoint {
-    /// Returns the motion of the joint at `value`.
+    /// Returns the turn or slide alone, without the origin.
     pub(super) fn transform(&self, value: f64) -> Transform {
         self.motion.transform(self.axis, value)
     }
@@ -121,7 +121,7 @@ impl MovingJoint {
 pub struct Frames {
     /// Link 0 (the base), then the link that each joint carries.
     pub links: Vec<Transform>,
-    /// The tip.
+    /// The frame of the tip link, which is fixed in the last of them.
     pub tip: Transform,
 }
 

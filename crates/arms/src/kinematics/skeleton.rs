@@ -18,7 +18,7 @@ const SAME_POINT_TOLERANCE: f64 = 1e-9;
 pub struct Skeleton {
     /// The connectors, one more than rods; the last is the tip.
     pub(super) connectors: Vec<Anchor>,
-    /// The rods between them.
+    /// One between each two connectors, from the base out.
     pub rods: Vec<SkeletonRod>,
     /// Unit vector in the base's frame along the first joint's axis, from which the bend at the
     /// first connector is measured. None if that joint slides or the connector is not on it.
@@ -80,7 +80,6 @@ impl SerialChain {
         }
     }
 
-    /// Returns the joints' axes at `frames`.
     fn lines(&self, frames: &Frames) -> Vec<Line> {
         self.joints.iter().zip(&frames.links).map(|(joint, before)| joint.line(before)).collect()
     }
@@ -222,6 +221,7 @@ impl SkeletonBuilder<'_> {
         let first = connectors.first().filter(|c| c.first == 0 && c.last > 0)?;
         let axis = self.lines[0].along;
         let outward = connectors.get(1).map_or(0.0, |next| dot(self.between_m(first, next), axis));
+        // Adding 0 turns -0 into 0, so that equal directions are equal in every bit.
         Some(if outward < 0.0 { scaled(axis, -1.0) } else { add(axis, [0.0; 3]) })
     }
 }

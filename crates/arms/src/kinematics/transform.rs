@@ -47,6 +47,7 @@ impl Transform {
         quaternion: [f64; 4],
     ) -> Result<Self, InputError> {
         let length = norm(quaternion);
+        // Quaternions that people write have a length near 1; one so far off is a mistake.
         if !(length > 1e-9 && length < 1e9) {
             let cause = format!("{quaternion:?} has length {length}, and so no direction");
             let remedy = "give x,y,z,w, scalar last, such as 0,0,0,1 for no turn at all";
@@ -166,20 +167,18 @@ pub(super) fn multiply(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
 /// A straight line: a joint's axis in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
-    /// A point on it.
+    /// Any point on it, in m.
     pub(super) through_m: Vector,
-    /// Unit vector along it.
+    /// A unit vector; positive values turn about it or slide along it.
     pub(super) along: Vector,
 }
 
 impl Line {
-    /// Returns the point on the line that is nearest to `p_m`.
     pub(super) fn nearest(&self, p_m: Vector) -> Vector {
         let t = dot(sub(p_m, self.through_m), self.along);
         add(self.through_m, scaled(self.along, t))
     }
 
-    /// Returns the distance of `p_m` from the line.
     pub(super) fn distance_m(&self, p_m: Vector) -> f64 {
         norm(sub(p_m, self.nearest(p_m)))
     }
@@ -193,7 +192,8 @@ impl Line {
     /// Returns the ends of the common perpendicular, on this line and on `other`; none for parallel
     /// lines.
     pub(super) fn common_perpendicular(&self, other: &Self) -> Option<(Vector, Vector)> {
-        // The sine of the smallest angle between lines that do not count as parallel.
+        // The sine of the smallest angle between lines that do not count as parallel; at smaller
+        // ones rounding moves the feet as far as points that count as different.
         const PARALLEL: f64 = 1e-6;
         let normal = cross(self.along, other.along);
         let sine_squared = dot(normal, normal);

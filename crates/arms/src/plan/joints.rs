@@ -26,7 +26,7 @@ const MIN_STEP: f64 = 1e-3;
 /// An arm at a posture.
 #[derive(Debug, Clone, Copy)]
 pub struct JointPosture<'a> {
-    /// The arm.
+    /// The arm that the chain of the space stands for.
     pub arm: &'a Arm,
     /// A value for each of its joints, rad or m.
     pub joints: &'a [f64],

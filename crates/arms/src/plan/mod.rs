@@ -27,9 +27,10 @@ pub use space::RodSpace;
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.
 const MAX_GOALS: usize = 4;
-/// Largest number of searches for them.
+/// Largest number of searches for them, three for each: those from random postures may end at a
+/// posture known already, or at one that touches something.
 const MAX_SEARCHES: usize = 12;
-/// Restarts of the search for one of them.
+/// Restarts of one search; few, because the next search from another posture is worth more.
 const MAX_RESTARTS: usize = 25;
 
 /// A planning query: the goal of a path.
@@ -37,7 +38,7 @@ const MAX_RESTARTS: usize = 25;
 pub struct PlanningQuery<const D: usize> {
     /// The connector that is to move.
     pub k: usize,
-    /// Its target.
+    /// Where it is to be, in m.
     pub target: Point<D>,
     /// Distance at which the target counts as reached, meters.
     pub tolerance_m: f64,
@@ -48,10 +49,10 @@ pub type ChainPosture<const D: usize> = Vec<Point<D>>;
 
 /// A configuration space: the postures of a body, and the straight paths between them.
 pub trait ConfigurationSpace {
-    /// One posture.
+    /// A node of a tree.
     type Posture: Clone;
 
-    /// Returns the present posture.
+    /// Returns the posture that paths start from.
     fn present(&self) -> Self::Posture;
 
     /// Returns the length by which strides are scaled, such as that of the stretched body, meters.
@@ -67,10 +68,10 @@ pub trait ConfigurationSpace {
     /// their lengths evenly.
     fn interpolate(&self, a: &Self::Posture, b: &Self::Posture, fraction: f64) -> Self::Posture;
 
-    /// Returns whether a posture is valid.
+    /// Returns whether a posture keeps all constraints and touches nothing.
     fn is_free(&self, posture: &Self::Posture) -> bool;
 
-    /// Returns whether the straight path from one valid posture to another is free.
+    /// Returns whether all of the straight path after `a`, itself valid, is free, `b` included.
     fn is_path_free(&self, a: &Self::Posture, b: &Self::Posture) -> bool;
 
     /// Returns a random posture, valid or not.

@@ -4,14 +4,16 @@ use super::ConfigurationSpace;
 use sidestep_kernel::interrupt;
 use sidestep_kernel::stream::Draws;
 
-/// Largest number of random postures that the trees grow toward.
+/// Largest number of random postures that the trees grow toward, so that the search for a target
+/// that is cut off ends.
 const MAX_SAMPLES: usize = 2_000;
 /// Longest move of a connector between two postures of a tree, in lengths of the chain. The path of a stride is checked in
 /// far shorter steps, so it sets only how dense the trees are.
 const MAX_STRIDE: f64 = 0.1;
 /// Longest straight move of a connector, in lengths of the chain: what a growth of one tree may add.
 const MAX_SEGMENT: f64 = 4.0;
-/// Attempts to shorten a path.
+/// Pairs of postures between which a shortcut is tried: each costs a check of a path, and gains get
+/// ever smaller.
 const MAX_SHORTCUTS: usize = 120;
 
 /// Postures, each with its parent.
@@ -59,7 +61,6 @@ impl<S: ConfigurationSpace> Tree<S> {
         Some((last, false))
     }
 
-    /// Returns the postures from one back to its root.
     fn path_to_root(&self, mut i: usize) -> Vec<S::Posture> {
         let mut path = vec![self.postures[i].clone()];
         while let Some(from) = self.parents[i] {

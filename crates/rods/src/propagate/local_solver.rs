@@ -45,7 +45,7 @@ pub struct MasterMotion<const D: usize> {
     pub mn: Point<D>,
     /// The connector on the master's other side, if its new position is settled.
     pub prev: Option<Point<D>>,
-    /// Bend limit of the master, rad.
+    /// Bend limit of the master, rad; it is the slave that checks it, and knows both rods.
     pub max_bend_rad: f64,
     /// Whether nothing in the world can object.
     pub is_open: bool,
@@ -64,7 +64,7 @@ pub struct SlavePosition<const D: usize> {
     pub next: Option<(Point<D>, Rod)>,
 }
 
-/// A slave's reaction.
+/// Where a slave goes, and what a second sweep could change about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlaveReaction<const D: usize> {
     /// Its new position; the old one, bit for bit, if it stays.
@@ -100,7 +100,7 @@ impl<const D: usize> LocalSolver<D> {
         Self { reaction, ..self }
     }
 
-    /// Returns its bend limit, rad.
+    /// Returns its bend limit, rad, which its slaves need.
     pub fn max_bend_rad(&self) -> f64 {
         self.chain.connectors()[SELF_INDEX].max_bend_rad
     }

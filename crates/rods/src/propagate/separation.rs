@@ -33,7 +33,8 @@ impl ProofSchedule {
         is_due
     }
 
-    /// Records the result of a proof.
+    /// A proof that holds is followed by another at once, one that fails by a longer pause than
+    /// before.
     #[inline]
     fn record(&mut self, holds: bool) {
         self.pause = if holds { 0 } else { (2 * self.pause).clamp(1, MAX_PAUSE) };

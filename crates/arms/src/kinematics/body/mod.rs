@@ -34,9 +34,9 @@ pub struct ArmBody {
 /// A shape that is fixed in a link.
 #[derive(Debug, Clone, PartialEq)]
 struct LinkShape {
-    /// Name of its link.
+    /// Name of its link, for reports.
     link: String,
-    /// Its place in the model.
+    /// Where its center is, at any posture.
     mount: mount::Mount,
     core: ShapeCore,
     /// Radius of a ball about its center that holds it, in m.
@@ -143,7 +143,7 @@ impl ArmBody {
         &self.pairs
     }
 
-    /// Computes the places of all parts.
+    /// Computes the places of all parts; `values` move those beside the arm that follow its joints.
     pub(super) fn place_shapes(
         &self,
         frames: &Frames,
@@ -153,7 +153,8 @@ impl ArmBody {
         self.place_shapes_on(&frames.links, values, placed);
     }
 
-    /// Computes the places of all parts if the arm's links are at `links`.
+    /// The same from the poses of the links alone, for those that forward kinematics put into a
+    /// buffer.
     pub(super) fn place_shapes_on(
         &self,
         links: &[Transform],
@@ -169,11 +170,10 @@ impl ArmBody {
     }
 }
 
-/// A body at a posture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PlacedBody<'a> {
     pub(super) body: &'a ArmBody,
-    /// The places of its parts.
+    /// By the index of the part.
     pub(super) shapes: &'a [PlacedShape],
 }
 

@@ -39,13 +39,13 @@ impl Mount {
         self.steps.is_empty()
     }
 
-    /// Returns a frame in this one.
+    /// Returns where `inner` is, a frame given in this one.
     fn compose(&self, inner: &Transform) -> Self {
         Self { last: self.last.compose(inner), ..self.clone() }
     }
 }
 
-/// The mounts of all links of a model.
+/// By the index of the link in the model.
 pub(super) struct Mounts(Vec<Mount>);
 
 impl Mounts {

@@ -24,7 +24,7 @@ pub(super) struct ContactFinder<'a> {
     margin_m: f64,
 }
 
-/// The contacts of a posture.
+/// Kept from posture to posture, so that none allocates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ContactSet {
     pub(super) contacts: Vec<Contact>,
@@ -88,7 +88,7 @@ impl<'a> ContactFinder<'a> {
         }
     }
 
-    /// Finds all contacts of a posture.
+    /// Replaces `touched` by the contacts at `values`, where `placed` are the links.
     pub(super) fn find(&self, values: &[f64], placed: &LinkTransforms, touched: &mut ContactSet) {
         touched.contacts.clear();
         touched.hit = None;
@@ -119,6 +119,8 @@ impl<'a> ContactFinder<'a> {
                 continue;
             }
             let away = if apart_m > 0.0 {
+                // A rod through the center gets out in any direction; a fixed one gives the same
+                // steps everywhere.
                 scaled(sub(nearest, center_m), 1.0 / apart_m)
             } else {
                 [0.0, 0.0, 1.0]

@@ -18,7 +18,7 @@ use sidestep_kernel::math::atan2;
 /// length. Both errors end below their tolerances in any case; the value was not tuned by itself.
 const RADIAN_LENGTH: f64 = 0.3;
 
-/// The criteria for a posture.
+/// What a search measures at each posture.
 pub(super) struct IkCriteria<'a> {
     fast_fk: FastFk,
     goal: &'a ArmGoal,
@@ -28,7 +28,7 @@ pub(super) struct IkCriteria<'a> {
     radian_m: f64,
 }
 
-/// The errors of a posture.
+/// Kept from posture to posture, so that none allocates.
 #[derive(Debug, Clone)]
 pub(super) struct Evaluation {
     pub(super) placed: LinkTransforms,
@@ -75,7 +75,7 @@ impl<'a> IkCriteria<'a> {
         }
     }
 
-    /// Computes the errors of a posture.
+    /// Computes the links' poses and the errors at `values`; the Jacobian needs both.
     pub(super) fn evaluate(&self, values: &[f64], evaluation: &mut Evaluation) {
         self.fast_fk.compute(values, &mut evaluation.placed);
         let tip = evaluation.placed.tip;
@@ -107,6 +107,8 @@ impl<'a> IkCriteria<'a> {
                 evaluation.turn_rad = atan2(norm(normal), dot(own, wanted));
                 // Where the axes are parallel, any normal will do.
                 let about = normalized(normal).unwrap_or_else(|| perpendicular(own));
+                // The second row has no error: it keeps steps from turning the axis to the other
+                // side.
                 evaluation.about.extend([about, cross(own, about)]);
                 evaluation.wanted.extend([evaluation.turn_rad * self.radian_m, 0.0]);
             }

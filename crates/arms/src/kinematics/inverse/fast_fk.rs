@@ -7,7 +7,7 @@ use sidestep_kernel::geometry::{add, add_scaled, dot, scaled};
 use sidestep_kernel::math::sin_cos;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// An arm, prepared.
+/// The constants of an arm.
 #[derive(Debug)]
 pub(super) struct FastFk {
     joints: Vec<FastFkJoint>,
@@ -57,7 +57,7 @@ impl FastFk {
         Self { joints, to_tip: chain.to_tip }
     }
 
-    /// Computes the poses at these values of the variables.
+    /// Computes the poses at `values` into `placed`, which is one of this arm's.
     pub(super) fn compute(&self, values: &[f64], placed: &mut LinkTransforms) {
         for (i, joint) in self.joints.iter().enumerate() {
             let q = joint.drive.value(values);

@@ -5,7 +5,7 @@ use super::super::transform::{Transform, Vector};
 use crate::ik::Engine;
 use sidestep_kernel::InputError;
 
-/// The most postures that one goal may ask for.
+/// Most postures that one goal may ask for: each one found is compared with all before it.
 pub const MAX_SOLUTIONS: usize = 1000;
 
 /// A sphere that no part of the arm may enter. Where the arm's links have no shapes, its rods are
@@ -14,7 +14,7 @@ pub const MAX_SOLUTIONS: usize = 1000;
 pub struct Sphere {
     /// Center in m, in the base's frame.
     pub center_m: Vector,
-    /// Radius in m.
+    /// Radius in m; 0 for a point.
     pub radius_m: f64,
 }
 
@@ -25,14 +25,14 @@ impl Sphere {
     }
 }
 
-/// An axis of a frame.
+/// An axis of the tip's frame, as the column of its rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
-    /// The first.
+    /// Column 0.
     X,
-    /// The second.
+    /// Column 1.
     Y,
-    /// The third.
+    /// Column 2.
     Z,
 }
 
@@ -48,7 +48,7 @@ pub enum OrientationMask {
     Free,
     /// The direction of one axis: the tip may turn about it.
     Axis(Axis),
-    /// All of it.
+    /// All three axes.
     Whole,
 }
 
@@ -57,7 +57,7 @@ pub enum OrientationMask {
 pub struct PoseMask {
     /// Whether the position along the axes x, y and z of the target's frame counts.
     pub along: [bool; 3],
-    /// The part of the orientation that counts.
+    /// The turns that count, about the axes of that frame.
     pub turn: OrientationMask,
 }
 

@@ -34,6 +34,7 @@ pub(super) fn posture(
     let obstacles = Obstacles::new(balls.collect(), skeleton.reach_m).ok()?;
     let tip = chain.points().len() - 1;
     let wanted = ChainIkGoal {
+        // Half of it: the rest is for the joints that are read off the points.
         tolerance_m: 0.5 * goal.tolerance_m,
         restarts: RESTARTS,
         seed: goal.seed,

@@ -2,7 +2,7 @@
 
 use crate::ik::Engine;
 
-/// The answer to a goal.
+/// The posture that meets a goal, or else the one that came nearest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IkResult {
     /// Whether the goal is met, with all joints inside their limits and no part where it must not
@@ -45,15 +45,15 @@ pub struct IkSolution {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{part} would be {depth_m:.6} m deep in {against}")]
 pub struct Collision {
-    /// The part.
+    /// The part that is in another body; of two links of the arm the later one.
     pub part: ArmPart,
     /// The body that it is in.
     pub against: CollidesWith,
-    /// Depth in m.
+    /// How far they overlap in m, above 0.
     pub depth_m: f64,
 }
 
-/// A part of an arm.
+/// How a collision names a part: by its link, or by its rod where no link has a shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ArmPart {
     /// The rod from the connector of this index (from 0) to the next.
@@ -75,7 +75,7 @@ pub enum CollidesWith {
     Link(String),
 }
 
-/// The reason why a goal is not met.
+/// Why a goal is not met: the reason that helps most, of those that hold.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IkFailure {
     /// The rods are too short.
@@ -101,7 +101,7 @@ pub enum IkFailure {
     /// The target can be reached, but only with a joint outside its limits.
     #[error("joint `{joint}` would have to be at {value:.6}, outside {lower:.6} to {upper:.6}")]
     OutsideLimits {
-        /// Its name.
+        /// The first such joint from the base.
         joint: String,
         /// Its value in rad or m.
         value: f64,

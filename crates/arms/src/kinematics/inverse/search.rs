@@ -19,7 +19,6 @@ const START: Purpose = Purpose(0x1D);
 /// Restarts if no answer can be expected, to come near or to find the reason.
 const FEW_RESTARTS: usize = 8;
 
-/// The search for an answer to a goal.
 pub(super) struct IkSearch<'a> {
     pub(super) skeleton: &'a Skeleton,
     pub(super) by: Descender<'a>,
@@ -28,7 +27,7 @@ pub(super) struct IkSearch<'a> {
 /// The best end of several descents.
 struct BestDescent {
     descent: DescentResult,
-    /// Steps of all descents.
+    /// Steps of all descents, also of those that were not kept.
     steps: usize,
     starts: usize,
     is_met: bool,
@@ -67,6 +66,7 @@ impl<'a> IkSearch<'a> {
         let max_restarts = if out_of_reach.is_some() { FEW_RESTARTS } else { usize::MAX };
         let mut best = self.find_best(first, self.by.goal.restarts.min(max_restarts));
         best.steps += steps;
+        // The connectors' solution was only the first of the starts.
         let engine = if best.starts == 1 { engine } else { Engine::Dls };
         let reason =
             (!best.is_met).then(|| out_of_reach.unwrap_or_else(|| self.find_reason(&best)));
@@ -131,6 +131,7 @@ impl<'a> IkSearch<'a> {
 
     fn draw_value(&self, motion: JointMotion, [lower, upper]: [f64; 2], draws: &mut Draws) -> f64 {
         let reach_m = self.skeleton.reach_m.max(f64::MIN_POSITIVE);
+        // A range without ends becomes a full turn, or what the arm reaches to either side.
         let half = if motion == JointMotion::Turn { PI } else { reach_m };
         let (lower, upper) = match (lower.is_finite(), upper.is_finite()) {
             (true, true) => (lower, upper),

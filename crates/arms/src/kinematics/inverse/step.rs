@@ -2,17 +2,17 @@
 
 use super::super::serial::SerialChain;
 
-/// The range of each variable.
+/// Lowest and highest value of each variable, rad or m.
 #[derive(Debug)]
 pub(super) struct JointRanges {
     pub(super) ranges: Vec<[f64; 2]>,
 }
 
 impl JointRanges {
-    /// No limits.
+    /// Both ends of a joint that turns or slides without end.
     pub(super) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-    /// Returns bounds without limits.
+    /// Returns ranges for goals that ignore limits.
     pub(super) fn unlimited(chain: &SerialChain) -> Self {
         Self { ranges: vec![Self::UNLIMITED; chain.variables.len()] }
     }
@@ -44,7 +44,7 @@ impl JointRanges {
         }
     }
 
-    /// Returns the first variable outside its range: name, value and range.
+    /// Returns the first variable outside, for reports: name, value, lowest and highest value.
     pub(super) fn first_outside(
         &self,
         chain: &SerialChain,
@@ -139,6 +139,7 @@ impl Stepper {
             }
             trace += matrix[i * m + i];
         }
+        // Never 0, so that joints that cannot move the tip still give a finite step.
         let added = (damping * trace / m as f64).max(f64::MIN_POSITIVE.sqrt());
         (0..m).for_each(|i| matrix[i * m + i] += added);
         y.clear();

@@ -51,17 +51,17 @@ pub struct JointTracker {
     blank: LinkTransforms,
 }
 
-/// A place for a connector.
+/// A connector and where it is to be at the end of a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConnectorTarget {
-    /// Index of the connector.
+    /// Index of the connector in the skeleton, the base's being 0.
     pub connector: usize,
     /// Its place in m, in the base's frame.
     pub at_m: Vector,
 }
 
 impl JointTracker {
-    /// Returns the tracker of an arm.
+    /// Returns a tracker; `skeleton` must be that of `chain`.
     pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
         let anchors = skeleton.connectors.clone();
         Self {
@@ -82,6 +82,8 @@ impl JointTracker {
 
     /// Returns the distance at which a connector that leads counts as being at its place, in m.
     pub fn arrival_tolerance_m(&self) -> f64 {
+        // 1e-9 of the reach: descents that converge end far nearer, those that the room stops are
+        // off by far more.
         1e4 * ARRIVAL_TOLERANCE * self.reach_m
     }
 
@@ -308,7 +310,8 @@ fn lever_m(chain: &SerialChain, i: usize, anchor: &Anchor) -> f64 {
     norm(anchor.point_m) + links_m.sum::<f64>()
 }
 
-/// Returns the longest travel of a joint that slides; of one without limits 1 m.
+/// Returns the longest travel of a joint that slides; 1 m of one without limits, to keep bounds
+/// finite.
 fn max_slide_m(joint: &MovingJoint) -> f64 {
     match (joint.motion, joint.limits) {
         (JointMotion::Turn, _) => 0.0,
