@@ -75,6 +75,7 @@ impl<const D: usize> EscapeContext<'_, D> {
         let world = context.world;
         let most_m = match &world.escape {
             Some(escape) => escape.speed_max_m_s * world.dt_s * (1.0 + ROUNDING),
+            // No other chain relies on the claim of the only one.
             None if world.chains.len() == 1 => return None,
             None => f64::INFINITY,
         };
@@ -83,6 +84,7 @@ impl<const D: usize> EscapeContext<'_, D> {
             distance(*p, *was) > most_m || !self.claim.meets(&Bounds::from_points(&[*p]))
         })?;
         self.escaped.restore(body);
+        // After the last task connector 0 stands for the chain.
         let from = context.task(body).map_or(0, |task| task.agent);
         let reached = body.chain.points()[from];
         move_leader_robot(context, body);

@@ -77,6 +77,8 @@ fn scatter<const D: usize>(
         for _ in 0..MAX_PLACEMENT_TRIES {
             let place =
                 at.map(|x| x + by_m * normal(draws).clamp(-MAX_THROW_SIGMAS, MAX_THROW_SIGMAS));
+            // Only the sign counts, so that it does not matter how far around the place is
+            // measured.
             if context.obstacles.clearance_m([place; 2], radius_m, 1.0) > 0.0 {
                 chain.points_mut()[k] = place;
                 break;

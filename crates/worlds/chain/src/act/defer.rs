@@ -13,6 +13,8 @@ use sidestep_rods::{Chain, CompletedMotion, MAX_COORDINATE_M};
 pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> bool {
     let world = context.world;
     let Some(task) = context.task(body) else { return false };
+    // Nothing can veto, a motion is a single sub-step of connector 0, and nothing else needs the
+    // others' places.
     world.is_open()
         && world.reaction.is_none()
         && world.rules.step_m.is_none()
@@ -26,13 +28,15 @@ pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Bod
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
 fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
+    // Twice the step of a cycle, so that rounding is of no account.
     let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * dt_s;
     task.agent == 0
+        // These read other connectors in each cycle, or move them.
         && !matches!(task.driver, TaskKind::Navigate(_) | TaskKind::External | TaskKind::Own(_))
         && chain.points()[0].iter().all(|x| x.abs() < most_m)
 }
 
-/// Moves the initiator alone.
+/// Moves connector 0; the others follow when [`Body::catch_up`] is called.
 pub(super) fn move_initiator_only<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut Body<D>,

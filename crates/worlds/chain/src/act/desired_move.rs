@@ -88,7 +88,8 @@ pub(super) fn desired_move<const D: usize>(
     }
 }
 
-/// Returns the move of a navigator that has made its decision.
+/// After arrival comes what others have done to the connector or its robot; its own decision is
+/// last.
 fn navigator_move<const D: usize>(
     mut wheeled: NavigatorContext<'_, D>,
     decision: Option<Decision>,

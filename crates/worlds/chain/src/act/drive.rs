@@ -13,7 +13,7 @@ use crate::state::Body;
 use crate::trace::IntendedMove;
 use sidestep_rods::geometry::with_dimensions;
 
-/// Description of a move that waits.
+/// What inspections show of a move that gives way to an escape.
 const WAIT: &str = "wait for what moves";
 
 /// The outcome of a chain's task in a cycle.
@@ -33,6 +33,7 @@ pub(super) fn run_task<const D: usize>(
     let mut outcome = TaskOutcome { step: None, gives_way: lead_context.is_pressed };
     let Some(task) = context.task(acting.body) else { return outcome };
     let initiator = Initiator { context, task, follows: lead_context.follows };
+    // Whether this cycle uses up the time of the task.
     let is_late = context.world.start_time_s(acting.body.driving.cycles + 1) >= task.lasts_s;
     acting.body.driving.cycles += 1;
     let present = acting.body.driving.task;

@@ -23,7 +23,7 @@ impl<const D: usize> EventSink<'_, D> {
         }
     }
 
-    /// Returns an event of this chain.
+    /// Returns an event where a connector is, for callers that add a reason or an obstacle to it.
     pub(super) fn event(
         &self,
         chain: &Chain<D>,
@@ -44,7 +44,6 @@ impl<const D: usize> EventSink<'_, D> {
         }
     }
 
-    /// Records an event.
     pub(super) fn record(
         &mut self,
         chain: &Chain<D>,

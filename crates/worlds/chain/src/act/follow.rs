@@ -75,6 +75,7 @@ fn place_robot<const D: usize>(body: &mut Body<D>, k: usize) {
     let [x, y, _] = body.driving.ahead;
     let at = with_dimensions(body.chain.points()[k]);
     let ahead_rad = atan2(y, x);
+    // They differ while the robot turns on the spot, and otherwise by rounding only.
     let turns = wrap_angle(ahead_rad - leader.pose.heading_rad).abs() > HEADING_TOLERANCE_RAD;
     let heading_rad = if turns { leader.pose.heading_rad } else { ahead_rad };
     body.robots[k].pose = Pose2 { at, heading_rad };

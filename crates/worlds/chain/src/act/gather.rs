@@ -152,6 +152,7 @@ impl<const D: usize> ScatteredParts<'_, D> {
     fn obstacle_in_new_rod(&self, mut rods: Range<usize>) -> Option<u32> {
         rods.find_map(|rod| {
             let ends = [self.chain.points()[rod], self.chain.points()[rod + 1]];
+            // A body that only touches the rod is not in it.
             let radius_m = self.chain.rods()[rod].radius_m - TOLERANCE_M;
             self.obstacles.first_overlap(ends, radius_m)
         })

@@ -104,6 +104,7 @@ pub(super) fn follow_initiator<const D: usize>(
         _ => (false, to),
     };
     let followed = arm.follow(&[LeadTarget { k, to: at }], MAX_TRIES).or_else(|veto| {
+        // Planners and operators want exactly this place, not one near it.
         let decides = initiator.task.source() == RequestSource::Autonomous;
         if decides && arm.approach(LeadTarget { k, to }) { Ok(()) } else { Err(veto) }
     });
@@ -158,6 +159,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     /// When no part goes: the objection to the least. Then everything is as before the motion.
     fn follow(&mut self, led: &[LeadTarget<D>], tries: usize) -> Result<(), Veto<D>> {
         let (from, guide) = self.reset_to_joints();
+        // A chain that has not moved guides the joints nowhere.
         let guide = (guide != from).then_some(&guide[..]);
         let guided = ReferenceMotion { from: &from, guide, led };
         let free = ReferenceMotion { guide: None, ..guided };

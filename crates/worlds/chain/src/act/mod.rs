@@ -206,7 +206,6 @@ impl<'a, const D: usize> ChainContext<'a, D> {
 }
 
 impl<const D: usize> Initiator<'_, D> {
-    /// Returns the position of the initiator.
     fn position(self, body: &Body<D>) -> Point<D> {
         body.chain.points()[self.task.agent]
     }

@@ -149,6 +149,7 @@ fn lost_connectors(missing: &[MissingNeighbors]) -> BTreeMap<u32, u32> {
     let mut lost = BTreeMap::new();
     for (k, sides) in (0..).zip(missing) {
         for (side, missing) in Side::ALL.into_iter().zip(sides) {
+            // Connectors farther away only know of it from messages.
             if let Some(connector) = missing.filter(|_| side.neighbor(k, n) == *missing) {
                 lost.entry(connector).or_insert(k);
             }

@@ -38,6 +38,8 @@ pub(super) fn step_from_orders<const D: usize>(
             let at = chain.points()[k];
             let connector = &chain.connectors()[k];
             let mobility = &connector.mobility;
+            // A place that the mobility forbids is vetoed, unless the caller takes the nearest one
+            // allowed.
             let is_there = !goes_far || connector.is_still() || mobility.allows(to, at);
             Motion::Connector { k, to: if is_there { to } else { mobility.project(to, at) } }
         }
@@ -50,7 +52,6 @@ pub(super) fn step_from_orders<const D: usize>(
     Some(StepMotion::new(chain, &motion, initiator.step_m()))
 }
 
-/// Options of an ordered motion.
 #[derive(Clone, Copy)]
 pub(super) struct StepOptions {
     /// Whether the chain waits, because parts of it have to escape.
@@ -133,6 +134,7 @@ fn request_fraction<const D: usize>(
     part: f64,
 ) -> Outcome<D> {
     let motion = step.motion(part);
+    // The caller gets a report of a veto, as a planner does.
     let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let ActState { body, before, propagator, .. } = acting;
     let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
@@ -154,7 +156,7 @@ fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
     record_result_veto(acting.body, veto);
 }
 
-/// Records a veto in the result.
+/// Puts a veto into the result, after [`ActState::record_veto`] has made it the present objection.
 pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto<D>) {
     let answer = &mut body.external.answer;
     answer.veto = body.driving.objection;
@@ -179,7 +181,9 @@ pub(super) fn complete_result<const D: usize>(
         Some(_) if done_share > 0.0 => OrderOutcome::CutShort,
         Some(_) => OrderOutcome::Vetoed,
     };
+    // Without a veto it is all of the motion, whatever rounding has left.
     answer.done_share = if answer.outcome == OrderOutcome::Moved { 1.0 } else { done_share };
+    // A veto has set how far the connector could have gone.
     if answer.outcome != OrderOutcome::Vetoed {
         answer.reached_m = with_dimensions(reached);
     }

@@ -57,6 +57,7 @@ fn nearby_obstacles<const D: usize>(
         // In the very middle of a ball its surface lies in no direction.
         let to_surface = if fraction.is_finite() { scaled(to_core, fraction) } else { [0.0; D] };
         nearby.push(NearbyObstacle {
+            // Ids from there on are those of the parts of other chains.
             id: (obstacle.id < OTHER_CHAIN).then_some(obstacle.id),
             gap_m,
             to_surface_m: with_dimensions(to_surface),

@@ -38,7 +38,7 @@ pub(super) fn out_of_range_veto<const D: usize>(chain: &Chain<D>, by: usize) -> 
     Veto { by, from: by, reason: VetoReason::Limit, obstacle: None, reached }
 }
 
-/// Returns whether a chain is held somewhere.
+/// Returns whether some connector is not free, so that reaching a place takes return passes.
 pub(super) fn is_held<const D: usize>(chain: &Chain<D>) -> bool {
     chain.connectors().iter().any(|c| c.is_still() || c.mobility != Mobility::Free)
 }

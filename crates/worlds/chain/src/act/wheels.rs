@@ -24,7 +24,7 @@ const SHARED_GAP_FRACTION: f64 = 0.25;
 /// Largest angle between two headings that differ by rounding only.
 pub(super) const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 
-/// A step on wheels.
+/// What a navigator's wheels would do in a cycle, if the chain does not veto it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WheelStep {
     /// The pose to which it leads.
@@ -98,7 +98,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
         self.navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
     }
 
-    /// Returns the step that a navigator's wheels make by its decision.
+    /// Returns the step of a decision, slower if robots lag; counts the cycles in which it stands.
     pub(super) fn steer(&mut self, decision: Decision) -> WheelStep {
         let world = self.initiator.context.world;
         self.locate();

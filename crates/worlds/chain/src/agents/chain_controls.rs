@@ -9,7 +9,7 @@ use sidestep_rods::Veto;
 /// Decisions of a chain's agents in a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChainControls<const D: usize> {
-    /// The cycle.
+    /// The cycle that they decide; in any other one they are ignored.
     pub cycle: Cycle,
     /// The decisions, by connector; none of one that has not come to a decision in time.
     pub controls: Vec<Option<Control<D>>>,

@@ -34,11 +34,11 @@ const MAX_HELD_PACKETS: usize = 64;
 /// killed agent may be started again.
 #[derive(Debug, Clone)]
 pub struct ConnectorAgent<const D: usize> {
-    /// Number of its connector.
+    /// Number of its connector, from 0.
     me: u32,
     /// Number of connectors of its chain.
     n: u32,
-    /// Id of connector 0 on the network.
+    /// Id of connector 0 on the network; those of the others follow in order.
     first_id: EntityId,
     /// Digest of scenario and build.
     fingerprint: u64,
@@ -271,7 +271,7 @@ impl<const D: usize> ConnectorAgent<D> {
         });
     }
 
-    /// Starts its role in this cycle.
+    /// A leader that knows of a lost connector, or whose own radio is dead, does not begin.
     fn start_role(&mut self, role: Role<D>) {
         let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
         match (role, missing) {

@@ -12,13 +12,13 @@ use sidestep_rods::geometry::Point;
 pub struct Control<const D: usize> {
     /// The connector's number in its chain.
     pub connector: u32,
-    /// The cycle.
+    /// The cycle that it decides; it is refused in any other.
     pub cycle: Cycle,
-    /// Its motion.
+    /// Whether its connector moves, and where to.
     pub goes: ConnectorMove<D>,
     /// The motion that it led and that is carried out, if there is one.
     pub led: Option<ExecutedMotion>,
-    /// The end of its wish, if it leads the chain; none where time was up before.
+    /// How its intention ended, if it leads the chain; none where time was up before.
     pub ended: Option<LeaderOutcome<D>>,
     /// The nearest lost connectors below and above.
     pub missing: [Option<u32>; 2],
@@ -31,11 +31,11 @@ pub struct Control<const D: usize> {
 /// Motion of a connector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum ConnectorMove<const D: usize> {
-    /// It stays.
+    /// It took part in no motion that is carried out.
     Stays,
     /// It goes, in the motion with a number.
     To {
-        /// The number.
+        /// Number of the motion in its cycle, the same for all connectors that take part.
         request: u32,
         /// Its new place, meters.
         #[serde(with = "sidestep_rods::serde_point")]
@@ -54,31 +54,31 @@ pub enum ConnectorMove<const D: usize> {
 /// A motion that is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExecutedMotion {
-    /// Its number.
+    /// Its number in its cycle, which [`ConnectorMove::To`] repeats.
     pub request: u32,
-    /// The first connector that takes part,
+    /// The first connector that takes part.
     pub first: u32,
-    /// and the last.
+    /// The last one, which takes part as well.
     pub last: u32,
 }
 
-/// End of a leader's wish.
+/// How the intention of a leader ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum LeaderOutcome<const D: usize> {
     /// It was carried out, or not, by the ladder.
     Climbed {
-        /// The rung.
+        /// Where on the ladder it ended.
         climbed: RecoveryOutcome<D>,
-        /// The objection to the wish itself, if there was one.
+        /// The objection to the intention itself, if there was one.
         objection: Option<Veto<D>>,
         /// Its memory after that.
         memory: RecoveryMemory,
     },
     /// The chain stands, because a connector is lost.
     Stands {
-        /// The connector.
+        /// The nearest lost connector that the leader knows of.
         missing: u32,
     },
-    /// There was no wish.
+    /// There was no intention: the chain rests.
     Rested,
 }

@@ -48,7 +48,7 @@ pub(super) struct Parcel<M> {
     pub(super) first: u32,
     /// Number of the first message of the other that has not come yet.
     pub(super) next: u32,
-    /// The messages.
+    /// Those numbered from `first` on, in order; none where it only confirms.
     pub(super) messages: Vec<M>,
 }
 

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 /// A connector's perception at the start of a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConnectorPercept<const D: usize> {
-    /// The cycle.
+    /// The cycle that begins with this percept.
     pub cycle: Cycle,
     /// Its position, meters.
     pub at: WirePoint<D>,
@@ -29,13 +29,13 @@ pub struct ConnectorPercept<const D: usize> {
     pub role: Role<D>,
 }
 
-/// Perception of the connectors of a chain, by connector.
+/// Id of a chain, and what each of its connectors perceives, from connector 0 on.
 pub type ChainPercepts<const D: usize> = (EntityId, Vec<ConnectorPercept<D>>);
 
-/// The role of a connector in a cycle.
+/// Whether a connector leads its chain in a cycle, which only one does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Role<const D: usize> {
-    /// It follows.
+    /// Another one leads: it answers its neighbors.
     Follows,
     /// It leads the chain, which rests.
     Rests,
@@ -48,7 +48,7 @@ pub enum Role<const D: usize> {
 pub struct Intention<const D: usize> {
     /// The position that it wants to reach by the end of the cycle, meters.
     pub to: WirePoint<D>,
-    /// The source of the intention.
+    /// Who wants it, which decides what the leader tries after a veto.
     pub source: RequestSource,
     /// Its knowledge beside its neighborhood.
     pub situation: Situation,
@@ -106,7 +106,6 @@ impl SensedObstacle {
     }
 }
 
-/// Returns the error of a percept of connector `me`.
 fn invalid_percept(me: u32, cause: &str) -> InputError {
     let remedy = "give what its sensors have measured: finite numbers, up to 1e6 m";
     InputError::new(format!("sight of connector {me}"), cause.to_string(), remedy)

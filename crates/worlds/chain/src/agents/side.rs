@@ -48,17 +48,16 @@ pub(crate) struct PerSide<T> {
 }
 
 impl<T> PerSide<T> {
-    /// Returns the values below and above.
     pub(crate) fn new([below, above]: [T; 2]) -> Self {
         Self { below, above }
     }
 
-    /// Returns something for each side.
+    /// Makes the value below first.
     pub(crate) fn from_fn(mut make: impl FnMut(Side) -> T) -> Self {
         Self { below: make(Side::Below), above: make(Side::Above) }
     }
 
-    /// Visits both.
+    /// Visits the value below first.
     pub(crate) fn for_each(&mut self, mut visit: impl FnMut(Side, &mut T)) {
         visit(Side::Below, &mut self.below);
         visit(Side::Above, &mut self.above);

@@ -14,7 +14,6 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Counts a packet.
     pub(super) fn count(&mut self, bytes: usize) {
         self.messages += 1;
         self.bytes += bytes as u64;

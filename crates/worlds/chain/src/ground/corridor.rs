@@ -16,14 +16,14 @@ const MAX_TURN_DEG: f64 = 3600.0;
 /// A part of a corridor's center line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
-    /// Straight on.
+    /// Along the heading at its start.
     Straight {
-        /// Its length.
+        /// Its length, meters, above 0.
         length_m: f64,
     },
     /// Along an arc of a circle.
     Bend {
-        /// The circle's radius.
+        /// Radius of the center line, meters, above 0.
         radius_m: f64,
         /// Its angle, positive to the left, degrees.
         turn_deg: f64,
@@ -127,7 +127,7 @@ impl Corridor {
         Self::new(legs, width_m)
     }
 
-    /// Returns its legs.
+    /// Returns the legs, in order from the origin.
     pub fn legs(&self) -> &[Leg] {
         &self.legs
     }

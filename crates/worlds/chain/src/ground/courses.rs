@@ -14,7 +14,7 @@ use sidestep_rods::geometry::{
 pub enum Course<const D: usize> {
     /// Straight on without end.
     Straight {
-        /// Its velocity.
+        /// Its velocity at all times, not zero.
         velocity_m_s: Point<D>,
     },
     /// Inside a room whose sides throw it back: on each axis a triangle wave.
@@ -30,7 +30,7 @@ pub enum Course<const D: usize> {
         way_points: Vec<Point<D>>,
         /// Whether it goes from the last way point straight to the first, or back the way it came.
         closed: bool,
-        /// Its speed.
+        /// Its speed along all legs, meters per second.
         speed_m_s: f64,
     },
 }
@@ -107,7 +107,7 @@ impl<const D: usize> Mover<D> {
     }
 }
 
-/// Returns whether a velocity is one of a body that moves.
+/// Returns whether a velocity is finite and not zero.
 fn is_motion<const D: usize>(velocity_m_s: &Point<D>) -> bool {
     is_finite(velocity_m_s) && norm(*velocity_m_s) > 0.0
 }
@@ -210,7 +210,7 @@ impl<const D: usize> Movers<D> {
         }
     }
 
-    /// Returns their number.
+    /// Returns their number; their ids may have gaps.
     pub fn len(&self) -> usize {
         self.0.len()
     }

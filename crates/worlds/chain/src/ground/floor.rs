@@ -115,7 +115,7 @@ impl Floor {
         !self.is_solid(col, row)
     }
 
-    /// Returns the middle of a pixel.
+    /// Returns the middle of a pixel in meters; rows count from the bottom.
     pub fn pixel_center(&self, col: u32, row: u32) -> Point<2> {
         self.pixel_position(f64::from(col) + 0.5, f64::from(row) + 0.5)
     }

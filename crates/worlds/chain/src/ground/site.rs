@@ -46,12 +46,12 @@ impl Site {
         site
     }
 
-    /// Returns the floors.
+    /// Returns the floors of pixels; a map has one, a Stage world one for each floor plan.
     pub fn floors(&self) -> &[Floor] {
         &self.floors
     }
 
-    /// Returns all obstacles, numbered on from `first_id`.
+    /// Returns walls along pixels, then all other solids, numbered on from `first_id`.
     pub fn obstacles(&self, first_id: u32) -> Vec<Obstacle<2>> {
         let walls = self.floors.iter().flat_map(|floor| floor.walls(0));
         let all = walls.chain(self.solids.iter().copied());

@@ -53,7 +53,7 @@ pub struct EscapeRules {
     /// Most violations that the literal escape handles in a tick; at least half of them are
     /// contacts.
     pub most: usize,
-    /// The method.
+    /// How parts get out of the way.
     pub method: EscapeMethod,
 }
 
@@ -110,7 +110,7 @@ pub struct EscapeReport<const D: usize> {
     pub capped: usize,
     /// Depth of the deepest part still in a moving obstacle, meters; 0 if none is.
     pub deepest_m: f64,
-    /// The part that is still in one.
+    /// The deepest part that is still in one.
     pub left: Option<TrappedPart<D>>,
     /// The first part that got away: its connector, or the one at the start of its rod, and the
     /// obstacle that it got away from.
@@ -123,9 +123,9 @@ pub struct EscapeReport<const D: usize> {
 /// A part that is still in a moving obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrappedPart<const D: usize> {
-    /// The part.
+    /// The connector or rod that did not get out.
     pub part: ChainPart,
-    /// The obstacle.
+    /// Id of the obstacle that it is in.
     pub obstacle: u32,
     /// The reason why it could not leave; `None` if the tick's motions were used up.
     pub veto: Option<Veto<D>>,
@@ -143,7 +143,7 @@ pub struct Escaper<const D: usize> {
 /// A chain that may have to escape in a tick, and its surroundings.
 #[derive(Debug)]
 pub struct EscapeTick<'a, const D: usize> {
-    /// The chain.
+    /// The chain, which the escape moves.
     pub chain: &'a mut Chain<D>,
     /// Obstacles around it, with those that move.
     pub obstacles: &'a Obstacles<D>,
@@ -182,7 +182,7 @@ const TICKS_AHEAD: f64 = 20.0;
 const MAX_VIOLATIONS: usize = 40;
 
 impl<const D: usize> Escaper<D> {
-    /// Returns an escaper for rules.
+    /// Returns an escaper; it is [`Self::escape`] that checks the rules.
     pub fn new(rules: EscapeRules) -> Self {
         Self {
             rules,
@@ -191,7 +191,7 @@ impl<const D: usize> Escaper<D> {
         }
     }
 
-    /// Returns its rules.
+    /// Returns the rules that it was made with.
     pub fn rules(&self) -> &EscapeRules {
         &self.rules
     }

@@ -79,9 +79,9 @@ pub enum RecoveryOutcome<const D: usize> {
     Straight(CompletedMotion<D>),
     /// A fraction of the step.
     Shorter {
-        /// The fraction.
+        /// The fraction of the step that was free.
         part: f64,
-        /// The motion.
+        /// Counts of the shorter motion.
         moved: CompletedMotion<D>,
     },
     /// A motion in another direction.
@@ -90,7 +90,7 @@ pub enum RecoveryOutcome<const D: usize> {
         turn_rad: f64,
         /// The plane of the turn in space: 0 if it was toward the second axis, 1 if toward the third.
         plane: usize,
-        /// The motion.
+        /// Counts of the motion aside.
         moved: CompletedMotion<D>,
     },
     /// Nothing moved: the drive shall turn.
@@ -105,9 +105,9 @@ pub enum RecoveryOutcome<const D: usize> {
     },
     /// The other end led.
     PulledBack {
-        /// The end that led.
+        /// The end that led: connector 0 or the last one.
         by: usize,
-        /// The motion.
+        /// Counts of the motion that it led.
         moved: CompletedMotion<D>,
     },
     /// Nothing moved, and no rung is left; all vetoes, each once.
@@ -123,7 +123,7 @@ pub enum RecoveryOutcome<const D: usize> {
 /// A ladder, and an initiator's position on it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecoveryLadder {
-    /// Lengths of the rungs.
+    /// How often each rung may be tried.
     pub rungs: RecoveryLimits,
     /// Memory from tick to tick; part of a checkpoint.
     pub memory: RecoveryMemory,
@@ -150,9 +150,8 @@ pub(crate) trait ChainMover<const D: usize> {
 /// An end of a chain that may lead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChainEnd<const D: usize> {
-    /// The connector.
+    /// The connector at the end: the first or the last.
     pub(crate) by: usize,
-    /// Its position.
     pub(crate) at: Point<D>,
     /// The direction in which its rod points out of the chain, a unit vector.
     pub(crate) ahead: Point<D>,
@@ -161,11 +160,11 @@ pub(crate) struct ChainEnd<const D: usize> {
 /// A chain that is moved as a whole, in one process.
 #[derive(Debug)]
 pub struct DirectMover<'a, const D: usize> {
-    /// The chain.
+    /// The chain, which moves only where nothing vetoes.
     pub chain: &'a mut Chain<D>,
-    /// Obstacles around it.
+    /// What may veto, beside the chain itself.
     pub obstacles: &'a Obstacles<D>,
-    /// The rules of its motions.
+    /// Moves the chain, by the rules that it was made with.
     pub propagator: &'a mut Propagator<D>,
 }
 

@@ -36,6 +36,7 @@ pub(crate) fn execute_request<const D: usize>(
     let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
         return Ok(outcome);
     };
+    // A reach leads others back; it is of no use to an initiator that is held itself.
     if !is_held_veto(veto.reason) || veto.by == k {
         return Ok(outcome);
     }
@@ -43,7 +44,7 @@ pub(crate) fn execute_request<const D: usize>(
     move_with_base(&mut Scene { propagator, obstacles }, chain, &order, veto)
 }
 
-/// Returns whether a veto is that of a connector that is held.
+/// Returns whether a return pass may answer a veto.
 fn is_held_veto(reason: VetoReason) -> bool {
     matches!(reason, VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility)
 }

@@ -26,9 +26,9 @@ impl Pose2 {
 /// Speeds of the two wheels; negative is backward.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Wheels {
-    /// Speed of the left wheel.
+    /// Speed over ground of the wheel to the left of the heading, m/s.
     pub left_m_s: f64,
-    /// Speed of the right wheel.
+    /// Speed over ground of the wheel to the right of the heading, m/s.
     pub right_m_s: f64,
 }
 
@@ -38,7 +38,7 @@ impl Wheels {
         Self { left_m_s, right_m_s }
     }
 
-    /// Returns the speed of the middle, m/s.
+    /// Returns the speed of the axle's middle along the heading, m/s.
     pub fn speed_m_s(&self) -> f64 {
         0.5 * (self.left_m_s + self.right_m_s)
     }
@@ -57,7 +57,7 @@ impl Wheels {
     }
 }
 
-/// A differential drive.
+/// Two driven wheels on an axle through the middle of a body; none slips.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DifferentialDrive {
     wheelbase_m: f64,
@@ -126,7 +126,7 @@ pub fn steer(bearing_rad: f64, speed_m_s: f64) -> Wheels {
     }
 }
 
-/// Returns `sin(x) / x`.
+/// Returns `sin(x) / x`, and 1 at 0.
 fn sine_ratio(x: f64) -> f64 {
     // Below this, the next term of the series is less than half a unit in the last place.
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { sin(x) / x }

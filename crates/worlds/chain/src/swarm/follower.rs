@@ -33,9 +33,9 @@ pub struct Follower {
 /// Position and velocity of the connector that a follower keeps to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackingTarget {
-    /// Its place.
+    /// Its place at the end of the tick, meters.
     pub at: Point<2>,
-    /// Its velocity.
+    /// Its mean velocity in the tick, m/s.
     pub velocity_m_s: Point<2>,
 }
 

@@ -34,19 +34,19 @@ impl RobotBody {
     }
 }
 
-/// All bodies around a robot.
+/// All that a robot's sensors may meet.
 #[derive(Debug, Clone, Copy)]
 pub struct NearbyBodies<'a, R> {
     /// The world's obstacles.
     pub obstacles: &'a Obstacles<2>,
-    /// Other robots.
+    /// Bodies of robots, without that of the robot itself.
     pub robots: R,
 }
 
 /// A laser with equally spaced beams all around, of which it reads those within its field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Laser {
-    /// Its range.
+    /// Its range, meters; a beam that meets nothing reads that.
     range_m: f64,
     /// Standard deviation of its errors, meters; 0 for none.
     noise_std_m: f64,

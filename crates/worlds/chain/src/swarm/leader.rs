@@ -107,7 +107,7 @@ impl Default for TargetSense {
     }
 }
 
-/// How a leader turns.
+/// The point about which a leader turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TurnMode {
     /// About the resting wheel, as in the slides; if that is blocked it stands.
@@ -121,7 +121,7 @@ pub enum TurnMode {
 /// A leader: its laser and the parameters of its behavior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Leader {
-    /// Its laser.
+    /// The laser with which it sees walls and movers.
     pub laser: Laser,
     /// Angles to each side of straight ahead between which it looks for walls.
     pub sector_rad: [f64; 2],
@@ -139,7 +139,7 @@ pub struct Leader {
     pub leave_rule: Option<LeaveRule>,
     /// Detection of targets.
     pub target_sense: TargetSense,
-    /// How it turns.
+    /// Whether it turns on the spot where it cannot turn about a wheel.
     pub turning: TurnMode,
     /// Whether it treats no moving body as a wall, and stands while one is ahead and close. Otherwise a wall
     /// is anything that its laser meets, as in the slides, and a robot that crosses its path turns it around.
@@ -233,27 +233,27 @@ impl LeaderState {
     }
 }
 
-/// A value for each side.
+/// One value for the left of a robot, and one for the right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Sides<T> {
-    /// The value on the left.
+    /// That of what is counterclockwise of the heading.
     pub left: T,
-    /// The value on the right.
+    /// That of what is clockwise of the heading.
     pub right: T,
 }
 
-/// The surroundings of a leader.
+/// All that a leader's sensors may detect.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     /// The world's obstacles.
     pub obstacles: &'a Obstacles<2>,
-    /// Other robots.
+    /// Bodies of robots, without its own.
     pub bodies: &'a [RobotBody],
-    /// Its target.
+    /// The place that it seeks; `None` where it only follows walls.
     pub target: Option<Point<2>>,
 }
 
-/// A leader's perception.
+/// What a leader makes of a scan, and of its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Percept {
     /// Distances of the nearest walls, meters.
@@ -275,7 +275,7 @@ pub struct Sighting {
     pub way_is_free: bool,
 }
 
-/// A leader's decision.
+/// What a leader does in a cycle, and what it keeps in mind for the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
     /// Speeds of its wheels.
@@ -413,7 +413,6 @@ impl Leader {
     }
 }
 
-/// The layers' view of a wall.
 #[derive(Debug, Clone, Copy)]
 struct WallView {
     is_close: bool,

@@ -28,12 +28,12 @@ pub(super) struct RecoveryProgress<const D: usize> {
     requests: u32,
 }
 
-/// An answer to a question of the ladder.
+/// The answer to one question of the ladder; answers are in the order of the questions.
 #[derive(Debug, Clone, PartialEq)]
 enum LadderAnswer<const D: usize> {
     /// The outcome of a motion, after which the leader is at a place.
     Outcome(Outcome<D>, Point<D>),
-    /// The other end.
+    /// Place and direction of the far end; none in a chain of a single connector.
     End(Option<ChainEnd<D>>),
     /// The target is beyond all coordinates.
     Beyond,
@@ -44,7 +44,7 @@ enum LadderAnswer<const D: usize> {
 enum LadderQuestion<const D: usize> {
     /// A motion, or only whether it would be possible.
     Motion { request: Request<D>, only_asks: bool },
-    /// The other end.
+    /// Where the far end of the chain is, and in which direction its rod points.
     End,
 }
 
@@ -150,6 +150,7 @@ impl<const D: usize> ConnectorAgent<D> {
                 climbing.requests += 1;
                 let (k, to) = match request.motion {
                     Motion::Connector { k, to } => (k as u32, to),
+                    // The ladder moves single connectors only.
                     Motion::Rod { i, to } => (i as u32, to[0]),
                 };
                 let Intention { is_empty, is_open, .. } = climbing.intention;

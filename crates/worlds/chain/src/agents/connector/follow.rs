@@ -8,7 +8,7 @@ use sidestep_rods::local_solver::{LocalSolver, MasterMotion, SlavePosition, Slav
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{PendingVeto, Rod, VetoReason};
 
-/// A motion in which a connector is a slave.
+/// What a connector remembers of a motion, from its master's question to the decision.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SlaveMotion {
     /// Number of the motion in its cycle.

@@ -30,7 +30,7 @@ pub(super) struct LeadState<const D: usize> {
 enum LeadPhase {
     /// The next sub-step, if there is one.
     Step,
-    /// Asks one side.
+    /// Asks one side whether it can follow.
     Ask(Side, LengthChoice),
     /// Waits for its answer.
     Wait(Side, LengthChoice),
@@ -43,7 +43,7 @@ enum LeadPhase {
 enum LengthChoice {
     /// Another one only if the present one is blocked.
     Own,
-    /// All.
+    /// All that a rod may have: the second try, after a veto.
     All,
 }
 
@@ -146,7 +146,7 @@ impl<const D: usize> ConnectorAgent<D> {
         LeadPhase::Wait(side, lengths)
     }
 
-    /// Returns what follows the consent of one side.
+    /// Above is followed by below; after both the sub-step is accepted.
     fn after_consent(&self, leading: &mut LeadState<D>, side: Side) -> LeadPhase {
         if side == Side::Above {
             return LeadPhase::Ask(Side::Below, LengthChoice::Own);
@@ -247,7 +247,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    /// Sends the outcome of a motion to the agent that ordered it.
+    /// Sends the outcome to the agent that ordered the motion, or to this one's own ladder.
     fn send_outcome(&mut self, orderer: Option<Side>, outcome: Option<Outcome<D>>) {
         match orderer {
             Some(side) => self.send(side, Message::Done(outcome)),

@@ -44,7 +44,6 @@ const PUSH_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.25];
 const PUSH_TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
 
 impl<const D: usize> LiteralEscape<D> {
-    /// Returns an escape with empty buffers.
     pub(super) fn new(rules: EscapeRules) -> Self {
         Self {
             rules,
@@ -213,6 +212,8 @@ impl<const D: usize> LiteralEscape<D> {
                 if veto.by != k && tick.chain.connectors()[veto.by].is_still() =>
             {
                 let order =
+                    // A reach may end short of its target, but by less than the push goes beyond
+                    // the depth.
                     ReachRequest { k, target: to, base: veto.by, tolerance_m: 0.5 * PUSH_MARGIN_M };
                 match reach(tick.propagator, tick.chain, tick.obstacles, &order)? {
                     ReachOutcome::There { .. } => 0..tick.start.len(),

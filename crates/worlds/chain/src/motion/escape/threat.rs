@@ -9,7 +9,7 @@ use std::ops::Range;
 /// A part of a chain; the order breaks ties between equally deep violations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChainPart {
-    /// A connector.
+    /// The connector of this number.
     Connector(usize),
     /// The rod between a connector and the next.
     Rod(usize),

@@ -50,7 +50,7 @@ pub(super) struct Visit {
     goal_m: f64,
 }
 
-/// Returns the place of a point and a direction.
+/// Rounds a point and a direction to a cell and a heading.
 pub(super) fn visit_key<const D: usize>(at: Point<D>, u: Point<D>) -> VisitKey {
     let mut cell = [0; 3];
     for (i, x) in at.into_iter().enumerate() {

@@ -118,7 +118,6 @@ fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + 
     (0..=n).map(ChainPart::Connector).chain((0..n).map(ChainPart::Rod))
 }
 
-/// Returns the radius of a part, meters.
 pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: ChainPart) -> f64 {
     match part {
         ChainPart::Connector(k) => chain.connectors()[k].radius_m,
@@ -157,7 +156,6 @@ fn near_pair<const D: usize>(
     (apart_m < touch_m + reach_m).then(|| PartPair { parts, keep_m: touch_m.min(apart_m) })
 }
 
-/// Returns the nearest points of two parts.
 pub(super) fn nearest<const D: usize>(
     points: &[Point<D>],
     parts: [ChainPart; 2],

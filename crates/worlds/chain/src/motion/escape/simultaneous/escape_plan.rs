@@ -142,6 +142,8 @@ fn exit_candidates<const D: usize>(
         let near = threats.iter().filter(|t| t.mover == k);
         let gaps = near.map(|t| (gap_m(input.chain, t.part, mover), t.part));
         let Some((gap_m, part)) = gaps.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        // Twice as far as danger begins: an obstacle that is not in contact yet may be the better
+        // exit.
         if gap_m < 2.0 * DANGER_DISTANCE_M {
             let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), part));
             let through = scaled(direction_away(mover, &nearest), -1.0);
@@ -173,6 +175,7 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
         axes.extend(normalized(with_dimensions::<3, D>([normal[0], normal[1], normal[2]])));
     }
     for axis in axes {
+        // All around in steps of 30 degrees; straight through is there already.
         for k in 1..12 {
             let turn_rad = f64::from(k) * FRAC_PI_6;
             all.push(add_scaled(scaled(through, cos(turn_rad)), axis, sin(turn_rad)));

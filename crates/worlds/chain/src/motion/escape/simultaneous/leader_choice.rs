@@ -17,7 +17,8 @@ const SIDE_CONNECTORS: usize = 48;
 /// ticks each, with all 97 connectors.
 const MAX_WORK: usize = 40_000;
 
-/// Returns whether a leader should rest.
+/// Resting is rolled out only where moving brings parts inside, because rollouts are all the cost
+/// of a choice.
 pub(super) fn should_rest<const D: usize>(
     rules: &EscapeRules,
     input: &SolveInput<'_, D>,

@@ -58,7 +58,6 @@ const PRESSED_SPEED_FRACTION: f64 = 0.9;
 const TOUCH_M: f64 = 1e-9;
 
 impl<const D: usize> SimultaneousEscape<D> {
-    /// Returns an escape with empty buffers.
     pub(super) fn new(rules: EscapeRules) -> Self {
         Self { rules, solver: EscapeSolver::default(), best: Vec::new(), start: Vec::new() }
     }
@@ -89,6 +88,7 @@ impl<const D: usize> SimultaneousEscape<D> {
                 chain.points_mut().copy_from_slice(&self.best);
             }
             self.start = at;
+            // Further steps are for parts that are still inside.
             if !has_moved || report.left.is_none() {
                 break;
             }
@@ -101,7 +101,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         report
     }
 
-    /// Returns whether a leader should rest.
+    /// Tries both on copies; the chain stays as it is.
     pub(super) fn should_rest(
         &self,
         chain: &Chain<D>,

@@ -10,7 +10,6 @@ pub(super) struct TrialPosture<'a, const D: usize> {
     pub(super) inverse_mass: &'a [f64],
 }
 
-/// A point of a part.
 #[derive(Clone, Copy)]
 pub(super) struct PartPoint {
     pub(super) part: ChainPart,

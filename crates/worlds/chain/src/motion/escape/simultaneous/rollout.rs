@@ -85,7 +85,8 @@ impl<const D: usize> RolloutOptions<D> {
         Self { through, lead: None, clear: CLEAR_TICKS }
     }
 
-    /// Returns the options of a connector that leads.
+    /// Returns the options of a leader: rolled out to the end, because it may lead the chain inside
+    /// later.
     pub(super) fn with_lead(lead: LeadMotion<D>) -> Self {
         Self { through: None, lead: Some(lead), clear: MAX_TICKS }
     }

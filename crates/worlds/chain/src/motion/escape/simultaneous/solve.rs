@@ -253,7 +253,6 @@ fn trial_posture<'a, const D: usize>(
     TrialPosture { points, inverse_mass }
 }
 
-/// Returns the point of a part that is at a position.
 #[inline]
 fn part_point<const D: usize>(
     posture: &TrialPosture<'_, D>,

@@ -4,7 +4,6 @@ use super::super::Margin;
 use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, Obstacles, Rules};
 
-/// The input of a solve.
 #[derive(Clone, Copy)]
 pub(super) struct SolveInput<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
@@ -24,7 +23,7 @@ impl<const D: usize> SolveInput<'_, D> {
     }
 }
 
-/// The motion that a leader wants.
+/// What a leader would do in a tick, vetoes and escapes aside.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeadMotion<const D: usize> {
     /// The connector that leads.
