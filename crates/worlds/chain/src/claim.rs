@@ -7,7 +7,8 @@ use super::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
 use sidestep_rods::geometry::{Bounds, with_dimensions};
 
-/// Makes the claim of one chain.
+/// Claims the box of one chain, and keeps its navigator's decision, which is made before anything
+/// moves.
 pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
     claim_box(phase, slot);
     let &mut PhaseContext { world, state, now, .. } = phase;

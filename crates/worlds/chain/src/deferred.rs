@@ -10,7 +10,7 @@ use sidestep_rods::Chain;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::wavefront;
 
-/// Deferred motions of connector 0.
+/// Motions of connector 0 that the others have yet to follow.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DeferredMotions<const D: usize> {
     motions: wavefront::DeferredMotions<D>,

@@ -22,12 +22,12 @@ use std::sync::Arc;
 /// Largest number of motions in a script: a mistaken repetition must not fill the memory.
 pub(crate) const MAX_MOTIONS: usize = 1_000_000;
 
-/// One task.
+/// A task as a scenario gives it; what has come of it so far is in [`TaskProgress`].
 #[derive(Debug, Clone)]
 pub(crate) struct Task<const D: usize> {
     /// The connector that moves.
     pub(crate) agent: usize,
-    /// Speed of the connector, m/s.
+    /// Highest speed of that connector, m/s.
     pub(crate) speed_m_s: f64,
     /// The goal of the task.
     pub(crate) driver: TaskKind<D>,
@@ -86,7 +86,7 @@ pub(crate) struct Wander<const D: usize> {
 /// Places to go to.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Targets<const D: usize> {
-    /// The places.
+    /// Where to go, in this order.
     pub(crate) places: Vec<Point<D>>,
     /// Distance at which a place counts as reached, meters.
     pub(crate) tolerance_m: f64,
@@ -95,6 +95,7 @@ pub(crate) struct Targets<const D: usize> {
 impl<const D: usize> Task<D> {
     /// Returns the source of the task's motions.
     pub(crate) fn source(&self) -> RequestSource {
+        // A script is obeyed to the letter; all others may find another way after a veto.
         match self.driver {
             TaskKind::Script(_) => RequestSource::Operator,
             _ => RequestSource::Autonomous,
@@ -105,7 +106,7 @@ impl<const D: usize> Task<D> {
 /// Progress of an initiator through its tasks: a part of the state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaskProgress {
-    /// The present task.
+    /// Number of the present task, from 0; that of tasks in all once every one has ended.
     pub task: u32,
     /// Cycles since the task started.
     pub cycles: Cycle,
@@ -140,7 +141,7 @@ pub struct TaskProgress {
 pub struct VetoRecord {
     /// The connector that objected.
     pub by: u32,
-    /// The reason.
+    /// The constraint that it would have broken.
     pub reason: VetoReason,
 }
 

@@ -5,7 +5,7 @@ use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::VetoReason;
 
-/// Kinds of events.
+/// What may happen to a chain; each kind says what the value of its events is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
@@ -63,7 +63,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// All kinds.
+    /// All kinds, in the order of the labels in tables.
     pub const ALL: [Self; 23] = [
         Self::Veto,
         Self::Penetration,
@@ -148,20 +148,20 @@ impl EventKind {
     }
 }
 
-/// One event.
+/// Something that happened to a chain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Event {
     /// Cycle in which it happened.
     pub(crate) cycle: Cycle,
-    /// The chain.
+    /// Slot of the chain.
     pub(crate) chain: EntityId,
-    /// Its kind.
+    /// What happened; it gives `value` its meaning.
     pub(crate) kind: EventKind,
     /// The connector concerned.
     pub(crate) connector: u32,
-    /// The place of that connector.
+    /// Where that connector was, meters.
     pub(crate) at_m: Vec3,
-    /// The reason of a veto.
+    /// Reason of a veto, or of the last one before a target was given up.
     pub(crate) reason: Option<VetoReason>,
     /// The obstacle concerned, if any.
     pub(crate) obstacle: Option<u32>,

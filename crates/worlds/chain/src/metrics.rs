@@ -102,7 +102,7 @@ metrics! {
 }
 
 impl RungTally {
-    /// Counts a climb.
+    /// Counts a climb; one without a veto, or of an operator, is on no rung.
     pub(super) fn record<const D: usize>(&mut self, climbed: &RecoveryOutcome<D>) {
         let rung = match climbed {
             RecoveryOutcome::Straight(_) | RecoveryOutcome::Vetoed(_) => return,
@@ -163,7 +163,7 @@ impl EscapeTally {
 /// Counts for robots that keep to connectors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RobotTally {
-    /// Steps of all robots.
+    /// One for each robot and cycle.
     pub steps: u64,
     /// Times that a bumper was pressed,
     pub bumper_events: u64,
@@ -218,7 +218,7 @@ impl RobotTally {
 }
 
 impl ChainTally {
-    /// Adds a motion.
+    /// Adds a motion that the chain has followed.
     pub(crate) fn add_motion<const D: usize>(&mut self, moved: &CompletedMotion<D>) {
         self.rotations += moved.rotated as u64;
         self.moved += moved.changed as u64;
@@ -241,7 +241,7 @@ impl ChainTally {
         is_inside != was_inside
     }
 
-    /// Adds a veto.
+    /// Counts every veto, also those that are no events of their own.
     pub(crate) fn add_veto(&mut self, reason: VetoReason) {
         self.vetoes[reason.number()] += 1;
     }
@@ -286,7 +286,7 @@ impl Default for ChainTally {
 /// A motion or target that an initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AbandonedPart {
-    /// The task.
+    /// Number of the task, from 0.
     pub task: u32,
     /// The motion of its script, or the target.
     pub part: u32,
@@ -404,17 +404,17 @@ impl RobotMetrics {
 /// A motion or target that a chain's initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChainAbandonedPart {
-    /// The chain.
+    /// Id of the chain.
     pub chain: EntityId,
     /// The motion or target.
     #[serde(flatten)]
     pub what: AbandonedPart,
 }
 
-/// Metrics of one chain.
+/// What a run reports about one chain.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChainMetrics {
-    /// Its id.
+    /// Its place among all chains, copies included, from 0.
     pub chain: EntityId,
     /// Its name; may be empty.
     pub name: String,

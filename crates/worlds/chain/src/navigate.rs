@@ -29,7 +29,7 @@ pub(crate) struct Navigator {
 pub(crate) enum NavigationGoal {
     /// A place that it can detect.
     Target {
-        /// The place.
+        /// Where it is, meters.
         at: Point<2>,
         /// Distance at which the place counts as reached, meters.
         tolerance_m: f64,

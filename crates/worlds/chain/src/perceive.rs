@@ -22,7 +22,7 @@ pub(crate) struct Perceiver<'a, const D: usize> {
     pub(crate) scratch: &'a mut Scratch<D>,
 }
 
-/// A navigator's perception.
+/// What a navigator knows when it decides.
 pub(crate) struct NavigatorPercept<'a> {
     pub(crate) navigator: &'a Navigator,
     /// The connector that navigates.

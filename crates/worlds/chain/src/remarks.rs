@@ -6,7 +6,7 @@ use sidestep_arms::kinematics::JointMotion;
 use sidestep_rods::Mobility;
 use sidestep_scenario::Remark;
 
-/// Returns the remarks, in the order of the chains.
+/// Returns remarks on joints, then on the network, then on rules without effect.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
     let mut chains = compiled.world.chains.iter().enumerate();
     let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds(k, spec));

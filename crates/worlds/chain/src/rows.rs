@@ -31,7 +31,7 @@ struct JointRow {
     value: f64,
 }
 
-/// Adds one column per dimension of a position.
+/// Adds as many columns as there are dimensions, from x on.
 fn add_axis_columns(table: Table<PositionRow>, dimensions: usize) -> Table<PositionRow> {
     let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
     axes.fold(table, |table, (i, axis)| table.f64(axis, "position", move |p| p.at[i]))

@@ -39,9 +39,10 @@ pub(crate) use spec::ScenarioSpec;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Largest length, time or coordinate of a scenario.
+/// Largest length, time or coordinate of a scenario, the largest that rods take: beyond it,
+/// rounding is no longer small.
 const MAX_VALUE: f64 = 1e6;
-/// Cycles of a run whose scenario does not set them.
+/// Cycles of a run whose scenario does not set them: 40 s of the usual ones.
 const DEFAULT_CYCLES: u64 = 2000;
 /// Duration of a cycle, unless it is given, s: that of the measurements on which the defaults of the rules rest.
 const DEFAULT_DT_S: f64 = 0.02;
@@ -50,7 +51,10 @@ const DEFAULT_DT_S: f64 = 0.02;
 /// motion is smooth, slaves go up to 2.2 times as far; thick rods that turn aside throw them 12 to 19 times as far.
 const MAX_SLAVE_STEP_FACTOR: f64 = 4.0;
 
-/// Distance up to which clearance is measured, unless it is given, as a multiple of the largest connector's radius.
+/// Distance up to which clearance is measured, unless it is given, as a multiple of the largest
+/// connector's radius. A part is measured against all obstacles within it in each cycle, so that a
+/// longer one costs time; within two diameters an obstacle is seen many cycles before it is
+/// touched, at the usual speed. The value was chosen, not measured.
 const LOOK_FACTOR: f64 = 4.0;
 /// Radius, in meters, that stands for smaller ones when that distance is chosen: chains of points look around, too.
 const MIN_LOOK_RADIUS_M: f64 = 0.05;
@@ -298,7 +302,7 @@ pub struct ChainScenario<const D: usize> {
     pub world: Arc<ChainWorld<D>>,
     /// Name of the scenario, may be empty.
     pub name: String,
-    /// The seed.
+    /// Seed of all random draws; [`Self::reseeded`] returns the scenario with another.
     pub seed: u64,
     /// Most cycles of a run; it ends earlier when all tasks are done.
     pub cycles: u64,

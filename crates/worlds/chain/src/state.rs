@@ -125,7 +125,7 @@ impl<const D: usize> ChainState<D> {
         Self::from_bodies((0..self.len()).map(|slot| self.body(slot).clone()))
     }
 
-    /// Returns the number of chains.
+    /// Returns the number of chains; slots are less than it.
     pub fn len(&self) -> usize {
         self.cells.len()
     }
@@ -167,7 +167,7 @@ impl<const D: usize> ChainState<D> {
         body.submitted.as_ref().is_some_and(|submitted| submitted.cycle == cycle)
     }
 
-    /// Locks one chain for writing.
+    /// Locks one chain for writing; the grid of solid parts is then out of date.
     pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
         // Reading first: if every worker wrote the flag, its cache line would move between them in each cycle.
         if !self.has_changed.load(Relaxed) {
@@ -216,7 +216,7 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }
 
-    /// Returns the decision of a chain's navigator.
+    /// Returns what a chain's navigator has decided in this cycle; none where none leads.
     pub(crate) fn decision(&self, slot: usize) -> Option<Decision> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -225,7 +225,7 @@ impl<const D: usize> ChainState<D> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner) = decision;
     }
 
-    /// Returns the state after `cycle` cycles.
+    /// Returns all that the rest of a run depends on, after `cycle` cycles.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let bodies = 0..self.len();
         Snapshot {
@@ -243,7 +243,7 @@ impl<const D: usize> ChainState<D> {
         }
     }
 
-    /// Returns the records of one component, by chain.
+    /// Returns the records of those chains where there is something to save, by slot.
     fn save_component<C: Component>(
         &self,
         cycle: Cycle,

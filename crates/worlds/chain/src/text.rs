@@ -10,7 +10,7 @@ use sidestep_kernel::text::{
     Description, KeyValues, align_pairs, format_fixed, group_thousands, key_value,
 };
 
-/// Returns the contents of a compiled scenario.
+/// Returns what a scenario has and how long it lasts, before it runs.
 pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Description {
     Description { json: contents_json(compiled), text: align_pairs(&contents_lines(compiled)) }
 }

@@ -8,7 +8,7 @@ use sidestep_rods::geometry::Point;
 /// The record of an inspection; runs make none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct InspectionTrace<const D: usize> {
-    /// The chain.
+    /// The chain that is inspected; all others record nothing.
     pub(crate) slot: Slot,
     /// The move that its driver wanted.
     pub(crate) intended: Option<IntendedMove<D>>,

@@ -213,7 +213,7 @@ fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
     parts
 }
 
-/// Returns an obstacle as a drawn body.
+/// Returns what viewers draw of an obstacle; in the plane it gets a height.
 fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {

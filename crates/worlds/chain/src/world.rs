@@ -64,7 +64,7 @@ pub struct ChainWorld<const D: usize> {
     pub dt_s: f64,
     /// Cycles of the run, by which the progress of an endless task is measured.
     pub(crate) cycles: Cycle,
-    /// Rules by which chains react.
+    /// Rules of all chains; limits that a scenario leaves out follow from its speeds.
     pub(crate) rules: Rules,
     /// The reaction of free connectors, unless it is the built-in one.
     pub(crate) reaction: Option<Arc<dyn Reaction>>,
@@ -90,7 +90,7 @@ pub struct ChainWorld<const D: usize> {
 pub(crate) struct ChainSpec<const D: usize> {
     /// Its name; may be empty.
     pub(crate) name: String,
-    /// The chain at the start.
+    /// The chain before any change.
     pub(crate) start: Chain<D>,
     /// Tasks of its initiators, one after the other; at least one.
     pub(crate) tasks: Vec<Task<D>>,
@@ -105,27 +105,27 @@ pub(crate) struct ChainSpec<const D: usize> {
 /// A change to a chain at the start of a cycle (slides R8, R10, F3).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Change<const D: usize> {
-    /// The cycle.
+    /// The cycle at whose start it takes effect.
     pub(crate) cycle: Cycle,
-    /// The change.
+    /// What changes, and to what.
     pub(crate) what: ChangeKind<D>,
 }
 
-/// Kinds of changes.
+/// What a scenario may change in the course of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ChangeKind<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
         /// Its index.
         connector: usize,
-        /// Whether it has failed.
+        /// False if it works again.
         failed: bool,
     },
     /// A connector gets a new mobility.
     Mobility {
         /// Its index.
         connector: usize,
-        /// The new mobility.
+        /// Where it may be from then on.
         mobility: Mobility<D>,
     },
     /// A connector gets a new bend limit.
@@ -172,7 +172,7 @@ impl<const D: usize> Change<D> {
         }
     }
 
-    /// Applies a change of constraints.
+    /// Puts new limits into the chain; breaking and joining change places, not limits.
     pub(crate) fn constrain(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
             ChangeKind::Failed { connector, failed } => {

@@ -24,7 +24,7 @@ use sidestep_kernel::{
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
-/// A run of chains in `D` dimensions.
+/// A run whose number of dimensions is known; [`chain_run`] is for those who do not know it.
 pub type ChainRun<const D: usize> = Run<ChainWorld<D>>;
 
 /// Returns a run of a scenario at its start, in the plane or in space: a [`ChainRun`] behind the face that all worlds
@@ -53,7 +53,7 @@ impl<const D: usize> ChainScenario<D> {
         Run::new(self.world, start, &source.text, workers)
     }
 
-    /// Returns the plan that the scenario asks for.
+    /// Returns name, seed, length and checkpoints of a run.
     pub fn plan(&self) -> RunConfig {
         RunConfig {
             name: self.name.clone(),
@@ -73,12 +73,12 @@ pub struct Collector {
     rows: Rows,
     /// Events that wait for the next frame.
     log: Log<Event>,
-    /// Events gathered from the workers.
+    /// Events of a cycle in the order of the workers, until [`World::commit`] sorts them.
     gathered: Vec<Event>,
 }
 
 impl<const D: usize> ChainWorld<D> {
-    /// Returns the metrics of one chain.
+    /// Returns the counts of one chain so far, its progress, and the joint values of an arm.
     pub fn chain_metrics(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
@@ -100,6 +100,7 @@ impl<const D: usize> ChainWorld<D> {
 impl<const D: usize> World for ChainWorld<D> {
     const NAME: &'static str = "chain";
     const AGENT: &'static str = "connector";
+    // Positions are recorded before each cycle; beside a cycle of a chain the barrier for it takes no time.
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
@@ -109,6 +110,7 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 
     fn cycles_until_flush(&self, _: &ChainState<D>, collector: &Collector, _: Cycle) -> u64 {
+        // How many rows a cycle makes is not known before, so the buffers are looked at after each.
         if collector.rows.is_full() { 0 } else { u64::MAX }
     }
 

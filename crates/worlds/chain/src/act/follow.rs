@@ -18,7 +18,7 @@ use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions
 struct FollowContext<'a, const D: usize> {
     context: ChainContext<'a, D>,
     follower: &'a Follower,
-    /// Obstacles that are solid to robots.
+    /// Obstacles, with the robots of other chains but not their rods, which are virtual.
     solid: &'a Obstacles<D>,
     /// The robots of the chain as they were before the cycle.
     robots: &'a [RobotBody],

@@ -28,7 +28,7 @@ pub(crate) struct Orders {
 /// Places to which a connector or a rod shall go; in the plane the last coordinate is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Target {
-    /// A connector.
+    /// The place of one connector, meters.
     Connector([f64; 3]),
     /// Both ends of a rod.
     Rod([[f64; 3]; 2]),
@@ -37,7 +37,7 @@ pub(crate) enum Target {
 /// The result of orders.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct OrderResult {
-    /// The outcome.
+    /// How much of the motion was made.
     pub(crate) outcome: OrderOutcome,
     /// The positions that were to be reached within the cycle: of a rod's ends, or twice that of a connector.
     pub(crate) target_m: [[f64; 3]; 2],
@@ -59,7 +59,7 @@ pub(crate) enum OrderOutcome {
     NoOrder,
     /// All of the cycle's motion was made.
     Moved,
-    /// Some of it.
+    /// Some of it; then came the veto.
     CutShort,
     /// Nothing of it.
     Vetoed,
@@ -102,7 +102,7 @@ impl Orders {
     /// The order that gives the effect of a veto on the way.
     pub(crate) const REACH: &str = "reach";
 
-    /// Records an order by its name.
+    /// Records an order; the values are of the space that it has.
     pub(crate) fn record(&mut self, order: &str, values: &[f64]) {
         match (order, values) {
             (Self::TO, at) => self.target = Some(Target::Connector(in_space(at))),

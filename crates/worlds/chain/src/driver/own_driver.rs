@@ -80,7 +80,7 @@ pub struct NearbyObstacle {
     pub gap_m: f64,
     /// The vector from the middle of the connector to its surface, meters.
     pub to_surface_m: Point<3>,
-    /// Its velocity, m/s.
+    /// Its velocity, m/s; zero for a static obstacle.
     pub velocity_m_s: Point<3>,
 }
 

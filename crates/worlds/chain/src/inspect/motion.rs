@@ -12,7 +12,7 @@ use sidestep_rods::CompletedMotion;
 use sidestep_rods::geometry::{distance, sub, with_dimensions};
 use std::borrow::Cow;
 
-/// Connectors that are inspection, at most.
+/// Most connectors that an inspection lists.
 const MAX_LISTED_CONNECTORS: usize = 64;
 
 impl<const D: usize> ConnectorInspection<'_, D> {
@@ -122,7 +122,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    /// Adds the outcome.
+    /// Adds how far the connector gets, and all events of the cycle.
     pub(super) fn add_outcome(&self, inspection: &mut Inspection) {
         let mut table = FactTable::new(["event", "connector", "with", "value"]);
         for event in &self.scratch.events {

@@ -61,7 +61,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(Arm::new(serial, at_m, values))
     }
 
-    /// Returns the link of a model that a key gives by its name.
+    /// Returns the link that a key names; errors point at that key.
     fn link(
         &self,
         model: &Model,

@@ -37,7 +37,8 @@ const DEFAULT_RADIUS_M: f64 = 0.05;
 const ROD_RADIUS_FACTOR: f64 = 0.2;
 /// The same for the links of an arm: they are solid, and about as thick as its joints.
 const LINK_RADIUS_FACTOR: f64 = 0.8;
-/// Keys of a chain that an arm does not have, and the arm.
+/// Keys of which an arm allows none, and `arm` for faults that lie elsewhere; an error points at
+/// one of them that is given.
 const NON_ARM_KEYS: [&str; 11] = [
     "connectors",
     "points_m",
@@ -121,7 +122,8 @@ pub(super) struct LimitSection<const D: usize> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns all chains.
+    /// Returns the chains of all sections, `count` of each, in the order of the file, which gives
+    /// their slots.
     pub(super) fn chains(
         &self,
         dt_s: f64,
@@ -414,7 +416,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    /// Returns the chain that represents an arm, and the arm.
+    /// Returns an arm, and the chain of its connectors that guides it.
     fn arm_shape(
         &self,
         section: &Spanned<ChainSection<D>>,

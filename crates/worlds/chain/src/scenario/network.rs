@@ -77,7 +77,7 @@ impl ConnectorCounts {
         Self(chains.iter().map(|spec| spec.start.points().len() as u32).collect())
     }
 
-    /// Returns the ids on the network of some connectors of a chain.
+    /// Returns ids on the network, or which chain or connector does not exist.
     fn ids(&self, chain: EntityId, connectors: &[u32]) -> Result<Vec<EntityId>, SectionError> {
         let Some((before, &[n, ..])) = self.0.split_at_checked(chain as usize) else {
             let cause = format!("chain {chain} does not exist");

@@ -132,7 +132,8 @@ impl<const D: usize> ObstacleBuilder<D> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns all obstacles.
+    /// Returns the ground of a world; random obstacles come last, because they keep away from
+    /// chains.
     pub(super) fn ground(
         &self,
         site: Option<&Site>,
@@ -389,7 +390,8 @@ impl<const D: usize> Compiler<'_, D> {
         let connectors = chains.iter().flat_map(|spec| spec.start.connectors());
         let widest_m = connectors.map(|c| c.radius_m).fold(0.0, f64::max);
         let keep_m = widest_m + s.keep_m.unwrap_or(DEFAULT_KEEP_M);
-        // With one seed for all, fields in the same room would have their obstacles at the same places.
+        // With one seed for all, fields in the same room would have their obstacles at the same
+        // places; with numbers one apart, at those of a run with the next seed.
         let seed = Seed(self.head.seed.wrapping_add(number << 32));
         let NumberRange { low: least, high: greatest } = s.radius_m;
         if s.fill_fraction.is_some() && s.part.is_some() {
@@ -457,7 +459,7 @@ fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_
     points.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).chain(one)
 }
 
-/// Returns a point in the required number of dimensions.
+/// Sets coordinates that are missing to 0, and drops those beyond.
 pub(super) fn to_dimensions<const FROM: usize, const TO: usize>(p: Point<FROM>) -> Point<TO> {
     std::array::from_fn(|i| p.get(i).copied().unwrap_or(0.0))
 }

@@ -54,7 +54,7 @@ impl<const D: usize> ScenarioSpec<D> {
         all.into_iter().filter(|(_, is_given, _)| *is_given).map(|(key, _, moves)| (key, moves))
     }
 
-    /// Compiles it.
+    /// Compiles it; the result keeps it for further seeds.
     pub(super) fn compile(self) -> Result<ChainScenario<D>, InputError> {
         let compiled = self.compile_with(&self.head, None)?;
         Ok(ChainScenario { recipe: Some(Arc::new(self)), ..compiled })

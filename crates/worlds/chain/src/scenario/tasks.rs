@@ -17,7 +17,8 @@ use std::sync::Arc;
 pub(super) const DEFAULT_SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
 const DEFAULT_TOLERANCE_M: f64 = 1e-3;
-/// Time of vetoes after which a task is given up, unless it is given, s.
+/// Time of vetoes after which a task is given up, unless it is given, s: a planner makes four
+/// attempts in it.
 const DEFAULT_PATIENCE_S: f64 = 5.0;
 /// Standard deviation of the heading of an initiator that wanders, per square root of a meter, unless it is given,
 /// degrees.
@@ -92,7 +93,7 @@ impl<const D: usize> TaskSection<D> {
         }
     }
 
-    /// Returns the name of its kind.
+    /// Returns its kind as a scenario writes it.
     fn kind_name(&self) -> String {
         match &self.kind {
             ByName::BuiltIn(word) => format!("{word:?}").to_lowercase(),

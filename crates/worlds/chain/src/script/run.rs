@@ -8,7 +8,7 @@ use sidestep_kernel::math::{cos, sin};
 /// Position and orientation of an initiator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Turtle {
-    /// Position, m.
+    /// Where it is, meters; in the plane the last coordinate is not used.
     pub position_m: [f64; 3],
     /// Unit vector ahead.
     pub ahead: [f64; 3],
@@ -67,7 +67,6 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     linear_combination(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
 }
 
-/// Returns `a * by + b * times`.
 fn linear_combination(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| a[i] * by + b[i] * times)
 }
@@ -77,7 +76,7 @@ fn linear_combination(a: [f64; 3], by: f64, b: [f64; 3], times: f64) -> [f64; 3]
 pub enum ScriptMotion {
     /// Move straight to this position, in m.
     MoveTo {
-        /// The position.
+        /// The place, meters.
         position_m: [f64; 3],
     },
     /// Face this direction.
@@ -92,7 +91,7 @@ pub enum ScriptMotion {
     },
 }
 
-/// The motions of a script.
+/// Motions as they are derived; none follow after an error.
 #[derive(Debug, Clone)]
 pub struct ScriptMotions<'a> {
     script: &'a Script,

@@ -22,7 +22,7 @@ use std::collections::VecDeque;
 /// One chain as it is now.
 #[derive(Debug, Clone)]
 pub struct Body<const D: usize> {
-    /// Its connectors and rods.
+    /// Its connectors and rods; with deferred motions only connector 0 is where it should be.
     pub chain: Chain<D>,
     /// Progress of its initiator through its tasks.
     pub driving: TaskProgress,
@@ -65,7 +65,7 @@ pub struct ScatterState {
     pub first: u32,
     /// The last scattered connector.
     pub last: u32,
-    /// Speed at which each part returns, m/s.
+    /// Speed at which each part returns, m/s; 0 while they lie where they fell.
     pub speed_m_s: f64,
     /// Positions at which all connectors will be joined again, coordinate after coordinate; empty
     /// while the parts lie where they fell.
@@ -164,7 +164,7 @@ pub(crate) fn flatten<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
     points.iter().flatten().copied().collect()
 }
 
-/// Returns the points that are given coordinate after coordinate.
+/// Returns the points of [`flatten`].
 pub(crate) fn unflatten<const D: usize>(coordinates: &[f64]) -> Vec<Point<D>> {
     coordinates.chunks_exact(D).map(|at| std::array::from_fn(|i| at[i])).collect()
 }

@@ -41,15 +41,15 @@ pub(super) trait Component {
 pub(super) struct Owner {
     /// Cycles done.
     cycle: Cycle,
-    /// Number of its connectors.
+    /// Number of its connectors; records with higher numbers are damaged.
     connectors: usize,
-    /// Number of its coordinates.
+    /// Number of all their coordinates: the length of a posture of rods.
     coordinates: usize,
     /// Number of its joints, if it represents an arm.
     joints: Option<usize>,
 }
 
-/// One chain in a snapshot.
+/// What a snapshot has of every chain; the rest is in lists of those that have it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChainRecord {
     /// Positions of the connectors, coordinate after coordinate.
