@@ -19,7 +19,6 @@ use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
 use super::veto::VetoReason;
 use std::f64::consts::PI;
 
-/// A possible place for a slave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Candidate<const D: usize> {
     pub(super) at: Point<D>,
@@ -387,7 +386,6 @@ struct TurnedPlaces<'a, const D: usize> {
     context: &'a MotionContext<'a, D>,
     step: &'a SlaveStep<D>,
     length_m: f64,
-    /// Direction of the guide line.
     u0: Point<D>,
     found: &'a mut Vec<Candidate<D>>,
     informative: &'a mut Option<PendingVeto>,

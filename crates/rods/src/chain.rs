@@ -281,7 +281,7 @@ impl<const D: usize> Chain<D> {
         &self.rods
     }
 
-    /// Returns the rod between two neighbors.
+    /// Returns the rod between two neighbors, given in any order.
     #[inline]
     pub fn rod_between(&self, i: usize, j: usize) -> Rod {
         self.rods[i.min(j)]

@@ -37,7 +37,6 @@ impl AngleInterval {
 /// What of a rod decides in which directions an obstacle is in its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MasterRod {
-    /// Position of the master.
     pub(crate) master: Point<2>,
     pub(crate) length_m: f64,
 }
@@ -301,7 +300,6 @@ fn wrapped_rad(mut angle_rad: f64) -> f64 {
     angle_rad
 }
 
-/// Sense of rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TurnDirection {
     /// Counter-clockwise.

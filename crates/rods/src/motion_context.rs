@@ -116,7 +116,6 @@ impl PendingVeto {
     }
 }
 
-/// A master that moved, and its slave.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SlaveStep<const D: usize> {
     pub(super) master: usize,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub struct Obstacle<const D: usize> {
     /// Its id in vetoes. Several obstacles may share one, as the walls of a room do.
     pub id: u32,
-    /// Its inner part.
+    /// Its shape without the radius.
     pub core: Core<D>,
     /// Its reach beyond its core, meters; 0 for a thin wall.
     pub radius_m: f64,
@@ -44,7 +44,7 @@ impl<const D: usize> Obstacle<D> {
         self.velocity_m_s.iter().any(|&v| v != 0.0)
     }
 
-    /// Returns the box around it.
+    /// Returns the box around it, its radius included.
     #[inline]
     pub fn bounds(&self) -> Bounds<D> {
         self.core.bounds().grown(self.radius_m)
@@ -97,7 +97,6 @@ pub struct Obstacles<const D: usize> {
     reach_m: f64,
 }
 
-/// The obstacles that never move.
 #[derive(Debug, Default)]
 struct StillObstacles<const D: usize> {
     all: Vec<Obstacle<D>>,
@@ -132,7 +131,7 @@ impl<const D: usize> Obstacles<D> {
         Ok(obstacles)
     }
 
-    /// Returns whether there are none.
+    /// Returns whether there are none, neither static nor moving.
     pub fn is_empty(&self) -> bool {
         self.still.all.is_empty() && self.moving.is_empty()
     }

@@ -46,7 +46,6 @@ impl MotionTally {
     }
 }
 
-/// Direction along the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Direction {
     /// Toward higher indices.

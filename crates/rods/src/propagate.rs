@@ -35,7 +35,7 @@ const INTERRUPT_CHECK_INTERVAL: usize = 16;
 /// remembers nothing from one motion to the next that a result depends on.
 #[derive(Debug, Clone, Default)]
 pub struct Propagator<const D: usize> {
-    /// Rules by which chains react.
+    /// Rules by which it moves chains; they may change from one request to the next.
     pub rules: Rules,
     /// The reaction of free connectors, unless it is the built-in one.
     reaction: Option<Arc<dyn Reaction>>,
@@ -57,11 +57,16 @@ pub struct Propagator<const D: usize> {
 /// A choice point of the depth-first search: another reaction of an earlier slave.
 #[derive(Debug, Clone, Copy)]
 enum Alternative<const D: usize> {
-    /// Another place.
-    Place { slave: usize, candidate: Candidate<D> },
+    Place {
+        slave: usize,
+        candidate: Candidate<D>,
+    },
     /// A turn of its rod to the other side. It is computed only on backtracking, because that is
     /// rare and a turn is the costly part of a reaction.
-    OtherSide { slave: usize, tried: Point<D> },
+    OtherSide {
+        slave: usize,
+        tried: Point<D>,
+    },
 }
 
 /// The connectors that are moved from outside: one, or the two of a rod.
@@ -458,7 +463,8 @@ impl<const D: usize> Propagator<D> {
         }
     }
 
-    /// Writes the tentative positions into the chain.
+    /// Moves the chain; where a connector was before the request is kept the first time that it
+    /// moves.
     fn commit(&mut self, chain: &mut Chain<D>, driven: &DrivenConnectors<D>) {
         let run = self.tentative.run();
         // Outward from the driven connectors, so that the run of original positions has no gap.
@@ -558,6 +564,7 @@ impl<const D: usize> MotionContext<'_, D> {
 
     /// Checks whether the path of an initiator is free of obstacles and of the chain's own parts.
     fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
+        // The slides know collisions with obstacles only, so without any there is nothing to check.
         if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
             return Ok(());
         }

@@ -38,7 +38,7 @@ impl<const D: usize> RodBvh<D> {
         self.fit_loose();
     }
 
-    /// Builds the tree anew.
+    /// Builds the tree anew, in the memory that it has.
     pub fn rebuild(&mut self, boxes: impl Iterator<Item = Bounds<D>>) {
         self.rods.clear();
         self.rods.extend(boxes);

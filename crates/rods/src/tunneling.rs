@@ -19,7 +19,7 @@ use super::sweep::Sweep;
 /// A rod that passed through an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TunneledRod {
-    /// Index of the rod.
+    /// Index of the rod, that at connector 0 being 0.
     pub rod: usize,
     /// The obstacle's id.
     pub obstacle: u32,

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 
-/// Source of a request (slide R4).
+/// Who asks for a motion (slide R4).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RequestSource {
-    /// The connector itself.
+    /// The connector itself, which plans again after a veto.
     Autonomous,
     /// A planner, which reports a veto.
     Planner,
-    /// A person.
+    /// A person, who gets a report of a veto.
     Operator,
 }
 
@@ -28,26 +28,26 @@ pub enum VetoEffect {
     AsFarAsPossible,
 }
 
-/// The motion of a request.
+/// What moves, and where to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion<const D: usize> {
     /// One connector, which all others follow.
     Connector {
-        /// Its index.
+        /// Which one, counted from 0.
         k: usize,
-        /// Its target.
+        /// Where to, meters.
         to: Point<D>,
     },
     /// A rod: both its connectors in one request.
     Rod {
-        /// Its index.
+        /// Which one: that between connectors `i` and `i + 1`.
         i: usize,
-        /// Targets of connectors `i` and `i + 1`.
+        /// Where to, for connectors `i` and `i + 1`, meters.
         to: [Point<D>; 2],
     },
 }
 
-/// A request to a chain.
+/// A motion that is wanted of a chain, and what a veto means for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request<const D: usize> {
     /// What is to move, and where to.
@@ -118,7 +118,7 @@ impl VetoReason {
         Self::JointLimit,
     ];
 
-    /// Returns its number among all, from 0.
+    /// Returns its place in [`Self::ALL`].
     #[inline]
     pub fn number(self) -> usize {
         self as usize
@@ -208,7 +208,7 @@ pub struct CompletedMotion<const D: usize> {
 /// Outcome of a request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Outcome<const D: usize> {
-    /// The chain moved.
+    /// The chain moved, all of the way unless that was cut short.
     Moved(CompletedMotion<D>),
     /// Nothing moved; every bit is as before.
     Vetoed(Veto<D>),

@@ -8,7 +8,6 @@ use sidestep_rods::{
 };
 use std::f64::consts::PI;
 
-/// A chain and its constraints.
 #[derive(Clone, Copy)]
 pub(crate) struct ConstraintChecker<'a, const D: usize> {
     pub(crate) chain: &'a Chain<D>,

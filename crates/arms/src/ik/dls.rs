@@ -182,7 +182,7 @@ fn solve_damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping:
     x
 }
 
-/// Adopts the posture of a multiplier.
+/// Makes the rods of a multiplier the vectors; a rod at a kink has no direction and keeps its own.
 fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
     for (v, span) in vectors.iter_mut().zip(spans) {
         let w = add(*v, y);

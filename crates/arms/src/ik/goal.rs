@@ -4,7 +4,7 @@ use sidestep_rods::Veto;
 use sidestep_rods::geometry::Point;
 use std::fmt;
 
-/// The method that finds a posture.
+/// Methods to find a posture, which differ in time and in which posture they find.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
     /// The fastest: without constraints the chain's own rule up to 10 rods and damped least squares
@@ -34,7 +34,7 @@ impl Engine {
     }
 }
 
-/// A target for a connector.
+/// Where a connector is to be, and how long to search for a posture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChainIkGoal<const D: usize> {
     /// The connector that is to be there, counted from 0.
@@ -49,7 +49,7 @@ pub struct ChainIkGoal<const D: usize> {
     pub engine: Engine,
     /// Postures to start from, besides the present one, if an obstacle is in the way.
     pub restarts: usize,
-    /// Random seed of these postures.
+    /// Random seed of these postures: the same one gives the same result.
     pub seed: u64,
     /// Whether only a motion from the present posture counts.
     pub motion_only: bool,

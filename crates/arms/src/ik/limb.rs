@@ -13,7 +13,6 @@ pub(super) struct Limb<const D: usize> {
     pub(super) vectors: Vec<Point<D>>,
 }
 
-/// Lengths that a rod can have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) min_m: f64,

@@ -33,7 +33,6 @@ const PUSH_FACTOR: f64 = 1.3;
 /// Least displacement of a rod's nearest point per unit of push.
 const MIN_RESPONSE: f64 = 1e-3;
 
-/// Result of a start.
 pub(super) struct RelaxResult<const D: usize> {
     pub(super) rounds: usize,
     /// The objection to the best posture; `None` if it is good.

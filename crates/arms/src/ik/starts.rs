@@ -8,7 +8,7 @@ use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_rods::Chain;
 use sidestep_rods::geometry::{Point, add, add_scaled, dot, first_axis, normalized, scaled, sub};
 
-/// Random draws for starts.
+/// A stream of its own, so that no other draw shifts these.
 const START: Purpose = Purpose(0x1C);
 
 /// Lengths of the random vector that is added to the direction of each rod: from nearly straight limbs, which go past

@@ -54,9 +54,9 @@ pub enum RecoverError {
     /// Points leave these joints open, or couple them to connectors farther out.
     #[error("connector {connector} depends on {} at once; its position does not distinguish them", .joints.join(", "))]
     Coupled {
-        /// Index of the connector.
+        /// Index of the connector, the base's being 0.
         connector: usize,
-        /// Names of the joints.
+        /// Names of the joints, from the base out.
         joints: Vec<String>,
     },
     /// A joint between base and tip mimics another, so that values are not independent.
@@ -71,7 +71,7 @@ pub enum RecoverError {
          others are where they are"
     )]
     DoesNotFit {
-        /// Index of the connector.
+        /// Index of the connector, the base's being 0.
         connector: usize,
         /// Distance from the connector to that place, in m.
         distance_m: f64,

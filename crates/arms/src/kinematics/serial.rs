@@ -11,9 +11,9 @@ use sidestep_kernel::geometry::scaled;
 /// no value of its own: the values of a posture are those of [`SerialChain::variables`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SerialChain {
-    /// Name of the base link.
+    /// Name of the link in whose frame all places are.
     pub base: String,
-    /// Name of the tip link.
+    /// Name of the link that goals are for; of a part of an arm, its last connector.
     pub tip: String,
     /// The variables, in the order from base to tip.
     pub variables: Vec<Dof>,

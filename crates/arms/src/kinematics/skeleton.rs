@@ -27,7 +27,7 @@ pub struct Skeleton {
     pub reach_m: f64,
 }
 
-/// Lengths that a rod can have.
+/// Distances that two neighbors can have: one, unless a joint between them slides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkeletonRod {
     /// Shortest length in m. It is zero if a prismatic joint can bring its ends together.

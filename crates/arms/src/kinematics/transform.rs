@@ -127,7 +127,7 @@ impl Transform {
         Self { rotation, origin_m: [0.0; 3] }
     }
 
-    /// Returns a displacement.
+    /// Returns a displacement without a turn.
     pub(super) fn from_translation(by_m: Vector) -> Self {
         Self { origin_m: by_m, ..Self::IDENTITY }
     }

@@ -23,7 +23,7 @@ const MAX_GOALS: usize = 4;
 /// was not tuned.
 const MIN_STEP: f64 = 1e-3;
 
-/// An arm at a posture.
+/// Where paths of an arm start.
 #[derive(Debug, Clone, Copy)]
 pub struct JointPosture<'a> {
     /// The arm that the chain of the space stands for.

@@ -25,6 +25,7 @@ pub(crate) fn resolve<const D: usize>(
 ) -> Result<ResolvedScenario, InputError> {
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
+    // Scripts and arms are keys of chains alone.
     add_plain(&mut bundle, &file["chains"], "chains")?;
     if let Some(path) = file["ground"]["map"].as_str() {
         add_map(&mut bundle, &rosmap::load(&source.path(Path::new(path)))?);
@@ -55,6 +56,7 @@ fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), In
 
 fn copy(bundle: &mut Bundle<'_>, key: &str, path: &str) -> Result<(), InputError> {
     let file = Path::new(path).file_name().unwrap_or_default().display();
+    // Numbered, because files of different folders may have the same name.
     let path = bundle.copy(&format!("{}-{file}", bundle.count()), path)?;
     bundle.set(key, format_args!("{path:?}"));
     Ok(())

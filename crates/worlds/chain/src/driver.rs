@@ -29,7 +29,6 @@ pub(crate) struct Task<const D: usize> {
     pub(crate) agent: usize,
     /// Highest speed of that connector, m/s.
     pub(crate) speed_m_s: f64,
-    /// The goal of the task.
     pub(crate) driver: TaskKind<D>,
     /// Longest duration of the task, s; infinite if it may take as long as it needs.
     pub(crate) lasts_s: f64,
@@ -83,7 +82,6 @@ pub(crate) struct Wander<const D: usize> {
     pub(crate) within: Option<Bounds<D>>,
 }
 
-/// Places to go to.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Targets<const D: usize> {
     /// Where to go, in this order.
@@ -93,7 +91,6 @@ pub(crate) struct Targets<const D: usize> {
 }
 
 impl<const D: usize> Task<D> {
-    /// Returns the source of the task's motions.
     pub(crate) fn source(&self) -> RequestSource {
         // A script is obeyed to the letter; all others may find another way after a veto.
         match self.driver {

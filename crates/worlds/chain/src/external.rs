@@ -17,7 +17,6 @@ mod tests;
 
 /// The noun for an agent that observes and takes orders.
 const CHAIN: &str = "chain";
-/// Kinds of causes of vetoes.
 const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
 
 impl<const D: usize> ChainSpec<D> {
@@ -124,7 +123,7 @@ impl<const D: usize> ChainWorld<D> {
         external.orders.record(self.order_name(order), order.values);
     }
 
-    /// Writes a team's perception.
+    /// Writes a row for each agent of a team, in the order of its spaces.
     pub(super) fn observe(
         &self,
         state: &ChainState<D>,

@@ -16,12 +16,12 @@ pub(crate) struct Robots {
     pub(crate) lag_limit_m: f64,
 }
 
-/// A robot of a swarm.
+/// A robot that keeps to the connector of the same index.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Robot {
     /// Its place and heading.
     pub pose: Pose2,
-    /// Whether its bumper is pressed.
+    /// Whether its bumper is pressed: whether it touches something.
     pub is_bumped: bool,
 }
 

@@ -105,6 +105,7 @@ impl<const D: usize> ChainWorld<D> {
         }
         for &member in group.iter().take_while(|&&member| member <= slot) {
             if member == slot {
+                // The events of members before it are not about the chain.
                 phase.scratch.events.clear();
             }
             act::act_one(phase, &group, member);
@@ -222,7 +223,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    /// Adds the wish of the initiator.
+    /// Adds what the initiator wants, and where its task leads it.
     fn add_intention(&self, inspection: &mut Inspection) {
         let Some(task) = self.task() else { return };
         let Some(intended) = self.trace.intended else { return };
@@ -299,7 +300,6 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 }
 
-/// Returns some points as a line.
 fn line<const D: usize>(points: &[Point<D>]) -> MarkShape {
     MarkShape::Line { points_m: points.iter().map(|at| with_dimensions(*at)).collect() }
 }

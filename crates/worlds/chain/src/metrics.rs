@@ -144,7 +144,6 @@ metrics! {
 }
 
 impl EscapeTally {
-    /// Adds the result of a cycle.
     pub(super) fn add<const D: usize>(&mut self, escaped: &EscapeReport<D>) {
         self.moves += escaped.moves as u64;
         self.vetoes += escaped.vetoes as u64;
@@ -225,7 +224,6 @@ impl ChainTally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
-    /// Adds packets of an agent.
     pub(crate) fn add_traffic(&mut self, traffic: Traffic) {
         self.messages += traffic.messages;
         self.bytes += traffic.bytes;
@@ -406,7 +404,7 @@ impl RobotMetrics {
 pub struct ChainAbandonedPart {
     /// Id of the chain.
     pub chain: EntityId,
-    /// The motion or target.
+    /// What it gave up, and why.
     #[serde(flatten)]
     pub what: AbandonedPart,
 }
@@ -423,7 +421,7 @@ pub struct ChainMetrics {
     /// Joint values of an arm, rad or m, by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, f64>>,
-    /// Counts of the run.
+    /// Its counts, beside these in one object.
     #[serde(flatten)]
     pub tally: ChainTally,
 }
@@ -476,7 +474,6 @@ impl Metrics {
     }
 }
 
-/// Returns what the chains gave up.
 fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedPart> {
     let mut parts = Vec::new();
     for (chain, tally) in (0..).zip(tallies) {

@@ -13,18 +13,14 @@ const END_TOLERANCE_M: f64 = 0.5;
 /// A leader that cuts a bend passes some of them no nearer than the one before; the next leg of a hairpin is farther on.
 const LOOKAHEAD_POINTS: usize = 10;
 
-/// An initiator that navigates.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Navigator {
-    /// Its behavior.
     pub(crate) leader: Leader,
-    /// Its wheels.
     pub(crate) drive: DifferentialDrive,
     /// Its destination; without one it never stops.
     pub(crate) goal: Option<NavigationGoal>,
 }
 
-/// Destination of a navigator.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum NavigationGoal {
     /// A place that it can detect.
@@ -44,7 +40,6 @@ pub(crate) enum NavigationGoal {
 }
 
 impl Navigator {
-    /// Returns whether it may turn without moving.
     pub(crate) fn can_turn_on_the_spot(&self) -> bool {
         self.leader.turning == TurnMode::OnTheSpotWhereBlocked
     }

@@ -25,7 +25,6 @@ pub(crate) struct Perceiver<'a, const D: usize> {
 /// What a navigator knows when it decides.
 pub(crate) struct NavigatorPercept<'a> {
     pub(crate) navigator: &'a Navigator,
-    /// The connector that navigates.
     pub(crate) agent: usize,
     pub(crate) leader: LeaderState,
     pub(crate) percept: Percept,
@@ -46,6 +45,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         let TaskKind::Navigate(navigator) = &task.driver else { return None };
         let leader = body.leader_state(task);
         let stood = body.standstill.cycles;
+        // Not held while other bodies are locked.
         drop(body);
         self.gather_others(slot, task.agent, navigator, &leader);
         self.scratch.nearby.gather(world, state, now, std::iter::empty());

@@ -177,7 +177,6 @@ impl Rows {
     }
 }
 
-/// Adds the positions of a chain's connectors.
 fn connectors<const D: usize>(
     cycle: Cycle,
     slot: usize,

@@ -295,10 +295,10 @@ impl Default for RecordSection {
     }
 }
 
-/// A compiled scenario.
+/// A scenario that was checked, ready to start any number of runs.
 #[derive(Debug, Clone)]
 pub struct ChainScenario<const D: usize> {
-    /// The immutable world.
+    /// What never changes during a run; runs share it.
     pub world: Arc<ChainWorld<D>>,
     /// Name of the scenario, may be empty.
     pub name: String,
@@ -306,7 +306,7 @@ pub struct ChainScenario<const D: usize> {
     pub seed: u64,
     /// Most cycles of a run; it ends earlier when all tasks are done.
     pub cycles: u64,
-    /// The tables to keep.
+    /// The tables that its runs keep.
     pub record: RecordSection,
     /// The sections that it was compiled from; none where no scenario was read.
     pub(crate) recipe: Option<Arc<ScenarioSpec<D>>>,

@@ -60,7 +60,6 @@ pub(crate) struct PositionBuffer<const D: usize> {
 }
 
 impl<const D: usize> Scratch<D> {
-    /// Returns empty buffers.
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
             propagator: Propagator::new(world.rules).with_reaction(world.reaction.clone()),
@@ -131,7 +130,6 @@ impl<const D: usize> NearbyObstacles<D> {
 }
 
 impl<const D: usize> PositionBuffer<D> {
-    /// Records the positions of a chain.
     pub(crate) fn record(&mut self, body: &Body<D>) {
         self.points.clear();
         self.points.extend_from_slice(body.chain.points());

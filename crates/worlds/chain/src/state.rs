@@ -29,7 +29,7 @@ const ROUNDING_M: f64 = 1e-6;
 #[derive(Debug)]
 pub struct ChainState<const D: usize> {
     cells: Box<[ChainCell<D>]>,
-    /// Number of claims ever made.
+    /// Number of claims ever made, by which workers see whether sorted claims are out of date.
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
     neighbors: RwLock<Neighbors<D>>,
@@ -65,7 +65,7 @@ impl<const D: usize> ChainCell<D> {
 pub enum BodyRef<'a, const D: usize> {
     /// The chain itself.
     Locked(RwLockReadGuard<'a, Body<D>>),
-    /// A copy.
+    /// A copy, after the motions that the chain has yet to follow.
     Followed(Box<Body<D>>),
 }
 
@@ -212,6 +212,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
+        // Relaxed: the barrier between two phases orders this before all readers.
         self.claims.fetch_add(1, Relaxed);
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }

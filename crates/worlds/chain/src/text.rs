@@ -65,7 +65,6 @@ fn contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
     lines
 }
 
-/// Returns the position of every connector.
 pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Description {
     let mut rows = Vec::new();
     let axes: String =
@@ -81,7 +80,7 @@ pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Description {
     Description { json: Value::Array(rows), text }
 }
 
-/// Returns the outcome of a run.
+/// Returns the outcome of a run; what did not occur is mostly left out.
 pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
     let mut lines = motion(m);
     lines.extend(m.robots.as_ref().map(robots));

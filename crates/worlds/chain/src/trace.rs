@@ -20,12 +20,9 @@ pub(crate) struct InspectionTrace<const D: usize> {
     pub(crate) escapes: usize,
 }
 
-/// A move that a driver wants.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct IntendedMove<const D: usize> {
-    /// The connector that is to move.
     pub(crate) connector: usize,
-    /// Its description.
     pub(crate) words: &'static str,
     /// The position that the connector is to reach.
     pub(crate) to: Option<Point<D>>,

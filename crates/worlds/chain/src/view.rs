@@ -121,7 +121,6 @@ fn hit_range_m(range_m: f64, most_m: f64) -> f64 {
     if range_m < most_m { range_m } else { f64::INFINITY }
 }
 
-/// Returns the targets of a chain.
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     let least_m = point_radius_m(&spec.start);
     let mut goals = Vec::new();

@@ -77,7 +77,7 @@ pub struct ChainWorld<const D: usize> {
     pub(crate) streams: Streams,
     /// Chains that observe, and may be ordered, alike.
     pub(crate) teams: Arc<Teams>,
-    /// Deployment of the rules.
+    /// Where the rules run: in one process, or in an agent for each connector.
     pub deployment: Deployment,
     /// The network that carries the agents' messages, if it is unreliable.
     pub network: Option<Network>,
@@ -116,28 +116,24 @@ pub(crate) struct Change<const D: usize> {
 pub(crate) enum ChangeKind<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
-        /// Its index.
         connector: usize,
         /// False if it works again.
         failed: bool,
     },
     /// A connector gets a new mobility.
     Mobility {
-        /// Its index.
         connector: usize,
         /// Where it may be from then on.
         mobility: Mobility<D>,
     },
     /// A connector gets a new bend limit.
     MaxBend {
-        /// Its index.
         connector: usize,
         /// The greatest angle, rad.
         max_bend_rad: f64,
     },
     /// The chain breaks: connectors are thrown about at random.
     Scatter {
-        /// Their indices.
         connectors: RangeInclusive<usize>,
         /// Standard deviation of each coordinate, meters.
         by_m: f64,

@@ -27,7 +27,7 @@ use sidestep_kernel::geometry::norm;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmBody {
     parts: Vec<LinkShape>,
-    /// Pairs of parts that must not touch.
+    /// Parts that must not touch, each pair once, the lesser index first.
     pairs: Vec<(usize, usize)>,
 }
 
@@ -50,7 +50,6 @@ enum ShapeCore {
     Box(Cuboid),
 }
 
-/// A part at a posture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PlacedShape {
     pose: ParryPose,

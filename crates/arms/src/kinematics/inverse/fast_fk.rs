@@ -34,7 +34,7 @@ struct FastFkJoint {
 pub(super) struct LinkTransforms {
     /// Link 0 (the base), then the link that each joint carries.
     pub(super) links: Vec<Transform>,
-    /// The joints' axes.
+    /// The joints' axes in the base's frame.
     pub(super) lines: Vec<Line>,
     pub(super) tip: Transform,
 }

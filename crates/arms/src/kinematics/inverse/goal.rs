@@ -62,9 +62,9 @@ pub struct PoseMask {
 }
 
 impl PoseMask {
-    /// The position alone.
+    /// The position alone, which is what [`ArmGoal::new`] asks for.
     pub const POSITION: Self = Self { along: [true; 3], turn: OrientationMask::Free };
-    /// Position and orientation.
+    /// Position and orientation, which is what [`ArmGoal::from_pose`] asks for.
     pub const POSE: Self = Self { along: [true; 3], turn: OrientationMask::Whole };
 
     /// Returns the part of a target that counts, with or without its orientation, where some axes of its frame are
@@ -123,7 +123,7 @@ pub struct ArmGoal {
     pub engine: Engine,
     /// Random postures to start from after the given one.
     pub restarts: usize,
-    /// Random seed of these postures.
+    /// Random seed of these postures: the same one gives the same result.
     pub seed: u64,
     /// Number of postures wanted. From 2 on, the search continues from posture to posture until it has
     /// found as many that are [distinct](ArmGoal::apart), and the answer is the nearest to the start
@@ -135,7 +135,7 @@ pub struct ArmGoal {
     /// Least difference of distinct postures: of one joint at least, in rad, full turns apart; a
     /// slide counts as the angle that moves the tip as far at the arm's full reach.
     pub apart: f64,
-    /// Whether joints may be outside their limits.
+    /// Whether joints may be outside their limits, to learn what these prevent.
     pub ignore_limits: bool,
     /// Spheres that the arm may not enter.
     pub spheres: Vec<Sphere>,

@@ -33,7 +33,7 @@ pub struct IkResult {
 /// One of several postures that meet a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IkSolution {
-    /// A value for each variable.
+    /// A value for each variable of the arm, rad or m.
     pub values: Vec<f64>,
     /// Distance of the tool from its goal, see [`IkResult::error_m`].
     pub error_m: f64,

@@ -14,7 +14,7 @@ use sidestep_kernel::geometry::{norm, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use std::f64::consts::PI;
 
-/// Random draws for postures to start from.
+/// A stream of its own, so that no other draw shifts these.
 const START: Purpose = Purpose(0x1D);
 /// Restarts if no answer can be expected, to come near or to find the reason.
 const FEW_RESTARTS: usize = 8;
@@ -24,7 +24,6 @@ pub(super) struct IkSearch<'a> {
     pub(super) by: Descender<'a>,
 }
 
-/// The best end of several descents.
 struct BestDescent {
     descent: DescentResult,
     /// Steps of all descents, also of those that were not kept.
@@ -121,7 +120,7 @@ impl<'a> IkSearch<'a> {
         }
     }
 
-    /// Returns a random posture inside the limits.
+    /// Returns random posture number `index` inside the limits: the same one for the same seed.
     pub(super) fn random_posture(&self, index: usize) -> Vec<f64> {
         let Descender { chain, goal, bounds, .. } = &self.by;
         let mut draws = Streams::new(Seed(goal.seed)).draws(0, index as u64, START);

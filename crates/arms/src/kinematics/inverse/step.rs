@@ -72,7 +72,6 @@ pub(super) struct Stepper {
 #[derive(Clone, Copy)]
 pub(super) struct StepInput<'a> {
     pub(super) values: &'a [f64],
-    /// Wanted changes of the rows.
     pub(super) wanted: &'a [f64],
     /// Damping as a fraction of the mean of the matrix's diagonal.
     pub(super) damping: f64,

@@ -92,7 +92,7 @@ impl JointTracker {
         &self.speeds
     }
 
-    /// Returns the range of each variable.
+    /// Returns the lowest and highest value of each variable; infinite where a joint has no limit.
     pub fn limits(&self) -> &[[f64; 2]] {
         &self.limits.ranges
     }

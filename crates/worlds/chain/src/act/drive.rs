@@ -24,7 +24,6 @@ pub(super) struct TaskOutcome<const D: usize> {
     pub(super) gives_way: bool,
 }
 
-/// Carries out the present task.
 pub(super) fn run_task<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,

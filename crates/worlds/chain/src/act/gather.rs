@@ -59,7 +59,6 @@ pub(super) fn gather_parts<const D: usize>(
     }
 }
 
-/// Marks a chain as whole again.
 fn mark_whole<const D: usize>(body: &mut Body<D>, sink: &mut EventSink<'_, D>, first: usize) {
     body.scattered = None;
     body.tally.reformed += 1;

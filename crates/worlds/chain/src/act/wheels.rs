@@ -64,7 +64,7 @@ pub(super) fn drive_on_wheels<const D: usize>(
     }
 }
 
-/// Turns a navigator's robot on the spot.
+/// Sets the heading alone, which nothing can veto: a round body that turns touches nothing.
 pub(super) fn turn_robot<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
     if let Some(leader) = &mut body.driving.leader {
         leader.pose.heading_rad = heading_rad;

@@ -103,22 +103,19 @@ impl<const D: usize> TentativePosition<D> {
         Self { settled: position, base: position, now: position }
     }
 
-    /// Begins another motion.
+    /// Begins another motion where the last one was settled.
     fn start(&mut self) {
         *self = Self::new(self.settled);
     }
 
-    /// Accepts the present sub-step.
     fn accept(&mut self) {
         self.base = self.now;
     }
 
-    /// Undoes the present sub-step.
     fn revert(&mut self) {
         self.now = self.base;
     }
 
-    /// Ends the motion.
     fn finish(&mut self, goes: bool) {
         *self = Self::new(if goes { self.now } else { self.settled });
     }

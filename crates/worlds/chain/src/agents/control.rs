@@ -28,7 +28,7 @@ pub struct Control<const D: usize> {
     pub traffic: Traffic,
 }
 
-/// Motion of a connector.
+/// What a connector does in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum ConnectorMove<const D: usize> {
     /// It took part in no motion that is carried out.
@@ -43,7 +43,7 @@ pub enum ConnectorMove<const D: usize> {
     },
     /// It has consented to a motion and heard nothing further of it: it goes if its master goes.
     WithItsMaster {
-        /// The number of the motion.
+        /// Number of that motion in its cycle.
         request: u32,
         /// Its new place, meters.
         #[serde(with = "sidestep_rods::serde_point")]
@@ -51,7 +51,7 @@ pub enum ConnectorMove<const D: usize> {
     },
 }
 
-/// A motion that is carried out.
+/// A motion to which all have consented, as its leader reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExecutedMotion {
     /// Its number in its cycle, which [`ConnectorMove::To`] repeats.

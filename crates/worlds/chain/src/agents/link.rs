@@ -73,7 +73,7 @@ impl<M: Clone> Link<M> {
         }
     }
 
-    /// Says something, which the next parcel carries.
+    /// Queues a message for the next parcel, unless too many wait already.
     pub(super) fn push(&mut self, message: M) {
         if self.said.len() < MAX_UNCONFIRMED_MESSAGES {
             self.said.push_back(message);

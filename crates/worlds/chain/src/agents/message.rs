@@ -39,7 +39,6 @@ pub(super) struct Packet<const D: usize> {
     pub(super) parcel: Parcel<Message<D>>,
 }
 
-/// A message between neighbors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum Message<const D: usize> {
     /// "I am here." The packet around it names the lost connectors.
@@ -126,7 +125,6 @@ pub(super) struct VetoMessage {
 pub(super) struct LeadOrder<const D: usize> {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
-    /// The target.
     #[serde(with = "sidestep_rods::serde_point")]
     pub(super) to: Point<D>,
     pub(super) source: RequestSource,
@@ -138,7 +136,6 @@ pub(super) struct LeadOrder<const D: usize> {
 }
 
 impl<const D: usize> Packet<D> {
-    /// Returns its form on the network.
     pub(super) fn encode(&self) -> PacketBuffer {
         PacketBuffer::from_message(self)
     }

@@ -60,7 +60,7 @@ pub struct Intention<const D: usize> {
     pub is_open: bool,
 }
 
-/// An obstacle, as sensors see it.
+/// An obstacle as sensors see it, without its velocity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SensedObstacle {
     /// Its id in vetoes.
@@ -73,7 +73,7 @@ pub struct SensedObstacle {
 }
 
 impl SensedObstacle {
-    /// Returns an obstacle as sensors see it.
+    /// Returns an obstacle in numbers of any dimension.
     pub fn from_obstacle<const D: usize>(obstacle: &Obstacle<D>) -> Self {
         let core = match &obstacle.core {
             Core::Point(at) => at.to_vec(),

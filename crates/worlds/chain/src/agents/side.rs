@@ -12,10 +12,9 @@ pub(crate) enum Side {
 }
 
 impl Side {
-    /// Both sides.
+    /// In the order of arrays with a value for each side.
     pub(crate) const ALL: [Self; 2] = [Self::Below, Self::Above];
 
-    /// Returns the opposite direction.
     pub(crate) fn other(self) -> Self {
         match self {
             Self::Below => Self::Above,

@@ -3,7 +3,6 @@
 use super::VetoRecord;
 use serde::{Deserialize, Serialize};
 
-/// The state of an external caller.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct External {
     /// Orders for the next cycle.
@@ -34,7 +33,6 @@ pub(crate) enum Target {
     Rod([[f64; 3]; 2]),
 }
 
-/// The result of orders.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct OrderResult {
     /// How much of the motion was made.
@@ -51,7 +49,6 @@ pub(crate) struct OrderResult {
     pub(crate) obstacle: Option<u32>,
 }
 
-/// Outcome of orders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(crate) enum OrderOutcome {
     /// There was no order to go anywhere.

@@ -49,7 +49,7 @@ pub enum Proposal {
 /// What an initiator perceives in a cycle: places in meters; in the plane the last coordinate is 0.
 #[derive(Debug, Clone)]
 pub struct DriverPercept<'a> {
-    /// The present cycle.
+    /// The present cycle, from 0.
     pub now: Cycle,
     /// Cycles since its task began: 1 in the first one.
     pub cycles: Cycle,
@@ -61,7 +61,7 @@ pub struct DriverPercept<'a> {
     pub step_m: f64,
     /// The connector that it moves, an index of `connectors_m`.
     pub connector: usize,
-    /// The places of the chain's connectors.
+    /// The places of the chain's connectors before its motion, in their order.
     pub connectors_m: &'a [Point<3>],
     /// The direction in which it moved last, a unit vector; at first away from the chain.
     pub ahead: Point<3>,

@@ -37,7 +37,7 @@ impl<const D: usize> StepMotion<D> {
         }
     }
 
-    /// Returns a fraction of the motion.
+    /// Returns a fraction of the motion; all of it ends at the target bit for bit.
     pub(crate) fn motion(&self, part: f64) -> Motion<D> {
         let Self { first, from, to, .. } = *self;
         if self.is_rod {

@@ -35,7 +35,7 @@ pub enum Course<const D: usize> {
     },
 }
 
-/// A moving obstacle.
+/// A body and its course, which give its place at any time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mover<const D: usize> {
     /// The body, with its place at time 0 (on a patrol: anywhere).
@@ -189,7 +189,7 @@ fn patrol<const D: usize>(
     (at, scaled(u, if forward { speed_m_s } else { -speed_m_s }))
 }
 
-/// All moving obstacles of a world.
+/// All moving obstacles of a world, by id.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Movers<const D: usize>(Vec<Mover<D>>);
 

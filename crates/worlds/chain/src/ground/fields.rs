@@ -89,12 +89,11 @@ impl<const D: usize> Field<D> {
     }
 }
 
-/// Balls that wander about in a room.
+/// Balls that go straight on, and are thrown back at the sides of a room.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Crowd<const D: usize> {
     /// The room that they never leave.
     pub(crate) room: Bounds<D>,
-    /// Their number.
     pub(crate) n: u32,
     /// Their radii, evenly spread.
     pub(crate) radius_m: RangeInclusive<f64>,

@@ -107,7 +107,8 @@ impl Floor {
         }
     }
 
-    /// Returns whether a place is free.
+    /// Returns whether a place is on no solid pixel; beyond the floor, whether its surroundings are
+    /// open.
     pub fn is_free(&self, at: Point<2>) -> bool {
         let from = sub(at, self.corner_m);
         let col = (dot(from, self.axes[0]) / self.pixel_m[0]).floor() as i64;

@@ -33,7 +33,6 @@ pub(crate) struct SpaceRequirement {
     pub(crate) within: Option<Bounds<2>>,
 }
 
-/// The start of a chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChainPlacement {
     /// The leader, which faces away from its chain.
@@ -95,7 +94,6 @@ pub(crate) fn find_placement(
 }
 
 impl SpaceRequirement {
-    /// Returns the length of the chain.
     fn length_m(&self) -> f64 {
         self.spacing_m * (self.connectors.max(1) - 1) as f64
     }
@@ -244,7 +242,6 @@ struct SearchGrid {
 }
 
 impl SearchGrid {
-    /// Returns the middle of a box.
     fn place(&self, (col, row): (u32, u32)) -> Point<2> {
         let [x, y] = [col, row].map(|k| (f64::from(k) - f64::from(self.half)) * self.box_m);
         [self.leader[0] + x, self.leader[1] + y]

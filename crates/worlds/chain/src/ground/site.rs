@@ -76,7 +76,6 @@ impl From<stage::Pose2> for GroundPose {
     }
 }
 
-/// Returns a box around a pose.
 fn cuboid(pose: GroundPose, size_m: [f64; 2]) -> Cuboid<2> {
     let s = sin(pose.heading_rad);
     let c = cos(pose.heading_rad);

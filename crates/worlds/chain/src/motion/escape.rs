@@ -99,7 +99,7 @@ impl EscapeRules {
     }
 }
 
-/// Outcome of an escape.
+/// What an escape moved, and what it left inside.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EscapeReport<const D: usize> {
     /// Motions that brought a part farther away.
@@ -147,7 +147,7 @@ pub struct EscapeTick<'a, const D: usize> {
     pub chain: &'a mut Chain<D>,
     /// Obstacles around it, with those that move.
     pub obstacles: &'a Obstacles<D>,
-    /// The rules of its motions.
+    /// Moves it, by the rules that it was made with.
     pub propagator: &'a mut Propagator<D>,
     /// Positions of its connectors at the start of the tick.
     pub start: &'a [Point<D>],

@@ -31,7 +31,7 @@ const STEP_FRACTIONS: [f64; 3] = [0.5, 0.25, 0.125];
 /// costs more attempts, with coarser ones gaps are missed; the prototypes had these, and no others were measured.
 const FAN_RAD: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
 
-/// Lengths of the rungs.
+/// How long each rung of the ladder is tried before the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecoveryLimits {
     /// Turns on the spot in a row before this rung is given up.
@@ -194,7 +194,6 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
     }
 }
 
-/// The working data of a climb.
 struct RecoveryAttempt<'a, M, const D: usize> {
     by: &'a mut M,
     wanted: Request<D>,
@@ -305,7 +304,6 @@ impl RecoveryLadder {
         Ok((self.try_rungs(&mut climb, situation)?, objection))
     }
 
-    /// Tries the rungs one after the other.
     fn try_rungs<M: ChainMover<D>, const D: usize>(
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,

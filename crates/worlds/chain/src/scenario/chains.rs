@@ -623,7 +623,6 @@ impl<const D: usize> Compiler<'_, D> {
     }
 }
 
-/// Returns whether a task never ends.
 fn is_endless<const D: usize>(task: &Task<D>) -> bool {
     let has_an_end = match &task.driver {
         TaskKind::Rest | TaskKind::Wander(_) | TaskKind::External => false,

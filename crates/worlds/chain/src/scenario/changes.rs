@@ -76,7 +76,6 @@ impl<const D: usize> ChangeSection<D> {
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns a change of `chain`.
     pub(super) fn change(
         &self,
         section: &Spanned<ChangeSection<D>>,

@@ -271,7 +271,6 @@ impl RobotsSection {
         })
     }
 
-    /// Returns the radius of a robot's body.
     pub(super) fn radius_m(&self) -> f64 {
         self.radius_m.map_or(DEFAULT_RADIUS_M, f64::from)
     }

@@ -80,7 +80,6 @@ pub(super) struct TaskSection<const D: usize> {
 }
 
 impl<const D: usize> TaskSection<D> {
-    /// Returns the connector that moves.
     pub(super) fn connector(&self) -> usize {
         self.connector
     }
@@ -114,14 +113,12 @@ impl<const D: usize> TaskSection<D> {
         }
     }
 
-    /// Returns whether it drives on wheels.
     pub(super) fn is_navigator(&self) -> bool {
         self.built_in_kind() == Some(TaskKindWord::Navigate)
     }
 }
 
 impl<const D: usize> Compiler<'_, D> {
-    /// Returns a task of a chain.
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,

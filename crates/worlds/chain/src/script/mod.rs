@@ -46,7 +46,7 @@ pub(crate) const MAX_DEPTH: usize = 1000;
 /// Most statements that a script may carry out. Repetitions count as one each time.
 pub(crate) const MAX_STATEMENTS: u64 = 10_000_000;
 
-/// A script that can be run.
+/// A script whose text is right; while it runs, its values may still be wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Script {
     place: String,

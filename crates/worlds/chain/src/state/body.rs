@@ -96,7 +96,6 @@ pub(crate) struct Standstill {
 }
 
 impl<const D: usize> Body<D> {
-    /// Returns a chain at its start.
     pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
         let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
@@ -122,7 +121,7 @@ impl<const D: usize> Body<D> {
         Ok(body)
     }
 
-    /// Lets the chain follow deferred motions.
+    /// Lets the chain follow deferred motions, if there are any.
     pub(crate) fn catch_up(&mut self) {
         self.deferred.catch_up(&mut self.chain, &mut self.tally);
     }
@@ -159,7 +158,6 @@ impl<const D: usize> Body<D> {
     }
 }
 
-/// Returns the coordinates one after the other.
 pub(crate) fn flatten<const D: usize>(points: &[Point<D>]) -> Vec<f64> {
     points.iter().flatten().copied().collect()
 }

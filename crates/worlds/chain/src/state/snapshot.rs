@@ -349,7 +349,6 @@ fn add_any<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
     }
 }
 
-/// Adds plain data to a digest.
 fn add(hasher: &mut Hasher, data: &impl Serialize) {
     let bytes = postcard::to_stdvec(data).expect("a snapshot is plain data");
     for chunk in bytes.chunks(8) {

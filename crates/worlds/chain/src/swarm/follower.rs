@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// A follower: its wheels, its sensors and the parameters of its behavior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follower {
-    /// Its wheels.
+    /// Its wheels, with the limit of their speed.
     pub drive: DifferentialDrive,
     /// Its body and sensors.
     pub ring: SensorRing,
@@ -39,7 +39,7 @@ pub struct TrackingTarget {
     pub velocity_m_s: Point<2>,
 }
 
-/// A follower's decision.
+/// What a follower does in a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
     /// Speeds of its wheels.

@@ -37,7 +37,7 @@ impl RobotBody {
 /// All that a robot's sensors may meet.
 #[derive(Debug, Clone, Copy)]
 pub struct NearbyBodies<'a, R> {
-    /// The world's obstacles.
+    /// Obstacles of the world, the moving ones where they are now.
     pub obstacles: &'a Obstacles<2>,
     /// Bodies of robots, without that of the robot itself.
     pub robots: R,
@@ -56,7 +56,7 @@ pub struct Laser {
     directions: Vec<Point<2>>,
 }
 
-/// The result of a laser's scan.
+/// Ranges of one scan, and which beams met something that moves.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Scan {
     /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
@@ -84,6 +84,7 @@ impl Laser {
         half_field_rad: f64,
         noise_std_m: f64,
     ) -> Result<Self, InputError> {
+        // More than ten a degree are taken as a mistake.
         if !(4..=3600).contains(&beams) {
             return Err(laser_error(format!("has {beams} beams"), "give 4 to 3600"));
         }
@@ -109,7 +110,7 @@ impl Laser {
         })
     }
 
-    /// Returns its range, meters.
+    /// Returns the range of its beams, meters; those that meet nothing read that.
     pub fn range_m(&self) -> f64 {
         self.range_m
     }

@@ -217,7 +217,7 @@ fn leader_error(cause: String, remedy: &str) -> InputError {
     InputError::new("leader", cause, remedy)
 }
 
-/// A leader's memory.
+/// What a leader keeps from cycle to cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LeaderState {
     /// Its place and heading.
@@ -245,7 +245,7 @@ pub struct Sides<T> {
 /// All that a leader's sensors may detect.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
-    /// The world's obstacles.
+    /// Obstacles of the world, the moving ones where they are now.
     pub obstacles: &'a Obstacles<2>,
     /// Bodies of robots, without its own.
     pub bodies: &'a [RobotBody],
@@ -266,7 +266,7 @@ pub struct Percept {
     pub stands_for_it: bool,
 }
 
-/// A detected target.
+/// A target that is detected, as seen from the heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// Direction relative to the heading, left positive.

@@ -15,7 +15,6 @@ use sidestep_rods::geometry::{Point, normalized, sub};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
 
-/// A leader's climb.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RecoveryProgress<const D: usize> {
     intention: Intention<D>,
@@ -140,7 +139,6 @@ impl<const D: usize> ConnectorAgent<D> {
         true
     }
 
-    /// Puts a question to the chain.
     fn ask_chain(&mut self, question: LadderQuestion<D>) {
         match question {
             LadderQuestion::End if self.n == 1 => self.add_answer(LadderAnswer::End(None)),

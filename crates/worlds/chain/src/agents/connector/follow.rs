@@ -195,7 +195,6 @@ impl<const D: usize> ConnectorAgent<D> {
         self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.start()));
     }
 
-    /// Accepts the present sub-step of a motion.
     pub(super) fn accept_sub_step(&mut self) {
         self.position.accept();
         self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.accept()));

@@ -9,7 +9,6 @@ use sidestep_rods::geometry::{Point, lerp};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{CompletedMotion, Outcome, PendingVeto, Veto};
 
-/// A motion that a connector leads.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LeadState<const D: usize> {
     order: LeadOrder<D>,
@@ -48,7 +47,6 @@ enum LengthChoice {
 }
 
 impl<const D: usize> ConnectorAgent<D> {
-    /// Begins to lead a motion.
     pub(super) fn start_leading(&mut self, order: LeadOrder<D>, orderer: Option<Side>) {
         self.start_motion();
         self.following = None;

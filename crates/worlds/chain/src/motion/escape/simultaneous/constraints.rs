@@ -51,14 +51,12 @@ const BEND_MARGIN: f64 = 1e-6;
 /// Rounding of displacements, meters.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Positions that are checked.
 pub(super) struct Constraints<'a, 'b, const D: usize> {
     pub(super) input: &'a SolveInput<'b, D>,
     pub(super) points: &'a [Point<D>],
 }
 
 impl<const D: usize> Constraints<'_, '_, D> {
-    /// Returns whether all hard constraints hold.
     pub(super) fn are_met(&self, contacts: &Contacts<D>, bends: &[BendConstraint]) -> bool {
         self.are_lengths_met()
             && self.are_travels_met()

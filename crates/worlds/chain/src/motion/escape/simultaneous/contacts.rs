@@ -23,7 +23,6 @@ pub(super) struct PartPair {
     pub(super) keep_m: f64,
 }
 
-/// The contacts of a tick.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Contacts<const D: usize> {
     /// Parts near an obstacle that moves.

@@ -63,7 +63,6 @@ impl EscapePlan {
         self.rests
     }
 
-    /// Records whether the leader rests.
     pub(crate) fn set_resting(&mut self, rests: bool) {
         self.rests = rests;
     }

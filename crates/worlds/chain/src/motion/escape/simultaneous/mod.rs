@@ -62,7 +62,6 @@ impl<const D: usize> SimultaneousEscape<D> {
         Self { rules, solver: EscapeSolver::default(), best: Vec::new(), start: Vec::new() }
     }
 
-    /// Moves the chain away from moving obstacles.
     pub(super) fn escape(
         &mut self,
         tick: &mut EscapeTick<'_, D>,

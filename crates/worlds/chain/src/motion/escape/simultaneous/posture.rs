@@ -3,7 +3,6 @@
 use super::super::threat::ChainPart;
 use sidestep_rods::geometry::{Point, add_scaled};
 
-/// Positions under trial.
 pub(super) struct TrialPosture<'a, const D: usize> {
     pub(super) points: &'a mut [Point<D>],
     /// 1 for a connector that may move, 0 for one that never does.

@@ -23,7 +23,6 @@ pub(super) struct Rollout<'a, const D: usize> {
 #[derive(Clone, Copy)]
 pub(super) struct RolloutOptions<const D: usize> {
     through: Option<ExitDirection<D>>,
-    /// The connector that leads.
     lead: Option<LeadMotion<D>>,
     /// Ticks without contact after which the rollout ends.
     clear: usize,
@@ -47,7 +46,6 @@ const DEPTH_COST: f64 = 0.2;
 /// Rounds of a solve in a rollout, with margins and without; fewer than in a tick, because rollouts are many.
 const ROUNDS: [usize; 2] = [12, 20];
 
-/// The chain under trial, and its surroundings.
 struct Trial<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,

@@ -22,7 +22,6 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Default)]
 pub(super) struct EscapeSolver<const D: usize> {
     pub(super) contacts: Contacts<D>,
-    /// The positions found.
     pub(super) points: Vec<Point<D>>,
     inverse_mass: Vec<f64>,
     bends: Vec<BendConstraint>,

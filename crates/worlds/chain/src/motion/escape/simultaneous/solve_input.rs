@@ -26,7 +26,6 @@ impl<const D: usize> SolveInput<'_, D> {
 /// What a leader would do in a tick, vetoes and escapes aside.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeadMotion<const D: usize> {
-    /// The connector that leads.
     pub(crate) k: usize,
     /// The displacement that it wants in this tick, meters.
     pub(crate) displacement_m: Point<D>,
