@@ -57,16 +57,11 @@ pub struct Propagator<const D: usize> {
 /// A choice point of the depth-first search: another reaction of an earlier slave.
 #[derive(Debug, Clone, Copy)]
 enum Alternative<const D: usize> {
-    Place {
-        slave: usize,
-        candidate: Candidate<D>,
-    },
+    /// A valid place, worse than the one that was taken.
+    Place { slave: usize, candidate: Candidate<D> },
     /// A turn of its rod to the other side. It is computed only on backtracking, because that is
     /// rare and a turn is the costly part of a reaction.
-    OtherSide {
-        slave: usize,
-        tried: Point<D>,
-    },
+    OtherSide { slave: usize, tried: Point<D> },
 }
 
 /// The connectors that are moved from outside: one, or the two of a rod.

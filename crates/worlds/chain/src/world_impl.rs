@@ -110,7 +110,7 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 
     fn cycles_until_flush(&self, _: &ChainState<D>, collector: &Collector, _: Cycle) -> u64 {
-        // How many rows a cycle makes is not known before, so the buffers are looked at after each.
+        // How many rows a cycle makes is not known before, so the buffers are checked after each.
         if collector.rows.is_full() { 0 } else { u64::MAX }
     }
 

@@ -28,7 +28,7 @@ pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Bod
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
 fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
-    // Twice the step of a cycle, so that rounding is of no account.
+    // Twice the step of a cycle, which leaves room for rounding.
     let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * dt_s;
     task.agent == 0
         // These read other connectors in each cycle, or move them.

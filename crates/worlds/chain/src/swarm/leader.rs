@@ -275,7 +275,7 @@ pub struct Sighting {
     pub way_is_free: bool,
 }
 
-/// What a leader does in a cycle, and what it keeps in mind for the next.
+/// What a leader does in a cycle, and what it remembers for the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
     /// Speeds of its wheels.
