@@ -100,7 +100,7 @@ impl<const D: usize> ChainWorld<D> {
 impl<const D: usize> World for ChainWorld<D> {
     const NAME: &'static str = "chain";
     const AGENT: &'static str = "connector";
-    // Positions are recorded before each cycle; beside a cycle of a chain the barrier for it takes no time.
+    // Positions are recorded before each cycle, which takes far longer than the barrier for that.
     const OBSERVES_EACH_CYCLE: bool = true;
 
     type Collector = Collector;
