@@ -21,7 +21,7 @@ pub struct CountTable {
 /// One estimated probability and the counts on which it rests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Name of the table of counts.
+    /// Name of the table of counts, such as `confusion` or `moves`.
     pub table: String,
     /// The truth, or the command.
     pub row: String,
@@ -40,16 +40,16 @@ pub struct Estimate {
 /// A row that rests on few counts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LowCountRow {
-    /// Name of the table of counts.
+    /// Name of the table of counts, as in [`Estimate`].
     pub table: String,
     /// The truth, or the command.
     pub row: String,
-    /// Number of counts in the row.
+    /// Sum of the row's cells, which is its number of events; may be 0.
     pub count: f64,
 }
 
 impl CountTable {
-    /// Returns a table without counts.
+    /// Returns a table of zeros; rows are truths or commands, columns outcomes.
     pub fn new(name: &str, rows: &[String], columns: &[String]) -> Self {
         Self {
             name: name.to_owned(),
@@ -59,12 +59,13 @@ impl CountTable {
         }
     }
 
-    /// Adds `weight` to a cell.
+    /// Adds `weight` to a cell: 1 for an event, or a share of one that is spread over several
+    /// cells.
     pub fn add(&mut self, row: usize, column: usize, weight: f64) {
         self.cells[row][column] += weight;
     }
 
-    /// Returns the name of the table.
+    /// Returns the name under which reports and profiles list the table.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -84,7 +85,7 @@ impl CountTable {
         &self.cells
     }
 
-    /// Returns the counts of one row.
+    /// Returns the counts of one row, one per column.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.cells[row]
     }

@@ -17,7 +17,7 @@ pub struct HoldoutTest {
     pub table: String,
     /// Number of events used for learning.
     pub trained_on: f64,
-    /// Number of events held out.
+    /// Number of events held out, which the learned table is to predict.
     pub held_out: f64,
     /// Chi-square statistic of the hypothesis that both parts follow one law.
     pub chi_square: f64,

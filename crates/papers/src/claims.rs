@@ -29,7 +29,7 @@ struct ExperimentText {
     about: String,
 }
 
-/// The parts of a report.
+/// The parts of a report, in the order in which they stand there.
 pub(crate) struct ReportParts<'a> {
     pub(crate) claims: &'a [Claim],
     pub(crate) pictures: Vec<Picture>,
@@ -50,7 +50,7 @@ struct ClaimText {
 }
 
 impl ClaimsFile {
-    /// Reads the claims of a paper.
+    /// Panics where the text is wrong, because it is part of the program.
     pub(crate) fn read(text: &str) -> Self {
         toml::from_str(text).expect("the claims of a paper are right")
     }
@@ -102,7 +102,7 @@ impl ClaimsFile {
         text.unwrap_or_else(|| panic!("there is no claim `{id}`"))
     }
 
-    /// Returns a claim by its number, its verdict, and our figures.
+    /// Words and rule of the claim are those of the file.
     pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
         let text = self.text(id);
         Claim {

@@ -52,7 +52,7 @@ struct ErrorRecovery<'a> {
     drafts: usize,
 }
 
-/// A draft, and its error.
+/// A draft, and the error of compiling it; none where it compiles.
 struct DraftStep {
     draft: Draft,
     error: Option<InputError>,

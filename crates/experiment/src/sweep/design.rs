@@ -45,7 +45,7 @@ impl Factor {
 }
 
 impl Factor {
-    /// Returns a variant for each value.
+    /// In the order of the values; each variant sets this key alone.
     fn variants(&self) -> Vec<Variant> {
         let mut variants = Vec::with_capacity(self.values.len());
         for value in &self.values {
@@ -149,7 +149,7 @@ impl LatinHypercube {
 /// combination of the factors' values. Without any of them, the scenario unchanged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Design {
-    /// Variants that are listed one by one.
+    /// Variants that are listed one by one; if empty, the scenario unchanged.
     pub list: Vec<Variant>,
     /// Samples of a hypercube.
     pub hypercube: Option<LatinHypercube>,

@@ -20,7 +20,7 @@ const MAX_LEVEL_NAME_CHARS: usize = 40;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Level {
-    /// A number.
+    /// All values of the parameter are numbers.
     Number(f64),
     /// Text; empty if the parameter is not set.
     Text(String),
@@ -113,7 +113,7 @@ impl<'a> RunGroups<'a> {
         })
     }
 
-    /// Returns the label of a metric.
+    /// In the words of the world, as far as it has some.
     pub(super) fn label(&self, metric: &RunColumn) -> Label {
         Label::from_metric(&metric.name, self.meanings)
     }
@@ -123,12 +123,12 @@ impl<'a> RunGroups<'a> {
         metric_label(self.meanings, &metric.name).meaning
     }
 
-    /// Returns the number of runs of a variant.
+    /// Counts all runs; [`Self::values`] has fewer where seeds change nothing.
     pub(super) fn runs_of(&self, variant: usize) -> usize {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).count()
     }
 
-    /// Returns the rows of a variant, by replicate.
+    /// In the order of replicates.
     pub(super) fn rows(&self, variant: usize) -> impl Iterator<Item = usize> {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
     }

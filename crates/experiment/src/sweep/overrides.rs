@@ -21,9 +21,9 @@ pub struct SweepOverrides {
     pub max_runs: Option<u32>,
     /// The metrics to report, and that the precision applies to, where it names none.
     pub metrics: Vec<String>,
-    /// The baseline.
+    /// The baseline, instead of the file's.
     pub baseline: Option<BaselineSpec>,
-    /// The seed of the first run.
+    /// The seed of the first run, instead of that of the file or the scenario.
     pub first_seed: Option<u64>,
     /// Whether every run is recorded, even if the file does not say so.
     pub record: bool,

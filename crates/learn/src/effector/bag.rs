@@ -68,7 +68,7 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
 struct OdometryWindow {
     /// Number of gaps of odometry before.
     stretch: usize,
-    /// The pose that odometry claims at the start.
+    /// The pose that odometry claims at the start, in the frame of odometry.
     start: Pose2,
     scan: Scan,
 }

@@ -37,7 +37,7 @@ pub(super) struct Sighting {
 }
 
 impl Sighting {
-    /// Returns the true subject.
+    /// `None` where nothing that was there fits the reading.
     pub(super) fn subject(&self) -> Option<u32> {
         self.truth.map(|candidate| candidate.subject)
     }

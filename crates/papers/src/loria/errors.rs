@@ -33,7 +33,7 @@ pub(super) enum ErrorSpread {
 }
 
 impl ErrorSpread {
-    /// Both recipes.
+    /// In the order of tables and figures.
     pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
 
     /// Returns its name in tables.

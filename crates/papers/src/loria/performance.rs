@@ -22,9 +22,9 @@ use std::sync::Arc;
 /// Times of a load with a number of workers.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct LoadTiming {
-    /// Number of the load.
+    /// Index into [`PerformanceResults::loads`].
     pub(super) load: usize,
-    /// Workers.
+    /// Number of workers of the run.
     pub(super) workers: usize,
     /// Whether the run was recorded.
     pub(super) recorded: bool,
@@ -48,7 +48,7 @@ impl LoadTiming {
 /// The cost of a run before its first cycle.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct InitializationCost {
-    /// Number of the load.
+    /// Index into [`PerformanceResults::loads`].
     pub(super) load: usize,
     /// Seconds to read the scenario, compile the world and place all bodies.
     pub(super) seconds: f64,
@@ -71,7 +71,7 @@ pub(super) struct PerformanceResults {
     pub(super) processors: usize,
     /// The timed loads.
     pub(super) loads: Vec<Workload>,
-    /// The times.
+    /// By load, unrecorded before recorded, and then by number of workers.
     pub(super) timings: Vec<LoadTiming>,
     /// Initialization of each load.
     pub(super) initialization: Vec<InitializationCost>,
@@ -89,6 +89,7 @@ pub(super) fn loads(plan: &LoriaConfig) -> Vec<Workload> {
         for &operations in &plan.operations {
             loads.push(Workload {
                 robots,
+                // Few people, because the paper's loads vary in robots.
                 people: robots / 5,
                 size: 2,
                 operations,
@@ -111,7 +112,7 @@ pub(super) fn worker_counts(max: usize) -> Vec<usize> {
 }
 
 impl PerformanceResults {
-    /// Runs the experiment.
+    /// Times every load and its initialization, and compares the digests.
     ///
     /// # Errors
     /// When a recording fails.
@@ -160,6 +161,7 @@ impl PerformanceResults {
     /// Returns whether the machine itself gave less than this share of the workers' worth: then other
     /// processes were using it, and times mean little.
     pub(super) fn is_machine_busy(&self) -> bool {
+        // Less than 1, because processors slow down somewhat when all of them work.
         const SHARE: f64 = 0.85;
         let min_speed_up = SHARE * self.max_workers() as f64;
         self.at_max_workers(false).any(|timing| timing.machine.mean_or_zero() < min_speed_up)

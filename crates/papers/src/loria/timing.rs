@@ -25,7 +25,7 @@ const DECISION_OPERATIONS: u32 = 500;
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Workload {
-    /// Robots.
+    /// Number of robots, all of them with [`CostlyBehaviour`].
     pub(super) robots: u32,
     /// People, of 2 x 2 boxes.
     pub(super) people: u32,
@@ -62,7 +62,7 @@ impl Workload {
         (robot_cycles / (bodies * (1 + u64::from(self.operations / DECISION_OPERATIONS)))).max(10)
     }
 
-    /// Returns the scenario.
+    /// Its robots have the behavior `costly`, which [`Self::compiled`] adds.
     fn source(&self) -> Source {
         let costly = toml::Table::from_iter([("kind".to_string(), "costly".into())]);
         let settings = [
@@ -234,7 +234,7 @@ impl TimedRun {
         result.map(|()| took_s)
     }
 
-    /// Returns the run.
+    /// For its digest after it was timed.
     pub(super) fn simulation(&self) -> &RobotsRun {
         &self.simulation
     }

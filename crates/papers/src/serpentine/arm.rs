@@ -55,10 +55,9 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ArmResults {
-    /// Results by case.
+    /// Those without pillars first, each without a planner and then with one.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }

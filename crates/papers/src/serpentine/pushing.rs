@@ -91,10 +91,9 @@ fn cases() -> Vec<Vec<Setting>> {
     cases
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct PushingResults {
-    /// Results by case.
+    /// Those pushed by the head first, from what folds most easily on.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
@@ -172,7 +171,6 @@ impl PushingResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns cases of pushing, or of pulling.
     pub(super) fn cases_by_direction(&self, by_head: bool) -> impl Iterator<Item = &CaseResults> {
         self.cases.iter().filter(move |c| c.is_true("by_head") == by_head)
     }

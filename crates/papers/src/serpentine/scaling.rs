@@ -25,7 +25,7 @@ const CLUTTERED_CONNECTORS: usize = 450;
 /// One chain that is led through the open.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct OpenTiming {
-    /// Connectors.
+    /// Number of connectors, the head included.
     pub(super) connectors: usize,
     /// Time of a motion, microseconds: rods of fixed length,
     pub(super) fixed_us: f64,
@@ -67,7 +67,6 @@ impl FarObstacleTiming {
     }
 }
 
-/// All timings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ScalingResults {
     /// Sizes by number of connectors.

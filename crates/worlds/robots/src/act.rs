@@ -172,7 +172,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
         WalkResult { steps: walk.steps.len(), contact: None }
     }
 
-    /// Makes the first `steps` steps of a walk.
+    /// Makes a walk up to its contact, step by step, so that a path over its own boxes ends right.
     #[inline]
     fn execute_steps(&self, walk: &StepPath, steps: usize, slot: Slot) {
         if steps == 0 {

@@ -67,7 +67,7 @@ pub enum Sector {
     Ahead,
     /// Between 45 and 135 degrees to the left.
     Left,
-    /// Behind.
+    /// Less than 45 degrees off the opposite of the heading.
     Behind,
     /// Between 45 and 135 degrees to the right.
     Right,

@@ -45,7 +45,6 @@ pub(crate) const FACTS: WorldFacts = WorldFacts {
     group_sizes: Some(GroupSizes::Metric { metric: "group_sizes" }),
 };
 
-/// Returns a tool that paints boxes of the map.
 fn paint(
     id: &'static str,
     sign: &'static str,

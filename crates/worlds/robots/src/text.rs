@@ -163,7 +163,7 @@ fn map(world: &RobotsWorld) -> Value {
     })
 }
 
-/// Returns the number of bodies of each kind.
+/// Kinds without bodies are left out.
 fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
     let mut count = BTreeMap::new();
     for id in 0..world.bodies.len() as u32 {

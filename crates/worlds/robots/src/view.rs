@@ -61,7 +61,7 @@ impl RobotsWorld {
         ids.map(|id| builder.body(id, state.body(id))).collect()
     }
 
-    /// Returns one body.
+    /// For a single body; [`Self::visible_bodies`] computes the sines of all of them once.
     pub(super) fn visible_body(&self, id: EntityId, body: &BodyState) -> Body {
         BodyViewBuilder::new(self).body(id, body)
     }
@@ -162,7 +162,7 @@ impl RobotsWorld {
         poses
     }
 
-    /// Returns the name of a body in frames: its kind and its id.
+    /// Robots, people and doors are numbered together, so that the number alone is unique too.
     pub(super) fn body_id(&self, id: EntityId) -> BodyId {
         BodyId::new(self.visible_kind(id), id, None)
     }

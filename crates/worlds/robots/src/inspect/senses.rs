@@ -10,7 +10,7 @@ use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{self, BodyId, BodyKind, FactSection, FactTable, FactValue, MarkShape};
 
-/// One beam.
+/// One row of the table of readings: what a beam truly meets, and what its sensor makes of that.
 struct BeamReading<'a, T> {
     sensor: &'a MountedSensor,
     bearing_deg: f64,

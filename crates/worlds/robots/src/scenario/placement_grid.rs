@@ -7,7 +7,7 @@ use sidestep_map::{Cell, GridMap, Rect};
 
 /// Marks a box without an occupant.
 const EMPTY: u32 = u32::MAX;
-/// Marks a wall.
+/// Like [`EMPTY`] above every entity id.
 const WALL: u32 = u32::MAX - 1;
 /// Number of draws before a free place is searched for in order. Where one place in fifty is free, so many draws
 /// fail in 2 % of all cases.

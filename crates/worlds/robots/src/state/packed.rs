@@ -115,7 +115,7 @@ impl LastContact {
 pub(crate) struct PackedPose(u32);
 
 impl PackedPose {
-    /// Returns the pose of a body.
+    /// Column and row are those of the padded grid, below 2^15.
     #[inline]
     pub(crate) fn new(at: Position, facing: Facing) -> Self {
         Self(u32::from(facing.0) << 30 | at.row() << 15 | at.col())
@@ -131,7 +131,7 @@ impl PackedPose {
         self.0 >> 15 & 0x7fff
     }
 
-    /// Returns the heading.
+    /// As [`Facing::heading`]; of a door 0 or 1.
     pub(crate) fn heading(self) -> u8 {
         (self.0 >> 30) as u8
     }
