@@ -25,7 +25,7 @@ pub struct Estimate {
     pub table: String,
     /// The truth, or the command.
     pub row: String,
-    /// The outcome.
+    /// The outcome, or what was reported.
     pub column: String,
     /// Number of times that the outcome occurred.
     pub count: f64,
@@ -70,12 +70,12 @@ impl CountTable {
         &self.name
     }
 
-    /// Returns the names of the rows.
+    /// Returns the names of the rows: truths or commands.
     pub fn rows(&self) -> &[String] {
         &self.rows
     }
 
-    /// Returns the names of the columns.
+    /// Returns the names of the columns: outcomes.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
@@ -90,7 +90,7 @@ impl CountTable {
         &self.cells[row]
     }
 
-    /// Returns the sum of one row.
+    /// Returns the sum of one row, its number of events.
     pub fn total(&self, row: usize) -> f64 {
         self.cells[row].iter().sum()
     }

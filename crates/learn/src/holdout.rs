@@ -48,7 +48,7 @@ pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
     (train, held)
 }
 
-/// Compares two tables of the same shape.
+/// Compares two tables of the same shape; `alpha` smooths the learned one for the log-loss.
 pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> HoldoutTest {
     let n_rows = trained.rows().len();
     let tests: Vec<(f64, usize)> =

@@ -33,7 +33,7 @@ pub use sockets::{FleetRunner, FlightMeasurement, SocketCase, SocketMeasurements
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgentflyConfig {
-    /// Numbers of airplanes.
+    /// Numbers of airplanes that meet, each of them a case.
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
     pub seeds: usize,
@@ -50,7 +50,7 @@ pub struct AgentflyConfig {
 /// The amount of work of the part over real sockets, with flights one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SocketsConfig {
-    /// Numbers of airplanes.
+    /// Numbers of airplanes that meet, each of them a case.
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
     pub seeds: usize,
@@ -550,7 +550,6 @@ impl AgentflyReport {
     }
 }
 
-/// The words of the marks of flights.
 const TRACK_NOTE: &str = "A ring is where an airplane starts, an arrowhead where it arrives.";
 
 fn flight(id: u32, track_m: &[AirPoint]) -> Series {

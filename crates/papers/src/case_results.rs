@@ -275,7 +275,6 @@ fn rows_of_variant(table: &RunTable, number: u32) -> Vec<usize> {
         .collect()
 }
 
-/// A value of the results of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Value {
@@ -292,7 +291,6 @@ pub(crate) enum Value {
     BySeed(Vec<NamedNumbers>),
 }
 
-/// Numbers by name.
 pub(crate) type NamedNumbers = Vec<(&'static str, f64)>;
 
 fn of_runs<S: Serializer>(runs: &[NamedNumbers], serializer: S) -> Result<S::Ok, S::Error> {
@@ -337,7 +335,6 @@ impl CaseResults {
         Self { case: case.into_iter().collect(), results: results.into_iter().collect(), runs: 10 }
     }
 
-    /// Replaces a value.
     #[cfg(test)]
     pub(crate) fn set_value(&mut self, name: &str, value: Value) {
         let mut all = self.case.iter_mut().chain(&mut self.results);

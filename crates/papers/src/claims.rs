@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 /// The claims of a paper, read from its file in `claims/` when they are first needed.
 pub(crate) type PaperClaims = LazyLock<ClaimsFile>;
 
-/// A file of claims.
+/// A paper's title, experiments and claims, as a file of `claims/` has them.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ClaimsFile {
@@ -36,7 +36,7 @@ pub(crate) struct ReportParts<'a> {
     pub(crate) experiments: Vec<Experiment>,
 }
 
-/// A claim in words.
+/// What the paper says, and how it is judged.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ClaimText {

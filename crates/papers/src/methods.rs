@@ -35,7 +35,7 @@ pub struct MethodResult {
     pub min_separation_m: Option<f64>,
     /// Share of the airplanes that arrived.
     pub arrived: Estimate,
-    /// Mean delay, percent.
+    /// Mean time beyond that of the flight alone, in percent of it.
     pub delay_percent: Estimate,
     /// Time spent deciding per run, seconds.
     pub optimize_cpu_s: Estimate,

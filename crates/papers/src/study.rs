@@ -121,7 +121,6 @@ impl Study {
         self.filtered(|v| among.contains(&setting_number(v, key)))
     }
 
-    /// Returns the number of variants.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.variants.len()

@@ -216,7 +216,7 @@ impl Tree<'_> {
     }
 }
 
-/// Joins parts that overlap.
+/// Joins parts that overlap or touch.
 fn merge_ranges(mut parts: Vec<Range<usize>>) -> Vec<Range<usize>> {
     parts.sort_by_key(|part| part.start);
     let mut joined: Vec<Range<usize>> = Vec::new();

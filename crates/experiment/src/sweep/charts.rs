@@ -59,7 +59,7 @@ pub(super) fn is_sampled(groups: &RunGroups<'_>) -> bool {
     })
 }
 
-/// Returns the parameters that are numbers.
+/// By index into [`RunGroups::parameters`].
 pub(super) fn numeric_parameters(groups: &RunGroups<'_>) -> Vec<usize> {
     (0..groups.parameters.len()).filter(|p| groups.parameters[*p].numeric).collect()
 }

@@ -39,7 +39,7 @@ impl Level {
 /// A parameter that differs between variants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Path of its key.
+    /// Path of its key; of parameters that always change together, the paths of all.
     pub name: String,
     /// Whether all its values are numbers.
     pub numeric: bool,
@@ -64,7 +64,7 @@ pub(super) struct RunGroups<'a> {
     meanings: &'static [MetricInfo],
     /// Whether seeds change nothing, variant by variant.
     pub(super) seedless: Vec<bool>,
-    /// The run of each variant and replicate.
+    /// Row of the table, by variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
@@ -194,7 +194,7 @@ impl<'a> RunGroups<'a> {
         others.windows(2).all(|pair| pair[0] == pair[1])
     }
 
-    /// Returns the variants that have this level.
+    /// By index into [`Self::variants`].
     pub(super) fn with_level(&self, parameter: usize, level: usize) -> Vec<usize> {
         let of = &self.parameters[parameter].of_variant;
         (0..of.len()).filter(|v| of[*v] == level).collect()

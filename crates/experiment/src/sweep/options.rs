@@ -24,7 +24,7 @@ pub struct SummaryOptions {
     pub meanings: &'static [MetricInfo],
 }
 
-/// The baseline of variants.
+/// What the variants are compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BaselineChoice {
     /// One variant for all others, by its name in tables.

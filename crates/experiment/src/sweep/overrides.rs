@@ -11,7 +11,7 @@ use sidestep_kernel::InputError;
 pub struct SweepOverrides {
     /// Settings of every variant, after those of the file.
     pub fixed: Vec<Setting>,
-    /// Further factors of the grid.
+    /// Further factors of the grid, behind those of the file.
     pub factors: Vec<Factor>,
     /// The precision at which a variant has had enough runs; the metrics of the file's stay.
     pub until: Option<Precision>,

@@ -47,7 +47,7 @@ impl RunTableBuilder {
         for_each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
     }
 
-    /// Sets a field of the last row.
+    /// Sets a field of the last row; its column is made when it first appears.
     fn set(&mut self, role: Role, name: &str, value: &Value, place: usize) {
         let row = self.trials.len() - 1;
         let trial = self.trials[row];

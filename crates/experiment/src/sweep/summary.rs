@@ -93,7 +93,7 @@ pub struct VariantMetric {
     pub not_finite: usize,
     /// Whether seeds change nothing in the variant.
     pub seedless: bool,
-    /// The description of the values.
+    /// Mean, spread and quantiles of numbers, or a share.
     pub values: MetricValues,
 }
 
@@ -156,7 +156,7 @@ pub struct Trend {
 /// A metric that is not shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct OmittedMetric {
-    /// Its column.
+    /// Name of its column.
     pub metric: String,
     /// The reason, in words for a table.
     pub reason: String,
@@ -173,7 +173,7 @@ pub struct Summary {
     pub parameters: Vec<Parameter>,
     /// The name of the baseline of the variants; each comparison has the variant itself.
     pub baseline: Option<String>,
-    /// The metrics shown.
+    /// The metrics shown: as requested, else the most informative first.
     pub metrics: Vec<MetricSummary>,
     /// The metrics that are not shown.
     pub left_out: Vec<OmittedMetric>,

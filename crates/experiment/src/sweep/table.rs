@@ -21,7 +21,7 @@ pub enum Role {
     Parameter,
     /// A result of the run. A column of `Bool` is a share.
     Metric,
-    /// Digest of the run.
+    /// Digest of the run's last state, in hexadecimal.
     Digest,
     /// A time that the run took: it differs when the run is made again.
     Cost,

@@ -20,7 +20,7 @@ pub struct Outcome {
     /// Number of the trial; files call it `cell`.
     #[serde(rename = "cell")]
     pub trial: u64,
-    /// Cycles that were run.
+    /// Cycles that were run; 0 if the run failed.
     pub cycles: Cycle,
     /// Digest of the last state, in hexadecimal; empty if the run failed.
     pub digest: String,

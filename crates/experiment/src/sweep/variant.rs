@@ -106,7 +106,6 @@ impl Variant {
         Ok(())
     }
 
-    /// Returns the keys that it sets.
     pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
         self.settings.iter().map(|setting| setting.key.as_str())
     }

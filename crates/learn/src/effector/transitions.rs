@@ -49,7 +49,7 @@ impl EffectorProfile {
 /// One possible result of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileTransition {
-    /// Probability of the result.
+    /// Probability of the result, rounded to nine decimals.
     pub p: f64,
     /// Boxes walked, in the robot's frame: `F`, `B`, `L`, `R`; empty where it stays.
     pub path: String,

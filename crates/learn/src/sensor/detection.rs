@@ -39,7 +39,6 @@ impl Detection {
         [&self.all, &self.robots, &self.landmarks]
     }
 
-    /// Counts of `views`.
     pub(super) fn from_views<'a>(
         views: impl IntoIterator<Item = &'a SubjectView>,
         looks: u64,

@@ -60,7 +60,6 @@ pub(super) fn read(
     Ok((parser.observations, readings))
 }
 
-/// The indices of the columns.
 struct ReadingColumns {
     truth: usize,
     reported: usize,

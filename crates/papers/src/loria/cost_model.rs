@@ -56,7 +56,6 @@ pub(super) struct CostSample {
 }
 
 impl CostSample {
-    /// Returns the number of bodies, `n + m`.
     fn bodies(&self) -> f64 {
         self.agents + self.objects
     }
@@ -110,7 +109,7 @@ impl CostModel {
         Self::fit(points)
     }
 
-    /// Fits the model to runs.
+    /// Both steps of a cycle are fitted apart, because their times are measured apart.
     pub(super) fn fit(points: Vec<CostSample>) -> Self {
         let first = fit_per_body(&points, first_row, |p| p.first_ns);
         let second = fit_per_body(&points, second_row, |p| p.second_ns);

@@ -70,7 +70,6 @@ pub(super) enum BeamCount {
 }
 
 impl BeamCount {
-    /// Returns the bearings of the beams in degrees.
     pub(super) fn bearings_deg(self) -> Vec<f64> {
         let (n, step) = match self {
             Self::Sixteen => (16, 22.5),

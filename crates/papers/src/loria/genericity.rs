@@ -34,7 +34,6 @@ impl BuildOutcomes {
     }
 }
 
-/// The genericity experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct GenericityResults {
     /// Those without a camera first, each by size.

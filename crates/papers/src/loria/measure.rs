@@ -38,7 +38,7 @@ pub(super) struct LoriaVariant {
     pub(super) regime: Regime,
     /// The law for blocked paths.
     pub(super) obstacle_rule: ObstacleRule,
-    /// The behavior of robots.
+    /// How robots deal with obstacles.
     pub(super) mind: AvoidancePolicy,
     /// The errors of sensors and effectors.
     pub(super) tables: ErrorTables,

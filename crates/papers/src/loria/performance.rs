@@ -64,12 +64,10 @@ pub(super) const REFERENCE_CYCLES: u64 = 1000;
 /// Worker counts of which the digests are compared; more than the machine has processors is allowed.
 const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
-/// The parallel performance experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PerformanceResults {
     /// Processors that the run may use.
     pub(super) processors: usize,
-    /// The timed loads.
     pub(super) loads: Vec<Workload>,
     /// By load, unrecorded before recorded, and then by number of workers.
     pub(super) timings: Vec<LoadTiming>,
@@ -152,7 +150,6 @@ impl PerformanceResults {
         self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
     }
 
-    /// Returns the timings with the most workers.
     pub(super) fn at_max_workers(&self, recorded: bool) -> impl Iterator<Item = &LoadTiming> {
         let most = self.max_workers();
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
@@ -197,7 +194,6 @@ impl PerformanceResults {
         Estimate::paired_difference(&costly, &cheap)
     }
 
-    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.times_table(), self.initialization_table(), self.digest_table()]
     }

@@ -19,7 +19,6 @@ use std::sync::Arc;
 pub(super) struct VariantOutcomes {
     /// Name of the floor, which the variant does not serialize.
     pub(super) floor: String,
-    /// The variant that was run.
     pub(super) variant: LoriaVariant,
     /// By seed, from 1 on.
     pub(super) outcomes: Vec<RunMeasures>,
@@ -207,7 +206,6 @@ impl ReliabilityResults {
         all
     }
 
-    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![
             self.regimes_table(),
@@ -319,7 +317,6 @@ impl ReliabilityResults {
         table
     }
 
-    /// Returns the figures of this experiment.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let bars = [
             self.regime_bars(
@@ -385,7 +382,6 @@ impl ReliabilityResults {
 /// A behavior, its beams and their recipe of errors, swept over the error level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SweepCase {
-    /// The behavior of the robots.
     pub(super) mind: AvoidancePolicy,
     /// Their number of beams.
     pub(super) beams: BeamCount,

@@ -41,10 +41,8 @@ pub(super) struct StrategyTiming {
     pub(super) complete: bool,
 }
 
-/// All trials.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct StrategyResults {
-    /// The timed loads.
     pub(super) loads: Vec<Workload>,
     /// By load, then by number of workers, the double pool first.
     pub(super) trials: Vec<StrategyTiming>,
@@ -136,7 +134,6 @@ impl StrategyResults {
         with_most.next().map_or(&[], |t| &t.ratios[..])
     }
 
-    /// Returns the comparison as a table.
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "Mean [95 % interval] over repeats, each the best of {SEGMENTS} stretches that take \

@@ -33,7 +33,6 @@ pub(super) struct Workload {
     pub(super) size: u32,
     /// Multiply-and-adds that every decision costs beside its own work.
     pub(super) operations: u32,
-    /// The building.
     #[serde(skip)]
     pub(super) floor: Arc<Floor>,
 }
@@ -86,7 +85,6 @@ impl Workload {
             .expect("the experiments' scenarios are valid")
     }
 
-    /// Returns a run at its start.
     pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
         self.compiled().start(&self.source(), workers)
     }
@@ -196,7 +194,6 @@ pub(super) struct TimedRun {
 }
 
 impl TimedRun {
-    /// Returns a run that is not recorded.
     pub(super) fn new(load: &Workload, workers: usize) -> Self {
         Self { simulation: load.simulation(workers), recorder: None }
     }

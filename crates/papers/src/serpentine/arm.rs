@@ -62,7 +62,6 @@ pub(super) struct ArmResults {
     pub(super) cases: Vec<CaseResults>,
 }
 
-/// Returns the arm of the scenario.
 fn arm() -> Result<SerialChain, InputError> {
     let scenario: toml::Table = toml::from_str(SCENARIO).expect("a scenario of this experiment");
     let text = scenario["chains"][0]["arm"]["urdf_text"].as_str().expect("its arm");

@@ -50,7 +50,6 @@ fn format_passes(case: &CaseResults) -> String {
     format!("{median} ({})", case.count("most_passes"))
 }
 
-/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct BreakCase {
     /// Middle connectors that are thrown about,

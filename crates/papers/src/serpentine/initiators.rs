@@ -292,7 +292,6 @@ fn bend_limit_result(limit_deg: f64, in_space: bool, runs: &[BendLimitRun]) -> B
 }
 
 impl InitiatorCounts {
-    /// Sums the results of some runs.
     fn total(runs: Vec<Self>) -> Self {
         runs.into_iter().fold(Self::default(), |mut all, run| {
             all.moved.extend(run.moved);

@@ -97,7 +97,6 @@ impl MoverResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cases of a way to react.
     pub(super) fn cases_with_escape<'a>(
         &'a self,
         escape: &'a str,

@@ -85,7 +85,6 @@ fn format_method(case: &CaseResults) -> String {
     method.name().into()
 }
 
-/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct PostureCase {
     /// How the tip is brought to its target.

@@ -61,7 +61,6 @@ pub(super) struct FarObstacleTiming {
 }
 
 impl FarObstacleTiming {
-    /// Returns the time of a motion, by repeat.
     fn us(&self) -> Vec<Option<f64>> {
         self.us_by_repeat.iter().map(|us| Some(*us)).collect()
     }

@@ -20,10 +20,9 @@ pub(super) struct WalkResult {
     pub(super) contact: Option<Blocker>,
 }
 
-/// An obstacle that stops a walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Blocker {
-    /// Kind of the obstacle.
+    /// Index into the scenario's kinds.
     pub(super) kind: u8,
     /// Side of the body that touches it.
     pub(super) side: Side,

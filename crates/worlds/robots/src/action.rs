@@ -22,7 +22,7 @@ pub(crate) struct Step {
 pub(crate) struct StepPath {
     /// In the order in which they are made; empty for a turn in place and for staying.
     pub(crate) steps: Vec<Step>,
-    /// Quarter turns to the left.
+    /// Quarter turns to the left after the steps, 0 to 3.
     pub(crate) turn: u8,
     /// All steps together, for the many walks that meet no obstacle.
     pub(crate) whole: NetEffect,
@@ -89,11 +89,11 @@ pub(crate) struct SweptVolumeNode {
 /// An action of a body type at a heading.
 #[derive(Debug, Clone)]
 pub(crate) struct Action {
-    /// Probability of each walk.
+    /// By which one of `walks` is drawn.
     pub(crate) distribution: Categorical,
     /// Probabilities as given, kept for exact computations and for rescaling.
     pub(crate) probabilities: Vec<f64>,
-    /// The walk of each outcome.
+    /// One for each transition of the effector, the intended one first.
     pub(crate) walks: Vec<StepPath>,
     /// The tree of everything that the action may sweep.
     pub(crate) sweep: SweptVolume,

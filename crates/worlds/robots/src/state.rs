@@ -121,7 +121,7 @@ pub struct BodyRecord {
     pub facing: Facing,
     /// See [`BodyState::contact`].
     pub contact: LastContact,
-    /// The robot's memory.
+    /// The robot's memory; all 0 for other bodies.
     pub memory: [u32; 4],
     /// Last broadcast, if there was one.
     pub voice: Option<u64>,

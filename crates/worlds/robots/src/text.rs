@@ -11,7 +11,6 @@ use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
-/// Returns the outcome of a run.
 pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     let total = &metrics.total;
     let mut lines = vec![

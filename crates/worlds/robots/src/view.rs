@@ -167,7 +167,6 @@ impl RobotsWorld {
         BodyId::new(self.visible_kind(id), id, None)
     }
 
-    /// Returns an event in words.
     pub(super) fn view_event(&self, event: &Event) -> LogEvent {
         let mut with = None;
         let (level, kind, words) = match event.event {
@@ -191,7 +190,7 @@ impl RobotsWorld {
 struct BodyViewBuilder<'a> {
     world: &'a RobotsWorld,
     plane: CachedIsometry2,
-    /// The turn of each heading.
+    /// The turn of each heading, as a pose has it.
     turns: [[f64; 4]; 4],
 }
 

@@ -200,7 +200,7 @@ pub enum Role {
 pub struct RobotModel {
     /// Sensors and effectors, shared by types that differ only in behavior.
     pub body: Arc<RobotBody>,
-    /// The behavior, which chooses its actions.
+    /// Chooses the actions; shared by all robots of the type, and without state of its own.
     pub behaviour: Arc<dyn Behaviour>,
     /// Whether it is decided from outside; asked once, because the answer is needed in every cycle.
     pub(super) is_external: bool,
@@ -220,7 +220,7 @@ pub struct RobotBody {
     pub sensors: Vec<MountedSensor>,
     /// Sector of each beam of all sensors in order.
     pub(crate) sectors: Vec<Sector>,
-    /// The effector as data.
+    /// The effector as the scenario gives it.
     pub effector: EffectorModel,
     /// The effector on this body, see [`BodyType::actions`].
     pub(crate) actions: Arc<[Action]>,
@@ -229,7 +229,7 @@ pub struct RobotBody {
 /// A sensor on a body of a given size, with the boxes of its beams at every heading.
 #[derive(Debug)]
 pub struct MountedSensor {
-    /// The sensor as data.
+    /// The sensor as the scenario gives it.
     pub model: SensorModel,
     pub(super) table: AliasTable,
     /// The boxes that its beams cross, for each heading.
@@ -403,12 +403,11 @@ impl RobotsWorld {
         &self.types[usize::from(self.bodies[id as usize].ty)]
     }
 
-    /// Returns the ids of the robots.
+    /// Returns the ids of the robots, rising.
     pub fn robots(&self) -> &[EntityId] {
         &self.robots
     }
 
-    /// Returns whether a body is a door.
     pub(crate) fn is_door(&self, id: EntityId) -> bool {
         matches!(self.type_of(id).role, Role::Door(_))
     }

@@ -9,7 +9,7 @@ use sidestep_kernel::stream::Draws;
 /// enter the same boxes. Without radio it behaves as [`Wander`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Announce {
-    /// The behavior that chooses the actions.
+    /// Chooses the actions where no other robot is in the way.
     pub wander: Wander,
     /// Side of the robot, in boxes.
     pub size: u32,

@@ -59,7 +59,7 @@ pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
 /// A scenario that is checked and tabulated, ready for any number of runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    /// The immutable world.
+    /// The world, shared by all runs of the scenario.
     pub world: Arc<RobotsWorld>,
     /// Place and facing of each entity at the start, by id.
     pub start: Arc<[((u32, u32), u8)]>,
@@ -69,7 +69,7 @@ pub struct Compiled {
     pub seed: u64,
     /// Number of cycles that the scenario asks for.
     pub cycles: u64,
-    /// The tables to keep.
+    /// The tables that a run keeps where it is recorded.
     pub record: RecordSection,
     /// Surprises found by compiling.
     pub remarks: Vec<Remark>,
