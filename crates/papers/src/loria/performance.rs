@@ -393,6 +393,7 @@ fn digests(
     load: &Workload,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<(Vec<(usize, String)>, String), RecordError> {
+    // Bodies meet often enough in so many cycles that a wrong order would show in the digest.
     const CYCLES: u64 = 100;
     let mut digests = Vec::new();
     for workers in DIGEST_WORKERS {

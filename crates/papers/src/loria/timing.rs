@@ -105,8 +105,9 @@ impl Behaviour for CostlyBehaviour {
     }
 }
 
-/// Does `operations` dependent multiply-and-adds, only to spend time: each needs the one before, so that neither the compiler
-/// nor the processor does several at once.
+/// Does `operations` dependent multiply-and-adds, only to spend time: each needs the one before, so
+/// that neither the compiler nor the processor does several at once. The numbers are those of
+/// Knuth's generator MMIX; others would do as well.
 fn spend_time(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -108,6 +108,7 @@ fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
 /// Runs a case until some part objects; returns the distance and the measures on the way.
 fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
     let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
+    // The longest rod, 0.8 m, with the radii of its ends.
     let obstacles = Obstacles::new(walls, 1.3)?;
     let mut chain = chain(setting_number(case, "max_bend_deg"))?;
     let rules = Rules { self_collision: is_set(case, "self_collision"), ..Rules::default() };
