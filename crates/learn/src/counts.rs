@@ -21,11 +21,11 @@ pub struct CountTable {
 /// One estimated probability and the counts on which it rests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Name of the table of counts.
+    /// Name of the table of counts, such as `confusion` or `moves`.
     pub table: String,
     /// The truth, or the command.
     pub row: String,
-    /// The outcome.
+    /// The outcome, or what was reported.
     pub column: String,
     /// Number of times that the outcome occurred.
     pub count: f64,
@@ -40,16 +40,16 @@ pub struct Estimate {
 /// A row that rests on few counts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LowCountRow {
-    /// Name of the table of counts.
+    /// Name of the table of counts, as in [`Estimate`].
     pub table: String,
     /// The truth, or the command.
     pub row: String,
-    /// Number of counts in the row.
+    /// Sum of the row's cells, which is its number of events; may be 0.
     pub count: f64,
 }
 
 impl CountTable {
-    /// Returns a table without counts.
+    /// Returns a table of zeros; rows are truths or commands, columns outcomes.
     pub fn new(name: &str, rows: &[String], columns: &[String]) -> Self {
         Self {
             name: name.to_owned(),
@@ -59,22 +59,23 @@ impl CountTable {
         }
     }
 
-    /// Adds `weight` to a cell.
+    /// Adds `weight` to a cell: 1 for an event, or a share of one that is spread over several
+    /// cells.
     pub fn add(&mut self, row: usize, column: usize, weight: f64) {
         self.cells[row][column] += weight;
     }
 
-    /// Returns the name of the table.
+    /// Returns the name under which reports and profiles list the table.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Returns the names of the rows.
+    /// Returns the names of the rows: truths or commands.
     pub fn rows(&self) -> &[String] {
         &self.rows
     }
 
-    /// Returns the names of the columns.
+    /// Returns the names of the columns: outcomes.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
@@ -84,12 +85,12 @@ impl CountTable {
         &self.cells
     }
 
-    /// Returns the counts of one row.
+    /// Returns the counts of one row, one per column.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.cells[row]
     }
 
-    /// Returns the sum of one row.
+    /// Returns the sum of one row, its number of events.
     pub fn total(&self, row: usize) -> f64 {
         self.cells[row].iter().sum()
     }

@@ -84,7 +84,7 @@ fn write_estimate(f: &mut Formatter<'_>, e: &Estimate) -> Result {
     )
 }
 
-/// Writes the rows with few counts.
+/// Where every row has enough counts, one line says so.
 pub(super) fn write_low_count_rows(
     f: &mut Formatter<'_>,
     thin: &[LowCountRow],
@@ -181,7 +181,7 @@ fn format_p(p: f64) -> String {
     if p < MIN_P { format!("< {MIN_P}") } else { format!("= {p:.4}") }
 }
 
-/// Returns a probability for the column of a table.
+/// Without the `=` of a sentence, for which a column has no room.
 fn format_p_column(p: f64) -> String {
     if p < MIN_P { format!("<{MIN_P}") } else { format!("{p:.4}") }
 }

@@ -17,7 +17,7 @@ pub struct HoldoutTest {
     pub table: String,
     /// Number of events used for learning.
     pub trained_on: f64,
-    /// Number of events held out.
+    /// Number of events held out, which the learned table is to predict.
     pub held_out: f64,
     /// Chi-square statistic of the hypothesis that both parts follow one law.
     pub chi_square: f64,
@@ -48,7 +48,7 @@ pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
     (train, held)
 }
 
-/// Compares two tables of the same shape.
+/// Compares two tables of the same shape; `alpha` smooths the learned one for the log-loss.
 pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> HoldoutTest {
     let n_rows = trained.rows().len();
     let tests: Vec<(f64, usize)> =

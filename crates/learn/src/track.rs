@@ -6,7 +6,6 @@ use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 /// Motion capture with a wider gap than this says nothing about the time between: a robot may turn and come back.
 const MAX_INTERPOLATION_SECS: f64 = 0.5;
 
-/// A pose in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose2 {
     pub(crate) x_m: f64,
@@ -52,7 +51,7 @@ impl Pose2 {
         }
     }
 
-    /// Returns the motion from here to `to`.
+    /// In the frame of this pose.
     pub(crate) fn motion_to(&self, to: &Pose2) -> Displacement2 {
         let (dx, dy) = (to.x_m - self.x_m, to.y_m - self.y_m);
         let (s, c) = (sin(self.heading_rad), cos(self.heading_rad));

@@ -33,13 +33,13 @@ pub use sockets::{FleetRunner, FlightMeasurement, SocketCase, SocketMeasurements
 /// The amount of work to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgentflyConfig {
-    /// Numbers of airplanes.
+    /// Numbers of airplanes that meet, each of them a case.
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
     pub seeds: usize,
     /// Maximum number of cycles of each run.
     pub cycles: u64,
-    /// Workers.
+    /// Number of runs at once; only measured times depend on it.
     pub workers: usize,
     /// The part over real sockets.
     pub sockets: SocketsConfig,
@@ -50,7 +50,7 @@ pub struct AgentflyConfig {
 /// The amount of work of the part over real sockets, with flights one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SocketsConfig {
-    /// Numbers of airplanes.
+    /// Numbers of airplanes that meet, each of them a case.
     pub airplanes: Vec<usize>,
     /// Runs of each number, by seed from 1.
     pub seeds: usize,
@@ -361,7 +361,7 @@ fn join_estimates(values: &[Estimate]) -> String {
 static CLAIMS: PaperClaims =
     PaperClaims::new(|| ClaimsFile::read(include_str!("../claims/agentfly.toml")));
 
-/// Returns a claim by its number, its verdict, and our figures.
+/// Words and rule of the claim are those of its file.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     CLAIMS.claim(id, verdict, ours.into())
 }
@@ -393,7 +393,7 @@ fn judge_fewer_messages(cases: &[CaseResults]) -> Claim {
     claim("A-2", verdict, format!("pim / team: {}", join_estimates(&ratios)))
 }
 
-/// Judges that each of several ratios is above a threshold.
+/// Each of the ratios has to pass by itself, see [`judge_thresholds`].
 fn judge_all_above(ratios: &[Estimate], threshold: f64) -> Verdict {
     judge_thresholds(ratios.iter().map(|ratio| ThresholdTest::above(ratio, threshold)))
 }
@@ -416,7 +416,7 @@ fn judge_byte_growth(cases: &[CaseResults], id: &str, of_team: &str) -> Claim {
     claim(id, judge_all_above(&[power], CLAIMS.threshold(id)), ours)
 }
 
-/// Returns the first and the last of several.
+/// Nothing of fewer than two, which show no growth.
 fn first_and_last(ratios: &[Estimate]) -> Vec<Estimate> {
     match ratios {
         [first, .., last] => vec![*first, *last],
@@ -469,7 +469,7 @@ impl AgentflyReport {
         self
     }
 
-    /// Returns figures 4 to 7.
+    /// The paper's figures 4 to 7 in order: flights, time, messages, bytes.
     fn figures(&self) -> Vec<Figure> {
         let title = format!("Flights of {} airplanes", self.tracks_m.len());
         let tracks = (0..).zip(&self.tracks_m);
@@ -493,7 +493,7 @@ impl AgentflyReport {
         figure(title, ["airplanes", y_label], lines)
     }
 
-    /// Returns all numbers.
+    /// One row for each case, with all its numbers.
     fn table(&self) -> Table {
         let note = format!(
             "Per run, with 95 % intervals. Deciding is measured, as if every agent had a processor of \
@@ -550,7 +550,6 @@ impl AgentflyReport {
     }
 }
 
-/// The words of the marks of flights.
 const TRACK_NOTE: &str = "A ring is where an airplane starts, an arrowhead where it arrives.";
 
 fn flight(id: u32, track_m: &[AirPoint]) -> Series {

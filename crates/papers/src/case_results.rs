@@ -10,14 +10,14 @@ use sidestep_document::figure::Point;
 use sidestep_document::{Estimate, Figure, Series, Table};
 use std::fmt;
 
-/// The runs of one case.
+/// The rows of one variant in the table of runs.
 pub(crate) struct CaseRuns<'a> {
     results: &'a StudyResults,
     variant: &'a Variant,
     rows: Vec<usize>,
 }
 
-/// One run of a case.
+/// One row of the table of runs.
 #[derive(Clone, Copy)]
 pub(crate) struct CaseRun<'a> {
     results: &'a StudyResults,
@@ -30,7 +30,7 @@ impl CaseRun<'_> {
         self.results.table.column(metric)?.values.number(self.row)
     }
 
-    /// Returns a metric as text.
+    /// Empty if the run does not have it.
     pub(crate) fn text(&self, metric: &str) -> String {
         self.results.table.column(metric).map_or_else(String::new, |c| c.values.text(self.row))
     }
@@ -40,19 +40,19 @@ impl CaseRun<'_> {
         self.number(metric).unwrap_or(0.0)
     }
 
-    /// Returns a count of steps, in percent of all steps.
+    /// Above 100 where a step may count several times.
     pub(crate) fn percent_of_steps(&self, metric: &str) -> f64 {
         100.0 * self.number_or_zero(metric) / self.number_or_zero("steps")
     }
 
-    /// Returns whether a metric is true, or above 0.
+    /// A metric that is missing counts as not true.
     pub(crate) fn is_true(&self, metric: &str) -> bool {
         self.number_or_zero(metric) > 0.0
     }
 }
 
 impl CaseRuns<'_> {
-    /// Returns the value that the case sets a key to.
+    /// A key that the case does not set is a bug, and panics.
     pub(crate) fn setting(&self, key: &str) -> Value {
         match self.variant.value(key) {
             Some(toml::Value::Integer(n)) => Value::Count(*n as u64),
@@ -63,12 +63,11 @@ impl CaseRuns<'_> {
         }
     }
 
-    /// Returns the settings of the case.
     pub(crate) fn variant(&self) -> &Variant {
         self.variant
     }
 
-    /// Returns the value that the case sets a key to, as a number.
+    /// As [`Self::setting`], of a key that is a number.
     pub(crate) fn setting_number(&self, key: &str) -> f64 {
         setting_number(self.variant, key)
     }
@@ -78,12 +77,12 @@ impl CaseRuns<'_> {
         self.rows.iter().map(|&row| CaseRun { results: self.results, row })
     }
 
-    /// Returns the mean of a metric over the runs.
+    /// Runs that do not have the metric do not count.
     pub(crate) fn mean(&self, metric: &str) -> Value {
         Value::Estimate(Estimate::from_values(self.iter_runs().map(|run| run.number(metric))))
     }
 
-    /// Returns the mean of the values that `of` gives for each run.
+    /// As [`Self::mean`], of a value for which there is no metric.
     pub(crate) fn mean_of(&self, of: impl Fn(&CaseRun<'_>) -> f64) -> Value {
         Value::Estimate(Estimate::from_values(self.iter_runs().map(|run| Some(of(&run)))))
     }
@@ -101,7 +100,7 @@ impl CaseRuns<'_> {
         Value::Estimate(mean.clamped(0.0, f64::INFINITY))
     }
 
-    /// Returns the share of the runs for which this holds.
+    /// Of all runs, with the interval of the share.
     pub(crate) fn proportion(&self, holds: impl Fn(&CaseRun<'_>) -> bool) -> Value {
         Value::Share(Proportion::from_flags(self.iter_runs().map(|run| holds(&run))))
     }
@@ -111,7 +110,7 @@ impl CaseRuns<'_> {
         Value::Count(self.iter_runs().map(|run| run.number_or_zero(metric) as u64).sum())
     }
 
-    /// Returns the number of runs for which this holds.
+    /// As [`Self::proportion`], without an interval.
     pub(crate) fn count(&self, holds: impl Fn(&CaseRun<'_>) -> bool) -> Value {
         Value::Count(self.iter_runs().filter(|run| holds(run)).count() as u64)
     }
@@ -231,7 +230,7 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Returns the results of every case.
+    /// In the order of the sweep's variants.
     pub(crate) fn cases(&self, results: &StudyResults) -> Vec<CaseResults> {
         case_runs(results)
             .map(|runs| CaseResults {
@@ -242,7 +241,7 @@ impl Columns {
             .collect()
     }
 
-    /// Returns the cases as a table.
+    /// Columns without a head are left out.
     pub(crate) fn table(&self, title: &str, note: &str, cases: &[CaseResults]) -> Table {
         let columns: Vec<&Column> =
             self.case.iter().chain(self.results).filter(|c| !c.head.is_empty()).collect();
@@ -259,7 +258,7 @@ fn named_values(columns: &[Column], runs: &CaseRuns<'_>) -> Vec<(&'static str, V
     columns.iter().map(|column| (column.name, column.summary.of(runs))).collect()
 }
 
-/// Returns the runs of every case.
+/// In the order of the sweep's variants, the runs of each by seed.
 pub(crate) fn case_runs(results: &StudyResults) -> impl Iterator<Item = CaseRuns<'_>> {
     let variants = (0..).zip(&results.variants);
     variants.map(|(number, variant)| CaseRuns {
@@ -276,7 +275,6 @@ fn rows_of_variant(table: &RunTable, number: u32) -> Vec<usize> {
         .collect()
 }
 
-/// A value of the results of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Value {
@@ -293,7 +291,6 @@ pub(crate) enum Value {
     BySeed(Vec<NamedNumbers>),
 }
 
-/// Numbers by name.
 pub(crate) type NamedNumbers = Vec<(&'static str, f64)>;
 
 fn of_runs<S: Serializer>(runs: &[NamedNumbers], serializer: S) -> Result<S::Ok, S::Error> {
@@ -320,7 +317,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// Results of one case.
+/// Settings and results of one case, by the names of its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CaseResults {
     case: Vec<(&'static str, Value)>,
@@ -338,14 +335,12 @@ impl CaseResults {
         Self { case: case.into_iter().collect(), results: results.into_iter().collect(), runs: 10 }
     }
 
-    /// Replaces a value.
     #[cfg(test)]
     pub(crate) fn set_value(&mut self, name: &str, value: Value) {
         let mut all = self.case.iter_mut().chain(&mut self.results);
         all.find(|(own, _)| *own == name).expect("a column of this name").1 = value;
     }
 
-    /// Returns the number of runs.
     pub(crate) fn runs(&self) -> usize {
         self.runs
     }
@@ -373,7 +368,7 @@ impl CaseResults {
         }
     }
 
-    /// Returns a count.
+    /// Panics where the column is no count.
     pub(crate) fn count(&self, name: &str) -> u64 {
         match self.value(name) {
             Value::Count(n) => *n,
@@ -389,7 +384,7 @@ impl CaseResults {
         }
     }
 
-    /// Returns whether the value is true.
+    /// A value that is no truth value is not true.
     pub(crate) fn is_true(&self, name: &str) -> bool {
         *self.value(name) == Value::Yes(true)
     }
@@ -399,7 +394,6 @@ impl CaseResults {
         matches!(self.value(name), Value::Word(own) if own == word)
     }
 
-    /// Returns a share of runs.
     pub(crate) fn proportion(&self, name: &str) -> &Proportion {
         match self.value(name) {
             Value::Share(share) => share,
@@ -412,7 +406,6 @@ impl CaseResults {
         self.proportion(name).holds_always()
     }
 
-    /// Returns a mean.
     pub(crate) fn estimate(&self, name: &str) -> &Estimate {
         match self.value(name) {
             Value::Estimate(estimate) => estimate,
@@ -435,7 +428,7 @@ impl CaseResults {
         format_mm(self.optional_number(name))
     }
 
-    /// Returns a point of a figure.
+    /// Nothing where no run has a value.
     pub(crate) fn point(&self, x: f64, y: &str) -> Option<Point> {
         match self.value(y) {
             Value::Share(share) => Some(share.point(x)),
@@ -536,7 +529,6 @@ impl Proportion {
         Self::new(hits, n)
     }
 
-    /// Returns a share of `hits` out of `n`.
     pub(crate) fn new(hits: u64, n: u64) -> Self {
         Self { hits, n, interval: clopper_pearson(hits, n) }
     }

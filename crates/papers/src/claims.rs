@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 /// The claims of a paper, read from its file in `claims/` when they are first needed.
 pub(crate) type PaperClaims = LazyLock<ClaimsFile>;
 
-/// A file of claims.
+/// A paper's title, experiments and claims, as a file of `claims/` has them.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ClaimsFile {
@@ -29,14 +29,14 @@ struct ExperimentText {
     about: String,
 }
 
-/// The parts of a report.
+/// The parts of a report, in the order in which they stand there.
 pub(crate) struct ReportParts<'a> {
     pub(crate) claims: &'a [Claim],
     pub(crate) pictures: Vec<Picture>,
     pub(crate) experiments: Vec<Experiment>,
 }
 
-/// A claim in words.
+/// What the paper says, and how it is judged.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ClaimText {
@@ -50,7 +50,7 @@ struct ClaimText {
 }
 
 impl ClaimsFile {
-    /// Reads the claims of a paper.
+    /// Panics where the text is wrong, because it is part of the program.
     pub(crate) fn read(text: &str) -> Self {
         toml::from_str(text).expect("the claims of a paper are right")
     }
@@ -102,7 +102,7 @@ impl ClaimsFile {
         text.unwrap_or_else(|| panic!("there is no claim `{id}`"))
     }
 
-    /// Returns a claim by its number, its verdict, and our figures.
+    /// Words and rule of the claim are those of the file.
     pub(crate) fn claim(&'static self, id: &str, verdict: Verdict, ours: String) -> Claim {
         let text = self.text(id);
         Claim {

@@ -19,7 +19,7 @@ use sidestep_document::{Estimate, Table};
 /// Results of a method over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodResult {
-    /// Its name.
+    /// Name of the method in scenarios.
     pub method: &'static str,
     /// Runs; run `k` of every method has the same traffic.
     pub runs: usize,
@@ -35,7 +35,7 @@ pub struct MethodResult {
     pub min_separation_m: Option<f64>,
     /// Share of the airplanes that arrived.
     pub arrived: Estimate,
-    /// Mean delay, percent.
+    /// Mean time beyond that of the flight alone, in percent of it.
     pub delay_percent: Estimate,
     /// Time spent deciding per run, seconds.
     pub optimize_cpu_s: Estimate,
@@ -50,9 +50,9 @@ pub struct MethodResult {
 /// The runs of each method, by seeds that follow one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SeedSpan {
-    /// The seed of the first run.
+    /// Seed of the first run; the others count up from it.
     pub first: u64,
-    /// Number of runs.
+    /// Number of runs of each method, at least 1.
     pub runs: usize,
 }
 
@@ -61,7 +61,7 @@ pub struct SeedSpan {
 pub struct Comparison<'a> {
     /// The scenario, of the airspace world; its own method is not used.
     pub source: &'a Source,
-    /// The methods.
+    /// The methods, in the order of the results.
     pub methods: &'a [BuiltInMethod],
     /// The runs of each method.
     pub seeds: SeedSpan,
@@ -149,7 +149,7 @@ fn metrics_of(runs: &[(Metrics, Digest)]) -> Vec<Metrics> {
     runs.iter().map(|(metrics, _)| metrics.clone()).collect()
 }
 
-/// Runs a scenario to its end.
+/// The digest is that of the state at the end of all cycles, or when all airplanes have arrived.
 fn run_to_end(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest), InputError> {
     let mut run = airspace_run(source, 1)?;
     run.set_interrupt(interrupt.clone());

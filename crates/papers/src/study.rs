@@ -59,7 +59,6 @@ pub(crate) fn run_all<C: Sync, T: Send, E: Send>(
     Ok(results.into_iter().map(|(_, result)| result).collect())
 }
 
-/// Returns a setting of a variant.
 pub(crate) fn setting(key: &str, value: impl Into<toml::Value>) -> Setting {
     Setting { key: key.into(), value: value.into() }
 }
@@ -111,7 +110,7 @@ impl Study {
         self
     }
 
-    /// Keeps the variants for which this holds.
+    /// The variants that are kept stay in their order.
     pub(crate) fn filtered(mut self, holds: impl Fn(&Variant) -> bool) -> Self {
         self.variants.retain(holds);
         self
@@ -122,7 +121,6 @@ impl Study {
         self.filtered(|v| among.contains(&setting_number(v, key)))
     }
 
-    /// Returns the number of variants.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.variants.len()

@@ -65,7 +65,7 @@ impl Draft {
         DeTable::parse(&draft.source.text).is_ok().then_some(draft)
     }
 
-    /// Returns an error in the draft as one in the text as it was given.
+    /// An error in another file than the given text stays as it is.
     pub(super) fn map_error_back(&self, given: &Source, error: &InputError) -> InputError {
         let Some(start) = error.position().filter(|_| error.place() == given.place) else {
             return error.clone();
@@ -83,7 +83,7 @@ impl Draft {
     }
 }
 
-/// Returns the place of a line and a column.
+/// Lines and columns count from 1, columns in characters.
 fn offset(text: &str, (line, column): (usize, usize)) -> usize {
     let start: usize = text.split_inclusive('\n').take(line - 1).map(str::len).sum();
     let ahead = text[start..].char_indices().nth(column - 1).map_or(text.len() - start, |(i, _)| i);

@@ -52,7 +52,7 @@ struct ErrorRecovery<'a> {
     drafts: usize,
 }
 
-/// A draft, and its error.
+/// A draft, and the error of compiling it; none where it compiles.
 struct DraftStep {
     draft: Draft,
     error: Option<InputError>,
@@ -118,7 +118,7 @@ impl<'a> ErrorRecovery<'a> {
         Some(step)
     }
 
-    /// Returns the schema of the draft's world.
+    /// Null where the draft has no known world: then there are no examples.
     fn schema(&self, draft: &Draft) -> Value {
         let world = draft.source().value("world");
         let world = world.as_ref().and_then(toml::Value::as_str);

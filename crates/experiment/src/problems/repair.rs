@@ -41,6 +41,8 @@ pub(super) fn repairs(draft: &Draft, error: &InputError, schema: &Value) -> Vec<
         all.extend(other_value_repairs(draft, &own, schema));
         all.push(Repair::from_guess(&own, RepairKind::Remove));
     }
+    // At last the tables around the key, the innermost first: the less is removed, the more errors
+    // of the rest are found.
     for count in (1..own.len()).rev() {
         all.push(Repair::from_guess(&own[..count], RepairKind::Remove));
     }
@@ -65,7 +67,7 @@ fn suggested_repair(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Re
     vec![Repair { target: own.to_vec(), what, is_meant: true }]
 }
 
-/// Returns insertions of a key that is missing.
+/// The error's text names the key; its values are examples of the schema, then the list beside it.
 fn missing_key_repairs(
     draft: &Draft,
     error: &InputError,

@@ -37,7 +37,7 @@ pub(super) fn find(text: &str, path: &[String]) -> Option<KeyNode> {
     Some(tree.node(&step))
 }
 
-/// A value on the path to a key.
+/// A value on the path to a key, with the table or array that holds it; elements have no name.
 #[derive(Clone, Copy)]
 struct PathStep<'t, 'i> {
     name: Option<&'t Spanned<std::borrow::Cow<'i, str>>>,
@@ -216,7 +216,7 @@ impl Tree<'_> {
     }
 }
 
-/// Joins parts that overlap.
+/// Joins parts that overlap or touch.
 fn merge_ranges(mut parts: Vec<Range<usize>>) -> Vec<Range<usize>> {
     parts.sort_by_key(|part| part.start);
     let mut joined: Vec<Range<usize>> = Vec::new();

@@ -12,7 +12,7 @@ use sidestep_scenario::suggestion;
 use std::collections::{BTreeMap, BTreeSet};
 use toml::Value;
 
-/// Largest number of values that an error lists.
+/// Largest number of values that an error lists: more are no longer read.
 const MAX_LISTED_VALUES: usize = 20;
 
 /// The baseline as requested: the values of some keys, the name of a variant, or both.

@@ -59,7 +59,7 @@ pub(super) fn is_sampled(groups: &RunGroups<'_>) -> bool {
     })
 }
 
-/// Returns the parameters that are numbers.
+/// By index into [`RunGroups::parameters`].
 pub(super) fn numeric_parameters(groups: &RunGroups<'_>) -> Vec<usize> {
     (0..groups.parameters.len()).filter(|p| groups.parameters[*p].numeric).collect()
 }
@@ -153,7 +153,7 @@ fn line_points(
     points
 }
 
-/// Returns the position of a level on the axis.
+/// Words have no value, and stand at their number.
 fn level_position(groups: &RunGroups<'_>, parameter: usize, level: usize) -> f64 {
     match groups.parameters[parameter].levels[level] {
         super::groups::Level::Number(value) => value,
@@ -285,7 +285,6 @@ fn figure(groups: &RunGroups<'_>, metric: &RunColumn, title: String, x_label: St
     Figure { title, x_label, y_label, ..Figure::default() }
 }
 
-/// Returns the note on means.
 fn means_note(groups: &RunGroups<'_>) -> String {
     format!("Means with 95 % intervals, {}.", run_counts(groups))
 }

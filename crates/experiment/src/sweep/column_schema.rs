@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// Name of the column of reasons why runs failed; it exists only if one did.
 pub(super) const FAILURE: &str = "failure";
-/// Name of the column of cycles done.
+/// Name of the column of cycles done; failed runs have no value in it.
 pub(super) const CYCLES: &str = "cycles_run";
 
 /// The columns of a table of runs: results of runs and the times that they took, with the types that hold all values.
@@ -35,7 +35,7 @@ pub(super) struct ColumnOrder {
 }
 
 impl ColumnSchema {
-    /// Adds the columns of an outcome.
+    /// Adds the columns of an outcome; the order of outcomes does not matter.
     pub fn add(&mut self, outcome: &Outcome) {
         for_each_field(outcome, |role, name, value, place| {
             let trial = if value.is_null() { u64::MAX } else { outcome.trial };
@@ -43,7 +43,8 @@ impl ColumnSchema {
         });
     }
 
-    /// Adds a column, with the type of its values if there are any.
+    /// Adds a column, or a further value of it: the types are joined, and the earliest place
+    /// counts.
     pub(super) fn add_column(
         &mut self,
         role: Role,
@@ -127,7 +128,7 @@ pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
     }
 }
 
-/// Returns a value as text.
+/// Strings without quotes, all else as JSON.
 pub(super) fn value_text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }

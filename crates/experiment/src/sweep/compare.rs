@@ -9,7 +9,7 @@ use sidestep_statistics::{Bootstrap, Interval, Pairs, holm};
 /// Difference between a variant and the baseline in one metric, over pairs of equal replicates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The variant.
+    /// Name of the variant in tables.
     pub variant: String,
     /// The variant that it is compared with.
     pub baseline: String,

@@ -15,7 +15,7 @@ const SAMPLE_STREAM: Purpose = Purpose(0);
 /// A key and all values that it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// Path of the key.
+    /// Path of the key, e.g. `robots.count`.
     pub key: String,
     /// Its values, at least one.
     pub values: Vec<Value>,
@@ -45,7 +45,7 @@ impl Factor {
 }
 
 impl Factor {
-    /// Returns a variant for each value.
+    /// In the order of the values; each variant sets this key alone.
     fn variants(&self) -> Vec<Variant> {
         let mut variants = Vec::with_capacity(self.values.len());
         for value in &self.values {
@@ -73,14 +73,14 @@ pub struct LatinHypercube {
     pub samples: usize,
     /// Random seed of places and pairings.
     pub seed: u64,
-    /// The sides of the box.
+    /// The sides of the box, one for each key that is sampled.
     pub ranges: Vec<ParameterRange>,
 }
 
 /// A side of a hypercube.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterRange {
-    /// Path of the key.
+    /// Path of the key, e.g. `robots.count`.
     pub key: String,
     /// Its smallest value.
     pub low: f64,
@@ -114,7 +114,7 @@ impl ParameterRange {
 }
 
 impl LatinHypercube {
-    /// Returns all samples, in order.
+    /// Each sample sets the keys of all ranges.
     fn samples(&self) -> Vec<Variant> {
         let streams = Streams::new(Seed(self.seed));
         let mut settings: Vec<Vec<Setting>> = vec![Vec::new(); self.samples];
@@ -149,9 +149,9 @@ impl LatinHypercube {
 /// combination of the factors' values. Without any of them, the scenario unchanged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Design {
-    /// Variants that are listed one by one.
+    /// Variants that are listed one by one; if empty, the scenario unchanged.
     pub list: Vec<Variant>,
-    /// Samples of a hypercube.
+    /// Samples of a hypercube, each combined with every entry of the list.
     pub hypercube: Option<LatinHypercube>,
     /// Keys that are varied independently; the last one changes first.
     pub factors: Vec<Factor>,

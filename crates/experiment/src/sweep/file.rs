@@ -12,11 +12,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use toml::Value;
 
-/// Default number of runs of each variant.
+/// Default number of runs of each variant: enough for a first interval, and soon done.
 const DEFAULT_REPLICATES: u32 = 10;
-/// Default of the largest number of runs of each variant, if a precision ends them.
+/// Default of the largest number of runs of each variant, if a precision ends them: one out of
+/// reach would never.
 pub const DEFAULT_MAX_RUNS: u32 = 1000;
-/// Largest number of samples of a hypercube, and of runs of a variant.
+/// Largest number of samples of a hypercube, and of runs of a variant: a sample is a variant, and a
+/// sweep has no more of them.
 const MAX_COUNT: u64 = 1_000_000;
 
 /// The description of a sweep, as requested.
@@ -26,13 +28,13 @@ pub struct Sweep {
     pub place: String,
     /// Its name; may be empty.
     pub name: String,
-    /// The scenario's file.
+    /// The scenario's file; not read where [`Self::given`] has its text.
     pub scenario: PathBuf,
     /// The scenario itself, where it was read already and is no file.
     pub given: Option<Source>,
     /// Settings of every variant, applied before its own.
     pub fixed: Vec<Setting>,
-    /// The variants.
+    /// The variants to run; by default the scenario alone.
     pub design: Design,
     /// Largest number of runs of each variant; at least 1.
     pub replicates: u32,
@@ -184,7 +186,7 @@ struct UntilSection {
     max_runs: Option<u64>,
 }
 
-/// Returns the JSON Schema of a sweep file.
+/// Returns the JSON Schema of a sweep file, by which editors complete and check it.
 pub fn schema() -> serde_json::Value {
     let mut keys = schema::for_type::<SweepFile>();
     keys["properties"]["format"]["const"] = FORMAT.into();

@@ -20,7 +20,7 @@ const MAX_LEVEL_NAME_CHARS: usize = 40;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Level {
-    /// A number.
+    /// All values of the parameter are numbers.
     Number(f64),
     /// Text; empty if the parameter is not set.
     Text(String),
@@ -39,7 +39,7 @@ impl Level {
 /// A parameter that differs between variants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Path of its key.
+    /// Path of its key; of parameters that always change together, the paths of all.
     pub name: String,
     /// Whether all its values are numbers.
     pub numeric: bool,
@@ -64,7 +64,7 @@ pub(super) struct RunGroups<'a> {
     meanings: &'static [MetricInfo],
     /// Whether seeds change nothing, variant by variant.
     pub(super) seedless: Vec<bool>,
-    /// The run of each variant and replicate.
+    /// Row of the table, by variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
 
@@ -113,7 +113,7 @@ impl<'a> RunGroups<'a> {
         })
     }
 
-    /// Returns the label of a metric.
+    /// In the words of the world, as far as it has some.
     pub(super) fn label(&self, metric: &RunColumn) -> Label {
         Label::from_metric(&metric.name, self.meanings)
     }
@@ -123,12 +123,12 @@ impl<'a> RunGroups<'a> {
         metric_label(self.meanings, &metric.name).meaning
     }
 
-    /// Returns the number of runs of a variant.
+    /// Counts all runs; [`Self::values`] has fewer where seeds change nothing.
     pub(super) fn runs_of(&self, variant: usize) -> usize {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).count()
     }
 
-    /// Returns the rows of a variant, by replicate.
+    /// In the order of replicates.
     pub(super) fn rows(&self, variant: usize) -> impl Iterator<Item = usize> {
         self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
     }
@@ -194,7 +194,7 @@ impl<'a> RunGroups<'a> {
         others.windows(2).all(|pair| pair[0] == pair[1])
     }
 
-    /// Returns the variants that have this level.
+    /// By index into [`Self::variants`].
     pub(super) fn with_level(&self, parameter: usize, level: usize) -> Vec<usize> {
         let of = &self.parameters[parameter].of_variant;
         (0..of.len()).filter(|v| of[*v] == level).collect()

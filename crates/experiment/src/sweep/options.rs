@@ -4,7 +4,7 @@ use sidestep_scenario::MetricInfo;
 use sidestep_statistics::Bootstrap;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Options of a summary.
+/// What a summary shows, and with which names and intervals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SummaryOptions {
     /// Metrics to show, in this order; `None` for the default order of the module.
@@ -18,16 +18,16 @@ pub struct SummaryOptions {
     pub names: Option<Vec<String>>,
     /// Variants in which seeds change nothing: their one value has no interval.
     pub seedless: BTreeSet<String>,
-    /// Options of bootstrap intervals.
+    /// Resamples, coverage and seed of bootstrap intervals.
     pub bootstrap: Bootstrap,
     /// The metrics in words.
     pub meanings: &'static [MetricInfo],
 }
 
-/// The baseline of variants.
+/// What the variants are compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BaselineChoice {
-    /// The variant of this name.
+    /// One variant for all others, by its name in tables.
     Variant(String),
     /// Each with a variant of its own.
     Matched {
@@ -45,6 +45,7 @@ impl Default for SummaryOptions {
         Self {
             metrics: None,
             names: None,
+            // As many as one looks through; the others are listed as left out.
             max_metrics: 12,
             against: None,
             seedless: BTreeSet::new(),

@@ -11,7 +11,7 @@ use sidestep_kernel::InputError;
 pub struct SweepOverrides {
     /// Settings of every variant, after those of the file.
     pub fixed: Vec<Setting>,
-    /// Further factors of the grid.
+    /// Further factors of the grid, behind those of the file.
     pub factors: Vec<Factor>,
     /// The precision at which a variant has had enough runs; the metrics of the file's stay.
     pub until: Option<Precision>,
@@ -21,9 +21,9 @@ pub struct SweepOverrides {
     pub max_runs: Option<u32>,
     /// The metrics to report, and that the precision applies to, where it names none.
     pub metrics: Vec<String>,
-    /// The baseline.
+    /// The baseline, instead of the file's.
     pub baseline: Option<BaselineSpec>,
-    /// The seed of the first run.
+    /// The seed of the first run, instead of that of the file or the scenario.
     pub first_seed: Option<u64>,
     /// Whether every run is recorded, even if the file does not say so.
     pub record: bool,

@@ -23,11 +23,11 @@ use std::str::FromStr;
 pub struct Plan {
     /// Name of the sweep; may be empty.
     pub name: String,
-    /// Name of the world.
+    /// Name of the world, in whose words a summary speaks of metrics.
     pub world: String,
     /// Keys that differ between variants, in the order of their columns.
     pub parameters: Vec<String>,
-    /// The variants.
+    /// The variants; trials refer to them by index.
     pub variants: Vec<Variant>,
     /// Largest number of runs of each variant.
     pub replicates: u32,
@@ -65,13 +65,13 @@ impl<'de> Deserialize<'de> for Plan {
 /// The unit of work: a variant with a seed. Files and `--json` call it `cell`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Trial {
-    /// Its number.
+    /// Its number, as [`Plan`] counts trials.
     pub id: u64,
-    /// Number of its variant.
+    /// Index of its variant in [`Plan::variants`].
     pub variant: u32,
     /// Number of the run among those of its variant.
     pub replicate: u32,
-    /// The seed.
+    /// The seed, the same for equal replicates of all variants.
     pub seed: u64,
 }
 
@@ -182,7 +182,7 @@ impl Plan {
         Err(InputError::new(place, format!("there are {runs} runs"), remedy))
     }
 
-    /// Returns the effect of seeds on the runs of a variant.
+    /// As the world knows it before any run.
     pub(super) fn seeds(&self, variant: u32) -> SeedEffect {
         self.variants[variant as usize].seeds
     }
@@ -207,7 +207,8 @@ impl Plan {
         self.len() == 0
     }
 
-    /// Returns the trial of a variant and a replicate.
+    /// Returns the trial of a variant and a replicate, which must be below [`Plan::replicates`],
+    /// because numbers of trials would overlap otherwise.
     pub fn trial(&self, variant: u32, replicate: u32) -> Trial {
         Trial {
             id: u64::from(variant) * u64::from(self.replicates) + u64::from(replicate),
@@ -254,7 +255,7 @@ pub fn check_seeds(first: u64, runs: u64) -> Result<(), String> {
     Err(format!("{runs} seeds from {first} on exceed 2^63 - 1"))
 }
 
-/// Returns the last part of a dotted key.
+/// `count` of `robots.count`.
 fn last_part(key: &str) -> &str {
     key.rsplit('.').next().unwrap_or(key)
 }
@@ -274,7 +275,7 @@ fn number_duplicates(names: &mut [String]) {
 /// A share of the trials: number `index` of `count`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shard {
-    /// Its number.
+    /// From 0 to `count - 1`.
     pub index: u32,
     /// The number of shares.
     pub count: u32,

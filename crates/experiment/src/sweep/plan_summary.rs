@@ -52,7 +52,7 @@ impl Plan {
     }
 }
 
-/// Returns the baseline by the names of variants.
+/// A summary finds variants by name, because a table may have runs of some of them only.
 fn baseline_choice(baseline: &Baseline, names: &[String]) -> BaselineChoice {
     let mut of = BTreeMap::new();
     for (variant, baseline) in names.iter().zip(&baseline.of) {

@@ -29,9 +29,9 @@ pub struct Rounds<'a> {
 /// The reason why a variant is no longer run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct VariantStop {
-    /// Number of the variant.
+    /// Index of the variant in [`Plan::variants`].
     pub variant: u32,
-    /// Number of its runs.
+    /// Number of its runs when they were enough.
     pub runs: usize,
     /// The reason why they are enough.
     pub reason: StopReason,
@@ -52,7 +52,7 @@ impl<'a> Rounds<'a> {
         Self { plan, until, values: vec![BTreeMap::new(); n], done: vec![BTreeSet::new(); n] }
     }
 
-    /// Adds an outcome.
+    /// Adds an outcome; one of a trial that is not in the plan is left out.
     pub fn add(&mut self, outcome: &Outcome) {
         let Some(trial) = self.plan.trial_of(outcome.trial) else { return };
         let variant = trial.variant as usize;
@@ -157,7 +157,7 @@ impl<'a> Rounds<'a> {
 /// Values of a metric, by replicate.
 type Values = BTreeMap<u32, Option<f64>>;
 
-/// Returns the values of the first round.
+/// Fewer than [`MIN_RUNS`] while the round is in progress.
 fn first_round(values: &Values) -> impl Iterator<Item = &Option<f64>> {
     (0..MIN_RUNS as u32).filter_map(|k| values.get(&k))
 }

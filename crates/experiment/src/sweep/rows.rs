@@ -41,13 +41,13 @@ impl RunTableBuilder {
         self.trials.is_empty()
     }
 
-    /// Adds an outcome.
+    /// Adds an outcome; they may come in any order, because [`Self::build`] sorts them.
     pub fn push(&mut self, outcome: &Outcome) {
         self.trials.push(outcome.trial);
         for_each_field(outcome, |role, name, value, place| self.set(role, name, value, place));
     }
 
-    /// Sets a field of the last row.
+    /// Sets a field of the last row; its column is made when it first appears.
     fn set(&mut self, role: Role, name: &str, value: &Value, place: usize) {
         let row = self.trials.len() - 1;
         let trial = self.trials[row];
@@ -186,11 +186,10 @@ impl RunTable {
         }
     }
 
-    /// Returns the fields of a row that an outcome has by name.
+    /// Without those that are fields of their own in an [`Outcome`].
     fn fields(&self, role: Role, row: usize) -> Map<String, Value> {
         let mut fields = Map::new();
         for column in self.columns_with_role(role) {
-            // Fields of their own in an outcome.
             if ![CYCLES, FAILURE].contains(&column.name.as_str()) {
                 fields.insert(column.name.clone(), column.values.json(row));
             }

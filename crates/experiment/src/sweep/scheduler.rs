@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Takes a result: once it returns, the trial is finished.
 pub type ResultSink<'a, T, E> = dyn FnMut(T) -> Result<(), E> + Send + 'a;
 
-/// The state that all workers share.
+/// Results are taken one at a time, and a failure ends all workers before their next trial.
 struct SharedState<'a, 'b, T, E> {
     take: &'a mut ResultSink<'b, T, E>,
     failure: Option<E>,

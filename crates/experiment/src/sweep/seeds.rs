@@ -17,17 +17,17 @@ const PILOT_RUNS: u32 = 2;
 #[derive(Debug)]
 pub struct PilotRuns<'a> {
     plan: &'a Plan,
-    /// The ends of pilots, by variant.
+    /// Digests of the last states of pilots, by variant and replicate.
     ends: BTreeMap<u32, BTreeMap<u32, String>>,
 }
 
 impl<'a> PilotRuns<'a> {
-    /// Returns the pilots before any run.
+    /// Returns the pilots before any run: no variant is settled.
     pub fn new(plan: &'a Plan) -> Self {
         Self { plan, ends: BTreeMap::new() }
     }
 
-    /// Returns the pilots of a table of runs.
+    /// The pilots among the rows of a table; none where it has no digests.
     pub(super) fn from_table(plan: &'a Plan, runs: &RunTable) -> Self {
         let mut pilots = Self::new(plan);
         let Some(trials) = runs.columns_with_role(Role::Trial).next() else { return pilots };
@@ -39,7 +39,7 @@ impl<'a> PilotRuns<'a> {
         pilots
     }
 
-    /// Adds an outcome.
+    /// Adds an outcome; one that is not of a pilot changes nothing.
     pub fn add(&mut self, outcome: &Outcome) {
         self.add_digest(Some(outcome.trial), outcome.digest.clone());
     }

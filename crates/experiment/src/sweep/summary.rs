@@ -7,7 +7,8 @@ use serde::Serialize;
 use sidestep_document::{Estimate, Figure, Table};
 use sidestep_statistics::{Correlation, Interval, QuantileInterval};
 
-/// The quantiles that are reported.
+/// The quantiles that are reported: the median, the quartiles, and the bounds of the middle 90 % of
+/// the runs.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// The reason why a metric is not shown if others were requested.
@@ -16,9 +17,9 @@ pub(super) const NOT_REQUESTED: &str = "not asked for";
 /// Runs that differ by their seeds alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VariantSummary {
-    /// Its name.
+    /// Its name in tables.
     pub name: String,
-    /// Number of its runs.
+    /// Number of its runs in the table.
     pub runs: usize,
     /// Its values of the [`Summary::parameters`].
     pub levels: Vec<Level>,
@@ -69,20 +70,20 @@ pub struct Proportion {
     pub interval: Option<Interval>,
 }
 
-/// The values of a metric, by kind.
+/// The values of a metric: a share where its column holds truth values, else numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MetricValues {
-    /// Numbers.
+    /// Of a metric that counts or measures.
     Numbers(NumericSummary),
-    /// Yes or no.
+    /// Of a metric that is true or false.
     Share(Proportion),
 }
 
-/// A metric in a variant.
+/// One metric over the runs of one variant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VariantMetric {
-    /// The variant.
+    /// Name of the variant in tables.
     pub variant: String,
     /// Number of runs with a value.
     pub n: usize,
@@ -92,16 +93,16 @@ pub struct VariantMetric {
     pub not_finite: usize,
     /// Whether seeds change nothing in the variant.
     pub seedless: bool,
-    /// The description of the values.
+    /// Mean, spread and quantiles of numbers, or a share.
     pub values: MetricValues,
 }
 
 /// The marginal mean of a metric at one level of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectLevel {
-    /// The level.
+    /// One of the levels of [`Effect::parameter`].
     pub level: Level,
-    /// Number of variants that have it.
+    /// Number of variants that are averaged over.
     pub variants: usize,
     /// Mean over these, of each replicate, and over replicates: `n` is the number of replicates.
     pub estimate: Estimate,
@@ -110,13 +111,13 @@ pub struct EffectLevel {
 /// The main effect of a parameter: means over all others, in a full grid.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Effect {
-    /// The parameter.
+    /// Name of the parameter, as in [`Parameter::name`].
     pub parameter: String,
-    /// Its levels.
+    /// In the order of [`Parameter::levels`].
     pub levels: Vec<EffectLevel>,
 }
 
-/// The summary of a metric.
+/// Everything about one metric, over all variants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MetricSummary {
     /// Name of its column.
@@ -130,7 +131,7 @@ pub struct MetricSummary {
     /// Share of its variance that lies between variants, adjusted; at least 0. It is used as a
     /// rank, not as a result.
     pub explained: Option<f64>,
-    /// Its values in each variant.
+    /// In the order of [`Summary::variants`].
     pub variants: Vec<VariantMetric>,
     /// Comparison of each other variant with the baseline.
     pub comparisons: Vec<Comparison>,
@@ -143,7 +144,7 @@ pub struct MetricSummary {
 pub struct Trend {
     /// Name of the metric's column.
     pub metric: String,
-    /// The parameter.
+    /// Name of the parameter, as in [`Parameter::name`].
     pub parameter: String,
     /// Spearman's rank correlation over the variants, with its 95 % interval; absent where one of both
     /// is constant.
@@ -155,24 +156,24 @@ pub struct Trend {
 /// A metric that is not shown.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct OmittedMetric {
-    /// Its column.
+    /// Name of its column.
     pub metric: String,
-    /// The reason.
+    /// The reason, in words for a table.
     pub reason: String,
 }
 
 /// The summary of a table of runs, as plain data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Number of runs.
+    /// Number of rows of the table.
     pub runs: usize,
-    /// The variants.
+    /// In the order of their first runs.
     pub variants: Vec<VariantSummary>,
     /// The parameters that differ between variants.
     pub parameters: Vec<Parameter>,
     /// The name of the baseline of the variants; each comparison has the variant itself.
     pub baseline: Option<String>,
-    /// The metrics shown.
+    /// The metrics shown: as requested, else the most informative first.
     pub metrics: Vec<MetricSummary>,
     /// The metrics that are not shown.
     pub left_out: Vec<OmittedMetric>,
@@ -194,8 +195,8 @@ pub struct MetricSection {
     pub title: String,
     /// The thing counted or measured; may be empty.
     pub meaning: &'static str,
-    /// Its figures.
+    /// Over each parameter, or over the variants where there is none.
     pub figures: Vec<Figure>,
-    /// Its tables.
+    /// All numbers of the metric, in tables that a page shows folded.
     pub tables: Vec<Table>,
 }

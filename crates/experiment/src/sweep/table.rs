@@ -15,13 +15,13 @@ pub enum Role {
     Variant,
     /// Number of the replicate: equal ones have the same seed in all variants.
     Replicate,
-    /// The seed.
+    /// Seed of the run's random draws.
     Seed,
     /// A parameter, equal in all runs of a variant.
     Parameter,
     /// A result of the run. A column of `Bool` is a share.
     Metric,
-    /// Digest of the run.
+    /// Digest of the run's last state, in hexadecimal.
     Digest,
     /// A time that the run took: it differs when the run is made again.
     Cost,
@@ -33,12 +33,12 @@ pub type RunColumn = RoleColumn<Role>;
 /// A table of runs, with one row per run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunTable {
-    /// The columns.
+    /// All of the same length, as [`Self::check`] makes sure.
     pub columns: Vec<RunColumn>,
 }
 
 impl RunTable {
-    /// Returns the number of runs.
+    /// Returns the number of rows; 0 without columns.
     pub fn runs(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
     }
@@ -48,7 +48,7 @@ impl RunTable {
         self.columns.iter().filter(move |c| c.role == role)
     }
 
-    /// Returns the column with this name.
+    /// Returns the first column with this name, which columns of different roles may share.
     pub fn column(&self, name: &str) -> Option<&RunColumn> {
         self.columns.iter().find(|c| c.name == name)
     }

@@ -12,7 +12,7 @@ use sidestep_kernel::math;
 use sidestep_statistics::Interval;
 
 impl Summary {
-    /// Returns the summary as tables.
+    /// Returns all numbers of all metrics shown, then the metrics that are not.
     pub fn tables(&self) -> Vec<Table> {
         tables(self)
     }
@@ -33,7 +33,7 @@ impl Summary {
         footnotes(self)
     }
 
-    /// Returns the summary metric by metric.
+    /// Returns [`Self::tables`] and [`Self::figures`], put together for each metric.
     pub fn sections(&self) -> Vec<MetricSection> {
         let mut sections = Vec::with_capacity(self.metrics.len());
         for metric in &self.metrics {
@@ -219,7 +219,7 @@ const EFFECTS_NOTE: &str = "Main effects are means over all variants that have t
                        these variants have a value. Each replicate counts as one, since its variants share \
                        their seeds.";
 
-/// Returns the tables of a metric.
+/// Values; then differences if there is a baseline, and main effects in a full grid.
 fn metric_tables(summary: &Summary, metric: &MetricSummary) -> Vec<Table> {
     let mut tables = vec![values(metric)];
     if let Some(baseline) = &summary.baseline {
@@ -409,6 +409,7 @@ fn format_number(value: f64, half_width: Option<f64>) -> String {
     let decimals = 1.0 - math::log10(scale).floor();
     // If runs agree to the last bits, more than six decimals of a number of usual size say nothing.
     let decimals = if value.abs() >= 1e-3 { decimals.min(6.0) } else { decimals };
+    // An exponent where plain digits would be wider than a column.
     let text = if !value.is_finite() || decimals > 8.0 || value.abs() >= 1e9 {
         format!("{value:.3e}")
     } else {

@@ -6,20 +6,21 @@ use serde_json::{Map, Value};
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
 use sidestep_scenario::{Source, Worlds};
 
-/// Cycles between two checks whether to continue.
+/// Cycles between two checks whether to continue: few, so that a run stops soon, and enough for
+/// checks to cost nothing.
 const INTERRUPT_CHECK_CYCLES: Cycle = 256;
 
 /// Endings of the names of metrics that a clock measured: they are kept beside the results, because
 /// they differ when the trial is run again.
 const CLOCK_METRIC_SUFFIXES: [&str; 2] = ["cpu_s", "wall_s"];
 
-/// The outcome of a trial.
+/// The outcome of a trial, which becomes one row of the table of runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Number of the trial; files call it `cell`.
     #[serde(rename = "cell")]
     pub trial: u64,
-    /// Cycles that were run.
+    /// Cycles that were run; 0 if the run failed.
     pub cycles: Cycle,
     /// Digest of the last state, in hexadecimal; empty if the run failed.
     pub digest: String,
@@ -88,7 +89,7 @@ impl TrialRun {
 }
 
 impl Outcome {
-    /// Returns the outcome of a simulation that has ended.
+    /// Returns the outcome of a simulation that has ended: its present metrics and digest.
     pub fn from_simulation(trial: Trial, simulation: &dyn Simulation) -> Self {
         let (costs, metrics) = flattened(&simulation.metrics())
             .into_iter()

@@ -12,9 +12,9 @@ pub(super) const DEFAULT_LABEL: &str = "(default)";
 /// The scenario of which variants are run, before their settings.
 #[derive(Debug, Clone, Copy)]
 pub struct BaseScenario<'a> {
-    /// Name of its world.
+    /// Name of the world that reads the scenario.
     pub world: &'a str,
-    /// Its seed.
+    /// Its seed, that of replicate 0 unless the sweep gives another.
     pub seed: u64,
     /// Its text, with the settings that all variants share.
     pub source: &'a Source,
@@ -25,7 +25,7 @@ pub struct BaseScenario<'a> {
 pub struct Setting {
     /// Path of the key, e.g. `robots.count`.
     pub key: String,
-    /// The value.
+    /// Its value; of any type that TOML has.
     pub value: Value,
 }
 
@@ -88,7 +88,8 @@ impl From<Vec<Setting>> for Variant {
 }
 
 impl Variant {
-    /// Returns a variant with a name that stands for its settings.
+    /// Returns a variant with a name that stands for all of `settings` in tables; settings added
+    /// later are listed beside it.
     pub fn with_name(name: impl Into<String>, settings: Vec<Setting>) -> Self {
         Self { name: Some(name.into()), named: settings.len(), ..settings.into() }
     }
@@ -105,7 +106,6 @@ impl Variant {
         Ok(())
     }
 
-    /// Returns the keys that it sets.
     pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
         self.settings.iter().map(|setting| setting.key.as_str())
     }

@@ -66,9 +66,9 @@ fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
 
 /// The time since a true pose, and the claims of odometry about it.
 struct OdometryWindow {
-    /// Number of gaps of odometry before.
+    /// Number of gaps of odometry before it; no window reaches across one.
     stretch: usize,
-    /// The pose that odometry claims at the start.
+    /// The pose that odometry claims at the start, in the frame of odometry.
     start: Pose2,
     scan: Scan,
 }

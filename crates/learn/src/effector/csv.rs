@@ -27,7 +27,7 @@ const MAX_TURN_DEG: f64 = 360.0;
 const RULE: &str = "counts of measured displacements, phase-averaged where they are no whole \
     boxes or quarter turns; every outcome that was seen, plus alpha";
 
-/// One row of the file.
+/// The end of one action, in the frame of its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MeasuredDisplacement {
     /// Index in [`STANDARD_ACTIONS`].
@@ -206,7 +206,6 @@ fn parse(table: &CsvTable) -> Result<(Vec<MeasuredDisplacement>, u64), InputErro
     Ok((free, n_cut))
 }
 
-/// The indices of the columns.
 struct DisplacementColumns {
     action: usize,
     ahead: usize,

@@ -12,9 +12,9 @@ use serde::Serialize;
 /// The end of a displacement, in whole boxes and quarter turns of the start frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct GridDisplacement {
-    /// Number of boxes ahead.
+    /// Boxes ahead; below 0 behind.
     pub ahead: i32,
-    /// Number of boxes to the left.
+    /// Boxes to the left; below 0 to the right.
     pub left: i32,
     /// Number of quarter turns (90 degrees) to the left.
     pub quarters: i32,

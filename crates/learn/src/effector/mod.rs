@@ -54,7 +54,7 @@ fn check_box(box_m: f64) -> Result<(), InputError> {
 pub struct LearnedEffector {
     /// Counts, probabilities with intervals, fit; serializable and printable.
     pub report: EffectorReport,
-    /// The effector in the form of a profile.
+    /// The same in the form that a scenario loads.
     pub profile: EffectorProfile,
 }
 

@@ -63,7 +63,7 @@ impl CommandWindow {
         Self { start_secs: command.t_secs, path_m: 0.0, turn_rad: 0.0 }
     }
 
-    /// Adds `command`, in force for `step_secs`.
+    /// A command holds until the next one.
     fn add_command(&mut self, command: &VelocityCommand, step_secs: f64) {
         self.path_m += command.forward_mps * step_secs;
         self.turn_rad += command.turn_radps * step_secs;

@@ -33,7 +33,7 @@ pub struct EffectorReport {
     /// Displacements: `ahead_boxes`, `left_boxes`, `dtheta_minus_cmd_rad`, `duration_s` and
     /// all other quantities that the source gives, by name with unit.
     pub moments: BTreeMap<String, Moments>,
-    /// The turns.
+    /// `None` where the log has no commanded turn.
     pub turns: Option<TurnReport>,
     /// Counts of every action's outcomes, phase-averaged, where the source names actions.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -47,7 +47,7 @@ pub struct EffectorReport {
     pub lateral_slip: Option<Moments>,
     /// Every estimated probability with its count and interval.
     pub probabilities: Vec<Estimate>,
-    /// Rows with few counts.
+    /// Rows with fewer counts than [`EstimateOptions::thin_below`].
     pub thin: Vec<LowCountRow>,
     /// Tests of how well a part of the events predicts the rest.
     pub hold_out: Vec<HoldoutTest>,
@@ -66,9 +66,9 @@ pub struct ForwardShares {
     pub ahead: f64,
     /// Share that went two boxes ahead.
     pub ahead2: f64,
-    /// Share that went one ahead and one to the left.
+    /// To the box diagonally ahead on the left.
     pub ahead_left: f64,
-    /// Share that went one ahead and one to the right.
+    /// To the box diagonally ahead on the right.
     pub ahead_right: f64,
     /// Share that went anywhere else.
     pub other: f64,
@@ -88,13 +88,13 @@ impl ForwardShares {
 /// The results of commanded turns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TurnReport {
-    /// Number of turns.
+    /// Number of commanded turns, to either side.
     pub n: usize,
-    /// Number of turns to the left.
+    /// Those commanded to the left.
     pub n_left: usize,
-    /// Number of turns to the right.
+    /// Those commanded to the right.
     pub n_right: usize,
-    /// Ratio of true to commanded turn.
+    /// True over commanded turn: below 1 where the robot turns too little.
     pub true_over_commanded: Option<Moments>,
     /// True turn minus commanded turn in degrees, + = too far.
     pub error_deg_along_turn: Option<Moments>,

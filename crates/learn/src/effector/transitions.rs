@@ -19,7 +19,7 @@ pub struct EffectorProfile {
 }
 
 impl EffectorProfile {
-    /// Returns the transitions of an action.
+    /// Returns the transitions of an action; `None` if it was not learned.
     pub fn action(&self, name: &str) -> Option<&[ProfileTransition]> {
         let found = self.actions.iter().find(|(action, _)| action == name);
         found.map(|(_, transitions)| transitions.as_slice())
@@ -49,7 +49,7 @@ impl EffectorProfile {
 /// One possible result of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileTransition {
-    /// Probability of the result.
+    /// Probability of the result, rounded to nine decimals.
     pub p: f64,
     /// Boxes walked, in the robot's frame: `F`, `B`, `L`, `R`; empty where it stays.
     pub path: String,
@@ -146,7 +146,7 @@ pub(super) fn certain_transition(outcome: GridDisplacement) -> Vec<ProfileTransi
     from_outcomes(&[outcome], &[1.0], 0.0)
 }
 
-/// Returns the intended result of an action, by its name in a profile.
+/// A name other than `forward`, `left` and `right` is meant to stay.
 pub(super) fn intended_displacement(action: &str) -> GridDisplacement {
     let (ahead, quarters) = match action {
         "forward" => (1, 0),

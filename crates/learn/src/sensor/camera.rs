@@ -15,7 +15,7 @@ pub(super) const NOTHING: &str = "nothing";
 pub struct SensorProfile {
     /// Bearings of the beams in degrees relative to the heading, + to the left.
     pub bearings_deg: Vec<f64>,
-    /// Range in meters.
+    /// Length of the beams in meters; nothing farther off is seen.
     pub range_m: f64,
     /// The possible reports; the first is `nothing`.
     pub observations: Vec<String>,
@@ -70,7 +70,7 @@ impl SensorProfile {
         }
     }
 
-    /// Returns the index of the observation that a kind designates.
+    /// Returns 0, which is nothing, where the sensor has no observation for the kind.
     fn designated_observation(&self, kind: &str) -> u8 {
         let own = self.designates.iter().find(|(name, _)| name == kind);
         let designated = own.map_or(kind, |(_, observation)| observation);
@@ -79,7 +79,7 @@ impl SensorProfile {
     }
 }
 
-/// Returns the row of each name, see [`row_of`].
+/// Every name must have a row.
 fn rows_of(rows: &[NamedRow], names: &[String]) -> Vec<Vec<f64>> {
     names.iter().map(|name| row_of(rows, name).expect("a row for each name")).collect()
 }
@@ -188,6 +188,9 @@ fn subject_row(
     alpha: f64,
 ) -> Vec<f64> {
     let detected = detection_rate(looks, kind, class, alpha);
+    // Without a sighting of this kind its code is taken to be read right. This need not be listed
+    // as assumed: either all subjects of the kind were missed, and the row hardly counts, or none
+    // was in view, and their detection is listed.
     let mut as_kind = looks.kinds.smoothed(kind, alpha).unwrap_or_else(|| {
         let mut truly = vec![0.0; 3];
         truly[kind] = 1.0;
@@ -210,6 +213,8 @@ fn detection_rate(
     }
     let pooled: [f64; 2] =
         [0, 1].map(|column: usize| table.cells().iter().map(|row| row[column]).sum());
+    // A kind that was never in view is taken to be always detected; [`assumed_detections`] lists
+    // its classes.
     if pooled == [0.0, 0.0] { 1.0 } else { smooth(&pooled, alpha)[0] }
 }
 

@@ -39,7 +39,6 @@ impl Detection {
         [&self.all, &self.robots, &self.landmarks]
     }
 
-    /// Counts of `views`.
     pub(super) fn from_views<'a>(
         views: impl IntoIterator<Item = &'a SubjectView>,
         looks: u64,
@@ -62,7 +61,7 @@ impl Detection {
     }
 }
 
-/// One subject in view of one bin.
+/// One subject in view of one observer in one bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SubjectView {
     is_robot: bool,
@@ -102,13 +101,13 @@ fn bins(robot: &RobotLog) -> Option<(f64, usize)> {
     (1.0..=MAX_BINS).contains(&n_bins).then_some((start_secs, n_bins as usize))
 }
 
-/// Returns the first and last of the time stamps.
+/// `None` without any; stamps are taken to be in order.
 fn first_and_last(mut stamps: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let first = stamps.next()?;
     Some((first, stamps.last().unwrap_or(first)))
 }
 
-/// Returns the subjects read in each bin.
+/// A subject that is read several times in a bin is listed as often.
 fn codes_by_bin(
     dataset: &Dataset,
     robot: &RobotLog,

@@ -42,7 +42,7 @@ use sidestep_kernel::InputError;
 pub struct LearnedSensor {
     /// Counts, probabilities with intervals, fit; serializable and printable.
     pub report: SensorReport,
-    /// The sensor in the form of a profile.
+    /// The same in the form that a scenario loads.
     pub profile: SensorProfile,
 }
 
@@ -56,7 +56,7 @@ pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<LearnedSens
     mrclam::learn(&folder.display().to_string(), &dataset, options, &classes)
 }
 
-/// The scanner to learn from a bag.
+/// The map by which scans are judged, and the scanner that the profile gets.
 #[derive(Debug, Clone, Copy)]
 pub struct Scanner<'a> {
     /// The file of the map in the frame of which the true poses are: a ROS map, or an image of one.

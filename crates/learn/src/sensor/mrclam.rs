@@ -161,7 +161,7 @@ fn count(sightings: &[Sighting], is_counted: impl Fn(&Sighting) -> bool) -> u64 
     sightings.iter().filter(|sighting| is_counted(sighting)).count() as u64
 }
 
-/// Returns the estimates of cells with counts.
+/// For the confusion of subjects, a large table with mostly empty cells.
 pub(super) fn nonzero_estimates(table: &CountTable) -> impl Iterator<Item = Estimate> {
     table.estimates().into_iter().filter(|estimate| estimate.count > 0.0)
 }

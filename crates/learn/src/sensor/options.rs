@@ -6,7 +6,7 @@ use sidestep_kernel::InputError;
 /// Largest number of distance classes; more are taken for a mistake: each has a row and a column of every table.
 const MAX_CLASSES: usize = 64;
 
-/// Options of learning a sensor.
+/// Options of learning a sensor; the default is the camera of the MRCLAM robots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorOptions {
     /// The rule by which counts become probabilities.
@@ -39,7 +39,7 @@ impl Default for SensorOptions {
 }
 
 impl SensorOptions {
-    /// Checks everything and returns the distance classes.
+    /// Edges and names of the distance classes are checked together, so the classes are made here.
     pub(super) fn check(&self) -> Result<DistanceClasses, InputError> {
         self.estimate.check()?;
         if !(self.range_m.is_finite() && self.range_m > 0.0) {

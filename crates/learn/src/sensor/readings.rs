@@ -10,7 +10,7 @@ use sidestep_kernel::InputError;
 /// Largest number of observations; a column with more is taken for a column of numbers.
 const MAX_OBSERVATIONS: usize = 250;
 
-/// One row of the file.
+/// One reading, and what it should have been.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LabeledReading {
     /// Index of the true observation; 0 is `nothing`.
@@ -60,7 +60,6 @@ pub(super) fn read(
     Ok((parser.observations, readings))
 }
 
-/// The indices of the columns.
 struct ReadingColumns {
     truth: usize,
     reported: usize,
@@ -84,7 +83,7 @@ impl ReadingColumns {
     }
 }
 
-/// Returns the rows of the sensor that is to be learned.
+/// Where `wanted` is not given, the file must be of a single sensor.
 fn rows_of_sensor<'t>(
     table: &'t CsvTable,
     wanted: Option<&str>,
@@ -139,7 +138,7 @@ fn observations(
     Ok(std::iter::once(NOTHING).chain(others).map(String::from).collect())
 }
 
-/// Turns rows into readings.
+/// Properties of a file with which each of its rows is read.
 struct RowParser<'a> {
     place: &'a str,
     columns: ReadingColumns,

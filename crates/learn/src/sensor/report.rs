@@ -25,7 +25,7 @@ pub struct SensorReport {
     pub skipped: u64,
     /// The same by cause.
     pub skipped_by_cause: BTreeMap<String, u64>,
-    /// Number of sightings with a correct report.
+    /// Number of sightings whose report is what was truly there.
     pub correct: u64,
     /// Number of sightings with a report that agrees with the subject that geometry alone would choose.
     pub nearest_agrees: Option<u64>,
@@ -37,7 +37,7 @@ pub struct SensorReport {
     pub kinds: Option<CountTable>,
     /// Lower edges of the distance classes in meters.
     pub distance_edges_m: Vec<f64>,
-    /// Names of the distance classes.
+    /// Names of the distance classes, near to far.
     pub distance_classes: Vec<String>,
     /// True class against reported class, over correct reports; shape `(classes, classes)`.
     pub distance_counts: CountMatrix,
@@ -62,7 +62,7 @@ pub struct SensorReport {
     /// Every estimated probability with its count and interval. Of `confusion`, only the cells with
     /// counts.
     pub probabilities: Vec<Estimate>,
-    /// Rows with few counts.
+    /// Rows with fewer counts than [`EstimateOptions::thin_below`].
     pub thin: Vec<LowCountRow>,
     /// Tests of how well a part of the events predicts the rest.
     pub hold_out: Vec<HoldoutTest>,
@@ -75,12 +75,12 @@ pub struct SensorReport {
 /// Errors of measurement, measured minus true; `None` where nothing was measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorMoments {
-    /// Error of the range in meters.
+    /// Of the range in meters, + = measured too far.
     pub range_error_m: Option<Moments>,
-    /// Error of the range in meters, by class of the true range.
+    /// The same by class of the true range.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub range_error_by_true_class: Vec<Option<Moments>>,
-    /// Error of the bearing in radians.
+    /// Of the bearing in radians, + = measured too far to the left.
     pub bearing_error_rad: Option<Moments>,
 }
 

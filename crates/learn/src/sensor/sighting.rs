@@ -20,7 +20,7 @@ const BEARING_SPREAD_RAD: f64 = 0.03;
 /// Spread of the range by which candidates are weighed, as a share of the true range.
 const RANGE_SPREAD_FRACTION: f64 = 0.1;
 
-/// One judged reading.
+/// One reading, and the subjects that it may be of.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sighting {
     /// Number of the observing robot.
@@ -28,7 +28,7 @@ pub(super) struct Sighting {
     pub(super) barcode: u32,
     /// The subject that has the barcode; `None` when no subject has it.
     pub(super) decoded: Option<u32>,
-    /// The subject that was really there.
+    /// The subject that was really there; `None` where none fits the reading.
     pub(super) truth: Option<Candidate>,
     /// The subject that geometry alone would choose.
     pub(super) nearest: Option<u32>,
@@ -37,7 +37,7 @@ pub(super) struct Sighting {
 }
 
 impl Sighting {
-    /// Returns the true subject.
+    /// `None` where nothing that was there fits the reading.
     pub(super) fn subject(&self) -> Option<u32> {
         self.truth.map(|candidate| candidate.subject)
     }
@@ -54,7 +54,7 @@ pub(super) struct Candidate {
     pub(super) subject: u32,
     /// True range in meters, center to center.
     pub(super) range_m: f64,
-    /// True bearing in radians.
+    /// True bearing in radians, + to the left.
     pub(super) bearing_rad: f64,
     /// Squared distance from the reading, in spreads.
     misfit: f64,

@@ -17,7 +17,7 @@ pub(super) const NO_SUBJECT: usize = 2;
 pub(super) struct SubjectLabels {
     /// Subject numbers, in increasing order.
     subjects: Vec<u32>,
-    /// Those that are robots.
+    /// Those that are robots; all others are landmarks.
     robots: Vec<u32>,
 }
 

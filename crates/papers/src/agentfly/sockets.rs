@@ -17,7 +17,7 @@ use std::time::Instant;
 /// Deployments with agents that can be processes.
 const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
 
-/// A flight, as it was measured.
+/// The effort of a whole flight, in one process or over sockets.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct FlightMeasurement {
     /// Seconds by a clock.
@@ -47,9 +47,9 @@ pub enum SocketMeasurements {
 /// The flights of some airplanes with one deployment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SocketCase {
-    /// Number of airplanes.
+    /// Number of airplanes that meet in the super-conflict.
     pub airplanes: usize,
-    /// The deployment.
+    /// The deployment, by its name in scenarios.
     pub deployment: &'static str,
     /// Runs by seed, in one process.
     pub alone: Vec<FlightMeasurement>,
@@ -104,7 +104,6 @@ fn measure_in_one_process(text: &str) -> Result<FlightMeasurement, InputError> {
     })
 }
 
-/// A quantity of a flight.
 type Quantity = fn(&FlightMeasurement) -> f64;
 
 /// The quantities of the table, each in one process and over sockets.
@@ -159,7 +158,7 @@ impl SocketMeasurements {
         Some(claim("A-7", verdict, ours))
     }
 
-    /// Returns all numbers.
+    /// One row for each case; without measurements the note has the reason.
     pub(super) fn table(&self) -> Table {
         let note = match self {
             Self::Measured(_) => MEASURED_NOTE.into(),

@@ -56,7 +56,6 @@ pub(super) struct CostSample {
 }
 
 impl CostSample {
-    /// Returns the number of bodies, `n + m`.
     fn bodies(&self) -> f64 {
         self.agents + self.objects
     }
@@ -67,9 +66,8 @@ impl CostSample {
 pub(super) struct Parameter {
     /// Its name in the paper, as read.
     pub(super) name: String,
-    /// Its meaning.
+    /// The work that takes the time, in words.
     pub(super) meaning: String,
-    /// Value in ns.
     pub(super) value_ns: f64,
     /// 95 % interval in ns.
     pub(super) interval_ns: Option<Interval>,
@@ -78,7 +76,7 @@ pub(super) struct Parameter {
 /// The fitted model.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct CostModel {
-    /// The runs.
+    /// The runs that were fitted, one for each load.
     pub(super) points: Vec<CostSample>,
     /// `t_p`, `t_o`, `c_d`, `c_s`, `e_u`; empty if they cannot be separated.
     pub(super) parameters: Vec<Parameter>,
@@ -99,18 +97,19 @@ const PARAMETERS: [(&str, &str); 5] = [
 ];
 
 impl CostModel {
-    /// Measures and fits.
+    /// Times every load of the grid with one worker, and fits the model to the times.
     pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let loads = grid(plan);
         let mut points = Vec::new();
         for (index, load) in loads.iter().enumerate() {
             report("cost model", index as f64 / loads.len() as f64);
+            // Half a timed stretch, because each load is run for [`BLOCKS`] of them.
             points.push(measure(load, plan.timed_robot_cycles / 2));
         }
         Self::fit(points)
     }
 
-    /// Fits the model to runs.
+    /// Both steps of a cycle are fitted apart, because their times are measured apart.
     pub(super) fn fit(points: Vec<CostSample>) -> Self {
         let first = fit_per_body(&points, first_row, |p| p.first_ns);
         let second = fit_per_body(&points, second_row, |p| p.second_ns);
@@ -125,7 +124,7 @@ impl CostModel {
         }
     }
 
-    /// Returns the parameter of a name.
+    /// `None`, too, where the parameters cannot be separated.
     pub(super) fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
     }
@@ -258,7 +257,8 @@ fn whole_cycles(points: &[CostSample], first: &Option<Fit>, second: &Option<Fit>
     1.0 - unexplained / all.max(f64::MIN_POSITIVE)
 }
 
-/// Sides of robots in boxes.
+/// Sides of robots in boxes; three, so that the price of a box is that of a line, and not of two
+/// points.
 const SIZES: [u32; 3] = [1, 2, 3];
 
 /// Returns loads of different numbers, crowding and size.

@@ -33,7 +33,7 @@ pub(super) enum ErrorSpread {
 }
 
 impl ErrorSpread {
-    /// Both recipes.
+    /// In the order of tables and figures.
     pub(super) const ALL: [Self; 2] = [Self::Even, Self::Blind];
 
     /// Returns its name in tables.
@@ -70,7 +70,6 @@ pub(super) enum BeamCount {
 }
 
 impl BeamCount {
-    /// Returns the bearings of the beams in degrees.
     pub(super) fn bearings_deg(self) -> Vec<f64> {
         let (n, step) = match self {
             Self::Sixteen => (16, 22.5),

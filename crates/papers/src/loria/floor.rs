@@ -26,7 +26,6 @@ pub(super) enum AvoidancePolicy {
 }
 
 impl AvoidancePolicy {
-    /// All three.
     #[cfg(test)]
     pub(super) const ALL: [Self; 3] = [Self::Touch, Self::Avoid, Self::Filter];
 
@@ -41,9 +40,9 @@ impl AvoidancePolicy {
 pub(super) struct Floor {
     /// Its name in tables.
     pub(super) name: &'static str,
-    /// The scenario of its robots.
+    /// The text of its scenario, which a variant changes.
     pub(super) scenario: &'static str,
-    /// The building.
+    /// The building that the scenario describes.
     pub(super) office: Arc<Office>,
     robots_per_corridor: u32,
     people: u32,
@@ -77,6 +76,7 @@ impl Floor {
             name,
             scenario,
             office: Arc::new(office.expect("the experiments' offices stand")),
+            // Every corridor has a group of robots of its own, all of them equally many.
             robots_per_corridor: excerpt.robots[0].count,
             people: excerpt.people[0].count,
         }
@@ -103,12 +103,12 @@ impl Floor {
         self.office.corridors.iter().filter(|c| c.width > 4 * c.height)
     }
 
-    /// Returns the number of robots on the floor.
+    /// Every corridor has as many of them.
     pub(super) fn robots(&self) -> u32 {
         self.robots_per_corridor * self.corridors().count() as u32
     }
 
-    /// Describes the floor in words.
+    /// Size, corridors, rooms, robots and people, for notes of tables.
     pub(super) fn describe(&self) -> String {
         let map = &self.office.map;
         format!(

@@ -34,10 +34,9 @@ impl BuildOutcomes {
     }
 }
 
-/// The genericity experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct GenericityResults {
-    /// All builds.
+    /// Those without a camera first, each by size.
     pub(super) builds: Vec<BuildOutcomes>,
     /// Cycles of each run.
     pub(super) cycles: u64,

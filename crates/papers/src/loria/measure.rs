@@ -38,7 +38,7 @@ pub(super) struct LoriaVariant {
     pub(super) regime: Regime,
     /// The law for blocked paths.
     pub(super) obstacle_rule: ObstacleRule,
-    /// The behavior of robots.
+    /// How robots deal with obstacles.
     pub(super) mind: AvoidancePolicy,
     /// The errors of sensors and effectors.
     pub(super) tables: ErrorTables,
@@ -93,7 +93,7 @@ impl LoriaVariant {
     }
 }
 
-/// Results of a run of a variant.
+/// Results of one run of a variant, by which the paper's claims are judged.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(super) struct RunMeasures {
     /// Contacts per 1000 actions, with anything.
@@ -115,10 +115,10 @@ pub(super) struct RunMeasures {
     pub(super) lawful: bool,
 }
 
-/// A measure of an outcome.
+/// One number of an outcome; `None` where the run does not have it.
 pub(super) type Measure = fn(&RunMeasures) -> Option<f64>;
 
-/// Returns the values of a measure by run.
+/// One value per run, in the order of `outcomes`.
 pub(super) fn values(outcomes: &[RunMeasures], measure: Measure) -> Vec<Option<f64>> {
     outcomes.iter().map(measure).collect()
 }

@@ -163,7 +163,7 @@ pub enum LoriaError {
 pub struct LoriaReport {
     /// The plan that was run.
     pub plan: LoriaConfig,
-    /// Version of the program.
+    /// Version of the program that made the report.
     pub program_version: String,
     reliability: ReliabilityResults,
     genericity: GenericityResults,
@@ -217,7 +217,7 @@ pub fn run_recorded(
 }
 
 impl LoriaReport {
-    /// Returns the experiments in the order of the report.
+    /// In the order of the file of claims, which has their words.
     fn experiments(&self) -> Vec<Experiment> {
         claims::CLAIMS.experiments([
             (self.reliability.figures(), self.reliability.tables()),

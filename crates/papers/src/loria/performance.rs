@@ -22,9 +22,9 @@ use std::sync::Arc;
 /// Times of a load with a number of workers.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct LoadTiming {
-    /// Number of the load.
+    /// Index into [`PerformanceResults::loads`].
     pub(super) load: usize,
-    /// Workers.
+    /// Number of workers of the run.
     pub(super) workers: usize,
     /// Whether the run was recorded.
     pub(super) recorded: bool,
@@ -48,7 +48,7 @@ impl LoadTiming {
 /// The cost of a run before its first cycle.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct InitializationCost {
-    /// Number of the load.
+    /// Index into [`PerformanceResults::loads`].
     pub(super) load: usize,
     /// Seconds to read the scenario, compile the world and place all bodies.
     pub(super) seconds: f64,
@@ -64,14 +64,12 @@ pub(super) const REFERENCE_CYCLES: u64 = 1000;
 /// Worker counts of which the digests are compared; more than the machine has processors is allowed.
 const DIGEST_WORKERS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
-/// The parallel performance experiment.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PerformanceResults {
     /// Processors that the run may use.
     pub(super) processors: usize,
-    /// The timed loads.
     pub(super) loads: Vec<Workload>,
-    /// The times.
+    /// By load, unrecorded before recorded, and then by number of workers.
     pub(super) timings: Vec<LoadTiming>,
     /// Initialization of each load.
     pub(super) initialization: Vec<InitializationCost>,
@@ -89,6 +87,7 @@ pub(super) fn loads(plan: &LoriaConfig) -> Vec<Workload> {
         for &operations in &plan.operations {
             loads.push(Workload {
                 robots,
+                // Few people, because the paper's loads vary in robots.
                 people: robots / 5,
                 size: 2,
                 operations,
@@ -111,7 +110,7 @@ pub(super) fn worker_counts(max: usize) -> Vec<usize> {
 }
 
 impl PerformanceResults {
-    /// Runs the experiment.
+    /// Times every load and its initialization, and compares the digests.
     ///
     /// # Errors
     /// When a recording fails.
@@ -151,7 +150,6 @@ impl PerformanceResults {
         self.timings.iter().map(|timing| timing.workers).max().unwrap_or(1)
     }
 
-    /// Returns the timings with the most workers.
     pub(super) fn at_max_workers(&self, recorded: bool) -> impl Iterator<Item = &LoadTiming> {
         let most = self.max_workers();
         self.timings.iter().filter(move |t| t.workers == most && t.recorded == recorded)
@@ -160,6 +158,7 @@ impl PerformanceResults {
     /// Returns whether the machine itself gave less than this share of the workers' worth: then other
     /// processes were using it, and times mean little.
     pub(super) fn is_machine_busy(&self) -> bool {
+        // Less than 1, because processors slow down somewhat when all of them work.
         const SHARE: f64 = 0.85;
         let min_speed_up = SHARE * self.max_workers() as f64;
         self.at_max_workers(false).any(|timing| timing.machine.mean_or_zero() < min_speed_up)
@@ -195,7 +194,6 @@ impl PerformanceResults {
         Estimate::paired_difference(&costly, &cheap)
     }
 
-    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![self.times_table(), self.initialization_table(), self.digest_table()]
     }
@@ -395,6 +393,7 @@ fn digests(
     load: &Workload,
     recorders: &mut NewRecorder<'_>,
 ) -> Result<(Vec<(usize, String)>, String), RecordError> {
+    // Bodies meet often enough in so many cycles that a wrong order would show in the digest.
     const CYCLES: u64 = 100;
     let mut digests = Vec::new();
     for workers in DIGEST_WORKERS {

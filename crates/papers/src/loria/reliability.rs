@@ -17,11 +17,10 @@ use std::sync::Arc;
 /// A variant and its outcomes by seed.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct VariantOutcomes {
-    /// Name of the floor.
+    /// Name of the floor, which the variant does not serialize.
     pub(super) floor: String,
-    /// The variant that was run.
     pub(super) variant: LoriaVariant,
-    /// Its outcomes.
+    /// By seed, from 1 on.
     pub(super) outcomes: Vec<RunMeasures>,
 }
 
@@ -45,7 +44,7 @@ impl VariantOutcomes {
 pub(super) struct ReliabilityResults {
     /// The floors, in words.
     pub(super) floors: Vec<String>,
-    /// Every variant with its outcomes.
+    /// The four regimes at all places first, then the sweep over error levels.
     #[serde(rename = "cells")]
     pub(super) variants: Vec<VariantOutcomes>,
     /// Error levels of the sweep.
@@ -55,7 +54,7 @@ pub(super) struct ReliabilityResults {
 /// The selection of a variant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct VariantKey<'a> {
-    /// Name of the floor.
+    /// Name of the floor in tables.
     pub(super) floor: &'a str,
     /// Law for blocked paths.
     pub(super) rule: ObstacleRule,
@@ -95,7 +94,7 @@ pub(super) const STRAIGHTNESS: Measure = MEASURES[4].1;
 pub(super) const LATERAL: Measure = MEASURES[5].1;
 
 impl ReliabilityResults {
-    /// Runs the experiment.
+    /// Runs every variant with all seeds of the plan.
     pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let floors = [Floor::medium(), Floor::small(), Floor::large()].map(Arc::new);
         let variants = variants(&floors, plan);
@@ -207,7 +206,6 @@ impl ReliabilityResults {
         all
     }
 
-    /// Returns the tables of this experiment.
     pub(super) fn tables(&self) -> Vec<Table> {
         vec![
             self.regimes_table(),
@@ -319,7 +317,6 @@ impl ReliabilityResults {
         table
     }
 
-    /// Returns the figures of this experiment.
     pub(super) fn figures(&self) -> Vec<Figure> {
         let bars = [
             self.regime_bars(
@@ -385,7 +382,6 @@ impl ReliabilityResults {
 /// A behavior, its beams and their recipe of errors, swept over the error level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SweepCase {
-    /// The behavior of the robots.
     pub(super) mind: AvoidancePolicy,
     /// Their number of beams.
     pub(super) beams: BeamCount,
@@ -400,7 +396,7 @@ impl SweepCase {
         (AvoidancePolicy::Avoid, BeamCount::Four),
     ];
 
-    /// Returns all cases of the sweep.
+    /// Each behavior with its beams, under either recipe.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         Self::POLICIES
             .into_iter()

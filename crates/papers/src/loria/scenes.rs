@@ -14,7 +14,7 @@ use std::sync::Arc;
 const CYCLES: Cycle = 600;
 /// Cycles at the end of the run for which trails are drawn.
 const TRAIL_CYCLES: Cycle = 400;
-/// The seed of all scenes.
+/// One seed for all scenes, so that the same robots start at the same places.
 const SEED: u64 = 1;
 
 /// Returns all pictures: the same floor and seed, without errors and with both.

@@ -17,11 +17,11 @@ use std::convert::Infallible;
 /// Times of a load under a strategy.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct StrategyTiming {
-    /// Number of the load.
+    /// Index into [`StrategyResults::loads`].
     pub(super) load: usize,
-    /// Name of the strategy.
+    /// Name of the strategy in tables.
     pub(super) strategy: String,
-    /// Workers.
+    /// Number of workers of the run.
     pub(super) workers: usize,
     /// Milliseconds per cycle.
     pub(super) cycle_ms: Estimate,
@@ -41,12 +41,10 @@ pub(super) struct StrategyTiming {
     pub(super) complete: bool,
 }
 
-/// All trials.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct StrategyResults {
-    /// The timed loads.
     pub(super) loads: Vec<Workload>,
-    /// The trials.
+    /// By load, then by number of workers, the double pool first.
     pub(super) trials: Vec<StrategyTiming>,
 }
 
@@ -62,7 +60,6 @@ enum StrategyRun {
     Arithmetic,
 }
 
-/// A run, the name of its strategy and its number of workers.
 struct StrategyCandidate {
     strategy: &'static str,
     workers: usize,
@@ -98,7 +95,7 @@ impl StrategyCandidate {
 }
 
 impl StrategyResults {
-    /// Runs the comparison.
+    /// Times the loads with the cheapest and the costliest decisions under all three strategies.
     pub(super) fn run(plan: &LoriaConfig, report: &mut Progress<'_>) -> Self {
         let mut loads = loads(plan);
         // Three strategies take three times as long: the costs between show nothing that their ends do not.
@@ -137,7 +134,6 @@ impl StrategyResults {
         with_most.next().map_or(&[], |t| &t.ratios[..])
     }
 
-    /// Returns the comparison as a table.
     pub(super) fn table(&self) -> Table {
         let note = format!(
             "Mean [95 % interval] over repeats, each the best of {SEGMENTS} stretches that take \

@@ -25,7 +25,7 @@ const DECISION_OPERATIONS: u32 = 500;
 /// Robots that wander on a floor among people and doors, at a given density and cost.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Workload {
-    /// Robots.
+    /// Number of robots, all of them with [`CostlyBehaviour`].
     pub(super) robots: u32,
     /// People, of 2 x 2 boxes.
     pub(super) people: u32,
@@ -33,7 +33,6 @@ pub(super) struct Workload {
     pub(super) size: u32,
     /// Multiply-and-adds that every decision costs beside its own work.
     pub(super) operations: u32,
-    /// The building.
     #[serde(skip)]
     pub(super) floor: Arc<Floor>,
 }
@@ -62,7 +61,7 @@ impl Workload {
         (robot_cycles / (bodies * (1 + u64::from(self.operations / DECISION_OPERATIONS)))).max(10)
     }
 
-    /// Returns the scenario.
+    /// Its robots have the behavior `costly`, which [`Self::compiled`] adds.
     fn source(&self) -> Source {
         let costly = toml::Table::from_iter([("kind".to_string(), "costly".into())]);
         let settings = [
@@ -86,7 +85,6 @@ impl Workload {
             .expect("the experiments' scenarios are valid")
     }
 
-    /// Returns a run at its start.
     pub(super) fn simulation(&self, workers: usize) -> RobotsRun {
         self.compiled().start(&self.source(), workers)
     }
@@ -107,8 +105,9 @@ impl Behaviour for CostlyBehaviour {
     }
 }
 
-/// Does `operations` dependent multiply-and-adds, only to spend time: each needs the one before, so that neither the compiler
-/// nor the processor does several at once.
+/// Does `operations` dependent multiply-and-adds, only to spend time: each needs the one before, so
+/// that neither the compiler nor the processor does several at once. The numbers are those of
+/// Knuth's generator MMIX; others would do as well.
 fn spend_time(mut x: u64, operations: u32) {
     for _ in 0..operations {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -196,7 +195,6 @@ pub(super) struct TimedRun {
 }
 
 impl TimedRun {
-    /// Returns a run that is not recorded.
     pub(super) fn new(load: &Workload, workers: usize) -> Self {
         Self { simulation: load.simulation(workers), recorder: None }
     }
@@ -234,7 +232,7 @@ impl TimedRun {
         result.map(|()| took_s)
     }
 
-    /// Returns the run.
+    /// For its digest after it was timed.
     pub(super) fn simulation(&self) -> &RobotsRun {
         &self.simulation
     }

@@ -55,15 +55,13 @@ const COLUMNS: Columns = Columns {
     ],
 };
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ArmResults {
-    /// Results by case.
+    /// Those without pillars first, each without a planner and then with one.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
 
-/// Returns the arm of the scenario.
 fn arm() -> Result<SerialChain, InputError> {
     let scenario: toml::Table = toml::from_str(SCENARIO).expect("a scenario of this experiment");
     let text = scenario["chains"][0]["arm"]["urdf_text"].as_str().expect("its arm");

@@ -16,7 +16,7 @@ use sidestep::rods::rebuild::{MovableEnd, ReformResult, reform};
 use sidestep::rods::{Chain, Connector, Rod};
 use sidestep_document::{Table, estimate::format_short};
 
-/// Connectors of the whole chain.
+/// Connectors of the whole chain: twice as many as are thrown about at most.
 const CONNECTORS: usize = 40;
 const ROD: Rod = Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.02 };
 /// Standard deviation of the bends of the whole chain, radians.
@@ -50,7 +50,6 @@ fn format_passes(case: &CaseResults) -> String {
     format!("{median} ({})", case.count("most_passes"))
 }
 
-/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct BreakCase {
     /// Middle connectors that are thrown about,
@@ -83,10 +82,9 @@ impl BreakCase {
     }
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct BreakResults {
-    /// Results by case.
+    /// By number of scattered connectors, those of which none are gone first.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }

@@ -12,7 +12,7 @@ use sidestep::kernel::{InputError, Simulation};
 use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::{Figure, Table};
 
-/// The scenario.
+/// The scenario, of which a picture shows a run as well.
 pub(super) const SCENARIO: &str = include_str!("../../scenarios/serpentine/corridor.toml");
 const SWEEP: &str = include_str!("../../scenarios/serpentine/corridor.sweep.toml");
 
@@ -98,7 +98,6 @@ fn is_in_band(run: &dyn Simulation) -> bool {
     (BAND_M[0]..=BAND_M[1]).contains(&apart_m)
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct CorridorResults {
     /// Results by case, the fewest followers first.
@@ -106,7 +105,7 @@ pub(super) struct CorridorResults {
     pub(super) cases: Vec<CaseResults>,
 }
 
-/// Returns the sweep of a plan.
+/// The sweep's variants that have the plan's widths and numbers of followers.
 pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
     let study = Study::from_file(SWEEP, SCENARIO)?.filtered_by_number(WIDTH, &plan.widths_m);
     let study =
@@ -141,7 +140,7 @@ impl CorridorResults {
         self.cases.iter().filter(move |c| c.has_text("leaving", leaving))
     }
 
-    /// Returns the cases of a reading with the fewest followers.
+    /// For figures over the width: they are one for each width.
     pub(super) fn cases_with_fewest_followers<'a>(
         &'a self,
         leaving: &'a str,

@@ -135,10 +135,9 @@ fn toml_point(point: Point<2>) -> TomlValue {
     TomlValue::from(point.to_vec())
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct FieldResults {
-    /// Results by case.
+    /// By reading and number of discs at rest, then by the speed of discs that move.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
@@ -170,7 +169,7 @@ impl FieldResults {
         })
     }
 
-    /// Returns cases with discs that move.
+    /// All of them have the first of the [`READINGS`].
     pub(super) fn moving(&self) -> impl Iterator<Item = &CaseResults> {
         self.cases.iter().filter(|c| c.number("speed_ratio") > 0.0)
     }

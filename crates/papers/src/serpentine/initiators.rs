@@ -45,14 +45,14 @@ pub(super) struct InitiatorResults {
     /// Runs of a world in which a connector fails on the way, and the veto that the operator
     /// receives names that one.
     pub(super) told: Proportion,
-    /// Bend limits.
+    /// In the order of [`BEND_LIMITS`].
     pub(super) bends: Vec<BendLimitResult>,
 }
 
-/// Results for bend limits.
+/// Results of motions under one bend limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct BendLimitResult {
-    /// The limit.
+    /// Largest angle between two rods that is allowed.
     pub(super) limit_deg: f64,
     /// Whether in space, or in the plane.
     pub(super) in_space: bool,
@@ -62,7 +62,7 @@ pub(super) struct BendLimitResult {
     pub(super) other_vetoes: u64,
     /// Motions after which a bend was beyond the limit.
     pub(super) exceeded: u64,
-    /// The sharpest bend.
+    /// Sharpest bend after any of the motions.
     pub(super) sharpest_deg: f64,
 }
 
@@ -143,7 +143,7 @@ fn count_motions(seed: u64) -> Result<InitiatorCounts, InputError> {
     Ok(seen)
 }
 
-/// The veto that is expected.
+/// The connector that has to object, and for which reason.
 struct ExpectedVeto {
     by: usize,
     reason: VetoReason,
@@ -166,6 +166,7 @@ fn is_vetoed_as_expected(
 
 /// Lets an operator lead a chain of which a connector fails; returns whether the veto names it.
 fn veto_names_failed(seed: u64) -> Result<bool, InputError> {
+    // Any connector of the scenario's 16 but the two ends, of which the first one leads.
     let failing = 1 + (draws(seed).uniform_below(14)) as usize;
     let source = source(
         FAILING,
@@ -291,7 +292,6 @@ fn bend_limit_result(limit_deg: f64, in_space: bool, runs: &[BendLimitRun]) -> B
 }
 
 impl InitiatorCounts {
-    /// Sums the results of some runs.
     fn total(runs: Vec<Self>) -> Self {
         runs.into_iter().fold(Self::default(), |mut all, run| {
             all.moved.extend(run.moved);

@@ -37,7 +37,7 @@ use sidestep::kernel::{InputError, Seed};
 use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::{Document, Experiment, Picture};
 
-/// Speed of initiators, m/s.
+/// Speed of initiators in all scenarios, m/s.
 const SPEED_M_S: f64 = 0.5;
 /// Duration of a cycle unless an experiment varies it, s.
 const DT_S: f64 = 0.02;
@@ -74,7 +74,7 @@ pub struct SerpentineConfig {
     pub mover_discs: Vec<usize>,
     /// Cycles of such a run.
     pub mover_cycles: u64,
-    /// Connectors of the snake in space.
+    /// Numbers of connectors of the snake in space.
     pub snake_connectors: Vec<usize>,
     /// Cycles of its runs.
     pub snake_cycles: u64,
@@ -88,7 +88,7 @@ pub struct SerpentineConfig {
     pub breaks: usize,
     /// Links of chains that reach for targets,
     pub ik_links: Vec<usize>,
-    /// and targets.
+    /// and number of targets for each of them.
     pub ik_targets: usize,
     /// The cycle of the swarm's picture.
     pub pictured_cycles: u64,
@@ -170,7 +170,7 @@ impl SerpentineConfig {
 pub struct SerpentineReport {
     /// The plan that was run.
     pub plan: SerpentineConfig,
-    /// Version of the program.
+    /// Version of the program that made the report.
     pub program_version: String,
     corridor: corridor::CorridorResults,
     rotations: rotation::RotationResults,
@@ -239,7 +239,7 @@ pub fn run(
 }
 
 impl SerpentineReport {
-    /// Returns the experiments in the order of the report.
+    /// In the order of the file of claims, which has their words.
     fn experiments(&self) -> Vec<Experiment> {
         let scaling = &self.scaling;
         let corridor = &self.corridor;

@@ -73,15 +73,14 @@ fn ratio(case: &Variant) -> f64 {
     setting_number(case, SPEED) / SPEED_M_S
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct MoverResults {
-    /// Results by case.
+    /// In the order of the sweep's variants.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
 
-/// Returns the sweep of a plan.
+/// The sweep's variants that have the plan's numbers and speeds of discs.
 pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
     let study = Study::from_file(SWEEP, SCENARIO)?;
     let study = study.filtered(|v| plan.mover_discs.contains(&(setting_number(v, DISCS) as usize)));
@@ -98,7 +97,6 @@ impl MoverResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cases of a way to react.
     pub(super) fn cases_with_escape<'a>(
         &'a self,
         escape: &'a str,

@@ -35,7 +35,7 @@ pub(super) enum IkMethod {
     FreeBase,
     /// The chain's rule there and back until tip and base are where they belong.
     ThereAndBack,
-    /// Damped least squares.
+    /// Damped least squares, a usual numeric method, to compare with.
     LeastSquares,
 }
 
@@ -85,12 +85,11 @@ fn format_method(case: &CaseResults) -> String {
     method.name().into()
 }
 
-/// A case of the experiment.
 #[derive(Debug, Clone, Copy)]
 struct PostureCase {
-    /// The way.
+    /// How the tip is brought to its target.
     way: IkMethod,
-    /// Rods.
+    /// Number of rods; the tip is the connector behind the last one.
     links: usize,
     /// Largest relative deviation of a rod's length from the mean.
     slack: f64,
@@ -115,10 +114,9 @@ impl PostureCase {
     }
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct PostureResults {
-    /// Results by case.
+    /// By number of links, then by slack, then by method.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
@@ -212,7 +210,7 @@ impl PostureResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cases of a way.
+    /// By number of links, then by slack.
     pub(super) fn cases_with_method(&self, way: IkMethod) -> impl Iterator<Item = &CaseResults> {
         self.cases.iter().filter(move |c| c.has_text("way", way.key()))
     }

@@ -91,10 +91,9 @@ fn cases() -> Vec<Vec<Setting>> {
     cases
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct PushingResults {
-    /// Results by case.
+    /// Those pushed by the head first, from what folds most easily on.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
@@ -109,6 +108,7 @@ fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
 /// Runs a case until some part objects; returns the distance and the measures on the way.
 fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
     let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
+    // The longest rod, 0.8 m, with the radii of its ends.
     let obstacles = Obstacles::new(walls, 1.3)?;
     let mut chain = chain(setting_number(case, "max_bend_deg"))?;
     let rules = Rules { self_collision: is_set(case, "self_collision"), ..Rules::default() };
@@ -172,7 +172,6 @@ impl PushingResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns cases of pushing, or of pulling.
     pub(super) fn cases_by_direction(&self, by_head: bool) -> impl Iterator<Item = &CaseResults> {
         self.cases.iter().filter(move |c| c.is_true("by_head") == by_head)
     }

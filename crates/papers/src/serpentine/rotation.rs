@@ -49,10 +49,9 @@ fn slave_over_master(case: &CaseRuns<'_>) -> Value {
     Value::Number(case.max_value("max_slave_step_m") / case.setting_number(STEP))
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct RotationResults {
-    /// Results by case.
+    /// In the order of the sweep's variants.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
@@ -94,7 +93,7 @@ impl RotationResults {
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 
-    /// Returns the cases of a rule.
+    /// In the order of the sweep's variants.
     pub(super) fn cases_with_rule<'a>(
         &'a self,
         rotation: &'a str,

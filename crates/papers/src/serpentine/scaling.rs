@@ -25,7 +25,7 @@ const CLUTTERED_CONNECTORS: usize = 450;
 /// One chain that is led through the open.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct OpenTiming {
-    /// Connectors.
+    /// Number of connectors, the head included.
     pub(super) connectors: usize,
     /// Time of a motion, microseconds: rods of fixed length,
     pub(super) fixed_us: f64,
@@ -61,13 +61,11 @@ pub(super) struct FarObstacleTiming {
 }
 
 impl FarObstacleTiming {
-    /// Returns the time of a motion, by repeat.
     fn us(&self) -> Vec<Option<f64>> {
         self.us_by_repeat.iter().map(|us| Some(*us)).collect()
     }
 }
 
-/// All timings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct ScalingResults {
     /// Sizes by number of connectors.

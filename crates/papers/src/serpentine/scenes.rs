@@ -18,7 +18,7 @@ const TRAIL_INTERVAL_CYCLES: u64 = 10;
 /// snake.
 const MAX_BALL_DISTANCE_M: f64 = 0.7;
 
-/// Returns all pictures.
+/// The swarm, the snake, and the broken chain before and after.
 pub(super) fn all(plan: &SerpentineConfig) -> Result<Vec<Scene>, InputError> {
     let mut scenes = vec![swarm(plan)?, creeping(plan)?];
     scenes.extend(broken_chain()?);

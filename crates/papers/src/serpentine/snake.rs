@@ -10,7 +10,7 @@ use sidestep::experiment::sweep::Variant;
 use sidestep::kernel::InputError;
 use sidestep_document::Table;
 
-/// The scenario.
+/// The scenario, of which a picture shows a run as well.
 pub(super) const SCENARIO: &str = include_str!("../../scenarios/serpentine/snake.toml");
 const SWEEP: &str = include_str!("../../scenarios/serpentine/snake.sweep.toml");
 const CONNECTORS: &str = "chains.connectors";
@@ -71,15 +71,14 @@ fn of_fields(case: &Variant, key: &str) -> f64 {
     total
 }
 
-/// All cases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct SnakeResults {
-    /// Results by case.
+    /// In the order of the sweep's variants.
     #[serde(rename = "cells")]
     pub(super) cases: Vec<CaseResults>,
 }
 
-/// Returns the sweep of a plan.
+/// The sweep's variants that have the plan's numbers of connectors.
 pub(super) fn study(plan: &SerpentineConfig) -> Result<Study, InputError> {
     let study = Study::from_file(SWEEP, SCENARIO)?;
     let study = study

@@ -20,10 +20,9 @@ pub(super) struct WalkResult {
     pub(super) contact: Option<Blocker>,
 }
 
-/// An obstacle that stops a walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Blocker {
-    /// Kind of the obstacle.
+    /// Index into the scenario's kinds.
     pub(super) kind: u8,
     /// Side of the body that touches it.
     pub(super) side: Side,
@@ -172,7 +171,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
         WalkResult { steps: walk.steps.len(), contact: None }
     }
 
-    /// Makes the first `steps` steps of a walk.
+    /// Makes a walk up to its contact, step by step, so that a path over its own boxes ends right.
     #[inline]
     fn execute_steps(&self, walk: &StepPath, steps: usize, slot: Slot) {
         if steps == 0 {

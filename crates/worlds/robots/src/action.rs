@@ -20,9 +20,9 @@ pub(crate) struct Step {
 /// A transition at a heading, prepared for walking on the grid.
 #[derive(Debug, Clone)]
 pub(crate) struct StepPath {
-    /// Its steps.
+    /// In the order in which they are made; empty for a turn in place and for staying.
     pub(crate) steps: Vec<Step>,
-    /// Quarter turns to the left.
+    /// Quarter turns to the left after the steps, 0 to 3.
     pub(crate) turn: u8,
     /// All steps together, for the many walks that meet no obstacle.
     pub(crate) whole: NetEffect,
@@ -69,13 +69,13 @@ impl NetEffect {
 /// behind a wall need not be claimed: a blocked step leaves out its subtree.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SweptVolume {
-    /// The steps.
+    /// Depth first: the steps that may follow a step stand directly behind it.
     pub(crate) nodes: Box<[SweptVolumeNode]>,
     /// Index offsets of the boxes entered, step after step.
     pub(crate) boxes: Box<[i32]>,
 }
 
-/// One step of a [`SweptVolume`].
+/// One step of a [`SweptVolume`]; paths that start alike share it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SweptVolumeNode {
     /// Start of its boxes in [`SweptVolume::boxes`].
@@ -89,11 +89,11 @@ pub(crate) struct SweptVolumeNode {
 /// An action of a body type at a heading.
 #[derive(Debug, Clone)]
 pub(crate) struct Action {
-    /// Probability of each walk.
+    /// By which one of `walks` is drawn.
     pub(crate) distribution: Categorical,
     /// Probabilities as given, kept for exact computations and for rescaling.
     pub(crate) probabilities: Vec<f64>,
-    /// The walk of each outcome.
+    /// One for each transition of the effector, the intended one first.
     pub(crate) walks: Vec<StepPath>,
     /// The tree of everything that the action may sweep.
     pub(crate) sweep: SweptVolume,
@@ -196,7 +196,8 @@ fn index_offset((columns, rows): (i32, i32), stride: u32) -> i32 {
 }
 
 /// Returns the row of boxes just outside a body in direction `u` (`ahead`), or the body's own
-/// hindmost row, from left to right as seen along `u`.
+/// hindmost row, from left to right as seen along `u`. Of several obstacles the first in this order
+/// is the one that a contact reports.
 fn edge(body: (u32, u32), (ux, uy): (i32, i32), ahead: bool) -> Vec<(i32, i32)> {
     let w = body.0 as i32;
     let h = body.1 as i32;

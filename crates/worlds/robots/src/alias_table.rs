@@ -41,7 +41,7 @@ impl AliasColumn {
 /// A drawn reading, with its nearness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SampledReading {
-    /// The reading.
+    /// The report as the robot perceives it.
     pub(crate) reading: Reading,
     /// Its distance class, or [`UNSEEN`] where nothing is reported.
     pub(crate) nearness: u8,
@@ -78,14 +78,14 @@ impl AliasTable {
         Ok(Self { classes, bits, columns: columns.into(), reliable })
     }
 
-    /// Returns the row of a true reading.
+    /// Rows are ordered by observation, then by class.
     #[inline]
     pub(crate) fn row(&self, truth: Reading) -> RowIndex {
         let row = usize::from(truth.observation) * self.classes + usize::from(truth.class);
         RowIndex((row << self.bits) as u32)
     }
 
-    /// Returns the true reading of a row.
+    /// The inverse of [`Self::row`], for logs that keep the truth beside the report.
     pub(crate) fn truth(&self, row: RowIndex) -> Reading {
         let row = row.0 as usize >> self.bits;
         Reading { observation: (row / self.classes) as u8, class: (row % self.classes) as u8 }

@@ -40,7 +40,7 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    /// Both.
+    /// In the order of the report that measures them.
     pub const ALL: [Self; 2] = [Self::SpatialPartition, Self::OneLock];
 
     /// Returns its name in tables.
@@ -63,7 +63,7 @@ pub struct BaselineRun {
     serial_acts: u64,
 }
 
-/// A worker's own data.
+/// Data of one worker, which no other one reads or writes while they run.
 #[derive(Debug, Default)]
 struct BandWorker {
     scratch: Scratch,
@@ -98,7 +98,7 @@ impl BaselineRun {
         Self { compiled, state, strategy, workers: band_workers, cycle: 0, serial_acts: 0 }
     }
 
-    /// Runs `cycles` cycles.
+    /// Runs on from the cycle that the last call has reached.
     pub fn advance(&mut self, cycles: u64) {
         let span = self.cycle..self.cycle + cycles;
         match self.strategy {
@@ -130,6 +130,7 @@ impl BaselineRun {
         let state = &self.state;
         let world_lock = Mutex::new(());
         workers::run(&mut self.workers, |worker, own| {
+            // Each call of `run` starts a new team of workers, which counts its pools from 0.
             for (pool, now) in (0u64..).zip(span.clone()) {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
                     with_cycle!(world, state, now, |cycle| for slot in bodies {
@@ -209,7 +210,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the band of a column.
+/// Bands are sorted from west to east, and the last one has no end.
 fn band_of(bands: &[Range<u32>], col: u32) -> usize {
     bands.partition_point(|band| band.end <= col).min(bands.len() - 1)
 }

@@ -49,7 +49,7 @@ impl BroadcastBuffer {
         self.0.iter().filter(|page| !page.spoken.is_empty()).for_each(|page| page.set(id, word));
     }
 
-    /// Returns the bytes on the heap.
+    /// Both pages count; 0 without radio.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.0.iter().map(|page| page.words.heap_bytes() + page.spoken.heap_bytes()).sum()
     }

@@ -67,7 +67,7 @@ pub enum Sector {
     Ahead,
     /// Between 45 and 135 degrees to the left.
     Left,
-    /// Behind.
+    /// Less than 45 degrees off the opposite of the heading.
     Behind,
     /// Between 45 and 135 degrees to the right.
     Right,
@@ -93,7 +93,7 @@ impl Sector {
 /// Everything a robot knows when it decides.
 #[derive(Debug)]
 pub struct Percept<'a> {
-    /// The present cycle.
+    /// Cycle in which the robot decides, from 0 on.
     pub now: Cycle,
     /// The robot's own id, by which others know it as a sender.
     pub id: EntityId,
@@ -162,7 +162,7 @@ pub enum TripEvent {
 /// A robot's choice for this cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
-    /// The action to try.
+    /// The action to try, by its number in the robot's effector.
     pub action: ActionId,
     /// Whether the last action started or completed a trip; trips are counted and timed.
     pub trip: Option<TripEvent>,

@@ -130,7 +130,7 @@ pub fn compare(
     Ok(Comparison::new(&exact, &counts, cycles, runs))
 }
 
-/// Counts how often each pose is the final one.
+/// Each run has a seed of its own; all share the tables of sensors and effectors.
 fn count_final_poses(
     compiled: &Compiled,
     source: &Source,

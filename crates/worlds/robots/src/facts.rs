@@ -20,6 +20,7 @@ pub(crate) const FACTS: WorldFacts = WorldFacts {
             name: "contact",
             meaning: "1 where the last action was stopped",
             measure: RewardMeasure::Positive { observation: "contact" },
+            // A first reward that makes sense by itself: agents learn to run into nothing.
             default_weight: -1.0,
         },
         RewardTerm {
@@ -45,7 +46,6 @@ pub(crate) const FACTS: WorldFacts = WorldFacts {
     group_sizes: Some(GroupSizes::Metric { metric: "group_sizes" }),
 };
 
-/// Returns a tool that paints boxes of the map.
 fn paint(
     id: &'static str,
     sign: &'static str,

@@ -46,7 +46,6 @@ impl RobotsWorld {
         })
     }
 
-    /// Returns a body's heading in words.
     fn heading_name(heading: u8) -> &'static str {
         HEADING_NAMES[usize::from(heading % 4)]
     }
@@ -103,7 +102,6 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
         self.inspection.add_section(section);
     }
 
-    /// Returns where the body is.
     fn position_m(&self) -> view::Vec3 {
         self.cycle.world.visible_body(self.id, self.cycle.body(self.slot)).pose.at_m
     }
@@ -202,7 +200,7 @@ impl<'a, T: BoxWord> Inspector<'a, T> {
 }
 
 impl RobotsWorld {
-    /// Returns the corners of a rectangle of boxes.
+    /// The corners come counterclockwise from the lower left.
     fn corners_m(&self, Rect { col, row, width, height }: Rect) -> Vec<view::Vec3> {
         let east = col + width;
         let north = row + height;

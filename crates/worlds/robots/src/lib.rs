@@ -72,7 +72,7 @@ pub struct Event {
     pub event: EventKind,
 }
 
-/// Kinds of events.
+/// What happened. People's contacts are no events: they just try another time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
     /// A robot's action ran into something.
@@ -84,9 +84,9 @@ pub enum EventKind {
         /// The body touched; none for a wall.
         with: Option<EntityId>,
     },
-    /// A door has opened.
+    /// A door has opened: its boxes are free for bodies that act later in the same cycle.
     DoorOpened,
-    /// A door has closed.
+    /// A door has closed, after it has waited until no body stood in it.
     DoorClosed,
 }
 
@@ -101,7 +101,7 @@ pub struct SensorSample {
     pub sensor: u16,
     /// The true reading: the first obstacle that the beam meets.
     pub truth: Reading,
-    /// The reading that the sensor reported.
+    /// What the robot perceived; equal to `truth` unless the sensor erred.
     pub reported: Reading,
 }
 

@@ -48,7 +48,7 @@ metrics! {
 }
 
 impl RobotsWorld {
-    /// Returns the counters of a robot after `cycle` cycles.
+    /// Returns the counters of a robot. `cycle` counts its actions, and must be that of `state`.
     pub fn counts(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> Counters {
         let first_contact = id as usize * self.kinds.len();
         let mut contacts = 0;

@@ -18,7 +18,7 @@ pub(super) struct DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// Adds an action of a robot.
+    /// Has to see every action of the robot, in their order.
     pub(super) fn add(&mut self, world: &RobotsWorld, sample: &MotionSample) {
         let Role::Robot(model) = &world.type_of(sample.robot).role else { return };
         let intended = &model.body.effector.transitions[usize::from(sample.action)][0];

@@ -24,7 +24,7 @@ pub enum ConflictPolicy {
 }
 
 impl ConflictPolicy {
-    /// All policies.
+    /// Every policy, the default one first.
     pub const ALL: [Self; 5] =
         [Self::Random, Self::Fixed, Self::ByKind, Self::RightOfWay, Self::Rounds];
 

@@ -23,7 +23,8 @@ pub(crate) const RUN: Purpose = Purpose(9);
 /// The heading that starts where the policy `right_of_way` leaves a tie; the entity is the group's
 /// smallest id.
 pub(crate) const RIGHT_OF_WAY: Purpose = Purpose(10);
-/// Readings of the sensor with this number on its robot.
+/// Readings of the sensor with this number on its robot: from 16 on, so that there is room for
+/// further purposes below.
 pub(crate) const fn sense(sensor: usize) -> Purpose {
     Purpose(16 + sensor as u16)
 }

@@ -6,7 +6,7 @@ use super::world::{MountedSensor, RobotsWorld, Role};
 use sidestep_scenario::Remark;
 use std::collections::BTreeMap;
 
-/// Number of the kind `wall`.
+/// The first kind that a beam can meet: 0 is `free`.
 const WALL: usize = 1;
 
 /// Returns the remarks, warnings first.

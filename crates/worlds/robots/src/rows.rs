@@ -174,7 +174,7 @@ impl Collector {
         Self { record, ..Self::default() }
     }
 
-    /// Starts to keep rows from cycle `now` on.
+    /// Keeps rows from cycle `now` on; poses only where trajectories are recorded.
     pub(super) fn start(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         let record = &self.record;
         self.rows.trajectories.start(record.trajectories.then(|| trajectory_table(world)));
@@ -186,6 +186,8 @@ impl Collector {
         if record.trajectories {
             let bodies = world.bodies.len();
             let target = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);
+            // With few bodies the cycles, and not the poses, limit how long rows wait to be
+            // recorded.
             let capacity = target.min(MAX_BUFFER_POSES / bodies).clamp(1, 4096);
             state.frames = Some(PoseBuffer::new(now, capacity, bodies));
         }
@@ -277,7 +279,7 @@ impl Collector {
     }
 }
 
-/// Returns the columns of the table of poses in these cycles.
+/// Rows are ordered by body, then by cycle.
 fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) -> Vec<Values> {
     let cycles = (span.end - span.start) as usize;
     // Doors never move; their events say when they open.
@@ -360,7 +362,7 @@ fn label_index(labels: &[String], name: &str) -> u32 {
 }
 
 impl RobotsWorld {
-    /// Returns the sensors of all robot types.
+    /// Returns the sensors of all robot types; one comes once for every type that carries it.
     pub fn sensors(&self) -> impl Iterator<Item = &SensorModel> {
         self.types.iter().flat_map(|ty| match &ty.role {
             Role::Robot(model) => model.body.sensors.iter().map(|s| &s.model).collect(),

@@ -122,7 +122,7 @@ pub(super) struct SensorSection {
     _evidence: toml::Table,
 }
 
-/// Rows of a matrix by name.
+/// Probabilities of all reports, by the name of what is truly there.
 pub(super) type MatrixRows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 
 /// Actions by name; `box_m` and `evidence` name the data on which they rest.

@@ -19,7 +19,7 @@ use std::sync::atomic::AtomicU64;
 /// and below far apart in memory, many rows those to the side.
 const ROWS_PER_BAND: u32 = 8;
 
-/// The state of a robots world.
+/// Everything that changes during a run. Workers share it, so most of it is atomic.
 #[derive(Debug)]
 pub struct RobotsState {
     /// The body that stands in, or claims, each box of the padded grid.
@@ -30,14 +30,14 @@ pub struct RobotsState {
     pub bodies: Box<[BodyState]>,
     /// Kind of each body, by slot; apart from `bodies`, because beams read it of many bodies and nothing else.
     pub(crate) kinds: Box<[u8]>,
-    /// Slot of each entity, by id.
+    /// Slot of each entity, by id; [`Self::arrange`] rewrites it.
     pub(crate) slot_of_id: Box<[Slot]>,
     /// Number of contacts of each body by kind touched, at `id * kinds + kind`; apart from `bodies`, because
     /// contacts are rare and the number of kinds is the scenario's.
     pub(crate) contacts: Column<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub(crate) bids: Box<[AtomicU64]>,
-    /// Last broadcast of each robot.
+    /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
     pub(crate) frames: Option<PoseBuffer>,
@@ -94,7 +94,7 @@ impl BodyState {
 /// Poses of all bodies over some cycles; those of one cycle are stored together.
 #[derive(Debug)]
 pub(crate) struct PoseBuffer {
-    /// Cycle of the first pose.
+    /// Cycle of the first pose; moves on whenever poses are recorded.
     pub(crate) first: Cycle,
     /// Number of cycles for which there is room.
     pub(crate) capacity: usize,
@@ -121,7 +121,7 @@ pub struct BodyRecord {
     pub facing: Facing,
     /// See [`BodyState::contact`].
     pub contact: LastContact,
-    /// The robot's memory.
+    /// The robot's memory; all 0 for other bodies.
     pub memory: [u32; 4],
     /// Last broadcast, if there was one.
     pub voice: Option<u64>,
@@ -129,7 +129,7 @@ pub struct BodyRecord {
     pub counts: [u32; 3],
     /// Cycles spent on completed trips, and the cycle in which the present one started.
     pub trip: [u64; 2],
-    /// Number of contacts by kind.
+    /// Contacts by the number of the kind touched.
     pub contacts: Vec<u32>,
 }
 
@@ -207,7 +207,7 @@ impl RobotsState {
         self.bodies[slot as usize].position()
     }
 
-    /// Returns the type of the body in a slot.
+    /// As [`RobotsWorld::type_of`], for a slot instead of an id.
     #[inline]
     pub(crate) fn body_type<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
@@ -230,7 +230,7 @@ impl RobotsState {
         }
     }
 
-    /// Returns whether the body in a slot is a door that is open.
+    /// An open door covers no box, unlike every other body.
     pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
         let body = &self.bodies[slot as usize];
         world.is_door(body.id) && body.facing.get().is_open()
@@ -268,7 +268,7 @@ impl RobotsState {
         bits
     }
 
-    /// Returns the state that a snapshot describes.
+    /// Floor and slots are made anew; `snapshot` must be of the same bodies on the same map.
     pub(super) fn restore(world: &RobotsWorld, snapshot: &Snapshot) -> Self {
         let state = Self::empty(world);
         for (k, index) in world.map_indices().enumerate() {

@@ -11,7 +11,6 @@ use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
-/// Returns the outcome of a run.
 pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     let total = &metrics.total;
     let mut lines = vec![
@@ -163,7 +162,7 @@ fn map(world: &RobotsWorld) -> Value {
     })
 }
 
-/// Returns the number of bodies of each kind.
+/// Kinds without bodies are left out.
 fn bodies(world: &RobotsWorld) -> BTreeMap<&str, u64> {
     let mut count = BTreeMap::new();
     for id in 0..world.bodies.len() as u32 {

@@ -61,7 +61,7 @@ impl RobotsWorld {
         ids.map(|id| builder.body(id, state.body(id))).collect()
     }
 
-    /// Returns one body.
+    /// For a single body; [`Self::visible_bodies`] computes the sines of all of them once.
     pub(super) fn visible_body(&self, id: EntityId, body: &BodyState) -> Body {
         BodyViewBuilder::new(self).body(id, body)
     }
@@ -162,12 +162,11 @@ impl RobotsWorld {
         poses
     }
 
-    /// Returns the name of a body in frames: its kind and its id.
+    /// Robots, people and doors are numbered together, so that the number alone is unique too.
     pub(super) fn body_id(&self, id: EntityId) -> BodyId {
         BodyId::new(self.visible_kind(id), id, None)
     }
 
-    /// Returns an event in words.
     pub(super) fn view_event(&self, event: &Event) -> LogEvent {
         let mut with = None;
         let (level, kind, words) = match event.event {
@@ -191,7 +190,7 @@ impl RobotsWorld {
 struct BodyViewBuilder<'a> {
     world: &'a RobotsWorld,
     plane: CachedIsometry2,
-    /// The turn of each heading.
+    /// The turn of each heading, as a pose has it.
     turns: [[f64; 4]; 4],
 }
 

@@ -74,12 +74,12 @@ impl Regime {
         ["reliable", "effectors", "sensors", "both"][self as usize]
     }
 
-    /// Returns whether sensors are reliable.
+    /// Where they are, every reading is the truth, whatever the tables of sensors say.
     pub(crate) fn has_reliable_sensors(self) -> bool {
         matches!(self, Self::Reliable | Self::Effectors)
     }
 
-    /// Returns whether effectors are reliable.
+    /// Where they are, every action ends in its first transition, whatever the tables say.
     pub(crate) fn has_reliable_effectors(self) -> bool {
         matches!(self, Self::Reliable | Self::Sensors)
     }
@@ -138,7 +138,8 @@ pub struct Body {
 }
 
 impl Body {
-    /// Returns whether the body acts in this cycle.
+    /// Returns whether the body acts in this cycle; otherwise it stays where it is, and claims
+    /// nothing.
     #[inline]
     pub fn is_due(&self, now: Cycle) -> bool {
         (now + u64::from(self.phase)).is_multiple_of(u64::from(self.period))
@@ -156,7 +157,7 @@ impl Body {
 /// Properties shared by the bodies of one type.
 #[derive(Debug, Clone)]
 pub struct BodyType {
-    /// Number of its kind.
+    /// Index into [`RobotsWorld::kinds`].
     pub kind: u8,
     /// Width and height in boxes.
     pub size: (u32, u32),
@@ -176,7 +177,7 @@ impl BodyType {
         Rect { col: at.0, row: at.1, width: self.size.0, height: self.size.1 }
     }
 
-    /// Returns the index in `actions` of an action at a heading.
+    /// Not for doors, which have no actions.
     #[inline]
     pub(crate) fn action_index(&self, heading: u8, action: u8) -> u16 {
         u16::from(heading) * (self.actions.len() / 4) as u16 + u16::from(action)
@@ -186,11 +187,11 @@ impl BodyType {
 /// The three sorts of bodies.
 #[derive(Debug, Clone)]
 pub enum Role {
-    /// An agent.
+    /// An agent: perceives, decides and acts.
     Robot(RobotModel),
-    /// A mobile object.
+    /// A mobile object, such as a person: moves at random, and perceives nothing.
     Mover(Mover),
-    /// A door.
+    /// Opens and closes in its place, by a schedule or by chance.
     Door(Door),
 }
 
@@ -199,14 +200,13 @@ pub enum Role {
 pub struct RobotModel {
     /// Sensors and effectors, shared by types that differ only in behavior.
     pub body: Arc<RobotBody>,
-    /// The behavior, which chooses its actions.
+    /// Chooses the actions; shared by all robots of the type, and without state of its own.
     pub behaviour: Arc<dyn Behaviour>,
     /// Whether it is decided from outside; asked once, because the answer is needed in every cycle.
     pub(super) is_external: bool,
 }
 
 impl RobotModel {
-    /// Returns a robot type of this body and this behavior.
     pub(crate) fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
         let is_external = behaviour.is_external();
         Self { body, behaviour, is_external }
@@ -220,16 +220,16 @@ pub struct RobotBody {
     pub sensors: Vec<MountedSensor>,
     /// Sector of each beam of all sensors in order.
     pub(crate) sectors: Vec<Sector>,
-    /// The effector as data.
+    /// The effector as the scenario gives it.
     pub effector: EffectorModel,
     /// The effector on this body, see [`BodyType::actions`].
     pub(crate) actions: Arc<[Action]>,
 }
 
-/// A sensor on a body of a given size.
+/// A sensor on a body of a given size, with the boxes of its beams at every heading.
 #[derive(Debug)]
 pub struct MountedSensor {
-    /// The sensor as data.
+    /// The sensor as the scenario gives it.
     pub model: SensorModel,
     pub(super) table: AliasTable,
     /// The boxes that its beams cross, for each heading.
@@ -306,7 +306,7 @@ impl MountedSensor {
                 && model.confusion.iter().all(|matrix| is_identity(matrix))
     }
 
-    /// Returns the observation that a kind designates.
+    /// Returns 0, which is nothing, where the sensor does not see the kind.
     pub(super) fn designated_observation(&self, kind: u8) -> u8 {
         self.model.designates[usize::from(kind)]
     }
@@ -366,7 +366,8 @@ pub enum Door {
 }
 
 impl Door {
-    /// Returns whether the door wants to be open in this cycle.
+    /// A door that wants to close waits while a body stands in it. Only doors that act by chance
+    /// draw.
     pub(crate) fn wants_open(&self, is_open: bool, now: Cycle, draw: impl FnOnce() -> u32) -> bool {
         match *self {
             Self::Periodic { open, closed, phase } => (now + phase) % (open + closed) < open,
@@ -397,17 +398,16 @@ impl Radio {
 }
 
 impl RobotsWorld {
-    /// Returns the type of a body.
+    /// Returns the type of a body; `id` is an index into [`Self::bodies`].
     pub fn type_of(&self, id: EntityId) -> &BodyType {
         &self.types[usize::from(self.bodies[id as usize].ty)]
     }
 
-    /// Returns the ids of the robots.
+    /// Returns the ids of the robots, rising.
     pub fn robots(&self) -> &[EntityId] {
         &self.robots
     }
 
-    /// Returns whether a body is a door.
     pub(crate) fn is_door(&self, id: EntityId) -> bool {
         matches!(self.type_of(id).role, Role::Door(_))
     }
@@ -423,7 +423,7 @@ impl RobotsWorld {
         Position::new(col + self.border, row + self.border)
     }
 
-    /// Returns the number of boxes of the map.
+    /// Returns the number of boxes without those of the border.
     pub(super) fn map_boxes(&self) -> usize {
         self.map.cells().len()
     }

@@ -20,7 +20,7 @@ use sidestep_kernel::{
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
-/// A run of a robots world.
+/// A run of a robots world, for callers that read its state or its typed metrics.
 pub type RobotsRun = Run<RobotsWorld>;
 
 /// Returns a run of a scenario at its start.

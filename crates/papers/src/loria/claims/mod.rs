@@ -14,7 +14,7 @@ use super::performance::PerformanceResults;
 use crate::claims::{ClaimsFile, PaperClaims, ThresholdTest, judge_every_run, judge_thresholds};
 use sidestep_document::claim::{Claim, Verdict};
 
-/// Judges all claims.
+/// In the order of the paper.
 pub(super) fn judge(report: &LoriaReport) -> Vec<Claim> {
     let mut claims = setting::claims(report);
     claims.extend(behaviour::claims(report));
@@ -22,11 +22,11 @@ pub(super) fn judge(report: &LoriaReport) -> Vec<Claim> {
     claims
 }
 
-/// The words of the report.
+/// Words, rules and thresholds of the claims.
 pub(super) static CLAIMS: PaperClaims =
     PaperClaims::new(|| ClaimsFile::read(include_str!("../../../claims/loria.toml")));
 
-/// Returns a claim by its number, its verdict, and our figures.
+/// Words and rule of the claim are those of its file.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     CLAIMS.claim(id, verdict, ours.into())
 }

@@ -16,18 +16,18 @@ use crate::claims::{
 };
 use sidestep_document::claim::{Claim, Verdict};
 
-/// Judges all claims.
+/// Claims about all chains first, then those about swarms.
 pub(super) fn judge(report: &SerpentineReport) -> Vec<Claim> {
     let mut claims = chains::claims(report);
     claims.extend(swarms::claims(report));
     claims
 }
 
-/// The words of the report.
+/// Words, rules and thresholds of the claims.
 pub(super) static CLAIMS: PaperClaims =
     PaperClaims::new(|| ClaimsFile::read(include_str!("../../../claims/serpentine.toml")));
 
-/// Returns a claim by its number, its verdict, and our figures.
+/// Words and rule of the claim are those of its file.
 fn claim(id: &str, verdict: Verdict, ours: impl Into<String>) -> Claim {
     CLAIMS.claim(id, verdict, ours.into())
 }

@@ -9,7 +9,7 @@ use sidestep_kernel::stream::Draws;
 /// enter the same boxes. Without radio it behaves as [`Wander`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Announce {
-    /// The behavior that chooses the actions.
+    /// Chooses the actions where no other robot is in the way.
     pub wander: Wander,
     /// Side of the robot, in boxes.
     pub size: u32,
@@ -48,7 +48,7 @@ impl Behaviour for Announce {
     }
 }
 
-/// Returns the announced poses, each with its sender.
+/// Reads every word as a pose: one of another behavior only makes the robot turn or wait in vain.
 fn announced_poses(heard: &[ReceivedMessage]) -> impl Iterator<Item = (u32, AnnouncedPose)> + '_ {
     heard.iter().map(|heard| (heard.sender, AnnouncedPose::from_word(heard.word)))
 }
@@ -83,7 +83,8 @@ impl AnnouncedPose {
         Self {
             col: signed_part(word, 0),
             row: signed_part(word, 1),
-            // Any word may come in over the radio, from other behaviors too.
+            // Any word may come in over the radio, from other behaviors too. A negative part leaves
+            // 253 to 255 here, which `after_action` brings back below 4.
             heading: (signed_part(word, 2) % 4) as u8,
             size: signed_part(word, 3),
         }

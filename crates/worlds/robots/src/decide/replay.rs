@@ -7,7 +7,7 @@ use sidestep_kernel::stream::Draws;
 /// A fixed list of actions, then nothing, or the list again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Replay {
-    /// The actions in order.
+    /// The actions, one for each decision.
     pub actions: Vec<ActionId>,
     /// Whether it starts again at the end of the list.
     pub repeat: bool,

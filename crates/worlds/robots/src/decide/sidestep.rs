@@ -20,10 +20,11 @@ pub enum SensorTrust {
     TwoReports,
 }
 
-/// Word 1: a sidestep under way: heading in the low two bits, boxes left to go above them.
+/// Word 1, after the count of goals in word 0 (`goto.rs`): a sidestep under way, its heading in the
+/// low two bits, boxes left to go above them.
 const SIDESTEP_WORD: usize = 1;
 /// Word 2: near reports of the last cycle, a byte per sector (ahead, left, right), and in the
-/// fourth byte its heading plus 1.
+/// fourth byte its heading plus 1, so that the 0 of the start is no heading.
 const LAST_REPORTS_WORD: usize = 2;
 
 /// The sectors that matter to a robot that never moves backward, in the order of the bytes of
@@ -106,7 +107,7 @@ fn resume_sidestep(
     }
 }
 
-/// Returns the number of near reports of a sector in one percept.
+/// Near is the first distance class, of whatever thing; capped at a byte of `LAST_REPORTS_WORD`.
 fn near_reports(percept: &Percept<'_>, sector: Sector) -> u8 {
     let beams = percept.readings.iter().zip(percept.sectors);
     let near = beams.filter(|(reading, of)| {
@@ -132,6 +133,8 @@ fn follow_course(
 ) -> ActionId {
     let (away, boxes) = match near {
         // Two robots that meet must not mirror each other forever, so wait or step aside by a draw.
+        // Waiting is the rarer choice, because most obstacles do not go away. The length is drawn
+        // too, because two that step to the same side by as many boxes meet again.
         NearSides { ahead: true, .. } if draws.uniform_below(4) == 0 => return STAY,
         NearSides { ahead: true, .. } => (freer_side(percept, draws), 1 + draws.uniform_below(3)),
         NearSides { left: true, right: false, .. } => (RIGHT, 1),

@@ -34,6 +34,7 @@ impl Behaviour for StallDetector {
         let last_place = word & ((1 << PLACE_BITS) - 1);
         let in_vain = if last_place == place { word >> PLACE_BITS } else { 0 };
         let is_stalled = in_vain >= STALL_STEPS;
+        // Kind 0 is that of free boxes and of no obstacle: the robot does not know what stops it.
         let assumed = is_stalled.then_some(Contact { kind: 0, side: Side::Front });
         let percept = Percept { contact: percept.contact.or(assumed), ..*percept };
         let decision = self.inner.decide(&percept, memory, draws);

@@ -34,7 +34,8 @@ pub(super) fn follow(
     }
 }
 
-/// Waits or sidesteps by a draw, because two robots that meet must not mirror each other forever.
+/// Waits or sidesteps by a draw, because two robots that meet must not mirror each other forever;
+/// by one or two boxes only, because it does not see where it goes.
 fn evade(percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> ActionId {
     if draws.uniform_below(3) == 0 {
         return STAY;

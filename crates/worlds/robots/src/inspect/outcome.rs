@@ -57,7 +57,7 @@ impl<T: BoxWord> Inspector<'_, T> {
         all
     }
 
-    /// Adds the transition that is drawn.
+    /// What blocks the transition is added where something does.
     fn with_drawn_transition(
         &self,
         section: FactSection,
@@ -84,7 +84,7 @@ impl<T: BoxWord> Inspector<'_, T> {
         self.cycle.world.body_id(self.cycle.body(slot).id)
     }
 
-    /// Returns the number of steps that are made of a transition.
+    /// A cut keeps the steps before the obstacle; other rules, and people, make none then.
     fn steps_made(&self, tried: &TransitionResult) -> usize {
         let body = self.cycle.body(self.slot);
         let is_mover = matches!(self.cycle.type_of(body).role, Role::Mover(_));
@@ -115,7 +115,8 @@ impl<T: BoxWord> Inspector<'_, T> {
         }
     }
 
-    /// Returns the line of some steps of a walk that starts at `from_m`.
+    /// The line begins where the first of these steps does, and has one point more than there are
+    /// steps.
     fn path_line(&self, from_m: view::Vec3, walk: &StepPath, steps: Range<usize>) -> MarkShape {
         let mut at = [0, 0];
         let mut points_m = vec![self.offset_point(from_m, at)];
@@ -138,7 +139,7 @@ impl<T: BoxWord> Inspector<'_, T> {
     }
 }
 
-/// Returns all transitions of an action, the drawn one marked.
+/// Rows are in the effector's order, in which the intended transition comes first.
 fn transition_table(action: &Action, all: &[TransitionResult], drawn: usize) -> FactTable {
     let mut table =
         FactTable::new(["transition", "turn", "in free space", "here", "steps free", "drawn"]);

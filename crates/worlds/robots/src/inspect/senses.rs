@@ -10,7 +10,7 @@ use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{self, BodyId, BodyKind, FactSection, FactTable, FactValue, MarkShape};
 
-/// One beam.
+/// One row of the table of readings: what a beam truly meets, and what its sensor makes of that.
 struct BeamReading<'a, T> {
     sensor: &'a MountedSensor,
     bearing_deg: f64,
@@ -167,7 +167,6 @@ fn beam_weight(ends_at_something: bool) -> f64 {
     if ends_at_something { 1.0 } else { 0.25 }
 }
 
-/// Adds a decision in words.
 fn with_decision(section: FactSection, model: &RobotModel, decision: Decision) -> FactSection {
     let action = model.body.effector.actions.get(usize::from(decision.action)).cloned();
     let trip = decision.trip.map(|trip| match trip {

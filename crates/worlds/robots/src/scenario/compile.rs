@@ -43,7 +43,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Largest number of bodies of a scenario.
+/// Largest number of bodies of a scenario, which finds a slip in `count` before it fills the
+/// memory.
 const MAX_BODIES: u64 = 10_000_000;
 /// Number of cycles of a run where the scenario does not give it.
 const DEFAULT_CYCLES: u64 = 10_000;
@@ -55,20 +56,20 @@ const MAX_BEAM_BOXES: f64 = 60_000.0;
 /// Behaviors that the library's user adds, by the name that a scenario gives them.
 pub type Behaviours = BTreeMap<String, Arc<dyn Behaviour>>;
 
-/// A compiled scenario.
+/// A scenario that is checked and tabulated, ready for any number of runs.
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    /// The immutable world.
+    /// The world, shared by all runs of the scenario.
     pub world: Arc<RobotsWorld>,
     /// Place and facing of each entity at the start, by id.
     pub start: Arc<[((u32, u32), u8)]>,
     /// Name of the scenario; may be empty.
     pub name: String,
-    /// The random seed.
+    /// Seed of all draws of a run; [`Self::reseeded`] changes it.
     pub seed: u64,
     /// Number of cycles that the scenario asks for.
     pub cycles: u64,
-    /// The tables to keep.
+    /// The tables that a run keeps where it is recorded.
     pub record: RecordSection,
     /// Surprises found by compiling.
     pub remarks: Vec<Remark>,
@@ -76,7 +77,8 @@ pub struct Compiled {
 }
 
 impl Compiled {
-    /// Compiles a scenario.
+    /// Compiles a scenario; `own` behaviors come beside the built-in ones, `order` changes no
+    /// result.
     ///
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in it.

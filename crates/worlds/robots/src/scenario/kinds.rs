@@ -14,7 +14,7 @@ const WALL: usize = 1;
 /// Largest number of kinds, because a contact keeps its kind in seven bits.
 const MAX_KINDS: usize = 127;
 
-/// All kinds, by number.
+/// The kinds by number, with what the sections of the scenario say of them.
 pub(super) struct Kinds {
     source: Arc<Source>,
     all: Vec<Kind>,
@@ -117,7 +117,7 @@ impl Kinds {
         Err(self.source.error(name.span(), cause, remedy))
     }
 
-    /// Returns the names by number.
+    /// By number, as the world keeps them.
     pub(super) fn names(&self) -> Vec<String> {
         self.all.iter().map(|kind| kind.name.clone()).collect()
     }
@@ -216,7 +216,7 @@ fn has_bodies(count: Option<&Spanned<u32>>) -> bool {
     count.is_none_or(|count| *count.get_ref() > 0)
 }
 
-/// Returns the kinds of all sections of bodies.
+/// Sections with a count of 0 are not there: no sensor meets their kind.
 fn body_sections(file: &RobotsFile) -> impl Iterator<Item = BodySection<'_>> {
     let robots = file.robots.0.iter().map(|s| BodySection {
         kind: &s.get_ref().kind,

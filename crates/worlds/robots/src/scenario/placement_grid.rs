@@ -5,15 +5,15 @@ use sidestep_kernel::EntityId;
 use sidestep_kernel::stream::Streams;
 use sidestep_map::{Cell, GridMap, Rect};
 
-/// Marks a box without an occupant.
+/// No entity has this id.
 const EMPTY: u32 = u32::MAX;
-/// Marks a wall.
+/// Like [`EMPTY`] above every entity id.
 const WALL: u32 = u32::MAX - 1;
 /// Number of draws before a free place is searched for in order. Where one place in fifty is free, so many draws
 /// fail in 2 % of all cases.
 const MAX_TRIES: u32 = 200;
 
-/// The occupant of each box of the map.
+/// The occupant of each box of the map: an entity id, [`EMPTY`] or [`WALL`].
 pub(super) struct PlacementGrid {
     width: u32,
     height: u32,

@@ -12,7 +12,7 @@ use sidestep_kernel::space::Position;
 pub(crate) struct Intent(u8);
 
 impl Intent {
-    /// No action.
+    /// Of bodies that are not due, and of doors that stay as they are.
     pub(crate) const IDLE: Self = Self(0);
     /// The only action of bodies without a choice: people step on, doors toggle.
     pub(crate) const ONLY_ACTION: Self = Self(1);
@@ -31,7 +31,6 @@ impl Intent {
         Self(self.0 | Self::CLEAR)
     }
 
-    /// Returns whether nothing is intended.
     #[inline(always)]
     pub(crate) fn is_idle(self) -> bool {
         self == Self::IDLE
@@ -56,9 +55,7 @@ impl Intent {
 pub struct Facing(u8);
 
 impl Facing {
-    /// A door that is closed.
     pub(crate) const CLOSED: Self = Self(0);
-    /// A door that is open.
     pub(crate) const OPEN: Self = Self(1);
 
     /// Returns the one of a body with this heading: 0 east, 1 north, 2 west, 3 south.
@@ -93,10 +90,8 @@ impl Facing {
 pub struct LastContact(u16);
 
 impl LastContact {
-    /// No contact.
     pub(crate) const NONE: Self = Self(0);
 
-    /// Returns the word of a contact.
     #[inline]
     pub(crate) fn from_contact(Contact { kind, side }: Contact) -> Self {
         Self(1 << 15 | u16::from(side as u8) << 8 | u16::from(kind))
@@ -115,7 +110,7 @@ impl LastContact {
 pub(crate) struct PackedPose(u32);
 
 impl PackedPose {
-    /// Returns the pose of a body.
+    /// Column and row are those of the padded grid, below 2^15.
     #[inline]
     pub(crate) fn new(at: Position, facing: Facing) -> Self {
         Self(u32::from(facing.0) << 30 | at.row() << 15 | at.col())
@@ -131,7 +126,7 @@ impl PackedPose {
         self.0 >> 15 & 0x7fff
     }
 
-    /// Returns the heading.
+    /// As [`Facing::heading`]; of a door 0 or 1.
     pub(crate) fn heading(self) -> u8 {
         (self.0 >> 30) as u8
     }

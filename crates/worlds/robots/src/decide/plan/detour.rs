@@ -21,7 +21,7 @@ pub(super) struct StepCosts {
     pub(super) beside: u16,
     /// Extra price of a place where something may be.
     pub(super) vague: u16,
-    /// Direction of the last step.
+    /// Direction of the last step; none before the first.
     pub(super) moved: Option<u8>,
     /// Whether that step did not lead nearer to the goal, so that it belongs to a detour.
     pub(super) is_sidestep: bool,

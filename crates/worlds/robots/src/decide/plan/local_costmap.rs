@@ -10,7 +10,6 @@ use std::sync::Arc;
 /// Distance in boxes up to which a robot plans. The square around it then has 81 places, which one word of
 /// 128 bits holds as a set.
 pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
-/// Side of the square in which it plans.
 pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
 /// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for. The body
 /// covers boxes east and north of the one from which all are counted, so there must be more on that side.

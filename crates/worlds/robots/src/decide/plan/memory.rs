@@ -39,7 +39,7 @@ pub(super) struct PlannerMemory {
 }
 
 impl PlannerMemory {
-    /// Unpacks a memory.
+    /// Reads the fields in the order in which [`Self::store`] writes them.
     pub(super) fn from_memory(memory: &Memory) -> Self {
         let mut one = BitReader(memory.words[PLANNER_MEMORY_WORD]);
         let mut two = BitReader(memory.words[OWN_REQUEST_WORD]);
@@ -60,7 +60,7 @@ impl PlannerMemory {
         }
     }
 
-    /// Packs it into a memory.
+    /// Fills both words to the last bit: a new field needs bits of another one.
     pub(super) fn store(&self, memory: &mut Memory) {
         let mut one = BitWriter::default();
         one.write_u8(self.rank, 8);

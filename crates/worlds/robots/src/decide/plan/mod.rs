@@ -226,6 +226,7 @@ fn update_memory(
     if goal.is_final_place(percept.at) {
         memory.rank = AT_LAST_GOAL_RANK;
     } else if goal.is_done {
+        // One rank in four cycles: the ranks up to the highest one last for about 240 cycles.
         let growth = u8::from(percept.now.is_multiple_of(4));
         memory.rank = (memory.rank + growth).clamp(AT_LAST_GOAL_RANK + 1, MAX_DONE_RANK);
     }
@@ -390,7 +391,8 @@ fn travel(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -
     }
     if view.is_blocked(direction) {
         memory.waited += 1;
-        // Sensors that err may see something in a narrow gap forever.
+        // Sensors that err may see something in a narrow gap forever. One decision in four tries to
+        // go on, so that of two robots that wait for each other mostly one moves.
         let has_waited = view.is_careful && memory.waited > WAIT_TIMEOUT_DECISIONS;
         let tries = has_waited && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
@@ -412,6 +414,8 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     let has_gained = moved.is_some_and(|moved| view.rise((moved + 2) % 4) == Some(1));
     // Where nothing errs robots see enough to keep to every change of course.
     let is_sidestep = !view.is_careful || moved.is_some() && !has_gained;
+    // At first cheaper than most detours, because the obstacle may go away; each decision in vain
+    // makes a longer detour worth it.
     StepCosts { blocked: 3 + 4 * u16::from(memory.waited), beside, vague, moved, is_sidestep }
 }
 

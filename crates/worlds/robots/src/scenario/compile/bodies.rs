@@ -16,7 +16,7 @@ pub(super) struct BodyGroup {
     pub(super) phase: Option<u32>,
 }
 
-/// One type for all of a group, or one for each body.
+/// One type for all of a group, or one for each body where goals or phases are its own.
 #[derive(Debug)]
 pub(super) enum GroupTypes {
     Shared(u16),
@@ -135,12 +135,12 @@ fn is_inside(from: u32, extent: u32, limit: u32) -> bool {
     extent > 0 && from.checked_add(extent).is_some_and(|end| end <= limit)
 }
 
-/// Returns the number of cycles from one action to the next.
+/// Bodies act in every cycle unless the scenario says otherwise.
 pub(super) fn period_cycles(period: Option<Period>) -> u32 {
     period.map_or(1, |period| period.get() as u32)
 }
 
-/// Returns width and height in boxes.
+/// Bodies cover one box unless the scenario says otherwise.
 pub(super) fn size_boxes(size: Option<[SideBoxes; 2]>) -> (u32, u32) {
     size.map_or((1, 1), |[width, height]| (width.get() as u32, height.get() as u32))
 }

@@ -41,6 +41,7 @@ fn read_map(
             "leave it out, or give an image as `file`",
         ));
     }
+    // By default the paper's robot, 0.53 m across, covers 2 x 2 boxes.
     let box_size_m = s.box_size_m.map_or(0.25, f64::from);
     match (&s.file, &s.ascii, &s.office) {
         (Some(file), None, None) => {

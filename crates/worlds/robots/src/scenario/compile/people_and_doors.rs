@@ -22,6 +22,8 @@ impl Compiler<'_> {
         self.reach = self.reach.max(1);
         let step = [Transition { p: 1.0, path: vec![Side::Front], turn: 0 }];
         let actions = actions_at_headings(&[step.to_vec()], size, self.stride());
+        // By default a person draws a new direction at every fifth action on average: it crosses
+        // rooms, and soon leaves a wall that it has run into.
         let straight = Bernoulli::new(s.p_straight.map_or(0.8, f64::from));
         let ty = self.body_type(&s.kind, size, actions, Role::Mover(Mover { straight }))?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);

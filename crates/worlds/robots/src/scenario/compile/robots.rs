@@ -327,7 +327,7 @@ fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, UnlocatedE
     Ok(Replay { actions: ids.collect::<Result<_, _>>()?, repeat: s.repeat.unwrap_or(false) })
 }
 
-/// Returns the number of boxes of a robot's side.
+/// One box unless the scenario says otherwise.
 fn side_boxes(s: &RobotSection) -> u32 {
     s.size.map_or(1, |side| side.get() as u32)
 }

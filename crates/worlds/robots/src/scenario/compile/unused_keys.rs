@@ -4,7 +4,7 @@
 use super::super::{DoorSection, MoverSection, RobotSection, RobotsFile};
 use super::*;
 
-/// The built-in behaviors, and the keys of each.
+/// The built-in behaviors, and the keys that each reads beside `kind`.
 pub(in crate::scenario) const BEHAVIOURS: [(&str, &[&str]); 7] = [
     ("wander", &["turn_every"]),
     ("announce", &["turn_every"]),
