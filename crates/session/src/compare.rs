@@ -78,7 +78,6 @@ fn differing_bodies(
     differing
 }
 
-/// Returns the number of bodies that have rows.
 fn count_bodies(rows: &PositionColumns, table: &Table) -> usize {
     bits_by_body(rows, &[], |name| table.column(name)).len()
 }

@@ -40,7 +40,7 @@ enum BodySource {
 }
 
 impl BodySource {
-    /// Returns the bodies of a cycle.
+    /// Returns the bodies of a cycle, which may be before the last one.
     fn bodies_at(&mut self, cycle: Cycle) -> Vec<Body> {
         match self {
             Self::Tables(places) => places.bodies_at(cycle),

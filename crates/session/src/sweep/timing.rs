@@ -13,7 +13,7 @@ pub struct SweepTiming {
     worked_s: f64,
     /// The part of that time spent on simulation.
     simulated_s: f64,
-    /// Number of runs.
+    /// Number of runs, those that failed among them.
     pub runs: u64,
     /// Largest number of runs in progress at once.
     pub at_once: usize,
@@ -38,7 +38,7 @@ impl SweepTiming {
         self.at_once = at_once;
     }
 
-    /// Adds the times of later runs.
+    /// Adds the times of later runs; their number at once is kept if it is larger.
     pub(super) fn add(&mut self, later: Self) {
         self.wall_s += later.wall_s;
         self.worked_s += later.worked_s;
