@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
 
-/// Maximum number of entries of a folder that are listed.
+/// Maximum number of entries of a folder that are listed, so that one listing stays quick.
 const MAX_ENTRIES: usize = 1000;
 /// Maximum size of a file that is read when its folder is listed: a list must not take seconds.
 const MAX_FILE_BYTES: u64 = 1 << 20;

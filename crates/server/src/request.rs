@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 /// it replaces, both as JSON.
 pub const MAX_REQUEST_BYTES: usize = 40 << 20;
 
-/// A request of which only the number can be read.
+/// A request whose other parts may be malformed: the answer needs its number.
 #[derive(Deserialize)]
 struct RequestNumber {
     id: u32,

@@ -34,12 +34,11 @@ pub(super) struct CancelToken {
 }
 
 impl CancelToken {
-    /// Returns whether the job is cancelled.
     pub(super) fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Relaxed)
     }
 
-    /// Cancels the job.
+    /// Asks the job to stop: between its steps, and within a cycle that it computes.
     pub(super) fn cancel(&self) {
         self.is_cancelled.store(true, Relaxed);
         self.interrupt.raise();

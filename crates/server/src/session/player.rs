@@ -246,7 +246,7 @@ impl Player {
         Ok(ReplyBody::Done)
     }
 
-    /// Pauses at the present cycle.
+    /// Pauses at the present cycle, whose metrics and digest are then on display.
     fn pause(&mut self) {
         let is_at_end = self.is_at_end();
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
