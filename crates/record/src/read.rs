@@ -42,12 +42,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// Returns the number of rows.
+    /// Returns the number of rows, which all columns have.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, Values::len)
     }
 
-    /// Returns the values of the column `name`, if it exists.
+    /// Returns the values of the column `name`; `None` if the table has no such column.
     pub fn column(&self, name: &str) -> Option<&Values> {
         Some(&self.columns[position(&self.schema, name)?])
     }
@@ -169,7 +169,7 @@ pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
     InputError::new(path.display(), cause, remedy)
 }
 
-/// The requested range of cycles.
+/// The requested range of cycles; all rows if it has no bounds, also those of tables without cycles.
 #[derive(Debug, Clone, Copy)]
 struct CycleRange {
     from: Bound<u64>,
@@ -201,7 +201,7 @@ impl CycleRange {
     }
 }
 
-/// One open file.
+/// One open file, of which one row group at a time is in memory.
 struct PartReader<'a> {
     path: &'a Path,
     bytes: File,

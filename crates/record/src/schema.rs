@@ -36,11 +36,11 @@ pub struct Provenance {
     pub program_version: String,
     /// The scenario's text, with every default and include resolved.
     pub scenario: String,
-    /// The seed.
+    /// The seed of the run, in case an option has replaced that of the scenario.
     pub seed: u64,
 }
 
-/// One column in [`COLUMNS`].
+/// One column in [`COLUMNS`], with what the Parquet schema cannot express.
 #[derive(Debug, Serialize, Deserialize)]
 struct ColumnEntry {
     name: String,

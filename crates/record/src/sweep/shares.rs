@@ -179,7 +179,6 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     }
 }
 
-/// Returns the share with this file name.
 fn share_of(name: &str, extension: &str) -> Option<Share> {
     let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
     Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })
