@@ -190,7 +190,7 @@ fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
     failed.len()
 }
 
-/// Prints that a share is done, or how many of its runs are finished.
+/// Prints that a share is done, or how many of its runs are finished so far.
 ///
 /// # Errors
 /// When that cannot be written.
