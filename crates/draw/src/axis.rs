@@ -44,7 +44,6 @@ impl Axis {
         self
     }
 
-    /// Returns the label.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
@@ -112,6 +111,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
         let margin = 0.04 * (high - low);
         return (low - margin, high + margin);
     }
+    // Beyond 0.4 the empty part would be most of the axis.
     // Zero belongs on an axis that comes near it.
     let low = if low > 0.0 && low < 0.4 * high { 0.0 } else { low };
     let high = if high < 0.0 && high > 0.4 * low { 0.0 } else { high };
@@ -185,7 +185,6 @@ impl FittedAxis {
         }
     }
 
-    /// Returns the value that lies at `part` (0 to 1) of the axis.
     pub(crate) fn value_at(&self, part: f64) -> f64 {
         if self.log {
             return self.low * pow(self.high / self.low, part);

@@ -70,7 +70,7 @@ const CROSS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
-/// A color in SVG notation.
+/// A color in SVG notation: borrowed where it is fixed, owned where it follows from a number.
 pub(crate) type SvgColor = Cow<'static, str>;
 
 /// The symbol before a legend's label.
@@ -90,7 +90,7 @@ pub(crate) enum LegendSymbol {
     Leader,
 }
 
-/// An entry of a legend.
+/// A line of a legend; entries without a label are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LegendEntry {
     pub(crate) symbol: LegendSymbol,
@@ -188,7 +188,7 @@ impl Legend {
     }
 }
 
-/// Returns the attributes of a reference line.
+/// Returns the attributes of a reference line, dashed so that no series is taken for it.
 pub(crate) fn reference_line_attributes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
@@ -253,7 +253,6 @@ pub(crate) fn title_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { weight: Weight::Bold, fill: INK, ..TextStyle::new(size_px, Anchor::Start) }
 }
 
-/// Returns the text style of small print.
 pub(crate) fn small_print_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { fill: FAINT_INK, ..TextStyle::new(size_px, Anchor::Start) }
 }

@@ -4,7 +4,7 @@ use crate::error::DrawError;
 use sidestep_kernel::view::{BODY_COLORS, Color};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of colors of series.
+/// One more than bodies have: charts also use black, which on a map would be a wall.
 const SERIES_COLOR_COUNT: usize = BODY_COLORS.len() + 1;
 
 /// Returns the colors of series in SVG notation, those of bodies and black: Okabe and Ito's palette without its
@@ -62,7 +62,6 @@ pub(crate) fn series_fill(index: usize) -> (f64, &'static str) {
     }
 }
 
-/// Returns a color in SVG notation.
 pub(crate) fn hex([r, g, b]: Color) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
