@@ -365,7 +365,6 @@ impl IkOptions {
     }
 }
 
-/// Returns the sphere of a row of x, y, z and radius in m.
 fn sphere(&[x, y, z, radius_m]: &[f64; 4]) -> Sphere {
     Sphere { center_m: [x, y, z], radius_m }
 }
@@ -396,7 +395,7 @@ fn result_arrays<'py>(
         .build(ResultClass("sidestep._arm", "IkResult"))
 }
 
-/// Returns the further postures of each target, one per row.
+/// Returns the further postures of each target, one per row; targets have different numbers of them.
 fn other_postures<'py>(
     py: Python<'py>,
     results: &[IkResult],

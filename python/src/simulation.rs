@@ -156,7 +156,7 @@ impl Simulation {
         })
     }
 
-    /// Returns a team by number or name, with its number.
+    /// Returns a team by number or name, with its number; the first one without either.
     fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<IndexedTeam> {
         find_team(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
@@ -185,7 +185,7 @@ impl Simulation {
         buffers?.into_dict(py, team)
     }
 
-    /// Gives an order to agents of a team.
+    /// Gives an order to some agents of a team, while other threads of Python run.
     fn order_agents(
         &self,
         order: &str,
@@ -233,7 +233,7 @@ impl Simulation {
 enum Goal {
     /// This many cycles after the present one.
     Further(u64),
-    /// This one.
+    /// To this cycle, counted from the start of the run.
     Until(Cycle),
 }
 
@@ -255,7 +255,7 @@ impl Goal {
     }
 }
 
-/// The outcome of one time slice.
+/// How far one time slice got.
 struct SliceOutcome {
     /// Cycles done.
     done: u64,

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A package of the workspace.
+/// A package of the workspace, with its description by cargo.
 pub(crate) struct Package {
     /// Root of the workspace.
     root: PathBuf,

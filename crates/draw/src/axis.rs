@@ -111,8 +111,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
         let margin = 0.04 * (high - low);
         return (low - margin, high + margin);
     }
-    // Beyond 0.4 the empty part would be most of the axis.
-    // Zero belongs on an axis that comes near it.
+    // Zero belongs on an axis that comes near it: the data then still take more than half of the length.
     let low = if low > 0.0 && low < 0.4 * high { 0.0 } else { low };
     let high = if high < 0.0 && high > 0.4 * low { 0.0 } else { high };
     let step = nice_step(high - low, most);

@@ -56,7 +56,7 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// The style of a text; its color is always that of ink.
+/// The style of a text; its font is always the embedded one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextStyle<'a> {
     pub(crate) size_px: f64,

@@ -57,7 +57,7 @@ impl Model {
         (is_branch(path[k]) && branches > 1 && longest < joints_before).then_some(hand)
     }
 
-    /// Returns for each link whether it is rigid to `link`.
+    /// Returns for each link whether no movable joint lies between it and `link`.
     fn rigid_links(&self, link: usize) -> Vec<bool> {
         let mut is_rigid = vec![false; self.links.len()];
         is_rigid[link] = true;
