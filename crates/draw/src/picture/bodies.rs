@@ -302,6 +302,7 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
         _ => return,
     };
     if body.kind == BodyKind::Robot {
+        // A third of the side to each end, so that the color of the body stays visible around it.
         let size_m = 0.34 * side_m;
         let corners =
             [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];

@@ -18,6 +18,7 @@ impl Model {
         let mut best_count = 0;
         for leaf in self.leaves() {
             let count = self.movable_joints(&self.path_to(leaf));
+            // Any leaf is better than the root, even where no joint moves.
             if count > best_count || best == self.root {
                 best = leaf;
                 best_count = count;

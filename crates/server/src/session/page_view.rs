@@ -140,6 +140,7 @@ impl PageView {
         } else {
             return false;
         }
+        // Counted from the time when it was due, so that small delays do not lower the rate.
         self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
         has_credit
     }

@@ -265,6 +265,7 @@ impl Player {
     /// request comes; `None` for forever.
     pub(super) fn poll(&mut self) -> Option<Duration> {
         let now = Instant::now();
+        // Each time, because another session may have started since, and wants its share.
         self.history.keyframes.shrink_to_budget();
         match (self.state, self.seek) {
             (SessionState::Playing, _) => {

@@ -151,7 +151,7 @@ impl CycleRange {
 }
 
 impl ExportContext<'_> {
-    /// Returns the run at the start of a cycle, computed from the last checkpoint before it.
+    /// Returns the run at the start of a cycle, computed from the last checkpoint if that is before it.
     fn run_up_to(&self, cycle: Cycle) -> Result<Box<dyn Simulation>, Error> {
         let mut run = self.recorded.start_near(cycle, self.wanted.workers)?;
         self.drive(run.as_mut(), cycle, Sinks::default())?;

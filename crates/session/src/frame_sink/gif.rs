@@ -121,6 +121,7 @@ impl Palette {
         }
         colors.sort_unstable();
         colors.dedup();
+        // The last entry is not a color. Colors that do not fit get the nearest one that does.
         colors.truncate(usize::from(UNCHANGED));
         let known = colors.len();
         // A palette has a power of two of entries; the rest stays unused.

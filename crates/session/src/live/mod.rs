@@ -137,6 +137,7 @@ impl ViewerServer {
     /// Shows a frame that was due.
     pub fn send_frame(&mut self, frame: Frame, now: Instant) {
         self.shown_s = frame.time_s;
+        // Counted from the time when it was due, so that small delays do not lower the rate.
         self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
         self.is_encoding.store(true, Ordering::Release);
         if let Some(frames) = &self.frames {

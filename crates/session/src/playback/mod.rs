@@ -157,6 +157,7 @@ impl Simulation for RecordedPlayback {
             return Err(CheckpointError::Damaged);
         }
         self.cycle = cycle;
+        // The next frame is of another time, so its events are those from here on.
         self.shown = cycle;
         Ok(())
     }
