@@ -271,7 +271,7 @@ fn draw_error(error: &DrawError) -> PyErr {
     error::RecordError::new_err(error.to_string())
 }
 
-/// Returns tables by name.
+/// Returns a dict of tables by name, also of those without rows.
 fn tables_dict(
     py: Python<'_>,
     rows: Vec<(TableSchema, Vec<Values>)>,

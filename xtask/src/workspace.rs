@@ -8,7 +8,7 @@ use std::process::Command;
 
 /// A package of the workspace, with its description by cargo.
 pub(crate) struct Package {
-    /// Root of the workspace.
+    /// Root of the workspace, from which paths of sources are counted.
     root: PathBuf,
     metadata: Value,
 }

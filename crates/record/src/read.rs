@@ -159,7 +159,6 @@ fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputEr
     Ok((found, complete))
 }
 
-/// Returns the error of a folder that cannot be read.
 pub(crate) fn unreadable(folder: &Path, error: &RecordError) -> InputError {
     InputError::new(folder.display(), error.cause.clone(), "make the folder readable")
 }
@@ -376,7 +375,7 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     }
 }
 
-/// Appends the rows with a cycle in the range.
+/// Appends the rows with a cycle in the range; without a column of cycles all of them.
 fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: CycleRange) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,
@@ -442,7 +441,7 @@ pub(crate) fn read_cells<T: DataType, V: Clone + Default>(
     Ok(values.into())
 }
 
-/// Reads a column of text to its end.
+/// Reads a column of text to its end; apart from numbers, because texts are decoded into one buffer.
 pub(crate) fn read_texts(
     reader: ColumnReaderImpl<ByteArrayType>,
     is_nullable: bool,

@@ -53,7 +53,7 @@ struct ColumnEntry {
     nullable: bool,
 }
 
-/// Names of the column types in [`COLUMNS`].
+/// Writes column types by the kernel's names for them, which files keep even if the variants in Rust change.
 mod type_name {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::Serializer;

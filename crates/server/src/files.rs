@@ -30,7 +30,7 @@ pub(crate) struct AllowedFiles {
 /// A folder or a file given at start.
 #[derive(Debug)]
 struct Root {
-    /// The path as it was given.
+    /// The path as it was given, which listings show.
     path: PathBuf,
     /// The path with links resolved.
     real: PathBuf,
@@ -88,7 +88,7 @@ impl AllowedFiles {
         Self { granted: Arc::new(granted), ..self }
     }
 
-    /// Returns the first folder given at start.
+    /// Returns the first folder given at start, from which paths in a new scenario start.
     pub(crate) fn first_root_folder(&self) -> PathBuf {
         let folder = self.roots.iter().find(|root| root.real.is_dir());
         folder.map_or_else(PathBuf::new, |root| root.path.clone())

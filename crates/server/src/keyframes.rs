@@ -25,7 +25,6 @@ pub(crate) struct MemoryBudget {
 }
 
 impl MemoryBudget {
-    /// Returns a budget of some bytes in all, and a maximum for one run.
     pub(crate) fn new(total_bytes: usize, max_bytes_per_run: usize) -> Self {
         Self {
             used: AtomicUsize::new(0),

@@ -76,7 +76,8 @@ impl Outbox {
         self.lock().long.iter().map(|(_, bytes)| bytes).sum()
     }
 
-    /// Sends a reply.
+    /// Sends a reply; its request counts as answered at once, and the reply is in the backlog until the socket takes
+    /// it.
     pub(crate) fn send_reply(&self, reply: &Reply) {
         let text = to_json(reply);
         let mut pending = self.lock();

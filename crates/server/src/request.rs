@@ -69,7 +69,6 @@ fn read_call(Envelope { id, session, call }: Envelope) -> Result<ClientRequest, 
     Ok(ClientRequest::Session { id, session, call })
 }
 
-/// Returns the name of the called method.
 fn method_name(id: u32, call: &Map<String, Value>) -> Result<String, Problem> {
     let name = call.get("do").and_then(Value::as_str);
     name.map(String::from).ok_or_else(|| {

@@ -95,7 +95,7 @@ impl Samples {
         self.spacing = self.spacing.saturating_mul(2);
     }
 
-    /// Returns the samples from a number on.
+    /// Returns the samples from a number on; none if there are not so many, as after a thinning.
     pub(crate) fn answer(&self, from: u32) -> ReplyBody {
         let first = (from as usize).min(self.cycles.len());
         ReplyBody::Metrics {

@@ -129,7 +129,7 @@ impl RateLimiter {
     }
 }
 
-/// The sessions of a socket.
+/// The sessions of a socket, which end with it.
 struct SocketSessions {
     state: Arc<AppState>,
     outbox: Arc<Outbox>,

@@ -82,7 +82,7 @@ fn count_bodies(rows: &PositionColumns, table: &Table) -> usize {
     bits_by_body(rows, &[], |name| table.column(name)).len()
 }
 
-/// Returns the bits of all columns by body, of all its rows.
+/// Returns the bits of all columns by body, so that missing values and negative zeros count, too.
 fn bits_by_body<'a>(
     rows: &PositionColumns,
     names: &[&str],

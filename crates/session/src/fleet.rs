@@ -39,7 +39,7 @@ pub struct AgentName {
 }
 
 impl AgentName {
-    /// Returns the name of an agent that is a body, or a part of one.
+    /// Returns the name of a body's agent, or with `part` of the agent that is this part of it.
     pub fn new(noun: impl Into<Cow<'static, str>>, number: EntityId, part: Option<u32>) -> Self {
         Self { noun: noun.into(), number, part }
     }

@@ -19,7 +19,7 @@ use crate::run_table::{self, LoadedTable};
 pub struct Share {
     /// Its number, from 0.
     pub index: u32,
-    /// The number of shares.
+    /// The number of shares into which the trials are split; those of other numbers may exist beside.
     pub count: u32,
 }
 

@@ -135,7 +135,7 @@ fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec
     (distinct, numbers)
 }
 
-/// Returns the appearance of a body in each condition.
+/// Returns the appearance of a body in each condition, because conditions change from frame to frame.
 fn appearances(body: &Body, dimensions: u8) -> [Appearance; 5] {
     CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
 }

@@ -25,7 +25,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Creates an encoder for a run with this scenery.
+    /// Creates an encoder for a run with this scenery, whose first frame begins a body table.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();
         let mut encoder = Self { session, dimensions: 2, names, body_set: None, tables: 0 };

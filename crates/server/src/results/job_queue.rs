@@ -96,13 +96,11 @@ impl JobQueue {
     }
 }
 
-/// Returns the error of a job that panicked.
 fn internal_error() -> ResultError {
     let problem = Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
     ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
 }
 
-/// Converts an error of a job.
 pub(super) fn result_error(error: &Error) -> ResultError {
     crate::session::problem_of(error).into()
 }

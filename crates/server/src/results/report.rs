@@ -110,7 +110,7 @@ impl ReportPart {
     }
 }
 
-/// Returns the names of all figures as JSON.
+/// Returns the names of all figures as JSON, by which the page asks for each.
 fn figures_json(report: &RenderedReport) -> String {
     let stems: Vec<&str> = report.pictures.iter().map(|picture| picture.stem.as_str()).collect();
     serde_json::json!(stems).to_string()

@@ -18,7 +18,7 @@ pub(super) struct RunHistory {
 }
 
 impl RunHistory {
-    /// Returns the history of a run that is at its start.
+    /// Starts the history of a run with a keyframe and a sample of its start.
     pub(super) fn from_run(
         run: &dyn Simulation,
         infos: &'static [MetricInfo],

@@ -217,7 +217,7 @@ impl SessionWorker {
     }
 }
 
-/// Returns the message of a panic.
+/// Returns the message of a panic; it is text unless a library panicked with a value of its own.
 fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()

@@ -49,7 +49,7 @@ pub(super) struct Player {
     request_in_progress: Option<u32>,
     slice: SliceSize,
     rate: CycleRate,
-    /// Digest of the state, and its cycle.
+    /// Digest of the state at its cycle: computed once for each pause, because it reads the whole state.
     digest: Option<(Cycle, String)>,
     /// The result of comparing a recording with its digest.
     verdict: Option<String>,

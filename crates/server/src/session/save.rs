@@ -47,7 +47,6 @@ pub(super) fn session_path(own: Option<&SessionFile>, place: &str) -> Result<Str
     })
 }
 
-/// Options of saving.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SaveOptions {
     /// The text that the page believes the file holds; without it, the text that the session has read or written.
