@@ -12,11 +12,9 @@ pub(crate) type IndexedTeam = (usize, Arc<Team>);
 
 /// The part of a run that policies need.
 pub(crate) trait PolicyRun {
-    /// Returns the cycles done.
     fn now(&self, py: Python<'_>) -> PyResult<Cycle>;
     /// Returns whether nothing can happen anymore.
     fn has_ended(&self, py: Python<'_>) -> PyResult<bool>;
-    /// Returns the plan of its scenario.
     fn plan(&self) -> RunConfig;
     /// Returns a team by number or name, with its number, by which the run knows it.
     fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<IndexedTeam>;

@@ -104,7 +104,6 @@ impl Simulation {
         })
     }
 
-    /// Returns a value read from the run.
     fn read<T: Send>(
         &self,
         py: Python<'_>,
@@ -113,7 +112,6 @@ impl Simulation {
         self.with_run(py, |run| Ok(query(run.simulation())))
     }
 
-    /// Returns the state as bytes.
     fn checkpoint_bytes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         self.with_run(py, |run| run.checkpoint().map_err(|e| error::record_error(&e)))
     }
@@ -203,7 +201,6 @@ impl Simulation {
         })
     }
 
-    /// Draws the present state.
     fn draw(&self, py: Python<'_>, width: u32) -> PyResult<(AnimationFrame, (u32, u32))> {
         self.with_run(py, |run| {
             let simulation = run.simulation_mut();

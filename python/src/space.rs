@@ -215,7 +215,6 @@ impl ObservationBuffers {
         Self(spaces.map(|space| Buffer::zeroed(space, team.agents.len())).collect())
     }
 
-    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> Vec<BufferMut<'_>> {
         self.0.iter_mut().map(Buffer::as_buffer_mut).collect()
     }
@@ -302,7 +301,6 @@ impl<'py> OutArrays<'py> {
         Ok(Self(arrays))
     }
 
-    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> PyResult<Vec<BufferMut<'_>>> {
         self.0.iter_mut().map(Array::as_buffer_mut).collect()
     }

@@ -49,7 +49,6 @@ impl Package {
         Path::new(string(&self.metadata["manifest_path"])).starts_with(self.root.join(folder))
     }
 
-    /// Reads the files of all targets.
     pub(crate) fn sources(&self) -> Result<Vec<Source>, String> {
         let mut targets: Vec<&Value> = array(&self.metadata["targets"]).collect();
         // A file that code and tests share is read once, as code.

@@ -136,7 +136,6 @@ impl Legend {
         self.font_px * 1.6
     }
 
-    /// Returns the height of all rows.
     pub(crate) fn height_px(&self) -> f64 {
         self.placed.last().map_or(0.0, |(_, row, _)| (*row as f64 + 1.0) * self.row_px())
     }
@@ -193,7 +192,7 @@ pub(crate) fn reference_line_attributes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
 
-/// Draws the mark where a track starts.
+/// Draws the mark where a track starts: a ring, filled so that no line shows through.
 pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(
         center,
@@ -229,7 +228,7 @@ pub(crate) fn arrowhead(
     svg.path(&data, format_args!(r#"class="direction" fill="{color}" {rim}"#));
 }
 
-/// Draws the mark where a track ends.
+/// Draws the mark where a track ends: a dot, unlike the ring at its start.
 pub(crate) fn end_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(center, radius + 1.0, format_args!(r##"fill="{color}" stroke="#FFFFFF""##));
 }

@@ -87,7 +87,6 @@ impl Style {
     /// A map as large as a page.
     pub const MAP: Self = Self { width_px: 900.0, height_px: 900.0, font_px: 13.0 };
 
-    /// Returns the size of title text in pixels.
     pub(crate) fn title_px(&self) -> f64 {
         self.font_px * 1.15
     }

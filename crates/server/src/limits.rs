@@ -40,7 +40,6 @@ impl ConnectionLimiter {
         Some(ConnectionPermit { limiter: self.clone(), peer })
     }
 
-    /// Returns whether there is no connection.
     pub(crate) fn is_empty(&self) -> bool {
         self.lock().is_empty()
     }

@@ -54,7 +54,7 @@ impl AppState {
         }
     }
 
-    /// Returns the first notice for a page.
+    /// Returns the first notice for a page: version, worlds, and what the command line asked to open.
     pub(crate) fn hello(&self) -> ServerNotification {
         ServerNotification::Hello {
             version: VERSION,

@@ -91,7 +91,6 @@ fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCod
     Ok(ExitCode::Interrupted)
 }
 
-/// Returns the tables of all metrics.
 fn tables(summary: &Summary) -> String {
     let mut texts = Vec::new();
     for table in &summary.brief() {

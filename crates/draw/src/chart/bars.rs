@@ -28,7 +28,6 @@ impl Bar {
         Self { value, interval: None }
     }
 
-    /// Returns the values that it reaches.
     fn heights(&self) -> [f64; 3] {
         let (low, high) = self.interval.unwrap_or((self.value, self.value));
         [low, self.value, high]

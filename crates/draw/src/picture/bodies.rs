@@ -213,7 +213,6 @@ fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
     is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
 }
 
-/// Returns the line around a body.
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     let white = [0xFF; 3];
     match body.kind {

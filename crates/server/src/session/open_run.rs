@@ -291,7 +291,6 @@ impl OpenRun {
         recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
-    /// Returns whether its text cannot be replaced.
     pub(crate) fn is_read_only(&self) -> bool {
         self.deps.read_only || self.recorded.is_some()
     }

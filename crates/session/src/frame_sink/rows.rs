@@ -35,7 +35,6 @@ impl FrameRows {
         Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
     }
 
-    /// Takes the rows that were kept so far.
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
         let table = frames_table();
         let rows = std::mem::take(&mut self.rows);

@@ -25,7 +25,6 @@ impl SweepTiming {
         Self { started_at: Some(Instant::now()), ..Self::default() }
     }
 
-    /// Adds a finished run.
     pub(super) fn record(&mut self, outcome: &Outcome) {
         self.runs += 1;
         self.simulated_s += outcome.costs.get("run_wall_s").and_then(|v| v.as_f64()).unwrap_or(0.0);
