@@ -16,7 +16,7 @@ pub(crate) fn folder() -> &'static Path {
     FOLDER.get().expect("a folder was chosen")
 }
 
-/// Writes a file and returns its path.
+/// Writes a file for one input, over that of the input before, and returns its path.
 pub(crate) fn file(name: &str, data: &[u8]) -> PathBuf {
     let path = folder().join(name);
     fs::write(&path, data).expect("a file");
@@ -45,7 +45,7 @@ pub(crate) fn mrclam_folder(data: &[u8]) -> &'static Path {
     folder()
 }
 
-/// A run folder with this manifest.
+/// A run folder with this manifest, and nothing else that a reader needs before it.
 pub(crate) fn run_folder(data: &[u8]) -> &'static Path {
     file("scenario.toml", b"format = 1\n");
     file("run.json", data);

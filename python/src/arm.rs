@@ -44,7 +44,7 @@ fn option_error(e: &InputError) -> PyErr {
 /// Words for the method that finds the joint values.
 const ENGINES: [(&str, Engine); 3] =
     [("auto", Engine::Auto), ("chain", Engine::Chain), ("dls", Engine::Dls)];
-/// Words for the collision model of an arm.
+/// Words for the parts that must not touch obstacles, as `--body` of the command has them.
 const BODIES: [(&str, CollisionModel); 3] = [
     ("rods", CollisionModel::Rods),
     ("shapes", CollisionModel::Shapes),
@@ -78,7 +78,7 @@ enum Axis {
     About(usize),
 }
 
-/// Returns the rows of an array of this width.
+/// Returns the rows of an array, which must have this width.
 fn matrix_rows(
     name: &str,
     array: &PyReadonlyArray2<'_, f64>,
@@ -331,7 +331,7 @@ impl IkOptions {
         Ok((goal, remarks))
     }
 
-    /// Returns the goal of one target.
+    /// Returns the goal of one target; the number of its values decides how its orientation is given.
     fn target_goal(&self, goal: &ArmGoal, target: &[f64]) -> PyResult<ArmGoal> {
         let position = row_vector(target);
         let target_pose = match target.len() {
@@ -365,7 +365,6 @@ impl IkOptions {
     }
 }
 
-/// Returns the sphere of a row of x, y, z and radius in m.
 fn sphere(&[x, y, z, radius_m]: &[f64; 4]) -> Sphere {
     Sphere { center_m: [x, y, z], radius_m }
 }
@@ -396,7 +395,7 @@ fn result_arrays<'py>(
         .build(ResultClass("sidestep._arm", "IkResult"))
 }
 
-/// Returns the further postures of each target, one per row.
+/// Returns the further postures of each target, one per row; targets have different numbers of them.
 fn other_postures<'py>(
     py: Python<'py>,
     results: &[IkResult],

@@ -113,7 +113,6 @@ pub(crate) fn rows_by_name<'py>(
     Ok(rows)
 }
 
-/// Returns a number for each body.
 pub(crate) fn body_column<'py, T: numpy::Element>(
     py: Python<'py>,
     bodies: &[Body],
@@ -132,7 +131,6 @@ pub(crate) fn body_rows<'py, const N: usize>(
     PyArray1::from_vec(py, flat).reshape([bodies.len(), N])
 }
 
-/// Returns a text for each body.
 pub(crate) fn body_texts<'py>(
     py: Python<'py>,
     bodies: &[Body],

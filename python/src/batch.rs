@@ -70,7 +70,7 @@ impl Batch {
         Ok((number, &**team))
     }
 
-    /// Returns a truth value for each world.
+    /// Returns a truth value for each world; `None` stands for all worlds.
     fn parse_mask(&self, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<bool>>> {
         let Some(mask) = mask else { return Ok(None) };
         let array: Option<PyReadonlyArray1<'_, bool>> = mask.extract().ok();
@@ -80,7 +80,7 @@ impl Batch {
         }
     }
 
-    /// Returns a seed for each world.
+    /// Returns a seed for each world, of a list or an array of whole numbers.
     fn parse_seeds(&self, seeds: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
         whole_numbers(seeds)
             .filter(|seeds| seeds.len() == self.worlds)
@@ -117,7 +117,6 @@ fn whole_numbers(values: &Bound<'_, PyAny>) -> Option<Vec<u64>> {
     values.extract().ok()
 }
 
-/// Returns the exception of a batch.
 fn batch_error(error: &BatchError) -> PyErr {
     match error {
         BatchError::Start { world, seed, error } => {

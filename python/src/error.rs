@@ -13,7 +13,6 @@ pyo3::import_exception!(sidestep._errors, CheckpointError);
 pyo3::import_exception!(sidestep._errors, ReplayError);
 pyo3::import_exception!(sidestep._errors, ClosedError);
 
-/// Returns the exception of wrong input.
 pub(crate) fn input_error(error: &kernel::InputError) -> PyErr {
     let (line, column) = error.position().unzip();
     InputError::new_err((
@@ -54,7 +53,6 @@ pub(crate) fn argument_error(
     input_error(&kernel::InputError::new(place, cause, remedy))
 }
 
-/// Returns the exception of an order.
 pub(crate) fn order_error(error: &control::OrderError) -> PyErr {
     OrderError::new_err(error.to_string())
 }
@@ -78,7 +76,6 @@ pub(crate) fn restore_error(error: &RestoreError) -> PyErr {
     }
 }
 
-/// Returns the exception of a session.
 pub(crate) fn session_error(error: &Error) -> PyErr {
     match error {
         Error::Input(error) => input_error(error),

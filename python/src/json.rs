@@ -73,7 +73,7 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>, key: &str) -> PyResult<toml::Val
     ))
 }
 
-/// Returns a dict as a TOML table.
+/// Returns a dict as a TOML table; `key` is its place, for errors.
 pub(crate) fn to_toml_table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResult<toml::Table> {
     let mut table = toml::Table::new();
     for entry in mapping.items()?.iter() {
@@ -88,7 +88,6 @@ pub(crate) fn to_toml_table(mapping: &Bound<'_, PyMapping>, key: &str) -> PyResu
     Ok(table)
 }
 
-/// Returns a list of the items of an iterator.
 pub(crate) fn to_list<'py, T>(
     py: Python<'py>,
     items: impl IntoIterator<Item = T>,

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 
-/// Returns an object as HTML, from the function for its kind.
+/// Returns an object as HTML; `function` of `sidestep/_notebook.py` makes it.
 pub(crate) fn to_html<'py>(
     object: &Bound<'py, PyAny>,
     function: &str,

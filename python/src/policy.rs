@@ -12,19 +12,17 @@ pub(crate) type IndexedTeam = (usize, Arc<Team>);
 
 /// The part of a run that policies need.
 pub(crate) trait PolicyRun {
-    /// Returns the cycles done.
     fn now(&self, py: Python<'_>) -> PyResult<Cycle>;
     /// Returns whether nothing can happen anymore.
     fn has_ended(&self, py: Python<'_>) -> PyResult<bool>;
-    /// Returns the plan of its scenario.
     fn plan(&self) -> RunConfig;
-    /// Returns a team by number or name, with its number.
+    /// Returns a team by number or name, with its number, by which the run knows it.
     fn team(&self, team: &Bound<'_, PyAny>) -> PyResult<IndexedTeam>;
     /// Returns the teams that take orders, with their numbers.
     fn ordered_teams(&self) -> Vec<IndexedTeam>;
-    /// Returns the observations of a team.
+    /// Returns the observations of a team before the next cycle, one array by name for each space.
     fn observed<'py>(&self, py: Python<'py>, team: &IndexedTeam) -> PyResult<Bound<'py, PyDict>>;
-    /// Gives an order to all agents of a team.
+    /// Gives an order to all agents of a team for the next cycle.
     fn give_order(&self, order: &str, values: &Bound<'_, PyAny>, team: &Team) -> PyResult<()>;
     /// Advances by one cycle.
     fn advance(&self, py: Python<'_>) -> PyResult<()>;
@@ -124,6 +122,8 @@ impl<'py> TeamPolicy<'py> {
             );
             return Err(OrderError::new_err(message));
         }
+        // A bare array stands for the first order: most teams have only one, and its name would be noise. It is also
+        // what the documentation of `Simulation.run` promises.
         let Ok(by_name) = decided.cast::<PyMapping>() else {
             let Some(first) = team.action_spaces.first() else {
                 let message = format!("the agents of team `{}` decide for themselves", team.name);

@@ -10,11 +10,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sidestep::statistics::Interval;
 
-/// A class of results: its module, and its name.
+/// A class of results: the module of the package that defines it, and its name.
 #[derive(Clone, Copy)]
 pub(crate) struct ResultClass(pub(crate) &'static str, pub(crate) &'static str);
 
-/// The fields of a result, by name.
+/// The fields of a result, by the names that its class in Python has.
 pub(crate) struct Fields<'py>(Bound<'py, PyDict>);
 
 impl<'py> Fields<'py> {
@@ -23,7 +23,7 @@ impl<'py> Fields<'py> {
         Self(PyDict::new(py))
     }
 
-    /// Returns the fields of a JSON object.
+    /// Returns the fields of a JSON object; anything else is an error.
     pub(crate) fn from_json(py: Python<'py>, object: &serde_json::Value) -> PyResult<Self> {
         let object = to_python(py, object)?.into_bound(py);
         Ok(Self(object.cast_into::<PyDict>()?))
@@ -41,7 +41,7 @@ impl<'py> Fields<'py> {
         self.with(name, interval)
     }
 
-    /// Returns the result.
+    /// Returns the result as an object of its class.
     pub(crate) fn build(
         self,
         ResultClass(module, name): ResultClass,

@@ -45,7 +45,7 @@ pub(crate) struct LoadedScenario {
     unpacked: Option<Arc<tempfile::TempDir>>,
 }
 
-/// The text of a scenario.
+/// Where the text of a scenario comes from, and whether it is written yet.
 enum ScenarioText {
     /// A text that was read or written.
     Own(Source),
@@ -73,7 +73,7 @@ impl LoadedScenario {
         Self { compiled, text, is_dict, resolved, seedless, unpacked }
     }
 
-    /// Returns the scenario of a bundle.
+    /// Returns the scenario of a bundle, whose files are unpacked to a temporary folder.
     pub(crate) fn from_bundle(py: Python<'_>, resolved: ResolvedScenario) -> PyResult<Self> {
         let unpacked = if resolved.files.is_empty() {
             None

@@ -104,7 +104,6 @@ impl Simulation {
         })
     }
 
-    /// Returns a value read from the run.
     fn read<T: Send>(
         &self,
         py: Python<'_>,
@@ -113,7 +112,6 @@ impl Simulation {
         self.with_run(py, |run| Ok(query(run.simulation())))
     }
 
-    /// Returns the state as bytes.
     fn checkpoint_bytes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         self.with_run(py, |run| run.checkpoint().map_err(|e| error::record_error(&e)))
     }
@@ -156,7 +154,7 @@ impl Simulation {
         })
     }
 
-    /// Returns a team by number or name, with its number.
+    /// Returns a team by number or name, with its number; the first one without either.
     fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<IndexedTeam> {
         find_team(&self.teams, team).map(|(number, team)| (number, Arc::clone(team)))
     }
@@ -185,7 +183,7 @@ impl Simulation {
         buffers?.into_dict(py, team)
     }
 
-    /// Gives an order to agents of a team.
+    /// Gives an order to some agents of a team, while other threads of Python run.
     fn order_agents(
         &self,
         order: &str,
@@ -203,7 +201,6 @@ impl Simulation {
         })
     }
 
-    /// Draws the present state.
     fn draw(&self, py: Python<'_>, width: u32) -> PyResult<(AnimationFrame, (u32, u32))> {
         self.with_run(py, |run| {
             let simulation = run.simulation_mut();
@@ -233,7 +230,7 @@ impl Simulation {
 enum Goal {
     /// This many cycles after the present one.
     Further(u64),
-    /// This one.
+    /// To this cycle, counted from the start of the run.
     Until(Cycle),
 }
 
@@ -255,7 +252,7 @@ impl Goal {
     }
 }
 
-/// The outcome of one time slice.
+/// How far one time slice got.
 struct SliceOutcome {
     /// Cycles done.
     done: u64,
@@ -271,7 +268,7 @@ fn draw_error(error: &DrawError) -> PyErr {
     error::RecordError::new_err(error.to_string())
 }
 
-/// Returns tables by name.
+/// Returns a dict of tables by name, also of those without rows.
 fn tables_dict(
     py: Python<'_>,
     rows: Vec<(TableSchema, Vec<Values>)>,

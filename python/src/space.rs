@@ -173,7 +173,7 @@ pub(crate) fn find_team<'a>(
     })
 }
 
-/// Returns a team by number.
+/// Returns a team by number; an error lists how many there are.
 pub(crate) fn team_at(
     teams: &[Arc<control::Team>],
     number: usize,
@@ -185,7 +185,7 @@ pub(crate) fn team_at(
     })
 }
 
-/// Buffers for the observations of a team, one for each of its spaces.
+/// Buffers for the observations of a team, in the order of its spaces: the run fills all in one pass.
 pub(crate) struct ObservationBuffers(Vec<Buffer>);
 
 enum Buffer {
@@ -209,13 +209,12 @@ impl Buffer {
 }
 
 impl ObservationBuffers {
-    /// Returns buffers for the observations of `team`.
+    /// Returns zeroed buffers of the right lengths for all agents of `team`.
     pub(crate) fn from_team(team: &control::Team) -> Self {
         let spaces = team.observation_spaces.iter();
         Self(spaces.map(|space| Buffer::zeroed(space, team.agents.len())).collect())
     }
 
-    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> Vec<BufferMut<'_>> {
         self.0.iter_mut().map(Buffer::as_buffer_mut).collect()
     }
@@ -302,7 +301,6 @@ impl<'py> OutArrays<'py> {
         Ok(Self(arrays))
     }
 
-    /// Returns the buffers to write into.
     pub(crate) fn buffers_mut(&mut self) -> PyResult<Vec<BufferMut<'_>>> {
         self.0.iter_mut().map(Array::as_buffer_mut).collect()
     }

@@ -9,7 +9,6 @@ use sidestep::statistics::{self, Bootstrap, Interval, Pairs, Sample, StopDecisio
 /// Values that come from Python.
 type PyValues<'py> = PyReadonlyArray1<'py, f64>;
 
-/// Returns the class of a result of `sidestep.stats`.
 fn class(name: &'static str) -> ResultClass {
     ResultClass("sidestep.stats", name)
 }

@@ -47,7 +47,7 @@ pub(crate) struct SweepOptions<'py> {
     record: bool,
 }
 
-/// A requested sweep.
+/// A requested sweep, read and not compiled yet.
 struct SweepRequest {
     sweep: Sweep,
     /// The scenario that it varies, if it was given one: an unpickled scenario deletes its temporary files when it is
@@ -65,7 +65,7 @@ fn parse_settings(mapping: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<Settin
     Ok(settings)
 }
 
-/// Returns the precision that ends a sweep.
+/// Parses the precision that ends a sweep, in the notation of `--until`.
 fn parse_precision(text: &str) -> PyResult<Precision> {
     text.parse().map_err(|cause: String| {
         let remedy =

@@ -297,7 +297,7 @@ fn to_python_values<'py>(
     }
 }
 
-/// Returns a column for NumPy.
+/// Returns a column for NumPy; integers of which some are missing become floats, because only those have NaN.
 fn to_numpy_column<'py>(
     py: Python<'py>,
     array: &ArrayRef,

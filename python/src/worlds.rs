@@ -17,7 +17,7 @@ pub(crate) fn set(worlds: Worlds) {
     let _ = WORLDS.set(worlds);
 }
 
-/// Returns the list.
+/// Returns the list with which this native module was filled.
 pub(crate) fn list() -> &'static Worlds {
     WORLDS.get().expect("a module without its list has no classes")
 }

@@ -20,7 +20,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
     ("zenoh", &["sidestep-link"]),
 ];
 
-/// Folder of the crates of worlds.
+/// Below it each crate is a world; no other place tells them apart.
 const WORLDS: &str = "crates/worlds";
 
 /// Crates that depend on a world, through others too. All else takes worlds as an argument, or needs none.
@@ -76,7 +76,7 @@ fn worlds_are_known_to_the_facade_and_its_users_alone() {
     assert_eq!(knows, BTreeSet::from(KNOWS_WORLDS));
 }
 
-/// Returns the file, or the files of the folder.
+/// Returns the file itself, or those directly in the folder.
 fn files_at(path: &Path) -> Vec<PathBuf> {
     match fs::read_dir(path) {
         Ok(entries) => entries.map(|entry| entry.unwrap().path()).filter(|p| p.is_file()).collect(),

@@ -47,9 +47,9 @@ pub(crate) struct Source {
 /// Path as it is written: `["crate", "a", "B"]`; the last name of a glob is `*`.
 pub(crate) struct NamedPath {
     pub(crate) names: Vec<String>,
-    /// Module that names it, with inline modules.
+    /// Module that names it, with inline modules: relative paths start there.
     pub(crate) module: Vec<String>,
-    /// Name that an import gives it.
+    /// Name that an import gives it; none for a path in code.
     pub(crate) import: Option<String>,
 }
 

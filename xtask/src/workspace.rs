@@ -6,9 +6,9 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A package of the workspace.
+/// A package of the workspace, with its description by cargo.
 pub(crate) struct Package {
-    /// Root of the workspace.
+    /// Root of the workspace, from which paths of sources are counted.
     root: PathBuf,
     metadata: Value,
 }
@@ -49,7 +49,6 @@ impl Package {
         Path::new(string(&self.metadata["manifest_path"])).starts_with(self.root.join(folder))
     }
 
-    /// Reads the files of all targets.
     pub(crate) fn sources(&self) -> Result<Vec<Source>, String> {
         let mut targets: Vec<&Value> = array(&self.metadata["targets"]).collect();
         // A file that code and tests share is read once, as code.

@@ -23,7 +23,6 @@ enum ProgressDisplay {
 }
 
 impl ConsoleWatcher {
-    /// Returns a watcher that prints to `console`.
     pub(crate) fn new(console: Console) -> Self {
         Self { console, display: Mutex::new(None) }
     }

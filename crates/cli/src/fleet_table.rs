@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::io::{IsTerminal, Write as _};
 use std::time::{Duration, Instant};
 
-/// Time between two tables where there is no terminal to draw one over the other.
+/// Time between two tables where there is no terminal to draw one over the other: a log must stay readable.
 const PRINT_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Lines of a terminal that a table leaves free, for the command line above and warnings below: a table that scrolls cannot be
@@ -33,7 +33,7 @@ impl FleetTable {
         Self { console, is_table, is_terminal, bar: None, lines: 0, next: Instant::now() }
     }
 
-    /// Shows the fleet as it is now.
+    /// Shows the fleet at once on a terminal, else only when a print is due.
     pub(crate) fn update(&mut self, now: &FleetStatus) {
         if !self.is_table {
             let bar =

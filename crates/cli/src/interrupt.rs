@@ -58,7 +58,6 @@ fn set_handler(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     })
 }
 
-/// Returns whether the run was asked to stop.
 pub(crate) fn is_requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }

@@ -41,7 +41,7 @@ use std::sync::OnceLock;
 /// The worlds of [`main_with`].
 static OWN_WORLDS: OnceLock<Worlds> = OnceLock::new();
 
-/// Returns the worlds of this program.
+/// Returns the worlds of [`main_with`], else those of this project.
 fn worlds() -> &'static Worlds {
     OWN_WORLDS.get().unwrap_or(&WORLDS)
 }

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Environment variable with the path of the program, if it is not beside this one.
 const PATH_VARIABLE: &str = "SIDESTEP_LINK";
 
-/// Time between two checks for an interrupt.
+/// Time between two checks for an interrupt: a key press seems to act at once.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Options of the server and of nodes.
@@ -66,7 +66,6 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 }
 
 impl LinkArgs {
-    /// Returns the settings for a scenario.
     pub(crate) fn common_settings(&self, file: PathBuf, overrides: Vec<String>) -> CommonSettings {
         let build = worlds().build().into();
         CommonSettings {
@@ -79,14 +78,14 @@ impl LinkArgs {
         }
     }
 
-    /// Returns the protocol of endpoints.
+    /// Returns the protocol of endpoints, by which both ends know whether to encrypt.
     pub(crate) fn protocol(&self) -> &'static str {
         if self.tls.tls_ca.is_some() { "tls" } else { "tcp" }
     }
 }
 
 impl TlsArgs {
-    /// Returns the files, where there are any.
+    /// Returns the certificates; `None` where links are not encrypted.
     pub(crate) fn files(&self) -> Option<Tls> {
         match (self.tls_ca.clone(), self.tls_cert.clone(), self.tls_key.clone()) {
             (Some(authority), Some(certificate), Some(key)) => {
@@ -163,7 +162,7 @@ fn cannot_start_error(error: &std::io::Error) -> Failure {
     Failure::other(format!("cannot start {LINK_PROGRAM}: {error}"), remedy)
 }
 
-/// Returns the job as a line of text.
+/// Returns the job as a line of text, the form in which the program reads it.
 ///
 /// # Errors
 /// When a path in it is no text: the program could not find it.

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::console::{Console, group_thousands};
 
-/// The progress bar of a run, or of many.
+/// The progress bar of a run, in cycles, or of many, in runs.
 #[derive(Debug)]
 pub(crate) struct RunBar(ProgressBar);
 

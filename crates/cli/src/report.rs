@@ -5,7 +5,6 @@ use sidestep::kernel::text::key_value;
 use sidestep::kernel::world::DecisionMode;
 use sidestep_session::{Phases, RunStatus, Summary};
 
-/// Returns the summary as text for people.
 pub(crate) fn summary_text(summary: &Summary) -> String {
     let mut lines = vec![
         key_value(&format!("{}s", summary.agent), group_thousands(summary.agents as u64)),
@@ -71,7 +70,7 @@ fn phases_text(phases_s: &Phases) -> String {
     shares.join(", ")
 }
 
-/// Formats a rate with as many digits as it needs.
+/// Formats a rate: whole below 100 000, above it in millions with two decimals.
 fn format_rate(per_second: f64) -> String {
     if per_second < 1e5 {
         return group_thousands(per_second as u64);

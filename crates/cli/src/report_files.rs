@@ -7,7 +7,7 @@ use sidestep_session::{write_atomically, write_png};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The files of a report.
+/// Where a report is stored: all files are beside the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ReportFiles {
     /// The page; the Markdown version has the same name with the ending `md`.
@@ -19,19 +19,18 @@ pub(crate) struct ReportFiles {
 /// The formats that pictures are stored in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PngOutput {
-    /// Only SVG.
+    /// SVG alone, which the page needs.
     None,
-    /// SVG and PNG.
+    /// SVG, and PNG for programs that cannot show it.
     AlsoPng,
 }
 
 impl ReportFiles {
-    /// Returns the path of the Markdown version.
     pub(crate) fn markdown(&self) -> PathBuf {
         self.html.with_extension("md")
     }
 
-    /// Returns the name of the page without its ending.
+    /// Returns the name of the page without its ending, from which the names of the others are made.
     pub(crate) fn stem(&self) -> String {
         self.html.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }

@@ -48,7 +48,6 @@ pub(crate) struct WorkersArg {
 }
 
 impl WorkersArg {
-    /// Returns the number of worker threads.
     pub(crate) fn count(self) -> usize {
         self.workers.map_or_else(workers::available_workers, usize::from)
     }

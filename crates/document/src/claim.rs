@@ -24,7 +24,7 @@ impl Verdict {
     pub const ALL: [Self; 5] =
         [Self::Held, Self::Refuted, Self::Undecided, Self::Lost, Self::Setting];
 
-    /// Returns its word.
+    /// Returns its word, as reports and their JSON have it.
     pub fn name(self) -> &'static str {
         ["held", "refuted", "undecided", "lost", "setting"][self as usize]
     }
@@ -40,9 +40,9 @@ pub struct Claim {
     /// The paper's own figure, if it states one. None of the three papers gives an interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub papers_figure: Option<&'static str>,
-    /// Our figures.
+    /// Our figures, with intervals and numbers of runs.
     pub ours: String,
-    /// The verdict.
+    /// The verdict, by the rule in `reason`.
     pub verdict: Verdict,
     /// The rule by which the verdict follows, and its limits.
     pub reason: String,
@@ -56,7 +56,7 @@ impl Claim {
     }
 }
 
-/// Returns the number of claims with this verdict.
+/// Returns the number of claims with this verdict, for the summary above them.
 pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }

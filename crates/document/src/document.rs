@@ -8,7 +8,7 @@ use serde::Serialize;
 /// A report.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Document {
-    /// Its subject.
+    /// Its subject, shown as the first heading.
     pub title: String,
     /// The result, in a sentence or two.
     pub lead: Text,
@@ -43,11 +43,11 @@ pub enum Block {
 /// One experiment of a report: its setup and its results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// Its name.
+    /// Its name, which becomes the heading of a section.
     pub title: &'static str,
     /// Its setup, and the effect to look for, with the markup of [`Text::from_markup`].
     pub about: &'static str,
-    /// Its figures.
+    /// Its figures, shown before the tables.
     pub figures: Vec<Figure>,
     /// Its numbers.
     pub tables: Vec<Table>,
@@ -60,7 +60,7 @@ pub struct Code {
     pub title: String,
     /// `sh`, `toml`, ...
     pub language: &'static str,
-    /// The text.
+    /// The text, shown as it stands.
     pub text: String,
 }
 
@@ -69,9 +69,9 @@ pub struct Code {
 pub struct Picture {
     /// Its title: the content of the picture.
     pub title: String,
-    /// Small print.
+    /// Small print below the picture, e.g. the meaning of colors.
     pub caption: String,
-    /// The picture itself, as SVG.
+    /// A whole SVG document, without anything that has to be loaded.
     #[serde(skip)]
     pub svg: String,
 }
@@ -110,12 +110,12 @@ impl Text {
         Self(spans)
     }
 
-    /// Returns a name or a command alone.
+    /// Returns a name or a command alone, in which nothing is markup.
     pub fn code(text: impl Into<String>) -> Self {
         Self(vec![Span::Code(text.into())])
     }
 
-    /// Appends more text.
+    /// Appends more text, without a blank between the two.
     #[must_use]
     pub fn append(mut self, more: impl Into<Text>) -> Self {
         self.0.extend(more.into().0);
@@ -187,7 +187,7 @@ impl Document {
         self.push(Block::Section(title.into()))
     }
 
-    /// Appends a part.
+    /// Appends a part, below all earlier ones.
     pub fn push(&mut self, block: Block) -> &mut Self {
         self.blocks.push(block);
         self

@@ -14,7 +14,7 @@ pub struct Estimate {
     pub mean: Option<f64>,
     /// 95 % interval of the mean; absent with fewer than two values.
     pub interval: Option<Interval>,
-    /// Number of values.
+    /// Number of values that exist; missing ones do not count.
     pub n: usize,
     /// The interval before it was clamped to the bounds of the quantity; p-values follow from it.
     #[serde(skip)]
@@ -102,7 +102,7 @@ impl Estimate {
         self.interval.is_some_and(|i| i.high < value)
     }
 
-    /// Returns the mean, or 0 without values; for figures.
+    /// Returns the mean, or 0 without values: callers have to know that there are some.
     pub fn mean_or_zero(&self) -> f64 {
         self.mean.unwrap_or(0.0)
     }

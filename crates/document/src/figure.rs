@@ -54,12 +54,12 @@ pub enum FigureKind {
     },
 }
 
-/// A point of a figure.
+/// A measured value at a place of the horizontal axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
     /// Position along the horizontal axis.
     pub x: f64,
-    /// The value.
+    /// The value, in the unit of the vertical axis; one that is not a number is not drawn.
     pub y: f64,
     /// Lower and upper end of the value's interval, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -104,12 +104,12 @@ impl Point {
     }
 }
 
-/// A named series of points.
+/// Points that share a color and a name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
     /// Name in the legend; a series without a name is not listed there.
     pub name: String,
-    /// The points.
+    /// The points, in the order in which a line joins them.
     pub points: Vec<Point>,
 }
 
@@ -123,7 +123,7 @@ pub struct Table {
     pub note: String,
     /// Headings of the columns.
     pub columns: Vec<String>,
-    /// Cells, row by row.
+    /// Cells, row by row; a short row has empty cells at its end.
     pub rows: Vec<Vec<String>>,
     /// Whether a page shows only the title until a reader opens it.
     pub is_folded: bool,

@@ -12,7 +12,7 @@ use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
 
-/// Shortest side of a picture, pixels: of a long and narrow world, too.
+/// Shortest side of a picture, pixels: below it a long and narrow world would leave nothing to see.
 const MIN_FRAME_PX: u32 = 32;
 /// Longest side of a picture, pixels: four bytes a pixel are then 64 MiB a frame.
 const MAX_FRAME_PX: u32 = 4096;

@@ -44,7 +44,6 @@ impl Axis {
         self
     }
 
-    /// Returns the label.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }
@@ -112,7 +111,7 @@ fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64
         let margin = 0.04 * (high - low);
         return (low - margin, high + margin);
     }
-    // Zero belongs on an axis that comes near it.
+    // Zero belongs on an axis that comes near it: the data then still take more than half of the length.
     let low = if low > 0.0 && low < 0.4 * high { 0.0 } else { low };
     let high = if high < 0.0 && high > 0.4 * low { 0.0 } else { high };
     let step = nice_step(high - low, most);
@@ -185,7 +184,6 @@ impl FittedAxis {
         }
     }
 
-    /// Returns the value that lies at `part` (0 to 1) of the axis.
     pub(crate) fn value_at(&self, part: f64) -> f64 {
         if self.log {
             return self.low * pow(self.high / self.low, part);

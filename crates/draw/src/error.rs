@@ -19,7 +19,7 @@ pub enum DrawError {
     Value {
         /// The quantity, with its unit.
         what: &'static str,
-        /// The given value.
+        /// The given value, which may be infinite or no number.
         value: f64,
         /// The condition that a right value meets.
         must: &'static str,
@@ -27,7 +27,7 @@ pub enum DrawError {
     /// A picture that would take too much memory.
     #[error("{what}: {found} asked for, at most {limit} can be drawn")]
     TooLarge {
-        /// The part that is too large.
+        /// The part that is too large, e.g. boxes of a map.
         what: &'static str,
         /// The requested amount.
         found: u64,

@@ -70,7 +70,7 @@ const CROSS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
-/// A color in SVG notation.
+/// A color in SVG notation: borrowed where it is fixed, owned where it follows from a number.
 pub(crate) type SvgColor = Cow<'static, str>;
 
 /// The symbol before a legend's label.
@@ -90,7 +90,7 @@ pub(crate) enum LegendSymbol {
     Leader,
 }
 
-/// An entry of a legend.
+/// A line of a legend; entries without a label are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LegendEntry {
     pub(crate) symbol: LegendSymbol,
@@ -136,7 +136,6 @@ impl Legend {
         self.font_px * 1.6
     }
 
-    /// Returns the height of all rows.
     pub(crate) fn height_px(&self) -> f64 {
         self.placed.last().map_or(0.0, |(_, row, _)| (*row as f64 + 1.0) * self.row_px())
     }
@@ -188,12 +187,12 @@ impl Legend {
     }
 }
 
-/// Returns the attributes of a reference line.
+/// Returns the attributes of a reference line, dashed so that no series is taken for it.
 pub(crate) fn reference_line_attributes(color: &str) -> String {
     format!(r#"stroke="{color}" stroke-width="1.4" stroke-dasharray="6 4" fill="none""#)
 }
 
-/// Draws the mark where a track starts.
+/// Draws the mark where a track starts: a ring, filled so that no line shows through.
 pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(
         center,
@@ -229,7 +228,7 @@ pub(crate) fn arrowhead(
     svg.path(&data, format_args!(r#"class="direction" fill="{color}" {rim}"#));
 }
 
-/// Draws the mark where a track ends.
+/// Draws the mark where a track ends: a dot, unlike the ring at its start.
 pub(crate) fn end_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     svg.circle(center, radius + 1.0, format_args!(r##"fill="{color}" stroke="#FFFFFF""##));
 }
@@ -253,7 +252,6 @@ pub(crate) fn title_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { weight: Weight::Bold, fill: INK, ..TextStyle::new(size_px, Anchor::Start) }
 }
 
-/// Returns the text style of small print.
 pub(crate) fn small_print_style(size_px: f64) -> TextStyle<'static> {
     TextStyle { fill: FAINT_INK, ..TextStyle::new(size_px, Anchor::Start) }
 }

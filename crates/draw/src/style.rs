@@ -4,7 +4,7 @@ use crate::error::DrawError;
 use sidestep_kernel::view::{BODY_COLORS, Color};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of colors of series.
+/// One more than bodies have: charts also use black, which on a map would be a wall.
 const SERIES_COLOR_COUNT: usize = BODY_COLORS.len() + 1;
 
 /// Returns the colors of series in SVG notation, those of bodies and black: Okabe and Ito's palette without its
@@ -62,7 +62,6 @@ pub(crate) fn series_fill(index: usize) -> (f64, &'static str) {
     }
 }
 
-/// Returns a color in SVG notation.
 pub(crate) fn hex([r, g, b]: Color) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
@@ -88,7 +87,6 @@ impl Style {
     /// A map as large as a page.
     pub const MAP: Self = Self { width_px: 900.0, height_px: 900.0, font_px: 13.0 };
 
-    /// Returns the size of title text in pixels.
     pub(crate) fn title_px(&self) -> f64 {
         self.font_px * 1.15
     }

@@ -56,7 +56,7 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// The style of a text.
+/// The style of a text; its font is always the embedded one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextStyle<'a> {
     pub(crate) size_px: f64,
@@ -93,7 +93,6 @@ impl Svg {
         let _ = writeln!(self.body, "{element}");
     }
 
-    /// Writes a rectangle with the attributes `attributes`.
     pub(crate) fn rect(&mut self, r: Rect, attributes: impl Display) {
         let Rect { x, y, width, height } = r;
         let (x, y, width, height) =
@@ -103,7 +102,6 @@ impl Svg {
         ));
     }
 
-    /// Writes a straight line with the attributes `attributes`.
     pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), attributes: impl Display) {
         let (x1, y1, x2, y2) =
             (SvgNumber(from.0), SvgNumber(from.1), SvgNumber(to.0), SvgNumber(to.1));
@@ -112,12 +110,10 @@ impl Svg {
         ));
     }
 
-    /// Writes a path with the path data `data`.
     pub(crate) fn path(&mut self, data: &str, attributes: impl Display) {
         self.push_raw(format_args!(r#"<path d="{data}" {attributes}/>"#));
     }
 
-    /// Writes a circle around `center`.
     pub(crate) fn circle(&mut self, center: (f64, f64), radius: f64, attributes: impl Display) {
         let x = SvgNumber(center.0);
         let y = SvgNumber(center.1);
@@ -169,7 +165,7 @@ impl Svg {
         self.push_raw(format_args!(r#"</clipPath><g clip-path="url(#{id})">"#));
     }
 
-    /// Closes the innermost group.
+    /// Closes the innermost group; each opened one needs it once.
     pub(crate) fn close_group(&mut self) {
         self.push_raw("</g>");
     }

@@ -77,7 +77,7 @@ impl LabelSpacing {
     }
 }
 
-/// A range of positive numbers.
+/// A range of positive numbers on a logarithmic axis.
 struct DecadeRange {
     low: f64,
     high: f64,

@@ -36,7 +36,7 @@ pub struct CorrectedLog {
 pub struct Scan {
     /// Time in s from the start of the log; not always increasing.
     pub t_secs: f64,
-    /// Number of beams.
+    /// Number of beams; their ranges are checked and not kept.
     pub n_beams: u32,
     /// Corrected pose.
     pub pose: PoseXyTheta,

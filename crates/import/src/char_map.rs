@@ -17,7 +17,6 @@ pub(super) struct SourceText<'a> {
 }
 
 impl<'a> SourceText<'a> {
-    /// Creates an error at the byte `offset` of the text.
     pub(super) fn error(
         &self,
         offset: usize,
@@ -38,7 +37,6 @@ impl<'a> SourceText<'a> {
     }
 }
 
-/// A line of a text.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
     /// Number of bytes of the text before the line.

@@ -32,7 +32,7 @@ pub struct LocalPlane {
 }
 
 impl LocalPlane {
-    /// Creates the plane around `center`.
+    /// Creates the plane around `center`, which becomes its origin.
     pub fn centered_at(center: LatLon) -> Self {
         let east_scale = math::cos(center.lat_deg.to_radians()).max(MIN_COSINE);
         Self { center, east_scale }

@@ -139,7 +139,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Returns the path of the image.
+    /// Returns the path of the image, or of the same name with `.gz` where only that exists.
     fn image(&self, folder: &Path) -> Result<PathBuf, InputError> {
         let value = self.value("image")?;
         let name = value.data.as_str().filter(|name| !name.is_empty()).ok_or_else(|| {
@@ -203,7 +203,7 @@ fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
         .with_offset(text, byte_offset(text, error.marker().index()))
 }
 
-/// Returns the byte offset of the character number `index`.
+/// Converts the parser's position, counted in characters, to bytes.
 fn byte_offset(text: &str, index: usize) -> usize {
     text.char_indices().nth(index).map_or(text.len(), |(offset, _)| offset)
 }

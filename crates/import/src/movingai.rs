@@ -147,7 +147,7 @@ fn read_header<'a>(
 
 const HEADER_REMEDY: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
 
-/// Reads the word `word` of the text as a number.
+/// Reads a size of the header; errors point at the word.
 fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
     word.parse().map_err(|_| {
         let cause = format!("`{word}` is not a whole number");
@@ -200,7 +200,7 @@ fn scen_row(source: SourceText<'_>, line: usize, text: Line<'_>) -> Result<ScenR
     Ok(ScenRow { line, bucket, map, width, height, start, goal, optimal_length })
 }
 
-/// The fields of a row, in order.
+/// The fields of a row, taken one by one.
 struct Fields<'a> {
     source: SourceText<'a>,
     line: Line<'a>,

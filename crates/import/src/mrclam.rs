@@ -19,11 +19,11 @@ use sidestep_scenario::file::read_text;
 /// A data set: all files of one folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
-    /// Subject number by barcode number.
+    /// Subject number by barcode number: measurements have only the latter.
     pub subject_of_barcode: BTreeMap<u32, u32>,
     /// Position in the world by subject number, in meters.
     pub landmarks: BTreeMap<u32, [f64; 2]>,
-    /// Log of each robot by subject number.
+    /// Log of each robot by subject number; subjects without a surveyed position are robots.
     pub robots: BTreeMap<u32, RobotLog>,
 }
 

@@ -66,7 +66,7 @@ impl PixelMap {
         &self.pixels
     }
 
-    /// Returns the number of pixels of each type.
+    /// Returns the number of pixels of each type, before any conversion into boxes.
     pub fn counts(&self) -> CellCounts {
         CellCounts::from_cells(&self.pixels)
     }
@@ -99,7 +99,7 @@ impl PixelMap {
         Ok(GridMap::new(width, height, box_size_m, cells).with_plane(self.plane))
     }
 
-    /// Returns the cell of a box of these pixels.
+    /// Returns the cell of a box: a single wall makes it one, because a robot must not drive into it.
     fn merged_cell(&self, cols: &Range<usize>, rows: &Range<usize>) -> Cell {
         let mut merged = Cell::Free;
         for row in rows.clone() {
@@ -137,7 +137,7 @@ impl AxisAlignment {
         (pixel as u32).min(self.pixels - 1)
     }
 
-    /// Returns the number of boxes.
+    /// Returns the number of boxes, so that every pixel's center and every box with its center on the map is in one.
     fn boxes(self) -> u64 {
         let Some(last) = self.pixels.checked_sub(1) else { return 0 };
         let length = f64::from(self.pixels) * self.resolution_m / self.box_size_m;

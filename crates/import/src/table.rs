@@ -32,7 +32,7 @@ pub const MAX_CSV_BYTES: u64 = 1 << 28;
 pub struct Token<'a> {
     /// The word without the blanks around it.
     pub text: &'a str,
-    /// Line, from 1.
+    /// Line in the file, from 1, as editors count.
     pub line: usize,
     /// Column of its first character, from 1.
     pub column: usize,
@@ -124,11 +124,11 @@ pub fn rows<'a, const N: usize>(
 pub struct CsvTable {
     place: String,
     header: Vec<String>,
-    /// Line of the header, from 1.
+    /// Line of the header, from 1; comments may precede it.
     header_line: usize,
     /// Line of each row, from 1.
     lines: Vec<u32>,
-    /// All fields of all rows in one string.
+    /// All fields of all rows in one string: a table of millions of cells allocates once.
     fields: String,
     /// The end of each field in `fields`; as many per row as the header has.
     ends: Vec<u32>,
@@ -223,7 +223,7 @@ impl CsvTable {
     }
 }
 
-/// One row of a [`CsvTable`].
+/// One row of a [`CsvTable`]; its fields are not copied.
 #[derive(Debug, Clone, Copy)]
 pub struct CsvRow<'a> {
     table: &'a CsvTable,

@@ -41,9 +41,9 @@ pub struct Track {
 pub struct Sample {
     /// Time in s since the start of 1970, UTC.
     pub time_s: f64,
-    /// Its position.
+    /// Its position on the earth, as the transponder reports it.
     pub position: LatLon,
-    /// Barometric altitude, in ft.
+    /// Barometric altitude above standard pressure in ft, so not the height above ground.
     pub altitude_ft: f64,
     /// Speed over the ground in kt, not negative.
     pub ground_speed_kt: f64,
@@ -75,14 +75,14 @@ const TIMES_S: RangeInclusive<f64> = -1e11..=1e11;
 /// The longest time in s between the earliest row and the latest: no recording takes 30 years.
 const MAX_DURATION_S: f64 = 1e9;
 
-/// The range of altitudes, in ft.
+/// The range of altitudes in ft: beyond it the column must hold another quantity.
 const ALTITUDES_FT: RangeInclusive<f64> = -1e6..=1e6;
 
 /// The greatest speed between two rows, in m/s: beyond it one of the two positions is wrong. The simulator bounds
 /// airplanes by it as well; here an error points at the row.
 pub const MAX_SPEED_M_S: f64 = 1e6;
 
-/// The indices of the columns.
+/// The indices of the columns; the optional ones may be missing.
 struct ColumnIndices<'a> {
     place: &'a str,
     time: usize,

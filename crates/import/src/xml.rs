@@ -8,7 +8,7 @@ use sidestep_kernel::InputError;
 /// The maximum number of elements, comments and pieces of text in one file.
 const MAX_NODES: u32 = 1 << 20;
 
-/// An XML file in memory.
+/// An XML file in memory, with its text, at which errors point.
 pub(super) struct XmlFile<'a> {
     place: &'a str,
     text: &'a str,
@@ -34,7 +34,6 @@ impl<'a> XmlFile<'a> {
         Err(root.error(cause, "check that this is the right kind of file"))
     }
 
-    /// Returns all elements in the order of the file.
     pub(super) fn elements(&self) -> impl Iterator<Item = Element<'_>> {
         let nodes = self.document.descendants().filter(Node::is_element);
         nodes.map(|node| Element { file: self, node })
@@ -79,7 +78,7 @@ fn offset_of(text: &str, at: roxmltree::TextPos) -> usize {
     before + line.chars().take(at.col as usize - 1).map(char::len_utf8).sum::<usize>()
 }
 
-/// An element of a file.
+/// An element of a file, which knows the file for its errors.
 #[derive(Clone, Copy)]
 pub(super) struct Element<'a> {
     file: &'a XmlFile<'a>,
@@ -87,7 +86,6 @@ pub(super) struct Element<'a> {
 }
 
 impl<'a> Element<'a> {
-    /// Returns its name without prefix.
     pub(super) fn name(&self) -> &'a str {
         self.node.tag_name().name()
     }
@@ -149,12 +147,10 @@ impl<'a> Element<'a> {
         Ok(value)
     }
 
-    /// Returns all attributes.
     pub(super) fn attributes(self) -> impl Iterator<Item = XmlAttribute<'a>> {
         self.node.attributes().map(move |attribute| XmlAttribute { element: self, attribute })
     }
 
-    /// Creates an error at the start of the element.
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let offset = self.node.range().start;
         InputError::new(self.file.place, cause, remedy).with_offset(self.file.text, offset)
@@ -169,7 +165,7 @@ impl<'a> Element<'a> {
     }
 }
 
-/// The value of an attribute.
+/// The value of an attribute, which knows its element for its errors.
 #[derive(Clone, Copy)]
 pub(super) struct XmlAttribute<'a> {
     element: Element<'a>,
@@ -205,7 +201,6 @@ impl<'a> XmlAttribute<'a> {
         })
     }
 
-    /// Creates an error at the value.
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let file = self.element.file;
         let offset = self.attribute.range_value().start;

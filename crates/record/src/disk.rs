@@ -67,6 +67,7 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
         if path.is_dir() {
             sync_tree(&path)?;
         } else {
+            // Open for writing, because Windows flushes only such files.
             File::options().write(true).open(&path)?.sync_all()?;
         }
     }
@@ -88,7 +89,7 @@ pub(crate) fn list(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
     entries.map_err(|e| RecordError::new(folder.display(), e))
 }
 
-/// The folder that holds `path`.
+/// The folder that holds `path`: of a bare name the current one, for which the standard library has an empty path.
 pub(crate) fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -25,7 +25,7 @@ const LOCK: &str = "run.lock";
 pub struct NewRun {
     /// The world to simulate, e.g. `robots`.
     pub world: String,
-    /// The build that makes it.
+    /// The build that makes the run, which alone can resume it.
     pub build: String,
     /// Scenario, seed and version that its rows result from.
     pub origin: Provenance,
@@ -33,7 +33,7 @@ pub struct NewRun {
     pub cycles_planned: u64,
 }
 
-/// The treatment of an existing run in the folder.
+/// What to do if the folder holds a run already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IfExists {
     /// Leave it alone and fail.
@@ -42,7 +42,7 @@ pub enum IfExists {
     Replace,
 }
 
-/// The point at which a run resumes.
+/// The state from which a stopped run goes on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ResumePoint {
     /// Cycle 0: the run was stopped before its first checkpoint.
@@ -105,17 +105,17 @@ impl RunFolder {
         Ok((Self { path: path.to_path_buf(), manifest, scenario, _lock: lock }, point))
     }
 
-    /// Returns the path of the folder.
+    /// Returns the path of the folder, as it was given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the content of `run.json`.
+    /// Returns the content of `run.json`, as it is on the disk.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// Returns the text of the scenario.
+    /// Returns the text of `scenario.toml`, with every default and include resolved.
     pub fn scenario(&self) -> &str {
         &self.scenario
     }
@@ -153,7 +153,7 @@ impl RunFolder {
         })
     }
 
-    /// Writes `summary.json`.
+    /// Writes `summary.json`, durably, before the run is declared complete.
     ///
     /// # Errors
     /// An I/O error, or a summary that is not JSON.
@@ -199,11 +199,11 @@ impl RunFolder {
 /// A run folder to read from; its run may still be in progress.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunReader {
-    /// Path of the folder.
+    /// Path of the folder, as it was given.
     pub path: PathBuf,
-    /// The content of `run.json`.
+    /// The content of `run.json` when the folder was opened.
     pub manifest: Manifest,
-    /// The scenario's text.
+    /// The text of `scenario.toml`, with every default and include resolved.
     pub scenario: String,
 }
 

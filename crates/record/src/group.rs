@@ -41,7 +41,6 @@ impl RowGroup {
         self.rows == ROWS
     }
 
-    /// Returns whether the group has no rows.
     pub(crate) fn is_empty(&self) -> bool {
         self.rows == 0
     }

@@ -10,7 +10,7 @@ use sidestep_kernel::ports::RecordError;
 use crate::disk;
 use crate::format::{self, FormatVersion};
 
-/// File name of the manifest of a sweep.
+/// File by which a folder is known as that of a sweep.
 pub(crate) const SWEEP_MANIFEST: &str = "sweep.json";
 
 /// The progress of a run.
@@ -37,7 +37,7 @@ pub struct Manifest {
     pub build: Option<String>,
     /// The world that was simulated, e.g. `robots`.
     pub world: String,
-    /// The seed.
+    /// The seed of the run, in case an option has replaced that of the scenario.
     pub seed: u64,
     /// Progress of the run.
     pub status: Status,
@@ -66,7 +66,7 @@ impl Manifest {
         read_json(path)
     }
 
-    /// Replaces the manifest at `path`.
+    /// Replaces the manifest at `path` in one step: a reader finds the old or the new one.
     pub(crate) fn write(&self, path: &Path) -> Result<(), RecordError> {
         disk::replace(path, &json(self, path)?)
     }

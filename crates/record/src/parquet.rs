@@ -94,7 +94,7 @@ impl Recorder for ParquetRecorder {
     }
 }
 
-/// The writer of one table.
+/// The writer of one table, from the first part to the last.
 struct TableWriter {
     schema: TableSchema,
     parquet_schema: TypePtr,

@@ -27,7 +27,7 @@ pub(crate) fn first_cycle(name: &str) -> Option<u64> {
     name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()
 }
 
-/// A part that is being written.
+/// A part that is being written; it has no valid footer before it is closed.
 pub(crate) struct PartWriter {
     path: PathBuf,
     file: SerializedFileWriter<File>,

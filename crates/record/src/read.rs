@@ -42,12 +42,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// Returns the number of rows.
+    /// Returns the number of rows, which all columns have.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, Values::len)
     }
 
-    /// Returns the values of the column `name`, if it exists.
+    /// Returns the values of the column `name`; `None` if the table has no such column.
     pub fn column(&self, name: &str) -> Option<&Values> {
         Some(&self.columns[position(&self.schema, name)?])
     }
@@ -159,7 +159,6 @@ fn find_parts(folder: &Path, name: &str) -> Result<(Vec<PathBuf>, bool), InputEr
     Ok((found, complete))
 }
 
-/// Returns the error of a folder that cannot be read.
 pub(crate) fn unreadable(folder: &Path, error: &RecordError) -> InputError {
     InputError::new(folder.display(), error.cause.clone(), "make the folder readable")
 }
@@ -169,7 +168,7 @@ pub(crate) fn damaged(path: &Path, cause: impl Into<String>) -> InputError {
     InputError::new(path.display(), cause, remedy)
 }
 
-/// The requested range of cycles.
+/// The requested range of cycles; all rows if it has no bounds, also those of tables without cycles.
 #[derive(Debug, Clone, Copy)]
 struct CycleRange {
     from: Bound<u64>,
@@ -201,7 +200,7 @@ impl CycleRange {
     }
 }
 
-/// One open file.
+/// One open file, of which one row group at a time is in memory.
 struct PartReader<'a> {
     path: &'a Path,
     bytes: File,
@@ -376,7 +375,7 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
     }
 }
 
-/// Appends the rows with a cycle in the range.
+/// Appends the rows with a cycle in the range; without a column of cycles all of them.
 fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: CycleRange) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,
@@ -442,7 +441,7 @@ pub(crate) fn read_cells<T: DataType, V: Clone + Default>(
     Ok(values.into())
 }
 
-/// Reads a column of text to its end.
+/// Reads a column of text to its end; apart from numbers, because texts are decoded into one buffer.
 pub(crate) fn read_texts(
     reader: ColumnReaderImpl<ByteArrayType>,
     is_nullable: bool,

@@ -33,7 +33,7 @@ use crate::part::error_cause;
 use crate::read::{check_bytes, damaged, read_cells, read_texts, required_value};
 use crate::schema::{self, CHECKSUMS, COLUMNS, FORMAT, VERSION};
 
-/// Number of rows in a row group.
+/// Number of rows in a row group: a row may have hundreds of metrics, all of which are in memory until it is written.
 const GROUP_ROWS: usize = 1 << 16;
 
 /// One column in the key-value pair [`COLUMNS`] of the file.
@@ -43,7 +43,7 @@ struct RoleColumnEntry {
     role: Value,
 }
 
-/// A table that was read back.
+/// A table that was read back, in the order of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedTable<R> {
     /// Its columns, all of the same length; those with a role that this version does not know are
@@ -331,7 +331,7 @@ pub fn read_blocks<R: DeserializeOwned + Clone>(
     Ok(())
 }
 
-/// An open table, with the description of its columns.
+/// An open table, of which one row group at a time is in memory.
 struct TableReader<R> {
     bytes: File,
     file: SerializedFileReader<File>,

@@ -36,11 +36,11 @@ pub struct Provenance {
     pub program_version: String,
     /// The scenario's text, with every default and include resolved.
     pub scenario: String,
-    /// The seed.
+    /// The seed of the run, in case an option has replaced that of the scenario.
     pub seed: u64,
 }
 
-/// One column in [`COLUMNS`].
+/// One column in [`COLUMNS`], with what the Parquet schema cannot express.
 #[derive(Debug, Serialize, Deserialize)]
 struct ColumnEntry {
     name: String,
@@ -53,7 +53,7 @@ struct ColumnEntry {
     nullable: bool,
 }
 
-/// Names of the column types in [`COLUMNS`].
+/// Writes column types by the kernel's names for them, which files keep even if the variants in Rust change.
 mod type_name {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::Serializer;

@@ -28,7 +28,7 @@ pub struct RenderedReport {
 pub struct SvgFile {
     /// Name without its ending, e.g. `03-speed-up`.
     pub stem: String,
-    /// The picture as SVG.
+    /// The picture as a whole SVG document, which needs no other file.
     pub svg: String,
 }
 

@@ -16,7 +16,8 @@ const COOKIE_NAME: &str = "sidestep-studio-";
 /// The header in which browsers report whether the requesting page is of the same origin.
 const SEC_FETCH_SITE: &str = "sec-fetch-site";
 
-/// The reason why a request is refused.
+/// The reason why a request is refused. Every request is checked for host and origin, and for the token only where it
+/// asks for more than the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AccessError {
     /// It was sent to a name that is not ours.
@@ -48,7 +49,7 @@ impl AccessPolicy {
         Ok(Self { port: address.port(), name, token })
     }
 
-    /// Returns the token, where one is needed.
+    /// Returns the token; `None` where the server listens only on the machine itself.
     pub(crate) fn token(&self) -> Option<&str> {
         self.token.as_deref()
     }
@@ -136,7 +137,7 @@ impl AccessPolicy {
     }
 }
 
-/// Returns a header that occurs exactly once, as text.
+/// Returns a header that occurs exactly once, as text: of several, a proxy and we might take different ones.
 fn single_header<'a>(headers: &'a HeaderMap, name: &axum::http::HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?.to_str().ok()?;

@@ -6,11 +6,12 @@ use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
 
-/// Maximum number of events kept; further ones are counted.
+/// Maximum number of events kept: some tens of megabytes. Further ones are counted.
 const MAX_EVENTS: usize = 100_000;
 /// Number of cycles for which events that are not kept are counted together, so that the counts stay few.
 const LOSS_BUCKET_CYCLES: Cycle = 1024;
-/// Maximum number of events in a frame, the last ones.
+/// Maximum number of events in a frame, the last ones: frames stay small however much happens, and
+/// the page requests the others.
 const MAX_FRAME_EVENTS: usize = 100;
 
 /// The events of one run.

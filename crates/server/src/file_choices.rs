@@ -6,11 +6,11 @@ use std::collections::{BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of files listed.
+/// Maximum number of files listed: a longer list is no help to choose from.
 const MAX_FILES: usize = 300;
 /// Maximum number of files and folders examined: a scenario may lie in a home folder with millions of files.
 const MAX_ENTRIES: usize = 3000;
-/// Maximum depth of folders in folders that is examined.
+/// Maximum depth of folders in folders that is examined; maps and profiles lie near their scenario.
 const MAX_DEPTH: usize = 3;
 
 impl AllowedFiles {
@@ -56,7 +56,8 @@ impl AllowedFiles {
     }
 }
 
-/// Returns the names in a folder that are not hidden, in order.
+/// Returns the names in a folder that are not hidden, sorted, so that the limit cuts off the same ones on every
+/// system.
 fn entries(folder: &Path, limit: usize) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let names =

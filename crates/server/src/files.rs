@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
 
-/// Maximum number of entries of a folder that are listed.
+/// Maximum number of entries of a folder that are listed, so that one listing stays quick.
 const MAX_ENTRIES: usize = 1000;
 /// Maximum size of a file that is read when its folder is listed: a list must not take seconds.
 const MAX_FILE_BYTES: u64 = 1 << 20;
@@ -30,7 +30,7 @@ pub(crate) struct AllowedFiles {
 /// A folder or a file given at start.
 #[derive(Debug)]
 struct Root {
-    /// The path as it was given.
+    /// The path as it was given, which listings show.
     path: PathBuf,
     /// The path with links resolved.
     real: PathBuf,
@@ -88,7 +88,7 @@ impl AllowedFiles {
         Self { granted: Arc::new(granted), ..self }
     }
 
-    /// Returns the first folder given at start.
+    /// Returns the first folder given at start, from which paths in a new scenario start.
     pub(crate) fn first_root_folder(&self) -> PathBuf {
         let folder = self.roots.iter().find(|root| root.real.is_dir());
         folder.map_or_else(PathBuf::new, |root| root.path.clone())

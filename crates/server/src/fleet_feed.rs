@@ -57,7 +57,7 @@ impl FleetFeed {
         }
     }
 
-    /// Returns the present state of the feed.
+    /// Returns the newest view, and takes nothing away: several sessions may show one fleet.
     pub(crate) fn snapshot(&self) -> FeedSnapshot {
         self.lock().clone()
     }

@@ -14,7 +14,7 @@ use axum::routing::get;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Maximum size of the body of a request: it is a token.
+/// Maximum size of the body of a request: the only one is the token, and some room.
 const MAX_BODY_BYTES: usize = 256;
 /// The time in which a token must arrive.
 const TOKEN_TIMEOUT: Duration = Duration::from_secs(10);

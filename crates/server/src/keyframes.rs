@@ -25,7 +25,6 @@ pub(crate) struct MemoryBudget {
 }
 
 impl MemoryBudget {
-    /// Returns a budget of some bytes in all, and a maximum for one run.
     pub(crate) fn new(total_bytes: usize, max_bytes_per_run: usize) -> Self {
         Self {
             used: AtomicUsize::new(0),
@@ -35,13 +34,13 @@ impl MemoryBudget {
         }
     }
 
-    /// Returns the number of bytes that each run may use.
+    /// Returns the number of bytes that each run may use now; it changes as runs start and end.
     fn share(&self) -> usize {
         (self.total_bytes / self.runs.load(Relaxed).max(1)).min(self.max_bytes_per_run)
     }
 }
 
-/// The keyframes of one run.
+/// The keyframes of one run; the first, at its start, is never dropped.
 #[derive(Debug)]
 pub(crate) struct Keyframes {
     checkpoints: BTreeMap<Cycle, Vec<u8>>,

@@ -72,19 +72,19 @@ pub const SPEED_RANGE: RangeInclusive<f64> = 0.1..=100.0;
 /// Options for the start of a server.
 #[derive(Clone)]
 pub struct Options {
-    /// The worlds.
+    /// The worlds whose scenarios can be opened, with the build that runs them.
     pub worlds: Worlds,
-    /// The program and its build, for people.
+    /// The program and its build, for people: the page shows it.
     pub program: String,
     /// Scenarios and recordings to open, and folders that may be read; the current folder if there are none.
     pub targets: Vec<PathBuf>,
-    /// The address to listen at.
+    /// The address to listen at, as the user gave it: a name becomes one of the allowed hosts.
     pub host: String,
     /// The port; 0 for any free one, `None` for the first free one of a range.
     pub port: Option<u16>,
     /// Whether texts of pages are refused, and nothing is written.
     pub read_only: bool,
-    /// The number of worker threads of each session.
+    /// The number of worker threads of each session; no result depends on it.
     pub workers: usize,
     /// The configured address at which viewers of Foxglove's protocol watch the session that was opened last.
     pub foxglove: Option<ViewerAddress>,
@@ -177,7 +177,7 @@ impl Studio {
 }
 
 impl Drop for Studio {
-    /// Ends all sessions, and waits for them.
+    /// Ends all sessions, and waits for them, some seconds at most.
     fn drop(&mut self) {
         self.shutdown.send_replace(true);
         if let Some(thread) = self.thread.take() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Maximum number of connections at a time.
+/// Maximum number of connections at a time: 16 pages and what they load beside, below the usual limit of open files.
 const MAX_CONNECTIONS: usize = 128;
 /// Maximum number of connections of a peer at a time. It does not hold for this machine itself, from which all connections
 /// that are forwarded (by `ssh -L`, say) seem to come.
@@ -40,7 +40,6 @@ impl ConnectionLimiter {
         Some(ConnectionPermit { limiter: self.clone(), peer })
     }
 
-    /// Returns whether there is no connection.
     pub(crate) fn is_empty(&self) -> bool {
         self.lock().is_empty()
     }

@@ -5,9 +5,9 @@ use sidestep_session::next_free_port;
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 
-/// The first port that is tried where none is given.
+/// The first port that is tried where none is given: no common program has it.
 const FIRST_PORT: u16 = 7800;
-/// The number of ports that are tried.
+/// The number of ports that are tried: more servers on one machine use any free port.
 const PORT_COUNT: u16 = 100;
 
 /// Binds the given port, or the first free one of a range.

@@ -11,9 +11,9 @@ use tokio::sync::Notify;
 /// Something to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum OutboxItem {
-    /// A reply or a notice.
+    /// A reply or a notice, each of which is sent.
     Text(String),
-    /// A frame.
+    /// The newest frame of a session.
     Frame(Vec<u8>),
 }
 
@@ -36,7 +36,7 @@ struct PendingMessages {
     last: SessionId,
 }
 
-/// The newest frame and state of one session.
+/// The newest frame and state of one session: an older one that was not sent is of no use to the page.
 #[derive(Debug, Default)]
 struct LatestUpdate {
     status: Option<String>,
@@ -76,7 +76,8 @@ impl Outbox {
         self.lock().long.iter().map(|(_, bytes)| bytes).sum()
     }
 
-    /// Sends a reply.
+    /// Sends a reply; its request counts as answered at once, and the reply is in the backlog until the socket takes
+    /// it.
     pub(crate) fn send_reply(&self, reply: &Reply) {
         let text = to_json(reply);
         let mut pending = self.lock();

@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// A file of the page.
+/// A file of the page, in the table that `build.rs` writes.
 struct Asset {
     /// Its path below the page's address.
     path: &'static str,

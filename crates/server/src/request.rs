@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 /// it replaces, both as JSON.
 pub const MAX_REQUEST_BYTES: usize = 40 << 20;
 
-/// A request of which only the number can be read.
+/// A request whose other parts may be malformed: the answer needs its number.
 #[derive(Deserialize)]
 struct RequestNumber {
     id: u32,
@@ -69,7 +69,6 @@ fn read_call(Envelope { id, session, call }: Envelope) -> Result<ClientRequest, 
     Ok(ClientRequest::Session { id, session, call })
 }
 
-/// Returns the name of the called method.
 fn method_name(id: u32, call: &Map<String, Value>) -> Result<String, Problem> {
     let name = call.get("do").and_then(Value::as_str);
     name.map(String::from).ok_or_else(|| {

@@ -8,9 +8,10 @@ use std::time::Duration;
 
 /// Maximum number of samples; beyond it every second one is dropped. A chart is at most about 2000 pixels wide.
 const MAX_SAMPLES: usize = 2048;
-/// Maximum number of metrics; further ones are left out.
+/// Maximum number of metrics; further ones are left out, so that memory has a limit for worlds with a metric per
+/// agent.
 const MAX_METRICS: usize = 400;
-/// Minimum time between two samples, before any thinning.
+/// Minimum time between two samples, before any thinning: charts that change faster cannot be read.
 const MIN_SPACING: Duration = Duration::from_millis(100);
 /// Minimum ratio of total time to the time spent on sampling: it slows a run down by 1 % at most.
 const MIN_COST_RATIO: u32 = 100;
@@ -25,7 +26,7 @@ pub(crate) struct Samples {
     /// Number of times that every second sample was dropped.
     thinned: u32,
     spacing: Duration,
-    /// The time that it took to take the last sample.
+    /// The time that it took to take the last sample, which decides how soon the next one may come.
     last_cost: Duration,
 }
 
@@ -49,7 +50,6 @@ impl Samples {
         cycle > last && since >= self.spacing.max(self.last_cost.saturating_mul(MIN_COST_RATIO))
     }
 
-    /// Returns whether a cycle comes after all samples.
     pub(crate) fn is_new(&self, cycle: Cycle) -> bool {
         self.cycles.last().is_none_or(|&last| cycle > last)
     }
@@ -95,7 +95,7 @@ impl Samples {
         self.spacing = self.spacing.saturating_mul(2);
     }
 
-    /// Returns the samples from a number on.
+    /// Returns the samples from a number on; none if there are not so many, as after a thinning.
     pub(crate) fn answer(&self, from: u32) -> ReplyBody {
         let first = (from as usize).min(self.cycles.len());
         ReplyBody::Metrics {

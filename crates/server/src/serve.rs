@@ -18,7 +18,8 @@ use tokio::time::{sleep, timeout};
 /// Timeouts of connections that are no WebSockets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Timeouts {
-    /// The time for the head of a request, and between two requests.
+    /// The time for the head of a request, and between two requests: ample for a browser, and no idle connection
+    /// keeps its permit for longer.
     head: Duration,
     /// The time after which a connection ends with the response in progress; the browser opens another one. Otherwise one
     /// that repeats a request again and again would keep its permit for good.
@@ -37,11 +38,13 @@ impl Default for Timeouts {
     }
 }
 
-/// The time that a response in progress has when the server ends.
+/// The time that a response in progress has when the server ends: small ones get through, and nobody waits for the
+/// end.
 const GRACE_TIMEOUT: Duration = Duration::from_secs(1);
 /// The delay after a failure to accept, because of too many open files for instance: retrying at once would be a busy loop.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(500);
-/// Maximum number of connections that are refused with a response at a time; further ones are only closed.
+/// Maximum number of connections that are refused with a response at a time: refusals have no permits, so they need a
+/// limit.
 const MAX_REFUSALS: usize = 32;
 const TOO_MANY_RESPONSE: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: text/plain; charset=utf-8\r\n\
     connection: close\r\ncontent-length: 63\r\n\r\nThere are too many connections: close pages, and try it again.\n";
@@ -82,6 +85,7 @@ pub(crate) async fn serve(
 
 async fn wait_until_empty(limiter: &ConnectionLimiter) {
     while !limiter.is_empty() {
+        // In a loop, because permits are dropped without a signal; it lasts a second at most.
         sleep(Duration::from_millis(5)).await;
     }
 }
@@ -156,7 +160,7 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// A connection, with its permit.
+/// A connection that keeps its permit also after it has become a WebSocket.
 struct Connection {
     stream: TcpStream,
     stall_timer: StallTimer,

@@ -21,7 +21,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::spawn_blocking;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// Maximum number of sessions of a socket.
+/// Maximum number of sessions of a socket: each has threads and memory of its own.
 const MAX_SESSIONS: usize = 4;
 /// Maximum number of requests without a reply and of unsent replies. Further requests are not read from the socket, so TCP
 /// holds the page back.
@@ -31,11 +31,11 @@ const LONG_REQUEST_BYTES: usize = 1 << 20;
 /// Bytes of long requests without a reply beyond which further requests are not read: each may be 40 MiB, and
 /// [`MAX_BACKLOG`] of them would be gigabytes.
 const MAX_LONG_REQUEST_BYTES: usize = 64 << 20;
-/// Sustained number of requests per second.
+/// Sustained number of requests per second; a page that drags a slider sends one for each frame of the screen.
 const MAX_REQUESTS_PER_S: f64 = 300.0;
-/// Number of requests that may arrive at once.
+/// Number of requests that may arrive at once, after a pause: two seconds' worth.
 const MAX_REQUEST_BURST: f64 = 600.0;
-/// Time between two pings.
+/// Time between two pings: routers forget connections that are idle for a minute or more.
 const PING_INTERVAL: Duration = Duration::from_secs(30);
 /// Time without a message or a pong after which a page counts as gone. A laptop that sleeps for some minutes keeps its
 /// sessions.
@@ -129,7 +129,7 @@ impl RateLimiter {
     }
 }
 
-/// The sessions of a socket.
+/// The sessions of a socket, which end with it.
 struct SocketSessions {
     state: Arc<AppState>,
     outbox: Arc<Outbox>,
@@ -284,7 +284,7 @@ impl SocketSessions {
     }
 }
 
-/// Returns the schema of a world's scenarios, and the tools that edit them.
+/// Returns the JSON Schema of a world's scenarios, and the tools that edit them on the canvas.
 ///
 /// # Errors
 /// When there is no such world.

@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
-/// Maximum number of sessions at a time, of all sockets.
+/// Maximum number of sessions at a time, of all sockets: each has worker threads, and a run in memory.
 const MAX_SESSIONS: u32 = 12;
-/// Maximum number of sockets at a time.
+/// Maximum number of sockets at a time; each is a page.
 const MAX_SOCKETS: usize = 16;
 /// Number of threads for blocking work: one for each socket, and some for results.
 pub(crate) const MAX_BLOCKING_THREADS: usize = MAX_SOCKETS + 4;
@@ -21,11 +21,9 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The state that all sockets share.
 pub(crate) struct AppState {
-    /// The dependencies of sessions.
+    /// What sessions depend on, which all share.
     pub(crate) deps: SessionDeps,
-    /// The rules of access.
     pub(crate) access: AccessPolicy,
-    /// The queue of reports and exports.
     pub(crate) jobs: JobQueue,
     program: String,
     open: Vec<TargetRef>,
@@ -56,7 +54,7 @@ impl AppState {
         }
     }
 
-    /// Returns the first notice for a page.
+    /// Returns the first notice for a page: version, worlds, and what the command line asked to open.
     pub(crate) fn hello(&self) -> ServerNotification {
         ServerNotification::Hello {
             version: VERSION,
@@ -84,7 +82,7 @@ impl AppState {
         self.sockets.clone().try_acquire_owned().ok()
     }
 
-    /// Returns whether no further socket is accepted.
+    /// Returns whether no further socket is accepted now.
     pub(crate) fn is_full(&self) -> bool {
         self.sockets.available_permits() == 0
     }

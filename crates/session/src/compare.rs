@@ -78,12 +78,11 @@ fn differing_bodies(
     differing
 }
 
-/// Returns the number of bodies that have rows.
 fn count_bodies(rows: &PositionColumns, table: &Table) -> usize {
     bits_by_body(rows, &[], |name| table.column(name)).len()
 }
 
-/// Returns the bits of all columns by body, of all its rows.
+/// Returns the bits of all columns by body, so that missing values and negative zeros count, too.
 fn bits_by_body<'a>(
     rows: &PositionColumns,
     names: &[&str],

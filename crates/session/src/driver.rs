@@ -15,12 +15,12 @@ use std::time::{Duration, Instant};
 /// Duration of a slice, and so the longest wait for a stop: short enough that a key press seems to act at once.
 const SLICE_DURATION: Duration = Duration::from_millis(20);
 
-/// The cycles and the time of a stretch of a run in this process.
+/// A stretch of a run in this process: its cycles, and the time that they took.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RunTiming {
-    /// Cycles done.
+    /// Cycles done in the stretch, not since the run's start.
     pub cycles: u64,
-    /// Elapsed time.
+    /// Elapsed time, including that in which viewers held the run.
     pub wall: Duration,
     /// CPU time of all threads.
     pub cpu: Duration,
@@ -37,7 +37,7 @@ impl std::ops::AddAssign for RunTiming {
 /// The destinations of a run's rows and frames.
 #[derive(Default)]
 pub struct Sinks<'a> {
-    /// Rows and checkpoints.
+    /// The run folder, which takes rows at multiples of cycles and saves checkpoints when they are due.
     pub recording: Option<&'a mut RunRecorder>,
     /// Rows alone, for callers that keep them in memory; they are handed over once, so there is no recording then.
     pub rows: Option<&'a mut dyn Recorder>,
@@ -117,7 +117,8 @@ fn drive_slices(
     Ok(RunTiming { cycles: run.cycle() - from, wall: wall.elapsed(), cpu: cpu.elapsed() })
 }
 
-/// Advances a little, by at most `allowed` cycles, and passes on rows and frames that are due.
+/// Advances by at most `allowed` cycles, and by no more than fit a slice or come before the next rows or frame are
+/// due.
 fn drive_slice(
     run: &mut dyn Simulation,
     until: Cycle,
@@ -187,7 +188,7 @@ fn advance_sampling(
     run.cycle() - from
 }
 
-/// The number of cycles of a slice.
+/// The number of cycles that take about [`SLICE_DURATION`], by the times of the slices before.
 #[derive(Debug)]
 struct SliceSize(u64);
 

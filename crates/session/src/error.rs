@@ -11,10 +11,10 @@ pub enum Error {
     /// Wrong input, with its place and a remedy.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Something could not be stored.
+    /// A run folder, an MCAP file or a checkpoint could not be stored.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A picture could not be drawn.
+    /// A picture could not be drawn: a size is too large, or a number has no place in it.
     #[error("the picture cannot be drawn: {0}")]
     Draw(#[from] DrawError),
     /// The watcher asked to stop before there was a result to keep.
@@ -29,20 +29,20 @@ pub enum Error {
     /// Anything else that stopped the work, with its remedy.
     #[error("{cause}\n  help: {remedy}")]
     Other {
-        /// The reason.
+        /// Becomes the message, in lower case and without an end mark.
         cause: String,
-        /// The remedy.
+        /// Is shown below the message, as an instruction.
         remedy: String,
     },
 }
 
 impl Error {
-    /// Returns a stop with its cause and remedy.
+    /// Returns [`Error::Other`].
     pub fn other(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Other { cause: cause.into(), remedy: remedy.into() }
     }
 
-    /// Returns the error of a file that could not be written.
+    /// Returns an [`Error::Other`] about `path`, with the system's reason.
     pub fn cannot_write(path: &Path, error: &std::io::Error) -> Self {
         let remedy = "check the folder, its permissions and the space on the disk";
         Self::other(format!("cannot write {}: {error}", path.display()), remedy)

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::path::PathBuf;
 
-/// The name of the program.
+/// The program beside `sidestep` that alone contains the network stack.
 pub const LINK_PROGRAM: &str = "sidestep-link";
 
 /// A job for the program.
@@ -21,7 +21,7 @@ pub const LINK_PROGRAM: &str = "sidestep-link";
 pub enum Job {
     /// Serve a world to nodes, some of which it starts itself.
     Fleet(FleetJob),
-    /// Run one agent of it.
+    /// Run one agent of a fleet, whose server another process is.
     Node(NodeJob),
     /// Watch a fleet that flies already.
     Watch(WatchJob),
@@ -30,7 +30,7 @@ pub enum Job {
 /// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AgentName {
-    /// The noun for such an agent.
+    /// What people call such an agent, e.g. `airplane`.
     pub noun: Cow<'static, str>,
     /// The number of its visible body.
     pub number: EntityId,
@@ -39,7 +39,7 @@ pub struct AgentName {
 }
 
 impl AgentName {
-    /// Returns the name of an agent that is a body, or a part of one.
+    /// Returns the name of a body's agent, or with `part` of the agent that is this part of it.
     pub fn new(noun: impl Into<Cow<'static, str>>, number: EntityId, part: Option<u32>) -> Self {
         Self { noun: noun.into(), number, part }
     }
@@ -62,7 +62,7 @@ impl fmt::Display for AgentName {
 /// A scenario, and the build that is to fly it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobScenario {
-    /// The scenario's file.
+    /// Path of the scenario; relative paths in it start at its folder.
     pub file: PathBuf,
     /// Changes of it, as `key=value`.
     pub overrides: Vec<String>,
@@ -73,7 +73,7 @@ pub struct JobScenario {
 /// Settings that a server and its nodes share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommonSettings {
-    /// The scenario.
+    /// The scenario, from which each party makes its own copy of the world.
     pub flown: JobScenario,
     /// Certificates, where links are encrypted and both ends prove their identity.
     pub tls: Option<Tls>,
@@ -81,20 +81,20 @@ pub struct CommonSettings {
     pub lease_s: f64,
     /// The address at which it serves its metrics, as `HOST:PORT`.
     pub metrics: Option<String>,
-    /// Whether logs are JSON.
+    /// Whether each line of the log is a JSON object, for programs that collect logs.
     pub json_log: bool,
     /// The least severe log lines that are written, e.g. `info`.
     pub log: String,
 }
 
-/// A fleet.
+/// Job of the server: it advances the world, and collects the controls of all nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FleetJob {
     /// Settings that nodes have, too.
     pub common: CommonSettings,
     /// Number of nodes that are started here, of the agents with the lowest ids; all of them unless given.
     pub nodes: Option<usize>,
-    /// The course of time.
+    /// Whether cycles wait for nodes or come at their time.
     pub clock: ClockMode,
     /// The way from node to node.
     pub topology: Topology,
@@ -108,12 +108,12 @@ pub struct FleetJob {
     pub packets: bool,
 }
 
-/// A node.
+/// Job of one node: it decides for one agent, and sees nothing of the world but that agent's percepts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NodeJob {
     /// Settings that the server has, too.
     pub common: CommonSettings,
-    /// Its agent.
+    /// The agent for which it decides; the server knows the node by it.
     pub agent: AgentName,
     /// Endpoints, at one of which the server listens.
     pub connect: Vec<String>,
@@ -202,11 +202,11 @@ pub struct JobError {
     pub is_input: bool,
     /// Whether it was asked to stop.
     pub is_interrupted: bool,
-    /// The place of the error.
+    /// The file, option or endpoint concerned; empty if none is.
     pub place: String,
-    /// The reason.
+    /// Becomes the message, without its place.
     pub cause: String,
-    /// The remedy.
+    /// Is shown below the message, as an instruction.
     pub remedy: String,
 }
 
@@ -217,11 +217,11 @@ pub struct FleetScene {
     pub build: String,
     /// The world's name.
     pub world: String,
-    /// The noun for an agent.
+    /// What people call an agent of this world, e.g. `airplane`.
     pub agent: String,
-    /// The seed of the run.
+    /// Identifies the run together with the scenario: viewers show it.
     pub seed: u64,
-    /// The scenery.
+    /// Walls, floor and starts, which frames do not repeat.
     pub scenery: Scenery,
 }
 
@@ -233,7 +233,7 @@ pub struct FleetFrame {
     /// The bodies; its log has the last events of the run, not only those since the frame before, which a viewer may
     /// not have seen.
     pub frame: Frame,
-    /// The nodes.
+    /// Counts and states of the nodes at the same moment as the frame.
     pub fleet: FleetStatus,
     /// Whether the fleet has come to its end.
     pub is_over: bool,
@@ -256,7 +256,7 @@ pub struct FleetStatus {
     pub talk_p50_ms: Option<f64>,
     /// The time in milliseconds below which 99 of 100 of them are.
     pub talk_p99_ms: Option<f64>,
-    /// The noun for an agent.
+    /// What people call an agent of this world, e.g. `airplane`.
     pub noun: String,
     /// Names of the agents for which all wait, because their nodes are not heard.
     pub waits_for: Vec<String>,
@@ -278,7 +278,7 @@ pub struct NodeStatus {
     /// A word for its state: `awaited`, `joined`, `gone`, `silent` if it was not heard for a second, or its part in
     /// the cycle.
     pub state: String,
-    /// The process of the node, where it has one.
+    /// System id of the node's process on its machine; `None` before the node has joined.
     pub process: Option<u32>,
     /// The epoch of the coordinator that it follows.
     pub epoch: u64,

@@ -28,16 +28,16 @@ pub struct ManagedRun {
     run: Box<dyn Simulation>,
     recording: Option<RunRecorder>,
     mcap: Option<McapSink>,
-    /// Rows and frames that are kept in memory.
+    /// Rows that [`Self::keep_rows`] asked for.
     rows: Option<RowStore>,
     frames: Option<FrameRows>,
     viewers: Option<LiveControl>,
     workers: usize,
     /// The cycle to stop at, if before the planned end.
     until: Option<Cycle>,
-    /// The report about the file that the scenario was made from.
+    /// For the summary: the scenario's text was made from a file of another program.
     import: Option<ImportedScenario>,
-    /// Cycles and time so far.
+    /// Cycles and time of all calls so far, without those of an earlier process.
     timing: RunTiming,
     /// The last cycle for which [`Self::order`] gave an order.
     ordered_at: Option<Cycle>,
@@ -116,7 +116,7 @@ impl OutputPaths<'_> {
         RunRecorder::create(folder, resolved, run, self.if_exists(), build).map(Some)
     }
 
-    /// Returns whether the MCAP file is to be in the folder.
+    /// Returns whether the MCAP file lies in the folder, which then has to exist before the file.
     fn is_mcap_in_folder(&self) -> bool {
         let (Some((file, _)), Some(folder)) = (self.mcap, self.folder) else { return false };
         resolve_path(file).starts_with(resolve_path(folder))
@@ -209,7 +209,7 @@ impl ManagedRun {
         Self { import, ..self }
     }
 
-    /// The run.
+    /// The run, to look at; it is at the end of the last call that advanced it.
     pub fn simulation(&self) -> &dyn Simulation {
         self.run.as_ref()
     }

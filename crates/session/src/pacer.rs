@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 /// The delay beyond which a run does not rush to catch up: a viewer would see a jump.
 const MAX_LAG: Duration = Duration::from_millis(250);
 
-/// The clock of a run that is played at a speed.
+/// The clock of a run that is played at a speed: it converts cycles to times from the start of the run or the last
+/// restart, so errors do not add up.
 #[derive(Debug, Clone, Copy)]
 pub struct Pacer {
     start: Instant,

@@ -49,7 +49,7 @@ pub(crate) fn draw_svg(
     Ok(draw(&scenery, &frame, &trails, &PictureOptions::page(&scenery, caption))?)
 }
 
-/// Returns the small print under a picture.
+/// Returns the small print under a picture: what identifies the run.
 pub(crate) fn footnote(run: &dyn Simulation) -> String {
     format!("Seed {}, sidestep {}.", run.config().seed, VERSION)
 }

@@ -25,7 +25,7 @@ pub struct RecordedRun {
     pub cycles_done: Cycle,
     /// Digest of the state after these cycles, if it is known.
     pub digest: Option<String>,
-    /// The run folder, if the run was recorded to one.
+    /// The run folder; `None` for an MCAP file, which has neither tables nor checkpoints.
     pub folder: Option<PathBuf>,
     source: Source,
     /// The folder of the scenario's files.

@@ -60,7 +60,6 @@ impl RowStore {
         Ok(Self { tables, places, begin, known: BTreeMap::new() })
     }
 
-    /// The cycle from which on rows are kept.
     pub(crate) fn first_cycle(&self) -> Cycle {
         self.begin
     }

@@ -106,7 +106,6 @@ impl RunRecorder {
         self.save_checkpoint(run)
     }
 
-    /// Returns the folder.
     pub(crate) fn folder(&self) -> &RunFolder {
         &self.folder
     }

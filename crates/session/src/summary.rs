@@ -28,7 +28,7 @@ pub enum RunStatus {
 pub struct Summary {
     /// Version of the program.
     pub version: &'static str,
-    /// Name of the world.
+    /// Name of the world, as `world` in the scenario.
     pub world: &'static str,
     /// Noun for an agent of the world.
     #[serde(skip)]
@@ -37,7 +37,7 @@ pub struct Summary {
     pub name: String,
     /// Whether the run reached its end.
     pub status: RunStatus,
-    /// The seed.
+    /// The seed, in case an option has replaced that of the scenario.
     pub seed: u64,
     /// Digest of the state after `cycles` cycles, in hexadecimal.
     pub digest: String,
@@ -90,11 +90,11 @@ fn as_shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Er
 /// Seconds spent in each phase, by the clock of worker 0.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Phases {
-    /// Time of the phase *claim*.
+    /// Bodies perceive, decide where agents decide alone, and claim.
     pub claim: f64,
-    /// Time of the phase *join*.
+    /// Claims become groups of bodies in conflict.
     pub join: f64,
-    /// Time of the phase *act*.
+    /// Groups decide where agents decide together, and all act.
     pub act: f64,
     /// Time of recording.
     pub record: f64,

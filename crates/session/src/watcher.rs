@@ -62,7 +62,7 @@ pub struct NoWatcher;
 
 impl Watcher for NoWatcher {}
 
-/// A watcher of larger work, which does not report the cycles of its parts.
+/// A watcher of larger work: it passes on requests to stop, and does not report the cycles of the parts.
 pub(crate) struct NestedWatcher<'a>(pub(crate) &'a dyn Watcher);
 
 impl Watcher for NestedWatcher<'_> {

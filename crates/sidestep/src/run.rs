@@ -15,7 +15,7 @@ pub struct Run {
 pub struct Table {
     /// Its name, its columns, and facts about all rows.
     pub schema: TableSchema,
-    /// The values of each column.
+    /// The values of each column, in the order of the schema; all of one length.
     pub columns: Vec<Values>,
 }
 
@@ -25,7 +25,7 @@ impl Table {
         &self.schema.name
     }
 
-    /// Returns the values of the column with this name.
+    /// Returns the values of the column with this name; `None` if the table has no such column.
     pub fn column(&self, name: &str) -> Option<&Values> {
         let index = self.schema.columns.iter().position(|column| column.name == name)?;
         self.columns.get(index)

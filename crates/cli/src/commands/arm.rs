@@ -130,7 +130,6 @@ struct RodLimits {
 }
 
 impl Arm {
-    /// Returns the positions of the arm at these joint values.
     pub(crate) fn positions(&self, values: &[f64]) -> ArmPositions {
         let chain = &self.selection.chain;
         let frames = chain.forward(values);
@@ -179,7 +178,6 @@ impl ArmPositions {
         ArmPicture { robot: &self.robot, connectors: &self.connectors, target, obstacles }
     }
 
-    /// Returns the positions as text for people.
     pub(crate) fn text(&self) -> String {
         let joints: Vec<_> =
             self.joint_info.iter().map(|j| (j.name.clone(), joint_text(j))).collect();
@@ -208,7 +206,7 @@ fn joint_text(joint: &JointPosition) -> String {
     format!("{:>9} {:<3}  ({limits})", format_fixed(joint.value, 4), joint.unit)
 }
 
-/// Formats numbers with six decimals in aligned columns.
+/// Formats numbers with six decimals (micrometers, and less than an arcsecond) in aligned columns.
 pub(crate) fn format_numbers(numbers: &[f64]) -> String {
     let columns = numbers.iter().map(|x| format!("{:>10}", format_fixed(*x, 6)));
     columns.collect::<Vec<_>>().join(" ")

@@ -11,18 +11,19 @@ use std::path::Path;
 /// arm, and a connector is a little thicker than the links that it joins.
 const THICKNESS_FRACTION: f64 = 0.012;
 const RADIUS_FRACTION: f64 = 0.014;
-/// Drawn radius of a target, as a fraction of the arm's length.
+/// Drawn radius of a target, as a fraction of the arm's length: larger than a connector, so that one at the tip stays
+/// visible.
 const TARGET_FRACTION: f64 = 0.02;
 
-/// The content of a picture.
+/// The content of a picture, in the frame of the arm's base.
 pub(crate) struct ArmPicture<'a> {
-    /// Name of the robot.
+    /// The robot's name, which becomes the title.
     pub(crate) robot: &'a str,
     /// Positions of the connectors in m, from the base out.
     pub(crate) connectors: &'a [Vector],
     /// Target position of the tip, in m.
     pub(crate) target: Option<Vector>,
-    /// The obstacles.
+    /// Spheres in m that the posture had to avoid.
     pub(crate) obstacles: &'a [Sphere],
 }
 

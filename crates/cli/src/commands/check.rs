@@ -30,8 +30,6 @@ pub(crate) struct CheckArgs {
     scenario: ScenarioArgs,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -83,7 +81,7 @@ fn print_all_errors(
     Ok(ExitCode::WrongInput)
 }
 
-/// Adds the memory that a run takes: the peak of this process once it has started one.
+/// Adds the memory that a run takes: the peak of this process once it has started one with one worker.
 fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &mut Description) {
     let _run = compiled.start(source, 1);
     let Some(bytes) = peak_bytes() else { return };

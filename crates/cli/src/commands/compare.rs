@@ -60,8 +60,6 @@ impl MethodName {
     }
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the scenario is wrong, or of another world.
 pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -28,8 +28,6 @@ struct CompletionsOutput {
     script: String,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When they cannot be written.
 pub(crate) fn completions(args: &CompletionsArgs, console: Console) -> Result<ExitCode, Failure> {

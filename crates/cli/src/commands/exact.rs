@@ -100,8 +100,6 @@ impl ExportArgs {
     }
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the scenario is wrong or is not a Markov chain, or the export cannot be written.
 pub(crate) fn exact(args: &ExactArgs, console: Console) -> Result<ExitCode, Failure> {

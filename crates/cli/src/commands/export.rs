@@ -125,8 +125,6 @@ pub(crate) struct ExportArgs {
     replace: bool,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the recorded run or an option is wrong, or the result cannot be stored or differs from
 /// the recording.

@@ -33,8 +33,6 @@ pub(crate) struct FkArgs {
     png: Option<PathBuf>,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When a file, a link, the posture or the values are wrong.
 pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -97,14 +97,11 @@ pub(crate) struct FleetArgs {
     link: LinkArgs,
 }
 
-/// Parses a speed.
 fn parse_speed(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.01..=1000.0).contains(x));
     number.ok_or_else(|| "give a number from 0.01 to 1000".into())
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When anything is wrong with its input, or the fleet fails.
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {

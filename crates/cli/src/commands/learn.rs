@@ -251,8 +251,6 @@ struct TargetArgs {
     name: String,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When a log, an option or the profile is wrong, or the profile cannot be written.
 pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -23,8 +23,6 @@ pub(crate) struct ManArgs {
     folder: PathBuf,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the folder cannot be written to.
 pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -88,8 +88,6 @@ struct MapCounts {
     boxes: CellCounts,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the map is wrong, or the picture cannot be written.
 pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure> {

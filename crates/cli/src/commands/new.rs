@@ -31,7 +31,7 @@ pub(crate) struct NewArgs {
     file: Option<PathBuf>,
 }
 
-/// The names of the worlds, each with a description.
+/// The worlds as values of an option, each with its description as help.
 pub(crate) fn world_names() -> PossibleValuesParser {
     PossibleValuesParser::new(worlds().iter().map(world_value))
 }
@@ -41,8 +41,6 @@ pub(super) fn world_value(world: &dyn WorldType) -> PossibleValue {
     PossibleValue::new(world.name()).help(world.about())
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the file is there already or cannot be written.
 pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure> {

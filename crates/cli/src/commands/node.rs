@@ -61,7 +61,7 @@ pub(crate) struct NodeArgs {
     link: LinkArgs,
 }
 
-/// Parses the name of a connector.
+/// Parses `CHAIN.CONNECTOR`, both from 0.
 fn connector(text: &str) -> Result<AgentName, String> {
     let numbers = text.split_once('.').map(|(chain, connector)| (chain.parse(), connector.parse()));
     match numbers {
@@ -77,8 +77,6 @@ impl NodeArgs {
     }
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When anything is wrong with its input, or the server is not there.
 pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failure> {

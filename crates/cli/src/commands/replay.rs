@@ -49,8 +49,6 @@ pub(crate) struct ReplayArgs {
     png: Option<PathBuf>,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the folder or the cycle is wrong, or the state differs from the recorded one.
 pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Failure> {

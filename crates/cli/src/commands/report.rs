@@ -62,7 +62,7 @@ struct PrintArgs {
     labels: Vec<String>,
 }
 
-/// Formats of figures for print.
+/// Formats of figures for print; PDF is known so that its error can give a remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FigureFormat {
     Svg,
@@ -72,8 +72,6 @@ enum FigureFormat {
     Pdf,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the folder holds nothing to report, something in it is damaged, or the report cannot be
 /// written.
@@ -172,7 +170,7 @@ fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Parses a label and its replacement.
+/// Parses `WORDS=OTHERS`.
 fn parse_label(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {

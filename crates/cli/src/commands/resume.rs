@@ -40,8 +40,6 @@ pub(crate) struct ResumeArgs {
     cycles: Option<Cycle>,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the folder holds no run that can be continued, or results cannot be stored.
 pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {

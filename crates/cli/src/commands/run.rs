@@ -67,8 +67,6 @@ pub(crate) struct RunArgs {
     many: ReplicationArgs,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
@@ -113,7 +111,6 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     run_to_end(run, console)
 }
 
-/// Starts to serve a run to viewers, and prints the address.
 fn serve_viewers(
     run: &mut ManagedRun,
     at: &ViewerAddress,

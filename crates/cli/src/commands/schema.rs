@@ -43,7 +43,6 @@ fn other_files() -> Vec<(&'static str, Value)> {
     of_worlds.chain([(SWEEP_NAME, sidestep::experiment::sweep::file::schema())]).collect()
 }
 
-/// The names of the worlds and of other files.
 fn schema_names() -> PossibleValuesParser {
     let mut values: Vec<PossibleValue> = worlds().iter().map(world_value).collect();
     for (name, schema) in other_files() {
@@ -53,8 +52,6 @@ fn schema_names() -> PossibleValuesParser {
     PossibleValuesParser::new(values)
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the file cannot be written.
 pub(crate) fn schema(args: &SchemaArgs, console: Console) -> Result<ExitCode, Failure> {

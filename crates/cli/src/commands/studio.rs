@@ -29,7 +29,7 @@ Examples:
 The page may read what lies below the given folders, the folders of the given \
 files, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
 
-/// The time between two checks for an interrupt.
+/// The time between two checks for an interrupt: a key press seems to act at once.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Watch, steer, replay and edit in the browser.
@@ -128,7 +128,7 @@ fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Fail
     Ok(())
 }
 
-/// Waits until the command is interrupted.
+/// Waits until the command is interrupted, or the server ends by itself.
 fn wait_for_end(studio: &Studio) -> Result<(), Failure> {
     while !interrupt::is_requested() {
         if studio.has_ended() {

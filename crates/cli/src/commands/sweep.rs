@@ -116,8 +116,6 @@ struct FolderArgs {
     folder: PathBuf,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the sweep or a folder is wrong, runs are missing, or results cannot be stored.
 pub(crate) fn sweep(args: &SweepArgs, console: Console) -> Result<ExitCode, Failure> {

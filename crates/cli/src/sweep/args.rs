@@ -44,7 +44,6 @@ pub(crate) struct ReplicationArgs {
 }
 
 impl ReplicationArgs {
-    /// Returns whether an option asks for many runs.
     pub(crate) fn is_requested(&self) -> bool {
         self.replicate.is_some() || !self.vary.is_empty() || self.until.is_some()
     }

@@ -91,7 +91,6 @@ fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCod
     Ok(ExitCode::Interrupted)
 }
 
-/// Returns the tables of all metrics.
 fn tables(summary: &Summary) -> String {
     let mut texts = Vec::new();
     for table in &summary.brief() {
@@ -190,7 +189,7 @@ fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
     failed.len()
 }
 
-/// Prints that a share is done, or how many of its runs are finished.
+/// Prints that a share is done, or how many of its runs are finished so far.
 ///
 /// # Errors
 /// When that cannot be written.

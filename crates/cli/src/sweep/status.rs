@@ -7,7 +7,7 @@ use serde_json::json;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{Folder, ShareStatus, SweepStatus};
 
-/// Largest number of failed runs that are listed.
+/// Largest number of failed runs that are listed: many have the same cause.
 const MAX_LISTED_FAILURES: usize = 5;
 
 /// Prints the progress of a sweep.

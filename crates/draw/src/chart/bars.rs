@@ -8,9 +8,9 @@ use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{INK, Style, series_color, series_fill};
 use crate::svg::Rect;
 
-/// The part of a category's slot that its bars fill.
+/// The part of a category's slot that its bars fill; the rest separates it from the next.
 const FILLED_FRACTION: f64 = 0.78;
-/// Greatest width of a bar.
+/// Greatest width of a bar: a few wide ones would look like areas.
 const MAX_BAR_WIDTH_PX: f64 = 60.0;
 
 /// The height of a bar, optionally with its interval.
@@ -28,7 +28,6 @@ impl Bar {
         Self { value, interval: None }
     }
 
-    /// Returns the values that it reaches.
     fn heights(&self) -> [f64; 3] {
         let (low, high) = self.interval.unwrap_or((self.value, self.value));
         [low, self.value, high]

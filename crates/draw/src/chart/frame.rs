@@ -13,16 +13,16 @@ const LABEL_GAP_PX: f64 = 5.0;
 const NOTE_GAP_PX: f64 = 8.0;
 /// Gap between the names of two categories.
 const SLOT_GAP_PX: f64 = 6.0;
-/// Gap beside an upright name.
+/// Gap between an upright name and the axis.
 const UPRIGHT_GAP_PX: f64 = 4.0;
 /// Largest fraction of the picture's height that upright names take; longer ones are cut off.
 const MAX_UPRIGHT_FRACTION: f64 = 0.4;
-/// Least fraction of the picture's height for the data; the picture grows to provide it.
+/// Least fraction of the picture's height for the data: long labels make the picture higher, not the data flat.
 const MIN_AREA_FRACTION: f64 = 0.55;
 
 /// The content of the horizontal axis.
 pub(crate) enum XAxis<'a> {
-    /// Numbers.
+    /// A numeric axis, its range known.
     Values(FittedAxis),
     /// Named slots of equal width.
     Categories(&'a [String]),
@@ -39,6 +39,7 @@ pub(crate) struct FrameText<'a> {
 
 /// Returns the number of labeled ticks that fit a picture of this style, across and upward.
 pub(crate) fn max_ticks(style: &Style) -> (usize, usize) {
+    // A label of five digits is about four letters wide, and needs space beside it.
     let across = style.width_px / (7.0 * style.font_px);
     let upward = style.height_px / (4.5 * style.font_px);
     ((across as usize).clamp(2, 12), (upward as usize).clamp(2, 10))
@@ -157,7 +158,6 @@ impl ChartFrame {
         frame
     }
 
-    /// Returns the horizontal scale of `across`.
     pub(crate) fn x_scale(&self, across: &FittedAxis) -> Scale {
         across.scale_between(self.area.x, self.area.right())
     }
@@ -167,7 +167,6 @@ impl ChartFrame {
         self.svg.open_clip(self.area.grown(6.0));
     }
 
-    /// Returns the finished picture.
     pub(crate) fn finish(mut self) -> String {
         let text_style =
             TextStyle { fill: FAINT_INK, ..TextStyle::new(self.style.small_px(), Anchor::Start) };

@@ -23,7 +23,7 @@ const MAX_MARKERS: usize = 60;
 pub struct Point {
     /// Position along the horizontal axis. A point that is not a number interrupts its line.
     pub x: f64,
-    /// Position along the vertical axis.
+    /// Position along the vertical axis; one that is not a number interrupts the line.
     pub y: f64,
     /// Lower and upper end of the error bar, in units of the vertical axis.
     pub interval: Option<(f64, f64)>,
@@ -68,7 +68,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Returns points joined by a line.
+    /// Returns points joined by a line in their order, with markers if they are few.
     pub fn line(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { label: label.into(), points, mark: Mark::Line }
     }
@@ -78,7 +78,7 @@ impl Series {
         Self { mark: Mark::Band, ..Self::line(label, points) }
     }
 
-    /// Returns points that are not joined.
+    /// Returns points with markers alone.
     pub fn points(label: impl Into<String>, points: Vec<Point>) -> Self {
         Self { mark: Mark::Points, ..Self::line(label, points) }
     }
@@ -141,7 +141,7 @@ impl Plot {
         self
     }
 
-    /// Adds a series.
+    /// Adds a series; its number among them decides color and marker.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);

@@ -14,9 +14,9 @@ use sidestep_kernel::view::{
 
 /// Least width of a line, because thinner ones would vanish.
 const MIN_LINE_PX: f64 = 1.4;
-/// Least radius of a body.
+/// Least radius of a body, because smaller ones would vanish.
 const MIN_RADIUS_PX: f64 = 1.2;
-/// Least length of an arrowhead.
+/// Least length of an arrowhead, because its direction would not be visible in a shorter one.
 const MIN_DART_PX: f64 = 9.0;
 /// Least radius of a leader's mark, from above and in space.
 const MIN_LEADER_PX: [f64; 2] = [3.0, 5.0];
@@ -33,9 +33,9 @@ const SEAM_PX: f64 = 1.0;
 const MIN_SEAMED_PX: f64 = 8.0;
 /// Number of balls in space above which those of one size and about one depth are one path, without rims.
 const MAX_SEPARATE_BALLS: usize = 400;
-/// Shades of such balls.
+/// Shades of such balls: with one path for each, their number decides the bytes.
 const SHADES: f64 = 16.0;
-/// The attributes that lines share.
+/// Round, because the segments of a line are drawn one by one in space and must join without a notch.
 const LINE_ATTRIBUTES: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
 /// Duration of the movement that a body's arrow shows, in seconds.
 const ARROW_TIME_S: f64 = 1.0;
@@ -169,7 +169,7 @@ fn depth(canvas: &Canvas, at: Vec3) -> f64 {
     canvas.camera.depth_m(at)
 }
 
-/// Returns the color of a body, and its opacity.
+/// Returns the color of a body, paler with distance in space, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let appearance = body.appearance(scene.scenery.dimensions);
     let acts = body.kind.is_agent() || body.kind == BodyKind::Rods;
@@ -213,7 +213,6 @@ fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
     is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
 }
 
-/// Returns the line around a body.
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     let white = [0xFF; 3];
     match body.kind {
@@ -302,6 +301,7 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
         _ => return,
     };
     if body.kind == BodyKind::Robot {
+        // A third of the side to each end, so that the color of the body stays visible around it.
         let size_m = 0.34 * side_m;
         let corners =
             [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];
@@ -334,7 +334,6 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     }
 }
 
-/// Returns whether a body leads the others.
 pub(super) fn is_leader(body: &Body) -> bool {
     body.state == Condition::Leading
 }
@@ -389,7 +388,7 @@ fn faces(pose: &Pose, size_m: Vec3, canvas: &Canvas) -> Vec<[Vec3; 4]> {
     faces
 }
 
-/// Returns a circle that lies flat.
+/// Returns a circle that lies flat, as a polygon, because in space it is seen as an ellipse.
 fn circle(pose: &Pose, radius_m: f64) -> [Vec3; CORNERS] {
     std::array::from_fn(|k| {
         let angle = k as f64 * std::f64::consts::TAU / CORNERS as f64;
@@ -397,7 +396,7 @@ fn circle(pose: &Pose, radius_m: f64) -> [Vec3; CORNERS] {
     })
 }
 
-/// Returns an arrowhead with its middle at the pose.
+/// Returns an arrowhead with its middle at the pose, notched at the back by a quarter of its length.
 fn dart(pose: &Pose, length_m: f64, width_m: f64) -> [Vec3; 4] {
     let half_m = 0.5 * length_m;
     let wing_m = 0.5 * width_m;

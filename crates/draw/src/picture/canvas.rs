@@ -86,7 +86,6 @@ impl Canvas {
         self.camera == Camera::ABOVE
     }
 
-    /// Returns 0 for the farthest place, 1 for the nearest.
     pub(crate) fn nearness(&self, place: Vec3) -> f64 {
         let [far_m, near_m] = self.depths_m;
         ((self.camera.depth_m(place) - far_m) / (near_m - far_m)).clamp(0.0, 1.0)

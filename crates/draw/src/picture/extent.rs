@@ -17,7 +17,7 @@ const MARGIN_FRACTION: f64 = 0.03;
 /// Least length of a side, as a fraction of the longest: bodies in a row would otherwise make a picture of no height.
 const MIN_SIDE_FRACTION: f64 = 0.2;
 
-/// Returns the number of points that a body is drawn with.
+/// Returns the number of points that a body is drawn with, which limits the size of a picture.
 fn point_count(body: &Body) -> usize {
     match &body.shape {
         Shape::Line { points_m, .. } => points_m.len(),

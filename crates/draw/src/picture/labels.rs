@@ -132,6 +132,7 @@ fn write_label(svg: &mut Svg, label: Label<'_>, area: Rect, taken: &mut Vec<Rect
         let left = x - out - width;
         let middle = x - 0.5 * width;
         let up = y - out - height;
+        // Readers look for a name to the right first, and beside or above a point rather than at its corners.
         [
             (x + out, y - 0.5 * height),
             (left, y - 0.5 * height),

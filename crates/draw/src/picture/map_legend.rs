@@ -126,7 +126,7 @@ fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     entries
 }
 
-/// Returns the name of a thing.
+/// Returns the name of a thing: its own, or its kind and number.
 pub(super) fn display_name(scene: &Scene<'_>, kind: BodyKind, number: u32) -> String {
     let own = scene.scenery.names.iter().find(|(k, n, _)| (*k, *n) == (kind, number));
     match own {

@@ -13,9 +13,9 @@ use sidestep_kernel::view::Color;
 const SHADES: usize = 8;
 /// Part of its color that the oldest part of a trail keeps.
 const OLDEST_COLOR_FRACTION: f64 = 0.3;
-/// Opacity of a ribbon, and of a line.
+/// Opacity of a ribbon, which must not hide the floor, and of a line.
 const OPACITY: [f64; 2] = [0.5, 0.8];
-/// Width of a trail that is a line.
+/// Width of a trail that is a line: thinner than any body.
 const LINE_PX: f64 = 1.8;
 /// Distance below which points of a line cannot be distinguished.
 const MIN_POINT_DISTANCE_PX: f64 = 0.7;
@@ -55,7 +55,7 @@ pub(super) fn draw(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas) {
     svg.close_group();
 }
 
-/// Returns the color of a shade.
+/// Returns the color of a shade, the paler the older.
 fn aged_color(color: Color, shade: usize) -> Color {
     let part =
         OLDEST_COLOR_FRACTION + (1.0 - OLDEST_COLOR_FRACTION) * shade as f64 / (SHADES - 1) as f64;

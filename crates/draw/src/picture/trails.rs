@@ -18,7 +18,7 @@ const RIBBON_LENGTHS_CYCLES: [Cycle; 4] = [400, 200, 100, 50];
 /// Largest fraction of the covered area that may be covered twice before ribbons are shortened.
 const MAX_OVERLAP_FRACTION: f64 = 0.3;
 
-/// A trail that is drawn.
+/// A trail that is drawn, as far as it is, with its style.
 #[derive(Debug, Clone)]
 pub(crate) struct DrawnTrail<'a> {
     pub(crate) of: BodyId,

@@ -15,7 +15,7 @@ const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 pub(super) trait HasStamp {
     /// Returns the time in s.
     fn t_secs(&self) -> f64;
-    /// Returns the number of its message, from 1.
+    /// Returns the number of its message on its topic from 1, which errors give.
     fn message(&self) -> u64;
 }
 

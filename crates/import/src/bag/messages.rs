@@ -59,7 +59,7 @@ message!(
 message!(
     /// A pose with its uncertainty.
     PoseWithCovariance {
-        /// The pose.
+        /// The mean, without its uncertainty.
         pose: Pose,
         /// Covariance of x, y, z and the turns about them, row by row.
         covariance: [f64; 36],
@@ -83,7 +83,7 @@ message!(
     Odometry {
         /// The time, and the frame of the pose.
         header: Header,
-        /// The frame of the velocity.
+        /// The frame of the velocity, fixed to the robot.
         child_frame_id: String,
         /// The estimated pose.
         pose: PoseWithCovariance,
@@ -97,7 +97,7 @@ message!(
     PoseStamped {
         /// The time, and the frame of the pose.
         header: Header,
-        /// The pose.
+        /// The pose of the thing that the topic is about.
         pose: Pose,
     }
 );
@@ -107,7 +107,7 @@ message!(
     PoseWithCovarianceStamped {
         /// The time, and the frame of the pose.
         header: Header,
-        /// The pose.
+        /// The estimate, in the frame of the header.
         pose: PoseWithCovariance,
     }
 );
@@ -117,7 +117,7 @@ message!(
     TransformStamped {
         /// The time, and the frame of the transform.
         header: Header,
-        /// The child frame.
+        /// The frame whose pose this is; its parent is that of the header.
         child_frame_id: String,
         /// The pose of the child in its parent.
         transform: Pose,
@@ -127,7 +127,7 @@ message!(
 message!(
     /// `tf2_msgs/msg/TFMessage`: frames in other frames.
     TfMessage {
-        /// The transforms.
+        /// Poses of frames that were measured or changed together.
         transforms: Vec<TransformStamped>,
     }
 );
@@ -143,9 +143,9 @@ message!(
         angle_max_rad: f32,
         /// The step between beams.
         angle_increment_rad: f32,
-        /// The time between beams.
+        /// The time between beams in s; 0 where all are measured at once.
         time_increment_s: f32,
-        /// The time between scans.
+        /// The time between scans in s; 0 where it is not known.
         scan_time_s: f32,
         /// The minimum range of the scanner.
         range_min_m: f32,

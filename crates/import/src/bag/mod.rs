@@ -154,7 +154,6 @@ impl TopicSelection {
     }
 }
 
-/// Returns the topics of a bag in words.
 fn describe_topics(topics: &BTreeMap<String, Topic>) -> String {
     let listed: Vec<String> = topics
         .iter()

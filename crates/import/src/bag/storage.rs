@@ -21,7 +21,7 @@ const CDR: &str = "cdr";
 /// A message as it is stored.
 pub(super) struct RawMessage<'a> {
     pub(super) topic: &'a str,
-    /// Its type.
+    /// Name of its type, e.g. `nav_msgs/msg/Odometry`.
     pub(super) schema: &'a str,
     /// Its number on its topic, from 1.
     pub(super) number: u64,
@@ -34,7 +34,7 @@ pub(super) struct Topic {
     /// The type of its messages.
     pub(super) schema: String,
     encoding: String,
-    /// Number of messages.
+    /// Number of messages in all files of the bag.
     pub(super) messages: u64,
 }
 

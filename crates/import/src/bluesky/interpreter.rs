@@ -192,7 +192,7 @@ impl<'p> Interpreter<'p> {
         Ok(CommandOutcome::Done)
     }
 
-    /// Adds a new aircraft; errors point at `word`.
+    /// Adds a new aircraft; errors point at `word`. An identifier may be used again once its aircraft is deleted.
     fn add_aircraft(&mut self, word: Token, builder: AircraftBuilder) -> Result<(), CommandError> {
         if self.builders.len() >= MAX_AIRCRAFT {
             let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");

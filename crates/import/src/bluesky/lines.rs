@@ -82,7 +82,7 @@ impl<'a> LogicalLine<'a> {
         }
     }
 
-    /// Returns the commands on this line.
+    /// Returns the commands on this line, all with the time at its start.
     pub(super) fn commands(
         &self,
         place: &dyn fmt::Display,

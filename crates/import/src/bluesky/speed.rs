@@ -5,13 +5,13 @@ use sidestep_kernel::math;
 /// A knot in m/s.
 pub const KNOT_MPS: f64 = 1852.0 / 3600.0;
 
-/// A foot in m.
+/// The international foot in m.
 pub const FOOT_M: f64 = 0.3048;
 
 const SEA_LEVEL_PRESSURE_PA: f64 = 101_325.0;
 const GRAVITY_MPS2: f64 = 9.806_65;
 const AIR_GAS_CONSTANT: f64 = 287.052_87;
-/// Ratio of the heat capacities of air.
+/// Ratio of the heat capacities of air, by which impact pressure follows from the Mach number.
 const HEAT_CAPACITY_RATIO: f64 = 1.4;
 
 /// The speed of sound at sea level, in m/s.
@@ -29,7 +29,7 @@ const LAYERS: [(f64, f64, f64); 4] = [
 /// A speed through the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Airspeed {
-    /// Calibrated airspeed in kt.
+    /// Calibrated airspeed in kt: the true one at sea level that has the same impact pressure.
     CasKt(f64),
     /// Multiple of the speed of sound.
     Mach(f64),

@@ -39,7 +39,6 @@ impl<'a> Arguments<'a> {
         })
     }
 
-    /// Returns the number of arguments left.
     pub(super) fn remaining(&self) -> usize {
         self.words.len()
     }
@@ -57,7 +56,6 @@ impl<'a> Arguments<'a> {
         self.next().map(|word| parse(self.place, word)).transpose()
     }
 
-    /// Takes a latitude and a longitude.
     pub(super) fn lat_lon(&mut self) -> Result<LatLon, InputError> {
         let latitude = self.required("a latitude")?;
         let lat_deg = degrees(self.place, latitude, LATITUDE)?;
@@ -232,7 +230,6 @@ pub(super) fn vertical_speed_fpm(place: &dyn fmt::Display, word: Token) -> Resul
     Err(word.error(place, cause, &format!("write {low} to {high} ft/min, up or down, or 0")))
 }
 
-/// Reads a size of the protected zone.
 pub(super) fn zone_size(
     place: &dyn fmt::Display,
     word: Token,

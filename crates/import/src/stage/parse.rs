@@ -51,7 +51,7 @@ pub(super) struct SourcePosition {
     pub(super) offset: usize,
 }
 
-/// Parses the items of a file.
+/// Parses the items of a file; `file` is its number among all that were read, for positions.
 pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, InputError> {
     check_nesting(place, text)?;
     let mut parser = preceded(blank, repeat(0.., |input: &mut Input| item(input, file)));

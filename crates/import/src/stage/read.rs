@@ -25,7 +25,7 @@ pub(super) fn world(path: &Path) -> Result<World, InputError> {
     Ok(reader.world)
 }
 
-/// A file that has been read.
+/// A file that has been read; positions refer to it by its number.
 struct SourceFile {
     path: PathBuf,
     text: String,
@@ -203,7 +203,7 @@ impl WorldReader {
         Ok(is_hit || self.number(def, "ranger_return", 1.0)? >= 0.0)
     }
 
-    /// Reads the pixels of a bitmap.
+    /// Reads the pixels of a bitmap, rows from the bottom; its size in meters follows from the model.
     fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
         let image = Bitmap::load(&self.path(bitmap)?)?;
         let from_top = image.map_brightness(|brightness| brightness <= MAX_SOLID_BRIGHTNESS);
@@ -280,7 +280,7 @@ impl WorldReader {
     }
 }
 
-/// The properties that are read.
+/// The properties that have an effect here; all others are counted as not used.
 const KNOWN_PROPERTIES: [&str; 8] =
     ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
 

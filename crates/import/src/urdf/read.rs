@@ -89,7 +89,6 @@ struct Links {
 }
 
 impl Links {
-    /// Returns the link in an element's attribute `link`.
     fn link_in_attribute(&self, element: Element) -> Result<usize, InputError> {
         let value = element.required("link")?;
         self.names.get(value.text()).ok_or_else(|| {

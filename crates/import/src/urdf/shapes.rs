@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct Collision {
     /// The shape's frame in the link's.
     pub origin: Origin,
-    /// The shape.
+    /// As the model gives it; a mesh is not opened yet.
     pub shape: Shape,
 }
 
@@ -113,7 +113,7 @@ impl Model {
     }
 }
 
-/// The bounding box of a mesh.
+/// The bounding box of a mesh, in the frame of its coordinates.
 struct MeshBox {
     size_m: [f64; 3],
     center_m: [f64; 3],

@@ -51,7 +51,7 @@ pub struct NamedPosture {
 /// A tool at the end of an arm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EndEffector {
-    /// Its name.
+    /// Its name, as the file gives it.
     pub name: String,
     /// The link that it is mounted on, as an index of [`Model::links`].
     pub parent_link: usize,
@@ -158,7 +158,7 @@ impl Semantics {
     }
 }
 
-/// Returns the ends of the path that holds all of these joints.
+/// Returns the ends of the path that holds all of these joints; `None` if they branch.
 fn path_ends(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
     let depth = |joint: usize| {
         let path = model.joint_path(model.root, model.joints[joint].child);

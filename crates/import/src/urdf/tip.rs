@@ -18,6 +18,7 @@ impl Model {
         let mut best_count = 0;
         for leaf in self.leaves() {
             let count = self.movable_joints(&self.path_to(leaf));
+            // Any leaf is better than the root, even where no joint moves.
             if count > best_count || best == self.root {
                 best = leaf;
                 best_count = count;
@@ -57,7 +58,7 @@ impl Model {
         (is_branch(path[k]) && branches > 1 && longest < joints_before).then_some(hand)
     }
 
-    /// Returns for each link whether it is rigid to `link`.
+    /// Returns for each link whether no movable joint lies between it and `link`.
     fn rigid_links(&self, link: usize) -> Vec<bool> {
         let mut is_rigid = vec![false; self.links.len()];
         is_rigid[link] = true;

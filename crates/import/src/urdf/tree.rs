@@ -27,7 +27,7 @@ impl Names {
     }
 }
 
-/// Returns whether the mimicry of `joint` is a cycle.
+/// Returns whether the value of `joint` follows from itself, by the joints that it mimics.
 pub(super) fn has_mimic_cycle(joints: &[Joint], joint: usize) -> bool {
     let mut next = joint;
     // A chain without a cycle has each joint at most once.
@@ -68,7 +68,7 @@ fn quote_names(names: impl ExactSizeIterator<Item = String>) -> String {
     names.take(MAX_LISTED).collect::<Vec<_>>().join(", ") + more
 }
 
-/// Returns for each link the joint that carries it.
+/// Returns for each link the joint that carries it, `None` for roots; a second one is an error.
 fn parent_joints(
     elements: &[Element],
     links: &[String],

@@ -50,7 +50,7 @@ impl ColumnChunk {
         Ok(())
     }
 
-    /// Appends a page of `rows` values.
+    /// Appends a page of `rows` values, those that are missing among them.
     pub(crate) fn add_page(&mut self, page: Vec<u8>, rows: u32, encoding: Encoding) -> Result<()> {
         self.rows += u64::from(rows);
         self.write(Page::DataPage {

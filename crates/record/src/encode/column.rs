@@ -26,7 +26,7 @@ pub(crate) struct ColumnEncoder {
     chunk: ColumnChunk,
 }
 
-/// The encoder for the column's type.
+/// The encoder of the values of a page; labels and integers compress, other types are stored as they are.
 enum Encoder {
     U32(DeltaEncoder<u32>),
     I32(DeltaEncoder<i32>),
@@ -83,7 +83,7 @@ impl ColumnEncoder {
         Self { descriptor, labels: spec.labels.clone(), encoder, levels, rows_in_page: 0, chunk }
     }
 
-    /// Appends the values at `range`.
+    /// Appends the values at `range`, and ends pages that become full.
     pub(crate) fn append(&mut self, values: &Values, mut range: Range<usize>) -> Result<()> {
         while !range.is_empty() {
             let n = (PAGE_ROWS - self.rows_in_page).min(range.len());

@@ -6,9 +6,9 @@
 
 use super::packing::{PACK, Packer, bits, put_varint, put_zigzag, width_u32};
 
-/// Number of differences in a block.
+/// Number of differences in a block; the format asks for a multiple of 128, and short blocks adapt better.
 const BLOCK: usize = 128;
-/// Number of groups of [`PACK`] differences in a block.
+/// The format wants a multiple of 32 differences in a group, which is what [`PACK`] is.
 const GROUPS: usize = BLOCK / PACK;
 
 /// An integer with differences that wrap around in its own width.
@@ -102,7 +102,7 @@ fn put_any_block(deltas: &[i64; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends a block of differences that fit 32 bits.
+/// Appends a block of differences that fit 32 bits; with the smallest one subtracted they still do, without a sign.
 fn put_narrow_block(deltas: &[i32; BLOCK], packer: &Packer, out: &mut Vec<u8>) {
     let least = deltas.iter().copied().fold(i32::MAX, i32::min);
     let above = deltas.map(|d| d.wrapping_sub(least) as u32);

@@ -41,11 +41,11 @@ pub struct PlaybackRequest {
 /// The state of the run, as reported to viewers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Playback {
-    /// Whether it advances.
+    /// Whether it advances, and if not, why.
     pub playing: PlaybackPhase,
-    /// Simulated seconds.
+    /// Simulated seconds since the start of the run.
     pub time_s: f64,
-    /// Simulated seconds per second.
+    /// Simulated seconds per second of the viewers' clock.
     pub speed: f64,
     /// Whether the time has jumped.
     pub did_seek: bool,
@@ -56,9 +56,9 @@ pub struct Playback {
 pub enum PlaybackPhase {
     /// It advances.
     Playing,
-    /// It stands still.
+    /// It stands still, and goes on when a viewer asks.
     Paused,
-    /// It is at its end.
+    /// It stands still, and cannot go on.
     Ended,
 }
 
@@ -80,9 +80,9 @@ pub struct LiveFrameWriter {
 pub struct ServedRun<'a> {
     /// Everything that stays the same.
     pub scenery: &'a Scenery,
-    /// The first frame.
+    /// The first frame, whose size helps to decide how many messages may wait for a viewer.
     pub first: &'a Frame,
-    /// The end of the run, in simulated seconds.
+    /// The end of the run in simulated seconds, up to which viewers show a time line.
     pub end_s: f64,
 }
 
@@ -167,7 +167,7 @@ impl LiveFrameWriter {
 struct LiveOutput {
     context: Arc<Context>,
     handler: Arc<RequestHandler>,
-    /// Channels by topic.
+    /// Channels by topic; a channel exists from the first message of its topic on.
     channels: BTreeMap<String, Arc<RawChannel>>,
 }
 

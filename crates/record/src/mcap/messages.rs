@@ -27,7 +27,7 @@ fn timestamp(ns: u64) -> Option<Timestamp> {
     Some(Timestamp::new(seconds, (ns % NS_PER_S) as u32))
 }
 
-/// Returns the time of a log entry.
+/// Returns the simulated time of a log entry, its own and not that of the frame that brings it.
 pub(super) fn log_time_ns(entry: &Log) -> u64 {
     entry.timestamp.map_or(0, |t| u64::from(t.sec()) * NS_PER_S + u64::from(t.nsec()))
 }
@@ -201,6 +201,7 @@ fn arrow(body: &Body, length_m: f64, width_m: f64) -> ArrowPrimitive {
         ViewPose { at_m: body.pose.transform_point([-0.5 * length_m, 0.0, 0.0]), ..body.pose };
     ArrowPrimitive {
         pose: pose(&tail),
+        // Of the length 0.4 is shaft: with less the tail of a short body would not show where it heads.
         shaft_length: 0.4 * length_m,
         shaft_diameter: 0.3 * width_m,
         head_length: 0.6 * length_m,
@@ -219,6 +220,7 @@ fn heading_arrow(body: &Body) -> Option<ArrowPrimitive> {
     let from = ViewPose { at_m: body.pose.transform_point([0.0, 0.0, top_m]), ..body.pose };
     Some(ArrowPrimitive {
         pose: pose(&from),
+        // As long as the body reaches ahead, and thin, so that it covers little of it.
         shaft_length: 0.5 * half_m,
         shaft_diameter: 0.25 * half_m,
         head_length: 0.5 * half_m,

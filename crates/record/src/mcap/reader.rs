@@ -29,27 +29,27 @@ pub fn is_mcap(path: &Path) -> bool {
 pub struct McapRunInfo {
     /// Path of the file.
     pub path: PathBuf,
-    /// Version of its format.
+    /// Version of the folder format that the build had; refused if its major number differs.
     pub format: FormatVersion,
-    /// Version of the program that made it.
+    /// Version of the program that made the recording.
     pub program_version: String,
     /// Build of the program; early recordings do not have it.
     pub build: Option<String>,
-    /// The world.
+    /// The world that was simulated, e.g. `robots`.
     pub world: String,
-    /// The seed.
+    /// The seed of the run, in case an option has replaced that of the scenario.
     pub seed: u64,
     /// Whether the run reached its end.
     pub status: Status,
-    /// Cycles done.
+    /// Cycles done when the recording ended; the last frame may be of an earlier one.
     pub cycles_done: u64,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
-    /// Number of cycles between frames.
+    /// Number of cycles between frames; there is one of the end as well.
     pub every: u64,
-    /// Digest of the last state.
+    /// Digest of the state after `cycles_done` cycles.
     pub digest: String,
-    /// The scenario's text.
+    /// The scenario's text, with every default and include resolved.
     pub scenario: String,
     /// Files that the scenario names, by their path relative to it.
     pub files: Vec<(String, Vec<u8>)>,
@@ -94,7 +94,7 @@ impl McapRunInfo {
     }
 }
 
-/// A recording's description of its run.
+/// The metadata of the recording that describes its run, as texts.
 struct RunMetadata<'a> {
     path: &'a Path,
     values: BTreeMap<String, String>,
@@ -112,7 +112,6 @@ impl RunMetadata<'_> {
     }
 }
 
-/// Returns a recording's description of its run.
 pub(super) fn describe_run(
     source: &mut McapFile,
     summary: &Summary,

@@ -17,10 +17,10 @@ use sidestep_kernel::{Cycle, InputError};
 use super::messages;
 use super::reader::{McapFile, damaged, describe_run};
 
-/// Events beyond this number are left out.
+/// Events beyond this number are left out, because all are kept in memory.
 const MAX_EVENTS: usize = 200_000;
 
-/// The size up to which any chunk is unpacked, in bytes.
+/// The size in bytes up to which any chunk is unpacked: many times that of our own chunks.
 const MIN_RECORD_LIMIT_BYTES: u64 = 1 << 26;
 
 /// The messages of a recording, by cycle.
@@ -92,6 +92,7 @@ impl McapSceneReader {
             return Ok(());
         }
         // Unpacked data may be larger, but a damaged length must not ask for all memory.
+        // A chunk is smaller than the file, and no compression is known to reach a thousandth.
         let most = self.source.length.saturating_mul(1 << 10).max(MIN_RECORD_LIMIT_BYTES);
         let limit = usize::try_from(most).unwrap_or(usize::MAX);
         let options = options.include_topics([topic]).with_record_length_limit(limit);

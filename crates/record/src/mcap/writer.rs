@@ -45,9 +45,9 @@ pub struct McapProvenance {
 pub struct McapFooter {
     /// Whether the run reached its end.
     pub status: Status,
-    /// Cycles done.
+    /// Cycles done when the recording ended.
     pub cycles_done: u64,
-    /// Digest of the last state.
+    /// Digest of the state after `cycles_done` cycles, in hexadecimal.
     pub digest: String,
 }
 

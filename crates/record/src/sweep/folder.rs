@@ -36,11 +36,11 @@ pub struct SweepManifest<P> {
     pub build: Option<String>,
     /// Fingerprint of the scenario of each variant and the files it names, see [`fingerprint`].
     pub fingerprints: Vec<String>,
-    /// The plan.
+    /// The plan, in a format of the caller's.
     pub plan: P,
 }
 
-/// The folder of a sweep.
+/// The folder of a sweep, with a plan of type `P`.
 #[derive(Debug, Clone)]
 pub struct SweepFolder<P> {
     path: PathBuf,
@@ -52,7 +52,7 @@ pub struct SweepFolder<P> {
 pub struct TempFolder(PathBuf);
 
 impl TempFolder {
-    /// Returns its path.
+    /// Returns its path; nothing below it is left once this is dropped.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -143,17 +143,17 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Ok(Self { path: path.to_path_buf(), manifest })
     }
 
-    /// Returns the path of the folder.
+    /// Returns the path of the folder, as it was given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the content of `sweep.json`.
+    /// Returns the content of `sweep.json`, as it was read.
     pub fn manifest(&self) -> &SweepManifest<P> {
         &self.manifest
     }
 
-    /// Returns the plan.
+    /// Returns the plan, which never changes after the folder was made.
     pub fn plan(&self) -> &P {
         &self.manifest.plan
     }

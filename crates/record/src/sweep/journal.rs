@@ -26,7 +26,7 @@ const MAX_LOCK_RETRIES: usize = 5;
 /// and the time between two.
 const LOCK_RETRY_DELAY: Duration = Duration::from_millis(10);
 
-/// The sweep that a journal is of.
+/// What a journal has to match: its runs may not go into the table of another sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepIdentity<'a> {
     /// Version of the program that makes its runs.

@@ -19,7 +19,7 @@ use crate::run_table::{self, LoadedTable};
 pub struct Share {
     /// Its number, from 0.
     pub index: u32,
-    /// The number of shares.
+    /// The number of shares into which the trials are split; those of other numbers may exist beside.
     pub count: u32,
 }
 
@@ -179,7 +179,6 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     }
 }
 
-/// Returns the share with this file name.
 fn share_of(name: &str, extension: &str) -> Option<Share> {
     let (index, count) = name.strip_suffix(extension)?.strip_suffix('.')?.split_once("-of-")?;
     Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })

@@ -163,7 +163,6 @@ fn table_of_contents(sections: &[PageSection<'_>]) -> Markup {
     }
 }
 
-/// Returns text with its markup.
 fn text(text: &Text) -> Markup {
     html! {
         @for span in &text.0 {

@@ -33,11 +33,13 @@ pub(super) struct BodySet {
     is_flat: bool,
 }
 
-/// A shape as far as it matters, in a form that can be sorted.
+/// A shape in a form that can be sorted: its kind and its measures as bits, without the points of a line. Those
+/// change in every frame, and frames have them; a change of the key would send a new body table.
 type ShapeKey = (u8, [u64; 3]);
 
 impl BodySet {
-    /// Returns the set of these bodies.
+    /// Returns the set of the bodies of a frame; those of one shape share it, because tables of thousands of bodies
+    /// have few.
     pub(super) fn from_bodies(bodies: &[Body], dimensions: u8) -> Self {
         let is_flat = dimensions == 2;
         let members = Vec::with_capacity(bodies.len());
@@ -68,7 +70,7 @@ impl BodySet {
             && self.members.iter().zip(bodies).all(|(member, body)| self.is_same(member, body))
     }
 
-    /// Returns whether a body has the identity and the shape of a member.
+    /// Returns whether a body has the identity and the shape of a member: if all do, the page's table still holds.
     fn is_same(&self, member: &BodyIdentity, body: &Body) -> bool {
         member.kind == body.kind
             && member.number == body.number
@@ -133,7 +135,7 @@ fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec
     (distinct, numbers)
 }
 
-/// Returns the appearance of a body in each condition.
+/// Returns the appearance of a body in each condition, because conditions change from frame to frame.
 fn appearances(body: &Body, dimensions: u8) -> [Appearance; 5] {
     CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
 }

@@ -50,7 +50,6 @@ fn occupancy_grid(floor: &view::OccupancyGrid) -> OccupancyGrid {
     OccupancyGrid { width, height, box_m, origin_m: plane.origin_m, yaw_rad: plane.yaw_rad, runs }
 }
 
-/// Returns the shape of a body.
 pub(super) fn shape(shape: &view::Shape) -> Shape {
     match *shape {
         view::Shape::Cuboid { size_m } => Shape::Cuboid { size_m },
@@ -63,18 +62,16 @@ pub(super) fn shape(shape: &view::Shape) -> Shape {
     }
 }
 
-/// Returns the appearance of a body.
 pub(super) fn appearance(body: &Body, dimensions: u8) -> Appearance {
     let view::Appearance { color, opacity, layer, .. } = body.appearance(dimensions);
     Appearance { color, opacity, layer }
 }
 
-/// Returns the identity of a body.
 pub(crate) fn body_id(id: &view::BodyId) -> BodyId {
     BodyId { kind: id.kind.name().into(), number: id.number, part: id.part }
 }
 
-/// Returns a scan.
+/// Returns a scan; ranges without an echo become null.
 pub(crate) fn scan(scan: &view::Scan) -> Scan {
     Scan {
         body: body_id(&scan.of),
@@ -93,7 +90,7 @@ fn finite_or_null(ranges_m: &[f64]) -> Vec<Option<f64>> {
     ranges_m.iter().map(|range_m| range_m.is_finite().then_some(*range_m)).collect()
 }
 
-/// Returns an event.
+/// Returns an event; its cycle becomes a float, because JavaScript has no other numbers.
 pub(crate) fn event(entry: &LogEvent) -> RunEvent {
     let level = match entry.level {
         Severity::Info => "info",

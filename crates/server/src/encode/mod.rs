@@ -10,9 +10,9 @@ use body_set::BodySet;
 use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
 use std::collections::BTreeMap;
 
-/// First bytes of a frame.
+/// First bytes of a frame: `SSTF`, least significant byte first.
 const MAGIC: u32 = 0x4654_5353;
-/// Bytes before the first column.
+/// Bytes before the first column; a multiple of 8, so that the two floats in it are aligned.
 const HEADER_BYTES: usize = 56;
 
 /// Encodes the frames of a session, and a body table whenever the bodies are no longer those of the last one.
@@ -25,7 +25,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Creates an encoder for a run with this scenery.
+    /// Creates an encoder for a run with this scenery, whose first frame begins a body table.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();
         let mut encoder = Self { session, dimensions: 2, names, body_set: None, tables: 0 };
@@ -104,7 +104,6 @@ impl Encoder {
     }
 }
 
-/// Returns the points of a body that is a line.
 fn points(body: &Body) -> Option<&[[f64; 3]]> {
     match &body.shape {
         Shape::Line { points_m, .. } => Some(points_m),
@@ -112,7 +111,7 @@ fn points(body: &Body) -> Option<&[[f64; 3]]> {
     }
 }
 
-/// Writes a column of numbers.
+/// Writes a column of numbers as `f32`: half the bytes of `f64`, and finer than a pixel.
 fn put_column(out: &mut Vec<u8>, numbers: impl Iterator<Item = f64>) {
     numbers.for_each(|number| out.extend_from_slice(&(number as f32).to_le_bytes()));
 }
@@ -143,7 +142,7 @@ fn condition_code(condition: Condition) -> u8 {
     }
 }
 
-/// The conditions of a body, by their codes.
+/// The conditions of a body, at the index that [`condition_code`] gives each; the page numbers them alike.
 const CONDITIONS: [Condition; 5] =
     [Condition::Plain, Condition::Leading, Condition::Open, Condition::Touching, Condition::Failed];
 

@@ -53,7 +53,7 @@ async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Respo
     Ok((about, bytes).into_response())
 }
 
-/// The requested part of a run, and its format.
+/// The requested part of a run, and its format, as read from the address.
 struct ExportSpec {
     format: Format,
     /// The text that is added to the name of the run.
@@ -94,7 +94,7 @@ impl ExportSpec {
         Ok(Self { format, suffix, media, cycle: cycle.transpose()? })
     }
 
-    /// Returns the name of the file.
+    /// Returns the name under which the browser saves the export: that of the run, with a suffix and the ending.
     fn file_name(&self, path: &Path) -> String {
         // `.` has no name of its own.
         let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());

@@ -34,12 +34,11 @@ pub(super) struct CancelToken {
 }
 
 impl CancelToken {
-    /// Returns whether the job is cancelled.
     pub(super) fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Relaxed)
     }
 
-    /// Cancels the job.
+    /// Asks the job to stop: between its steps, and within a cycle that it computes.
     pub(super) fn cancel(&self) {
         self.is_cancelled.store(true, Relaxed);
         self.interrupt.raise();
@@ -97,13 +96,11 @@ impl JobQueue {
     }
 }
 
-/// Returns the error of a job that panicked.
 fn internal_error() -> ResultError {
     let problem = Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
     ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
 }
 
-/// Converts an error of a job.
 pub(super) fn result_error(error: &Error) -> ResultError {
     crate::session::problem_of(error).into()
 }

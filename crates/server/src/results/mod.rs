@@ -24,7 +24,7 @@ use crate::protocol::Problem;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
-/// The reason why there is no result.
+/// The reason why there is no result: the status for the browser, and the problem that the page shows.
 pub(super) struct ResultError(StatusCode, Problem);
 
 impl ResultError {

@@ -19,7 +19,7 @@ impl QueryFields {
         )
     }
 
-    /// Returns a field.
+    /// Returns a field with its percent signs decoded; of several of one name, the last.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
         self.0.get(name).map(String::as_str)
     }

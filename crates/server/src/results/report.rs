@@ -110,7 +110,7 @@ impl ReportPart {
     }
 }
 
-/// Returns the names of all figures as JSON.
+/// Returns the names of all figures as JSON, by which the page asks for each.
 fn figures_json(report: &RenderedReport) -> String {
     let stems: Vec<&str> = report.pictures.iter().map(|picture| picture.stem.as_str()).collect();
     serde_json::json!(stems).to_string()
@@ -121,7 +121,7 @@ fn no_such_figure(stem: &str) -> Problem {
     Problem::new("report", cause, "give html, markdown, or one of figures")
 }
 
-/// Returns the name of a folder as part of a file name.
+/// Returns the name of a folder as part of a file name, in plain characters only.
 fn folder_name(path: &Path) -> String {
     let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     super::export::plain_file_name(&whole.file_stem().unwrap_or_default().to_string_lossy())

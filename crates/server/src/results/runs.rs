@@ -5,7 +5,7 @@ use crate::protocol::{Problem, ReplyBody, SweepRun, TargetRef};
 use sidestep_session::sweep::{FinishedRuns, Folder, read_finished};
 use std::path::Path;
 
-/// Maximum number of runs listed.
+/// Maximum number of runs listed: a longer list is sent and shown too slowly, and nobody reads it.
 const MAX_RUNS: usize = 20_000;
 
 /// Lists the runs of the sweep in a folder.

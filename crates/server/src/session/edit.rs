@@ -9,7 +9,7 @@ use sidestep_scenario::Source;
 /// The key under which the TOML parser puts a date, which JSON does not have.
 const DATE_KEY: &str = "$__toml_private_datetime";
 
-/// Returns a text with edits.
+/// Returns a text with all edits, one after the other.
 ///
 /// # Errors
 /// When texts are refused, or an edit does not fit.

@@ -10,7 +10,7 @@ use sidestep_session::{
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time between two checks of viewers' requests.
+/// Time between two checks of viewers' requests: a key press in a viewer seems to act at once.
 const POLL_INTERVAL: Duration = Duration::from_millis(40);
 
 /// The one address at which viewers are served. Sessions share it: the one opened last has the lease.
@@ -106,7 +106,7 @@ impl FoxgloveLease {
         viewers.take_request()
     }
 
-    /// Returns when to check viewers' requests.
+    /// Returns when to check viewers' requests; `None` where viewers are not served.
     pub(super) fn next_update(&self) -> Option<Instant> {
         self.is_enabled().then_some(self.due)
     }

@@ -18,7 +18,7 @@ pub(super) struct RunHistory {
 }
 
 impl RunHistory {
-    /// Returns the history of a run that is at its start.
+    /// Starts the history of a run with a keyframe and a sample of its start.
     pub(super) fn from_run(
         run: &dyn Simulation,
         infos: &'static [MetricInfo],
@@ -35,7 +35,7 @@ impl RunHistory {
         history
     }
 
-    /// Records a run that has advanced for some computing time.
+    /// Takes a keyframe and a sample of a run that has advanced for some computing time, where they are due.
     pub(super) fn record(&mut self, run: &dyn Simulation, computing_time: Duration) {
         if self.keyframes.is_due(run.cycle(), computing_time) {
             self.add_keyframe(run);

@@ -5,7 +5,7 @@ use crate::protocol::{BodyId, Problem};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::Inspection;
 
-/// Returns the percepts, decisions and actions of a body.
+/// Returns the percepts, decisions and actions of a body in the last cycle.
 ///
 /// # Errors
 /// If there is no such body, or it cannot be inspected.

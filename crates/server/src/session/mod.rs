@@ -34,18 +34,17 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-/// Maximum number of requests that wait for a session.
+/// Maximum number of requests that wait for a session; a socket has no more than 64 open, so it is never reached by
+/// one.
 const MAX_QUEUED_REQUESTS: usize = 256;
 /// Maximum wait for a request. It is a safeguard: a request wakes the thread, and so does the time of the next work.
 const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// The request that opens a session.
+/// The request that opens a session: it is answered by the session's thread, because opening may take seconds.
 pub(crate) struct OpenRequest {
-    /// The session's number.
     pub(crate) session: SessionId,
-    /// The number of the request.
+    /// The number of the request, which the answer repeats.
     pub(crate) id: u32,
-    /// The thing to open.
     pub(crate) target: OpenTarget,
     /// Another seed than the scenario's.
     pub(crate) seed: Option<u64>,
@@ -101,7 +100,7 @@ impl Session {
         self.source.get()
     }
 
-    /// Returns whether it has ended.
+    /// Returns whether its thread has ended by itself, for instance by a bug.
     pub(crate) fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }
@@ -218,7 +217,7 @@ impl SessionWorker {
     }
 }
 
-/// Returns the message of a panic.
+/// Returns the message of a panic; it is text unless a library panicked with a value of its own.
 fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()

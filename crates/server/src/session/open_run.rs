@@ -15,14 +15,13 @@ use sidestep_session::{Error, RecordedRun, read_scenario};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What sessions depend on.
+/// What sessions depend on, from the options of the server.
 #[derive(Clone)]
 pub(crate) struct SessionDeps {
-    /// The worlds.
     pub(crate) worlds: Worlds,
     /// The files that pages may read.
     pub(crate) files: AllowedFiles,
-    /// The number of worker threads of each session.
+    /// The number of worker threads of each session; no result depends on it.
     pub(crate) workers: usize,
     /// Whether texts of pages are refused.
     pub(crate) read_only: bool,
@@ -49,11 +48,11 @@ impl SessionDeps {
     }
 }
 
-/// An open run.
+/// The scenario or recording of a session, with its present run.
 pub(crate) struct OpenRun {
-    /// The run.
+    /// The run at its start; the player takes it from there.
     pub(crate) run: Box<dyn Simulation>,
-    /// Its last cycle.
+    /// Its last cycle: of a recording, the last recorded one.
     pub(crate) until: Cycle,
     /// The scenario, without the requested seed.
     pub(crate) source: Source,
@@ -101,7 +100,7 @@ impl OpenRun {
         Self::from_scenario(deps, source, seed, None)
     }
 
-    /// Shares the scenario with other threads.
+    /// Lets other threads read the scenario's text, as it is after each restart and save.
     pub(crate) fn with_shared_source(mut self, shared_source: SharedSource) -> Self {
         shared_source.set(&self.source);
         self.shared_source = shared_source;
@@ -270,17 +269,14 @@ impl OpenRun {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_build().is_none())
     }
 
-    /// Returns the memory for keyframes, shared by all sessions.
     pub(crate) fn budget(&self) -> &Arc<MemoryBudget> {
         &self.deps.budget
     }
 
-    /// Returns the host of Foxglove viewers.
     pub(crate) fn foxglove_host(&self) -> Option<Arc<FoxgloveHost>> {
         self.deps.foxglove.clone()
     }
 
-    /// Returns the descriptions of the world's metrics.
     pub(crate) fn metric_infos(&self) -> &'static [MetricInfo] {
         let world_type = self.deps.worlds.find(self.run.world());
         world_type.map_or(&[], |world_type| world_type.metric_infos())
@@ -295,7 +291,6 @@ impl OpenRun {
         recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
 
-    /// Returns whether its text cannot be replaced.
     pub(crate) fn is_read_only(&self) -> bool {
         self.deps.read_only || self.recorded.is_some()
     }

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 /// Duration of a slice of computing, and so the longest wait of a request, unless a cycle takes longer: less than the time
 /// between two frames of a screen (16 ms).
 const SLICE_DURATION: Duration = Duration::from_millis(12);
-/// Time over which cycles are counted.
+/// Time over which cycles are counted: shorter ones make the number on the page flicker.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
 
-/// The number of cycles of a slice.
+/// The number of cycles that take about [`SLICE_DURATION`], by the times of the slices before.
 #[derive(Debug)]
 pub(super) struct SliceSize(u64);
 

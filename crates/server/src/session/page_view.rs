@@ -16,9 +16,9 @@ const FRAME_INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / MAX_FRAMES
 const STATUS_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two transfers of events where there is no credit for frames: a simulation keeps only the last some thousands.
 const EVENTS_INTERVAL: Duration = Duration::from_millis(250);
-/// Maximum credit; any beyond it is ignored.
+/// Maximum credit; any beyond it is ignored, so that sums cannot overflow.
 const MAX_CREDIT: u32 = 1000;
-/// Maximum number of bodies with scans in a frame.
+/// Maximum number of bodies with scans in a frame: a scan has up to hundreds of beams as text.
 pub(super) const MAX_SCANNED_BODIES: usize = 16;
 
 /// A page's view of one session.
@@ -26,11 +26,11 @@ pub(super) struct PageView {
     session: SessionId,
     outbox: Arc<Outbox>,
     encoder: Encoder,
-    /// Number of frames that the page is ready to receive.
+    /// Number of frames that the page is ready to receive; each one sent takes one.
     credit: u32,
     /// Number of frames that were due and could not be sent.
     left_out: u32,
-    /// The bodies with scans in frames.
+    /// The bodies with scans in frames, as the page selected them.
     scans_of: Vec<BodyId>,
     /// Whether the last frame is out of date.
     is_stale: bool,
@@ -84,12 +84,11 @@ impl PageView {
         self.is_stale = true;
     }
 
-    /// Adds credit for further frames.
     pub(super) fn add_credit(&mut self, frames: u32) {
         self.credit = self.credit.saturating_add(frames).min(MAX_CREDIT);
     }
 
-    /// Selects the bodies with scans in frames.
+    /// Selects the bodies with scans, from the next frame on.
     pub(super) fn set_scanned_bodies(&mut self, scans_of: Vec<BodyId>) {
         self.scans_of = scans_of;
         self.is_stale = true;
@@ -141,6 +140,7 @@ impl PageView {
         } else {
             return false;
         }
+        // Counted from the time when it was due, so that small delays do not lower the rate.
         self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
         has_credit
     }
@@ -187,12 +187,12 @@ impl PageView {
         self.last_status.as_ref() != Some(status)
     }
 
-    /// Returns the last reported status.
+    /// Returns the last reported status; `None` before the first report.
     pub(super) fn last_reported(&self) -> Option<SessionStatus> {
         self.last_status.clone()
     }
 
-    /// Returns when a status may be reported again.
+    /// Returns when a status may be reported again, if none changes at once.
     pub(super) fn status_due(&self) -> Instant {
         self.status_due
     }

@@ -49,7 +49,7 @@ pub(super) struct Player {
     request_in_progress: Option<u32>,
     slice: SliceSize,
     rate: CycleRate,
-    /// Digest of the state, and its cycle.
+    /// Digest of the state at its cycle: computed once for each pause, because it reads the whole state.
     digest: Option<(Cycle, String)>,
     /// The result of comparing a recording with its digest.
     verdict: Option<String>,
@@ -246,7 +246,7 @@ impl Player {
         Ok(ReplyBody::Done)
     }
 
-    /// Pauses at the present cycle.
+    /// Pauses at the present cycle, whose metrics and digest are then on display.
     fn pause(&mut self) {
         let is_at_end = self.is_at_end();
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
@@ -265,6 +265,7 @@ impl Player {
     /// request comes; `None` for forever.
     pub(super) fn poll(&mut self) -> Option<Duration> {
         let now = Instant::now();
+        // Each time, because another session may have started since, and wants its share.
         self.history.keyframes.shrink_to_budget();
         match (self.state, self.seek) {
             (SessionState::Playing, _) => {

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Time between two transfers of events: a simulation keeps only the last some thousands.
 const EVENTS_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A run that is computed ahead to its end.
+/// A second copy of a recorded run, which nobody sees.
 pub(super) struct Prefetcher {
     run: Box<dyn Simulation>,
     until: Cycle,

@@ -20,12 +20,11 @@ pub(super) struct SessionFile {
 pub(crate) struct SharedSource(Arc<Mutex<Option<Source>>>);
 
 impl SharedSource {
-    /// Returns the scenario, once it is open.
+    /// Returns the scenario; `None` until the session's thread has opened it.
     pub(crate) fn get(&self) -> Option<Source> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Replaces it by another one.
     pub(super) fn set(&self, source: &Source) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(source.clone());
     }
@@ -48,7 +47,6 @@ pub(super) fn session_path(own: Option<&SessionFile>, place: &str) -> Result<Str
     })
 }
 
-/// Options of saving.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SaveOptions {
     /// The text that the page believes the file holds; without it, the text that the session has read or written.

@@ -12,7 +12,7 @@ use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
 use target::Target;
 
-/// The output formats, each with its own options.
+/// The output formats, each with those options that no other one has.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Format {
     /// Tables as text: one of this name, or all.
@@ -30,33 +30,33 @@ pub enum Format {
         /// The longer side in pixels; `None` for the default.
         width_px: Option<u16>,
     },
-    /// Animated GIF.
+    /// Animated GIF; it repeats without end.
     Gif(AnimationOptions),
-    /// Animation as numbered PNG files.
+    /// Animation as PNG files `frame-00001.png` and so on in a folder.
     Frames(AnimationOptions),
 }
 
-/// Options of an animation.
+/// Options that both kinds of animations have; they change nothing in the frames that are taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct AnimationOptions {
-    /// Frames per second; `None` for the default.
+    /// Frames shown per second, whatever time passes between them in the run; `None` for 15.
     pub fps: Option<u16>,
-    /// The longer side in pixels; `None` for the default.
+    /// The longer side in pixels; `None` for 640 of a GIF, and 1280 of PNG files.
     pub width_px: Option<u16>,
 }
 
 /// A requested export: its format, its part of the run and its place.
 #[derive(Debug, Clone)]
 pub struct ExportRequest<'a> {
-    /// The format.
+    /// The format, with its own options.
     pub form: Format,
-    /// The place; `None` for one beside the recorded run, with its name.
+    /// The file or folder; `None` for one beside the recorded run, with its name.
     pub out: Option<&'a Path>,
-    /// Whether an earlier export is replaced.
+    /// Whether an earlier export is replaced; without it the export is refused where something exists.
     pub replace: bool,
     /// The first cycle; for pictures, the cycle that is shown.
     pub from: Option<Cycle>,
-    /// The last cycle.
+    /// The last cycle, whose state is still exported; without it the last recorded one.
     pub until: Option<Cycle>,
     /// Only cycles that are multiples of this; tables always have all events. Without it,
     /// animations have at most 150 frames.
@@ -65,12 +65,13 @@ pub struct ExportRequest<'a> {
     pub workers: usize,
 }
 
-/// Files that were written.
+/// The files that were written, and how far they are trusted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportResult {
     /// The files, or the folder of an animation's frames.
     pub paths: Vec<PathBuf>,
-    /// Whether a run that was computed again reached the recorded digest.
+    /// Whether a run that was computed again reached the recorded digest; false for tables, which are copied, and for
+    /// an export that stops before the recorded end.
     pub is_confirmed: bool,
     /// Number of frames of an animation, and number shown per second.
     pub film: Option<(usize, u16)>,
@@ -112,7 +113,7 @@ pub fn export(
     }
 }
 
-/// An export that has been checked.
+/// An export whose cycles were checked against the recorded ones.
 struct ExportContext<'a> {
     recorded: &'a RecordedRun,
     wanted: &'a ExportRequest<'a>,
@@ -150,7 +151,7 @@ impl CycleRange {
 }
 
 impl ExportContext<'_> {
-    /// Returns the run at the start of a cycle.
+    /// Returns the run at the start of a cycle, computed from the last checkpoint if that is before it.
     fn run_up_to(&self, cycle: Cycle) -> Result<Box<dyn Simulation>, Error> {
         let mut run = self.recorded.start_near(cycle, self.wanted.workers)?;
         self.drive(run.as_mut(), cycle, Sinks::default())?;
@@ -184,6 +185,8 @@ fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
 
 fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let ExportContext { recorded, wanted, span, .. } = job;
+    // The endings of all files of a bag: recording, metadata and map, and description of the map. A folder to be
+    // replaced may hold nothing else, so a kind of file that bags get later belongs here, too.
     let target = Target::for_folder(job, "-rosbag", &["mcap", "yaml", "pgm"])?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);

@@ -15,8 +15,10 @@ use std::path::Path;
 
 /// Largest number of frames of an animation, unless more are requested: ten seconds at [`DEFAULT_FPS`].
 const MAX_FRAMES: Cycle = 150;
-/// Frames per second.
+/// Fast enough for the eye to join the frames, and slow enough that 150 of them show a whole run.
 const DEFAULT_FPS: u16 = 15;
+// A GIF is mostly shown inside a page and grows with its area; frames are material for videos, and a PNG is one
+// picture.
 const DEFAULT_GIF_WIDTH_PX: u16 = 640;
 const DEFAULT_FRAME_WIDTH_PX: u16 = 1280;
 const DEFAULT_PNG_WIDTH_PX: u16 = 1600;
@@ -26,7 +28,6 @@ pub(super) fn export_svg(job: &ExportContext<'_>) -> Result<ExportResult, Error>
     export_picture(job, ".svg", |svg| Ok(svg.into_bytes()))
 }
 
-/// Exports the same picture as PNG.
 pub(super) fn export_png(
     job: &ExportContext<'_>,
     width_px: Option<u16>,
@@ -51,7 +52,6 @@ fn export_picture(
     Ok(ExportResult::single_file(target.path(), is_confirmed))
 }
 
-/// Exports an animation as GIF.
 pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<ExportResult, Error> {
     let target = Target::for_file(job, ".gif")?;
     export_animation(job, options, &target, |animation| {
@@ -59,7 +59,6 @@ pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<Ex
     })
 }
 
-/// Exports an animation as numbered pictures in a folder.
 pub(super) fn export_frames(
     job: &ExportContext<'_>,
     options: Options,
@@ -117,7 +116,6 @@ impl Animation<'_> {
         write_atomically(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
     }
 
-    /// Writes numbered pictures to `folder`.
     fn write_frames(&self, width_px: u16, folder: &Path) -> Result<(), Error> {
         let view = self.pictures.view(width_px.into())?;
         let watched = ProgressGuard(self.watcher);

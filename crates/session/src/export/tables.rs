@@ -14,14 +14,13 @@ use std::path::{Path, PathBuf};
 /// Name of the table of which every row is kept, regardless of `every`.
 const EVENTS: &str = "events";
 
-/// The formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TableFormat {
     Csv,
     Parquet,
 }
 
-/// Exports the table `only`, or all.
+/// Exports the table `only`, or all of the run.
 pub(super) fn export(
     job: &ExportContext<'_>,
     form: TableFormat,
@@ -59,7 +58,7 @@ pub(super) fn export(
     Ok(ExportResult { paths, is_confirmed: false, film: None })
 }
 
-/// The tables that are exported.
+/// An export of tables, with the cycles of their rows.
 struct TableExport<'a> {
     folder: &'a Path,
     job: &'a ExportContext<'a>,

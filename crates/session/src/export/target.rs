@@ -75,7 +75,6 @@ impl Target {
         InputError::new(self.path.display(), cause, remedy)
     }
 
-    /// Returns the path.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }

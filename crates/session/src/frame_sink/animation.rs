@@ -12,14 +12,14 @@ use sidestep_kernel::view::{
 use sidestep_kernel::{Cycle, InputError};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Largest number of bodies in all frames; more would take too much memory.
+/// Largest number of bodies in all frames: all frames are in memory until the last one is known.
 const MAX_BODIES: usize = 4_000_000;
 /// Largest number of cycles for which every place of a track is kept: sixty such tracks take some hundred megabytes.
 const MAX_TRACK_CYCLES: Cycle = 50_000;
-/// Number of frames before a picture for which tracks are shown.
+/// Number of frames before a picture for which tracks are shown: two seconds at the default rate of an animation.
 const TRAIL_FRAMES: usize = 30;
 
-/// The frames of an animation.
+/// Frames and tracks of a run, kept until all are complete and the common view is known.
 pub(crate) struct AnimationFrames {
     scenery: Scenery,
     every: Cycle,
@@ -84,12 +84,11 @@ impl AnimationFrames {
         Trail { of, points: places[begin..end.max(begin)].to_vec() }
     }
 
-    /// Returns the number of frames.
     pub(crate) fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Returns the view that all frames share.
+    /// Returns the view that all frames share: it contains the bodies of all of them.
     ///
     /// # Errors
     /// When it cannot be drawn.
@@ -97,7 +96,6 @@ impl AnimationFrames {
         Ok(View::new(self.scenery.clone(), &self.frames, width_px)?)
     }
 
-    /// Draws one frame.
     ///
     /// # Errors
     /// When it cannot be drawn.
@@ -156,6 +154,7 @@ fn corner_before_slip(scenery: &Scenery, body: &Body, from: Vec3, quarters: u32)
     // In the frame of the floor, where motions are along the axes.
     let from = to_floor(plane, from);
     let to = to_floor(plane, body.pose.at_m);
+    // In meters: rounding of the turn into the floor's frame moves a place less, and any motion of a body more.
     let has_moved_x = (from[0] - to[0]).abs() > 1e-9;
     let has_moved_y = (from[1] - to[1]).abs() > 1e-9;
     let [x, y, z] = corner(from, quarters, to);

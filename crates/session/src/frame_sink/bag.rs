@@ -17,7 +17,7 @@ use sidestep_map::Cell;
 use sidestep_record::{BagSchema, BagWriter};
 use std::path::Path;
 
-/// The frame of the true poses.
+/// The fixed frame that the map, the starts and the true poses share.
 const MAP_FRAME: &str = "map";
 
 /// A bag that is written while a run advances.
@@ -184,7 +184,7 @@ fn header(time_s: f64, frame_id: String) -> Header {
     Header { stamp: Time::from_ns(to_ns(time_s)), frame_id }
 }
 
-/// Returns the name of a body in topics and frames.
+/// Returns e.g. `robot_3`: names in ROS begin with a letter and have no spaces.
 fn namespace(who: BodyId) -> String {
     format!("{}_{}", who.kind, who.number)
 }

@@ -110,15 +110,18 @@ impl Palette {
         ]);
         for &color in drawn {
             colors.extend((0..=BLEND_STEPS).map(|k| blend(color, white, k)));
+            // Edges against walls are fewer than those against white, so two steps have to do within 256 colors.
             colors.extend([2, 4].map(|k| blend(color, WALL_COLOR, k)));
         }
         // Lines in the color of a zone that cross another zone.
         for (k, &color) in BODY_COLORS.iter().enumerate() {
+            // A zone is drawn nearly transparent, so the color under a crossing line is close to white.
             let under = blend(BODY_COLORS[(k + 1) % BODY_COLORS.len()], white, 5);
             colors.extend([1, 3, 5].map(|k| blend(color, under, k)));
         }
         colors.sort_unstable();
         colors.dedup();
+        // The last entry is not a color. Colors that do not fit get the nearest one that does.
         colors.truncate(usize::from(UNCHANGED));
         let known = colors.len();
         // A palette has a power of two of entries; the rest stays unused.
@@ -141,7 +144,7 @@ fn color_key(pixel: &[u8]) -> usize {
     red << (2 * COLOR_BITS) | green << COLOR_BITS | blue
 }
 
-/// Returns the color in the middle of those with a key.
+/// Returns the color in the middle of those that share a key, which errs least for all of them.
 fn color_of_key(key: u32) -> [u8; 3] {
     [2 * COLOR_BITS, COLOR_BITS, 0].map(|shift| {
         let upper = key >> shift & ((1 << COLOR_BITS) - 1);

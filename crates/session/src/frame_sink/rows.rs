@@ -8,10 +8,10 @@ use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, FrameOptions};
 use sidestep_kernel::{Cycle, Simulation};
 use std::ops::Range;
 
-/// Name of the table.
+/// Name that [`RowSelection::frames`](crate::RowSelection) promises, beside the tables of the world.
 const FRAMES_TABLE: &str = "frames";
 
-/// A body at a moment.
+/// A body at a moment: frames of a run have different bodies, so each one is a row.
 struct Row {
     cycle: Cycle,
     time_s: f64,
@@ -22,9 +22,9 @@ struct Row {
 /// is over.
 pub(crate) struct FrameRows {
     every: Cycle,
-    /// The cycle of the first frame.
+    /// The cycle of the first frame; `None` before it.
     first: Option<Cycle>,
-    /// The cycle of the last frame.
+    /// The cycle of the last frame, so that none is taken twice.
     last: Option<Cycle>,
     rows: Vec<Row>,
 }
@@ -35,7 +35,6 @@ impl FrameRows {
         Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
     }
 
-    /// Takes the rows that were kept so far.
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
         let table = frames_table();
         let rows = std::mem::take(&mut self.rows);
@@ -74,7 +73,7 @@ impl FrameSink for FrameRows {
     }
 }
 
-/// Returns the present frame of a run as a table.
+/// Returns the present frame of a run as a table, one row for each body.
 pub fn frame_rows(run: &mut dyn Simulation) -> (TableSchema, Vec<Values>) {
     let table = frames_table();
     let rows: Vec<Row> = body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect();

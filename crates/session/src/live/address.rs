@@ -5,9 +5,9 @@ use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::str::FromStr;
 
-/// The port if none is given: the one that viewers try first.
+/// The port if none is given: the one that Foxglove's viewers try first.
 const DEFAULT_PORT: u16 = 8765;
-/// The number of ports that are tried.
+/// Ports after one that is in use that are tried for a suggestion: a machine rarely has so many servers side by side.
 const MAX_PORTS_TRIED: u16 = 100;
 
 /// A host, or a host and a port, at which viewers are served.
@@ -73,7 +73,7 @@ impl ViewerAddress {
         Ok(Self { port, ..self.clone() })
     }
 
-    /// Returns the address to give to a viewer.
+    /// Returns the address to give to a viewer, with the scheme of WebSockets.
     pub fn url(&self) -> String {
         format!("ws://{}:{}", self.host(), self.port)
     }
@@ -100,7 +100,7 @@ impl ViewerAddress {
     }
 }
 
-/// Returns the first free port of the next hundred.
+/// Returns the first port after `port` that is free now; `None` if none of the next hundred is.
 pub fn next_free_port(ip: IpAddr, port: u16) -> Option<u16> {
     let after = (port..port.saturating_add(MAX_PORTS_TRIED)).skip(1);
     after.into_iter().find(|port| TcpListener::bind(SocketAddr::new(ip, *port)).is_ok())

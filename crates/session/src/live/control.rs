@@ -67,7 +67,7 @@ impl LiveControl {
         target
     }
 
-    /// Shows the end of the run.
+    /// Sends the last state, so that viewers show the end and stop their clocks.
     pub(crate) fn finish(&mut self, run: &mut dyn Simulation) {
         self.playing = PlaybackPhase::Ended;
         self.send_updates(run, Instant::now());

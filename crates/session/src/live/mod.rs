@@ -31,7 +31,7 @@ const PLAYBACK_INTERVAL: Duration = Duration::from_millis(100);
 /// Half a second in all, in which a server that ends gives its port back.
 const MAX_BIND_ATTEMPTS: u32 = 50;
 const BIND_RETRY_DELAY: Duration = Duration::from_millis(10);
-/// The speeds that viewers can ask for.
+/// The speeds that viewers can ask for, in simulated seconds per second; others are clamped.
 const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 /// The viewers of one run. They are disconnected when this is dropped.
@@ -68,7 +68,7 @@ struct PlaybackRequests {
 }
 
 impl ViewerServer {
-    /// The options of frames for viewers.
+    /// The options with which callers make the frames that they send: scans of the first bodies only.
     pub const FRAME_OPTIONS: FrameOptions = FRAME_OPTIONS;
 
     /// Starts to serve viewers of a run.
@@ -116,7 +116,7 @@ impl ViewerServer {
         })
     }
 
-    /// Returns whether there are viewers.
+    /// Returns whether anyone would see a frame: without viewers none is worth making.
     pub fn has_viewers(&self) -> bool {
         self.server.has_viewers()
     }
@@ -126,7 +126,7 @@ impl ViewerServer {
         lock(&self.requests.waiting).take()
     }
 
-    /// Returns whether a frame of this time is due for them now.
+    /// Returns whether a frame of this time is due for them now: it differs from the last, and that one is encoded.
     pub fn is_frame_due(&self, time_s: f64, now: Instant) -> bool {
         self.has_viewers()
             && time_s != self.shown_s
@@ -137,6 +137,7 @@ impl ViewerServer {
     /// Shows a frame that was due.
     pub fn send_frame(&mut self, frame: Frame, now: Instant) {
         self.shown_s = frame.time_s;
+        // Counted from the time when it was due, so that small delays do not lower the rate.
         self.frame_due = (self.frame_due + FRAME_INTERVAL).max(now);
         self.is_encoding.store(true, Ordering::Release);
         if let Some(frames) = &self.frames {
@@ -172,7 +173,7 @@ impl Drop for ViewerServer {
 }
 
 impl PlaybackRequests {
-    /// Accepts a request, and returns the resulting playback.
+    /// Accepts a request in bounds, and returns the playback that viewers shall show until the run follows it.
     fn accept(&self, request: PlaybackRequest) -> Playback {
         let sent = *lock(&self.sent);
         let mut speed = sent.speed;

@@ -10,7 +10,7 @@ use sidestep_kernel::ports::RecordError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {
-    /// The checkpoint is damaged, or belongs to something else.
+    /// It is damaged, or belongs to another world, scenario or version.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// Rows that wait cannot be handed over.
@@ -21,7 +21,7 @@ pub enum RestoreError {
         "the run goes to {place}, which holds one past: it stands at cycle {now}, and the checkpoint is of {state}"
     )]
     AlreadyStored {
-        /// The folder or file.
+        /// The folder or file that has the rows.
         place: String,
         /// The cycle at which the run stands.
         now: Cycle,

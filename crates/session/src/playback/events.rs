@@ -10,7 +10,7 @@ use sidestep_kernel::view::{
 use sidestep_record::{Table, read_table};
 use std::ops::Range;
 
-/// The table of events.
+/// The name that all worlds give the table of events.
 const EVENTS_TABLE: &str = "events";
 /// The largest number of events; further ones are left out, because all are kept in memory.
 const MAX_EVENTS: usize = 200_000;

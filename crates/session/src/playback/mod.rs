@@ -40,7 +40,7 @@ enum BodySource {
 }
 
 impl BodySource {
-    /// Returns the bodies of a cycle.
+    /// Returns the bodies of a cycle, which may be before the last one.
     fn bodies_at(&mut self, cycle: Cycle) -> Vec<Body> {
         match self {
             Self::Tables(places) => places.bodies_at(cycle),
@@ -157,6 +157,7 @@ impl Simulation for RecordedPlayback {
             return Err(CheckpointError::Damaged);
         }
         self.cycle = cycle;
+        // The next frame is of another time, so its events are those from here on.
         self.shown = cycle;
         Ok(())
     }

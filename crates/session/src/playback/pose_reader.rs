@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// The approximate number of rows held at a time: some megabytes, and some seconds of playback.
 const WINDOW_ROWS: u64 = 200_000;
 
-/// The bodies of a recording.
+/// Reads the poses of all bodies, window by window.
 pub(super) struct PoseReader {
     folder: PathBuf,
     rows: Vec<PositionColumns>,
@@ -54,7 +54,8 @@ impl PoseReader {
         Ok(reader)
     }
 
-    /// Returns the cycles of the window around a cycle.
+    /// Returns the window around a cycle. Windows start at multiples of their length, so playback reads one after the
+    /// other.
     fn window_range(&self, rows: &PositionColumns, cycle: Cycle) -> Range<Cycle> {
         let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();
         let cycles = (WINDOW_ROWS / bodies.max(1) as u64).max(1) * rows.interval;
@@ -69,6 +70,8 @@ impl PoseReader {
         if !has_rows(&self.folder, rows.table) {
             return Ok(Window { from: range.start, table: None });
         }
+        // Two intervals more: the row of a body may be one interval old, and its direction is that from the row
+        // before.
         let before = range.start.saturating_sub(2 * rows.interval);
         let table = read_table(&self.folder, rows.table, before..range.end)?;
         Ok(Window { from: range.start, table: Some(table) })
@@ -92,7 +95,7 @@ impl PoseReader {
         self.bodies_with_poses(&poses)
     }
 
-    /// Returns the poses of the bodies of a table.
+    /// Returns the poses of the bodies of a table that have a recent row.
     fn poses(&self, rows: &PositionColumns, table: &Table, cycle: Cycle) -> Vec<(BodyId, Pose)> {
         let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
         let whose: Vec<BodyId> = headings.keys().copied().collect();
@@ -181,7 +184,7 @@ fn last_pose(
     Some(Pose::from_heading(at_m, recorded_rad.or(motion_rad).unwrap_or(0.0)))
 }
 
-/// Returns whether a body may have rows.
+/// Returns whether a table is for bodies of this kind; people share that of the robots.
 fn has_rows_in(rows: &PositionColumns, body: &Body) -> bool {
     let is_kind =
         body.kind == rows.kind || (rows.kind == BodyKind::Robot && body.kind == BodyKind::Person);

@@ -67,7 +67,6 @@ impl<'a> Events<'a> {
         Some(Self { table, cycles, kinds, names })
     }
 
-    /// Returns the cycles of the events of a kind.
     fn cycles_of_kind(&self, kind: usize) -> impl Iterator<Item = u64> {
         let events = self.cycles.iter().zip(self.kinds);
         events.filter(move |(_, k)| **k as usize == kind).map(|(cycle, _)| *cycle)
@@ -115,7 +114,7 @@ impl<'a> Events<'a> {
         table
     }
 
-    /// Returns the smallest and the largest value of a kind.
+    /// Returns the smallest and the largest finite value of a kind, as cells; dashes if there is none.
     fn value_range(&self, kind: usize, values: &[f64]) -> [String; 2] {
         let values = values.iter().zip(self.kinds);
         let of_kind =

@@ -125,7 +125,7 @@ fn summary_number(summary: Option<&Value>, key: &str) -> Option<f64> {
     summary?.get(key)?.as_f64()
 }
 
-/// Returns the commands that reproduce the run.
+/// Returns the commands that reproduce the run: an exact replay, and a new run of the recorded scenario.
 fn reproduction_commands(view: &RunReader) -> String {
     let folder = shell_quote(&view.path.display().to_string());
     let scenario = shell_quote(&view.path.join("scenario.toml").display().to_string());
@@ -137,7 +137,7 @@ fn reproduction_commands(view: &RunReader) -> String {
     )
 }
 
-/// Returns a path quoted for a shell.
+/// Returns a path as one word of a POSIX shell.
 pub(super) fn shell_quote(path: &str) -> String {
     let has_special =
         path.contains(|c: char| !c.is_ascii_alphanumeric() && !"/._-+=:,@%".contains(c));
@@ -165,7 +165,7 @@ fn append_metrics(
     document.tables(metrics::list_table("Metrics of pairs of agents", per_pair, meanings));
 }
 
-/// Returns the picture in the run folder.
+/// Returns the picture in the run folder; `None` if the run has not ended, or it could not be drawn.
 fn picture(folder: &Path) -> Result<Option<Picture>, InputError> {
     let path = folder.join("trajectories.svg");
     match std::fs::read_to_string(&path) {

@@ -155,7 +155,6 @@ fn stop_reasons_table(plan: &Plan, table: &RunTable) -> Option<Table> {
     (!stopped.is_empty()).then_some(rows)
 }
 
-/// Returns the commands that reproduce the sweep.
 fn reproduction_commands(folder: &Folder) -> String {
     let scenario = folder.path().join("variants/0000/scenario.toml");
     format!(

@@ -66,7 +66,6 @@ pub(super) fn format_cell(column: &ColumnSpec, values: &Values, row: usize) -> S
     }
 }
 
-/// Returns a number of rows as text.
 pub(super) fn format_rows(rows: usize) -> String {
     format!("{} row{}", super::text::format_count(rows as u64), if rows == 1 { "" } else { "s" })
 }

@@ -22,7 +22,7 @@ pub(super) struct OutcomeBuckets<'a> {
     /// The columns of all outcomes so far: every block has those of the whole table.
     schema: ColumnSchema,
     pilots: PilotRuns<'a>,
-    /// Trials of a bucket.
+    /// Consecutive trials that share a bucket.
     trials: u64,
     storage: BucketStorage,
     /// The first error of a file; reported at the end, because readers of journals pass outcomes on without errors.
@@ -31,9 +31,9 @@ pub(super) struct OutcomeBuckets<'a> {
 
 /// The place of the buckets.
 enum BucketStorage {
-    /// Rows in memory: there is one bucket.
+    /// One bucket is small enough to be joined in memory.
     Memory(RunTableBuilder),
-    /// Files of a folder.
+    /// One file for each bucket; the folder deletes itself with them.
     Files(TempFolder, Vec<BufWriter<File>>),
 }
 

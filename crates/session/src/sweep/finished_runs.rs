@@ -10,11 +10,11 @@ use sidestep_record::RunReader;
 use sidestep_scenario::{Source, Worlds};
 use std::path::Path;
 
-/// The finished runs of a sweep.
+/// The runs of a sweep in progress or done, for readers that need the whole table.
 pub struct FinishedRuns {
     /// One row per run, with the times that it took.
     pub table: RunTable,
-    /// Whether these are all runs.
+    /// Whether these are all planned runs.
     pub is_complete: bool,
 }
 

@@ -7,10 +7,9 @@ use sidestep_record::LoadedTable;
 use sidestep_record::sweep::{Share, SweepFolder};
 use sidestep_scenario::Worlds;
 
-/// The folder of a sweep.
+/// The folder of a sweep with our plan; the format of the folder itself does not depend on plans.
 pub type Folder = SweepFolder<Plan>;
 
-/// Returns the table of runs in a file.
 pub(super) fn to_run_table(file: LoadedTable<Role>) -> RunTable {
     RunTable { columns: file.columns }
 }

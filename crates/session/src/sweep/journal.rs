@@ -23,7 +23,6 @@ pub(super) struct StoredOutcome {
 }
 
 impl<'a> TimestampedOutcome<'a> {
-    /// Returns an outcome that comes in now.
     pub(super) fn now(outcome: &'a Outcome) -> Self {
         Self { outcome, ended_unix_s: now_unix_s() }
     }

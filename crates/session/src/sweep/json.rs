@@ -28,7 +28,7 @@ impl SweepResult {
     }
 }
 
-/// Returns the rows of runs that failed.
+/// Returns the rows of runs that failed, in the order of the table.
 pub fn failed_rows(table: &RunTable) -> impl Iterator<Item = usize> {
     let column = table.column("failure");
     (0..table.runs())

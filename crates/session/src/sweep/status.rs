@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 /// The span in seconds before the last run from which runs give the rate: a sweep that was stopped overnight and
 /// resumed has the rate of this morning.
 const RATE_WINDOW_S: f64 = 600.0;
+// Where journals are locked, only the estimate of the time left depends on these two.
 /// The idle time, in usual times between two runs, after which a sweep counts as abandoned, ...
 const IDLE_TIMEOUT_RUNS: f64 = 10.0;
 /// ... but not before this many seconds.
@@ -28,7 +29,7 @@ pub struct SweepStatus {
     pub runs: u64,
     /// Number of planned runs; an upper bound if a precision ends the sweep.
     pub total: u64,
-    /// Whether a precision ends the sweep.
+    /// Whether a precision ends the sweep: then its total is a bound, and there is no estimate of the time left.
     pub until_precise: bool,
     /// Number of runs that failed.
     pub failed: usize,
@@ -60,15 +61,15 @@ impl SweepStatus {
     }
 }
 
-/// A run that failed.
+/// A run that failed, with everything needed to repeat it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FailedRun {
     /// Number of its trial; `--json` calls it `cell`.
     #[serde(rename = "cell")]
     pub trial: u64,
-    /// Name of its variant.
+    /// Name of its variant, as tables show it.
     pub variant: String,
-    /// Its seed.
+    /// The seed of the run, which repeats the failure with the variant's scenario.
     pub seed: u64,
     /// The reason.
     pub why: String,
@@ -83,13 +84,13 @@ pub struct ShareStatus {
     pub runs: u64,
     /// Number of its planned runs; an upper bound if a precision ends the sweep.
     pub of: u64,
-    /// Whether it is done.
+    /// Whether all of its runs are finished and stored as a part.
     pub is_done: bool,
     /// Seconds since its last run finished; none if it is done.
     pub idle_s: Option<f64>,
 }
 
-/// What a scan of the folder finds.
+/// The runs of all parts and journals, each counted once even if two shares have it.
 #[derive(Default)]
 struct FolderScan {
     trials: BTreeSet<u64>,
@@ -207,7 +208,8 @@ fn eta_s(remaining: u64, runs_per_s: Option<f64>, idle_s: Option<f64>) -> Option
     Some(remaining as f64 / runs_per_s)
 }
 
-/// Returns whether no run has finished for longer than a sweep in progress would take.
+/// Returns whether no run has finished for longer than a sweep in progress would take; without a rate a minute
+/// decides.
 fn is_stalled(idle_s: f64, runs_per_s: Option<f64>) -> bool {
     let usual_s = runs_per_s.map_or(0.0, |runs_per_s| IDLE_TIMEOUT_RUNS / runs_per_s);
     idle_s > MIN_IDLE_TIMEOUT_S.max(usual_s)

@@ -13,7 +13,7 @@ pub struct SweepTiming {
     worked_s: f64,
     /// The part of that time spent on simulation.
     simulated_s: f64,
-    /// Number of runs.
+    /// Number of runs, those that failed among them.
     pub runs: u64,
     /// Largest number of runs in progress at once.
     pub at_once: usize,
@@ -25,7 +25,6 @@ impl SweepTiming {
         Self { started_at: Some(Instant::now()), ..Self::default() }
     }
 
-    /// Adds a finished run.
     pub(super) fn record(&mut self, outcome: &Outcome) {
         self.runs += 1;
         self.simulated_s += outcome.costs.get("run_wall_s").and_then(|v| v.as_f64()).unwrap_or(0.0);
@@ -38,7 +37,7 @@ impl SweepTiming {
         self.at_once = at_once;
     }
 
-    /// Adds the times of later runs.
+    /// Adds the times of later runs; their number at once is kept if it is larger.
     pub(super) fn add(&mut self, later: Self) {
         self.wall_s += later.wall_s;
         self.worked_s += later.worked_s;

@@ -120,6 +120,7 @@ impl TrialRunner<'_> {
             // For example a seed for which a scenario has no start: the other runs continue.
             Ok(Err(Error::Input(e))) => Some(Ok(Outcome::from_failure(trial, e.to_string()))),
             Ok(Err(Error::InterruptedInCycle(_))) => None,
+            // What cannot be stored would fail for every run, so it stops the sweep.
             Ok(Err(failure)) => Some(Err(failure)),
             Err(payload) if self.watcher.interrupt().caused(payload.as_ref()) => None,
             // A bug in one run costs only that run, not a sweep of days.

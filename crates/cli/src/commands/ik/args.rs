@@ -220,12 +220,12 @@ pub(super) fn parse_lengths<const N: usize>(
     parse_array(option, text, &format!("write {form} in m, such as {example}"))
 }
 
-/// Parses roll, pitch and yaw.
+/// Parses roll, pitch and yaw in rad.
 pub(super) fn parse_rpy(option: &str, text: &str) -> Result<Vector, InputError> {
     parse_array(option, text, "write roll,pitch,yaw in rad, such as 3.1416,0,0.5")
 }
 
-/// Parses a quaternion.
+/// Parses a quaternion x, y, z, w of any length but 0.
 pub(super) fn parse_quaternion(option: &str, text: &str) -> Result<[f64; 4], InputError> {
     parse_array(option, text, "write x,y,z,w, scalar last, such as 0,0,0,1 for no turn at all")
 }

@@ -101,8 +101,6 @@ pub(crate) struct IkArgs {
     goal: GoalArgs,
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When a file, a link, the posture, the values, the target or an obstacle is wrong.
 pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -15,7 +15,7 @@ use std::path::Path;
 const POSITION_COLUMNS: [&str; 3] = ["x", "y", "z"];
 const RPY_COLUMNS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 const QUATERNION_COLUMNS: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
-/// The largest number in a table: a place in m, or an angle in rad.
+/// The largest number in a table, a place in m or an angle in rad: larger ones are mistyped or in other units.
 const MAX_VALUE: f64 = 1e7;
 
 /// The results of all targets.
@@ -93,7 +93,6 @@ impl IkTableRow {
         }
     }
 
-    /// Returns the row as CSV, with the number of its target.
     fn csv_line(&self, target: usize, joints: &[f64]) -> String {
         let Self { reached, error_m, error_rad, iterations, starts, .. } = self;
         let joints: String = joints.iter().map(|value| format!(",{value}")).collect();
@@ -123,7 +122,7 @@ impl IkTable {
     }
 }
 
-/// Reads the targets.
+/// Reads the targets from the columns of a CSV file, whose names decide how orientations are given.
 fn read_targets(path: &Path) -> Result<Vec<TipTarget>, InputError> {
     let table = CsvTable::read(path)?;
     let rotation_columns = POSITION_COLUMNS.len()..;

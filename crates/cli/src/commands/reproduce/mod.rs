@@ -44,8 +44,6 @@ enum Paper {
     Serpentine(serpentine::SerpentineArgs),
 }
 
-/// Runs the command.
-///
 /// # Errors
 /// When the plan or the folder is wrong, or results cannot be stored.
 pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCode, Failure> {

@@ -35,7 +35,7 @@ impl Player {
         }
     }
 
-    /// Returns the state of playback for viewers.
+    /// Returns the state of playback in the words of viewers: a seek after which the run plays on counts as playing.
     fn playback(&self) -> Playback {
         let plays_after_seek = self.seek.is_some_and(|seek| seek.then.is_some());
         let playing = match self.state {
