@@ -47,16 +47,20 @@ pub(crate) struct InspectionTrace {
     pub(crate) events: Vec<Event>,
 }
 
+/// The decisions of a group in a cycle, and what they rest on; `own`, `controls` and `considered` by the place of the
+/// airplane in the group.
+pub(crate) struct GroupDecisions<'a> {
+    pub(crate) own: &'a [OwnshipState],
+    pub(crate) non_cooperative: &'a [NonCooperative],
+    /// `None` for an airplane whose pilot has not decided in time.
+    pub(crate) controls: &'a [Option<Control>],
+    pub(crate) considered: &'a [ManeuverCandidates],
+}
+
 impl InspectionTrace {
     /// Records the knowledge, the considerations and the decisions of a group.
-    pub(crate) fn record_decisions(
-        &mut self,
-        world: &AirspaceWorld,
-        own: &[OwnshipState],
-        non_cooperative: &[NonCooperative],
-        controls: &[Option<Control>],
-        considered: &[ManeuverCandidates],
-    ) {
+    pub(crate) fn record_decisions(&mut self, world: &AirspaceWorld, decided: &GroupDecisions<'_>) {
+        let &GroupDecisions { own, non_cooperative, controls, considered } = decided;
         let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(OwnshipState::known_aircraft).collect();
         self.non_cooperative = non_cooperative.to_vec();

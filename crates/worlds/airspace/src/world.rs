@@ -6,7 +6,7 @@ mod tests;
 
 use super::flight::{
     Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
-    SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
+    RoutePosition, SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperative;
@@ -315,7 +315,8 @@ impl AirspaceWorld {
     ) -> ActionPredictions {
         let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.actions(known.slot);
-        let predictions = self.air().predictions(model, actions, mission, known.pose, known.next);
+        let route = RoutePosition { mission, next: known.next, pose: known.pose };
+        let predictions = self.air().predictions(model, actions, route);
         ActionPredictions::new(predictions, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
     }

@@ -3,7 +3,7 @@
 use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{StateBeacon, TrafficPicture, TrafficState};
-use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction};
+use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction, RoutePosition};
 use crate::non_cooperative::NonCooperative;
 use crate::objective::{ActionPredictions, Objective};
 use crate::purpose;
@@ -70,7 +70,8 @@ impl CommonKnowledge {
             separation_m: beacon.separation_m,
             ..model.clone()
         };
-        let predictions = self.air.predictions(&model, actions, mission, beacon.pose, next);
+        let route = RoutePosition { mission, next, pose: beacon.pose };
+        let predictions = self.air.predictions(&model, actions, route);
         ActionPredictions::new(predictions, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
     }

@@ -23,6 +23,17 @@ pub struct Air {
     pub wind_m_s: Point,
 }
 
+/// An airplane's position on its route.
+#[derive(Debug, Clone, Copy)]
+pub struct RoutePosition<'a> {
+    /// All way-points of the route, also those behind it.
+    pub mission: &'a [Point],
+    /// Number of way-points done with, which is the index of the one that it flies to.
+    pub next: usize,
+    /// The pose from which it flies there.
+    pub pose: Pose2,
+}
+
 impl Air {
     /// Returns how an airplane flies through still air.
     pub fn autopilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Autopilot<'a> {
@@ -102,7 +113,7 @@ impl Air {
         Pose2 { at, ..pose }
     }
 
-    /// Returns where each action leads an airplane that flies to way-point `next`.
+    /// Returns where each action leads an airplane that is at a point of its route.
     ///
     /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
     /// be when the airplane, flying straight, reaches it.
@@ -110,10 +121,9 @@ impl Air {
         &self,
         model: &Model,
         actions: &[Action],
-        mission: &[Point],
-        pose: Pose2,
-        next: usize,
+        route: RoutePosition<'_>,
     ) -> Vec<Prediction> {
+        let RoutePosition { mission, next, pose } = route;
         interrupt::check();
         let mission = self.mission_in_air(mission, pose.at, next, model.v_m_s);
         let autopilot = self.autopilot(model, &mission);

@@ -78,6 +78,12 @@ pub(super) trait HostServices {
     fn on_no_majority(&mut self, number: usize, unanswering: &[usize]);
 }
 
+/// A host at a moment: its services, and its tick.
+pub(super) struct HostMoment<'a, S> {
+    pub services: &'a S,
+    pub tick: u64,
+}
+
 /// The rules by which a host waits for others.
 #[derive(Debug, Clone)]
 pub(super) struct HostConfig {
