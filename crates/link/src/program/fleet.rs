@@ -31,7 +31,7 @@ use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Time between two reports to the parent process.
+/// Time between two reports to the parent process: nodes report as often.
 const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Minimum time in seconds that nodes wait for the server to answer: on a busy machine many processes start at once.
@@ -95,7 +95,6 @@ fn fleet_scene(run: &dyn Simulation) -> FleetScene {
     }
 }
 
-/// Creates the table of all packets, if the job asks for one.
 /// Returns a quantile of durations in milliseconds; `None` without durations.
 fn quantile_ms(durations: &Histogram, fraction: f64) -> Option<f64> {
     durations.quantile(fraction).map(|s| 1e3 * s)
@@ -106,6 +105,7 @@ fn increase(last: u64, now: u64) -> f64 {
     now.saturating_sub(last) as f64
 }
 
+/// Creates the table of all packets, if the job asks for one.
 fn create_packet_table(
     job: &FleetJob,
     text: &str,

@@ -35,7 +35,7 @@ const OPEN_TIMEOUT_MS: u64 = 3_000;
 /// Time in which the endpoints of a closed session can usually be bound again.
 const RELEASE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The configuration of a Zenoh session.
+/// The parts of a Zenoh session's configuration that differ by session.
 #[derive(Debug, Clone, Default)]
 struct ZenohConfig<'a> {
     /// Id by which others know the session; none for one that Zenoh draws.
@@ -125,7 +125,7 @@ pub struct ZenohWire {
     other_nodes: Vec<Peer>,
     /// The endpoints of the mesh to which this node opens links.
     connect: Vec<String>,
-    /// The id of this node in the mesh.
+    /// The id of this node in the mesh, which all its sessions there share; 0 before the first.
     mesh_id: u128,
     /// Number of times that the mesh was opened.
     mesh_openings: u32,

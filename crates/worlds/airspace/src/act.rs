@@ -43,6 +43,7 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[Slot]) {
     if !flying.is_empty() {
         let before = context.scratch.events.len();
         fly(context, &flying);
+        // An event tells where its airplane is at the end of the cycle, which is known only now.
         for event in &mut context.scratch.events[before..] {
             let current = &state.airplanes[event.airplane as usize];
             let [x_m, y_m] = current.pose().at;

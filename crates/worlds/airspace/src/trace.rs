@@ -15,7 +15,7 @@ use sidestep_kernel::{EntityId, Slot};
 /// Records for an inspection; no run makes any.
 #[derive(Debug, Default)]
 pub(crate) struct InspectionTrace {
-    /// The airplane.
+    /// The airplane that is inspected.
     pub(crate) slot: Slot,
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<KnownAircraft>,
@@ -43,7 +43,7 @@ pub(crate) struct InspectionTrace {
     pub(crate) exchange: NetworkTraffic,
     /// The turn profile that it flies.
     pub(crate) flown: Option<TurnProfile>,
-    /// Its events.
+    /// Events of the cycle in which it has a part.
     pub(crate) events: Vec<Event>,
 }
 
@@ -93,7 +93,7 @@ impl InspectionTrace {
         }
     }
 
-    /// Returns its place in a group.
+    /// Returns its place in a group; `None` in one of others.
     fn place(&self, mut group: impl Iterator<Item = Slot>) -> Option<usize> {
         group.position(|slot| slot == self.slot)
     }

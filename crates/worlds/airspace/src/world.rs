@@ -25,13 +25,13 @@ use std::sync::Arc;
 pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Arc<Vec<Airplane>>,
-    /// The steps of time.
+    /// Lengths of a cycle, of the steps in it, and of the horizon.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The objective that is minimized.
     pub objective: Objective,
-    /// Settings of the optimizer.
+    /// Settings of the optimizer, which only method `pc` has.
     pub settings: OptimizerConfig,
     /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
@@ -39,9 +39,9 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: MethodKind,
-    /// Settings of MVP.
+    /// Settings of MVP; without effect on other methods.
     pub mvp: ReactiveSettings,
-    /// Settings of ORCA.
+    /// Settings of ORCA; without effect on other methods.
     pub orca: ReactiveSettings,
     /// The deployment of the optimizer.
     pub deployment: Deployment,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// The knowledge that all agents of a group share before their conversations.
 #[derive(Debug, Clone)]
 pub struct CommonKnowledge {
-    /// The present cycle.
+    /// The cycle in which they decide.
     pub now: Cycle,
     /// Ids of the group, rising.
     pub ids: Arc<[EntityId]>,
@@ -27,7 +27,7 @@ pub struct CommonKnowledge {
     pub air: Air,
     /// The objective that is minimized.
     pub objective: Objective,
-    /// Settings of the optimizer.
+    /// Settings of the optimizer, from the scenario.
     pub settings: OptimizerConfig,
     /// The random streams from which samples are drawn.
     pub streams: Streams,
@@ -37,7 +37,7 @@ pub struct CommonKnowledge {
     pub is_shielded: bool,
 }
 
-/// A flight as it was filed.
+/// A flight as it was filed: what all others know of it without a message.
 #[derive(Debug, Clone)]
 pub struct FiledFlight {
     /// Abilities of the airplane.

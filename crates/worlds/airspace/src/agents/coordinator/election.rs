@@ -13,6 +13,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         missed: ElectionCause,
         moment: &HostMoment<'_, P::Services>,
     ) {
+        // On a network that loses nothing, no coordinator gets lost.
         let Some(policy) = self.rules.retry_policy else { return };
         self.candidate_number = 1 + self.promised.number.max(self.candidate_number);
         let epoch = Epoch { number: self.candidate_number, owner: self.rules.me as u16 };

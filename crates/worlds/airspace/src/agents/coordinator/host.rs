@@ -111,6 +111,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         match coordinator.advance(&mut self.services, &context) {
             CoordinatorStep::Hop(to) => replica.migrate(&coordinator, to, tick),
             CoordinatorStep::Done => {}
+            // It has continued without the one that it waited for, and waits anew.
             CoordinatorStep::Stay if has_timed_out => replica.host(coordinator, tick),
             CoordinatorStep::Stay => {
                 replica.put_back(HostedCoordinator { coordinator, heartbeat_at, timeout_at });

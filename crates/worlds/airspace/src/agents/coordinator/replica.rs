@@ -36,7 +36,7 @@ pub(super) enum ReplicaRole<P> {
     Candidate(Candidate),
 }
 
-/// A coordinator that stays on a host.
+/// A coordinator on this host, with what is due if it stays here.
 #[derive(Debug, Clone)]
 pub(super) struct HostedCoordinator<P> {
     pub coordinator: P,
@@ -140,7 +140,6 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         }
     }
 
-    /// Returns whether the coordinator is here.
     pub(super) fn is_hosting(&self) -> bool {
         matches!(self.role, ReplicaRole::Hosting(_))
     }
@@ -150,7 +149,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         matches!(self.role, ReplicaRole::Idle)
     }
 
-    /// Hosts the coordinator from a tick on.
+    /// Takes the coordinator in at a tick, from which its times on this host count.
     pub(super) fn host(&mut self, coordinator: P, tick: u64) {
         let heartbeat_at = tick.saturating_add(self.rules.heartbeat_ticks());
         let timeout_at = tick.saturating_add(self.rules.wait_timeout_ticks());
@@ -376,6 +375,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Gives another host that stands for election time for some questions and answers.
     pub(super) fn defer_election(&mut self, tick: u64) {
         let answer_ticks = self.round_trip_ticks();
+        // Three times, because a question or its answer may get lost and be repeated.
         self.quiet_until = tick.saturating_add(answer_ticks.saturating_mul(3));
     }
 
