@@ -51,6 +51,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
     let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
     let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
+    // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&fleet_scene(run.simulation()));
@@ -69,6 +70,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
         has_faults: scenario.world.has_faults(),
     };
     let jobs = node_jobs(job, &listen, scenario.world.as_ref());
+    // Where the loss of a node ends the fleet, starting it again is of no use.
     let restarts = job.clock != ClockMode::Lockstep || scenario.world.waits_for_lost_nodes();
     let children = NodeProcesses::start(jobs, restarts)?;
     let run_config = run.simulation().config();

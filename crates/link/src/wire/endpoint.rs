@@ -16,7 +16,7 @@ pub enum WireError {
     /// A text is not in the form of an endpoint.
     #[error("`{0}` is no endpoint")]
     NoEndpoint(String),
-    /// There is no answer.
+    /// Nothing has answered within the time that was given.
     #[error("no answer from {endpoint}: {reason}")]
     NoAnswer {
         /// The address.

@@ -68,10 +68,12 @@ impl ZenohConfig<'_> {
             ("connect/timeout_ms", connected.to_string()),
             ("connect/exit_on_failure", self.connected_within.is_some().to_string()),
             (
+                // A node that starts before the server, or returns, need not wait longer than half a second.
                 "connect/retry",
                 r#"{"period_init_ms":50,"period_max_ms":500,"period_increase_factor":2}"#.into(),
             ),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
+            // Signs of life in each lease, so that some of them may be late.
             ("transport/link/tx/keep_alive", "4".into()),
             ("transport/unicast/open_timeout", OPEN_TIMEOUT_MS.to_string()),
             ("transport/unicast/accept_timeout", OPEN_TIMEOUT_MS.to_string()),

@@ -182,6 +182,7 @@ impl<'a> Compiler<'a> {
     fn waypoint_rule(&self, airplanes: &[Airplane]) -> WaypointRule {
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let given = self.file.airspace.tolerance_m;
+        // The 100 m that go with the paper's separation of 500 m.
         let tolerance_m = given.map_or((radius_m / 5.0).max(1.0), f64::from);
         WaypointRule { tolerance_m, passes: true }
     }
@@ -329,6 +330,7 @@ impl<'a> Compiler<'a> {
             let cause = "a horizon in points, which is a time now";
             return Err(self.source.error(former.span(), cause, remedy));
         }
+        // The paper predicts 125 points of one second each.
         let preset_s: f64 = if self.is_paper() { 125.0 } else { 90.0 };
         let given = section.horizon_s.as_ref();
         let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
