@@ -5,13 +5,13 @@ use crate::protocol::CycleStart;
 pub use sidestep::kernel::network::OutgoingPacket;
 use sidestep::kernel::{Cycle, EntityId};
 
-/// Controls of agents, serialized.
+/// Controls of agents in the form that their world reads, at most one of each.
 pub type Controls = Vec<(EntityId, Vec<u8>)>;
 
 /// Everything that an agent perceives at the start of a cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgentPercept {
-    /// The agent.
+    /// The agent that perceives it.
     pub agent: EntityId,
     /// The agents that decide together in this cycle, including this one, in ascending order.
     pub group: Vec<EntityId>,
@@ -24,7 +24,7 @@ pub struct AgentPercept {
 pub struct InvalidControl {
     /// The agent that sent it.
     pub agent: EntityId,
-    /// The reason.
+    /// Why it is invalid, for the server's log.
     pub reason: String,
 }
 
@@ -55,10 +55,10 @@ pub trait AgentProgram: Send {
     /// Does everything that is due by a tick.
     fn on_timer(&mut self, tick: u64);
 
-    /// Returns the tick of the next timer.
+    /// Returns the tick of the next timer; `None` where only a packet can make it go on.
     fn next_timer(&self) -> Option<u64>;
 
-    /// Takes the packets to be sent.
+    /// Takes out the packets to be sent, each once.
     fn take_packets(&mut self) -> Vec<OutgoingPacket>;
 
     /// Returns whether its control is ready.
@@ -67,7 +67,7 @@ pub trait AgentProgram: Send {
     /// Returns its control, once it is ready.
     fn control(&self) -> Option<Vec<u8>>;
 
-    /// Returns its present activity.
+    /// Returns its present activity; nothing depends on it.
     fn activity(&self) -> Activity;
 
     /// Returns the other agents that it has heard in this cycle, or in the one before if it has heard none yet.
@@ -87,7 +87,7 @@ pub struct Transmission {
     pub tick: u64,
     /// Its number among the sender's in that tick.
     pub sequence: u32,
-    /// Its size.
+    /// Its size in bytes.
     pub bytes: usize,
 }
 

@@ -115,7 +115,7 @@ impl DistributedWorld for DistributedAirspace {
     }
 }
 
-/// The program of a pilot, at a node.
+/// The program of a pilot at a node, with what the node reports about it.
 struct PilotProgram {
     world: Arc<AirspaceWorld>,
     pilot: Pilot,

@@ -61,7 +61,7 @@ impl Default for ArqLink {
     }
 }
 
-/// Frames that are due.
+/// What has to be sent to the other end now.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct DueFrames {
     /// Messages to retransmit, with their sequence numbers.
@@ -110,7 +110,7 @@ impl ArqLink {
         self.retransmit_at = self.oldest_since.map(|since| since + self.retransmit_delay);
     }
 
-    /// Returns the frames that are due.
+    /// Returns what is due by now, and sets the time of the next retransmission.
     pub(crate) fn take_due(&mut self, now: Duration) -> DueFrames {
         let mut due = DueFrames::default();
         if self.retransmit_at.is_some_and(|at| at <= now) {

@@ -9,7 +9,7 @@ pub trait DistributedWorld: Send + Sync {
     /// Number of agents; their ids on the network are those below.
     fn count(&self) -> usize;
 
-    /// Returns the name of an agent.
+    /// Returns the name by which users call an agent.
     fn name(&self, agent: EntityId) -> AgentName;
 
     /// Returns the id of a named agent; none if there is no such agent.

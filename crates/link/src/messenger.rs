@@ -41,7 +41,7 @@ pub struct MessengerStats {
 struct PeerState {
     incarnation: Incarnation,
     link: ArqLink,
-    /// Time at which it was last heard.
+    /// Time at which it was last heard, or connected.
     last_heard: Duration,
 }
 
@@ -64,7 +64,7 @@ pub struct Received {
     pub from: Peer,
     /// The sender's incarnation.
     pub incarnation: Incarnation,
-    /// The message.
+    /// The message; reliable ones of a sender come in order.
     pub message: Message,
 }
 
@@ -80,7 +80,7 @@ pub struct Messenger {
 }
 
 impl Messenger {
-    /// Returns the messenger of a peer in a new incarnation.
+    /// Returns the messenger of a peer in a new incarnation, not connected with any other.
     pub fn new(me: Peer, wire: Box<dyn Wire>) -> Self {
         Self {
             me,

@@ -25,7 +25,7 @@ pub struct Frame<M = Message> {
     pub from: Peer,
     /// The sender's incarnation.
     pub incarnation: Incarnation,
-    /// The receivers.
+    /// The receivers; another peer that gets the frame ignores it.
     pub to: Vec<Recipient>,
     /// The message, the same for all receivers; none in a frame that only acknowledges.
     pub message: Option<M>,
@@ -89,7 +89,7 @@ pub enum Message {
 /// A node that wants to join.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Join {
-    /// Its agent.
+    /// The agent that it would run.
     pub agent: EntityId,
     /// Fingerprint of the scenario that it has read.
     pub scenario: Fingerprint,
@@ -121,16 +121,16 @@ pub struct Welcome {
 /// The reason why a node may not join, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JoinError {
-    /// The reason.
+    /// What is wrong, for the node's user.
     pub cause: String,
-    /// The remedy.
+    /// What the node's user can do about it.
     pub remedy: String,
 }
 
 /// A node of a fleet, as known to others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
-    /// Its agent.
+    /// The agent that it runs; there is one node for each.
     pub agent: EntityId,
     /// Its present incarnation.
     pub incarnation: Incarnation,
@@ -138,10 +138,10 @@ pub struct Member {
     pub listens: Vec<String>,
 }
 
-/// The start of a cycle for a node.
+/// The start of a cycle for a node, or of its agent's round where agents decide one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CycleStart {
-    /// The cycle.
+    /// The cycle; the node gives up an earlier one.
     pub cycle: Cycle,
     /// The agent's percept, serialized.
     #[serde(with = "bytes")]
@@ -153,9 +153,9 @@ pub struct CycleStart {
 /// A tick to which a node may advance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AdvanceGrant {
-    /// The cycle.
+    /// The cycle; a node ignores a grant of another one.
     pub cycle: Cycle,
-    /// The tick.
+    /// The tick, in which a timer of the node ends or a packet arrives.
     pub tick: u64,
     /// Number of packets of the cycle that arrive at the node by that tick: it waits for all of them first, because
     /// other nodes' packets and this message travel over different links.
@@ -165,13 +165,13 @@ pub struct AdvanceGrant {
 /// A node's report that it has done a tick.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AdvanceDone {
-    /// The cycle.
+    /// The cycle; the server ignores a report of another one.
     pub cycle: Cycle,
-    /// The tick.
+    /// The tick that it has done.
     pub tick: u64,
     /// Packets that it has sent in it: receiver, and tick of arrival.
     pub sent: Vec<(EntityId, u64)>,
-    /// The tick of its next timer.
+    /// The tick of its next timer; `None` where only a packet can make it go on.
     pub next_timer: Option<u64>,
     /// Whether its control is ready.
     pub is_done: bool,
@@ -204,7 +204,7 @@ pub struct PacketRecord {
     pub to: EntityId,
     /// Its number among the sender's, in the conversation or, in real time, in the cycle.
     pub sequence: u32,
-    /// Its size.
+    /// Its size in bytes.
     pub bytes: u32,
     /// Number of times that it arrives: 0 if the scenario's faults drop it, 2 if they duplicate it.
     pub copies: u32,
@@ -215,7 +215,7 @@ pub struct PacketRecord {
 /// The control of an agent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Control {
-    /// The cycle.
+    /// The cycle for which it was decided; it is carried out in no other.
     pub cycle: Cycle,
     /// The control, serialized.
     pub control: Vec<u8>,
@@ -256,7 +256,7 @@ pub enum DecodeError {
 }
 
 impl<M: Serialize> Frame<M> {
-    /// Returns the bytes of the frame.
+    /// Returns the frame as a wire carries it, the magic number first.
     pub fn encode(&self) -> Vec<u8> {
         postcard::to_extend(self, MAGIC.to_vec()).expect("frames are plain data")
     }

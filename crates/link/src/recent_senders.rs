@@ -12,7 +12,7 @@ pub(crate) struct RecentSenders {
 }
 
 impl RecentSenders {
-    /// Starts a cycle.
+    /// Starts a cycle, and forgets those of the cycle before the last.
     pub(crate) fn start_cycle(&mut self) {
         self.previous = std::mem::take(&mut self.current);
     }

@@ -32,7 +32,7 @@ pub(super) struct AgentIo<'a> {
     pub(super) messenger: &'a mut Messenger,
 }
 
-/// A cycle of an agent.
+/// A cycle of an agent, from its percept until that of the next one.
 pub(super) struct AgentCycle {
     number: Cycle,
     /// Agents out of range of the agent's radio, in ascending order.
@@ -109,7 +109,7 @@ impl AgentCycle {
         }
     }
 
-    /// Returns the cycle with a log of its packets.
+    /// Returns the cycle with a log of its packets, for the server's table of all packets.
     pub(super) fn with_log(self) -> Self {
         Self { log: Some(Vec::new()), ..self }
     }
@@ -121,7 +121,6 @@ impl AgentCycle {
         }
     }
 
-    /// Returns the number of the cycle.
     pub(super) fn number(&self) -> Cycle {
         self.number
     }

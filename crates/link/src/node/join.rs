@@ -6,13 +6,13 @@ use crate::protocol::{Join, Message, Welcome};
 use crate::wire::Peer;
 use std::time::{Duration, Instant};
 
-/// Time after which it asks again.
+/// Time after which it asks again: the request or the answer to it may be lost.
 const JOIN_RETRY_DELAY: Duration = Duration::from_millis(100);
 
 /// The settings of a node that asks to join.
 #[derive(Debug, Clone)]
 pub struct JoinConfig {
-    /// The request.
+    /// The request, the same each time that it is sent.
     pub join: Join,
     /// Time after which it gives up.
     pub timeout: Duration,

@@ -81,7 +81,7 @@ pub struct Node {
     /// Packets of a cycle that has not started here.
     early_packets: Vec<(EntityId, Packet)>,
     status: Status,
-    /// The activity that was logged last.
+    /// The activity that was logged last, and its cycle: only changes are logged.
     logged_activity: (Cycle, &'static str),
     report_at: Instant,
     /// Time before which the links are not opened again.
@@ -214,7 +214,7 @@ impl Node {
         Ok(false)
     }
 
-    /// Starts a cycle.
+    /// Starts a cycle, with its packets that came early; an unfinished one is given up.
     fn on_cycle_start(&mut self, start: CycleStart) -> Result<(), NodeError> {
         let first_tick =
             self.program.start_cycle(start.cycle, &start.percept).map_err(NodeError::Percept)?;

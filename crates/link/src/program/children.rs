@@ -28,7 +28,7 @@ const MIN_STABLE_UPTIME: Duration = Duration::from_secs(10);
 const ZENOH_RUNTIME_CONFIG: &str = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), \
                        net: (handover: rx), app: (handover: rx))";
 
-/// The process of a node.
+/// A node that is started here, and perhaps started again.
 struct NodeProcess {
     job: NodeJob,
     child: Option<Child>,
@@ -38,7 +38,7 @@ struct NodeProcess {
     restart_delay: Duration,
 }
 
-/// The nodes that this process has started.
+/// The nodes that this process has started; they end when this is dropped.
 pub(super) struct NodeProcesses {
     nodes: BTreeMap<EntityId, NodeProcess>,
     /// Whether nodes that have ended are started again.

@@ -31,7 +31,7 @@ use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Time between two reports to the parent process.
+/// Time between two reports to the parent process: nodes report as often.
 const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Minimum time in seconds that nodes wait for the server to answer: on a busy machine many processes start at once.
@@ -51,6 +51,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
     let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
     let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
+    // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&fleet_scene(run.simulation()));
@@ -69,6 +70,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
         has_faults: scenario.world.has_faults(),
     };
     let jobs = node_jobs(job, &listen, scenario.world.as_ref());
+    // Where the loss of a node ends the fleet, starting it again is of no use.
     let restarts = job.clock != ClockMode::Lockstep || scenario.world.waits_for_lost_nodes();
     let children = NodeProcesses::start(jobs, restarts)?;
     let run_config = run.simulation().config();
@@ -95,7 +97,6 @@ fn fleet_scene(run: &dyn Simulation) -> FleetScene {
     }
 }
 
-/// Creates the table of all packets, if the job asks for one.
 /// Returns a quantile of durations in milliseconds; `None` without durations.
 fn quantile_ms(durations: &Histogram, fraction: f64) -> Option<f64> {
     durations.quantile(fraction).map(|s| 1e3 * s)
@@ -106,6 +107,7 @@ fn increase(last: u64, now: u64) -> f64 {
     now.saturating_sub(last) as f64
 }
 
+/// Creates the table of all packets, if the job asks for one.
 fn create_packet_table(
     job: &FleetJob,
     text: &str,

@@ -41,7 +41,7 @@ impl MetricsExporter {
 struct MetricsText(String);
 
 impl MetricsText {
-    /// Adds the head of a metric.
+    /// Adds the lines that come once before all samples of a metric.
     fn push_header(&mut self, name: &str, kind: &str, help: &str) {
         let _ = writeln!(self.0, "# HELP sidestep_{name} {help}\n# TYPE sidestep_{name} {kind}");
     }
@@ -76,7 +76,7 @@ impl MetricsText {
     }
 }
 
-/// Returns the metrics of a fleet.
+/// Returns the metrics that the server's address serves: its own, and those of all nodes.
 pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> String {
     let mut text = MetricsText::default();
     text.push_header("cycle", "gauge", "Cycles done.");
@@ -128,7 +128,7 @@ fn push_refusals(text: &mut MetricsText, metrics: &ServerMetrics) {
     }
 }
 
-/// A metric with a value for each node.
+/// A metric with a sample for each node, read from the node's status.
 struct NodeMetric {
     name: &'static str,
     kind: &'static str,
@@ -228,7 +228,7 @@ fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]
     }
 }
 
-/// Returns the metrics of a node.
+/// Returns the metrics that a node's own address serves.
 pub(super) fn node_metrics(agent: &AgentName, status: &Status) -> String {
     let mut text = MetricsText::default();
     let agent = format_label(&agent.noun, &agent.to_string());

@@ -3,7 +3,7 @@
 use sidestep_session::fleet::LinkMessage;
 use std::io::Write;
 
-/// Prints a message as a line.
+/// Prints a message as a line of JSON, which the parent process can read at once.
 pub(super) fn print_message(message: &LinkMessage) {
     let mut line = serde_json::to_string(message).expect("messages are plain data");
     line.push('\n');

@@ -40,7 +40,7 @@ impl ParentMonitor {
         });
     }
 
-    /// Returns whether it has ended.
+    /// Returns whether standard input has ended, so that this process has to end in good order.
     pub(super) fn has_ended(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -12,7 +12,7 @@ const MAX_EVENTS: usize = 200;
 /// Time that viewers have at the end to fetch the last view.
 const LAST_VIEW_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The publisher of views.
+/// The newest frame and the last events, from which views are made.
 #[derive(Debug)]
 pub(super) struct ViewPublisher {
     server: ViewServer,
@@ -51,7 +51,6 @@ impl ViewPublisher {
         self.server.publish(self.number, to_json(&view));
     }
 
-    /// Returns whether there is a viewer.
     pub(super) fn is_watched(&self) -> bool {
         self.server.is_watched()
     }
@@ -62,7 +61,6 @@ impl ViewPublisher {
     }
 }
 
-/// Returns the scene as a text.
 pub(super) fn scene_json(scene: &FleetScene) -> String {
     to_json(scene)
 }

@@ -19,7 +19,7 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Records a duration.
+    /// Counts a duration in its bucket; one on a bound is in the bucket below it.
     pub fn record(&mut self, duration: Duration) {
         let duration_s = duration.as_secs_f64();
         self.counts[BUCKET_BOUNDS_S.partition_point(|&bound| bound < duration_s)] += 1;

@@ -38,12 +38,12 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time between two signs of life to all nodes: several of them may be lost before a node's lease ends.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 
-/// The configuration of a server.
+/// What a server demands of nodes, and how it treats them.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
-    /// Fingerprint of the scenario.
+    /// Fingerprint of the scenario, which every node must have found as well.
     pub scenario: Fingerprint,
-    /// The build of the program.
+    /// The build of the program, which every node must have.
     pub build: String,
     /// The answer to nodes that may join.
     pub welcome: Welcome,
@@ -64,9 +64,9 @@ pub enum FleetError {
     NodeLost {
         /// Its agent, by its name for people.
         agent: String,
-        /// The cycle.
+        /// The cycle that cannot be computed without it.
         cycle: Cycle,
-        /// The reason.
+        /// How it was lost: its process has ended, or it was not heard.
         reason: String,
     },
     /// The world cannot advance.
@@ -80,9 +80,9 @@ pub struct FleetView<'a> {
     pub nodes: &'a BTreeMap<EntityId, NodeEntry>,
     /// The counts of the server.
     pub metrics: &'a ServerMetrics,
-    /// The messenger of the server.
+    /// The messenger of the server, which knows when each node was last heard.
     pub messenger: &'a Messenger,
-    /// The run.
+    /// The run, between two cycles or rounds.
     pub run: &'a HostedRun,
     /// Whether all nodes have joined.
     pub has_begun: bool,

@@ -7,7 +7,7 @@ use crate::protocol::{Incarnation, Member, Status};
 pub struct NodeEntry {
     /// Its node, if one has joined.
     pub member: Option<Member>,
-    /// The process id of the node.
+    /// The process id of the node on its machine; 0 before any has joined.
     pub process: u32,
     /// Whether all other nodes have acknowledged the node's `Hello`.
     pub is_ready: bool,
@@ -25,7 +25,7 @@ pub struct NodeEntry {
     pub late: u64,
     /// Number of its controls that could not be read or carried out.
     pub invalid: u64,
-    /// Number of nodes that have joined for the agent.
+    /// Number of nodes that have joined for the agent, one after the other.
     pub joins: u64,
 }
 
@@ -41,6 +41,7 @@ impl NodeEntry {
     pub fn assign(&mut self, member: Member, process: u32) {
         let is_new =
             self.member.as_ref().is_none_or(|known| known.incarnation != member.incarnation);
+        // A new process has received no `Hello` yet. One that only repeats its request stays as ready as it was.
         if is_new {
             self.joins += 1;
             self.is_ready = false;

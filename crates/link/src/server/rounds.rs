@@ -34,7 +34,7 @@ impl Server<'_> {
         }
     }
 
-    /// Returns whether an agent has sent its control.
+    /// Returns whether an agent has sent its control of the present round.
     pub(super) fn has_control(&self, agent: EntityId) -> bool {
         self.nodes.get(&agent).is_some_and(|node| node.control.is_some())
     }

@@ -13,10 +13,10 @@ use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 
-/// The clock of a node in a cycle.
+/// A node's time in a cycle, as far as the server knows it.
 #[derive(Debug, Default)]
 struct NodeClock {
-    /// The tick of its next timer.
+    /// The tick of its next timer, by its last report.
     next_timer: Option<u64>,
     /// Number of packets that will arrive at it, by tick.
     arrivals: BTreeMap<u64, u64>,

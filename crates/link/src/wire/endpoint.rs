@@ -10,18 +10,18 @@ pub enum WireError {
     Taken {
         /// The address.
         endpoint: String,
-        /// The reason.
+        /// What the operating system says.
         reason: String,
     },
     /// A text is not in the form of an endpoint.
     #[error("`{0}` is no endpoint")]
     NoEndpoint(String),
-    /// There is no answer.
+    /// Nothing has answered within the time that was given.
     #[error("no answer from {endpoint}: {reason}")]
     NoAnswer {
         /// The address.
         endpoint: String,
-        /// The reason.
+        /// What the last attempt to connect has found.
         reason: String,
     },
     /// There is an answer, and one of the two ends rejects the other's certificate.
@@ -29,7 +29,7 @@ pub enum WireError {
     Distrust {
         /// The address.
         endpoint: String,
-        /// The reason.
+        /// Which certificate is rejected, and why.
         reason: String,
     },
 }
@@ -54,7 +54,7 @@ fn parse_endpoint(endpoint: &str) -> Option<(&str, u16)> {
 /// A port that is bound, so that no other program gets it, until a socket of this program needs it.
 #[derive(Debug)]
 pub struct PortReservation {
-    /// The endpoint, with a port.
+    /// The endpoint, with the reserved port in place of port 0.
     pub endpoint: String,
     _port: TcpListener,
 }
@@ -78,7 +78,7 @@ pub fn reserve_port(endpoint: &str) -> Result<PortReservation, WireError> {
             bind(bare, port).map_err(|reason| endpoint_in_use(&[endpoint.into()], reason))?;
         return Ok(PortReservation { endpoint: endpoint.into(), _port: bound });
     }
-    // Processes that start together begin their search at different ports.
+    // Processes that start together begin their search at different ports: their ids follow each other.
     let first = (std::process::id().wrapping_mul(97) % u32::from(PORT_COUNT)) as u16;
     let mut last_reason = String::new();
     for k in 0..PORT_COUNT {
@@ -99,7 +99,7 @@ fn bind(host: &str, port: u16) -> Result<TcpListener, String> {
     TcpListener::bind(&*addresses.collect::<Vec<_>>()).map_err(|e| e.to_string())
 }
 
-/// Returns an endpoint with another port.
+/// Returns an endpoint with another port, in place of any that it has.
 pub fn with_port(endpoint: &str, port: u16) -> String {
     let address = endpoint.rsplit_once(':').map_or(endpoint, |(address, _)| address);
     format!("{address}:{port}")

@@ -35,7 +35,7 @@ const OPEN_TIMEOUT_MS: u64 = 3_000;
 /// Time in which the endpoints of a closed session can usually be bound again.
 const RELEASE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The configuration of a Zenoh session.
+/// The parts of a Zenoh session's configuration that differ by session.
 #[derive(Debug, Clone, Default)]
 struct ZenohConfig<'a> {
     /// Id by which others know the session; none for one that Zenoh draws.
@@ -68,10 +68,12 @@ impl ZenohConfig<'_> {
             ("connect/timeout_ms", connected.to_string()),
             ("connect/exit_on_failure", self.connected_within.is_some().to_string()),
             (
+                // A node that starts before the server, or returns, need not wait longer than half a second.
                 "connect/retry",
                 r#"{"period_init_ms":50,"period_max_ms":500,"period_increase_factor":2}"#.into(),
             ),
             ("transport/link/tx/lease", LEASE_MS.to_string()),
+            // Signs of life in each lease, so that some of them may be late.
             ("transport/link/tx/keep_alive", "4".into()),
             ("transport/unicast/open_timeout", OPEN_TIMEOUT_MS.to_string()),
             ("transport/unicast/accept_timeout", OPEN_TIMEOUT_MS.to_string()),
@@ -125,7 +127,7 @@ pub struct ZenohWire {
     other_nodes: Vec<Peer>,
     /// The endpoints of the mesh to which this node opens links.
     connect: Vec<String>,
-    /// The id of this node in the mesh.
+    /// The id of this node in the mesh, which all its sessions there share; 0 before the first.
     mesh_id: u128,
     /// Number of times that the mesh was opened.
     mesh_openings: u32,

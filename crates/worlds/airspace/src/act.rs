@@ -28,6 +28,7 @@ use super::pilot::{Control, OwnshipState};
 use super::scratch::PhaseContext;
 use super::settings::Deployment;
 use super::shield::TurnProfile;
+use super::trace::GroupDecisions;
 use controls::apply_controls;
 use flight::{AircraftMotion, FlownPath};
 use sidestep_kernel::Slot;
@@ -42,6 +43,7 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[Slot]) {
     if !flying.is_empty() {
         let before = context.scratch.events.len();
         fly(context, &flying);
+        // An event tells where its airplane is at the end of the cycle, which is known only now.
         for event in &mut context.scratch.events[before..] {
             let current = &state.airplanes[event.airplane as usize];
             let [x_m, y_m] = current.pose().at;
@@ -111,7 +113,13 @@ fn turn_profiles(
         };
     if let Some(trace) = &mut context.scratch.trace {
         trace.contacts = contacts.unwrap_or_default();
-        trace.record_decisions(world, &own, non_cooperative, &controls, &considered);
+        let decided = GroupDecisions {
+            own: &own,
+            non_cooperative,
+            controls: &controls,
+            considered: &considered,
+        };
+        trace.record_decisions(world, &decided);
     }
     let profiles = apply_controls(context, &own, non_cooperative, controls);
     if let Some(trace) = &mut context.scratch.trace {

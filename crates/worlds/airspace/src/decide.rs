@@ -25,7 +25,7 @@ use sidestep_kernel::{Cycle, EntityId};
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Optimization {
-    /// Cycle of the optimization.
+    /// Cycle for which the actions were chosen.
     pub cycle: Cycle,
     /// The member of the group with the smallest id.
     pub airplane: EntityId,
@@ -42,7 +42,7 @@ pub struct Optimization {
 /// Sums over optimizations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct OptimizationStats {
-    /// Number of optimizations.
+    /// Number of optimizations, each of one group in one cycle.
     pub optimizations: u64,
     /// Sum of their rounds.
     pub rounds: u64,
@@ -55,7 +55,7 @@ pub struct OptimizationStats {
 }
 
 impl OptimizationStats {
-    /// Adds one optimization.
+    /// Adds an optimization that has ended; beacons are not part of one.
     pub fn add(&mut self, one: &Optimization) {
         self.optimizations += 1;
         self.rounds += u64::from(one.rounds);

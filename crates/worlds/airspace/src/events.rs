@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Kinds of events.
+/// Kinds of events. Events of one cycle and airplane are recorded in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
@@ -37,7 +37,7 @@ pub enum EventKind {
     Absent,
 }
 
-/// The quantity that the value of an event measures.
+/// The quantity that the value of an event measures: each has a column of its own in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Measure {
     /// Meters.
@@ -49,7 +49,7 @@ pub(super) enum Measure {
 }
 
 impl Measure {
-    /// Returns its unit.
+    /// Returns its unit; empty for a number.
     pub(super) fn unit(self) -> &'static str {
         match self {
             Self::Distance => "m",
@@ -70,7 +70,7 @@ impl EventKind {
         }
     }
 
-    /// All kinds.
+    /// All kinds; the table of events stores places in this list.
     pub const ALL: [Self; 11] = [
         Self::LossOfSeparation,
         Self::Arrival,
@@ -120,12 +120,12 @@ impl EventKind {
     }
 }
 
-/// One event.
+/// Something that has happened to an airplane in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Event {
     /// Cycle in which it happened.
     pub cycle: Cycle,
-    /// Kind of the event.
+    /// What has happened, and what `value` measures.
     pub kind: EventKind,
     /// The airplane to which it happened.
     pub airplane: EntityId,
@@ -148,12 +148,12 @@ impl Event {
         (self.kind.measure() == Some(measure)).then_some(self.value)
     }
 
-    /// Returns an event of one airplane.
+    /// Returns an event of one airplane, without a value.
     pub fn new(cycle: Cycle, kind: EventKind, airplane: EntityId) -> Self {
         Self { cycle, kind, airplane, other: airplane, value: 0.0, at_m: None }
     }
 
-    /// Returns an event of two airplanes.
+    /// Returns an event of two airplanes without a value; it is recorded for the first of them.
     pub fn new_pair(cycle: Cycle, kind: EventKind, airplane: EntityId, other: EntityId) -> Self {
         Self { other, ..Self::new(cycle, kind, airplane) }
     }

@@ -15,11 +15,11 @@ pub enum ExternalAction {
 }
 
 impl ExternalAction {
-    /// The order to rank the actions.
+    /// Name of the order whose values are the actions by number, the best first.
     pub const RANKING: &'static str = "ranking";
-    /// The order of a turn rate.
+    /// Name of the order whose value is a turn rate in radians per second.
     pub const TURN_RATE: &'static str = "turn_rate_rad_s";
-    /// The order of a velocity.
+    /// Name of the order whose values are a velocity through the air in meters per second, east and north.
     pub const VELOCITY: &'static str = "velocity_m_s";
 
     /// Returns the action of an order by its name; `None` where there is no such order.

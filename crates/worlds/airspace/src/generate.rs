@@ -107,6 +107,7 @@ fn random(params: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplan
             .map(|_| in_disc(params.radius_m, &mut draws))
             .find(|goal| distance_m(start, *goal) >= 0.5 * params.radius_m);
         starts.add(start);
+        // Many draws are far enough, so the point opposite hardly ever has to do.
         airplanes.push(airplane(params, start, vec![goal.unwrap_or([-start[0], -start[1]])]));
     }
     Ok(airplanes)

@@ -205,7 +205,7 @@ impl AirplaneMetrics {
     }
 }
 
-/// Returns the metrics of one airplane.
+/// Returns the metrics of one airplane so far; without an arrival there is no flight time and no delay.
 pub fn airplane_metrics(
     world: &AirspaceWorld,
     state: &AirspaceState,

@@ -19,9 +19,8 @@ const MAX_DT_S: f64 = 1e4;
 /// A non-cooperative airplane as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NonCooperative {
-    /// The airplane.
     pub(crate) slot: Slot,
-    /// Its position.
+    /// Its position as all see it, with the error of the cycle.
     pub(crate) at: Point,
     /// Its velocity through the air, in meters per second.
     pub(crate) velocity_m_s: Point,

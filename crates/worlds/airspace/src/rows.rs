@@ -107,7 +107,7 @@ impl Rows {
         self.record.controls
     }
 
-    /// Starts to keep rows.
+    /// Starts to keep rows of the tables that the scenario asks for; before this call none are kept.
     pub(super) fn start(&mut self, world: &AirspaceWorld) {
         self.flown.start(self.record.trajectories.then(|| trajectories(&callsigns(world))));
         self.events.start(self.record.events.then(|| events(callsigns(world))));

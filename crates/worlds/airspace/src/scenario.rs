@@ -128,22 +128,22 @@ impl Rule for ReplayEnd {
     }
 }
 
-/// A compiled scenario.
+/// A scenario from which runs can start.
 #[derive(Debug, Clone)]
 pub struct CompiledAirspace {
-    /// The immutable world.
+    /// The world, which all runs of the scenario share.
     pub world: Arc<AirspaceWorld>,
     /// Name of the scenario; may be empty.
     pub name: String,
-    /// The random seed.
+    /// The seed in the text, or that of [`Self::reseeded`].
     pub seed: u64,
     /// Largest number of cycles; a run ends when all have arrived.
     pub cycles: u64,
-    /// The effect of another seed.
+    /// Whether another seed would change results.
     pub seeds: SeedEffect,
-    /// The tables to keep.
+    /// The tables that a run keeps, and the interval of its checkpoints.
     pub record: RecordSection,
-    /// Sides of the first fallbacks.
+    /// Sides of the first fallbacks, by id.
     pub fallbacks: Arc<Vec<Side>>,
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,

@@ -40,7 +40,7 @@ pub struct AirspaceState {
     external_actions: Box<[Mutex<Option<ExternalAction>>]>,
     /// The cycle for which controls were submitted, or [`NEVER`].
     controls_cycle: AtomicCell<u64>,
-    /// These controls.
+    /// The controls of that cycle, until their groups take them out.
     controls: Mutex<BTreeMap<EntityId, Control>>,
 }
 
@@ -49,6 +49,7 @@ const NEVER: Cycle = Cycle::MAX;
 
 /// One airplane's share of the state.
 #[derive(Debug, Default)]
+// A cache line each, so that workers of different airplanes do not wait for each other.
 #[repr(align(64))]
 pub struct AirplaneState {
     /// Position east, in meters.
@@ -77,7 +78,7 @@ pub struct AirplaneState {
     pub fallback: AtomicCell<Side>,
 }
 
-/// A pose on an orbit.
+/// A pose on an orbit, in cells, so that workers can store those of their groups at the same time.
 #[derive(Debug, Default)]
 struct OrbitPose {
     x_m: AtomicCell<f64>,
@@ -86,12 +87,12 @@ struct OrbitPose {
 }
 
 impl AirplaneState {
-    /// Returns its pose.
+    /// Returns its pose; in a cycle only the worker of its group changes it.
     pub fn pose(&self) -> Pose2 {
         Pose2 { at: [self.x_m.get(), self.y_m.get()], heading_rad: self.heading_rad.get() }
     }
 
-    /// Sets its pose.
+    /// Stores its pose, whose heading the caller has wrapped.
     pub fn set_pose(&self, pose: Pose2) {
         self.x_m.set(pose.at[0]);
         self.y_m.set(pose.at[1]);
@@ -170,7 +171,7 @@ fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
         .collect()
 }
 
-/// Puts memories back.
+/// Puts back what [`take`] has taken out; nothing where airplanes have no memory.
 fn put<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
     for (&slot, memory) in group.iter().zip(memories) {
         if let Some(one) = all.get(slot as usize) {
@@ -193,7 +194,7 @@ impl AirspaceState {
         math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
     }
 
-    /// Returns the state that a snapshot describes.
+    /// Returns the state that a snapshot describes; what is missing in it is empty.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();
         let max_range_m = (0..n).map(|i| world.interaction_range_m(i, i)).fold(1.0, f64::max);
@@ -341,7 +342,7 @@ impl AirspaceState {
         self.turn_rates_rad_s[slot as usize].set(omega_rad_s);
     }
 
-    /// Returns the state after `cycle` cycles.
+    /// Returns the present state, which is that after `cycle` cycles: the state itself does not count them.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let mut exempt = Vec::new();
         for (a, others) in (0..).zip(&self.exempt) {

@@ -9,7 +9,7 @@ use sidestep_kernel::Cycle;
 use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands, key_value};
 use std::fmt::Write;
 
-/// Returns the contents of a compiled scenario.
+/// Returns what is known of a scenario before it runs.
 pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
     let world = &*compiled.world;
     let shield = if world.shield { "on" } else { "off" };
@@ -116,7 +116,7 @@ fn round_to_tenth(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }
 
-/// Returns the outcome of a run.
+/// Returns the outcome of a run; parts of which there is nothing to say have no line.
 pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
     let mut lines = flights(metrics);
     lines.extend(not_appeared(metrics));

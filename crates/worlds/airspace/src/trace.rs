@@ -15,7 +15,7 @@ use sidestep_kernel::{EntityId, Slot};
 /// Records for an inspection; no run makes any.
 #[derive(Debug, Default)]
 pub(crate) struct InspectionTrace {
-    /// The airplane.
+    /// The airplane that is inspected.
     pub(crate) slot: Slot,
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<KnownAircraft>,
@@ -43,20 +43,24 @@ pub(crate) struct InspectionTrace {
     pub(crate) exchange: NetworkTraffic,
     /// The turn profile that it flies.
     pub(crate) flown: Option<TurnProfile>,
-    /// Its events.
+    /// Events of the cycle in which it has a part.
     pub(crate) events: Vec<Event>,
+}
+
+/// The decisions of a group in a cycle, and what they rest on; `own`, `controls` and `considered` by the place of the
+/// airplane in the group.
+pub(crate) struct GroupDecisions<'a> {
+    pub(crate) own: &'a [OwnshipState],
+    pub(crate) non_cooperative: &'a [NonCooperative],
+    /// `None` for an airplane whose pilot has not decided in time.
+    pub(crate) controls: &'a [Option<Control>],
+    pub(crate) considered: &'a [ManeuverCandidates],
 }
 
 impl InspectionTrace {
     /// Records the knowledge, the considerations and the decisions of a group.
-    pub(crate) fn record_decisions(
-        &mut self,
-        world: &AirspaceWorld,
-        own: &[OwnshipState],
-        non_cooperative: &[NonCooperative],
-        controls: &[Option<Control>],
-        considered: &[ManeuverCandidates],
-    ) {
+    pub(crate) fn record_decisions(&mut self, world: &AirspaceWorld, decided: &GroupDecisions<'_>) {
+        let &GroupDecisions { own, non_cooperative, controls, considered } = decided;
         let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(OwnshipState::known_aircraft).collect();
         self.non_cooperative = non_cooperative.to_vec();
@@ -89,7 +93,7 @@ impl InspectionTrace {
         }
     }
 
-    /// Returns its place in a group.
+    /// Returns its place in a group; `None` in one of others.
     fn place(&self, mut group: impl Iterator<Item = Slot>) -> Option<usize> {
         group.position(|slot| slot == self.slot)
     }

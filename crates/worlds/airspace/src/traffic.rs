@@ -372,6 +372,7 @@ fn banked_turn_deg_s(v_m_s: f64) -> f64 {
 
 fn header_text(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String {
     let Zone { gap_m, vertical_m } = zone;
+    // Airliners fly seven times as fast as the paper's airplanes and turn more slowly, so all times are longer.
     let horizon_s = horizon_s.unwrap_or(300.0);
     // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
     let name = toml::Value::from(name);

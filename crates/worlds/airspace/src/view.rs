@@ -45,7 +45,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     }
 }
 
-/// Returns the call signs.
+/// Returns the call signs as names of bodies; an airplane without one has no name.
 fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
     (0..)
         .zip(world.airplanes.iter())

@@ -6,7 +6,7 @@ mod tests;
 
 use super::flight::{
     Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
-    SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
+    RoutePosition, SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperative;
@@ -25,13 +25,13 @@ use std::sync::Arc;
 pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Arc<Vec<Airplane>>,
-    /// The steps of time.
+    /// Lengths of a cycle, of the steps in it, and of the horizon.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The objective that is minimized.
     pub objective: Objective,
-    /// Settings of the optimizer.
+    /// Settings of the optimizer, which only method `pc` has.
     pub settings: OptimizerConfig,
     /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
@@ -39,9 +39,9 @@ pub struct AirspaceWorld {
     pub legs: Legs,
     /// The method by which airplanes choose their actions.
     pub method: MethodKind,
-    /// Settings of MVP.
+    /// Settings of MVP; without effect on other methods.
     pub mvp: ReactiveSettings,
-    /// Settings of ORCA.
+    /// Settings of ORCA; without effect on other methods.
     pub orca: ReactiveSettings,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
@@ -315,7 +315,8 @@ impl AirspaceWorld {
     ) -> ActionPredictions {
         let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.actions(known.slot);
-        let predictions = self.air().predictions(model, actions, mission, known.pose, known.next);
+        let route = RoutePosition { mission, next: known.next, pose: known.pose };
+        let predictions = self.air().predictions(model, actions, route);
         ActionPredictions::new(predictions, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
     }

@@ -24,7 +24,7 @@ use sidestep_kernel::{
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
-/// A run of an airspace.
+/// A run of an airspace, which is a [`Fleet`](crate::Fleet) as well.
 pub type AirspaceRun = Run<AirspaceWorld>;
 
 /// Returns a run of a scenario at its start.

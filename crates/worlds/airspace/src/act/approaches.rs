@@ -26,6 +26,7 @@ pub(super) fn record_distances(
     let max_m = max_recorded_m(world, flights);
     for (k, &(x_m, i)) in by_x.iter().enumerate() {
         for &(_, j) in by_x[k + 1..].iter().take_while(|(other_m, _)| other_m - x_m <= max_m) {
+            // Flights are sorted by id, and so are the two of a pair.
             let a = &flights[i.min(j)];
             let b = &flights[i.max(j)];
             if is_recorded(world, a, b) {
@@ -43,6 +44,7 @@ fn record_pair(
     moment: SubStep,
     scratch: &mut Scratch,
 ) {
+    // The two were never on one level.
     if record.nearest_m.is_infinite() {
         return;
     }

@@ -34,6 +34,7 @@ fn error_ratio(context: &PhaseContext<'_>, slot: Slot) -> f64 {
     let Pose2 { at, heading_rad } = state.orbit_pose(slot);
     let heading_error_rad = wrap_angle(pose.heading_rad - heading_rad).abs();
     let max_deviation_m = world.bounds.max_deviation_m(v_m_s, world.timing.dt_s);
+    // The bounds on which the argument in `shield/errors.rs` rests.
     let errors_and_bounds = [
         (distance_m(observed_pose(world, slot, now, pose).at, pose.at), world.bounds.position_m),
         (distance_m(pose.at, at), max_deviation_m),

@@ -31,15 +31,15 @@ pub(super) struct AircraftMotion<'a> {
     pub(super) legs: Vec<Leg>,
     /// Legs flown in this `dt`, with times after the start of the run.
     pub(super) flown: Vec<Leg>,
-    /// End of its flight, if it has ended.
+    /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
     pub(super) end: Option<End>,
 }
 
-/// The path of an airplane.
+/// The path of an airplane, decided for this `dt` or recorded.
 pub(super) enum FlownPath<'a> {
     /// The turn rates that were decided, and the segment of the flight.
     Profile(TurnProfile, FlightSegment<'a>),
-    /// A recorded track.
+    /// A recorded track, flown as it is.
     Track(&'a Track),
 }
 
@@ -78,6 +78,7 @@ impl<'a> AircraftMotion<'a> {
                 let omega = profile.omegas_rad_s[moment.k];
                 let whole = Leg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
                 let to_climb_m = segment.altitude_m - self.altitude_m;
+                // A level that is reached within the step splits it into two legs.
                 let climbs_s = if segment.climb_m_s > 0.0 && to_climb_m != 0.0 {
                     to_climb_m.abs() / segment.climb_m_s
                 } else {
@@ -115,6 +116,7 @@ impl<'a> AircraftMotion<'a> {
             FlownPath::Profile(_, segment) => {
                 Levels::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
             }
+            // Within a step a track may leave the levels of its ends.
             FlownPath::Track(_) => Levels::ALL,
         }
     }

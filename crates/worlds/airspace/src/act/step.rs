@@ -30,6 +30,7 @@ pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<Aircraft
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             flight.start_step(world.wind_m_s, moment, world.timing.dtau_s);
         }
+        // Distances are those during the step: the legs of all are known, and nobody has flown yet.
         approaches::record_distances(world, &flights, moment, context.scratch);
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             fly(world, flight, moment);

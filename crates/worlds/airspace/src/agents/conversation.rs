@@ -10,19 +10,19 @@ use std::sync::Arc;
 /// The identity, participants and times of a conversation.
 #[derive(Debug, Clone)]
 pub struct ConversationInfo {
-    /// The conversation.
+    /// Cycle, subject and members, by which packets find their conversation.
     pub id: ConversationId,
     /// Ids of all participants, rising.
     pub members: Arc<[EntityId]>,
-    /// Id of the airplane itself.
+    /// Id of the airplane that takes part, one of `members`.
     pub me: EntityId,
     /// Digest of scenario and build.
     pub fingerprint: u64,
-    /// The tick in which it starts.
+    /// The tick in which it starts for this airplane; others may be earlier or later.
     pub start_tick: u64,
-    /// The tick in which it ends at the latest.
+    /// The tick in which it ends for this airplane at the latest.
     pub end_tick: u64,
-    /// Whether the radio is dead.
+    /// Whether the radio is dead: nothing that the participant says is sent.
     pub is_silent: bool,
 }
 
@@ -53,12 +53,12 @@ impl<P: Participant + ?Sized> Conversation<P> {
         self.participant.progress()
     }
 
-    /// Returns the count of its packets so far.
+    /// Returns the counts of the packets sent by this airplane so far.
     pub fn traffic(&self) -> NetworkTraffic {
         self.traffic
     }
 
-    /// Starts it.
+    /// Starts it, and adds the first packets to `out`.
     pub fn start(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
         self.participant.start(tick);
         self.send(out);

@@ -118,7 +118,7 @@ impl ExchangeMember {
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExchangeResult {
-    /// Decision of the shield for the airplane.
+    /// What it flies: its plan if all that were asked have agreed, or else its fallback.
     pub decision: ShieldDecision,
     /// Whether it would have flown another plan if all had agreed.
     pub held_back: bool,
@@ -305,7 +305,7 @@ impl ExchangeAgent {
             .collect()
     }
 
-    /// Computes its plan, and sends it.
+    /// Computes its plan, finds the members whose consent that needs, and returns it as a message.
     fn send_plan(&mut self) -> ExchangeMessage {
         let decision = self.filter_plans();
         self.decision = Some(decision);
@@ -422,7 +422,7 @@ impl ExchangeAgent {
         contacts
     }
 
-    /// Returns the orbit at the end of a plan.
+    /// Returns the orbit at the end of a plan, where the wind has carried it: plans are made in still air.
     fn orbit_state(&self, plan: &SafeManeuver) -> OrbitState {
         let [wx, wy] = self.setup.air.wind_m_s.map(|w| w * self.setup.air.timing.dt_s);
         let mut pose = plan.end();
@@ -452,6 +452,7 @@ impl link::Agent for ExchangeAgent {
     }
 
     fn limits(&self) -> MessageLimits {
+        // A proposal, a plan, and a list of those accepted.
         MessageLimits { bytes: self.setup.max_message_bytes(), messages: 3 }
     }
 
@@ -493,6 +494,7 @@ impl link::Agent for ExchangeAgent {
 
     fn wait_fraction(&self) -> f64 {
         match self.phase() {
+            // Each phase leaves time for those after it. Proposals are the largest messages and get the largest part.
             ExchangePhase::Proposals => 0.5,
             ExchangePhase::Plans => 0.75,
             // Some time is left for an orderly end.

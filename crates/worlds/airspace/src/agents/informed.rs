@@ -32,7 +32,7 @@ pub enum InformedMessage {
         next: u32,
         /// Way-points that it is to reach.
         mission: Vec<Point>,
-        /// Number of the airplane.
+        /// Id of the airplane, which must be the sender's.
         airplane: u32,
         /// Number of its orders that are carried out.
         orders: u32,
@@ -45,7 +45,7 @@ pub enum InformedMessage {
         round: u32,
         /// Largest move of the probabilities.
         change: f64,
-        /// Numbers of actions.
+        /// Numbers of the drawn actions, one for each sample.
         samples: Vec<u16>,
     },
     /// The sender's distribution after a round, and how far it has moved in it.
@@ -112,7 +112,7 @@ impl InformedMember {
     }
 }
 
-/// One agent.
+/// An agent that keeps the options of all members, and so knows what any joint choice costs.
 #[derive(Debug)]
 pub struct InformedAgent {
     own: Ownship,
@@ -281,6 +281,7 @@ impl InformedAgent {
         let me = self.own.me;
         let round = self.round;
         let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
+        // Before the first round nothing can have settled.
         let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
         self.members[me].samples.insert(round, samples.clone());
         InformedMessage::Samples {
@@ -334,6 +335,7 @@ impl Optimizer for InformedAgent {
             Estimator::Sampled { block, .. } => block,
         };
         let predictions = if self.by_model { 0 } else { actions };
+        // A probability takes 8 bytes, and the number of an action at most 3.
         let bytes = common.max_message_bytes(predictions) + 8 * actions + 3 * block;
         // Its predictions or its model, and a message for each round.
         MessageLimits { bytes, messages: rounds.saturating_add(2) }

@@ -29,15 +29,15 @@ pub struct IntentInput {
     pub me: usize,
     /// Its own message.
     pub own: Intent,
-    /// The flights of the group as filed.
+    /// The flights of the group as filed, by place: bounds on what its messages may say.
     pub filed: Arc<[FiledFlight]>,
-    /// Number of all airplanes.
+    /// Number of all airplanes of the world, which ids in messages are below.
     pub airplanes: usize,
     /// Whether each of the group was heard lately, or is met for the first time.
     pub expected: Vec<bool>,
 }
 
-/// One agent.
+/// An agent that is done when all others were heard or given up.
 #[derive(Debug)]
 pub struct IntentAgent {
     start: IntentInput,
@@ -73,6 +73,7 @@ impl link::Agent for IntentAgent {
     }
 
     fn limits(&self) -> MessageLimits {
+        // An id takes at most 5 bytes.
         MessageLimits { bytes: 64 + 5 * self.start.airplanes, messages: 1 }
     }
 

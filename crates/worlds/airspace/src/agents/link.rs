@@ -22,9 +22,9 @@ use std::sync::Arc;
 /// An agent as a state machine: messages in, messages to all others out. Others are known by their
 /// place in the group.
 pub trait Agent {
-    /// Type of the messages that it sends and receives.
+    /// What agents say to each other.
     type Message: Serialize + DeserializeOwned;
-    /// Type of its outcome.
+    /// What it comes to, e.g. the group that it has found.
     type Outcome;
 
     /// Returns its messages before it has heard anything.
@@ -79,13 +79,13 @@ pub trait Agent {
 /// Bounds on the messages that an agent may be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MessageLimits {
-    /// Largest number of bytes of a message.
+    /// Largest number of bytes of a message; a longer one is dropped unread.
     pub bytes: usize,
     /// Largest number of messages of one agent in a conversation.
     pub messages: u32,
 }
 
-/// A message on the wire.
+/// A message between endpoints: what an agent says, or a question about that and its answer.
 #[derive(Debug, Serialize, Deserialize)]
 enum WireMessage<M> {
     /// A message, with its number among the sender's.
@@ -151,7 +151,7 @@ struct PeerState {
 }
 
 impl PeerState {
-    /// Returns whether a number is new.
+    /// Records the number of a message that has come. Returns whether it has not come before.
     fn accept(&mut self, number: u32) -> bool {
         let is_new = number >= self.next && self.early.insert(number);
         while self.early.remove(&self.next) {
@@ -185,7 +185,6 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Sends a message to one other.
     fn send_to(&mut self, to: usize, message: PacketBuffer) {
         self.send(Some(self.config.group[to]), message);
     }
@@ -195,7 +194,7 @@ impl<A: Agent> Endpoint<A> {
         self.out.push(OutgoingMessage { to, message });
     }
 
-    /// Sends messages to all others.
+    /// Numbers messages of the agent, and sends them to all others.
     fn broadcast(&mut self, messages: Vec<A::Message>) {
         for message in messages {
             let message = PacketBuffer::from_message(&WireMessage::Said(self.count, message));
@@ -207,7 +206,7 @@ impl<A: Agent> Endpoint<A> {
         }
     }
 
-    /// Reads a message of another one.
+    /// Reads a message of another one, and checks it so that nothing has changed when it is refused.
     fn read(&self, from: usize, bytes: &[u8]) -> Result<WireMessage<A::Message>, InvalidMessage> {
         let (message, rest) = postcard::take_from_bytes::<WireMessage<A::Message>>(bytes)
             .map_err(|_| InvalidMessage::Form)?;
@@ -260,6 +259,7 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     fn start(&mut self, tick: u64) {
         self.start_tick = tick;
         self.retry.restart(tick);
+        // Also with a dead radio, because the agent decides alone then. Its messages are dropped in the conversation.
         let first = self.agent.start();
         self.broadcast(first);
         if self.config.is_silent {
@@ -278,6 +278,7 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         let message = self.read(place, bytes)?;
         self.others[place].unanswered = 0;
         self.others[place].is_there = true;
+        // The header was cut off on receipt; a message that is sent already counts it.
         self.retry.record_packet(HEADER_BYTES + bytes.len());
         match message {
             WireMessage::Said(number, content) if self.others[place].accept(number) => {

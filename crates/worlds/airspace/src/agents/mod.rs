@@ -46,7 +46,7 @@ use traffic_state::StateBeacon;
 /// Outcome of the optimization for an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionChoice {
-    /// Number of the chosen action.
+    /// The chosen action, by its number among those of the airplane.
     pub chosen: usize,
     /// The estimate of every action at the end.
     pub expected: Vec<f64>,
@@ -60,7 +60,7 @@ pub struct ActionChoice {
     pub chances: Vec<f64>,
 }
 
-/// Outcome of an agent.
+/// Outcome of an agent that optimizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptimizationResult {
     /// The decision; none if time was up before the agent had learned anything.

@@ -18,7 +18,7 @@ pub struct NetworkTraffic {
 }
 
 impl NetworkTraffic {
-    /// Adds the counts of other traffic.
+    /// Adds the counts of a conversation at another time, so that ticks add up, too.
     pub fn add(&mut self, other: Self) {
         self.messages += other.messages;
         self.multicasts += other.multicasts;

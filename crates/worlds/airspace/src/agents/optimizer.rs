@@ -20,16 +20,14 @@ pub(crate) enum OptimizerStep<M> {
 
 /// An algorithm of one airplane in a group. Others are known by their place.
 pub(crate) trait Optimizer {
-    /// Type of the messages that it sends and receives.
     type Message: Serialize + DeserializeOwned;
 
-    /// Returns the knowledge of its own airplane.
     fn ownship(&self) -> &Ownship;
 
     /// Returns the number of rounds made.
     fn round(&self) -> u32;
 
-    /// Returns its first message.
+    /// Returns the message with which it starts, before it has heard anything.
     fn first_message(&mut self) -> Self::Message;
 
     /// Checks a message of the airplane at a place, see [`link::Agent::check`].
@@ -60,7 +58,7 @@ pub(crate) trait Optimizer {
     fn take_beacons(&mut self) -> Vec<Option<StateBeacon>>;
 }
 
-/// An agent that optimizes.
+/// An agent around an optimizer, which takes a step whenever no message is missing.
 #[derive(Debug)]
 pub(crate) struct OptimizingAgent<O> {
     optimizer: O,

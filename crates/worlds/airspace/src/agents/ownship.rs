@@ -3,7 +3,7 @@
 use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{StateBeacon, TrafficPicture, TrafficState};
-use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction};
+use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction, RoutePosition};
 use crate::non_cooperative::NonCooperative;
 use crate::objective::{ActionPredictions, Objective};
 use crate::purpose;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// The knowledge that all agents of a group share before their conversations.
 #[derive(Debug, Clone)]
 pub struct CommonKnowledge {
-    /// The present cycle.
+    /// The cycle in which they decide.
     pub now: Cycle,
     /// Ids of the group, rising.
     pub ids: Arc<[EntityId]>,
@@ -27,7 +27,7 @@ pub struct CommonKnowledge {
     pub air: Air,
     /// The objective that is minimized.
     pub objective: Objective,
-    /// Settings of the optimizer.
+    /// Settings of the optimizer, from the scenario.
     pub settings: OptimizerConfig,
     /// The random streams from which samples are drawn.
     pub streams: Streams,
@@ -37,7 +37,7 @@ pub struct CommonKnowledge {
     pub is_shielded: bool,
 }
 
-/// A flight as it was filed.
+/// A flight as it was filed: what all others know of it without a message.
 #[derive(Debug, Clone)]
 pub struct FiledFlight {
     /// Abilities of the airplane.
@@ -70,7 +70,8 @@ impl CommonKnowledge {
             separation_m: beacon.separation_m,
             ..model.clone()
         };
-        let predictions = self.air.predictions(&model, actions, mission, beacon.pose, next);
+        let route = RoutePosition { mission, next, pose: beacon.pose };
+        let predictions = self.air.predictions(&model, actions, route);
         ActionPredictions::new(predictions, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
     }

@@ -33,7 +33,7 @@ pub trait Participant: Send {
     /// Returns whether it has come to its outcome.
     fn is_done(&self) -> bool;
 
-    /// Takes out the messages that it has to send.
+    /// Takes out the messages that it has to send, each once.
     fn take_messages(&mut self) -> Vec<OutgoingMessage>;
 
     /// Returns the largest number of bytes that a message to it may have.
@@ -45,7 +45,7 @@ pub trait Participant: Send {
     }
 }
 
-/// The progress of a participant of a conversation.
+/// How far a participant has come; nothing depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Progress {
     /// Number of rounds made; 0 in a conversation without rounds.
@@ -54,19 +54,19 @@ pub struct Progress {
     pub epoch: u32,
 }
 
-/// A participant that has an outcome.
+/// A participant that has not ended; once it has, it only answers others.
 pub trait WithOutcome: Participant {
-    /// Type of the outcome.
+    /// What it finds, chooses or agrees on.
     type Outcome;
 
     /// Returns the end of the conversation for it; one that is not done ends because time is up.
     fn finish(&mut self) -> ConversationEnd<Self::Outcome>;
 }
 
-/// The end of a conversation for one agent.
+/// How a conversation has ended for one agent; for others it may have ended otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConversationEnd<O> {
-    /// Its outcome, if it has one.
+    /// Its outcome; `None` if time was up before there was any.
     pub outcome: Option<O>,
     /// The others, by place, that it has not heard in spite of asking.
     pub unheard: Vec<usize>,
@@ -79,7 +79,7 @@ pub struct ConversationEnd<O> {
 pub struct OutgoingMessage {
     /// The receiver; `None` for all others of the conversation.
     pub to: Option<EntityId>,
-    /// The message.
+    /// The message, with room for the header of its packet.
     pub message: PacketBuffer,
 }
 

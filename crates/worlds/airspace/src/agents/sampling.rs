@@ -73,7 +73,7 @@ impl SamplingMember {
     }
 }
 
-/// One agent.
+/// An agent that knows of others only what they send in each round.
 #[derive(Debug)]
 pub struct SamplingAgent {
     own: Ownship,

@@ -44,7 +44,7 @@ pub struct OrbitState {
 /// One airplane's knowledge of another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrafficState {
-    /// Cycle in which the other was last heard.
+    /// Cycle in which the other was last heard; that of its appearance if it never was.
     pub heard_in: Cycle,
     /// Its message in that cycle.
     pub beacon: StateBeacon,
@@ -69,7 +69,7 @@ pub struct PlanEnd {
 pub type TrafficPicture = BTreeMap<EntityId, TrafficState>;
 
 impl OrbitState {
-    /// Returns its pose at the start of cycle `now`.
+    /// Returns its pose at the start of cycle `now`, carried by the wind since `as_of`.
     fn pose(&self, air: &Air, beacon: &StateBeacon, now: Cycle) -> Pose2 {
         let elapsed_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;

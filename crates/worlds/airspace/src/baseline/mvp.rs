@@ -156,6 +156,7 @@ fn velocity_change(
 ) -> Point {
     let zone_m = own.zone_m(other, settings) * RESOLUTION_FACTOR;
     let apart = sub(other.at, own.at);
+    // Two in one place have no line of sight, but its direction must be a number.
     let distance_m = length(apart).max(1e-9);
     let mut at = closest.at;
     let mut miss_m = length(at);
@@ -169,6 +170,7 @@ fn velocity_change(
         let angle_rad = math::asin(zone_m / distance_m) - math::asin(miss_m / distance_m);
         reach_m /= math::cos(angle_rad);
     }
+    // At the closest point itself no finite change would do, so it is as if a moment were left.
     let size = (reach_m - miss_m) / (closest.in_s.abs().max(1e-6) * miss_m);
     [at[0] * size, at[1] * size]
 }

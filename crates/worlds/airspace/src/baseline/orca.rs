@@ -14,7 +14,8 @@ use crate::settings::ReactiveSettings;
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
-/// Number of headings among which an airplane chooses, evenly spaced from the preferred one on.
+/// Number of headings among which an airplane chooses, evenly spaced from the preferred one on: 4 degrees apart, as
+/// far as the paper's airplane turns in a step, so that it could not fly finer ones.
 const HEADINGS: u32 = 90;
 /// Weight in meters per second of a turn by one radian, beside violations: of headings that are
 /// equally bad, the nearest one is flown.

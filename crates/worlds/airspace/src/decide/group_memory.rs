@@ -30,7 +30,7 @@ pub(crate) fn max_group_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) ->
     }
 }
 
-/// Returns the bytes of the predictions of all actions of a group.
+/// Returns the bytes of one copy of the predictions of all actions of a group.
 fn prediction_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
     let count: u64 = group.iter().map(|known| world.actions(known.slot).len() as u64).sum();
     count * world.timing.horizon as u64 * size_of::<Point>() as u64

@@ -283,7 +283,7 @@ const UNBOUNDED: SpaceKind = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64
 const POSITIVE: SpaceKind = SpaceKind::Real { low: 0.0, high: f64::INFINITY };
 const ANGLE: SpaceKind = SpaceKind::Real { low: -PI, high: PI };
 
-/// Returns the spaces of the neighbors in observations.
+/// Returns the spaces of the neighbors in observations, in the order in which [`Observation::write`] fills them.
 fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
     let ids = SpaceKind::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
     let each = |name: &str, bounds: SpaceKind, meaning: &str| {

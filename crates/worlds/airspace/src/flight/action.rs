@@ -96,7 +96,7 @@ impl Legs {
         Self { turns_s: vec![5.0, 10.0, 15.0], until_s: vec![60.0] }
     }
 
-    /// Returns whether there are no legs.
+    /// Returns whether there are no legs: each takes a time of either list.
     pub fn is_empty(&self) -> bool {
         self.turns_s.is_empty() || self.until_s.is_empty()
     }

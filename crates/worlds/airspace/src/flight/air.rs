@@ -15,12 +15,23 @@ const ALIGNED_RAD: f64 = 1e-10;
 /// The air: everything that is the same for all airplanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
-    /// The steps of time.
+    /// Lengths of a cycle, of the steps in it, and of the horizon.
     pub timing: Timing,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
+}
+
+/// An airplane's position on its route.
+#[derive(Debug, Clone, Copy)]
+pub struct RoutePosition<'a> {
+    /// All way-points of the route, also those behind it.
+    pub mission: &'a [Point],
+    /// Number of way-points done with, which is the index of the one that it flies to.
+    pub next: usize,
+    /// The pose from which it flies there.
+    pub pose: Pose2,
 }
 
 impl Air {
@@ -55,9 +66,11 @@ impl Air {
         let [wx, wy] = self.wind_m_s;
         let dx = goal[0] - at[0];
         let dy = goal[1] - at[1];
+        // At the goal any direction will do, but it must be a number.
         let length_m = math::hypot(dx, dy).max(1e-9);
         let ux = dx / length_m;
         let uy = dy / length_m;
+        // No scenario has a wind as fast as its airplanes, but a speed that came in a message may be lower.
         let crosswind_m_s = (wx * uy - wy * ux).clamp(-v_m_s, v_m_s);
         let along_m_s = (v_m_s * v_m_s - crosswind_m_s * crosswind_m_s).sqrt();
         // The velocity through the air: along the course, and against the crosswind.
@@ -86,7 +99,7 @@ impl Air {
         ((distance_m(pose.at, goal) - near_m) / step_m) as usize
     }
 
-    /// Returns a pose after some steps straight on.
+    /// Returns a pose after some steps straight on, carried along by the wind: all at once.
     pub fn after_straight_steps(&self, pose: Pose2, v_m_s: f64, steps: usize) -> Pose2 {
         let flown_s = steps as f64 * self.timing.dtau_s;
         let [wx, wy] = self.wind_m_s;
@@ -95,14 +108,14 @@ impl Air {
         Pose2 { at: [pose.at[0] + vx * flown_s, pose.at[1] + vy * flown_s], ..pose }
     }
 
-    /// Returns a pose after the wind has blown for one step.
+    /// Returns a pose moved by the wind of one step, which [`Pose2::step`] leaves out.
     pub fn after_wind_step(&self, pose: Pose2) -> Pose2 {
         let dtau_s = self.timing.dtau_s;
         let at = [pose.at[0] + self.wind_m_s[0] * dtau_s, pose.at[1] + self.wind_m_s[1] * dtau_s];
         Pose2 { at, ..pose }
     }
 
-    /// Returns where each action leads an airplane that flies to way-point `next`.
+    /// Returns where each action leads an airplane that is at a point of its route.
     ///
     /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
     /// be when the airplane, flying straight, reaches it.
@@ -110,10 +123,9 @@ impl Air {
         &self,
         model: &Model,
         actions: &[Action],
-        mission: &[Point],
-        pose: Pose2,
-        next: usize,
+        route: RoutePosition<'_>,
     ) -> Vec<Prediction> {
+        let RoutePosition { mission, next, pose } = route;
         interrupt::check();
         let mission = self.mission_in_air(mission, pose.at, next, model.v_m_s);
         let autopilot = self.autopilot(model, &mission);

@@ -8,13 +8,13 @@ use sidestep_kernel::Slot;
 /// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Airplane {
-    /// Its call sign, if it has one.
+    /// Its call sign; `None` where only its id identifies it.
     pub callsign: Option<String>,
-    /// Its abilities.
+    /// Its abilities, with the speed that it has until an order changes it.
     pub model: Model,
-    /// Its first pose.
+    /// The pose in which it appears.
     pub start: Pose2,
-    /// Way-points that it is to reach.
+    /// Way-points in the order in which it has to reach them.
     pub mission: Vec<Point>,
     /// Altitude in meters of the level on which the method takes it over.
     pub altitude_m: f64,
@@ -51,9 +51,9 @@ impl Airplane {
 /// An airplane of a group, as the group knows it.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownAircraft {
-    /// Slot of the airplane.
+    /// Slot of the airplane, which is its id.
     pub slot: Slot,
-    /// Its assumed pose.
+    /// Its pose as all see it, with the error of the cycle.
     pub pose: Pose2,
     /// Number of way-points done with.
     pub next: usize,

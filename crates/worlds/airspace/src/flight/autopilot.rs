@@ -134,6 +134,7 @@ impl PredictionState {
         let [c, s] = self.along;
         let ahead = dx * c + dy * s;
         let across = dy * c - dx * s;
+        // Over a horizon of a million meters, 1e-12 rad is a micrometer.
         ahead > 0.0 && across.abs() <= 1e-12 * ahead
     }
 
@@ -163,9 +164,9 @@ impl PredictionState {
 /// Flies step by step: an action, the way-points, and the flight after the last.
 #[derive(Debug, Clone, Copy)]
 pub struct Autopilot<'a> {
-    /// The airplane's model.
+    /// Gives the airspeed and the largest turn rate.
     pub model: &'a Model,
-    /// Way-points of the airplane.
+    /// All way-points; methods are given the index of the next one.
     pub mission: &'a [Point],
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
@@ -212,6 +213,7 @@ impl Autopilot<'_> {
         let mut points = Vec::with_capacity(timing.horizon);
         let mut flight = PredictionState::new(pose);
         let mut next = next;
+        // If it does not arrive within the horizon, all points count.
         let mut counted = timing.horizon;
         for k in 0..timing.horizon {
             let flown_s = k as f64 * self.dtau_s;
@@ -223,6 +225,7 @@ impl Autopilot<'_> {
                 let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
                 flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
             } else if goal.is_some_and(|&g| flight.is_heading_for(g)) {
+                // Most steps are such, and straight on needs no arctangent.
                 flight.step(self.model.v_m_s, 0.0, self.dtau_s);
             } else {
                 let omega = self.omega_rad_s(action, flight.pose, next, flown_s);

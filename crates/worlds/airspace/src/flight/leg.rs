@@ -21,7 +21,8 @@ const HEADING_TOLERANCE_RAD: f64 = 1e-9;
 /// Length in seconds below which an interval is no longer halved: at 1000 m/s no distance changes by more than 0.2 mm
 /// in it.
 const MIN_INTERVAL_S: f64 = 1e-7;
-/// Length in seconds below which an interval may be given up because the distance hardly varies in it.
+/// Length in seconds below which an interval may be given up because the distance hardly varies in it: the time of a
+/// loss is no less exact than that, even if the distance is just at the separation.
 const MAX_FLAT_INTERVAL_S: f64 = 0.05;
 /// Meters by which the distance may vary in such an interval.
 const FLAT_TOLERANCE_M: f64 = 1e-7;

@@ -12,15 +12,15 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Every level.
+    /// Every level: for an airplane whose altitude is not bounded, as on a recorded track.
     pub const ALL: Self = Self { low_m: f64::NEG_INFINITY, high_m: f64::INFINITY };
 
-    /// Returns one level.
+    /// Returns the range of an airplane that keeps its level.
     pub fn at(altitude_m: f64) -> Self {
         Self { low_m: altitude_m, high_m: altitude_m }
     }
 
-    /// Returns two levels and all between.
+    /// Returns the range of a change from one level to another, up or down.
     pub fn between(a_m: f64, b_m: f64) -> Self {
         Self { low_m: a_m.min(b_m), high_m: a_m.max(b_m) }
     }

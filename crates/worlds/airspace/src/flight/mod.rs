@@ -20,7 +20,7 @@ mod segment;
 mod track;
 
 pub use action::{Action, Legs, actions};
-pub use air::Air;
+pub use air::{Air, RoutePosition};
 pub use airplane::{Airplane, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 pub use leg::{Approach, Leg, Zone, is_separation_lost};

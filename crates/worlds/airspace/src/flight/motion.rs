@@ -77,7 +77,7 @@ pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
 }
 
-/// The steps of time.
+/// The times in which airplanes decide, fly a step, and look ahead.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Seconds between two optimizations.

@@ -15,11 +15,11 @@ pub const MAX_ORDERS: usize = 10_000;
 pub struct FlightOrder {
     /// Time at which it is given, in seconds after the start of the run.
     pub at_s: f64,
-    /// The task.
+    /// What changes then; all else of the flight stays.
     pub task: FlightTask,
 }
 
-/// A task for an airplane.
+/// What an order changes in a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FlightTask {
     /// Keep a heading, radians counterclockwise from east, until sent to a way-point again.

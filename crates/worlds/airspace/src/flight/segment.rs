@@ -22,7 +22,7 @@ pub(crate) struct FlightSegment<'a> {
     pub(crate) climb_m_s: f64,
 }
 
-/// The part of a flight from an order on.
+/// The part of a flight from an order on, in which this order and all before it hold.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentAfterOrder {
     model: Model,

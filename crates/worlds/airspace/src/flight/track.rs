@@ -151,6 +151,7 @@ impl TrackPoint {
     /// Returns whether its numbers can be computed with; comparisons with NaN are false.
     fn is_valid(&self) -> bool {
         let [x_m, y_m] = self.at;
+        // The bound on all places and times of a scenario.
         [self.t_s, x_m, y_m, self.altitude_m].iter().all(|value| value.abs() <= 1e9)
     }
 }

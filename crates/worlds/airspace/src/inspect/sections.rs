@@ -14,7 +14,7 @@ use sidestep_kernel::view::{
 
 /// Points of a predicted path that are drawn, at most, in addition to those of the next `dt`.
 const MAX_POINTS: usize = 32;
-/// Weight of predicted paths without a known probability.
+/// Weight of predicted paths without a known probability: faint, and visible.
 const UNKNOWN_WEIGHT: f64 = 0.2;
 
 impl Inspector<'_> {
@@ -151,7 +151,7 @@ impl Inspector<'_> {
         self.line(&points)
     }
 
-    /// Adds the messages of its group.
+    /// Adds the messages of its group; an airplane that is alone in one has sent none.
     pub(super) fn add_messages(&self, inspection: &mut Inspection) {
         if self.trace.group.len() < 2 {
             return;
@@ -169,7 +169,7 @@ impl Inspector<'_> {
         );
     }
 
-    /// Adds the outcome.
+    /// Adds the airplane after the cycle, and the events in which it had a part.
     pub(super) fn add_outcome(&self, inspection: &mut Inspection) {
         let current = &self.after.airplanes[self.id as usize];
         let profile = &self.trace.flown;

@@ -56,7 +56,7 @@ pub(super) fn ownship(
     }
 }
 
-/// Returns a flight as it was filed.
+/// Returns what all know of a flight before the run.
 pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
     let orders = world.airplanes[id as usize].orders.len();
     let max_way_points =
@@ -163,8 +163,10 @@ fn other_aircraft(
         error_m: world.error_m(one.id as usize),
         levels: Levels::between(one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
+        // The side of one that flies a profile is not visible; the exchange tries both.
         fallback: one.orbit.unwrap_or(Side::Left),
         exempt: exempt.into(),
+        // Ranks are known from proposals only.
         rank: 0,
     }
 }

@@ -13,11 +13,11 @@ use sidestep_kernel::{Cycle, EntityId};
 /// The motion of an airplane in a cycle, and everything else that its run keeps of the decision: one message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Control {
-    /// The airplane.
+    /// Id of the airplane that flies.
     pub id: EntityId,
     /// The cycle in which it flies so.
     pub cycle: Cycle,
-    /// Its maneuver.
+    /// What it flies in the cycle.
     pub maneuver: Maneuver,
     /// Outcome of the optimization; none where there was nothing to optimize.
     pub optimized: Option<OptimizerStats>,
@@ -29,7 +29,7 @@ pub struct Control {
     pub shielding: NetworkTraffic,
     /// Others that it no longer hears, deadlines missed, and the like.
     pub events: Vec<Event>,
-    /// Its memory.
+    /// What it remembers in the next cycle.
     pub memory: Memory,
 }
 
@@ -54,7 +54,7 @@ pub enum Maneuver {
 pub struct OptimizerStats {
     /// Whether a decision has reached it.
     pub is_decided: bool,
-    /// Number of rounds.
+    /// Number of rounds; 0 if no decision has reached it.
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
@@ -110,7 +110,7 @@ impl OptimizerStats {
 }
 
 impl Control {
-    /// Returns a control by which an airplane stays on its orbit.
+    /// Returns a control by which an airplane stays on its orbit: what it flies unless something else is decided.
     pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: Memory) -> Self {
         Self {
             id,

@@ -19,13 +19,13 @@ use sidestep_collectives::Estimator;
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
-/// The outcome of a conversation.
+/// The outcome of a conversation of any subject.
 pub(super) enum ConversationOutcome {
     /// The airplanes that decide together.
     Grouping(GroupingResult),
     /// The conclusion of an optimization.
     Optimization(OptimizationResult),
-    /// The intentions of all.
+    /// The intentions of the group by place; `None` for one that was not heard.
     Intents(Vec<Option<Intent>>),
     /// The result of the shield's exchange.
     Exchange(ExchangeResult),
@@ -55,7 +55,7 @@ impl From<ExchangeResult> for ConversationOutcome {
     }
 }
 
-/// A participant of a conversation of any subject.
+/// A participant of any kind, so that a pilot can hold the present one.
 pub(super) type DynParticipant = dyn WithOutcome<Outcome = ConversationOutcome>;
 
 /// A wrapper that turns the outcome of any participant into [`ConversationOutcome`].
@@ -127,7 +127,7 @@ where
     Box::new(ErasedParticipant(Endpoint::new(agent, config)))
 }
 
-/// Returns the participant of a conversation that finds the group.
+/// Returns the participant that finds an airplane's group among those near it.
 pub(super) fn grouping_participant(
     world: &AirspaceWorld,
     percept: &Percept,

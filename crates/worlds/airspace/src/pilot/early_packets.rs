@@ -28,7 +28,6 @@ pub(super) struct TakenPackets {
     pub(super) of_other_groups: u64,
 }
 
-/// One packet.
 #[derive(Debug)]
 struct EarlyPacket {
     conversation: ConversationId,

@@ -10,10 +10,12 @@ use crate::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
-/// Distance in meters beyond which all goals rank alike.
+/// Distance in meters beyond which all goals rank alike: about half of the range of a rank's 32 bits, of which
+/// refusals have the other half.
 const MAX_RANKED_DISTANCE_M: f64 = 2e9;
 /// Fraction of the distance flown in a `dt` by which a refusal brings an airplane forward in rank, so that it does
-/// not wait forever.
+/// not wait forever. It is small, so that an airplane near its goal still goes first and is soon gone: to overtake one
+/// that is a `dt` nearer takes eight refusals.
 const REFUSAL_FRACTION: f64 = 0.125;
 
 /// Everything that an airplane perceives at the start of a cycle: one message. All its other knowledge it has heard,
@@ -34,7 +36,7 @@ pub struct Percept {
 /// An airplane as those aboard know it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OwnshipState {
-    /// The airplane.
+    /// Its id, by which the filed flights are found.
     pub id: EntityId,
     /// Its pose by its own instruments, by which it keeps to its orbit.
     pub pose: Pose2,
@@ -50,7 +52,7 @@ pub struct OwnshipState {
     pub next: u32,
     /// Number of orders executed.
     pub orders: u32,
-    /// Side of its stored fallback.
+    /// Side of its stored fallback, the orbit that it may fly at any time.
     pub fallback: Side,
     /// Number of times that the shield has refused its preferred action.
     pub refusals: u32,
@@ -91,7 +93,10 @@ impl OwnshipState {
     /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
     /// lower half makes it unique.
     fn rank(&self, dt_s: f64, segment: &FlightSegment<'_>) -> u64 {
+        // A percept that came off a network may count more way-points than there are.
         let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
+        // Along the whole route, from where its own instruments see it: others are sent its rank, and do not compute
+        // it.
         let legs = ahead
             .iter()
             .scan(self.pose.at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
@@ -132,6 +137,8 @@ impl Percept {
         InvalidMessage::Airplane.unless(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
             .unless(orders as usize <= world.airplanes[id as usize].orders.len())?;
+        // From where the group is seen all its members compute together. The airplane's other numbers enter only what
+        // it sends, and the others check that.
         let seen =
             self.group.iter().flat_map(|one| [one.pose.at[0], one.pose.at[1], one.altitude_m]);
         InvalidMessage::Number.unless(seen.into_iter().all(f64::is_finite))
@@ -142,7 +149,7 @@ impl Percept {
         self.group.iter().map(|one| one.id).collect()
     }
 
-    /// Returns its place among them.
+    /// Returns its place among the members.
     pub(crate) fn own_place(&self) -> usize {
         let place = self.group.binary_search_by_key(&self.own.id, |one| one.id);
         place.expect("an airplane is in its own group")

@@ -51,6 +51,7 @@ impl Schedule {
     /// before all have ended the first.
     pub(crate) fn for_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
         let Some(network) = network else {
+            // So late that the network gets there only when nothing else is due, which is when all have decided.
             return Self { shield_from: u64::MAX / 2, ..Self::from_tick(0, None) };
         };
         Self::from_tick(2 * cycle * (network.deadline_ticks() + 1), Some(network))

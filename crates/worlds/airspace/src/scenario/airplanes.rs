@@ -195,6 +195,7 @@ impl Compiler<'_> {
             return Err(self.source.error(section.span(), cause, remedy));
         }
         if section.get_ref().v_m_s.is_none() {
+            // One that hardly moves in its record must be able to fly as well.
             model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
         }
         let callsign = section.get_ref().callsign(self.source)?;

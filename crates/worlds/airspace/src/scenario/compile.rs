@@ -19,16 +19,17 @@ use std::sync::Arc;
 
 /// Meters by which levels that are far enough apart may seem nearer because they were rounded.
 const ROUNDING_M: f64 = 1e-6;
-/// Smallest limit on the cycles of a run, unless its length is given.
+/// Smallest limit on the cycles of a run, unless its length is given. It costs nothing: a run ends when all have
+/// arrived.
 const MIN_CYCLE_LIMIT: u64 = 400;
 /// Factor on the time that the last airplane to enter would need alone, for a larger limit: it leaves room for detours
 /// and orbits.
 const CYCLE_LIMIT_FACTOR: f64 = 3.0;
-/// Largest number of steps of a horizon.
+/// Largest number of steps of a horizon: every action is predicted in all of them.
 const MAX_HORIZON_STEPS: f64 = 10_000.0;
-/// Largest number of steps of a `dt`.
+/// Largest number of steps of a `dt`: each is flown, and its approaches are recorded, by itself.
 const MAX_STEPS_PER_DT: f64 = 1000.0;
-/// Largest number of actions of an airplane.
+/// Largest number of actions of an airplane: the work for a pair grows with its square.
 const MAX_ACTIONS: usize = 1000;
 /// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.
 const MAX_PAIR_STEPS: usize = 100_000_000;
@@ -181,6 +182,7 @@ impl<'a> Compiler<'a> {
     fn waypoint_rule(&self, airplanes: &[Airplane]) -> WaypointRule {
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let given = self.file.airspace.tolerance_m;
+        // The 100 m that go with the paper's separation of 500 m.
         let tolerance_m = given.map_or((radius_m / 5.0).max(1.0), f64::from);
         WaypointRule { tolerance_m, passes: true }
     }
@@ -328,6 +330,7 @@ impl<'a> Compiler<'a> {
             let cause = "a horizon in points, which is a time now";
             return Err(self.source.error(former.span(), cause, remedy));
         }
+        // The paper predicts 125 points of one second each.
         let preset_s: f64 = if self.is_paper() { 125.0 } else { 90.0 };
         let given = section.horizon_s.as_ref();
         let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
@@ -413,7 +416,7 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
     (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
 }
 
-/// All speeds that an airplane is to fly with.
+/// Returns the speed of an airplane's model and those of its orders.
 fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
     let ordered = airplane.orders.iter().filter_map(|order| match order.task {
         FlightTask::Speed(v_m_s) => Some(v_m_s),

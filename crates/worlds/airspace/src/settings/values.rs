@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_scenario::{Number, Open, Rule, invalid_value, schema_by_hand};
 
-/// A separation.
+/// A separation in meters.
 pub(crate) type SeparationM = Number<Open<0, 1_000_000>>;
 
 /// Defines rules for numbers with bounds, with errors that give the reason for the bounds.

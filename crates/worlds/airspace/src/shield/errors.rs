@@ -30,16 +30,18 @@ use crate::flight::{Model, Pose2};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
-/// Fraction of the largest turn rate below which no airplane orbits.
+/// Fraction of the largest turn rate below which no airplane orbits: the orbit would be more than twice as wide as the
+/// tightest one.
 const MIN_RATE_FRACTION: f64 = 0.45;
 /// Airplanes orbit at one rate if none of them could turn this many times as fast as another. Were
 /// there no limit, a single airplane that hardly turns would put all others on circles that fill
 /// the sky.
 const MAX_RATE_RATIO: f64 = 10.0;
-/// Fraction of its lateral offset that an airplane aims to correct within a step.
+/// Fraction of its lateral offset that an airplane aims to correct within a step: with all of it, it would cross the
+/// orbit before its heading is back.
 const GAIN: f64 = 0.5;
 
-/// Bounds on errors.
+/// Bounds on errors for which the shield allows; 0 where there are none.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ErrorBounds {
     /// Distance in meters within which an airplane is of where all see it.
@@ -90,7 +92,6 @@ pub(crate) fn common_rates(max_rates_rad_s: &[f64]) -> Vec<f64> {
 /// An airplane on its orbit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrbitTracker {
-    /// Its pose.
     pub(crate) pose: Pose2,
     /// Its pose on the orbit, if it had made no errors.
     pub(crate) orbit_pose: Pose2,

@@ -87,12 +87,11 @@ impl SafeManeuver {
         Self::from_turn_rates(aircraft.orbit_pose, aircraft, vec![omega; steps], dtau_s, side)
     }
 
-    /// Returns the pose at the end of `dt`.
+    /// Returns the pose at the end of `dt`, where the orbit begins.
     pub(crate) fn end(&self) -> Pose2 {
         self.poses[self.poses.len() - 1]
     }
 
-    /// Returns the side of the orbit.
     pub(crate) fn side(&self) -> Side {
         self.side
     }

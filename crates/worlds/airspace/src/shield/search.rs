@@ -5,7 +5,7 @@ use super::safe_maneuver::{SafeManeuver, TurnProfile};
 use super::shielded_aircraft::ShieldedAircraft;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Decision of the shield for one airplane.
+/// The plan that the shield gives an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ShieldDecision {
     /// Number of the candidate to fly, `None` for the stored fallback.

@@ -59,7 +59,6 @@ impl ShieldedAircraft {
             || self.fallback_orbit().stays_apart(&other.fallback_orbit(), self.gap_m(other))
     }
 
-    /// Returns the orbit of its stored fallback.
     pub(super) fn fallback_orbit(&self) -> Orbit {
         self.orbit(self.fallback)
     }

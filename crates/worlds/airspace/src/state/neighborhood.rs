@@ -19,6 +19,7 @@ pub(crate) struct Neighborhood {
 impl Neighborhood {
     /// Returns lists for `n` airplanes that consider each other up to `side_m` meters away.
     pub(super) fn new(n: usize, side_m: f64) -> Self {
+        // Twice as many as airplanes, so that few squares share one.
         let buckets = (2 * n).next_power_of_two();
         Self {
             side_m,
@@ -32,6 +33,7 @@ impl Neighborhood {
     }
 
     fn bucket(&self, [x, y]: [i64; 2]) -> &AtomicU64 {
+        // Large odd factors (of the golden ratio, and of xxHash) spread neighboring squares over all buckets.
         let mixed = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
             ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
         &self.first[(mixed >> 32) as usize & (self.first.len() - 1)]

@@ -12,7 +12,7 @@ use sidestep_kernel::column::Packed;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Cycle, Digest, EntityId};
 
-/// One airplane in a snapshot.
+/// One airplane in a snapshot, as checkpoints have it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AirplaneRecord {
     /// Pose at the start of the cycle.

@@ -1,9 +1,9 @@
 //! Elections: how a missing coordinator is brought back.
 
-use super::MigratingCoordinator;
 use super::epoch::{Epoch, is_majority};
 use super::messages::{CoordinatorMessage, VoteRequest};
 use super::replica::{Candidate, CoordinatorReplica, ElectionCause, ReplicaRole, StateCopy};
+use super::{HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 
 impl<P: MigratingCoordinator> CoordinatorReplica<P> {
@@ -11,9 +11,9 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     pub(super) fn start_election(
         &mut self,
         missed: ElectionCause,
-        services: &P::Services,
-        tick: u64,
+        moment: &HostMoment<'_, P::Services>,
     ) {
+        // On a network that loses nothing, no coordinator gets lost.
         let Some(policy) = self.rules.retry_policy else { return };
         self.candidate_number = 1 + self.promised.number.max(self.candidate_number);
         let epoch = Epoch { number: self.candidate_number, owner: self.rules.me as u16 };
@@ -23,7 +23,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let mut votes = vec![false; self.rules.group];
         votes[self.rules.me] = true;
         let heard = votes.clone();
-        let due = tick + self.round_trip_ticks();
+        let due = moment.tick + self.round_trip_ticks();
         let tries_left = policy.tries.saturating_sub(1);
         // A host that is alone in its group elects itself.
         let is_elected = is_majority(&votes);
@@ -34,7 +34,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.role =
             ReplicaRole::Candidate(Candidate { request, lost, votes, heard, tries_left, due });
         if is_elected {
-            return self.restore_coordinator(services, tick);
+            return self.restore_coordinator(moment);
         }
         self.broadcast(&CoordinatorMessage::Elect(request));
     }
@@ -91,8 +91,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         epoch: Epoch,
         copy: Option<StateCopy>,
-        services: &P::Services,
-        tick: u64,
+        moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
         let ReplicaRole::Candidate(candidate) = &mut self.role else { return Ok(()) };
         if candidate.request.epoch != epoch {
@@ -101,20 +100,21 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         if let Some(copy) = copy
             && self.copy.as_ref().is_none_or(|own| copy.at > own.at)
         {
-            P::decode(&copy.state, services, self.number.into())?;
+            P::decode(&copy.state, moment.services, self.number.into())?;
             self.copy = Some(copy);
             // The hop on which it was lost is not known then.
             candidate.lost = None;
         }
         candidate.votes[from] = true;
         if is_majority(&candidate.votes) {
-            self.restore_coordinator(services, tick);
+            self.restore_coordinator(moment);
         }
         Ok(())
     }
 
     /// Brings the coordinator back from the newest copy that a majority has, or else from nothing.
-    pub(super) fn restore_coordinator(&mut self, services: &P::Services, tick: u64) {
+    pub(super) fn restore_coordinator(&mut self, moment: &HostMoment<'_, P::Services>) {
+        let &HostMoment { services, tick } = moment;
         let ReplicaRole::Candidate(Candidate { request, lost, .. }) = &self.role else { return };
         let at = request.epoch.first_version();
         let lost = *lost;

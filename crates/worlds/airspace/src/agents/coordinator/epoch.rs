@@ -41,7 +41,7 @@ impl Epoch {
         Version { epoch: self, hop: 0 }
     }
 
-    /// Returns whether it can be an epoch of a group.
+    /// Returns whether its owner is in a group of this size, and its number within reach.
     pub(super) fn is_valid_for(self, group: usize) -> bool {
         usize::from(self.owner) < group && self.number < MAX_NUMBER
     }
@@ -50,7 +50,6 @@ impl Epoch {
 /// A point on a coordinator's itinerary: the epoch, and the number of hops in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(super) struct Version {
-    /// Its epoch.
     pub epoch: Epoch,
     /// Number of hops since the epoch began.
     pub hop: u32,

@@ -3,7 +3,9 @@
 use super::epoch::Epoch;
 use super::messages::{self, MessageReader};
 use super::replica::{CoordinatorReplica, HostedCoordinator, QueuedMessage};
-use super::{CoordinatorStep, HostConfig, HostContext, HostServices, MigratingCoordinator};
+use super::{
+    CoordinatorStep, HostConfig, HostContext, HostMoment, HostServices, MigratingCoordinator,
+};
 use crate::agents::participant::InvalidMessage;
 use std::sync::Arc;
 
@@ -31,8 +33,9 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
 
     /// Starts: the coordinators are on their first hosts.
     pub(super) fn start(&mut self, tick: u64) {
+        let moment = HostMoment { services: &self.services, tick };
         for replica in &mut self.replicas {
-            replica.start(&self.services, tick);
+            replica.start(&moment);
         }
         self.run_all(tick);
     }
@@ -51,16 +54,18 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         let reader = MessageReader { me, group, replicas: self.replicas.len() };
         let (replica, message, state) = messages::decode(bytes, from, reader)?;
         let replica = &mut self.replicas[usize::from(replica)];
-        replica.on_message(from, message, state, &self.services, tick)?;
+        let moment = HostMoment { services: &self.services, tick };
+        replica.on_message(from, message, state, &moment)?;
         self.run_all(tick);
         Ok(())
     }
 
     /// Performs all actions that are due.
     pub(super) fn on_timer(&mut self, tick: u64) {
+        let moment = HostMoment { services: &self.services, tick };
         for replica in &mut self.replicas {
             let watches = self.services.is_watching(replica.number.into());
-            replica.on_timer(watches, &self.services, tick);
+            replica.on_timer(watches, &moment);
         }
         self.run_all(tick);
     }
@@ -106,6 +111,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         match coordinator.advance(&mut self.services, &context) {
             CoordinatorStep::Hop(to) => replica.migrate(&coordinator, to, tick),
             CoordinatorStep::Done => {}
+            // It has continued without the one that it waited for, and waits anew.
             CoordinatorStep::Stay if has_timed_out => replica.host(coordinator, tick),
             CoordinatorStep::Stay => {
                 replica.put_back(HostedCoordinator { coordinator, heartbeat_at, timeout_at });

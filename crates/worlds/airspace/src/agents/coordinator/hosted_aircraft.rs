@@ -24,7 +24,7 @@ pub(super) struct HostedAircraft {
     /// Whether there is no one above, and will be none.
     pub is_orphan: bool,
     has_news: bool,
-    /// The end of the conversation for the airplane.
+    /// Set once, when the airplane gets its control or nobody can bring it one.
     pub end: Option<ConversationEnd<OptimizationResult>>,
 }
 

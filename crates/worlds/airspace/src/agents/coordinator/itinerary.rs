@@ -159,6 +159,7 @@ impl Coordinator {
                 return Some(CoordinatorStep::Hop(home));
             }
         }
+        // Whether the decisions are made or not, every part waits for an answer.
         let parts = CoordinatorTask::HandBack(services.parts.len());
         self.task = self.advance_task(services, context, parts, parts);
         None
@@ -180,7 +181,7 @@ impl Coordinator {
         self.data.airplanes.extend(presumed);
     }
 
-    /// Brings the results to the parts before number `k`, the last one first.
+    /// Brings the results to the parts before number `k`, the last one first, because there the collection has ended.
     fn return_results(
         &mut self,
         k: usize,

@@ -53,7 +53,7 @@ pub(super) fn encode(number: u16, message: &CoordinatorMessage, state: &[u8]) ->
     PacketBuffer::from_parts(&(number, message), state)
 }
 
-/// A host that reads messages.
+/// What a host has to know of itself to check a message.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MessageReader {
     /// Its place in the group.

@@ -22,15 +22,14 @@ pub(super) struct HostContext<'a> {
     pub epochs: &'a [Epoch],
     /// Whether each coordinator is on the host.
     pub is_here: &'a [bool],
-    /// Whether it has waited here for long.
+    /// Whether it has waited here for [`HostConfig::wait_timeout_ticks`].
     pub has_timed_out: bool,
-    /// The host's tick.
+    /// The tick on the host's own clock.
     pub tick: u64,
 }
 
-/// A coordinator: the state that migrates.
+/// A coordinator, all of whose state migrates from host to host.
 pub(super) trait MigratingCoordinator: Sized {
-    /// What a host exposes to the coordinators that it hosts.
     type Services: HostServices;
 
     /// Returns the coordinator with this number before it has visited any host.
@@ -76,6 +75,12 @@ pub(super) trait HostServices {
     /// Called when no majority can be found to bring a coordinator back, with the hosts that
     /// have not answered.
     fn on_no_majority(&mut self, number: usize, unanswering: &[usize]);
+}
+
+/// A host at a moment: its services, and its tick.
+pub(super) struct HostMoment<'a, S> {
+    pub services: &'a S,
+    pub tick: u64,
 }
 
 /// The rules by which a host waits for others.

@@ -75,7 +75,9 @@ mod participant;
 mod replica;
 mod state;
 
-use migrating::{CoordinatorStep, HostConfig, HostContext, HostServices, MigratingCoordinator};
+use migrating::{
+    CoordinatorStep, HostConfig, HostContext, HostMoment, HostServices, MigratingCoordinator,
+};
 pub use participant::HostParticipant;
 
 #[cfg(test)]

@@ -62,7 +62,7 @@ impl HostParticipant {
 fn max_state_bytes(common: &CommonKnowledge) -> usize {
     let actions = common.max_actions();
     let block = samples_per_round(common).unwrap_or(0);
-    // A player, a decision, and the numbers beside the predictions.
+    // A player, a decision, and the numbers beside the predictions, of at most 10 bytes each.
     let numbers = 10 * (6 * actions + 2 * block.max(actions)) + 10 * block + 256;
     common.ids.len() * (common.max_message_bytes(block.max(actions)) + numbers) + 512
 }

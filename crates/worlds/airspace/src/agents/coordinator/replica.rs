@@ -4,7 +4,7 @@
 
 use super::epoch::{Epoch, Version};
 use super::messages::{CoordinatorMessage, VoteRequest, encode};
-use super::{HostConfig, MigratingCoordinator};
+use super::{HostConfig, HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 use sidestep_kernel::network::PacketBuffer;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub(super) enum ReplicaRole<P> {
     Candidate(Candidate),
 }
 
-/// A coordinator that stays on a host.
+/// A coordinator on this host, with what is due if it stays here.
 #[derive(Debug, Clone)]
 pub(super) struct HostedCoordinator<P> {
     pub coordinator: P,
@@ -120,7 +120,8 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Starts: the coordinator is on the first host.
-    pub(super) fn start(&mut self, services: &P::Services, tick: u64) {
+    pub(super) fn start(&mut self, moment: &HostMoment<'_, P::Services>) {
+        let &HostMoment { services, tick } = moment;
         self.heard_at = tick;
         if usize::from(self.promised.owner) == self.rules.me {
             let coordinator = P::new(services, self.number.into());
@@ -139,7 +140,6 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         }
     }
 
-    /// Returns whether the coordinator is here.
     pub(super) fn is_hosting(&self) -> bool {
         matches!(self.role, ReplicaRole::Hosting(_))
     }
@@ -149,7 +149,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         matches!(self.role, ReplicaRole::Idle)
     }
 
-    /// Hosts the coordinator from a tick on.
+    /// Takes the coordinator in at a tick, from which its times on this host count.
     pub(super) fn host(&mut self, coordinator: P, tick: u64) {
         let heartbeat_at = tick.saturating_add(self.rules.heartbeat_ticks());
         let timeout_at = tick.saturating_add(self.rules.wait_timeout_ticks());
@@ -187,18 +187,18 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         message: CoordinatorMessage,
         state: &[u8],
-        services: &P::Services,
-        tick: u64,
+        moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
+        let tick = moment.tick;
         match message {
-            CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, services, tick)?,
+            CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
             CoordinatorMessage::Vote(epoch, copy) => {
                 let copy = copy.map(|at| StateCopy { at, state: state.into() });
-                self.on_vote(from, epoch, copy, services, tick)?;
+                self.on_vote(from, epoch, copy, moment)?;
             }
             CoordinatorMessage::Ack(at) => self.on_ack(from, at, tick),
             CoordinatorMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
-            CoordinatorMessage::Stale(epoch) => self.on_stale(epoch, services, tick),
+            CoordinatorMessage::Stale(epoch) => self.on_stale(epoch, moment),
             CoordinatorMessage::Elect(candidacy) => self.on_vote_request(from, candidacy, tick),
         }
         if let ReplicaRole::Candidate(candidate) = &mut self.role {
@@ -212,9 +212,9 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         from: usize,
         at: Version,
         state: &[u8],
-        services: &P::Services,
-        tick: u64,
+        moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
+        let &HostMoment { services, tick } = moment;
         if at.epoch < self.promised {
             self.send(from, &CoordinatorMessage::Stale(self.promised), &[]);
         } else if at <= self.accepted {
@@ -276,25 +276,23 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Receives the news that a newer epoch was accepted by another host. A host that has the
     /// coordinator in its care wants to bring it back in a still newer one, unless one is alive in
     /// that one.
-    fn on_stale(&mut self, epoch: Epoch, services: &P::Services, tick: u64) {
+    fn on_stale(&mut self, epoch: Epoch, moment: &HostMoment<'_, P::Services>) {
         if epoch <= self.promised {
             return;
         }
         self.promised = epoch;
         match std::mem::replace(&mut self.role, ReplicaRole::Idle) {
             ReplicaRole::Idle => {}
-            ReplicaRole::Sending { .. } => {
-                self.start_election(ElectionCause::Outdated, services, tick)
-            }
+            ReplicaRole::Sending { .. } => self.start_election(ElectionCause::Outdated, moment),
             ReplicaRole::Hosting(HostedCoordinator { coordinator, .. }) => {
                 self.copy =
                     Some(StateCopy { at: self.accepted, state: coordinator.encode().into() });
-                self.start_election(ElectionCause::Outdated, services, tick);
+                self.start_election(ElectionCause::Outdated, moment);
             }
             ReplicaRole::Candidate(candidate) if candidate.request.epoch > epoch => {
                 self.role = ReplicaRole::Candidate(candidate);
             }
-            ReplicaRole::Candidate(_) => self.defer_election(tick),
+            ReplicaRole::Candidate(_) => self.defer_election(moment.tick),
         }
     }
 
@@ -306,12 +304,13 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Performs all actions that are due; `watches` says whether the host needs the coordinator.
-    pub(super) fn on_timer(&mut self, watches: bool, services: &P::Services, tick: u64) {
+    pub(super) fn on_timer(&mut self, watches: bool, moment: &HostMoment<'_, P::Services>) {
+        let tick = moment.tick;
         if self.next_timer(watches).is_none_or(|due| due > tick) {
             return;
         }
         match &mut self.role {
-            ReplicaRole::Idle => self.start_election(ElectionCause::Unheard, services, tick),
+            ReplicaRole::Idle => self.start_election(ElectionCause::Unheard, moment),
             ReplicaRole::Candidate(_) => self.retry_vote_requests(tick),
             ReplicaRole::Hosting(stay) if stay.heartbeat_at <= tick => {
                 stay.heartbeat_at = tick + self.rules.heartbeat_ticks();
@@ -319,11 +318,12 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             }
             // The coordinator checks the time when it is run.
             ReplicaRole::Hosting(_) => {}
-            ReplicaRole::Sending { .. } => self.retry_hop(services, tick),
+            ReplicaRole::Sending { .. } => self.retry_hop(moment),
         }
     }
 
-    fn retry_hop(&mut self, services: &P::Services, tick: u64) {
+    fn retry_hop(&mut self, moment: &HostMoment<'_, P::Services>) {
+        let &HostMoment { services, tick } = moment;
         let (ReplicaRole::Sending { to, tries_left, due, heartbeat_at }, Some(copy), Some(policy)) =
             (&mut self.role, self.copy.clone(), self.rules.retry_policy)
         else {
@@ -348,7 +348,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             self.role = ReplicaRole::Idle;
         } else {
             // It may have arrived all the same, so it continues in a new epoch or not at all.
-            self.start_election(ElectionCause::OnHop(to), services, tick);
+            self.start_election(ElectionCause::OnHop(to), moment);
         }
     }
 
@@ -375,6 +375,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Gives another host that stands for election time for some questions and answers.
     pub(super) fn defer_election(&mut self, tick: u64) {
         let answer_ticks = self.round_trip_ticks();
+        // Three times, because a question or its answer may get lost and be repeated.
         self.quiet_until = tick.saturating_add(answer_ticks.saturating_mul(3));
     }
 

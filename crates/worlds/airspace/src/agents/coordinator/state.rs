@@ -30,7 +30,7 @@ pub(super) struct MemberData {
     pub decided: Option<ActionChoice>,
 }
 
-/// The data of a round, or of all of them.
+/// The data of the algorithm up to its present round; with exact expectations one step makes all rounds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct RoundData {
     /// Number of rounds made, and of calm ones at the end of them.
@@ -69,7 +69,7 @@ pub(super) struct HierarchyData {
     pub unreachable: Vec<usize>,
 }
 
-/// A coordinator.
+/// All of a coordinator: what is sent with each hop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Coordinator {
     pub task: CoordinatorTask,
@@ -78,7 +78,7 @@ pub(super) struct Coordinator {
     pub hierarchy: Option<HierarchyData>,
 }
 
-/// Returns the number of samples in a round, where there are any.
+/// Returns the number of samples in a round; `None` where expectations are exact.
 pub(super) fn samples_per_round(common: &CommonKnowledge) -> Option<usize> {
     match common.settings.estimator {
         Estimator::Exact => None,
@@ -181,7 +181,7 @@ impl RoundData {
         self.is_final = true;
     }
 
-    /// Makes a round with samples.
+    /// Makes one round from samples, and the decisions if it is the last one.
     fn sampled_round(
         &mut self,
         common: &CommonKnowledge,

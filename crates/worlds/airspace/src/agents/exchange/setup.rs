@@ -10,7 +10,7 @@ use sidestep_kernel::{Cycle, EntityId};
 
 /// Number of cycles after which airplanes take turns: long enough to get out of the others' reach.
 const PRIORITY_PERIOD_CYCLES: Cycle = 12;
-/// Bound on headings in messages, in radians.
+/// Bound on headings in messages, in radians: those of airplanes are within half a turn.
 const MAX_HEADING_RAD: f64 = 1e6;
 
 /// An airplane as others see it, and as they know it from its filed plan.
@@ -30,7 +30,7 @@ pub struct ObservedAircraft {
 }
 
 impl ObservedAircraft {
-    /// Checks a beacon of this airplane.
+    /// Checks a beacon against where this airplane is seen and what it has filed.
     fn check_beacon(&self, beacon: &StateBeacon) -> Result<(), InvalidMessage> {
         let ShieldedAircraft { pose, omega_max_rad_s, orbit_rad_s, separation_m, .. } =
             self.aircraft;
@@ -75,7 +75,7 @@ impl ExchangeSetup {
         (*is_on_orbit, turn_order(aircraft.id, self.now), aircraft.id)
     }
 
-    /// Checks the proposal of the airplane at a place.
+    /// Checks the proposal of the airplane at a place: what is neither seen nor filed must be possible.
     pub(super) fn check_proposal(
         &self,
         place: usize,
@@ -114,7 +114,7 @@ impl ExchangeSetup {
         InvalidMessage::Airplane.unless(is_ascending(ids) && are_members)
     }
 
-    /// Returns the largest number of bytes of a message of the exchange.
+    /// Returns the largest number of bytes of a message: a proposal with as many profiles as any airplane can have.
     pub(super) fn max_message_bytes(&self) -> usize {
         let profiles = self.aircraft.iter().map(|one| one.max_profiles).max().unwrap_or(0);
         // A number of a message takes 8 bytes, a length or an id at most 5; the beacon is well below 256.

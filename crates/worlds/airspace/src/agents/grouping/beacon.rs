@@ -7,13 +7,13 @@ use crate::shield::Side;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
-/// Bound on headings in messages, in radians.
+/// Bound on headings in messages, in radians: those of airplanes are within half a turn.
 const MAX_HEADING_RAD: f64 = 1e6;
 
 /// An airplane as others see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurveillanceReport {
-    /// The airplane.
+    /// Id of the airplane that is seen.
     pub id: EntityId,
     /// Its pose, with the error of the cycle.
     pub pose: Pose2,
@@ -45,11 +45,11 @@ pub struct Beacon {
 /// A piece of knowledge about an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Item {
-    /// Its beacon.
+    /// What it says of itself; others relay it.
     Beacon(Beacon),
-    /// Its report.
+    /// What it has heard: sent once, when it expects no further beacon.
     Report {
-        /// The airplane.
+        /// Id of the airplane that reports.
         about: EntityId,
         /// Ids of those near it that have sent it their beacons themselves, rising.
         heard: Vec<EntityId>,
@@ -97,6 +97,6 @@ impl Beacon {
 
 /// Returns the largest number of bytes of an item in a world of `airplanes` airplanes.
 pub(super) fn max_item_bytes(airplanes: usize) -> usize {
-    // For each other airplane its id, and perhaps its observed flight.
+    // For each other airplane its id of at most 5 bytes, and perhaps its observed flight of at most 96.
     64 + airplanes * (5 + 96)
 }

@@ -63,7 +63,6 @@ impl Roster {
         self.beacons.get(&id)
     }
 
-    /// Returns whether the beacon of an airplane is known.
     pub(super) fn has_beacon(&self, id: EntityId) -> bool {
         self.beacons.contains_key(&id)
     }
@@ -73,7 +72,7 @@ impl Roster {
         self.has_beacon(id) && self.heard_by(id).is_some()
     }
 
-    /// Returns an item about an airplane.
+    /// Returns the report of an airplane or its beacon, if that is known.
     pub(super) fn item(&self, about: EntityId, is_report: bool) -> Option<Item> {
         if is_report {
             let heard = self.reports.get(&about)?.clone();

@@ -55,7 +55,7 @@ pub(super) enum ConversationTiming {
 }
 
 impl CycleState {
-    /// Returns the conversation that it is in.
+    /// Returns the conversation that it is in; `None` between two of them and after the last.
     pub(super) fn conversation(&mut self) -> Option<&mut Conversation<DynParticipant>> {
         match &mut self.phase {
             CyclePhase::Grouping(conversation)
