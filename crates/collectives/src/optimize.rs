@@ -40,7 +40,7 @@ pub struct OptimizerConfig {
     pub estimator: Estimator,
     /// The update of the distributions.
     pub update: Update,
-    /// The order of the updates.
+    /// Whether players see the updates of the same round.
     pub order: UpdateOrder,
     /// The cost that players learn from.
     pub utility: Utility,
@@ -52,7 +52,7 @@ pub struct OptimizerConfig {
     pub choice: Choice,
 }
 
-/// The rule by which an optimization stops.
+/// An optimization stops after enough calm rounds in a row, or else at the maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopCriterion {
     /// The largest change of a probability in a calm round.
@@ -81,7 +81,7 @@ pub struct OptimizeResult {
     /// Each player's final estimate of `E[G | x]`, up to a constant: it ranks the strategies that
     /// were not chosen.
     pub expected: Vec<Vec<f64>>,
-    /// Number of rounds.
+    /// Number of rounds that were run, at most `max_rounds`.
     pub rounds: u32,
     /// Whether the distributions converged, rather than the rounds run out.
     pub converged: bool,

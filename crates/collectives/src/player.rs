@@ -152,6 +152,7 @@ impl Player {
         let low = self.expected.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let spread = high - low;
+        // The spread is the natural unit of the costs: at this temperature, the worst strategy weighs 1/e of the best.
         if self.temperature == 0.0 {
             self.temperature = spread;
         }
@@ -159,6 +160,7 @@ impl Player {
             // All costs are equal, so no strategy is better than another.
             return 0.0;
         }
+        // With the 1, differences between costs far below 1e-12 count for nothing.
         let t = self.temperature.max(MIN_TEMPERATURE_FRACTION * (low.abs().max(high.abs()) + 1.0));
         let change = match update {
             Update::NearestNewton { step } => self.newton(step, t),

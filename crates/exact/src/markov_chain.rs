@@ -112,7 +112,7 @@ impl MarkovChain {
         next
     }
 
-    /// Returns the distribution after `actions` actions from the start.
+    /// Returns the distribution over [`MarkovChain::states`] after this number of actions from the start.
     pub fn distribution_after(&self, actions: u64) -> Vec<f64> {
         let mut distribution = self.start_distribution();
         for _ in 0..actions {

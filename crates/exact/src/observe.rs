@@ -11,7 +11,7 @@ use sidestep_scenario::suggestion;
 /// A beam of one of the robot's sensors.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Beam {
-    /// Name of the sensor.
+    /// Name of the sensor, as in the scenario.
     pub sensor: String,
     /// Number of the beam, from 0 in the order of the sensor's bearings.
     pub index: usize,

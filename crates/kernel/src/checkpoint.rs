@@ -9,7 +9,7 @@ use crate::units::Cycle;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 const MAGIC: &[u8; 8] = b"SIDESTEP";
-/// Bytes of a checksum: a [`Digest`].
+/// Bytes of a checksum, which is a [`Digest`]: it detects damage, not forgery.
 const CHECKSUM_BYTES: usize = 16;
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
@@ -22,7 +22,7 @@ pub struct Header {
     pub format: u32,
     /// Version of the program that wrote it; results may differ between versions.
     pub program_version: String,
-    /// Name of the world.
+    /// Name of the world, as scenarios write it.
     pub world: String,
     /// Digest of the resolved scenario's text.
     pub scenario: [u8; 16],
@@ -47,7 +47,7 @@ impl Header {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// Not a checkpoint at all.
+    /// The bytes do not begin with the magic of checkpoints.
     #[error("this is not a checkpoint")]
     NotACheckpoint,
     /// Cut short or changed.
@@ -64,9 +64,9 @@ pub enum CheckpointError {
     Foreign {
         /// The property that differs.
         what: &'static str,
-        /// Its value in the checkpoint.
+        /// Its value in the checkpoint's header; digests in hexadecimal.
         found: String,
-        /// The expected value.
+        /// Its value in the run that should continue.
         expected: String,
     },
 }

@@ -20,7 +20,7 @@ pub struct Editing {
     pub about_files: &'static str,
 }
 
-/// A tool.
+/// A tool of the page's toolbar.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EditTool {
     /// Its name for programs, unique among the tools of a world.
@@ -29,9 +29,9 @@ pub struct EditTool {
     pub sign: &'static str,
     /// Its name for people.
     pub name: &'static str,
-    /// Its use.
+    /// Its use in a sentence, which the page shows while the tool is chosen.
     pub help: &'static str,
-    /// Its effect.
+    /// What a press on the canvas does to the text.
     pub action: EditAction,
 }
 
@@ -65,7 +65,7 @@ pub enum EditAction {
         /// The sections of the bodies.
         section: &'static str,
     },
-    /// Adds a point (`at_m`).
+    /// Adds a section with a point (`at_m`).
     AddPoint {
         /// The sections.
         section: &'static str,
@@ -138,7 +138,7 @@ pub enum EditItems {
         section: &'static str,
         /// The noun for one of them.
         noun: &'static str,
-        /// Whether they have headings.
+        /// Whether they have headings, and so can be rotated.
         turns: bool,
     },
     /// Points (`at_m`).
@@ -176,14 +176,14 @@ pub struct EditNote {
     pub when: Option<&'static str>,
     /// The key without which it holds.
     pub unless: Option<&'static str>,
-    /// Its words.
+    /// The restriction in a sentence.
     pub text: &'static str,
 }
 
 /// The use of a file that holds no scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FileUse {
-    /// The kind of the file.
+    /// The kind of the files, by which the page finds the use of one.
     pub kind: UsedFile,
     /// Endings of its name, e.g. `.png`; none for any name.
     pub endings: &'static [&'static str],
@@ -208,7 +208,7 @@ pub enum UsedFile {
 }
 
 impl EditTool {
-    /// Returns a tool that selects.
+    /// The tool that selects; in space a world gives it another `help`.
     pub const SELECT: Self = Self {
         id: "select",
         sign: "↖",

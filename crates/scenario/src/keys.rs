@@ -131,7 +131,7 @@ impl<'t, 'i> LocatedValue<'t, 'i> {
     }
 }
 
-/// Returns the value at a path.
+/// `None` if a part of the path does not exist.
 fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<LocatedValue<'t, 'i>> {
     let mut located = LocatedValue::without_key(root);
     for part in parse_key(path).ok()? {

@@ -34,12 +34,12 @@ pub struct Remark {
 }
 
 impl Remark {
-    /// Creates a warning.
+    /// Creates a remark on a run that is probably not the one that its author wants.
     pub fn warning(key: impl Into<String>, words: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, key: key.into(), words: words.into() }
     }
 
-    /// Creates a note.
+    /// Creates a remark on a run that may differ from its author's expectation.
     pub fn note(key: impl Into<String>, words: impl Into<String>) -> Self {
         Self { severity: Severity::Note, key: key.into(), words: words.into() }
     }

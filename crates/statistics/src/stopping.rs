@@ -49,7 +49,7 @@ pub struct StoppingRule {
     pub max_runs: usize,
 }
 
-/// The answer of a [`StoppingRule`].
+/// The next step of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopDecision {
@@ -133,7 +133,7 @@ impl StoppingRule {
         StopDecision::Run(total)
     }
 
-    /// Decides at the end of a round.
+    /// Decides at the end of a round. A target that the last possible run reaches counts as reached.
     fn decide_round(&self, values: &[Option<f64>]) -> StopDecision {
         let runs = values.len();
         let sample = Sample::from_runs(values.iter().copied()).values;

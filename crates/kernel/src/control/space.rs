@@ -16,10 +16,10 @@ pub struct Space {
     pub meaning: String,
 }
 
-/// The values of a space.
+/// Type and bounds of the values of a space, the same for every number of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SpaceKind {
-    /// One of these, by number from 0.
+    /// Named choices; a value is the index of a name.
     Discrete(Vec<String>),
     /// Whole numbers from `low` to `high`, both included.
     Integer {
@@ -30,9 +30,9 @@ pub enum SpaceKind {
     },
     /// Numbers from `low` to `high`, both included; infinite where there is no bound.
     Real {
-        /// The lowest value.
+        /// The lowest value, in the unit of the space's name.
         low: f64,
-        /// The highest value.
+        /// The highest value, in the unit of the space's name.
         high: f64,
     },
 }

@@ -12,16 +12,16 @@ const STEPS_PER_MEAN: f64 = 10.0;
 /// A period, in seconds after the start of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeWindow {
-    /// Its start.
+    /// Its start, included.
     pub from_s: f64,
-    /// Its end; may be infinite.
+    /// Its end, excluded; may be infinite.
     pub until_s: f64,
 }
 
 /// A period in which an agent's radio is off: it neither sends nor receives, and is aware of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadioOutage {
-    /// Id of the agent.
+    /// Id of the agent whose radio is off.
     pub agent: EntityId,
     /// The period.
     pub window: TimeWindow,

@@ -12,7 +12,9 @@
 use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
 
+/// The first bytes of each packet, so that those of other programs are recognized at once.
 const MAGIC: [u8; 2] = *b"Ss";
+/// Version of this layout and of its checksum; packets of other versions are dropped.
 const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
@@ -35,7 +37,7 @@ pub trait Protocol: Copy + Ord {
 pub struct ConversationId<T> {
     /// The cycle that is decided.
     pub cycle: Cycle,
-    /// The topic.
+    /// The topic; a cycle has its topics in rising order.
     pub topic: T,
     /// A digest of the ids of all members: agents that assume different groups are in different conversations.
     pub members: u64,
@@ -78,7 +80,7 @@ impl PacketBuffer {
         Self(packet)
     }
 
-    /// The message.
+    /// The serialized message, without the room for the header.
     pub fn message(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]
     }
@@ -104,9 +106,9 @@ impl PacketBuffer {
 pub struct PacketHeader<T> {
     /// Digest of scenario and build: packets with any other are dropped.
     pub fingerprint: u64,
-    /// The conversation.
+    /// The conversation to which the packet belongs; each of its parts is in the header.
     pub conversation: ConversationId<T>,
-    /// The sender.
+    /// Id of the sender, which nothing in a packet proves.
     pub sender: EntityId,
     /// Number among the sender's packets of the conversation.
     pub sequence: u32,
@@ -179,7 +181,7 @@ pub fn parse_packet<T: Protocol>(
     Ok((header, message))
 }
 
-/// A reason reason a packet was dropped.
+/// A reason why a packet was dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum DropReason {
     /// Too short, or without the first bytes of a packet.
@@ -207,7 +209,7 @@ pub enum DropReason {
 }
 
 impl DropReason {
-    /// All reasons.
+    /// Every reason once, by its index in [`DropCounts`].
     pub const ALL: [Self; 11] = [
         Self::NoPacket,
         Self::Version,
@@ -245,7 +247,7 @@ impl DropReason {
 pub struct DropCounts([u64; DropReason::ALL.len()]);
 
 impl DropCounts {
-    /// Counts a packet that was dropped.
+    /// Adds one to the packets that were dropped for a reason.
     pub fn record(&mut self, reason: DropReason) {
         self.0[reason as usize] += 1;
     }
@@ -288,17 +290,18 @@ fn digest_bytes(bytes: &[u8]) -> u64 {
     const LANES: usize = 4;
     let (pairs, rest) = bytes.as_chunks::<16>();
     let (blocks, pairs) = pairs.as_chunks::<LANES>();
+    // Different starts, so that equal blocks in two lanes give different sums.
     let mut sums: [u64; LANES] = [1, 2, 3, 4];
     for block in blocks {
         sums = std::array::from_fn(|lane| mix_pair(sums[lane], &block[lane]));
     }
     let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
+    // Data that end in zeros differ from this padding by their length, which `digest` mixes in.
     let mut last = [0; 16];
     last[..rest.len()].copy_from_slice(rest);
     mix_pair(pairs.iter().fold(sum, mix_pair), &last)
 }
 
-/// Adds two words to a digest.
 fn mix_pair(sum: u64, bytes: &[u8; 16]) -> u64 {
     let (words, _) = bytes.as_chunks::<8>();
     let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);

@@ -10,7 +10,7 @@ use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One message.
+/// One message. Its first three fields come first because receivers sort messages by them.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Envelope {
     /// Cycle in which it was sent.
@@ -19,7 +19,7 @@ pub struct Envelope {
     pub sender: EntityId,
     /// Number of the message among the sender's in that cycle.
     pub sequence: u32,
-    /// The receiver.
+    /// The one receiver: a message to several is sent to each.
     pub receiver: EntityId,
     /// The content, serialized.
     pub payload: Vec<u8>,

@@ -29,7 +29,7 @@ impl AtomicBitSet {
         word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0
     }
 
-    /// Bytes on the heap.
+    /// Bytes on the heap: an eighth of the number of boxes, in whole words.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.0)
     }

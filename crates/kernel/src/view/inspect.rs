@@ -8,12 +8,12 @@ use serde::{Serialize, Serializer};
 /// Percepts and decisions of a body in a cycle, and their outcome, in a form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
-    /// The body.
+    /// The inspected body; serialized with the names of its fields.
     #[serde(serialize_with = "body_fields")]
     pub body: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
-    /// The body's name for people.
+    /// The body in words, as the heading of a panel.
     pub title: String,
     /// Facts about it, by topic.
     pub sections: Vec<FactSection>,
@@ -24,15 +24,15 @@ pub struct Inspection {
 /// Facts about one topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactSection {
-    /// The topic.
+    /// The topic, by which [`Inspection::section`] finds it.
     pub title: String,
     /// Single facts.
     pub facts: Vec<Fact>,
-    /// A table of facts of one kind.
+    /// A table after the single facts; `None` where it would have no rows.
     pub table: Option<FactTable>,
 }
 
-/// A fact.
+/// An answer to one question about the body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fact {
     /// The question that it answers.
@@ -41,11 +41,11 @@ pub struct Fact {
     pub value: FactValue,
 }
 
-/// The value of a fact.
+/// The value of a fact by its type, because viewers lay out each type in its own form.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FactValue {
-    /// A number.
+    /// A number with its unit.
     Number {
         /// The number itself.
         value: f64,
@@ -56,7 +56,7 @@ pub enum FactValue {
     Share(f64),
     /// Words.
     Text(String),
-    /// A body.
+    /// A body by its identity, so that viewers can select it.
     #[serde(serialize_with = "body_fields")]
     Body(BodyId),
     /// A position in meters.
@@ -79,17 +79,17 @@ pub struct FactTable {
 /// Something to draw over the scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// Its role in the inspection.
+    /// Its role, by which viewers choose a color.
     pub role: MarkRole,
     /// Words for it.
     pub label: String,
     /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
     pub weight: f64,
-    /// Its shape.
+    /// Its shape, at its place in the world.
     pub shape: MarkShape,
 }
 
-/// The role of a mark in an inspection.
+/// What a mark shows; viewers draw each role in a color of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MarkRole {
@@ -119,13 +119,13 @@ pub enum MarkRole {
     Target,
 }
 
-/// The shape of a mark, in meters.
+/// The shape of a mark in the frame of the world, in meters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum MarkShape {
     /// A polyline.
     Line {
-        /// Its points.
+        /// Its points, from one end to the other.
         points_m: Vec<Vec3>,
     },
     /// A polygon.
@@ -133,14 +133,14 @@ pub enum MarkShape {
         /// Its corners, counterclockwise.
         corners_m: Vec<Vec3>,
     },
-    /// A point.
+    /// A position without extent.
     Point {
         /// Its position.
         at_m: Vec3,
     },
     /// A horizontal circle.
     Circle {
-        /// Its center.
+        /// Its center, at its height.
         at_m: Vec3,
         /// Its radius.
         radius_m: f64,
@@ -162,7 +162,7 @@ fn body_fields<S: Serializer>(
 }
 
 impl MarkRole {
-    /// All roles.
+    /// Every role once, in the order of declaration.
     pub const ALL: [Self; 12] = [
         Self::True,
         Self::Reported,
@@ -208,7 +208,7 @@ impl Inspection {
         self.marks.push(Mark { role, label: label.into(), weight: weight.clamp(0.0, 1.0), shape });
     }
 
-    /// Returns the section with a title.
+    /// Returns the section with a title; `None` where the body has no facts on that topic.
     pub fn section(&self, title: &str) -> Option<&FactSection> {
         self.sections.iter().find(|section| section.title == title)
     }
@@ -219,14 +219,14 @@ impl Inspection {
         Some(&fact.value)
     }
 
-    /// Returns all marks in a role.
+    /// Returns the marks in a role, in the order in which they were added.
     pub fn marks_with_role(&self, role: MarkRole) -> impl Iterator<Item = &Mark> {
         self.marks.iter().filter(move |mark| mark.role == role)
     }
 }
 
 impl FactSection {
-    /// Creates a section without facts.
+    /// Creates a section without facts, which [`Inspection::add_section`] leaves out if it stays empty.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), facts: Vec::new(), table: None }
     }
@@ -238,7 +238,7 @@ impl FactSection {
         self
     }
 
-    /// Adds a fact, if there is a value.
+    /// Adds a fact, or nothing without a value, where [`Self::fact`] would show that there is none.
     #[must_use]
     pub fn fact_if(self, label: &str, value: Option<impl Into<FactValue>>) -> Self {
         match value {
@@ -266,7 +266,7 @@ impl FactTable {
         self.rows.push(values.into());
     }
 
-    /// Returns the values of a column, by its heading.
+    /// Returns the values of the column with a heading from the first row on; `None` if there is no such column.
     pub fn column(&self, heading: &str) -> Option<impl Iterator<Item = &FactValue>> {
         let k = self.columns.iter().position(|column| column == heading)?;
         Some(self.rows.iter().map(move |row| &row[k]))
@@ -274,7 +274,7 @@ impl FactTable {
 }
 
 impl FactValue {
-    /// Creates a number with a unit.
+    /// Creates a number; `unit` follows it on the screen, and is empty for plain numbers.
     pub fn number(value: f64, unit: &'static str) -> Self {
         Self::Number { value, unit }
     }
@@ -294,7 +294,7 @@ impl FactValue {
         Self::number(f64::from(value.try_into().unwrap_or(u32::MAX)), "")
     }
 
-    /// Creates words.
+    /// Creates words, which are shown as they are.
     pub fn text(words: impl Into<String>) -> Self {
         Self::Text(words.into())
     }

@@ -6,14 +6,14 @@ use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// An event.
+/// An event in the form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogEvent {
     /// The cycle in which it happened.
     pub cycle: Cycle,
-    /// Its severity.
+    /// Its severity: the level in the logs of viewers.
     pub level: Severity,
-    /// Its kind.
+    /// Its kind, which also defines the meaning of `value`.
     pub kind: LogEventKind,
     /// The body that it happened to.
     pub who: BodyId,
@@ -37,14 +37,14 @@ impl LogEvent {
 /// A number with its unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// The number.
+    /// The number, in `unit`.
     pub value: f64,
     /// Its unit; empty for plain numbers.
     pub unit: Cow<'static, str>,
 }
 
 impl Quantity {
-    /// Creates a number with its unit.
+    /// Creates a quantity; `unit` is empty for plain numbers.
     pub fn new(value: f64, unit: &'static str) -> Self {
         Self { value, unit: Cow::Borrowed(unit) }
     }
@@ -61,7 +61,7 @@ macro_rules! log_event_kinds {
         }
 
         impl LogEventKind {
-            /// All kinds.
+            /// Every kind once, in the order of declaration.
             pub const ALL: &[Self] = &[$(Self::$kind),*];
 
             /// Returns its name in files.
@@ -77,9 +77,9 @@ macro_rules! log_event_kinds {
 log_event_kinds! {
     /// Two bodies, or a body and a wall, touch.
     Contact = "contact",
-    /// A door has opened.
+    /// A door has opened; the body is the door.
     DoorOpened = "door-opened",
-    /// A door has closed.
+    /// A door has closed; the body is the door.
     DoorClosed = "door-closed",
     /// Two bodies are nearer to each other than they may be; the value is their distance.
     LossOfSeparation = "loss-of-separation",

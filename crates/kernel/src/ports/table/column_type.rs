@@ -22,7 +22,7 @@ pub enum ColumnType {
 }
 
 impl ColumnType {
-    /// All types.
+    /// Every type once, in the order of declaration.
     pub const ALL: [Self; 8] = [
         Self::U32,
         Self::U64,
