@@ -36,9 +36,9 @@ pub enum UpdateOrder {
 /// The settings of an optimization.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OptimizerConfig {
-    /// The estimator of expectations.
+    /// How the players get `E[G | x_i]`.
     pub estimator: Estimator,
-    /// The update of the distributions.
+    /// How a round moves the distributions.
     pub update: Update,
     /// Whether players see the updates of the same round.
     pub order: UpdateOrder,
@@ -46,7 +46,7 @@ pub struct OptimizerConfig {
     pub utility: Utility,
     /// Factor on the temperature after each round, in (0, 1].
     pub cooling: f64,
-    /// The stopping rule.
+    /// When the rounds end.
     pub stop: StopCriterion,
     /// The choice of final strategies from the distributions.
     pub choice: Choice,

@@ -49,7 +49,7 @@ pub enum Choice {
     Draw,
 }
 
-/// A player of a game.
+/// A player of a game: all that it keeps from round to round.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Player {
     /// Probability of each strategy.
@@ -80,6 +80,7 @@ impl Player {
         let Self { q, temperature, sums, counts, expected } = self;
         let has_shape = [q.len(), sums.len(), counts.len()] == [strategies; 3]
             && (expected.is_empty() || expected.len() == strategies);
+        // Players scale their probabilities to sum 1, so rounding errors are far below this tolerance.
         let is_distribution =
             q.iter().all(|p| (0.0..=1.0).contains(p)) && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         let are_counts = counts.iter().all(|count| (0.0..f64::INFINITY).contains(count));

@@ -50,7 +50,7 @@ impl<'a> MountedBeam<'a> {
         row
     }
 
-    /// Returns the beam's true reading.
+    /// The first box along the beam that is not free decides the true reading.
     fn truth(&self, robot: &SingleRobot, pose: GridPose) -> Reading {
         let crossed = self.crossed[usize::from(pose.heading)].iter();
         let mut met = crossed.map(|c| (c, robot.kind_at(pose.col + c.dx, pose.row + c.dy)));

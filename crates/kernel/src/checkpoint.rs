@@ -35,7 +35,7 @@ impl Header {
     /// compared: decoding has refused other formats, and any cycle can be continued.
     ///
     /// # Errors
-    /// When it is not; the error names the first difference.
+    /// When it is not; the error reports the first difference.
     pub fn check_origin(&self, expected: &Self) -> Result<(), CheckpointError> {
         check_match("version", &self.program_version, &expected.program_version)?;
         check_match("world", &self.world, &expected.world)?;

@@ -64,7 +64,7 @@ pub trait Phases: Sync + Sized {
     /// The phase in which agents decide, which determines the names of the phases in reports.
     const DECISION_MODE: DecisionMode = DecisionMode::Independent;
 
-    /// Returns a fresh scratch.
+    /// Returns an empty scratch; called once per worker.
     fn scratch(&self) -> Self::Scratch;
 
     /// Number of bodies, which is the number of tasks in a pool.

@@ -99,7 +99,7 @@ impl<'a> Bundle<'a> {
         self.files.len()
     }
 
-    /// Completes the bundle.
+    /// Returns the scenario's text with all keys set, and the files.
     ///
     /// # Errors
     /// When a key leads through something that is not a table.

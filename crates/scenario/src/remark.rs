@@ -25,7 +25,7 @@ impl Severity {
 /// A remark on a valid scenario.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
-    /// Its weight.
+    /// Its weight; lists of remarks have warnings first.
     pub severity: Severity,
     /// The key in question, in the notation of overrides: `robots.0.effector`.
     pub key: String,

@@ -45,7 +45,7 @@ pub struct StoppingRule {
     pub relative: bool,
     /// Number of runs of the first round; at least 2.
     pub min_runs: usize,
-    /// Maximum number of runs.
+    /// Number of runs after which it stops in any case.
     pub max_runs: usize,
 }
 
@@ -81,7 +81,7 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Returns the reason in words.
+    /// Returns the reason as a clause, without a capital letter or a period.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Reached => "the interval is as narrow as wanted",

@@ -10,7 +10,7 @@ pub struct Space {
     pub name: String,
     /// Shape of one agent's share; empty for a single number.
     pub shape: Vec<usize>,
-    /// The allowed values.
+    /// The allowed values, the same for every number of the shape.
     pub kind: SpaceKind,
     /// Its meaning, in one sentence.
     pub meaning: String,

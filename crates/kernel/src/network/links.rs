@@ -23,7 +23,7 @@ pub struct TimeWindow {
 pub struct RadioOutage {
     /// Id of the agent whose radio is off.
     pub agent: EntityId,
-    /// The period.
+    /// When it is off, in simulated time.
     pub window: TimeWindow,
 }
 
@@ -33,7 +33,7 @@ pub struct RadioOutage {
 pub struct Partition {
     /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
-    /// The period.
+    /// When the sides are apart, in simulated time.
     pub window: TimeWindow,
 }
 
@@ -44,7 +44,7 @@ pub struct UnidirectionalLink {
     pub sender: EntityId,
     /// Id of the agent whose messages to the other are lost.
     pub receiver: EntityId,
-    /// The period.
+    /// When one direction fails, in simulated time.
     pub window: TimeWindow,
 }
 

@@ -122,7 +122,7 @@ impl MemoryRecorder {
 /// Checks that `block` fits `schema`; recorders call it before they store anything.
 ///
 /// # Errors
-/// When a column does not fit; the error names the first one.
+/// When a column does not fit; the error reports the first one.
 pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordError> {
     let given = block.len();
     let expected = schema.columns.len();

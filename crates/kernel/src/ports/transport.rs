@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 pub struct Envelope {
     /// Cycle in which it was sent.
     pub cycle: Cycle,
-    /// The sender.
+    /// Id of the agent that sends it.
     pub sender: EntityId,
     /// Number of the message among the sender's in that cycle.
     pub sequence: u32,
@@ -64,9 +64,9 @@ pub struct MemoryTransport {
     faults: Faults,
     /// Envelopes by receiver, then by the cycle of arrival.
     waiting: BTreeMap<(EntityId, Cycle), Vec<Envelope>>,
-    /// Messages sent.
+    /// Messages sent so far, lost ones included.
     pub messages: u64,
-    /// Bytes of payload sent.
+    /// Bytes of their payloads, without headers.
     pub bytes: u64,
 }
 

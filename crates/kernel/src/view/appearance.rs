@@ -29,7 +29,7 @@ pub const ALERT_COLOR: Color = [0xD0, 0x10, 0x10];
 /// The appearance of a body, apart from its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
-    /// Its color.
+    /// Its color, before the opacity is applied.
     pub color: Color,
     /// Opacity, from 0 (fully transparent) to 1 (opaque).
     pub opacity: f64,

@@ -37,7 +37,7 @@ pub(super) struct KeyLookup<'l> {
 }
 
 impl<'t> Layout<'t> {
-    /// Reads a text.
+    /// Fails if the text is not TOML.
     pub(super) fn parse(text: &'t str) -> Result<Self, TomlError> {
         let document = Document::parse(text)?;
         let mut statements = Vec::new();
@@ -114,7 +114,6 @@ impl<'t> Layout<'t> {
     }
 }
 
-/// Returns the names in a table.
 fn names_of(item: &Item) -> Vec<String> {
     let table = item.as_table_like();
     table.map(|t| t.iter().map(|(key, _)| key.to_string()).collect()).unwrap_or_default()
@@ -166,7 +165,7 @@ fn push_missing(lookup: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditEr
     Ok(())
 }
 
-/// Returns the number of elements of an array.
+/// Returns the number of elements; `None` for what is neither an array nor a list of sections.
 pub(super) fn count(item: &Item) -> Option<usize> {
     let sections = item.as_array_of_tables().map(toml_edit::ArrayOfTables::len);
     sections.or_else(|| item.as_array().map(toml_edit::Array::len))
