@@ -51,7 +51,7 @@ pub enum ReplyTiming {
 pub struct AgentLoop<T> {
     /// The network between them.
     pub transport: T,
-    /// When the agents send their answers; it changes the number of packets, so worlds fix it.
+    /// When the agents send their answers, on which the number of packets depends.
     pub replies: ReplyTiming,
     /// A bound on the ticks that a packet is on its way. With it, agents to which nothing can be on its way are not
     /// asked for packets: of a long chain nearly all connectors wait. Without it, each is asked in each tick.

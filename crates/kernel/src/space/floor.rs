@@ -97,7 +97,7 @@ impl Floor {
         }
     }
 
-    /// Returns the occupant of the box with this index.
+    /// Returns what stands in the box with this index, row by row from the first; claims do not count.
     pub fn occupant(&self, index: usize) -> Occupant {
         fn occupant<T: BoxWord>(word: T) -> Occupant {
             match word {

@@ -39,13 +39,13 @@ pub struct Appearance {
     pub legend: &'static str,
 }
 
-/// Returns the color of the body with this number.
+/// Returns the color of a number; numbers that differ by a multiple of six share one.
 pub fn body_color(number: u32) -> Color {
     BODY_COLORS[number as usize % BODY_COLORS.len()]
 }
 
 impl Body {
-    /// Returns its appearance in a world with this number of dimensions.
+    /// Returns its appearance: in three dimensions, obstacles let what is behind them show through.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
         // Agents are on top, and what stands still at the bottom, because viewers follow what moves.

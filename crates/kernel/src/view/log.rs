@@ -53,7 +53,7 @@ impl Quantity {
 /// Declares the kinds of events with their names in files.
 macro_rules! log_event_kinds {
     ($($(#[$doc:meta])* $kind:ident = $name:literal,)*) => {
-        /// The kinds of events of all worlds.
+        /// The kinds of events of all worlds; a kind has the same meaning in each.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         #[serde(rename_all = "kebab-case")]
         pub enum LogEventKind {
