@@ -26,7 +26,7 @@ pub struct Header {
     pub world: String,
     /// Digest of the resolved scenario's text.
     pub scenario: [u8; 16],
-    /// Cycles done.
+    /// Cycles done: the run continues with the cycle of this number.
     pub cycle: Cycle,
 }
 
@@ -56,13 +56,13 @@ pub enum CheckpointError {
     /// Written with another layout.
     #[error("the checkpoint has format {found}, this program reads format {FORMAT_VERSION}")]
     Format {
-        /// The format that was found.
+        /// The version in the checkpoint's header.
         found: u32,
     },
     /// The checkpoint is of another program version, world or scenario.
     #[error("the checkpoint belongs to {what} `{found}`, not `{expected}`")]
     Foreign {
-        /// The property that differs.
+        /// The property that differs: `version`, `world` or `scenario`.
         what: &'static str,
         /// Its value in the checkpoint's header; digests in hexadecimal.
         found: String,

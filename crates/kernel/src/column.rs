@@ -80,7 +80,7 @@ impl<T: Packed> AtomicValue for T {
 pub struct AtomicCell<T: AtomicValue>(T::Cell);
 
 impl<T: AtomicValue> AtomicCell<T> {
-    /// A cell that holds `value`.
+    /// Creates a cell, before any worker can read it.
     #[inline(always)]
     pub fn new(value: T) -> Self {
         Self(value.cell())

@@ -147,7 +147,7 @@ pub(crate) struct Segment {
     pub(crate) limit_ns: u64,
 }
 
-/// The result of a [`Segment`].
+/// What a segment did, from which the number of workers for the next one is chosen.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SegmentTiming {
     /// Cycles done, at least 1.
@@ -156,7 +156,6 @@ pub(crate) struct SegmentTiming {
     pub(crate) took_ns: u64,
     /// Nanoseconds until the first of them was done.
     pub(crate) first_ns: u64,
-    /// Whether the observer stopped the run.
     pub(crate) is_stopped: bool,
     pub(crate) times: PhaseTimes,
 }
@@ -260,7 +259,7 @@ impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
 }
 
 impl<W: Phases> SegmentContext<'_, W> {
-    /// One worker's part of the segment.
+    /// One worker's part of the segment, with its processor time where this call is measured.
     fn run<C: Clock>(&self, worker: &Worker<'_>, leader: Option<&mut LeaderState<'_, '_, W, C>>) {
         let weight =
             lock(&self.workers[worker.index()]).stats.measurement_weight(self.segment.cycles);

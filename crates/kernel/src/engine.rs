@@ -22,7 +22,7 @@ const ARRANGE_INTERVAL_CYCLES: u64 = 64;
 /// Cycles in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CycleRange {
-    /// The first cycle.
+    /// The first cycle, counted from the start of the run.
     pub from: Cycle,
     /// Number of cycles; 0 for none.
     pub cycles: u64,

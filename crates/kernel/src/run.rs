@@ -206,7 +206,7 @@ impl<W: WorldControl> Run<W> {
         Ok(())
     }
 
-    /// Refuses orders that cannot be obeyed.
+    /// Checks shape and bounds by the teams, and then each order by the world.
     fn check_orders(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.teams.for_each_order(orders, |order| {
             self.world.check_order(order).map_err(|cause| OrderError::Invalid {

@@ -10,7 +10,7 @@ pub struct RunConfig {
     pub name: String,
     /// The seed from which all randomness of the run grows.
     pub seed: u64,
-    /// The maximum number of cycles.
+    /// The maximum number of cycles; a run in which nothing can happen anymore ends before.
     pub cycles: Cycle,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: Cycle,

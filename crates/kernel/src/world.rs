@@ -157,7 +157,7 @@ pub trait WorldRecording: World {
     /// Starts to keep the rows that [`WorldRecording::record`] records.
     fn start_recording(&self, state: &mut Self::State, collector: &mut Self::Collector, now: Cycle);
 
-    /// Starts to keep events for frames.
+    /// Starts to keep events for frames, which costs time and memory that no recording needs.
     fn enable_events(&self, collector: &mut Self::Collector);
 
     /// Starts to keep odometry for frames, in worlds with odometry errors.
@@ -197,7 +197,7 @@ pub trait WorldCheckpoint: World {
     /// Returns the digest of everything in a state that results depend on, in an order that does not depend on slots.
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
-    /// Returns the content of a checkpoint.
+    /// Returns the content of a checkpoint, by entity id and not by slot.
     fn save(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Self::Snapshot;
 
     /// Returns the state that was saved, and restores the saved parts of the collector.
@@ -309,6 +309,6 @@ pub trait WorldMetrics: World {
     /// Returns the outcome of a run, in lines for people.
     fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
-    /// Returns the pose of every body.
+    /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
     fn poses(&self, state: &Self::State, now: Cycle) -> Description;
 }

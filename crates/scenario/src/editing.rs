@@ -27,7 +27,7 @@ pub struct EditTool {
     pub id: &'static str,
     /// Its symbol on narrow screens.
     pub sign: &'static str,
-    /// Its name for people.
+    /// Its name for people, in the toolbar.
     pub name: &'static str,
     /// Its use in a sentence, which the page shows while the tool is chosen.
     pub help: &'static str,

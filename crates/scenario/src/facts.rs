@@ -23,7 +23,7 @@ pub struct RewardTerm {
     pub name: &'static str,
     /// The quantity that it measures.
     pub meaning: &'static str,
-    /// Its computation.
+    /// How it follows from the observations before and after a step.
     pub measure: RewardMeasure,
     /// Its weight in the reward of a caller who gives none; 0 if that has no such term.
     pub default_weight: f64,

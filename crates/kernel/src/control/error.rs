@@ -57,7 +57,7 @@ pub enum OrderError {
     /// Controls were submitted to a run whose agents decide within it.
     #[error("no agent of this run is controlled externally: {cause}")]
     NoExternalAgents {
-        /// The reason, and the remedy.
+        /// The reason and the remedy, in the words of the final error.
         cause: String,
     },
     /// The control of an agent is refused.
@@ -65,7 +65,7 @@ pub enum OrderError {
     Control {
         /// The agent in the world's words, e.g. `connector 2 of chain 0`.
         agent: String,
-        /// The reason, and the remedy.
+        /// The world's reason and the remedy.
         cause: String,
     },
     /// An order that makes no sense to the world.

@@ -42,7 +42,7 @@ impl Space {
     /// float.
     pub const MAX_INTEGER: i64 = (1 << 53) - 1;
 
-    /// Creates a space of single numbers.
+    /// Creates a space with one number per agent.
     pub fn new(name: impl Into<String>, kind: SpaceKind, meaning: impl Into<String>) -> Self {
         Self { name: name.into(), shape: Vec::new(), kind, meaning: meaning.into() }
     }
@@ -53,7 +53,7 @@ impl Space {
         Self { shape: shape.into(), ..self }
     }
 
-    /// Number of values of one agent.
+    /// Number of values of one agent: the product of the shape, 1 for a single number.
     pub fn width(&self) -> usize {
         self.shape.iter().product()
     }

@@ -7,10 +7,10 @@ use crate::ports::{Envelope, Transport};
 use crate::units::EntityId;
 use std::sync::Arc;
 
-/// A packet on its way out.
+/// A packet that an agent has written and its loop is to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutgoingPacket {
-    /// Ids of the receivers.
+    /// Ids of the receivers, shared by all packets to the same agents.
     pub to: Arc<[EntityId]>,
     /// Number among the sender's packets of the conversation.
     pub sequence: u32,

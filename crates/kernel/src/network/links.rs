@@ -53,11 +53,11 @@ pub struct UnidirectionalLink {
 pub struct FaultStreams {
     /// The streams of the run.
     pub streams: Streams,
-    /// Faults of messages.
+    /// For losses, duplicates and delays of single messages.
     pub network: Purpose,
-    /// States of links: in a burst of losses or not.
+    /// For the states of links: in a burst of losses or not.
     pub burst: Purpose,
-    /// Messages lost in a burst.
+    /// For messages within a burst, each of which is lost or not.
     pub burst_loss: Purpose,
 }
 

@@ -18,7 +18,7 @@ const MAGIC: [u8; 2] = *b"Ss";
 const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
-/// Position of the checksum among them.
+/// The checksum is the last field, so that it covers all others.
 const CHECKSUM_OFFSET: usize = HEADER_BYTES - 8;
 /// Initial capacity of a packet in bytes: most messages then need no second allocation.
 const TYPICAL_BYTES: usize = 512;
@@ -68,7 +68,7 @@ impl PacketBuffer {
         Self(postcard::to_extend(message, bytes).expect("messages are plain data"))
     }
 
-    /// Returns an already serialized message.
+    /// Returns the buffer of a message that was serialized before, with room for the header.
     pub fn from_bytes(message: &[u8]) -> Self {
         Self([&[0; HEADER_BYTES], message].concat())
     }
@@ -91,7 +91,7 @@ impl PacketBuffer {
         self.0.len()
     }
 
-    /// Returns the bytes of the packet.
+    /// Writes the header and the checksum into the room before the message, without a copy of it.
     pub fn into_packet<T: Protocol>(mut self, header: &PacketHeader<T>) -> Vec<u8> {
         header.write(&mut self.0[..CHECKSUM_OFFSET]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
@@ -115,7 +115,6 @@ pub struct PacketHeader<T> {
 }
 
 impl<T: Protocol> PacketHeader<T> {
-    /// Writes the bytes before the checksum.
     fn write(&self, bytes: &mut [u8]) {
         let ConversationId { cycle, topic, members } = self.conversation;
         bytes[..2].copy_from_slice(&MAGIC);
@@ -128,7 +127,7 @@ impl<T: Protocol> PacketHeader<T> {
         bytes[32..36].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
-    /// Reads the bytes before the checksum.
+    /// Checks as little as it can: the checksum is not known to be right yet.
     fn read(bytes: &[u8]) -> Result<Self, DropReason> {
         if bytes[..2] != MAGIC {
             return Err(DropReason::NoPacket);
@@ -242,7 +241,7 @@ impl DropReason {
     }
 }
 
-/// Packets that were dropped, by reason.
+/// Packets that were dropped, by [`DropReason`] as a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DropCounts([u64; DropReason::ALL.len()]);
 
@@ -275,7 +274,7 @@ pub fn digest(pieces: [&[u8]; 2]) -> u64 {
 
 /// 2^64 divided by the golden ratio, an odd number with bits in no pattern.
 const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
-/// The second prime of xxHash64.
+/// The second prime of xxHash64, another odd number with bits in no pattern.
 const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
 
 /// Folds a 128-bit product to 64 bits, as wyhash does: every input bit reaches every output bit.

@@ -25,7 +25,7 @@ pub struct Envelope {
     pub payload: Vec<u8>,
 }
 
-/// Delivers envelopes.
+/// Delivers envelopes, none of them in the cycle of sending.
 pub trait Transport {
     /// Sends a message, which may be received from the next cycle on.
     fn send(&mut self, envelope: Envelope);

@@ -15,9 +15,9 @@ pub struct Inspection {
     pub cycle: Cycle,
     /// The body in words, as the heading of a panel.
     pub title: String,
-    /// Facts about it, by topic.
+    /// Facts about it, in the order of the panel.
     pub sections: Vec<FactSection>,
-    /// Marks to draw over the scene.
+    /// Marks to draw over the scene, the first ones lowest.
     pub marks: Vec<Mark>,
 }
 
@@ -26,7 +26,7 @@ pub struct Inspection {
 pub struct FactSection {
     /// The topic, by which [`Inspection::section`] finds it.
     pub title: String,
-    /// Single facts.
+    /// Facts with a value each, in the order of the panel.
     pub facts: Vec<Fact>,
     /// A table after the single facts; `None` where it would have no rows.
     pub table: Option<FactTable>,
@@ -37,7 +37,7 @@ pub struct FactSection {
 pub struct Fact {
     /// The question that it answers.
     pub label: String,
-    /// The answer.
+    /// The answer; [`FactValue::None`] shows that there is none.
     pub value: FactValue,
 }
 
@@ -47,14 +47,14 @@ pub struct Fact {
 pub enum FactValue {
     /// A number with its unit.
     Number {
-        /// The number itself.
+        /// The number, in the unit.
         value: f64,
         /// Its unit; empty for plain numbers.
         unit: &'static str,
     },
     /// A share or probability, from 0 to 1.
     Share(f64),
-    /// Words.
+    /// Words, shown as they are.
     Text(String),
     /// A body by its identity, so that viewers can select it.
     #[serde(serialize_with = "body_fields")]
@@ -70,18 +70,18 @@ pub enum FactValue {
 /// A table of facts of one kind, e.g. one row per neighbor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactTable {
-    /// Headings of the columns.
+    /// Headings of the columns, which fix the length of each row.
     pub columns: Vec<String>,
     /// Rows of a value per column.
     pub rows: Vec<Vec<FactValue>>,
 }
 
-/// Something to draw over the scene.
+/// A figure over the scene that shows one percept, decision or outcome.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// Its role, by which viewers choose a color.
+    /// Its role, by which viewers choose a style.
     pub role: MarkRole,
-    /// Words for it.
+    /// What it shows, in words.
     pub label: String,
     /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
     pub weight: f64,
@@ -89,7 +89,7 @@ pub struct Mark {
     pub shape: MarkShape,
 }
 
-/// What a mark shows; viewers draw each role in a color of its own.
+/// What a mark shows; viewers draw each role in a style of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MarkRole {
@@ -123,12 +123,12 @@ pub enum MarkRole {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum MarkShape {
-    /// A polyline.
+    /// An open polyline.
     Line {
         /// Its points, from one end to the other.
         points_m: Vec<Vec3>,
     },
-    /// A polygon.
+    /// A closed polygon.
     Area {
         /// Its corners, counterclockwise.
         corners_m: Vec<Vec3>,
@@ -180,7 +180,7 @@ impl MarkRole {
 }
 
 impl Inspection {
-    /// Creates an empty inspection.
+    /// Creates an inspection without facts and marks; `cycle` is the one about to run.
     pub fn new(body: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
         Self { body, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
@@ -231,7 +231,7 @@ impl FactSection {
         Self { title: title.into(), facts: Vec::new(), table: None }
     }
 
-    /// Adds a fact.
+    /// Adds a fact after the others.
     #[must_use]
     pub fn fact(mut self, label: impl Into<String>, value: impl Into<FactValue>) -> Self {
         self.facts.push(Fact { label: label.into(), value: value.into() });
@@ -289,7 +289,7 @@ impl FactValue {
         Self::number(value_rad.to_degrees(), "°")
     }
 
-    /// Creates a number without a unit.
+    /// Creates a number without a unit; larger ones than `u32` holds become its maximum.
     pub fn count(value: impl TryInto<u32>) -> Self {
         Self::number(f64::from(value.try_into().unwrap_or(u32::MAX)), "")
     }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 /// An event in the form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogEvent {
-    /// The cycle in which it happened.
+    /// The cycle in which it happened, of which the frame after it shows the result.
     pub cycle: Cycle,
     /// Its severity: the level in the logs of viewers.
     pub level: Severity,
@@ -34,7 +34,7 @@ impl LogEvent {
     }
 }
 
-/// A number with its unit.
+/// The value of an event, with the unit that its kind defines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
     /// The number, in `unit`.
@@ -145,11 +145,11 @@ log_event_kinds! {
     NotPlanned = "not-planned",
 }
 
-/// The severity of an event.
+/// The severity of an event, rising.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Normal.
+    /// A normal course of the run.
     Info,
     /// Unusual, but allowed.
     Warning,

@@ -7,7 +7,7 @@ use crate::ports::Values;
 use crate::units::Cycle;
 use std::collections::BTreeMap;
 
-/// The past path of a body.
+/// The path of a body up to the moment of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     /// The body, which may be gone by now.
@@ -21,7 +21,7 @@ pub struct Trail {
 pub struct PositionColumns {
     /// Name of the table; its column `cycle` has the cycle of each row.
     pub table: &'static str,
-    /// The kind of the bodies.
+    /// The kind of all bodies of the table.
     pub kind: BodyKind,
     /// The column with their numbers.
     pub number: &'static str,

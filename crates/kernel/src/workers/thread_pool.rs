@@ -148,7 +148,7 @@ impl PoolState {
         self.call.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Calls all threads.
+    /// Resets the cursors before the call is visible, and wakes the threads.
     fn start(&self, n: usize, task: Job) {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.call();

@@ -56,7 +56,7 @@ impl<'t> Layout<'t> {
         Ok(lookup)
     }
 
-    /// Follows a key to its end.
+    /// Follows a key to its end; a key that does not exist is an error with a suggestion.
     pub(super) fn find(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
         let lookup = self.look_up(key)?;
         match lookup.rest.first() {

@@ -9,7 +9,7 @@ use toml_edit::{Datetime, Value};
 /// The number up to which whole numbers are exact as floats.
 const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// A value that is set.
+/// A value that is set, from the page or from an override.
 #[derive(Clone, Copy)]
 pub(super) enum NewValue<'v> {
     /// A value by its meaning.

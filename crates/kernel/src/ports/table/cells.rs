@@ -102,7 +102,7 @@ impl<T> Cells<T> {
 }
 
 impl<T: Clone + Default> Cells<T> {
-    /// Appends a cell.
+    /// Appends a cell; `None` is a missing value.
     pub fn push(&mut self, value: Option<T>) {
         self.mask.extend(self.values.len(), 1, value.is_some());
         self.values.push(value.unwrap_or_default());
@@ -222,7 +222,7 @@ impl Texts {
         self.ends.is_empty()
     }
 
-    /// Appends a cell.
+    /// Appends a cell; `None` is a missing text, unlike an empty one.
     pub fn push(&mut self, text: Option<&str>) {
         self.mask.extend(self.ends.len(), 1, text.is_some());
         self.text.push_str(text.unwrap_or_default());
