@@ -36,23 +36,23 @@ pub enum UpdateOrder {
 /// The settings of an optimization.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OptimizerConfig {
-    /// The estimator of expectations.
+    /// How the players get `E[G | x_i]`.
     pub estimator: Estimator,
-    /// The update of the distributions.
+    /// How a round moves the distributions.
     pub update: Update,
-    /// The order of the updates.
+    /// Whether players see the updates of the same round.
     pub order: UpdateOrder,
     /// The cost that players learn from.
     pub utility: Utility,
     /// Factor on the temperature after each round, in (0, 1].
     pub cooling: f64,
-    /// The stopping rule.
+    /// When the rounds end.
     pub stop: StopCriterion,
     /// The choice of final strategies from the distributions.
     pub choice: Choice,
 }
 
-/// The rule by which an optimization stops.
+/// An optimization stops after enough calm rounds in a row, or else at the maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopCriterion {
     /// The largest change of a probability in a calm round.
@@ -81,7 +81,7 @@ pub struct OptimizeResult {
     /// Each player's final estimate of `E[G | x]`, up to a constant: it ranks the strategies that
     /// were not chosen.
     pub expected: Vec<Vec<f64>>,
-    /// Number of rounds.
+    /// Number of rounds that were run, at most `max_rounds`.
     pub rounds: u32,
     /// Whether the distributions converged, rather than the rounds run out.
     pub converged: bool,

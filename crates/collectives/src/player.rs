@@ -49,7 +49,7 @@ pub enum Choice {
     Draw,
 }
 
-/// A player of a game.
+/// A player of a game: all that it keeps from round to round.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Player {
     /// Probability of each strategy.
@@ -80,6 +80,7 @@ impl Player {
         let Self { q, temperature, sums, counts, expected } = self;
         let has_shape = [q.len(), sums.len(), counts.len()] == [strategies; 3]
             && (expected.is_empty() || expected.len() == strategies);
+        // Players scale their probabilities to sum 1, so rounding errors are far below this tolerance.
         let is_distribution =
             q.iter().all(|p| (0.0..=1.0).contains(p)) && (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         let are_counts = counts.iter().all(|count| (0.0..f64::INFINITY).contains(count));
@@ -152,6 +153,7 @@ impl Player {
         let low = self.expected.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let spread = high - low;
+        // The spread is the natural unit of the costs: at this temperature, the worst strategy weighs 1/e of the best.
         if self.temperature == 0.0 {
             self.temperature = spread;
         }
@@ -159,6 +161,7 @@ impl Player {
             // All costs are equal, so no strategy is better than another.
             return 0.0;
         }
+        // With the 1, differences between costs far below 1e-12 count for nothing.
         let t = self.temperature.max(MIN_TEMPERATURE_FRACTION * (low.abs().max(high.abs()) + 1.0));
         let change = match update {
             Update::NearestNewton { step } => self.newton(step, t),

@@ -153,7 +153,7 @@ pub enum ObstacleRule {
 }
 
 impl ObstacleRule {
-    /// All rules.
+    /// Every rule once, in the order of declaration.
     pub const ALL: [Self; 3] = [Self::Cut, Self::Stay, Self::Renormalise];
 
     /// Returns its name in files.

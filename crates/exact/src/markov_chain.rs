@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// A state of a chain: the pose, and the contact as far as the policy depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ChainState {
-    /// The pose of the robot.
+    /// The pose in which the robot chooses its next action.
     pub pose: GridPose,
     /// Whether the last action met an obstacle; always false when the policy ignores contacts.
     pub after_contact: bool,
@@ -28,11 +28,11 @@ pub struct MarkovChain {
 /// The distribution of a chain in the long run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StationaryDistribution {
-    /// Probability of each state.
+    /// Probability of each of [`MarkovChain::states`].
     pub distribution: Vec<f64>,
     /// Total variation between the distribution and itself one action later; 0 if it were exact.
     pub residual: f64,
-    /// Number of iterations made.
+    /// Number of iterations until it converged, or the limit.
     pub iterations: u32,
 }
 
@@ -112,7 +112,7 @@ impl MarkovChain {
         next
     }
 
-    /// Returns the distribution after `actions` actions from the start.
+    /// Returns the distribution over [`MarkovChain::states`] after this number of actions from the start.
     pub fn distribution_after(&self, actions: u64) -> Vec<f64> {
         let mut distribution = self.start_distribution();
         for _ in 0..actions {

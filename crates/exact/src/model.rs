@@ -7,7 +7,7 @@ use sidestep_error_models::effector::{ActionId, Side, Transition};
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 
-/// Largest number of poses of a model.
+/// Largest number of poses of a model, four headings on 50,000 boxes: with the bound of outcomes it bounds the memory.
 pub const MAX_STATES: usize = 200_000;
 /// Largest number of outcomes over all poses and actions; they take about 320 MB.
 const MAX_OUTCOMES: usize = 20_000_000;

@@ -11,7 +11,7 @@ use sidestep_scenario::suggestion;
 /// A beam of one of the robot's sensors.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Beam {
-    /// Name of the sensor.
+    /// Name of the sensor, as in the scenario.
     pub sensor: String,
     /// Number of the beam, from 0 in the order of the sensor's bearings.
     pub index: usize,
@@ -50,7 +50,7 @@ impl<'a> MountedBeam<'a> {
         row
     }
 
-    /// Returns the beam's true reading.
+    /// The first box along the beam that is not free decides the true reading.
     fn truth(&self, robot: &SingleRobot, pose: GridPose) -> Reading {
         let crossed = self.crossed[usize::from(pose.heading)].iter();
         let mut met = crossed.map(|c| (c, robot.kind_at(pose.col + c.dx, pose.row + c.dy)));

@@ -114,7 +114,7 @@ fn merged(outcomes: Vec<(ActionOutcome, f64)>) -> Vec<(ActionOutcome, f64)> {
     sums.into_iter().collect()
 }
 
-/// Returns the unit vector to a side of a body with this heading.
+/// A heading and a side are quarter turns to the left, so their sum is the direction in the world.
 fn unit_vector(heading: u8, side: Side) -> (i32, i32) {
     match (heading + side as u8) % 4 {
         0 => (1, 0),

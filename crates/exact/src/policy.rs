@@ -5,7 +5,7 @@ use sidestep_error_models::effector::FORWARD;
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
 
-/// The names of the policies that have one.
+/// The names that [`policy`] accepts, for messages.
 pub const POLICIES: [&str; 3] = ["uniform", "forward", "bounce"];
 
 /// Returns the policy of a name: `uniform` (each standard action alike), `forward` (always ahead),

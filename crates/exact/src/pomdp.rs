@@ -46,12 +46,12 @@ impl Default for PomdpOptions {
     }
 }
 
-/// The size of a POMDP.
+/// The size of a POMDP, by which a planner's memory and time can be judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct PomdpSize {
-    /// Number of states.
+    /// Number of states: of pairs of a pose and a contact in which an action may end there.
     pub states: usize,
-    /// Number of actions.
+    /// Number of actions, the same in each state.
     pub actions: usize,
     /// Number of observations that can occur in some state.
     pub observations: usize,
@@ -115,7 +115,7 @@ impl Pomdp {
         })
     }
 
-    /// Returns its size.
+    /// Returns its size, without the text being written.
     pub fn size(&self) -> PomdpSize {
         PomdpSize {
             states: self.states.len(),

@@ -22,7 +22,7 @@ pub struct SingleRobot {
     pub kinds: Vec<String>,
     /// The rule for paths that meet an obstacle.
     pub obstacle_rule: ObstacleRule,
-    /// Pose at the start.
+    /// Pose at the start, the first pose of the model.
     pub start: GridPose,
     /// Side of the robot in boxes.
     pub size: u32,
@@ -34,7 +34,7 @@ pub struct SingleRobot {
     pub sensors: Vec<SensorModel>,
     /// Whether every reading is the truth.
     pub has_reliable_sensors: bool,
-    /// The effector.
+    /// The effector, as in free space; obstacles change its transitions by `obstacle_rule`.
     pub effector: EffectorModel,
     /// Whether every action ends as intended.
     pub has_reliable_effector: bool,

@@ -20,7 +20,6 @@ impl<T> SparseMatrix<T> {
         self.ends.push(self.entries.len());
     }
 
-    /// Returns the row with this number.
     pub(super) fn row(&self, index: usize) -> &[T] {
         let begin = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.entries[begin..self.ends[index]]

@@ -27,7 +27,7 @@ use world::{BatchWorld, BufferLayout};
 /// Makes a simulation at its start from a seed.
 pub type SimulationFactory = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
 
-/// Many simulations of one scenario.
+/// Simulations of one scenario, each with a seed of its own and identified by its index, from 0.
 pub struct Batch {
     shared: Arc<SharedWorlds>,
     pool: ThreadPool,
@@ -99,7 +99,7 @@ impl Batch {
         self.pool.workers()
     }
 
-    /// The teams of each world.
+    /// Returns the teams, the same in each world; [`Batch::order`] and [`Batch::observe`] take a team's index here.
     pub fn teams(&self) -> &[Team] {
         &self.teams
     }
@@ -230,7 +230,7 @@ impl Batch {
         self.first_error(|index| seeds[index].is_some()).map_or(Ok(()), Err)
     }
 
-    /// Returns the seed of each world.
+    /// Returns the seed with which each world last started.
     pub fn seeds(&self) -> Vec<u64> {
         (0..self.len()).map(|k| self.world(k).seed).collect()
     }
@@ -259,7 +259,7 @@ impl Batch {
         self.query(|run| run.digest())
     }
 
-    /// Returns the result of a function for each world.
+    /// Returns the result of `get` for each world by index, computed on the calling thread.
     ///
     /// # Errors
     /// When a world has broken off.
@@ -277,7 +277,7 @@ impl Batch {
         self.shared.world(index)
     }
 
-    /// Does some work in each world, on all workers.
+    /// Errors that the work leaves in a world also raise [`SharedWorlds::has_error`].
     fn for_each_world(
         &mut self,
         work: impl Fn(&mut BatchWorld, usize, &SharedWorlds) + Send + Sync + 'static,

@@ -9,7 +9,7 @@ use crate::units::Cycle;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 const MAGIC: &[u8; 8] = b"SIDESTEP";
-/// Bytes of a checksum: a [`Digest`].
+/// Bytes of a checksum, which is a [`Digest`]: it detects damage, not forgery.
 const CHECKSUM_BYTES: usize = 16;
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
@@ -22,11 +22,11 @@ pub struct Header {
     pub format: u32,
     /// Version of the program that wrote it; results may differ between versions.
     pub program_version: String,
-    /// Name of the world.
+    /// Name of the world, as scenarios write it.
     pub world: String,
     /// Digest of the resolved scenario's text.
     pub scenario: [u8; 16],
-    /// Cycles done.
+    /// Cycles done: the run continues with the cycle of this number.
     pub cycle: Cycle,
 }
 
@@ -35,7 +35,7 @@ impl Header {
     /// compared: decoding has refused other formats, and any cycle can be continued.
     ///
     /// # Errors
-    /// When it is not; the error names the first difference.
+    /// When it is not; the error reports the first difference.
     pub fn check_origin(&self, expected: &Self) -> Result<(), CheckpointError> {
         check_match("version", &self.program_version, &expected.program_version)?;
         check_match("world", &self.world, &expected.world)?;
@@ -47,7 +47,7 @@ impl Header {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// Not a checkpoint at all.
+    /// The bytes do not begin with the magic of checkpoints.
     #[error("this is not a checkpoint")]
     NotACheckpoint,
     /// Cut short or changed.
@@ -56,17 +56,17 @@ pub enum CheckpointError {
     /// Written with another layout.
     #[error("the checkpoint has format {found}, this program reads format {FORMAT_VERSION}")]
     Format {
-        /// The format that was found.
+        /// The version in the checkpoint's header.
         found: u32,
     },
     /// The checkpoint is of another program version, world or scenario.
     #[error("the checkpoint belongs to {what} `{found}`, not `{expected}`")]
     Foreign {
-        /// The property that differs.
+        /// The property that differs: `version`, `world` or `scenario`.
         what: &'static str,
-        /// Its value in the checkpoint.
+        /// Its value in the checkpoint's header; digests in hexadecimal.
         found: String,
-        /// The expected value.
+        /// Its value in the run that should continue.
         expected: String,
     },
 }

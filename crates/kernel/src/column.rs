@@ -11,11 +11,11 @@ use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering::Rel
 pub trait AtomicValue: Copy + Default + Send + Sync + 'static {
     /// The atomic that holds it.
     type Cell: Send + Sync;
-    /// Returns a cell with this value.
+    /// Returns the atomic of a new cell.
     fn cell(self) -> Self::Cell;
-    /// Reads a cell.
+    /// Reads a cell in relaxed order, see the module.
     fn load(cell: &Self::Cell) -> Self;
-    /// Writes a cell.
+    /// Writes a cell in relaxed order, see the module.
     fn store(cell: &Self::Cell, value: Self);
 }
 
@@ -52,11 +52,11 @@ impl AtomicValue for f64 {
 
 /// A value that is kept as a number which stands for it.
 pub trait Packed: Copy + Default + Send + Sync + 'static {
-    /// The number.
+    /// The integer that lies in memory in place of the value.
     type Bits: AtomicValue;
     /// Returns the number that stands for this value.
     fn to_bits(self) -> Self::Bits;
-    /// Returns the value that a number stands for.
+    /// Returns the value that a number from [`Self::to_bits`] stands for.
     fn from_bits(code: Self::Bits) -> Self;
 }
 
@@ -80,13 +80,13 @@ impl<T: Packed> AtomicValue for T {
 pub struct AtomicCell<T: AtomicValue>(T::Cell);
 
 impl<T: AtomicValue> AtomicCell<T> {
-    /// A cell that holds `value`.
+    /// Creates a cell, before any worker can read it.
     #[inline(always)]
     pub fn new(value: T) -> Self {
         Self(value.cell())
     }
 
-    /// The value.
+    /// Returns the value of before the last barrier, unless the cell has a writer in the present phase.
     #[inline(always)]
     pub fn get(&self) -> T {
         T::load(&self.0)
@@ -135,7 +135,7 @@ impl<T: AtomicValue> Column<T> {
         (0..n).map(|_| value).collect()
     }
 
-    /// The value of a slot.
+    /// Returns the value of a slot, with the same caveat as [`AtomicCell::get`].
     #[inline(always)]
     pub fn get(&self, slot: usize) -> T {
         T::load(&self.0[slot])
@@ -168,7 +168,7 @@ impl<T: AtomicValue> Column<T> {
         self.0.iter().map(T::load)
     }
 
-    /// Bytes on the heap.
+    /// Bytes on the heap: those of the atomics, one per slot.
     pub fn heap_bytes(&self) -> usize {
         std::mem::size_of_val(&*self.0)
     }
@@ -201,7 +201,7 @@ impl Column<u32> {
 }
 
 impl Column<u64> {
-    /// Adds to a slot's counter.
+    /// Adds to a slot's counter; no atomic addition, so allowed only to the slot's one writer of the phase.
     #[inline(always)]
     pub fn add(&self, slot: usize, by: u64) {
         self.set(slot, self.get(slot).wrapping_add(by));

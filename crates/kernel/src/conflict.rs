@@ -38,6 +38,7 @@ impl ConflictGroups {
     #[inline]
     pub fn reset(&self, slot: Slot) {
         self.parent.set(slot as usize, slot);
+        // `next_sibling` is read of children only, and a join writes it when it makes a slot a child.
         self.first_child.set(slot as usize, NONE);
     }
 
@@ -108,7 +109,7 @@ impl ConflictGroups {
         }
     }
 
-    /// Bytes on the heap.
+    /// Bytes on the heap: three words of 4 bytes per slot.
     pub fn heap_bytes(&self) -> usize {
         self.parent.heap_bytes() + self.first_child.heap_bytes() + self.next_sibling.heap_bytes()
     }

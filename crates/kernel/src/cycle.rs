@@ -35,7 +35,7 @@ pub struct PhaseTimes {
 }
 
 impl PhaseTimes {
-    /// Adds the times of other cycles.
+    /// Adds the times of further cycles, phase by phase.
     pub fn add(&mut self, other: Self) {
         self.claim_ns += other.claim_ns;
         self.join_ns += other.join_ns;
@@ -46,9 +46,9 @@ impl PhaseTimes {
 /// One worker's share of a run: the world's scratch and the kernel's stats.
 #[derive(Debug)]
 pub struct WorkerState<S> {
-    /// The world's scratch.
+    /// Buffers, events and sums that the world keeps per worker.
     pub scratch: S,
-    /// The kernel's stats.
+    /// What the kernel measures of the worker, the same in all worlds.
     pub stats: WorkerStats,
 }
 
@@ -60,15 +60,15 @@ pub struct WorkerStats {
     /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
     /// measured and stand for all.
     pub cpu_ns: u64,
-    /// Calls of a single cycle.
+    /// Calls of a single cycle so far, by which those to measure are chosen.
     single_cycle_calls: u64,
-    /// Buffer for the members of a group.
+    /// Buffer for the members of a group, kept to allocate none per group.
     members: Vec<Slot>,
     /// Bodies in conflict that have not acted yet, in worlds with an auction.
     pending: Vec<Slot>,
 }
 
-/// Number of the first calls of a single cycle that are all measured.
+/// The first calls of a single cycle are all measured, because a short run has too few for a sample.
 const MEASURED_FIRST_CALLS: u64 = 64;
 /// One of this many later calls is measured, and stands for all of them: reading the processor time is a system call,
 /// and a cycle of a small world that gets orders before each cycle takes hardly longer than that call.
@@ -140,7 +140,6 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Cycles in a row that are run without a change of the number of workers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment {
-    /// The first cycle.
     pub(crate) from: Cycle,
     /// The maximum number of cycles.
     pub(crate) cycles: u64,
@@ -148,7 +147,7 @@ pub(crate) struct Segment {
     pub(crate) limit_ns: u64,
 }
 
-/// The result of a [`Segment`].
+/// What a segment did, from which the number of workers for the next one is chosen.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SegmentTiming {
     /// Cycles done, at least 1.
@@ -157,13 +156,11 @@ pub(crate) struct SegmentTiming {
     pub(crate) took_ns: u64,
     /// Nanoseconds until the first of them was done.
     pub(crate) first_ns: u64,
-    /// Whether the observer stopped the run.
     pub(crate) is_stopped: bool,
-    /// Time per phase.
     pub(crate) times: PhaseTimes,
 }
 
-/// The parts of an engine that run a segment.
+/// The fields of an engine that a segment borrows one by one, because only `team` is borrowed mutably.
 pub(crate) struct EngineParts<'a, S, C> {
     pub(crate) groups: &'a ConflictGroups,
     /// One element per worker.
@@ -262,7 +259,7 @@ impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
 }
 
 impl<W: Phases> SegmentContext<'_, W> {
-    /// One worker's part of the segment.
+    /// One worker's part of the segment, with its processor time where this call is measured.
     fn run<C: Clock>(&self, worker: &Worker<'_>, leader: Option<&mut LeaderState<'_, '_, W, C>>) {
         let weight =
             lock(&self.workers[worker.index()]).stats.measurement_weight(self.segment.cycles);

@@ -18,7 +18,7 @@ impl Digest {
         hasher.finish()
     }
 
-    /// The 16 bytes.
+    /// The bytes in the order in which `Display` writes them.
     pub fn as_bytes(&self) -> &[u8; 16] {
         &self.0
     }
@@ -63,12 +63,12 @@ impl Hasher {
         self.write_bytes(&[value]);
     }
 
-    /// Adds a 32-bit word.
+    /// Adds a 32-bit word, little-endian.
     pub fn write_u32(&mut self, value: u32) {
         self.write_bytes(&value.to_le_bytes());
     }
 
-    /// Adds a 64-bit word.
+    /// Adds a 64-bit word, little-endian.
     pub fn write_u64(&mut self, value: u64) {
         self.write_bytes(&value.to_le_bytes());
     }

@@ -19,13 +19,13 @@ pub enum RowError {
     NotAProbability {
         /// Position in the row, from 1.
         index: usize,
-        /// Its value.
+        /// Its value, which may be NaN.
         value: f64,
     },
     /// The row does not sum to 1 (promise L2).
     #[error("the row sums to {}, {} 1 by {}", round_to_micro(*.sum), if *.sum < 1.0 { "short of" } else { "above" }, round_to_micro((.sum - 1.0).abs()))]
     Sum {
-        /// Its sum.
+        /// Its sum, farther from 1 than [`ROW_TOLERANCE`].
         sum: f64,
     },
 }

@@ -22,9 +22,9 @@ const ARRANGE_INTERVAL_CYCLES: u64 = 64;
 /// Cycles in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CycleRange {
-    /// The first cycle.
+    /// The first cycle, counted from the start of the run.
     pub from: Cycle,
-    /// Their number.
+    /// Number of cycles; 0 for none.
     pub cycles: u64,
 }
 
@@ -159,7 +159,8 @@ impl<W: Phases> Engine<W> {
     }
 }
 
-/// Approximate duration of a segment with one worker.
+/// Approximate duration of a segment with one worker: long beside the clock readings around it, and short enough that a
+/// probe starts soon after it is due.
 const SERIAL_SEGMENT_NS: u64 = 5_000_000;
 /// Duration of a segment with all workers: starting their threads is below 1 % of it.
 const PARALLEL_SEGMENT_NS: u64 = 20_000_000;
@@ -175,10 +176,12 @@ const MIN_PARALLEL_CYCLE_NS: f64 = 10_000.0;
 /// hundreds of cycles and a probe takes two or three.
 const EAGER_PROBE_CYCLE_NS: f64 = 1_000_000.0;
 
-/// All workers are chosen only if a cycle takes them less than this share of one worker's time.
+/// All workers are chosen only if a cycle takes them less than this share of one worker's time: a smaller gain is
+/// within the error of a probe of few cycles, and not worth the processor time of all.
 const MAX_PARALLEL_COST_FRACTION: f64 = 0.9;
 
-/// Time before the first probe, and between probes after one that changed the favorite.
+/// Time before the first probe, and between probes after one that changed the favorite: [`PROBE_WAIT_FACTOR`] times
+/// [`PROBE_NS`].
 const MIN_PROBE_WAIT_NS: f64 = 64e6;
 /// Longest time between probes that changed nothing; each of these waits is twice as long as the
 /// one before.
@@ -186,7 +189,8 @@ const MAX_PROBE_WAIT_NS: f64 = 5e9;
 /// A probe is followed by at least this many times its own duration without one.
 const PROBE_WAIT_FACTOR: f64 = 64.0;
 
-/// Weight of the newest segment in the exponential moving average of the cost of a cycle.
+/// Weight of the newest segment in the exponential moving average of the cost of a cycle: one slow segment does not
+/// change the favorite, but a change of load does after a few.
 const EMA_WEIGHT: f64 = 0.25;
 
 /// Decides by measurement whether one worker or all run the next segment.

@@ -8,25 +8,25 @@ use crate::math;
 /// A position or a vector in `D` dimensions, meters.
 pub type Point<const D: usize> = [f64; D];
 
-/// `a + b`.
+/// The point `a` moved by the vector `b`, or the sum of two vectors.
 #[inline]
 pub fn add<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-/// `a - b`.
+/// The vector from `b` to `a`.
 #[inline]
 pub fn sub<const D: usize>(a: Point<D>, b: Point<D>) -> Point<D> {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// `a` scaled by the factor `k`.
+/// The vector `a`, `k` times as long; in the opposite direction where `k` is negative.
 #[inline]
 pub fn scaled<const D: usize>(a: Point<D>, k: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] * k)
 }
 
-/// The point `a + k u`.
+/// The point reached from `a` along `k` times the vector `u`.
 #[inline]
 pub fn add_scaled<const D: usize>(a: Point<D>, u: Point<D>, k: f64) -> Point<D> {
     std::array::from_fn(|i| a[i] + u[i] * k)
@@ -96,7 +96,7 @@ pub fn with_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> 
     std::array::from_fn(|i| if i < D { p[i] } else { 0.0 })
 }
 
-/// The first axis.
+/// The unit vector along the first coordinate.
 pub fn first_axis<const D: usize>() -> Point<D> {
     std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 })
 }
@@ -137,7 +137,7 @@ pub fn cross<const D: usize>(a: Point<D>, b: Point<D>) -> Point<3> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The point of the segment `a b` nearest to `p`.
+/// The point of the segment from `a` to `b` nearest to `p`; `a` where the segment has no length.
 #[inline]
 pub fn nearest_on_segment<const D: usize>(p: Point<D>, a: Point<D>, b: Point<D>) -> Point<D> {
     let d = sub(b, a);

@@ -44,7 +44,7 @@ pub fn hypot(x: f64, y: f64) -> f64 {
     libm::hypot(x, y)
 }
 
-/// `x` to the power `y`.
+/// `x` to the power `y`; NaN for a negative `x` and a `y` with a fraction.
 #[inline]
 pub fn powf(x: f64, y: f64) -> f64 {
     libm::pow(x, y)

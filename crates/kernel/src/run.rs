@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// The start of a run: its settings, its state, and the collector beside the state.
 pub struct RunStart<W: World> {
-    /// The settings.
+    /// The settings, from the keys that all scenarios share.
     pub config: RunConfig,
     /// The state before the first cycle.
     pub state: W::State,
@@ -32,7 +32,7 @@ pub struct RunStart<W: World> {
     pub collector: W::Collector,
 }
 
-/// A run of a world.
+/// A world in progress: its state, its engine, and everything that waits to be replayed or recorded.
 pub struct Run<W: World> {
     world: Arc<W>,
     config: RunConfig,
@@ -94,12 +94,12 @@ impl<W: World> Run<W> {
         self.engine.force_parallel();
     }
 
-    /// The world.
+    /// The world, which several runs may share and no cycle changes.
     pub fn world(&self) -> &Arc<W> {
         &self.world
     }
 
-    /// The state.
+    /// The state at the start of the next cycle.
     pub fn state(&self) -> &W::State {
         &self.state
     }
@@ -188,6 +188,7 @@ impl<W: WorldControl> Run<W> {
         })?;
         if self.order_rows.is_enabled() {
             let names = self.teams.order_names();
+            // An order to no agents may have any name, and has no rows either.
             let name = names.iter().position(|name| name == orders.order).unwrap_or(0) as u32;
             self.teams.for_each_order(orders, |order| {
                 for (part, &value) in (0..).zip(order.values) {
@@ -205,7 +206,7 @@ impl<W: WorldControl> Run<W> {
         Ok(())
     }
 
-    /// Refuses orders that cannot be obeyed.
+    /// Checks shape and bounds by the teams, and then each order by the world.
     fn check_orders(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
         self.teams.for_each_order(orders, |order| {
             self.world.check_order(order).map_err(|cause| OrderError::Invalid {
@@ -233,6 +234,7 @@ impl<W: WorldControl> Run<W> {
         if self.last_applied.replace(self.cycle) == Some(self.cycle) {
             return;
         }
+        // Moved out while its orders are applied, which borrows the run.
         let order_log = std::mem::take(&mut self.order_log);
         for orders in order_log.due(self.cycle) {
             self.apply_orders(&orders).expect("`replay_orders` has checked it");

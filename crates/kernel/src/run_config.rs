@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 pub struct RunConfig {
     /// The scenario's name; may be empty.
     pub name: String,
-    /// The seed.
+    /// The seed from which all randomness of the run grows.
     pub seed: u64,
-    /// The maximum number of cycles.
+    /// The maximum number of cycles; a run in which nothing can happen anymore ends before.
     pub cycles: Cycle,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: Cycle,
@@ -27,7 +27,7 @@ impl RunConfig {
 /// The conflict groups of a run since its start, and its processor time in this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunStats {
-    /// The conflict groups.
+    /// The conflict groups, those before a resumed checkpoint included.
     pub groups: GroupSizes,
     /// Processor time of all workers, in nanoseconds.
     pub cpu_ns: u64,
@@ -36,7 +36,8 @@ pub struct RunStats {
 /// Conflict groups by size: a sum over cycles, which checkpoints keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GroupSizes {
-    /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies.
+    /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies, up to the 2^32 that slots can
+    /// number.
     pub counts: [u64; 32],
     /// Number of bodies of the largest group with a conflict; 0 if there was none.
     pub largest: u64,

@@ -29,7 +29,7 @@ pub trait Simulation: Any + Send {
     /// The settings of the run, from its scenario.
     fn config(&self) -> &RunConfig;
 
-    /// Cycles done.
+    /// Cycles done, which is the number of the next one.
     fn cycle(&self) -> Cycle;
 
     /// Number of entities that act (robots, connectors of chains, airplanes).
@@ -161,7 +161,7 @@ pub trait Simulation: Any + Send {
     /// Returns the outcome of the run so far, in lines of text.
     fn summary_lines(&self) -> KeyValues;
 
-    /// Returns the pose of every body.
+    /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
     fn poses(&self) -> Description;
 
     /// Returns the time spent in each phase in this process.

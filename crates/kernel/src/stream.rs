@@ -97,6 +97,7 @@ impl Draws {
     pub fn next_u32(&mut self) -> u32 {
         let lane = self.index % 4;
         if lane == 0 {
+            // The counter has 16 bits for the block, so a stream repeats after 2^18 words.
             let block = (self.index / 4) as u16;
             self.words = self.streams.block(self.entity, self.cycle, self.purpose, block);
         }

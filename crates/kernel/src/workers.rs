@@ -31,7 +31,8 @@ const MIN_CHUNKS_PER_SHARE: usize = 8;
 /// Spins before a waiting worker yields its processor: 10 to 200 us, by the processor. That is longer than workers wait
 /// for each other at the end of a balanced phase, so that they make no system call.
 const SPINS_BEFORE_YIELD: u32 = 4_000;
-/// Yields before it sleeps.
+/// Yields before a waiting worker sleeps: with more workers than processors, each yield lets one of the others go on,
+/// and waking a sleeper takes a system call.
 const YIELDS_BEFORE_SLEEP: u32 = 200;
 
 /// Returns the number of processors that this process may use, at least 1. The answer takes system
@@ -70,7 +71,7 @@ impl Worker<'_> {
         self.index
     }
 
-    /// Number of workers in the team.
+    /// Number of workers in the team, this one included.
     pub fn team_size(&self) -> usize {
         self.team.map_or(1, WorkerTeam::size)
     }
@@ -254,7 +255,8 @@ impl Barrier {
         }
     }
 
-    /// Waits until a generation has ended.
+    /// Waits until a generation has ended, in three steps of which each uses less processor time than the one before,
+    /// and takes longer to wake up.
     fn wait_for_end(&self, generation: u32, spins: u32) {
         for _ in 0..spins {
             if self.has_ended(generation) {

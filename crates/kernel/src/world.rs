@@ -64,7 +64,7 @@ pub trait Phases: Sync + Sized {
     /// The phase in which agents decide, which determines the names of the phases in reports.
     const DECISION_MODE: DecisionMode = DecisionMode::Independent;
 
-    /// Returns a fresh scratch.
+    /// Returns an empty scratch; called once per worker.
     fn scratch(&self) -> Self::Scratch;
 
     /// Number of bodies, which is the number of tasks in a pool.
@@ -126,7 +126,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     /// The sums, rows and events that a run keeps beside the state.
     type Collector: Send;
 
-    /// Number of agents.
+    /// Number of agents, the same in every cycle.
     fn agents(&self) -> usize;
 
     /// Number of cycles that may run before rows must be recorded.
@@ -157,7 +157,7 @@ pub trait WorldRecording: World {
     /// Starts to keep the rows that [`WorldRecording::record`] records.
     fn start_recording(&self, state: &mut Self::State, collector: &mut Self::Collector, now: Cycle);
 
-    /// Starts to keep events for frames.
+    /// Starts to keep events for frames, which costs time and memory that no recording needs.
     fn enable_events(&self, collector: &mut Self::Collector);
 
     /// Starts to keep odometry for frames, in worlds with odometry errors.
@@ -167,7 +167,7 @@ pub trait WorldRecording: World {
     /// [`WorldRecording::start_recording`] and [`WorldRecording::enable_events`].
     fn prepare(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
 
-    /// Returns the tables that are recorded.
+    /// Returns the recorded tables; the index is a table's number in the recorder.
     fn schemas(&self, collector: &Self::Collector) -> Vec<TableSchema>;
 
     /// Records the rows of all cycles before `now` that were not recorded yet.
@@ -194,10 +194,10 @@ pub trait WorldCheckpoint: World {
     /// depend, by entity id.
     type Snapshot: Serialize + DeserializeOwned;
 
-    /// Returns the digest of a state.
+    /// Returns the digest of everything in a state that results depend on, in an order that does not depend on slots.
     fn digest(&self, state: &Self::State, now: Cycle) -> Digest;
 
-    /// Returns the content of a checkpoint.
+    /// Returns the content of a checkpoint, by entity id and not by slot.
     fn save(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Self::Snapshot;
 
     /// Returns the state that was saved, and restores the saved parts of the collector.
@@ -286,7 +286,7 @@ pub trait WorldControl: World {
 
 /// The measurements of a run, and texts for people.
 pub trait WorldMetrics: World {
-    /// The measurements of a run.
+    /// The measurements of a run; the names of its fields are the names of metrics.
     type Metrics: Serialize;
 
     /// Returns the metrics of the run so far.
@@ -301,7 +301,7 @@ pub trait WorldMetrics: World {
     /// Returns the metrics of each agent, as a JSON array.
     fn agent_metrics(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Value;
 
-    /// Returns the metrics of pairs of agents, in worlds that have any.
+    /// Returns the metrics of pairs of agents; null in worlds without any.
     fn pair_metrics(&self, _: &Self::Collector) -> Value {
         Value::Null
     }
@@ -309,6 +309,6 @@ pub trait WorldMetrics: World {
     /// Returns the outcome of a run, in lines for people.
     fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
-    /// Returns the pose of every body.
+    /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
     fn poses(&self, state: &Self::State, now: Cycle) -> Description;
 }

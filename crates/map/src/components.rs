@@ -26,7 +26,7 @@ impl Components {
         (label != BLOCKED).then_some(label)
     }
 
-    /// Returns the number of boxes of each component, by component.
+    /// Returns the number of boxes of each component; its index is the component's number.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }

@@ -47,19 +47,19 @@ impl UnknownPolicy {
     }
 }
 
-/// The number of cells of each type; the three add up to the number of cells.
+/// The number of boxes of each type; the three add up to the number of boxes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellCounts {
-    /// Cells that are [`Cell::Free`].
+    /// Number of boxes where a body may stand.
     pub free: usize,
-    /// Cells that are [`Cell::Wall`].
+    /// Number of boxes with an occupied pixel, or one that a drawing or a generator makes a wall.
     pub wall: usize,
-    /// Cells that are [`Cell::Unknown`].
+    /// Number of boxes that were not mapped and have no occupied pixel.
     pub unknown: usize,
 }
 
 impl CellCounts {
-    /// Counts `cells`.
+    /// Counts each type in one pass.
     pub fn from_cells(cells: &[Cell]) -> Self {
         let mut counts = Self::default();
         for cell in cells {

@@ -177,7 +177,8 @@ impl BoxDimensions {
         1 + self.rooms_per_side * (self.room_width + 1) + 2 * self.cross_width()
     }
 
-    /// Southernmost row of corridor number `corridor`.
+    /// Returns the southernmost row of a corridor: the first lies north of the outer wall, a room and its wall with the
+    /// door, each further one a whole band farther north.
     fn corridor_row(&self, corridor: u32) -> u32 {
         corridor * self.band_pitch() as u32 + self.room_depth + 2
     }
@@ -258,7 +259,6 @@ impl Layout {
     }
 }
 
-/// Returns `length_m` in whole boxes.
 fn boxes(key: &str, length_m: f64, box_size_m: f64) -> Result<u32, InputError> {
     let boxes = (length_m / box_size_m).round();
     // NaN is refused too, because it is in no range.

@@ -16,7 +16,7 @@ const MAX_BYTES: u64 = 64 << 20;
 /// A scenario that needs no file from elsewhere, together with the files that it contains instead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResolvedScenario {
-    /// The TOML text.
+    /// The TOML text, with seed and cycles and with paths of `files` alone.
     pub text: String,
     /// Files by their path relative to the scenario.
     pub files: Vec<(String, Vec<u8>)>,
@@ -94,12 +94,12 @@ impl<'a> Bundle<'a> {
         Ok(self.add(name, bytes))
     }
 
-    /// Returns the number of files that were added so far.
+    /// Returns the number of files that were added so far, for names that no other file has.
     pub fn count(&self) -> usize {
         self.files.len()
     }
 
-    /// Completes the bundle.
+    /// Returns the scenario's text with all keys set, and the files.
     ///
     /// # Errors
     /// When a key leads through something that is not a table.

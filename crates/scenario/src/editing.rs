@@ -20,18 +20,18 @@ pub struct Editing {
     pub about_files: &'static str,
 }
 
-/// A tool.
+/// A tool of the page's toolbar.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EditTool {
     /// Its name for programs, unique among the tools of a world.
     pub id: &'static str,
     /// Its symbol on narrow screens.
     pub sign: &'static str,
-    /// Its name for people.
+    /// Its name for people, in the toolbar.
     pub name: &'static str,
-    /// Its use.
+    /// Its use in a sentence, which the page shows while the tool is chosen.
     pub help: &'static str,
-    /// Its effect.
+    /// What a press on the canvas does to the text.
     pub action: EditAction,
 }
 
@@ -48,61 +48,61 @@ pub enum EditAction {
     },
     /// Adds a body at a box, to the selected section that gives boxes (`at`), to the last one, or in a new one.
     AddBody {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
         /// Other keys of a new section.
         template: serde_json::Value,
     },
     /// Adds a body that covers all boxes of a rectangle, and clears the map there.
     AddDoor {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
         /// Other keys of a new section.
         template: serde_json::Value,
     },
     /// Adds a box to the way-points of the selected bodies (`behaviour.goals`).
     AddGoal {
-        /// The sections of the bodies.
+        /// Key of the sections of the bodies.
         section: &'static str,
     },
-    /// Adds a point (`at_m`).
+    /// Adds a section with a point (`at_m`).
     AddPoint {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a ball (`at_m`, `radius_m`).
     AddBall {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a wall (`ends_m`).
     AddWall {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a box (`at_m`, `size_m`).
     AddBox {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a triangle, or a corner to the selected polygon (`corners_m`).
     AddPolygon {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a way-point to a ball or a box (`patrol_m`).
     AddPatrol {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a body with its start, heading and first way-point (`at_m`, `heading_deg`, `way_points_m`).
     AddRoute {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
     /// Adds a way-point to the selected route.
     AddWayPoint {
-        /// The sections.
+        /// Key of the sections that the tool adds to, or edits.
         section: &'static str,
     },
 }
@@ -129,40 +129,40 @@ pub enum PaintArea {
 pub enum EditItems {
     /// Way-points and areas of bodies on boxes.
     Goals {
-        /// The sections of the bodies.
+        /// Key of the sections of the bodies.
         section: &'static str,
     },
     /// Bodies on boxes (`at`, `size`).
     Bodies {
-        /// The sections.
+        /// Key of the sections that have them.
         section: &'static str,
         /// The noun for one of them.
         noun: &'static str,
-        /// Whether they have headings.
+        /// Whether they have headings, and so can be rotated.
         turns: bool,
     },
     /// Points (`at_m`).
     Points {
-        /// The sections.
+        /// Key of the sections that have them.
         section: &'static str,
         /// The noun for one of them.
         noun: &'static str,
     },
     /// Balls, walls, boxes and polygons, with their patrols.
     Obstacles {
-        /// The sections.
+        /// Key of the sections that have them.
         section: &'static str,
     },
     /// Starts (`at_m`), and the targets of tasks.
     Starts {
-        /// The sections.
+        /// Key of the sections that have them.
         section: &'static str,
         /// The noun for one of them.
         noun: &'static str,
     },
     /// Routes: starts, headings and way-points.
     Routes {
-        /// The sections.
+        /// Key of the sections that have them.
         section: &'static str,
         /// The noun for one of them.
         noun: &'static str,
@@ -176,14 +176,14 @@ pub struct EditNote {
     pub when: Option<&'static str>,
     /// The key without which it holds.
     pub unless: Option<&'static str>,
-    /// Its words.
+    /// The restriction in a sentence.
     pub text: &'static str,
 }
 
 /// The use of a file that holds no scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FileUse {
-    /// The kind of the file.
+    /// The kind of the files, by which the page finds the use of one.
     pub kind: UsedFile,
     /// Endings of its name, e.g. `.png`; none for any name.
     pub endings: &'static [&'static str],
@@ -208,7 +208,7 @@ pub enum UsedFile {
 }
 
 impl EditTool {
-    /// Returns a tool that selects.
+    /// The tool that selects; in space a world gives it another `help`.
     pub const SELECT: Self = Self {
         id: "select",
         sign: "↖",

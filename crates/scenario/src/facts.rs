@@ -10,9 +10,9 @@ pub struct WorldFacts {
     pub default_order: Option<&'static str>,
     /// The terms of rewards, from the observations of agents.
     pub reward_terms: &'static [RewardTerm],
-    /// The recorded positions of agents.
+    /// Where recordings have the positions of agents, for plots of their paths.
     pub positions: Option<RecordedPositions>,
-    /// The sizes of conflict groups.
+    /// Where results have the sizes of conflict groups.
     pub group_sizes: Option<GroupSizes>,
 }
 
@@ -23,7 +23,7 @@ pub struct RewardTerm {
     pub name: &'static str,
     /// The quantity that it measures.
     pub meaning: &'static str,
-    /// Its computation.
+    /// How it follows from the observations before and after a step.
     pub measure: RewardMeasure,
     /// Its weight in the reward of a caller who gives none; 0 if that has no such term.
     pub default_weight: f64,
@@ -35,17 +35,17 @@ pub struct RewardTerm {
 pub enum RewardMeasure {
     /// The observation after the step.
     Value {
-        /// The observation.
+        /// Name of the observation: that of its space.
         observation: &'static str,
     },
     /// 1 where the observation after the step is above 0.
     Positive {
-        /// The observation.
+        /// Name of the observation: that of its space.
         observation: &'static str,
     },
     /// 1 where the observation has changed.
     Changed {
-        /// The observation.
+        /// Name of the observation: that of its space.
         observation: &'static str,
     },
     /// The sum of the absolute changes of all components.
@@ -55,7 +55,7 @@ pub enum RewardMeasure {
     },
     /// The increase of an observation.
     Increase {
-        /// The observation.
+        /// Name of the observation: that of its space.
         observation: &'static str,
         /// The observation that is 0 where the others are only padding, of agents that do not act yet, or no more.
         active: &'static str,
@@ -67,7 +67,7 @@ pub enum RewardMeasure {
         /// The number of targets left. After reaching one, an agent observes the next one, at an unrelated distance:
         /// then the term is the distance to the reached one.
         targets_left: &'static str,
-        /// As in [`RewardMeasure::Increase`].
+        /// The observation that is 0 for agents that do not act, as in [`RewardMeasure::Increase`].
         active: &'static str,
         /// The distance beyond which a target stands for none, in meters.
         none_beyond_m: f64,
@@ -99,11 +99,11 @@ pub struct RecordedPositions {
     pub kinds: &'static [&'static str],
 }
 
-/// The unit of recorded positions.
+/// The unit of the coordinates, which decides how a plot scales them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionUnit {
-    /// Meters.
+    /// Meters in the frame of the world.
     Meters,
     /// Boxes of a floor, whose facts (`box_m`, `origin_x_m`, `origin_y_m`, `yaw_rad`) the table has.
     Boxes,
@@ -115,14 +115,14 @@ pub enum PositionUnit {
 pub enum GroupSizes {
     /// A metric: the number of groups of 1, 2 to 3, 4 to 7, ... bodies.
     Metric {
-        /// Its name.
+        /// Name of the metric, a list in the results of a run.
         metric: &'static str,
     },
     /// A recorded table with a row for each group.
     Column {
-        /// Name of the table.
+        /// Name of the table in a recording.
         table: &'static str,
-        /// The column with the group's size.
+        /// The column with the number of bodies of each group.
         column: &'static str,
     },
 }

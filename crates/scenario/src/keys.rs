@@ -11,12 +11,12 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
-/// A key of a table.
+/// A key of a table, with its position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// The key itself.
+    /// The key without quotes.
     pub name: String,
-    /// Its position in the text.
+    /// Its position in the text, in bytes, without its value.
     pub span: Range<usize>,
 }
 
@@ -131,7 +131,7 @@ impl<'t, 'i> LocatedValue<'t, 'i> {
     }
 }
 
-/// Returns the value at a path.
+/// `None` if a part of the path does not exist.
 fn find<'t, 'i>(root: &'t Spanned<DeValue<'i>>, path: &str) -> Option<LocatedValue<'t, 'i>> {
     let mut located = LocatedValue::without_key(root);
     for part in parse_key(path).ok()? {

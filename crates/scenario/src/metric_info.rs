@@ -142,7 +142,7 @@ pub const fn phrase<const LEN: usize>(doc: &str) -> [u8; LEN] {
     phrase
 }
 
-/// A metric in words for people.
+/// A metric in words for people, also where its world does not list it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MetricLabel {
     /// A few words for titles and axes, without the unit.

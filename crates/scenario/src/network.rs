@@ -20,9 +20,9 @@ use std::ops::Range;
 
 /// The names of a world's agents in its network's section, and the defaults there.
 pub trait AgentNaming {
-    /// A radio outage, as in the file.
+    /// A radio outage as the file has it, with an agent in the world's own notation.
     type RadioOutage: DeserializeOwned + JsonSchema + Debug;
-    /// A partition, as in the file.
+    /// A partition as the file has it, with sides in the world's own notation.
     type Partition: DeserializeOwned + JsonSchema + Debug;
     /// A link that works in one direction, as in the file.
     type UnidirectionalLink: DeserializeOwned + JsonSchema + Debug;
@@ -31,7 +31,7 @@ pub trait AgentNaming {
     const DEFAULT_LATENCY_S: f64;
     /// The shortest latency that the world's clock can resolve, seconds.
     const MIN_LATENCY_S: f64;
-    /// Number of conversations in a cycle, one after the other.
+    /// Number of conversations in a cycle: one follows the other, so they share its time.
     const CONVERSATIONS_PER_CYCLE: u32;
     /// Words for the longest deadline.
     const MAX_DEADLINE_TEXT: &str;
@@ -58,19 +58,19 @@ pub trait AgentNaming {
     ) -> Result<UnidirectionalLink, SectionError>;
 }
 
-/// An error in a network's section.
+/// An error without the text's place, which the world's compiler adds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionError {
     /// Its position in the text; none for the section itself.
     pub span: Option<Range<usize>>,
-    /// The cause.
+    /// The cause, in the words of the final error.
     pub cause: String,
-    /// The remedy.
+    /// The remedy, in the words of the final error.
     pub remedy: String,
 }
 
 impl SectionError {
-    /// Returns an error of the section itself.
+    /// Returns an error of the section as a whole, which no single fault causes.
     pub fn new(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { span: None, cause: cause.into(), remedy: remedy.into() }
     }

@@ -156,7 +156,7 @@ pub type NonNegative = Number<AtLeastZero>;
 pub type Fraction = Number<Closed<0, 1>>;
 
 impl<R: Rule> Number<R> {
-    /// Returns the number.
+    /// Returns the number, which its rule allows.
     pub fn get(self) -> f64 {
         self.0
     }
@@ -209,7 +209,7 @@ impl<'de, R: Rule> Deserialize<'de> for Number<R> {
 pub struct Integer<const MIN: u64, const MAX: u64 = { u64::MAX }>(u64);
 
 impl<const MIN: u64, const MAX: u64> Integer<MIN, MAX> {
-    /// Returns the number.
+    /// Returns the number, from `MIN` to `MAX`.
     pub fn get(self) -> u64 {
         self.0
     }
@@ -292,7 +292,7 @@ impl<'de, const D: usize, R: Rule> Deserialize<'de> for Point<D, R> {
 /// One number, or a minimum and a maximum: `0.5` or `[0.4, 0.6]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NumberRange {
-    /// The minimum.
+    /// The minimum; not checked, as ranges have limits of their own where they are used.
     pub low: f64,
     /// The maximum; may equal the minimum.
     pub high: f64,
@@ -352,7 +352,7 @@ impl<'de> Visitor<'de> for RangeVisitor {
 
 /// The start of the message of an invalid value. Serde's errors are one text, so value and remedy travel in it.
 const INVALID_VALUE_PREFIX: &str = "wrong value `";
-/// The separator between the value and the remedy.
+/// Ends the value in such a message, where it occurs first.
 const REMEDY_SEPARATOR: &str = "`, ";
 
 /// Creates the error of a type that refuses a value; `Source::parse` adds key and position.

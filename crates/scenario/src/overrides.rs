@@ -38,7 +38,7 @@ impl Source {
 
 /// A parsed override.
 struct Override<'a> {
-    /// Its name in errors.
+    /// The whole option as an error's place: `--set a=1`.
     place: String,
     key: &'a str,
     value: Value,

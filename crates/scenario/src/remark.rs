@@ -25,7 +25,7 @@ impl Severity {
 /// A remark on a valid scenario.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
-    /// Its weight.
+    /// Its weight; lists of remarks have warnings first.
     pub severity: Severity,
     /// The key in question, in the notation of overrides: `robots.0.effector`.
     pub key: String,
@@ -34,12 +34,12 @@ pub struct Remark {
 }
 
 impl Remark {
-    /// Creates a warning.
+    /// Creates a remark on a run that is probably not the one that its author wants.
     pub fn warning(key: impl Into<String>, words: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, key: key.into(), words: words.into() }
     }
 
-    /// Creates a note.
+    /// Creates a remark on a run that may differ from its author's expectation.
     pub fn note(key: impl Into<String>, words: impl Into<String>) -> Self {
         Self { severity: Severity::Note, key: key.into(), words: words.into() }
     }

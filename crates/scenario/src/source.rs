@@ -23,7 +23,7 @@ pub(crate) const OVERRIDES_SUFFIX: &str = " (with --set)";
 /// The text of a scenario, its name in errors, and the folder that its paths are relative to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
-    /// Its name in errors.
+    /// Its name in errors: a path, or what the caller gave.
     pub place: String,
     /// The TOML text with overrides applied: the resolved scenario.
     pub text: String,
@@ -36,14 +36,14 @@ pub struct Source {
 pub struct Preamble {
     /// See [`FORMAT`].
     pub format: Spanned<u32>,
-    /// Name of the world.
+    /// Name of the world, which need not be a known one.
     pub world: Spanned<String>,
 }
 
 /// Words in errors about constructs that may span many lines: without its end, all errors after one follow from it.
 const MULTILINE_CONSTRUCTS: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
 
-/// Keys of [`Head`].
+/// Keys of [`Head`], which must be known before a scenario is split into head and sections.
 const HEAD_KEYS: [&str; 5] = ["format", "world", "name", "seed", "cycles"];
 
 /// The keys that all worlds share.

@@ -23,7 +23,7 @@ impl<T> Spanned<T> {
         self.0.span()
     }
 
-    /// Returns the value.
+    /// Returns the value, while the position stays with it.
     pub fn get_ref(&self) -> &T {
         self.0.get_ref()
     }

@@ -75,7 +75,7 @@ pub trait WorldType: Send + Sync {
 
 /// A scenario that was checked and compiled; many runs of it share one world.
 pub trait CompiledScenario: Send + Sync {
-    /// Name of its world.
+    /// Name of its world, as scenarios write it.
     fn world(&self) -> &'static str;
 
     /// The settings of its runs.
@@ -92,7 +92,7 @@ pub trait CompiledScenario: Send + Sync {
         Vec::new()
     }
 
-    /// Returns the effect of another seed.
+    /// Returns what another seed would change: a sweep runs a scenario once where that is nothing.
     fn seed_effect(&self) -> SeedEffect {
         SeedEffect::Decide
     }
@@ -187,12 +187,12 @@ impl Worlds {
         self.types.iter().map(AsRef::as_ref)
     }
 
-    /// Returns the names of the worlds.
+    /// Returns the names of the worlds, in the order of the list.
     pub fn names(&self) -> Vec<&'static str> {
         self.iter().map(WorldType::name).collect()
     }
 
-    /// Returns the world with this name.
+    /// Returns the world with this name; names are compared as they are.
     pub fn find(&self, name: &str) -> Option<&dyn WorldType> {
         self.iter().find(|world| world.name() == name)
     }

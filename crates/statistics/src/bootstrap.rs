@@ -92,6 +92,7 @@ impl Bootstrap {
         acceleration: f64,
         statistic: impl Fn(&[T]) -> Option<f64>,
     ) -> Option<Interval> {
+        // Resamples of two values have three means only; and a draw chooses among at most 2^32 items.
         if items.len() < 3 || u32::try_from(items.len()).is_err() {
             return None;
         }
@@ -105,7 +106,8 @@ impl Bootstrap {
             return None;
         }
         resampled.sort_by(f64::total_cmp);
-        // A difference from the estimate by rounding alone is a tie, at any magnitude.
+        // A difference from the estimate by rounding alone is a tie, at any magnitude: this fraction of the range of
+        // the resamples is far above rounding errors, and far below a difference that matters.
         let rounding = 1e-10 * (resampled[resampled.len() - 1] - resampled[0]);
         let below = resampled.partition_point(|v| *v < estimate - rounding);
         let ties = resampled.partition_point(|v| *v <= estimate + rounding) - below;

@@ -12,9 +12,9 @@ pub(super) const Z_975: f64 = 1.959_963_984_540_054;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(into = "[f64; 2]")]
 pub struct Interval {
-    /// Lower end.
+    /// Lower end, which belongs to the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end, which belongs to the interval.
     pub high: f64,
 }
 

@@ -15,7 +15,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Creates the sample of these runs.
+    /// Creates the sample of these runs, one item each; `None` for a run without a value.
     pub fn from_runs(runs: impl IntoIterator<Item = Option<f64>>) -> Self {
         let mut sample = Self::default();
         for value in runs {
@@ -114,7 +114,7 @@ pub fn percentile(sorted: &[f64], q: f64) -> Option<f64> {
 /// Size, mean, spread and percentiles of a set of measurements, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moments {
-    /// Number of values.
+    /// Number of values, at least 1.
     pub n: usize,
     /// Arithmetic mean.
     pub mean: f64,

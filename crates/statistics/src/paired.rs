@@ -40,7 +40,7 @@ impl Pairs {
         self.incomplete
     }
 
-    /// Returns `a - b`, pair by pair.
+    /// Returns `a - b` for each complete pair, in the order of the cases.
     pub fn differences(&self) -> Vec<f64> {
         self.pairs.iter().map(|(a, b)| a - b).collect()
     }

@@ -8,7 +8,7 @@ use sidestep_kernel::math;
 /// A correlation with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Correlation {
-    /// The correlation, from -1 to 1.
+    /// Spearman's coefficient, from -1 (orders are opposite) to 1 (orders agree).
     pub value: f64,
     /// Its interval, by Fisher's transformation with the variance of Bonett and Wright (2000); absent
     /// with fewer than four pairs, or where the order is perfect.
@@ -51,6 +51,7 @@ fn fisher_interval(correlation: f64, n: usize) -> Option<Interval> {
     Some(Interval { low: tanh(z - half_width), high: tanh(z + half_width) })
 }
 
+/// By `exp`, because [`math`] has no hyperbolic functions.
 fn tanh(z: f64) -> f64 {
     1.0 - 2.0 / (math::exp(2.0 * z) + 1.0)
 }

@@ -45,11 +45,11 @@ pub struct StoppingRule {
     pub relative: bool,
     /// Number of runs of the first round; at least 2.
     pub min_runs: usize,
-    /// Maximum number of runs.
+    /// Number of runs after which it stops in any case.
     pub max_runs: usize,
 }
 
-/// The answer of a [`StoppingRule`].
+/// The next step of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopDecision {
@@ -81,7 +81,7 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Returns the reason in words.
+    /// Returns the reason as a clause, without a capital letter or a period.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Reached => "the interval is as narrow as wanted",
@@ -133,7 +133,7 @@ impl StoppingRule {
         StopDecision::Run(total)
     }
 
-    /// Decides at the end of a round.
+    /// Decides at the end of a round. A target that the last possible run reaches counts as reached.
     fn decide_round(&self, values: &[Option<f64>]) -> StopDecision {
         let runs = values.len();
         let sample = Sample::from_runs(values.iter().copied()).values;

@@ -1,4 +1,5 @@
-//! A POMDP as text.
+//! A POMDP as text in Cassandra's POMDP file format, which dictates the keywords and the order of the lines:
+//! <https://www.pomdp.org/code/pomdp-file-spec.html>.
 
 use super::Pomdp;
 use std::fmt;
@@ -8,11 +9,13 @@ impl fmt::Display for Pomdp {
         writeln!(f, "# {}: one robot, computed exactly from its tables.", self.place)?;
         writeln!(f, "# State c3r4-east: lower-left box in column 3, row 4, heading east; behind")?;
         writeln!(f, "# it side and kind of the contact, if the last action ended in one.\n")?;
+        // The preamble, whose lines the format wants before all others; values may be rewards or costs.
         writeln!(f, "discount: {}\nvalues: reward", self.discount)?;
         writeln!(f, "states: {}", self.states.join(" "))?;
         writeln!(f, "actions: {}", self.actions.join(" "))?;
         writeln!(f, "observations: {}", self.observations.join(" "))?;
         writeln!(f, "start: {}\n", self.states[0])?;
+        // T: action : from : to probability. Entries that a file does not have are 0, so only the others are written.
         for (state, from) in self.states.iter().enumerate() {
             for (action, name) in self.actions.iter().enumerate() {
                 let row = self.transitions.row(state * self.actions.len() + action);
@@ -20,9 +23,12 @@ impl fmt::Display for Pomdp {
             }
         }
         writeln!(f)?;
+        // O: action : state after it : observation probability. `*` stands for all: what is observed depends on the
+        // state alone.
         for (row, state) in self.readings.rows().zip(&self.states) {
             write_row(f, &format!("O: * : {state}"), &self.observations, row)?;
         }
+        // R: action : from : to : observation reward. A later line replaces an earlier one for what both match.
         writeln!(f, "\nR: * : * : * : * 0")?;
         self.goals
             .iter()

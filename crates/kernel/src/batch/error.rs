@@ -14,35 +14,36 @@ pub enum BatchError {
     /// Too few or too many values, one for each world.
     #[error("a batch of {worlds} worlds needs {worlds} {what}, not {found}")]
     Count {
-        /// Number of worlds.
+        /// Worlds of the batch: the number of values that would be right.
         worlds: usize,
         /// The plural noun for the values, e.g. `seeds`.
         what: &'static str,
-        /// Number of values.
+        /// Number of values that were given.
         found: usize,
     },
     /// A world cannot start.
     #[error("world {world} cannot start with seed {seed}: {error}")]
     Start {
-        /// Its index.
+        /// Its index in the batch.
         world: usize,
-        /// Its seed.
+        /// The seed that was refused; the world may still run with an older one.
         seed: u64,
-        /// The reason.
+        /// The error of the factory.
         error: InputError,
     },
     /// A world with agents that observe, or are ordered, differently from those of the first.
     #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
     Shape {
-        /// Its index.
+        /// Its index in the batch.
         world: usize,
     },
-    /// An order that cannot be obeyed; no world got an order.
+    /// An order that cannot be obeyed: no world got it if [`Batch::order`](super::Batch::order) found that, all others
+    /// if [`Batch::advance`](super::Batch::advance) did.
     #[error("world {world}: {error}")]
     Order {
         /// Index of the world.
         world: usize,
-        /// The reason.
+        /// The error of that world's run.
         error: OrderError,
     },
     /// A missing team, or buffers of another shape.
@@ -54,9 +55,9 @@ pub enum BatchError {
          are whole, restart this one"
     )]
     Broken {
-        /// Its index.
+        /// Its index in the batch.
         world: usize,
-        /// Its seed.
+        /// The seed of its last start.
         seed: u64,
         /// Cycles that it had done before.
         cycle: Cycle,

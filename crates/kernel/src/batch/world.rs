@@ -6,7 +6,7 @@ use crate::simulation::Simulation;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// One of the worlds.
+/// A world behind its lock: any worker may work on it, one at a time.
 pub(super) struct BatchWorld {
     pub(super) seed: u64,
     /// `None` if it panicked, or never started.
@@ -44,7 +44,7 @@ impl BatchWorld {
         self.run.as_ref().map_or(&[], |run| run.teams())
     }
 
-    /// Returns the error of a world without a run.
+    /// A world without a run keeps its error, so the other answer would mean that the error was lost.
     pub(super) fn no_run_error(&self, index: usize) -> BatchError {
         self.error.clone().unwrap_or_else(|| BatchError::Broken {
             world: index,
@@ -77,7 +77,8 @@ impl BatchWorld {
         }
     }
 
-    /// Starts the world again; it stays the same if that fails. `teams`, if given, are those that it must have.
+    /// Starts the world again. It stays the same if the seed is refused or the teams differ from `teams`, where given;
+    /// a panic breaks it.
     pub(super) fn restart(
         &mut self,
         index: usize,
@@ -107,7 +108,7 @@ impl BatchWorld {
         self.error = Some(error);
     }
 
-    /// Observes into its own buffers.
+    /// Observes into its own buffers, for [`Self::copy_observations`] on the calling thread.
     pub(super) fn observe(&mut self, index: usize, team: usize, layouts: &[BufferLayout]) {
         let mut buffers = std::mem::take(&mut self.buffers);
         let fits = buffers.len() == layouts.len()

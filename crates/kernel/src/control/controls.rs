@@ -4,7 +4,6 @@ use crate::ports::{MemoryRecorder, Table, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
-/// Name of the table of controls.
 const CONTROLS: &str = "controls";
 /// Number of bytes in a row: tables have no type for bytes, and 64-bit integers are their widest.
 const ROW_BYTES: usize = 8;
@@ -20,7 +19,6 @@ pub(crate) struct ControlRow {
     value: u64,
 }
 
-/// Returns the table of controls.
 pub(crate) fn controls_table() -> Table<ControlRow> {
     Table::new(CONTROLS)
         .u64("cycle", "cycle for which the control was handed over", |c: &ControlRow| c.cycle)
@@ -30,7 +28,7 @@ pub(crate) fn controls_table() -> Table<ControlRow> {
         .u64("value", "the bytes, the first one lowest", |c| c.value)
 }
 
-/// Returns the rows of controls for a cycle.
+/// The first row belongs to no agent; see [`ControlRow`].
 pub(crate) fn control_rows(
     cycle: Cycle,
     controls: &[(EntityId, Vec<u8>)],
@@ -98,7 +96,7 @@ pub struct ControlReader {
 }
 
 impl ControlReader {
-    /// Name of the table that it reads.
+    /// Name of the table in a recording.
     pub const TABLE: &'static str = CONTROLS;
 
     /// Reads the next rows. `None` if they are not those of controls.
@@ -123,6 +121,7 @@ impl ControlReader {
                 controls.push((agent, Vec::new()));
             }
             let (last_agent, control) = controls.last_mut()?;
+            // The parts of a control lie in consecutive rows, the first with part 0.
             if *last_agent != agent {
                 return None;
             }
@@ -131,7 +130,7 @@ impl ControlReader {
         Some(())
     }
 
-    /// Returns all controls that were read.
+    /// Returns the controls of all blocks so far.
     pub fn into_log(self) -> ControlLog {
         self.log
     }

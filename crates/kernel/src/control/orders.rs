@@ -5,7 +5,6 @@ use crate::ports::Table;
 use crate::units::{Cycle, EntityId};
 use std::ops::Range;
 
-/// Name of the table of orders.
 pub(super) const ORDERS: &str = "orders";
 
 /// One value of an order, as recorded.
@@ -19,7 +18,7 @@ pub(crate) struct OrderRow {
     pub(crate) value: f64,
 }
 
-/// Returns the table of orders; `names` are the names of all of them.
+/// `names` are the labels of its column `order`: those of all orders of all teams.
 pub(crate) fn orders_table(names: Vec<String>) -> Table<OrderRow> {
     Table::new(ORDERS)
         .u64("cycle", "cycle before which the order was given, counted from 0", |o: &OrderRow| {
@@ -102,7 +101,7 @@ impl OrderLog {
         self.entries.get(next).map(|entry| entry.cycle)
     }
 
-    /// Number of entries for cycles before `cycle`.
+    /// Index of the first entry of `cycle` or a later one.
     fn count_before(&self, cycle: Cycle) -> usize {
         self.entries.partition_point(|entry| entry.cycle < cycle)
     }

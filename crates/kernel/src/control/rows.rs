@@ -22,7 +22,7 @@ struct IncompleteOrder {
 }
 
 impl OrderReader {
-    /// Name of the table that it reads.
+    /// Name of the table in a recording.
     pub const TABLE: &'static str = ORDERS;
 
     /// Reads the next rows. `None` if the columns are not those of orders.
@@ -56,7 +56,7 @@ impl OrderReader {
         Some(())
     }
 
-    /// Returns all orders that were read.
+    /// Returns the orders of all blocks so far; the last one counts as complete.
     pub fn into_log(mut self) -> OrderLog {
         self.finish_order();
         self.log

@@ -10,16 +10,16 @@ pub struct Space {
     pub name: String,
     /// Shape of one agent's share; empty for a single number.
     pub shape: Vec<usize>,
-    /// The allowed values.
+    /// The allowed values, the same for every number of the shape.
     pub kind: SpaceKind,
     /// Its meaning, in one sentence.
     pub meaning: String,
 }
 
-/// The values of a space.
+/// Type and bounds of the values of a space, the same for every number of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SpaceKind {
-    /// One of these, by number from 0.
+    /// Named choices; a value is the index of a name.
     Discrete(Vec<String>),
     /// Whole numbers from `low` to `high`, both included.
     Integer {
@@ -30,9 +30,9 @@ pub enum SpaceKind {
     },
     /// Numbers from `low` to `high`, both included; infinite where there is no bound.
     Real {
-        /// The lowest value.
+        /// The lowest value, in the unit of the space's name.
         low: f64,
-        /// The highest value.
+        /// The highest value, in the unit of the space's name.
         high: f64,
     },
 }
@@ -42,7 +42,7 @@ impl Space {
     /// float.
     pub const MAX_INTEGER: i64 = (1 << 53) - 1;
 
-    /// Creates a space of single numbers.
+    /// Creates a space with one number per agent.
     pub fn new(name: impl Into<String>, kind: SpaceKind, meaning: impl Into<String>) -> Self {
         Self { name: name.into(), shape: Vec::new(), kind, meaning: meaning.into() }
     }
@@ -53,7 +53,7 @@ impl Space {
         Self { shape: shape.into(), ..self }
     }
 
-    /// Number of values of one agent.
+    /// Number of values of one agent: the product of the shape, 1 for a single number.
     pub fn width(&self) -> usize {
         self.shape.iter().product()
     }

@@ -12,7 +12,8 @@ pub struct Team {
     pub name: String,
     /// Its agents, rising; rows of arrays are in this order.
     pub agents: Vec<EntityId>,
-    /// Spaces of their observations.
+    /// Spaces of their observations, in the order of the buffers of
+    /// [`Simulation::observe`](crate::Simulation::observe).
     pub observation_spaces: Vec<Space>,
     /// Spaces of orders to them; empty for agents that decide for themselves.
     pub action_spaces: Vec<Space>,
@@ -21,9 +22,9 @@ pub struct Team {
 /// One order to several agents: one row of values for each.
 #[derive(Debug, Clone, Copy)]
 pub struct Orders<'a> {
-    /// Name of the space.
+    /// Name of one of the receivers' action spaces.
     pub order: &'a str,
-    /// Receivers.
+    /// Ids of the receivers, which may be of several teams that take this order.
     pub agents: &'a [EntityId],
     /// Their values, one agent after the other.
     pub values: &'a [f64],
@@ -32,13 +33,13 @@ pub struct Orders<'a> {
 /// One order to one agent, checked against its space.
 #[derive(Debug, Clone, Copy)]
 pub struct Order<'a> {
-    /// Number of the team.
+    /// Index of the receiver's team in [`Teams::all`].
     pub team: usize,
-    /// Number of the space among those in which the team is ordered.
+    /// Index of the space in [`Team::action_spaces`].
     pub space: usize,
-    /// The receiver.
+    /// Id of the receiver.
     pub agent: EntityId,
-    /// The values.
+    /// One per number of the space's shape, each within its bounds.
     pub values: &'a [f64],
 }
 
@@ -48,13 +49,12 @@ pub struct Teams {
     all: Vec<Team>,
     /// Number of each entity's team, by id; [`NONE`] for those in none.
     team_of: Vec<u32>,
-    /// The noun for an agent.
+    /// The world's noun for an agent, for errors.
     noun: &'static str,
-    /// Names of all orders, each once.
+    /// Names of all orders, each once: the labels of the table `orders`.
     order_names: Vec<String>,
 }
 
-/// Stands for no team.
 const NONE: u32 = u32::MAX;
 
 impl Teams {
@@ -76,17 +76,15 @@ impl Teams {
         Self { all, team_of, noun, order_names }
     }
 
-    /// The teams.
+    /// Returns the teams; the index is a team's number everywhere else.
     pub fn all(&self) -> &[Team] {
         &self.all
     }
 
-    /// Returns whether any agent takes orders.
     pub(crate) fn accept_orders(&self) -> bool {
         self.all.iter().any(|team| !team.action_spaces.is_empty())
     }
 
-    /// The names of all orders, each once.
     pub(crate) fn order_names(&self) -> &[String] {
         &self.order_names
     }
@@ -190,7 +188,6 @@ impl Teams {
 /// The space in which a team takes an order.
 #[derive(Clone, Copy)]
 struct ActionSpace<'a> {
-    /// Number of the team.
     team: usize,
     /// Number of the space among the team's action spaces.
     index: usize,

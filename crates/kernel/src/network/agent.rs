@@ -7,20 +7,20 @@ use crate::ports::{Envelope, Transport};
 use crate::units::EntityId;
 use std::sync::Arc;
 
-/// A packet on its way out.
+/// A packet that an agent has written and its loop is to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutgoingPacket {
-    /// Ids of the receivers.
+    /// Ids of the receivers, shared by all packets to the same agents.
     pub to: Arc<[EntityId]>,
     /// Number among the sender's packets of the conversation.
     pub sequence: u32,
-    /// All of its bytes.
+    /// All of its bytes, header included.
     pub payload: Vec<u8>,
 }
 
 /// The program of an agent, as a state machine without a clock or a socket: packets and ticks in, packets out.
 pub trait NetworkAgent {
-    /// Its id on the network.
+    /// Its id on the network, which never changes.
     fn id(&self) -> EntityId;
 
     /// Receives a packet that came off the network from an agent: any bytes. Unreadable and impossible packets are
@@ -51,7 +51,7 @@ pub enum ReplyTiming {
 pub struct AgentLoop<T> {
     /// The network between them.
     pub transport: T,
-    /// When they send their answers.
+    /// When the agents send their answers, on which the number of packets depends.
     pub replies: ReplyTiming,
     /// A bound on the ticks that a packet is on its way. With it, agents to which nothing can be on its way are not
     /// asked for packets: of a long chain nearly all connectors wait. Without it, each is asked in each tick.
@@ -77,6 +77,7 @@ impl<T: Transport> AgentLoop<T> {
             let next = timers.chain(self.transport.next_arrival()).min();
             // The last tick stands for a time that never comes.
             let Some(next) = next.filter(|next| *next < u64::MAX) else { return };
+            // A timer may be set to a tick that has passed; it is due at once.
             tick = tick.max(next);
             for (place, agent) in agents.iter_mut().enumerate() {
                 if arrivals.can_arrive(place, tick) {
@@ -125,8 +126,9 @@ impl<T: Transport> AgentLoop<T> {
 /// The last tick in which something may arrive at each agent.
 struct ArrivalBounds {
     max_flight_ticks: Option<u64>,
-    /// Ids of the agents, rising.
+    /// Ids of the agents, rising, so that bisection finds a receiver.
     ids: Vec<EntityId>,
+    /// By place in `ids`; 0 before anything was sent to the agent.
     last_ticks: Vec<u64>,
 }
 

@@ -13,13 +13,14 @@ use std::collections::BTreeMap;
 pub struct FaultInjector {
     network: Network,
     streams: FaultStreams,
+    /// As in [`FaultInjector::start_cycle`].
     conversations: Vec<(u64, f64)>,
     /// Tick from which on each direction of a link is free.
     free_at: BTreeMap<[EntityId; 2], f64>,
 }
 
 impl FaultInjector {
-    /// Returns a network with these faults.
+    /// Returns the injector of an agent before its first cycle.
     pub fn new(network: Network, streams: FaultStreams) -> Self {
         Self { network, streams, conversations: vec![(0, 0.0)], free_at: BTreeMap::new() }
     }
@@ -35,6 +36,8 @@ impl FaultInjector {
     /// the tick by which all of the packet is sent, and the tick in which it arrives. The packet's `cycle` is the
     /// tick in which sending starts. The range is not checked, because no process has the places of all agents.
     pub fn arrivals(&mut self, packet: Envelope) -> Vec<(u64, u64)> {
+        // A network in memory for this packet alone: the same code then draws the same faults as in a run in one
+        // process.
         let network = Some(&self.network);
         let mut transport =
             FaultyTransport::in_memory(network, self.streams, None, &self.conversations);

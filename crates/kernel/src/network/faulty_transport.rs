@@ -82,6 +82,7 @@ impl<T: Transport> FaultyTransport<'_, T> {
         let free_at = self.free_at.entry([envelope.sender, envelope.receiver]).or_default();
         let bits = 8.0 * envelope.payload.len() as f64;
         *free_at = free_at.max(envelope.cycle as f64) + bits / bits_per_tick;
+        // The tick in which the last bit is sent; the transport inside adds the latency of one tick.
         free_at.floor() as u64
     }
 }

@@ -12,18 +12,18 @@ const STEPS_PER_MEAN: f64 = 10.0;
 /// A period, in seconds after the start of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeWindow {
-    /// Its start.
+    /// Its start, included.
     pub from_s: f64,
-    /// Its end; may be infinite.
+    /// Its end, excluded; may be infinite.
     pub until_s: f64,
 }
 
 /// A period in which an agent's radio is off: it neither sends nor receives, and is aware of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadioOutage {
-    /// Id of the agent.
+    /// Id of the agent whose radio is off.
     pub agent: EntityId,
-    /// The period.
+    /// When it is off, in simulated time.
     pub window: TimeWindow,
 }
 
@@ -33,7 +33,7 @@ pub struct RadioOutage {
 pub struct Partition {
     /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
-    /// The period.
+    /// When the sides are apart, in simulated time.
     pub window: TimeWindow,
 }
 
@@ -44,7 +44,7 @@ pub struct UnidirectionalLink {
     pub sender: EntityId,
     /// Id of the agent whose messages to the other are lost.
     pub receiver: EntityId,
-    /// The period.
+    /// When one direction fails, in simulated time.
     pub window: TimeWindow,
 }
 
@@ -53,11 +53,11 @@ pub struct UnidirectionalLink {
 pub struct FaultStreams {
     /// The streams of the run.
     pub streams: Streams,
-    /// Faults of messages.
+    /// For losses, duplicates and delays of single messages.
     pub network: Purpose,
-    /// States of links: in a burst of losses or not.
+    /// For the states of links: in a burst of losses or not.
     pub burst: Purpose,
-    /// Messages lost in a burst.
+    /// For messages within a burst, each of which is lost or not.
     pub burst_loss: Purpose,
 }
 

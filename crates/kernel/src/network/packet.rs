@@ -12,11 +12,13 @@
 use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
 
+/// The first bytes of each packet, so that those of other programs are recognized at once.
 const MAGIC: [u8; 2] = *b"Ss";
+/// Version of this layout and of its checksum; packets of other versions are dropped.
 const VERSION: u8 = 2;
 /// Number of bytes before the message.
 pub const HEADER_BYTES: usize = 44;
-/// Position of the checksum among them.
+/// The checksum is the last field, so that it covers all others.
 const CHECKSUM_OFFSET: usize = HEADER_BYTES - 8;
 /// Initial capacity of a packet in bytes: most messages then need no second allocation.
 const TYPICAL_BYTES: usize = 512;
@@ -35,7 +37,7 @@ pub trait Protocol: Copy + Ord {
 pub struct ConversationId<T> {
     /// The cycle that is decided.
     pub cycle: Cycle,
-    /// The topic.
+    /// The topic; a cycle has its topics in rising order.
     pub topic: T,
     /// A digest of the ids of all members: agents that assume different groups are in different conversations.
     pub members: u64,
@@ -66,7 +68,7 @@ impl PacketBuffer {
         Self(postcard::to_extend(message, bytes).expect("messages are plain data"))
     }
 
-    /// Returns an already serialized message.
+    /// Returns the buffer of a message that was serialized before, with room for the header.
     pub fn from_bytes(message: &[u8]) -> Self {
         Self([&[0; HEADER_BYTES], message].concat())
     }
@@ -78,7 +80,7 @@ impl PacketBuffer {
         Self(packet)
     }
 
-    /// The message.
+    /// The serialized message, without the room for the header.
     pub fn message(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]
     }
@@ -89,7 +91,7 @@ impl PacketBuffer {
         self.0.len()
     }
 
-    /// Returns the bytes of the packet.
+    /// Writes the header and the checksum into the room before the message, without a copy of it.
     pub fn into_packet<T: Protocol>(mut self, header: &PacketHeader<T>) -> Vec<u8> {
         header.write(&mut self.0[..CHECKSUM_OFFSET]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
@@ -104,16 +106,15 @@ impl PacketBuffer {
 pub struct PacketHeader<T> {
     /// Digest of scenario and build: packets with any other are dropped.
     pub fingerprint: u64,
-    /// The conversation.
+    /// The conversation to which the packet belongs; each of its parts is in the header.
     pub conversation: ConversationId<T>,
-    /// The sender.
+    /// Id of the sender, which nothing in a packet proves.
     pub sender: EntityId,
     /// Number among the sender's packets of the conversation.
     pub sequence: u32,
 }
 
 impl<T: Protocol> PacketHeader<T> {
-    /// Writes the bytes before the checksum.
     fn write(&self, bytes: &mut [u8]) {
         let ConversationId { cycle, topic, members } = self.conversation;
         bytes[..2].copy_from_slice(&MAGIC);
@@ -126,7 +127,7 @@ impl<T: Protocol> PacketHeader<T> {
         bytes[32..36].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
-    /// Reads the bytes before the checksum.
+    /// Checks as little as it can: the checksum is not known to be right yet.
     fn read(bytes: &[u8]) -> Result<Self, DropReason> {
         if bytes[..2] != MAGIC {
             return Err(DropReason::NoPacket);
@@ -179,7 +180,7 @@ pub fn parse_packet<T: Protocol>(
     Ok((header, message))
 }
 
-/// A reason reason a packet was dropped.
+/// A reason why a packet was dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum DropReason {
     /// Too short, or without the first bytes of a packet.
@@ -207,7 +208,7 @@ pub enum DropReason {
 }
 
 impl DropReason {
-    /// All reasons.
+    /// Every reason once, by its index in [`DropCounts`].
     pub const ALL: [Self; 11] = [
         Self::NoPacket,
         Self::Version,
@@ -240,12 +241,12 @@ impl DropReason {
     }
 }
 
-/// Packets that were dropped, by reason.
+/// Packets that were dropped, by [`DropReason`] as a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DropCounts([u64; DropReason::ALL.len()]);
 
 impl DropCounts {
-    /// Counts a packet that was dropped.
+    /// Adds one to the packets that were dropped for a reason.
     pub fn record(&mut self, reason: DropReason) {
         self.0[reason as usize] += 1;
     }
@@ -273,7 +274,7 @@ pub fn digest(pieces: [&[u8]; 2]) -> u64 {
 
 /// 2^64 divided by the golden ratio, an odd number with bits in no pattern.
 const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
-/// The second prime of xxHash64.
+/// The second prime of xxHash64, another odd number with bits in no pattern.
 const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
 
 /// Folds a 128-bit product to 64 bits, as wyhash does: every input bit reaches every output bit.
@@ -288,17 +289,18 @@ fn digest_bytes(bytes: &[u8]) -> u64 {
     const LANES: usize = 4;
     let (pairs, rest) = bytes.as_chunks::<16>();
     let (blocks, pairs) = pairs.as_chunks::<LANES>();
+    // Different starts, so that equal blocks in two lanes give different sums.
     let mut sums: [u64; LANES] = [1, 2, 3, 4];
     for block in blocks {
         sums = std::array::from_fn(|lane| mix_pair(sums[lane], &block[lane]));
     }
     let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
+    // Data that end in zeros differ from this padding by their length, which `digest` mixes in.
     let mut last = [0; 16];
     last[..rest.len()].copy_from_slice(rest);
     mix_pair(pairs.iter().fold(sum, mix_pair), &last)
 }
 
-/// Adds two words to a digest.
 fn mix_pair(sum: u64, bytes: &[u8; 16]) -> u64 {
     let (words, _) = bytes.as_chunks::<8>();
     let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);

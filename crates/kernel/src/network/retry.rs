@@ -6,7 +6,7 @@ use super::RetryPolicy;
 #[derive(Debug, Clone)]
 pub struct RetryTimer {
     policy: RetryPolicy,
-    /// Tick of the last progress.
+    /// Tick of the last message or request.
     waiting_since: u64,
     /// Size of the largest packet that went over its links, in bytes.
     max_packet_bytes: usize,

@@ -65,7 +65,7 @@ pub struct MemoryRecorder {
 }
 
 impl MemoryRecorder {
-    /// Creates empty tables of these schemas.
+    /// Creates an empty table for each schema; its index is the table's number for [`Recorder::append`].
     pub fn new(schemas: &[TableSchema]) -> Self {
         let tables = schemas
             .iter()
@@ -113,16 +113,16 @@ impl MemoryRecorder {
         }
     }
 
-    /// Returns whether [`Recorder::finish`] was called.
+    /// Returns whether [`Recorder::finish`] was called: until then the tables may lack rows.
     pub fn is_finished(&self) -> bool {
         self.finished
     }
 }
 
-/// Checks that `block` fits `schema`.
+/// Checks that `block` fits `schema`; recorders call it before they store anything.
 ///
 /// # Errors
-/// When a column does not fit; the error names the first one.
+/// When a column does not fit; the error reports the first one.
 pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordError> {
     let given = block.len();
     let expected = schema.columns.len();

@@ -10,22 +10,22 @@ use crate::units::{Cycle, EntityId};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One message.
+/// One message. Its first three fields come first because receivers sort messages by them.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Envelope {
     /// Cycle in which it was sent.
     pub cycle: Cycle,
-    /// The sender.
+    /// Id of the agent that sends it.
     pub sender: EntityId,
     /// Number of the message among the sender's in that cycle.
     pub sequence: u32,
-    /// The receiver.
+    /// The one receiver: a message to several is sent to each.
     pub receiver: EntityId,
     /// The content, serialized.
     pub payload: Vec<u8>,
 }
 
-/// Delivers envelopes.
+/// Delivers envelopes, none of them in the cycle of sending.
 pub trait Transport {
     /// Sends a message, which may be received from the next cycle on.
     fn send(&mut self, envelope: Envelope);
@@ -64,9 +64,9 @@ pub struct MemoryTransport {
     faults: Faults,
     /// Envelopes by receiver, then by the cycle of arrival.
     waiting: BTreeMap<(EntityId, Cycle), Vec<Envelope>>,
-    /// Messages sent.
+    /// Messages sent so far, lost ones included.
     pub messages: u64,
-    /// Bytes of payload sent.
+    /// Bytes of their payloads, without headers.
     pub bytes: u64,
 }
 

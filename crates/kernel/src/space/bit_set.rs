@@ -12,7 +12,7 @@ impl AtomicBitSet {
         Self((0..boxes.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
     }
 
-    /// Returns whether a box is marked.
+    /// Returns whether a box is marked; during a phase that marks boxes, perhaps not yet.
     #[inline]
     pub fn contains(&self, index: usize) -> bool {
         self.0[index / 64].load(Relaxed) >> (index % 64) & 1 == 1
@@ -29,7 +29,7 @@ impl AtomicBitSet {
         word.load(Relaxed) & bit == 0 && word.fetch_or(bit, Relaxed) & bit == 0
     }
 
-    /// Bytes on the heap.
+    /// Bytes on the heap: an eighth of the number of boxes, in whole words.
     pub fn heap_bytes(&self) -> usize {
         size_of_val(&*self.0)
     }

@@ -74,9 +74,9 @@ pub enum Floor {
 /// The occupant of a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Occupant {
-    /// Nothing.
+    /// Nothing stands there; a claim does not count.
     Empty,
-    /// A wall.
+    /// A wall, which stays for the whole run.
     Wall,
     /// The body in this slot.
     Body(Slot),
@@ -97,7 +97,7 @@ impl Floor {
         }
     }
 
-    /// Returns the occupant of the box with this index.
+    /// Returns what stands in the box with this index, row by row from the first; claims do not count.
     pub fn occupant(&self, index: usize) -> Occupant {
         fn occupant<T: BoxWord>(word: T) -> Occupant {
             match word {
@@ -120,7 +120,7 @@ impl Floor {
         }
     }
 
-    /// Bytes on the heap.
+    /// Bytes on the heap: 2 or 4 per box, by the variant.
     pub fn heap_bytes(&self) -> usize {
         match self {
             Self::Narrow(boxes) => boxes.heap_bytes(),

@@ -15,13 +15,13 @@ pub const BODY_COLORS: [Color; 6] = [
     [0xE6, 0x9F, 0x00],
     [0x56, 0xB4, 0xE9],
 ];
-/// Color of walls and everything else that stands still.
+/// Dark gray, for walls and everything else that stands still.
 pub const WALL_COLOR: Color = [0x3C, 0x3C, 0x3C];
-/// Color of unmapped boxes.
+/// Nearly white, because a map may consist mostly of unmapped boxes.
 pub const UNKNOWN_COLOR: Color = [0xED, 0xEB, 0xE6];
-/// Color of things that move but do not act.
+/// Light gray, for things that move but do not act.
 pub const MOBILE_COLOR: Color = [0xA6, 0xA6, 0xA6];
-/// Color of doors.
+/// Brown, like wood; an open door has a low opacity.
 pub const DOOR_COLOR: Color = [0x8B, 0x5A, 0x2B];
 /// Color of conditions that should not occur.
 pub const ALERT_COLOR: Color = [0xD0, 0x10, 0x10];
@@ -29,7 +29,7 @@ pub const ALERT_COLOR: Color = [0xD0, 0x10, 0x10];
 /// The appearance of a body, apart from its shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
-    /// Its color.
+    /// Its color, before the opacity is applied.
     pub color: Color,
     /// Opacity, from 0 (fully transparent) to 1 (opaque).
     pub opacity: f64,
@@ -39,15 +39,16 @@ pub struct Appearance {
     pub legend: &'static str,
 }
 
-/// Returns the color of the body with this number.
+/// Returns the color of a number; numbers that differ by a multiple of six share one.
 pub fn body_color(number: u32) -> Color {
     BODY_COLORS[number as usize % BODY_COLORS.len()]
 }
 
 impl Body {
-    /// Returns its appearance in a world with this number of dimensions.
+    /// Returns its appearance: in three dimensions, obstacles let what is behind them show through.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
+        // Agents are on top, and what stands still at the bottom, because viewers follow what moves.
         let layer = match self.kind {
             BodyKind::Door | BodyKind::Obstacle => 1,
             BodyKind::Start | BodyKind::Goal => 2,
@@ -63,6 +64,7 @@ impl Body {
         // In space an opaque obstacle would hide everything behind it.
         let opacity = if dimensions == 2 { 1.0 } else { 0.22 };
         match (self.kind, self.state) {
+            // Zones, starts and goals let the bodies within them show through.
             (BodyKind::Zone, Condition::Touching) => (ALERT_COLOR, 0.4),
             (BodyKind::Zone, _) => (own, 0.15),
             (_, Condition::Touching | Condition::Failed) => (ALERT_COLOR, 1.0),

@@ -8,55 +8,55 @@ use serde::{Serialize, Serializer};
 /// Percepts and decisions of a body in a cycle, and their outcome, in a form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
-    /// The body.
+    /// The inspected body; serialized with the names of its fields.
     #[serde(serialize_with = "body_fields")]
     pub body: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
-    /// The body's name for people.
+    /// The body in words, as the heading of a panel.
     pub title: String,
-    /// Facts about it, by topic.
+    /// Facts about it, in the order of the panel.
     pub sections: Vec<FactSection>,
-    /// Marks to draw over the scene.
+    /// Marks to draw over the scene, the first ones lowest.
     pub marks: Vec<Mark>,
 }
 
 /// Facts about one topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactSection {
-    /// The topic.
+    /// The topic, by which [`Inspection::section`] finds it.
     pub title: String,
-    /// Single facts.
+    /// Facts with a value each, in the order of the panel.
     pub facts: Vec<Fact>,
-    /// A table of facts of one kind.
+    /// A table after the single facts; `None` where it would have no rows.
     pub table: Option<FactTable>,
 }
 
-/// A fact.
+/// An answer to one question about the body.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fact {
     /// The question that it answers.
     pub label: String,
-    /// The answer.
+    /// The answer; [`FactValue::None`] shows that there is none.
     pub value: FactValue,
 }
 
-/// The value of a fact.
+/// The value of a fact by its type, because viewers lay out each type in its own form.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FactValue {
-    /// A number.
+    /// A number with its unit.
     Number {
-        /// The number itself.
+        /// The number, in the unit.
         value: f64,
         /// Its unit; empty for plain numbers.
         unit: &'static str,
     },
     /// A share or probability, from 0 to 1.
     Share(f64),
-    /// Words.
+    /// Words, shown as they are.
     Text(String),
-    /// A body.
+    /// A body by its identity, so that viewers can select it.
     #[serde(serialize_with = "body_fields")]
     Body(BodyId),
     /// A position in meters.
@@ -70,26 +70,26 @@ pub enum FactValue {
 /// A table of facts of one kind, e.g. one row per neighbor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactTable {
-    /// Headings of the columns.
+    /// Headings of the columns, which fix the length of each row.
     pub columns: Vec<String>,
     /// Rows of a value per column.
     pub rows: Vec<Vec<FactValue>>,
 }
 
-/// Something to draw over the scene.
+/// A figure over the scene that shows one percept, decision or outcome.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// Its role in the inspection.
+    /// Its role, by which viewers choose a style.
     pub role: MarkRole,
-    /// Words for it.
+    /// What it shows, in words.
     pub label: String,
     /// Likelihood or strength, from 0 to 1; 1 where that has no meaning.
     pub weight: f64,
-    /// Its shape.
+    /// Its shape, at its place in the world.
     pub shape: MarkShape,
 }
 
-/// The role of a mark in an inspection.
+/// What a mark shows; viewers draw each role in a style of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MarkRole {
@@ -119,28 +119,28 @@ pub enum MarkRole {
     Target,
 }
 
-/// The shape of a mark, in meters.
+/// The shape of a mark in the frame of the world, in meters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub enum MarkShape {
-    /// A polyline.
+    /// An open polyline.
     Line {
-        /// Its points.
+        /// Its points, from one end to the other.
         points_m: Vec<Vec3>,
     },
-    /// A polygon.
+    /// A closed polygon.
     Area {
         /// Its corners, counterclockwise.
         corners_m: Vec<Vec3>,
     },
-    /// A point.
+    /// A position without extent.
     Point {
         /// Its position.
         at_m: Vec3,
     },
     /// A horizontal circle.
     Circle {
-        /// Its center.
+        /// Its center, at its height.
         at_m: Vec3,
         /// Its radius.
         radius_m: f64,
@@ -162,7 +162,7 @@ fn body_fields<S: Serializer>(
 }
 
 impl MarkRole {
-    /// All roles.
+    /// Every role once, in the order of declaration.
     pub const ALL: [Self; 12] = [
         Self::True,
         Self::Reported,
@@ -180,7 +180,7 @@ impl MarkRole {
 }
 
 impl Inspection {
-    /// Creates an empty inspection.
+    /// Creates an inspection without facts and marks; `cycle` is the one about to run.
     pub fn new(body: BodyId, cycle: Cycle, title: impl Into<String>) -> Self {
         Self { body, cycle, title: title.into(), sections: Vec::new(), marks: Vec::new() }
     }
@@ -208,7 +208,7 @@ impl Inspection {
         self.marks.push(Mark { role, label: label.into(), weight: weight.clamp(0.0, 1.0), shape });
     }
 
-    /// Returns the section with a title.
+    /// Returns the section with a title; `None` where the body has no facts on that topic.
     pub fn section(&self, title: &str) -> Option<&FactSection> {
         self.sections.iter().find(|section| section.title == title)
     }
@@ -219,26 +219,26 @@ impl Inspection {
         Some(&fact.value)
     }
 
-    /// Returns all marks in a role.
+    /// Returns the marks in a role, in the order in which they were added.
     pub fn marks_with_role(&self, role: MarkRole) -> impl Iterator<Item = &Mark> {
         self.marks.iter().filter(move |mark| mark.role == role)
     }
 }
 
 impl FactSection {
-    /// Creates a section without facts.
+    /// Creates a section without facts, which [`Inspection::add_section`] leaves out if it stays empty.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), facts: Vec::new(), table: None }
     }
 
-    /// Adds a fact.
+    /// Adds a fact after the others.
     #[must_use]
     pub fn fact(mut self, label: impl Into<String>, value: impl Into<FactValue>) -> Self {
         self.facts.push(Fact { label: label.into(), value: value.into() });
         self
     }
 
-    /// Adds a fact, if there is a value.
+    /// Adds a fact, or nothing without a value, where [`Self::fact`] would show that there is none.
     #[must_use]
     pub fn fact_if(self, label: &str, value: Option<impl Into<FactValue>>) -> Self {
         match value {
@@ -266,7 +266,7 @@ impl FactTable {
         self.rows.push(values.into());
     }
 
-    /// Returns the values of a column, by its heading.
+    /// Returns the values of the column with a heading from the first row on; `None` if there is no such column.
     pub fn column(&self, heading: &str) -> Option<impl Iterator<Item = &FactValue>> {
         let k = self.columns.iter().position(|column| column == heading)?;
         Some(self.rows.iter().map(move |row| &row[k]))
@@ -274,7 +274,7 @@ impl FactTable {
 }
 
 impl FactValue {
-    /// Creates a number with a unit.
+    /// Creates a number; `unit` follows it on the screen, and is empty for plain numbers.
     pub fn number(value: f64, unit: &'static str) -> Self {
         Self::Number { value, unit }
     }
@@ -289,12 +289,12 @@ impl FactValue {
         Self::number(value_rad.to_degrees(), "°")
     }
 
-    /// Creates a number without a unit.
+    /// Creates a number without a unit; larger ones than `u32` holds become its maximum.
     pub fn count(value: impl TryInto<u32>) -> Self {
         Self::number(f64::from(value.try_into().unwrap_or(u32::MAX)), "")
     }
 
-    /// Creates words.
+    /// Creates words, which are shown as they are.
     pub fn text(words: impl Into<String>) -> Self {
         Self::Text(words.into())
     }

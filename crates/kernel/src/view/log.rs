@@ -6,14 +6,14 @@ use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// An event.
+/// An event in the form that is the same for all worlds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogEvent {
-    /// The cycle in which it happened.
+    /// The cycle in which it happened, of which the frame after it shows the result.
     pub cycle: Cycle,
-    /// Its severity.
+    /// Its severity: the level in the logs of viewers.
     pub level: Severity,
-    /// Its kind.
+    /// Its kind, which also defines the meaning of `value`.
     pub kind: LogEventKind,
     /// The body that it happened to.
     pub who: BodyId,
@@ -34,17 +34,17 @@ impl LogEvent {
     }
 }
 
-/// A number with its unit.
+/// The value of an event, with the unit that its kind defines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// The number.
+    /// The number, in `unit`.
     pub value: f64,
     /// Its unit; empty for plain numbers.
     pub unit: Cow<'static, str>,
 }
 
 impl Quantity {
-    /// Creates a number with its unit.
+    /// Creates a quantity; `unit` is empty for plain numbers.
     pub fn new(value: f64, unit: &'static str) -> Self {
         Self { value, unit: Cow::Borrowed(unit) }
     }
@@ -53,7 +53,7 @@ impl Quantity {
 /// Declares the kinds of events with their names in files.
 macro_rules! log_event_kinds {
     ($($(#[$doc:meta])* $kind:ident = $name:literal,)*) => {
-        /// The kinds of events of all worlds.
+        /// The kinds of events of all worlds; a kind has the same meaning in each.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         #[serde(rename_all = "kebab-case")]
         pub enum LogEventKind {
@@ -61,7 +61,7 @@ macro_rules! log_event_kinds {
         }
 
         impl LogEventKind {
-            /// All kinds.
+            /// Every kind once, in the order of declaration.
             pub const ALL: &[Self] = &[$(Self::$kind),*];
 
             /// Returns its name in files.
@@ -77,9 +77,9 @@ macro_rules! log_event_kinds {
 log_event_kinds! {
     /// Two bodies, or a body and a wall, touch.
     Contact = "contact",
-    /// A door has opened.
+    /// A door has opened; the body is the door.
     DoorOpened = "door-opened",
-    /// A door has closed.
+    /// A door has closed; the body is the door.
     DoorClosed = "door-closed",
     /// Two bodies are nearer to each other than they may be; the value is their distance.
     LossOfSeparation = "loss-of-separation",
@@ -145,11 +145,11 @@ log_event_kinds! {
     NotPlanned = "not-planned",
 }
 
-/// The severity of an event.
+/// The severity of an event, rising.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Normal.
+    /// A normal course of the run.
     Info,
     /// Unusual, but allowed.
     Warning,

@@ -68,9 +68,9 @@ impl OccupancyGrid {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Occupancy {
-    /// Nothing stands there.
+    /// Only bodies of the frame may stand there.
     Free,
-    /// A wall.
+    /// A wall, which no body enters.
     Wall,
     /// Not mapped.
     Unknown,
@@ -97,7 +97,7 @@ pub struct Frame {
     pub log_left_out: u64,
 }
 
-/// The options of a frame.
+/// The parts of a frame that are made on request, because they take time.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FrameOptions {
     /// The bodies whose scans the frame has. All would be slow: reading a sensor for a frame costs as much as simulating
@@ -109,7 +109,7 @@ impl FrameOptions {
     /// A frame with bodies and events, without scans.
     pub const WITHOUT_SCANS: Self = Self::with_first_scans(0);
 
-    /// Returns a frame with the scans of the first bodies that have sensors.
+    /// Returns a frame with the scans of the first `bodies` of those that have sensors.
     pub const fn with_first_scans(bodies: usize) -> Self {
         Self { scans: ScanSelection::First(bodies) }
     }

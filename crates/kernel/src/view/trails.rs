@@ -7,10 +7,10 @@ use crate::ports::Values;
 use crate::units::Cycle;
 use std::collections::BTreeMap;
 
-/// The past path of a body.
+/// The path of a body up to the moment of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
-    /// The body.
+    /// The body, which may be gone by now.
     pub of: BodyId,
     /// The positions of its center at the start of cycles, the earliest first.
     pub points: Vec<(Cycle, Vec3)>,
@@ -21,7 +21,7 @@ pub struct Trail {
 pub struct PositionColumns {
     /// Name of the table; its column `cycle` has the cycle of each row.
     pub table: &'static str,
-    /// The kind of the bodies.
+    /// The kind of all bodies of the table.
     pub kind: BodyKind,
     /// The column with their numbers.
     pub number: &'static str,
@@ -46,7 +46,7 @@ pub struct PositionColumns {
 /// A column with coordinates: a coordinate in meters is `offset_m` plus the value times `scale_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// Its name.
+    /// Name of the column in the table.
     pub column: &'static str,
     /// Meters per unit of the value.
     pub scale_m: f64,
@@ -54,7 +54,6 @@ pub struct Axis {
     pub offset_m: f64,
 }
 
-/// A row of the table.
 #[derive(Debug, PartialEq)]
 struct Row {
     cycle: Cycle,
@@ -90,7 +89,7 @@ impl PositionColumns {
         Some(trails)
     }
 
-    /// Returns the rows of some bodies before a cycle.
+    /// Returns the rows of each body, by cycle; `None` if the columns are those of another table.
     fn rows<'a>(
         &self,
         before: Cycle,

@@ -70,7 +70,7 @@ impl ThreadPool {
         Self { workers: workers.max(1), threads: None }
     }
 
-    /// Number of workers.
+    /// Number of workers, the calling thread included.
     pub fn workers(&self) -> usize {
         self.workers
     }
@@ -148,7 +148,7 @@ impl PoolState {
         self.call.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Calls all threads.
+    /// Resets the cursors before the call is visible, and wakes the threads.
     fn start(&self, n: usize, task: Job) {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.call();
@@ -209,7 +209,7 @@ impl PoolState {
     }
 }
 
-/// Checks a condition a number of times.
+/// Returns early if a condition holds; callers check it again under the lock, and sleep if it does not.
 fn poll_until(mut condition: impl FnMut() -> bool) {
     for _ in 0..POLLS_BEFORE_SLEEP {
         if condition() {

@@ -96,7 +96,6 @@ impl FreeSpace {
         self.width as usize * self.height as usize
     }
 
-    /// Returns whether the box at `index` is free.
     pub(super) fn contains(&self, index: usize) -> bool {
         self.bits[index / 64] >> (index % 64) & 1 == 1
     }

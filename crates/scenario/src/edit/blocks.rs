@@ -7,7 +7,7 @@ use super::{EditError, edit_error};
 use serde_json::Value as Json;
 use std::ops::Range;
 
-/// Removes all lines of the item at a path.
+/// Removes all lines of the item at a path, which may be spread over the text.
 pub(super) fn remove_lines(layout: &Layout<'_>, path: &[Step]) -> Vec<Splice> {
     layout.statement_runs(path).iter().map(|run| delete(removable_lines(layout, run))).collect()
 }
@@ -23,9 +23,10 @@ fn removable_lines(layout: &Layout<'_>, run: &Range<usize>) -> Range<usize> {
     if !is_section && ends_block {
         lines.start = above_comments(text, lines.start);
     }
+    // A section, or the last key of a block, takes one of the blank lines around it along, so that two do not meet.
     match (blank_before(text, lines.start), blank_after) {
-        // One of the two blank lines around it goes.
         (Some(blank), _) if is_section || ends_block => blank..lines.end,
+        // At the start of the text there is only the blank line after it.
         (None, Some(blank)) if is_section && lines.start == 0 => lines.start..blank,
         _ => lines,
     }
@@ -63,7 +64,6 @@ pub(super) fn insert_section(
     Ok(vec![insert(end, format!("{}{block}", layout.new_line()))])
 }
 
-/// Returns the path of an element of a list.
 fn element_path(list: &[Step], number: usize) -> Vec<Step> {
     [list, &[Step::Index(number)]].concat()
 }
@@ -90,7 +90,7 @@ pub(super) fn reorder_sections(layout: &Layout<'_>, list: &[Step], order: &[usiz
     splices
 }
 
-/// Returns all lines of a section of a list.
+/// Returns all lines of a section of a list, in one piece even where they are spread over the text.
 fn element_text(layout: &Layout<'_>, path: &[Step]) -> String {
     let runs = layout.statement_runs(path);
     let texts: Vec<&str> = runs.iter().map(|run| &layout.text[layout.lines(run)]).collect();

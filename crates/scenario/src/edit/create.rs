@@ -139,7 +139,8 @@ fn insert_line(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     }
 }
 
-/// Inserts a header, and a line, before the sections in it.
+/// Inserts a header, and a line below it, before the first section below `path`: after its header, the line would
+/// belong to that section.
 pub(super) fn insert_header_before(layout: &Layout<'_>, path: &[Step], line: &str) -> Splice {
     let block = format!("{}{line}", header(layout, path, false));
     match layout.statement_runs(path).first() {

@@ -103,7 +103,7 @@ fn promote_to_array(item: &Item, at: usize, value: &Json) -> Result<Vec<Splice>,
     })
 }
 
-/// Moves an element to another number.
+/// Moves an element; the others keep their order.
 pub(super) fn relocate(
     layout: &Layout<'_>,
     key: &[KeyPart],

@@ -11,7 +11,6 @@ use toml_edit::{Document, Item, Table, TomlError};
 pub(super) struct Statement {
     /// The path from the root; sections of a list end in their number.
     pub(super) path: Vec<Step>,
-    /// Whether it is a header.
     pub(super) is_header: bool,
     /// The parts of the key as written: those of the last names of the path.
     pub(super) keys: Vec<Range<usize>>,
@@ -38,7 +37,7 @@ pub(super) struct KeyLookup<'l> {
 }
 
 impl<'t> Layout<'t> {
-    /// Reads a text.
+    /// Fails if the text is not TOML.
     pub(super) fn parse(text: &'t str) -> Result<Self, TomlError> {
         let document = Document::parse(text)?;
         let mut statements = Vec::new();
@@ -57,7 +56,7 @@ impl<'t> Layout<'t> {
         Ok(lookup)
     }
 
-    /// Follows a key to its end.
+    /// Follows a key to its end; a key that does not exist is an error with a suggestion.
     pub(super) fn find(&self, key: &[KeyPart]) -> Result<KeyLookup<'_>, EditError> {
         let lookup = self.look_up(key)?;
         match lookup.rest.first() {
@@ -71,7 +70,7 @@ impl<'t> Layout<'t> {
         }
     }
 
-    /// Returns the item at the end of a path.
+    /// A step that does not exist is skipped; paths come from the text itself.
     pub(super) fn item(&self, path: &[Step]) -> &Item {
         path.iter().fold(self.document.as_item(), |item, step| {
             let child = match step {
@@ -115,13 +114,12 @@ impl<'t> Layout<'t> {
     }
 }
 
-/// Returns the names in a table.
 fn names_of(item: &Item) -> Vec<String> {
     let table = item.as_table_like();
     table.map(|t| t.iter().map(|(key, _)| key.to_string()).collect()).unwrap_or_default()
 }
 
-/// Follows one part of a key.
+/// A name that does not exist goes to `rest`, as it may be created; a number that does not exist is an error.
 fn follow_part(lookup: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditError> {
     if !lookup.rest.is_empty() {
         return push_missing(lookup, part);
@@ -167,7 +165,7 @@ fn push_missing(lookup: &mut KeyLookup<'_>, part: &KeyPart) -> Result<(), EditEr
     Ok(())
 }
 
-/// Returns the number of elements of an array.
+/// Returns the number of elements; `None` for what is neither an array nor a list of sections.
 pub(super) fn count(item: &Item) -> Option<usize> {
     let sections = item.as_array_of_tables().map(toml_edit::ArrayOfTables::len);
     sections.or_else(|| item.as_array().map(toml_edit::Array::len))
@@ -180,7 +178,7 @@ fn not_a_table(name: &str) -> EditError {
     )
 }
 
-/// Collects the statements of a table and of the tables in it.
+/// The order is that of the tables, not of the text: [`Layout::parse`] sorts.
 fn collect_statements(
     text: &str,
     table: &Table,
@@ -211,6 +209,7 @@ fn collect_statements(
 }
 
 fn push_section(text: &str, table: &Table, path: &mut Vec<Step>, statements: &mut Vec<Statement>) {
+    // A table without a position exists only by dotted keys, or by the headers of tables in it.
     if let (Some(_), Some(span)) = (table.position(), table.span()) {
         let brackets = text[span.start..].bytes().take_while(|b| *b == b'[').count();
         statements.push(Statement {
@@ -234,7 +233,7 @@ fn key_value(text: &str, path: &[Step], start: usize, end: usize) -> Statement {
     }
 }
 
-/// Returns the start of the line at an offset.
+/// Offset after the last line break before `offset`.
 pub(super) fn line_start(text: &str, offset: usize) -> usize {
     text[..offset].rfind('\n').map_or(0, |end| end + 1)
 }

@@ -5,15 +5,14 @@ use super::splice::{Splice, delete, insert, replace};
 use std::ops::Range;
 use toml_edit::Array;
 
-/// An element that has lines of its own.
+/// An element that shares its lines with no other, so that it can be moved or removed with its comment.
 struct OwnLines {
     /// Its lines, with the end of the last.
     lines: Range<usize>,
-    /// The comma after it.
+    /// Offset of the comma after it, which the last element may lack.
     comma: Option<usize>,
 }
 
-/// Returns the spans of the elements.
 fn element_spans(array: &Array) -> Vec<Range<usize>> {
     array.iter().filter_map(toml_edit::Value::span).collect()
 }
@@ -50,7 +49,7 @@ pub(super) fn insert_element(text: &str, array: &Array, at: usize, value: &str) 
     }
 }
 
-/// Removes an element.
+/// Removes an element with its own lines, or else with the comma that no longer separates two.
 pub(super) fn remove_element(text: &str, array: &Array, number: usize) -> Vec<Splice> {
     let spans = element_spans(array);
     let Some(span) = spans.get(number) else { return Vec::new() };
@@ -111,12 +110,12 @@ fn own_lines(text: &str, span: &Range<usize>) -> Option<OwnLines> {
     (is_first && is_last && is_comma_near).then_some(OwnLines { lines: start..end, comma })
 }
 
-/// Returns the line break at the end of some lines.
+/// The line break of an element decides that of its new neighbors, in texts that mix both kinds.
 fn line_ending<'t>(text: &'t str, lines: &Range<usize>) -> &'t str {
     if text[lines.clone()].ends_with("\r\n") { "\r\n" } else { "\n" }
 }
 
-/// Returns the offset of the comma after a value, if there is one.
+/// Looks past blanks, line breaks and comments.
 pub(super) fn comma_after(text: &str, offset: usize) -> Option<usize> {
     let offset = skip_space(text, offset);
     text[offset..].starts_with(',').then_some(offset)

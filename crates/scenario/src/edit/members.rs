@@ -13,7 +13,7 @@ pub(super) struct Member {
     path: Vec<String>,
     /// The parts of its key.
     pub(super) keys: Vec<Range<usize>>,
-    /// The end of its value.
+    /// Offset after its value.
     end: usize,
 }
 
@@ -22,7 +22,6 @@ impl Member {
         self.keys.first().map_or(self.end, |key| key.start)
     }
 
-    /// Returns whether it is at a path or below.
     pub(super) fn is_below(&self, path: &[Step]) -> bool {
         path.len() <= self.path.len()
             && path
@@ -48,7 +47,7 @@ pub(super) fn enclosing_table<'l>(
     None
 }
 
-/// Returns the members of an inline table, in the order of the text.
+/// Sorted by their order in the text, in which `toml_edit` does not keep dotted keys.
 pub(super) fn members(text: &str, table: &InlineTable) -> Vec<Member> {
     let mut members: Vec<Member> = table
         .get_values()
@@ -78,7 +77,7 @@ pub(super) fn insert_member(text: &str, table: &InlineTable, member: &str) -> Ve
     }]
 }
 
-/// Removes the members at a path or below.
+/// Removes the members at a path or below: dotted keys may be several.
 pub(super) fn remove_members(text: &str, table: &InlineTable, path: &[Step]) -> Vec<Splice> {
     let all = members(text, table);
     let open = table.span().map_or(0, |span| span.start + 1);

@@ -50,7 +50,7 @@ const MAX_WORK_BYTES: usize = 1 << 30;
 pub enum Edit {
     /// Sets a value; creates its parent tables.
     Set {
-        /// The key.
+        /// The key, which need not exist.
         key: String,
         /// The value; whole numbers become integers, or floats where a float was.
         value: Value,
@@ -66,7 +66,7 @@ pub enum Edit {
     },
     /// Removes a key, an element or a section.
     Remove {
-        /// The key.
+        /// The key; of an element, it ends in its number.
         key: String,
     },
     /// Moves an element or a section to another position of its array.
@@ -78,7 +78,7 @@ pub enum Edit {
     },
     /// Gives a key another name.
     Rename {
-        /// The key.
+        /// The key with its old name.
         key: String,
         /// The new name of its last part.
         to: String,
@@ -99,7 +99,7 @@ pub struct CharEdit {
     pub row: usize,
     /// Its column, from 0 at the left.
     pub column: usize,
-    /// The character.
+    /// The new character: no quote, backslash or control character.
     pub mark: char,
 }
 
@@ -208,7 +208,7 @@ impl Source {
         rest
     }
 
-    /// Makes one change.
+    /// Makes one change, or leaves the text as it was: the result must be TOML again.
     fn change(
         &mut self,
         splices: impl FnOnce(&Layout<'_>) -> Result<Vec<Splice>, EditError>,

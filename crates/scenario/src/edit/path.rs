@@ -6,7 +6,7 @@ use toml_edit::Key;
 /// The maximum number of parts of a key: several times as many as any scenario has.
 const MAX_PARTS: usize = 64;
 
-/// A part of a key.
+/// A name in a table, or the number of an element of an array: which of them, the text decides.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct KeyPart {
     /// The name, without quotes.
@@ -54,7 +54,6 @@ fn parse_part(text: &str) -> Result<KeyPart, EditError> {
     }
 }
 
-/// Returns the end of the part that a text begins with.
 fn end_of_part(text: &str) -> usize {
     match text.bytes().next() {
         Some(quote @ (b'"' | b'\'')) => end_of_quoted(text, quote),
@@ -62,7 +61,7 @@ fn end_of_part(text: &str) -> usize {
     }
 }
 
-/// Returns the end of the quoted name that a text begins with.
+/// Returns the offset after the closing quote, or the end of a text that lacks it.
 fn end_of_quoted(text: &str, quote: u8) -> usize {
     let mut bytes = text.bytes().enumerate().skip(1);
     while let Some((k, byte)) = bytes.next() {

@@ -20,7 +20,7 @@ pub(super) fn are_sections(items: &[Json]) -> bool {
     !items.is_empty() && items.iter().all(Json::is_object)
 }
 
-/// Returns the names on a path.
+/// Returns the names on a path without the numbers of elements, as headers have them.
 pub(super) fn names_of(path: &[Step]) -> Vec<String> {
     path.iter()
         .filter_map(|step| match step {
@@ -35,14 +35,14 @@ pub(super) fn dotted(names: &[String]) -> String {
     names.iter().map(|name| quoted_name(name)).collect::<Vec<_>>().join(".")
 }
 
-/// Returns the header of a section, or of one of a list.
+/// `is_element` stands for a section of a list, `[[...]]`.
 pub(super) fn header(layout: &Layout<'_>, path: &[Step], is_element: bool) -> String {
     let name = dotted(&names_of(path));
     let new_line = layout.new_line();
     if is_element { format!("[[{name}]]{new_line}") } else { format!("[{name}]{new_line}") }
 }
 
-/// Returns the text of a section, or of one of a list.
+/// Returns a header and lines for all members; large tables in them become sections of their own.
 pub(super) fn section_text(
     layout: &Layout<'_>,
     path: &[Step],

@@ -15,7 +15,7 @@ use toml_edit::{Item, Value};
 /// The size of the largest table that is set key by key: each key searches the whole text.
 const MAX_KEYS: usize = 1000;
 
-/// Sets a value.
+/// Sets a value in place of the old one, or creates the key.
 pub(super) fn set(
     layout: &Layout<'_>,
     key: &[KeyPart],
@@ -157,7 +157,7 @@ fn set_each<'v>(
     Ok(splices)
 }
 
-/// Sets the keys of a section one by one.
+/// Sets the keys of a section one by one, so that those that stay the same keep their text.
 fn set_members(
     layout: &Layout<'_>,
     path: &[Step],
@@ -194,7 +194,7 @@ fn may_be_section(value: &Json) -> bool {
     }
 }
 
-/// Sets the sections of a list one by one.
+/// Sets the sections of a list one by one, so that those that stay the same keep their text.
 fn set_sections(
     layout: &Layout<'_>,
     path: &[Step],
@@ -219,7 +219,7 @@ fn set_sections(
     Ok(splices)
 }
 
-/// Sets a value in place of sections.
+/// Sets a value in place of sections, which have no span of their own: they are removed, and the key is created.
 fn replace_sections(
     layout: &Layout<'_>,
     path: &[Step],

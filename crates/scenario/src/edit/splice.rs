@@ -11,17 +11,14 @@ pub(super) struct Splice {
     pub(super) text: String,
 }
 
-/// Replaces a piece.
 pub(super) fn replace(range: Range<usize>, text: impl Into<String>) -> Splice {
     Splice { range, text: text.into() }
 }
 
-/// Inserts a piece.
 pub(super) fn insert(offset: usize, text: impl Into<String>) -> Splice {
     replace(offset..offset, text)
 }
 
-/// Removes a piece.
 pub(super) fn delete(range: Range<usize>) -> Splice {
     replace(range, "")
 }

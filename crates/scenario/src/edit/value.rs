@@ -9,7 +9,7 @@ use toml_edit::{Datetime, Value};
 /// The number up to which whole numbers are exact as floats.
 const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// A value that is set.
+/// A value that is set, from the page or from an override.
 #[derive(Clone, Copy)]
 pub(super) enum NewValue<'v> {
     /// A value by its meaning.
@@ -29,12 +29,12 @@ impl NewValue<'_> {
     }
 }
 
-/// Returns whether a text replaces a date, and is one.
+/// JSON has no dates: a text in place of one stays a date if it can be read as one.
 fn is_date(old: Option<&Value>, text: &str) -> bool {
     old.is_some_and(Value::is_datetime) && text.parse::<Datetime>().is_ok()
 }
 
-/// Returns whether it is a float, or an array of floats.
+/// Such a value stays one of floats: 2 in place of 1.5 is written as 2.0.
 pub(super) fn has_floats(value: &Value) -> bool {
     match value {
         Value::Float(_) => true,
@@ -125,7 +125,7 @@ fn string_text(string: &str) -> String {
     text + "\"\"\""
 }
 
-/// Returns whether an old value means the same as a new one.
+/// Such a value is not written, so that its notation in the text stays: `1e3`, or an array over several lines.
 pub(super) fn is_same(old: &Value, new: &Json) -> bool {
     match (old, new) {
         (Value::String(a), Json::String(b)) => a.value() == b,

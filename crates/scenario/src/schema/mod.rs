@@ -25,7 +25,7 @@ use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 
-/// The version of JSON Schema.
+/// The dialect of JSON Schema: that in which [`for_type`] has schemars write.
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 /// Returns the schema of a type that is read from TOML, which has no null.
@@ -246,7 +246,7 @@ pub fn undocumented_keys(world: &dyn WorldType) -> Vec<String> {
     properties.into_iter().map(|(pointer, _)| pointer).collect()
 }
 
-/// Returns whether a text has a key as a word of its own.
+/// Words are divided by anything but letters, digits and `_`, so that `seed` is not found in `seed_of`.
 fn has_word(text: &str, key: &str) -> bool {
     text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == key)
 }
@@ -258,7 +258,7 @@ pub fn examples(schema: &Value, path: &[String]) -> Vec<Value> {
     examples.filter_map(Value::as_array).flatten().cloned().collect()
 }
 
-/// Returns a schema that was written by hand.
+/// Returns a schema that was written by hand; one that accepts everything if it is neither an object nor a truth value.
 #[doc(hidden)]
 pub fn written(schema: Value) -> Schema {
     Schema::try_from(schema).unwrap_or_default()

@@ -5,7 +5,6 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
-/// Returns a schema of numbers with further conditions.
 fn numbers(conditions: Value) -> Schema {
     let mut schema = json_schema!({ "type": "number" });
     if let Value::Object(conditions) = conditions {

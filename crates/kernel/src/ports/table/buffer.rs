@@ -29,7 +29,7 @@ pub trait Buffer {
 
 /// The tables of a run; the recorded ones are numbered in their order.
 pub trait Buffers {
-    /// Returns all tables.
+    /// Returns all tables, also those that are not recorded.
     fn buffers(&self) -> Vec<&dyn Buffer>;
 
     /// Returns all tables, in the same order.
@@ -40,7 +40,7 @@ pub trait Buffers {
         self.buffers().iter().any(|buffer| buffer.is_full())
     }
 
-    /// Returns the schemas of the recorded tables.
+    /// Returns the schemas of the recorded tables; the index is a table's number in a recorder.
     fn schemas(&self) -> Vec<TableSchema> {
         self.buffers().iter().filter_map(|buffer| buffer.schema()).collect()
     }

@@ -102,7 +102,7 @@ impl<T> Cells<T> {
 }
 
 impl<T: Clone + Default> Cells<T> {
-    /// Appends a cell.
+    /// Appends a cell; `None` is a missing value.
     pub fn push(&mut self, value: Option<T>) {
         self.mask.extend(self.values.len(), 1, value.is_some());
         self.values.push(value.unwrap_or_default());
@@ -114,13 +114,13 @@ impl<T: Clone + Default> Cells<T> {
         self.values.resize(rows, T::default());
     }
 
-    /// Appends the cells of `more`.
+    /// Appends the cells of `more`; missing ones stay missing.
     pub fn append(&mut self, more: &Self) {
         self.mask.append(self.values.len(), &more.mask, more.values.len());
         self.values.extend_from_slice(&more.values);
     }
 
-    /// Returns the cells of these rows, in this order.
+    /// Returns the cells of these rows, in this order; a row may occur several times.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         let values = order.iter().map(|&row| self.values[row].clone()).collect();
@@ -196,7 +196,7 @@ impl Texts {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
-    /// Returns all texts in one string.
+    /// Returns all texts without separators; [`ends`](Self::ends) divides them.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -212,7 +212,7 @@ impl Texts {
         self.mask.0.as_deref()
     }
 
-    /// Number of cells.
+    /// Number of cells, missing ones included.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
@@ -222,7 +222,7 @@ impl Texts {
         self.ends.is_empty()
     }
 
-    /// Appends a cell.
+    /// Appends a cell; `None` is a missing text, unlike an empty one.
     pub fn push(&mut self, text: Option<&str>) {
         self.mask.extend(self.ends.len(), 1, text.is_some());
         self.text.push_str(text.unwrap_or_default());
@@ -236,7 +236,7 @@ impl Texts {
         self.text.truncate(self.start(rows));
     }
 
-    /// Appends the cells of `more`.
+    /// Appends the cells of `more`; missing ones stay missing.
     pub fn append(&mut self, more: &Self) {
         more.options().for_each(|text| self.push(text));
     }
@@ -246,7 +246,7 @@ impl Texts {
         *self = self.options().zip(keep).filter(|(_, keep)| **keep).map(|(text, _)| text).collect();
     }
 
-    /// Returns the cells of these rows, in this order.
+    /// Returns the cells of these rows, in this order; a row may occur several times.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         order.iter().map(|&row| self.get(row)).collect()

@@ -1,6 +1,6 @@
 //! The types that a column can have.
 
-/// The type of a column.
+/// The type of all values of a column, which recordings keep exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnType {
     /// Unsigned 32-bit integers.
@@ -17,12 +17,12 @@ pub enum ColumnType {
     Bool,
     /// Short text from a small vocabulary, stored as an index into `labels`.
     Label,
-    /// Any text.
+    /// Text of any length, stored as it is.
     Text,
 }
 
 impl ColumnType {
-    /// All types.
+    /// Every type once, in the order of declaration.
     pub const ALL: [Self; 8] = [
         Self::U32,
         Self::U64,

@@ -9,13 +9,13 @@ use super::values::Values;
 pub struct ColumnSpec {
     /// Name; ends in the unit where the quantity has one.
     pub name: String,
-    /// Type of its values.
+    /// Type of its values, which blocks have to match.
     pub ty: ColumnType,
     /// One sentence for the reader of the file.
     pub meaning: String,
     /// The vocabulary of a [`ColumnType::Label`] column, empty for others.
     pub labels: Vec<String>,
-    /// Whether values may be missing.
+    /// Whether values may be missing; a block with a missing one is refused otherwise.
     pub is_nullable: bool,
 }
 
@@ -55,7 +55,7 @@ impl ColumnSpec {
 pub struct TableSchema {
     /// File stem, e.g. `trajectories`.
     pub name: String,
-    /// The columns in order.
+    /// The columns, in the order of the values of a block.
     pub columns: Vec<ColumnSpec>,
     /// Facts without which the rows cannot be read in full, by name: the side of a box, the kinds of
     /// bodies. A name ends in the unit where the fact has one.

@@ -90,7 +90,7 @@ impl Values {
         with_cells!(self, cells => cells.get(row).is_none())
     }
 
-    /// Appends the values of `more`.
+    /// Appends the values of `more`, which must be of the same type.
     ///
     /// # Panics
     /// When the types differ; [`check_block`](crate::ports::recorder::check_block) compares them
@@ -118,7 +118,7 @@ impl Values {
         with_cells!(self, cells => cells.retain_rows(keep));
     }
 
-    /// Returns the values of these rows, in this order.
+    /// Returns the values of these rows, in this order; a row may occur several times.
     #[must_use]
     pub fn pick(&self, order: &[usize]) -> Self {
         match self {
@@ -195,7 +195,7 @@ impl Values {
 pub struct RoleColumn<R> {
     /// Its name, with its unit where the quantity has one.
     pub name: String,
-    /// Its role.
+    /// Its role, by which readers select, e.g. only parameters.
     pub role: R,
     /// Its values, one per row.
     pub values: Values,
