@@ -80,7 +80,7 @@ impl Page {
                 OutboxItem::Frame(bytes) => self.frames.push(bytes),
                 OutboxItem::Text(text) => {
                     let value: Value = serde_json::from_str(&text).expect("JSON");
-                    let is_reply = value.get("id").is_some();
+                    let is_reply = value.get("notice").is_none();
                     if is_reply { self.replies.push(value) } else { self.notices.push(value) }
                 }
             }

@@ -48,13 +48,17 @@ fn its_tools_edit_its_text() {
     let tool = json!(editing.tools[1]);
     assert_eq!(tool["action"], json!({ "do": "add-point", "section": "reeds" }));
     // The edit that the page makes of it.
-    let (mut page, _) = open();
+    let folder = tempfile::tempdir().expect("a folder");
+    let deps = SessionDeps { worlds: worlds(), ..deps(folder.path(), 2) };
     let insert =
         json!({ "op": "insert", "key": "reeds", "at": null, "value": { "at_m": [7.5, 5.5] } });
-    let text = Pond.default_scenario();
-    let edited = page.ask(json!({ "do": "edit", "text": text, "edits": [insert] }));
-    let text = edited["text"].as_str().expect("a text");
-    let source = Source::new("pond.toml", text, "");
+    let edit = serde_json::from_value(insert).expect("an edit");
+    let source = Source::new("pond.toml", Pond.default_scenario(), folder.path());
+    let edited = apply_edits(&deps, &source, source.text.clone(), vec![edit]);
+    let Ok(ReplyBody::Edited { text }) = edited else {
+        panic!("an edited text: {edited:?}");
+    };
+    let source = Source::new("pond.toml", &text, "");
     let run = worlds().compile(&source).expect("valid").start(&source, 1);
     assert_eq!(run.scenery().bodies.len(), 1);
 }
