@@ -136,7 +136,7 @@ fn unreadable(path: &Path, error: &io::Error) -> String {
 
 /// Returns the table of files as source.
 fn table(files: &[(String, PathBuf)]) -> String {
-    let mut text = String::from("static ASSETS: &[Asset] = &[\n");
+    let mut text = String::from("static ASSETS: &[PageAsset] = &[\n");
     for (name, path) in files {
         let content = fs::read(path).expect("the page is read");
         let mut hasher = DefaultHasher::new();
@@ -146,7 +146,7 @@ fn table(files: &[(String, PathBuf)]) -> String {
         let path = path.display().to_string();
         writeln!(
             text,
-            "    Asset {{ path: {name:?}, media: {media:?}, tag: {tag:?}, bytes: include_bytes!({path:?}) }},"
+            "    PageAsset {{ path: {name:?}, media: {media:?}, tag: {tag:?}, bytes: include_bytes!({path:?}) }},"
         )
         .expect("text");
     }

@@ -6,7 +6,7 @@ use sidestep::kernel::network::{
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::agents::traffic_state::TrafficPicture;
 use sidestep::worlds::airspace::pilot::{Percept, Pilot, Protocol};
-use sidestep::worlds::airspace::{AirspaceWorld, Fleet, airspace_run};
+use sidestep::worlds::airspace::{AirspaceWorld, RemotePilotRun, airspace_run};
 use sidestep::worlds::chain::ChainState;
 use sidestep::worlds::chain::agents::{ConnectorAgent, MotionProtocol};
 use sidestep::worlds::chain::scenario::ChainScenario;

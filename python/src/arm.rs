@@ -8,9 +8,10 @@ use crate::watch::run_polling;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
-use sidestep::arms::ik::Engine;
+use sidestep::arms::ik::IkEngine;
 use sidestep::arms::kinematics::{
-    ArmBody, ArmFiles, ArmGoal, ArmSelection, Frames, IkResult, PoseMask, Sphere, Transform, Vector,
+    ArmBody, ArmFiles, ArmGoal, ArmSelection, IkResult, LinkFrames, ObstacleSphere, PoseMask,
+    Transform, Vector,
 };
 use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::kernel::InputError;
@@ -42,8 +43,8 @@ fn option_error(e: &InputError) -> PyErr {
 }
 
 /// Words for the method that finds the joint values.
-const ENGINES: [(&str, Engine); 3] =
-    [("auto", Engine::Auto), ("chain", Engine::Chain), ("dls", Engine::Dls)];
+const ENGINES: [(&str, IkEngine); 3] =
+    [("auto", IkEngine::Auto), ("chain", IkEngine::Chain), ("dls", IkEngine::Dls)];
 /// Words for the parts that must not touch obstacles, as `--body` of the command has them.
 const BODIES: [(&str, CollisionModel); 3] = [
     ("rods", CollisionModel::Rods),
@@ -209,7 +210,8 @@ impl Arm {
         let chain = &self.0.chain;
         let rows = matrix_rows("joints", &joints, chain.variables.len())?;
         let skeleton = chain.skeleton();
-        let frames: Vec<Frames> = py.detach(|| rows.iter().map(|row| chain.forward(row)).collect());
+        let frames: Vec<LinkFrames> =
+            py.detach(|| rows.iter().map(|row| chain.forward_kinematics(row)).collect());
         let n = rows.len();
         let tip = frames.iter().flat_map(|f| f.tip.origin_m).collect();
         let rotation = frames.iter().flat_map(|f| f.tip.rotation.concat()).collect();
@@ -217,7 +219,8 @@ impl Arm {
         let connectors =
             frames.iter().flat_map(|f| chain.connectors(&skeleton, f).concat()).collect();
         // Counted in a posture that always exists, because there may be no rows.
-        let count = chain.connectors(&skeleton, &chain.forward(&chain.rest_values())).len();
+        let count =
+            chain.connectors(&skeleton, &chain.forward_kinematics(&chain.rest_values())).len();
         let inside_limits: Vec<bool> =
             rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
         Fields::new(py)
@@ -365,8 +368,8 @@ impl IkOptions {
     }
 }
 
-fn sphere(&[x, y, z, radius_m]: &[f64; 4]) -> Sphere {
-    Sphere { center_m: [x, y, z], radius_m }
+fn sphere(&[x, y, z, radius_m]: &[f64; 4]) -> ObstacleSphere {
+    ObstacleSphere { center_m: [x, y, z], radius_m }
 }
 
 /// Returns results as arrays, one row for each target.

@@ -226,7 +226,7 @@ impl Batch {
     /// Digest of the state of each world, in hexadecimal; orders waiting for the next step are not in it.
     #[getter]
     fn digests(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.with_worlds(py, |batch| batch.query(|run| run.digest().to_string()))
+        self.with_worlds(py, |batch| batch.map_worlds(|run| run.digest().to_string()))
     }
 
     /// Returns the measurements of each world so far, a list of dicts.
@@ -234,7 +234,7 @@ impl Batch {
     /// >>> [world["actions"] for world in batch.metrics()]
     /// [2, 2, 2]
     fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let all = self.with_worlds(py, |batch| batch.query(|run| run.metrics()))?;
+        let all = self.with_worlds(py, |batch| batch.map_worlds(|run| run.metrics()))?;
         to_python(py, &serde_json::Value::from(all))
     }
 

@@ -196,7 +196,7 @@ enum Buffer {
 impl Buffer {
     /// Returns a buffer for a quantity of this many agents.
     fn zeroed(space: &control::Space, agents: usize) -> Self {
-        let n = agents * space.width();
+        let n = agents * space.value_count();
         if space.is_integer() { Self::Whole(vec![0; n]) } else { Self::Real(vec![0.0; n]) }
     }
 

@@ -388,7 +388,7 @@ fn resume_unless<T>(
     payload: Box<dyn Any + Send>,
     interrupt: &Interrupt,
 ) -> Result<Vec<T>, InputError> {
-    if interrupt.caused(payload.as_ref()) {
+    if interrupt.has_caused_unwind(payload.as_ref()) {
         return Ok(Vec::new());
     }
     resume_unwind(payload)

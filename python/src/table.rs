@@ -61,7 +61,11 @@ impl Table {
         let infos = worlds::list().find(world).map_or(&[][..], |world| world.metric_infos());
         let specs = columns.iter().map(|column| ColumnSpec {
             is_nullable: true,
-            ..ColumnSpec::new(&column.name, column.values.ty(), &column_description(column, infos))
+            ..ColumnSpec::new(
+                &column.name,
+                column.values.column_type(),
+                &column_description(column, infos),
+            )
         });
         let schema = TableSchema::new(name, specs.collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())

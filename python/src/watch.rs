@@ -97,7 +97,7 @@ pub(crate) fn catch_interrupt<T>(interrupt: &Interrupt, work: impl FnOnce() -> T
     }));
     match result {
         Ok(done) => Some(done),
-        Err(payload) if interrupt.caused(payload.as_ref()) => None,
+        Err(payload) if interrupt.has_caused_unwind(payload.as_ref()) => None,
         Err(payload) => resume_unwind(payload),
     }
 }

@@ -52,7 +52,7 @@ impl Driver for BackAndForth {
     fn decide(
         &self,
         percept: &DriverPercept<'_>,
-        memory: &mut chain::Memory,
+        memory: &mut chain::DriverMemory,
         _: &mut Draws,
     ) -> Proposal {
         let [cycles, ..] = &mut memory.words;

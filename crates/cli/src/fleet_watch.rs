@@ -88,7 +88,7 @@ fn watch_fleet(
             *feed = Some(new);
         }
         (LinkMessage::Scene(scene), Some(feed)) => feed.restart(*scene),
-        (LinkMessage::Seen(view), Some(feed)) => feed.publish(*view),
+        (LinkMessage::Seen(view), Some(feed)) => feed.replace_view(*view),
         // A view before its scene cannot be shown; the other messages belong to other jobs, or are handled by `run_job`.
         _ => {}
     })

@@ -1,7 +1,7 @@
 //! Random actions: the baseline of comparisons, and the policy of the exact chains.
 
 use crate::effector::{ActionId, FORWARD, LEFT, RIGHT, STANDARD_ACTIONS};
-use sidestep_kernel::distr::{Categorical, RowError};
+use sidestep_kernel::distr::{Categorical, DistributionError};
 
 /// Draws each action from fixed probabilities: one row while nothing blocks, another after a
 /// contact. It has no memory and asks for nothing else that a robot perceives, so a robot alone in a
@@ -24,7 +24,7 @@ impl RandomPolicy {
     ///
     /// # Errors
     /// When a row is not a distribution.
-    pub fn new(usual: Vec<f64>, after_contact: Vec<f64>) -> Result<Self, RowError> {
+    pub fn new(usual: Vec<f64>, after_contact: Vec<f64>) -> Result<Self, DistributionError> {
         Ok(Self {
             usual: ActionDistribution::new(usual)?,
             after_contact: ActionDistribution::new(after_contact)?,
@@ -74,7 +74,7 @@ impl RandomPolicy {
 }
 
 impl ActionDistribution {
-    fn new(probabilities: Vec<f64>) -> Result<Self, RowError> {
+    fn new(probabilities: Vec<f64>) -> Result<Self, DistributionError> {
         let distribution = Categorical::new(&probabilities)?;
         Ok(Self { probabilities, distribution })
     }

@@ -111,7 +111,7 @@ impl Batch {
     /// When an order cannot be obeyed; no world gets it then.
     pub fn order(&mut self, team: usize, order: &str, values: Vec<f64>) -> Result<(), BatchError> {
         let Some(Team { agents, .. }) = self.teams.get(team) else {
-            return Err(self.no_team(team).into());
+            return Err(self.no_such_team(team).into());
         };
         let values_per_world = values.len() / self.len();
         if values_per_world * self.len() != values.len() {
@@ -143,7 +143,7 @@ impl Batch {
     /// When a world was broken before this call: nothing is done then. When a world breaks during it, or cannot obey
     /// an order: all others have done their cycles then.
     pub fn advance(&mut self, cycles: u64, mask: Option<&[bool]>) -> Result<(), BatchError> {
-        self.check_count(mask.map(<[bool]>::len), "truth values")?;
+        self.check_world_count(mask.map(<[bool]>::len), "truth values")?;
         self.check_errors()?;
         let orders = std::mem::take(&mut self.orders);
         let worlds = self.len();
@@ -180,13 +180,13 @@ impl Batch {
     ) -> Result<(), BatchError> {
         self.check_errors()?;
         let Some(Team { agents, observation_spaces, .. }) = self.teams.get(team) else {
-            return Err(self.no_team(team).into());
+            return Err(self.no_such_team(team).into());
         };
         let layouts: Vec<BufferLayout> = observation_spaces
             .iter()
             .map(|space| BufferLayout {
                 is_integer: space.is_integer(),
-                length: agents.len() * space.width(),
+                length: agents.len() * space.value_count(),
             })
             .collect();
         self.check_buffers(observation_spaces, &layouts, buffers)?;
@@ -217,7 +217,7 @@ impl Batch {
     /// # Errors
     /// When a world cannot start with its seed: it then stays as it was, and all others have started.
     pub fn restart(&mut self, seeds: &[Option<u64>]) -> Result<(), BatchError> {
-        self.check_count(Some(seeds.len()), "seeds")?;
+        self.check_world_count(Some(seeds.len()), "seeds")?;
         self.orders.clear();
         let new_seeds = seeds.to_vec();
         let teams = Arc::clone(&self.teams);
@@ -240,7 +240,7 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn cycles(&self) -> Result<Vec<Cycle>, BatchError> {
-        self.query(|run| run.cycle())
+        self.map_worlds(|run| run.cycle())
     }
 
     /// Returns whether nothing can happen anymore, for each world.
@@ -248,7 +248,7 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn is_over(&self) -> Result<Vec<bool>, BatchError> {
-        self.query(|run| run.is_over())
+        self.map_worlds(|run| run.is_over())
     }
 
     /// Returns the digest of each world; queued orders are not in it.
@@ -256,14 +256,14 @@ impl Batch {
     /// # Errors
     /// When a world has broken off.
     pub fn digests(&self) -> Result<Vec<Digest>, BatchError> {
-        self.query(|run| run.digest())
+        self.map_worlds(|run| run.digest())
     }
 
     /// Returns the result of `get` for each world by index, computed on the calling thread.
     ///
     /// # Errors
     /// When a world has broken off.
-    pub fn query<T>(&self, get: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
+    pub fn map_worlds<T>(&self, get: impl Fn(&dyn Simulation) -> T) -> Result<Vec<T>, BatchError> {
         let mut values = Vec::with_capacity(self.len());
         for index in 0..self.len() {
             let world = self.world(index);
@@ -322,11 +322,15 @@ impl Batch {
         first
     }
 
-    fn no_team(&self, team: usize) -> OrderError {
+    fn no_such_team(&self, team: usize) -> OrderError {
         OrderError::NoTeam { team, teams: self.teams.len() }
     }
 
-    fn check_count(&self, found: Option<usize>, what: &'static str) -> Result<(), BatchError> {
+    fn check_world_count(
+        &self,
+        found: Option<usize>,
+        what: &'static str,
+    ) -> Result<(), BatchError> {
         let worlds = self.len();
         match found {
             Some(found) if found != worlds => Err(BatchError::Count { worlds, what, found }),

@@ -17,7 +17,7 @@ pub const FORMAT_VERSION: u32 = 2;
 
 /// The program, world, scenario and cycle that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Header {
+pub struct CheckpointHeader {
     /// [`FORMAT_VERSION`] of the writer.
     pub format: u32,
     /// Version of the program that wrote it; results may differ between versions.
@@ -30,7 +30,7 @@ pub struct Header {
     pub cycle: Cycle,
 }
 
-impl Header {
+impl CheckpointHeader {
     /// Checks that it is of the same program version, world and scenario as `expected`. Formats and cycles are not
     /// compared: decoding has refused other formats, and any cycle can be continued.
     ///
@@ -75,7 +75,7 @@ pub enum CheckpointError {
 ///
 /// # Panics
 /// When the state cannot be serialized, which is a bug of the world.
-pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
+pub fn encode(header: &CheckpointHeader, state: &impl Serialize) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes = postcard::to_extend(header, bytes).expect("a header is plain data");
     bytes = postcard::to_extend(state, bytes).expect("a state is plain data");
@@ -88,8 +88,8 @@ pub fn encode(header: &Header, state: &impl Serialize) -> Vec<u8> {
 ///
 /// # Errors
 /// When the bytes are not a checkpoint, damaged, or of another format.
-pub fn decode_header(bytes: &[u8]) -> Result<Header, CheckpointError> {
-    split(bytes).map(|(header, _)| header)
+pub fn decode_header(bytes: &[u8]) -> Result<CheckpointHeader, CheckpointError> {
+    split_checkpoint(bytes).map(|(header, _)| header)
 }
 
 /// Decodes a state written for `expected` (whose `cycle` is not compared).
@@ -99,16 +99,16 @@ pub fn decode_header(bytes: &[u8]) -> Result<Header, CheckpointError> {
 /// version, world or scenario.
 pub fn decode<S: DeserializeOwned>(
     bytes: &[u8],
-    expected: &Header,
+    expected: &CheckpointHeader,
 ) -> Result<(Cycle, S), CheckpointError> {
-    let (header, state) = split(bytes)?;
+    let (header, state) = split_checkpoint(bytes)?;
     header.check_origin(expected)?;
     let state = postcard::from_bytes(state).map_err(|_| CheckpointError::Damaged)?;
     Ok((header.cycle, state))
 }
 
 /// Checks the frame of a checkpoint, and returns its header and the bytes of its state.
-fn split(bytes: &[u8]) -> Result<(Header, &[u8]), CheckpointError> {
+fn split_checkpoint(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), CheckpointError> {
     let body = bytes.strip_prefix(MAGIC).ok_or(CheckpointError::NotACheckpoint)?;
     let (_, checksum) =
         bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(CheckpointError::Damaged)?;
@@ -141,8 +141,8 @@ fn hex(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    fn header() -> Header {
-        Header {
+    fn header() -> CheckpointHeader {
+        CheckpointHeader {
             format: FORMAT_VERSION,
             program_version: "1.2.3".into(),
             world: "toy".into(),
@@ -172,10 +172,10 @@ mod tests {
     #[test]
     fn a_foreign_checkpoint_says_what_differs() {
         let bytes = encode(&header(), &0u8);
-        let other = Header { world: "robots".into(), ..header() };
+        let other = CheckpointHeader { world: "robots".into(), ..header() };
         let error = decode::<u8>(&bytes, &other).expect_err("another world");
         assert_eq!(error.to_string(), "the checkpoint belongs to world `toy`, not `robots`");
-        let old = encode(&Header { format: 0, ..header() }, &0u8);
+        let old = encode(&CheckpointHeader { format: 0, ..header() }, &0u8);
         assert_eq!(decode::<u8>(&old, &header()), Err(CheckpointError::Format { found: 0 }));
     }
 }

@@ -127,9 +127,9 @@ impl<T: AtomicValue + std::fmt::Debug> std::fmt::Debug for AtomicCell<T> {
 }
 
 /// One value per slot, shared by the workers.
-pub struct Column<T: AtomicValue>(Box<[T::Cell]>);
+pub struct AtomicColumn<T: AtomicValue>(Box<[T::Cell]>);
 
-impl<T: AtomicValue> Column<T> {
+impl<T: AtomicValue> AtomicColumn<T> {
     /// Creates `n` slots that hold `value`.
     pub fn filled(n: usize, value: T) -> Self {
         (0..n).map(|_| value).collect()
@@ -174,25 +174,25 @@ impl<T: AtomicValue> Column<T> {
     }
 }
 
-impl<T: AtomicValue> FromIterator<T> for Column<T> {
+impl<T: AtomicValue> FromIterator<T> for AtomicColumn<T> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
         Self(values.into_iter().map(T::cell).collect())
     }
 }
 
-impl<T: AtomicValue> Clone for Column<T> {
+impl<T: AtomicValue> Clone for AtomicColumn<T> {
     fn clone(&self) -> Self {
         self.iter().collect()
     }
 }
 
-impl<T: AtomicValue + std::fmt::Debug> std::fmt::Debug for Column<T> {
+impl<T: AtomicValue + std::fmt::Debug> std::fmt::Debug for AtomicColumn<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_list().entries(self.iter()).finish()
     }
 }
 
-impl Column<u32> {
+impl AtomicColumn<u32> {
     /// Adds to a slot's counter, which in practice never wraps (2^32 events).
     #[inline(always)]
     pub fn add(&self, slot: usize, by: u32) {
@@ -200,7 +200,7 @@ impl Column<u32> {
     }
 }
 
-impl Column<u64> {
+impl AtomicColumn<u64> {
     /// Adds to a slot's counter; no atomic addition, so allowed only to the slot's one writer of the phase.
     #[inline(always)]
     pub fn add(&self, slot: usize, by: u64) {
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_column_keeps_what_is_set() {
-        let column: Column<u32> = [1, 2, 3].into_iter().collect();
+        let column: AtomicColumn<u32> = [1, 2, 3].into_iter().collect();
         column.set(1, 9);
         column.add(2, 4);
         assert_eq!(column.iter().collect::<Vec<_>>(), [1, 9, 7]);

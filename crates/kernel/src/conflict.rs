@@ -6,7 +6,7 @@
 //! of joins. A slot gets a parent at most once a cycle, so the forest needs three words per body
 //! and no allocation.
 
-use crate::column::Column;
+use crate::column::AtomicColumn;
 use crate::units::Slot;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -16,11 +16,11 @@ const NONE: Slot = Slot::MAX;
 #[derive(Debug)]
 pub struct ConflictGroups {
     /// Toward the leader; a leader points at itself.
-    parent: Column<Slot>,
+    parent: AtomicColumn<Slot>,
     /// Last slot that became a child of this one.
-    first_child: Column<Slot>,
+    first_child: AtomicColumn<Slot>,
     /// The previous child of the same parent.
-    next_sibling: Column<Slot>,
+    next_sibling: AtomicColumn<Slot>,
 }
 
 impl ConflictGroups {
@@ -28,15 +28,15 @@ impl ConflictGroups {
     pub fn new(n: usize) -> Self {
         Self {
             parent: (0..n as Slot).collect(),
-            first_child: Column::filled(n, NONE),
-            next_sibling: Column::filled(n, NONE),
+            first_child: AtomicColumn::filled(n, NONE),
+            next_sibling: AtomicColumn::filled(n, NONE),
         }
     }
 
     /// Makes `slot` a group of its own again; called by one worker, before the first join of a
     /// cycle.
     #[inline]
-    pub fn reset(&self, slot: Slot) {
+    pub fn make_singleton(&self, slot: Slot) {
         self.parent.set(slot as usize, slot);
         // `next_sibling` is read of children only, and a join writes it when it makes a slot a child.
         self.first_child.set(slot as usize, NONE);
@@ -59,7 +59,7 @@ impl ConflictGroups {
     }
 
     /// Puts two slots into one group. Any worker may call it, at any time between two barriers.
-    pub fn join(&self, a: Slot, b: Slot) {
+    pub fn join_groups(&self, a: Slot, b: Slot) {
         let mut a = a;
         let mut b = b;
         loop {
@@ -115,7 +115,7 @@ impl ConflictGroups {
     }
 }
 
-fn cell(column: &Column<Slot>, slot: Slot) -> &AtomicU32 {
+fn cell(column: &AtomicColumn<Slot>, slot: Slot) -> &AtomicU32 {
     &column.cells()[slot as usize]
 }
 
@@ -159,7 +159,7 @@ mod tests {
         fn groups_are_the_connected_components(edges in prop::collection::vec((0usize..40, 0usize..40), 0..60)) {
             let groups = ConflictGroups::new(40);
             for &(a, b) in &edges {
-                groups.join(a as Slot, b as Slot);
+                groups.join_groups(a as Slot, b as Slot);
             }
             prop_assert_eq!(partition(40, &groups), oracle(40, &edges));
         }
@@ -173,7 +173,7 @@ mod tests {
                     let (groups, edges) = (&groups, &edges);
                     scope.spawn(move || {
                         for (a, b) in edges.iter().skip(part).step_by(2) {
-                            groups.join(*a as Slot, *b as Slot);
+                            groups.join_groups(*a as Slot, *b as Slot);
                         }
                     });
                 }
@@ -185,8 +185,8 @@ mod tests {
     #[test]
     fn reset_takes_a_group_apart() {
         let groups = ConflictGroups::new(3);
-        groups.join(0, 2);
-        (0..3).for_each(|s| groups.reset(s));
+        groups.join_groups(0, 2);
+        (0..3).for_each(|s| groups.make_singleton(s));
         assert!((0..3).all(|s| groups.is_singleton(s)));
     }
 }

@@ -15,7 +15,7 @@
 use crate::conflict::ConflictGroups;
 use crate::interrupt::{self, Interrupt};
 use crate::ports::Clock;
-use crate::run_config::GroupSizes;
+use crate::run_config::GroupSizeHistogram;
 use crate::units::{Cycle, Slot};
 use crate::workers::{Worker, WorkerTeam};
 use crate::world::{Auction, PhaseContext, Phases};
@@ -56,7 +56,7 @@ pub struct WorkerState<S> {
 #[derive(Debug, Default)]
 pub struct WorkerStats {
     /// Conflict groups whose leaders this worker has handled.
-    pub groups: GroupSizes,
+    pub groups: GroupSizeHistogram,
     /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
     /// measured and stand for all.
     pub cpu_ns: u64,
@@ -139,7 +139,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Cycles in a row that are run without a change of the number of workers.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Segment {
+pub(crate) struct CycleSegment {
     pub(crate) from: Cycle,
     /// The maximum number of cycles.
     pub(crate) cycles: u64,
@@ -149,7 +149,7 @@ pub(crate) struct Segment {
 
 /// What a segment did, from which the number of workers for the next one is chosen.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct SegmentTiming {
+pub(crate) struct CycleSegmentTiming {
     /// Cycles done, at least 1.
     pub(crate) cycles: u64,
     /// Their time in nanoseconds, including the start of the threads and the observer.
@@ -178,9 +178,9 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     world: &W,
     state: &W::State,
     parts: EngineParts<'_, W::Scratch, C>,
-    segment: Segment,
+    segment: CycleSegment,
     mut observer: Option<&mut dyn Observer<W>>,
-) -> SegmentTiming {
+) -> CycleSegmentTiming {
     let EngineParts { groups, workers, team, clock, interrupt } = parts;
     let started_ns = clock.now_ns();
     if let Some(observer) = &mut observer {
@@ -188,7 +188,7 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     }
     let is_observed = observer.is_some();
     let stop = AtomicBool::new(false);
-    let shared = SegmentContext {
+    let shared = CycleSegmentContext {
         world,
         state,
         groups,
@@ -201,8 +201,13 @@ pub(crate) fn advance<W: Phases, C: Clock>(
     };
     // The observer's own time belongs to no phase.
     let mark_ns = if is_observed { clock.now_ns() } else { started_ns };
-    let mut leader =
-        LeaderState { clock, observer, started_ns, mark_ns, timing: SegmentTiming::default() };
+    let mut leader = LeadWorkerState {
+        clock,
+        observer,
+        started_ns,
+        mark_ns,
+        timing: CycleSegmentTiming::default(),
+    };
     match team {
         None => shared.run(&Worker::ALONE, Some(&mut leader)),
         Some(team) => team.run(
@@ -211,18 +216,18 @@ pub(crate) fn advance<W: Phases, C: Clock>(
             |worker, ()| shared.run::<C>(worker, None),
         ),
     }
-    SegmentTiming { took_ns: clock.now_ns() - started_ns, ..leader.timing }
+    CycleSegmentTiming { took_ns: clock.now_ns() - started_ns, ..leader.timing }
 }
 
 /// The data of a segment that all workers share.
-struct SegmentContext<'a, W: Phases> {
+struct CycleSegmentContext<'a, W: Phases> {
     world: &'a W,
     state: &'a W::State,
     groups: &'a ConflictGroups,
     workers: &'a WorkerStates<W::Scratch>,
     clock: &'a dyn Clock,
     interrupt: &'a Interrupt,
-    segment: Segment,
+    segment: CycleSegment,
     is_observed: bool,
     /// Whether the present cycle is the last one. Worker 0 writes it before a barrier, and all
     /// read it after that barrier, so relaxed order is enough.
@@ -230,16 +235,16 @@ struct SegmentContext<'a, W: Phases> {
 }
 
 /// The data of worker 0 alone: it reads the clock, calls the observer, and ends the segment.
-struct LeaderState<'a, 'b, W: Phases, C> {
+struct LeadWorkerState<'a, 'b, W: Phases, C> {
     clock: &'a C,
     observer: Option<&'a mut (dyn Observer<W> + 'b)>,
     started_ns: u64,
     /// Clock reading at the start of the present phase, in nanoseconds.
     mark_ns: u64,
-    timing: SegmentTiming,
+    timing: CycleSegmentTiming,
 }
 
-impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
+impl<W: Phases, C: Clock> LeadWorkerState<'_, '_, W, C> {
     /// Adds the time since the last call to one phase.
     fn end_phase(&mut self, phase: impl FnOnce(&mut PhaseTimes) -> &mut u64) {
         let now_ns = self.clock.now_ns();
@@ -248,7 +253,7 @@ impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
     }
 
     /// Counts a cycle, and returns whether the segment ends with it.
-    fn count_cycle(&mut self, segment: Segment) -> bool {
+    fn count_cycle(&mut self, segment: CycleSegment) -> bool {
         let since_ns = self.mark_ns - self.started_ns;
         self.timing.cycles += 1;
         if self.timing.cycles == 1 {
@@ -258,9 +263,13 @@ impl<W: Phases, C: Clock> LeaderState<'_, '_, W, C> {
     }
 }
 
-impl<W: Phases> SegmentContext<'_, W> {
+impl<W: Phases> CycleSegmentContext<'_, W> {
     /// One worker's part of the segment, with its processor time where this call is measured.
-    fn run<C: Clock>(&self, worker: &Worker<'_>, leader: Option<&mut LeaderState<'_, '_, W, C>>) {
+    fn run<C: Clock>(
+        &self,
+        worker: &Worker<'_>,
+        leader: Option<&mut LeadWorkerState<'_, '_, W, C>>,
+    ) {
         let weight =
             lock(&self.workers[worker.index()]).stats.measurement_weight(self.segment.cycles);
         let start_ns = if weight > 0 { self.clock.thread_cpu_ns() } else { 0 };
@@ -275,7 +284,7 @@ impl<W: Phases> SegmentContext<'_, W> {
     fn run_cycles<C: Clock>(
         &self,
         worker: &Worker<'_>,
-        mut leader: Option<&mut LeaderState<'_, '_, W, C>>,
+        mut leader: Option<&mut LeadWorkerState<'_, '_, W, C>>,
     ) {
         let mut guard = None;
         for now in self.segment.from.. {
@@ -310,7 +319,7 @@ impl<W: Phases> SegmentContext<'_, W> {
     }
 
     /// Calls the observer after the cycle that is done and, if there is one, before the next.
-    fn observe<C: Clock>(&self, now: Cycle, leader: &mut LeaderState<'_, '_, W, C>) {
+    fn observe<C: Clock>(&self, now: Cycle, leader: &mut LeadWorkerState<'_, '_, W, C>) {
         leader.end_phase(|times| &mut times.act_ns);
         let is_last = leader.count_cycle(self.segment);
         let Some(observer) = &mut leader.observer else { return };
@@ -333,7 +342,7 @@ impl<W: Phases> SegmentContext<'_, W> {
         worker: &Worker<'_>,
         worker_state: &mut WorkerState<W::Scratch>,
         now: Cycle,
-        mut leader: Option<&mut LeaderState<'_, '_, W, C>>,
+        mut leader: Option<&mut LeadWorkerState<'_, '_, W, C>>,
     ) {
         let &Self { world, state, groups, clock, segment, .. } = self;
         let WorkerState { scratch, stats } = worker_state;
@@ -343,7 +352,7 @@ impl<W: Phases> SegmentContext<'_, W> {
         let n = world.bodies(state);
         worker.for_each_chunk(pool, n, |bodies| {
             interrupt::check();
-            bodies.clone().for_each(|body| groups.reset(body as Slot));
+            bodies.clone().for_each(|body| groups.make_singleton(body as Slot));
             W::claim(context, bodies);
         });
         worker.barrier();
@@ -410,7 +419,7 @@ fn run_auction<W: Phases>(
     pending: &mut Vec<Slot>,
     worker: &Worker<'_>,
 ) {
-    while worker.any(!pending.is_empty()) {
+    while worker.any_worker(!pending.is_empty()) {
         interrupt::check();
         for &body in &*pending {
             auction.bid(context, body);

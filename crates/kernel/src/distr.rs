@@ -10,7 +10,7 @@ pub const ROW_TOLERANCE: f64 = 1e-6;
 
 /// A reason why a row is not a probability distribution.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum RowError {
+pub enum DistributionError {
     /// No outcome at all.
     #[error("the row is empty")]
     Empty,
@@ -40,17 +40,17 @@ fn round_to_micro(value: f64) -> f64 {
 /// # Errors
 /// When it is empty, has an entry outside [0, 1], or does not sum to 1 within
 /// [`ROW_TOLERANCE`].
-pub fn check_row(row: &[f64]) -> Result<(), RowError> {
+pub fn check_row(row: &[f64]) -> Result<(), DistributionError> {
     if row.is_empty() {
-        return Err(RowError::Empty);
+        return Err(DistributionError::Empty);
     }
     for (i, &value) in row.iter().enumerate() {
         if !(0.0..=1.0).contains(&value) {
-            return Err(RowError::NotAProbability { index: i + 1, value });
+            return Err(DistributionError::NotAProbability { index: i + 1, value });
         }
     }
     let sum: f64 = row.iter().sum();
-    if (sum - 1.0).abs() > ROW_TOLERANCE { Err(RowError::Sum { sum }) } else { Ok(()) }
+    if (sum - 1.0).abs() > ROW_TOLERANCE { Err(DistributionError::Sum { sum }) } else { Ok(()) }
 }
 
 /// A probability as a threshold: an event happens when a word is below it.
@@ -88,7 +88,7 @@ impl Categorical {
     ///
     /// # Errors
     /// See [`check_row`].
-    pub fn new(row: &[f64]) -> Result<Self, RowError> {
+    pub fn new(row: &[f64]) -> Result<Self, DistributionError> {
         check_row(row)?;
         let sum: f64 = row.iter().sum();
         let mut outcomes = Vec::new();
@@ -148,9 +148,12 @@ mod tests {
         assert_eq!(error.to_string(), "the row sums to 1.25, above 1 by 0.25");
         let error = check_row(&[0.05, 0.6, 0.05]).expect_err("0.7 is not 1");
         assert_eq!(error.to_string(), "the row sums to 0.7, short of 1 by 0.3");
-        assert_eq!(check_row(&[]), Err(RowError::Empty));
-        assert!(matches!(check_row(&[1.5]), Err(RowError::NotAProbability { index: 1, .. })));
-        assert!(matches!(check_row(&[f64::NAN]), Err(RowError::NotAProbability { .. })));
+        assert_eq!(check_row(&[]), Err(DistributionError::Empty));
+        assert!(matches!(
+            check_row(&[1.5]),
+            Err(DistributionError::NotAProbability { index: 1, .. })
+        ));
+        assert!(matches!(check_row(&[f64::NAN]), Err(DistributionError::NotAProbability { .. })));
     }
 
     #[test]

@@ -2,11 +2,11 @@
 //! workers.
 //!
 //! A cycle that is too small to be worth sharing runs on one worker alone. The engine measures instead of
-//! guessing, see `Autotuner`. Results do not depend on its choice.
+//! guessing, see `WorkerCountTuner`. Results do not depend on its choice.
 
 use crate::conflict::ConflictGroups;
 use crate::cycle::{
-    EngineParts, Observer, PhaseTimes, Segment, SegmentTiming, WorkerState, advance, lock,
+    CycleSegment, CycleSegmentTiming, EngineParts, Observer, PhaseTimes, WorkerState, advance, lock,
 };
 use crate::interrupt::Interrupt;
 use crate::ports::Clock;
@@ -37,7 +37,7 @@ pub struct Engine<W: Phases> {
     worker_states: Vec<Mutex<WorkerState<W::Scratch>>>,
     /// Barrier and cursors of all workers, created when they first work together.
     team: Option<WorkerTeam>,
-    autotuner: Autotuner,
+    autotuner: WorkerCountTuner,
     times: PhaseTimes,
     interrupt: Interrupt,
 }
@@ -53,7 +53,7 @@ impl<W: Phases> Engine<W> {
                 .map(|_| Mutex::new(WorkerState::new(world.scratch())))
                 .collect(),
             team: None,
-            autotuner: Autotuner::default(),
+            autotuner: WorkerCountTuner::default(),
             times: PhaseTimes::default(),
             interrupt: Interrupt::default(),
         }
@@ -82,7 +82,7 @@ impl<W: Phases> Engine<W> {
     }
 
     /// Time spent in each phase so far.
-    pub fn times(&self) -> PhaseTimes {
+    pub fn phase_times(&self) -> PhaseTimes {
         self.times
     }
 
@@ -133,8 +133,11 @@ impl<W: Phases> Engine<W> {
                 self.since_arranged = 0;
             }
             let options = self.autotuner.segment_options(self.worker_states.len());
-            let segment =
-                Segment { from: from + done, cycles: cycles - done, limit_ns: options.limit_ns };
+            let segment = CycleSegment {
+                from: from + done,
+                cycles: cycles - done,
+                limit_ns: options.limit_ns,
+            };
             let workers = &self.worker_states[..options.workers];
             let team = (options.workers > 1)
                 .then(|| self.team.get_or_insert_with(|| WorkerTeam::new(options.workers)));
@@ -203,7 +206,7 @@ const EMA_WEIGHT: f64 = 0.25;
 /// still noticed. Only a probe can make all workers the favorite, so an old measurement never does;
 /// one worker takes over as soon as all are slower.
 #[derive(Debug)]
-struct Autotuner {
+struct WorkerCountTuner {
     /// Nanoseconds per cycle with one worker and with all; `None` where not measured yet.
     serial_ns: Option<f64>,
     parallel_ns: Option<f64>,
@@ -217,14 +220,14 @@ struct Autotuner {
 
 /// The number of workers of the next segment, and its maximum duration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct SegmentOptions {
+struct CycleSegmentOptions {
     workers: usize,
     limit_ns: u64,
     /// Whether this measures the other mode, not the favorite.
     is_probe: bool,
 }
 
-impl Default for Autotuner {
+impl Default for WorkerCountTuner {
     fn default() -> Self {
         Self {
             serial_ns: None,
@@ -237,10 +240,10 @@ impl Default for Autotuner {
     }
 }
 
-impl Autotuner {
-    fn segment_options(&self, workers: usize) -> SegmentOptions {
+impl WorkerCountTuner {
+    fn segment_options(&self, workers: usize) -> CycleSegmentOptions {
         if self.force_parallel {
-            return SegmentOptions { workers, limit_ns: PARALLEL_SEGMENT_NS, is_probe: false };
+            return CycleSegmentOptions { workers, limit_ns: PARALLEL_SEGMENT_NS, is_probe: false };
         }
         let is_probe = workers > 1 && self.is_probe_due();
         let is_parallel = self.favors_parallel != is_probe;
@@ -251,7 +254,7 @@ impl Autotuner {
         } else {
             SERIAL_SEGMENT_NS
         };
-        SegmentOptions { workers: if is_parallel { workers } else { 1 }, limit_ns, is_probe }
+        CycleSegmentOptions { workers: if is_parallel { workers } else { 1 }, limit_ns, is_probe }
     }
 
     fn is_probe_due(&self) -> bool {
@@ -263,7 +266,7 @@ impl Autotuner {
         self.since_probe_ns >= self.probe_wait_ns || (is_first && serial_ns >= EAGER_PROBE_CYCLE_NS)
     }
 
-    fn record(&mut self, options: SegmentOptions, timing: &SegmentTiming) {
+    fn record(&mut self, options: CycleSegmentOptions, timing: &CycleSegmentTiming) {
         let took_ns = timing.took_ns as f64;
         let is_parallel = self.favors_parallel != options.is_probe;
         let measured = if is_parallel { &mut self.parallel_ns } else { &mut self.serial_ns };
@@ -298,7 +301,7 @@ impl Autotuner {
     }
 
     /// Goes back to one worker where all have become slower; the time lost counts like that of a probe.
-    fn fall_back_to_one(&mut self, timing: &SegmentTiming) {
+    fn fall_back_to_one(&mut self, timing: &CycleSegmentTiming) {
         let (Some(serial_ns), Some(parallel_ns)) = (self.serial_ns, self.parallel_ns) else {
             return;
         };
@@ -313,7 +316,7 @@ impl Autotuner {
 
 /// Nanoseconds per cycle, without the first one if it is to be left out: threads were started in
 /// it, and caches were cold.
-fn per_cycle_ns(timing: &SegmentTiming, without_first: bool) -> f64 {
+fn per_cycle_ns(timing: &CycleSegmentTiming, without_first: bool) -> f64 {
     let mut took_ns = timing.took_ns;
     let mut cycles = timing.cycles;
     if without_first {
@@ -338,7 +341,7 @@ mod tests {
     /// A pace on a machine with cycles of a known duration.
     #[derive(Default)]
     struct Trial {
-        pace: Autotuner,
+        pace: WorkerCountTuner,
         /// More for the first cycle of all workers: threads are started.
         start_ns: u64,
         now_ns: u64,
@@ -358,8 +361,12 @@ mod tests {
                 let cycles = plan.limit_ns.saturating_sub(start_ns).div_ceil(cycle_ns).max(1);
                 let took_ns = start_ns + cycles * cycle_ns;
                 let first_ns = start_ns + cycle_ns;
-                let timing =
-                    SegmentTiming { cycles, took_ns, first_ns, ..SegmentTiming::default() };
+                let timing = CycleSegmentTiming {
+                    cycles,
+                    took_ns,
+                    first_ns,
+                    ..CycleSegmentTiming::default()
+                };
                 if plan.is_probe {
                     self.looks_at_ns.push(self.now_ns);
                     self.looking_ns += took_ns;

@@ -36,32 +36,32 @@ struct WorkerLostPayload;
 /// The interrupt that a thread polls. Each thread counts its own checks, so that workers that check all the
 /// time do not wait for each other's cache lines.
 #[derive(Debug)]
-struct Attachment {
+struct InterruptAttachment {
     interrupt: Interrupt,
     checks: u64,
 }
 
 thread_local! {
     /// The interrupt that the present computation of this thread polls.
-    static ATTACHMENT: RefCell<Option<Attachment>> = const { RefCell::new(None) };
+    static ATTACHMENT: RefCell<Option<InterruptAttachment>> = const { RefCell::new(None) };
 }
 
 /// Checks the interrupt attached to this thread, if any. A computation calls it at least
 /// once in some milliseconds of work, at any depth of calls.
 ///
 /// # Panics
-/// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::caused`]
+/// When that interrupt is raised. The unwinding prints nothing; [`Interrupt::has_caused_unwind`]
 /// distinguishes it from that of a bug.
 #[inline]
 pub fn check() {
-    let is_raised =
-        ATTACHMENT.with_borrow_mut(|attached| attached.as_mut().is_some_and(Attachment::check));
+    let is_raised = ATTACHMENT
+        .with_borrow_mut(|attached| attached.as_mut().is_some_and(InterruptAttachment::check));
     if is_raised {
         resume_unwind(Box::new(InterruptPayload));
     }
 }
 
-impl Attachment {
+impl InterruptAttachment {
     fn check(&mut self) -> bool {
         self.checks += 1;
         self.interrupt.0.is_raised.load(Relaxed)
@@ -75,19 +75,19 @@ impl Interrupt {
     }
 
     /// Attaches the interrupt to this thread until the returned guard is dropped.
-    pub fn attach(&self) -> AttachGuard {
-        let attachment = Attachment { interrupt: self.clone(), checks: 0 };
-        AttachGuard { previous: ATTACHMENT.replace(Some(attachment)) }
+    pub fn attach(&self) -> InterruptGuard {
+        let attachment = InterruptAttachment { interrupt: self.clone(), checks: 0 };
+        InterruptGuard { previous: ATTACHMENT.replace(Some(attachment)) }
     }
 
     /// Number of checks by threads from which it was detached, for tests of the frequency of checks.
-    pub fn checks(&self) -> u64 {
+    pub fn check_count(&self) -> u64 {
         self.0.checks.load(Relaxed)
     }
 
     /// Returns whether a caught unwinding came from a check of this interrupt, rather than from a
     /// bug.
-    pub fn caused(&self, payload: &(dyn Any + Send)) -> bool {
+    pub fn has_caused_unwind(&self, payload: &(dyn Any + Send)) -> bool {
         let is_raised = self.0.is_raised.load(Relaxed);
         // The calling thread may unwind at a barrier, because another worker was the first to check.
         is_raised && (payload.is::<InterruptPayload>() || payload.is::<WorkerLostPayload>())
@@ -96,14 +96,16 @@ impl Interrupt {
 
 /// Keeps an interrupt attached to the thread until it is dropped.
 #[derive(Debug)]
-pub struct AttachGuard {
+pub struct InterruptGuard {
     /// The attachment to restore.
-    previous: Option<Attachment>,
+    previous: Option<InterruptAttachment>,
 }
 
-impl Drop for AttachGuard {
+impl Drop for InterruptGuard {
     fn drop(&mut self) {
-        if let Some(Attachment { interrupt, checks }) = ATTACHMENT.replace(self.previous.take()) {
+        if let Some(InterruptAttachment { interrupt, checks }) =
+            ATTACHMENT.replace(self.previous.take())
+        {
             interrupt.0.checks.fetch_add(checks, Relaxed);
         }
     }
@@ -137,8 +139,8 @@ mod tests {
             };
             let run = || workers::run(&mut vec![(); workers], work);
             let payload = catch_unwind(AssertUnwindSafe(run)).expect_err("it unwinds");
-            assert!(interrupt.checks() >= u64::from(raises));
-            interrupt.caused(payload.as_ref())
+            assert!(interrupt.check_count() >= u64::from(raises));
+            interrupt.has_caused_unwind(payload.as_ref())
         };
         for workers in [1, 3] {
             assert!(caught(true, workers));

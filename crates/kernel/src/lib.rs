@@ -50,12 +50,12 @@ pub mod workers;
 pub mod world;
 
 pub use batch::Batch;
-pub use column::Column;
+pub use column::AtomicColumn;
 pub use digest::Digest;
 pub use error::InputError;
 pub use interrupt::Interrupt;
 pub use run::{Run, RunStart};
-pub use run_config::{GroupSizes, RunConfig, RunStats};
+pub use run_config::{GroupSizeHistogram, RunConfig, RunStats};
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, Seed, Slot};
 pub use world::{

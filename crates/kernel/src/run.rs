@@ -1,6 +1,6 @@
 //! The one simulation: a world, its state, the engine, and the rows to record.
 
-use crate::checkpoint::{self, CheckpointError, Header};
+use crate::checkpoint::{self, CheckpointError, CheckpointHeader};
 use crate::control::{
     self, BufferMut, ControlLog, ControlRow, OrderError, OrderLog, OrderRow, Orders, Team, Teams,
 };
@@ -9,11 +9,11 @@ use crate::digest::Digest;
 use crate::engine::{CycleRange, Engine};
 use crate::interrupt::Interrupt;
 use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
-use crate::run_config::{GroupSizes, RunConfig, RunStats};
+use crate::run_config::{GroupSizeHistogram, RunConfig, RunStats};
 use crate::simulation::Simulation;
-use crate::text::{Description, KeyValues};
+use crate::text::{KeyValues, StateDescription};
 use crate::units::{Cycle, EntityId};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::{
     DecisionMode, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
 };
@@ -42,7 +42,7 @@ pub struct Run<W: World> {
     collector: W::Collector,
     engine: Engine<W>,
     /// Conflict groups up to the checkpoint from which the run was resumed.
-    groups_before: GroupSizes,
+    groups_before: GroupSizeHistogram,
     cycle: Cycle,
     clock: SystemClock,
     /// Whether rows are kept for a recorder.
@@ -74,7 +74,7 @@ impl<W: WorldControl> Run<W> {
             state,
             collector,
             engine,
-            groups_before: GroupSizes::default(),
+            groups_before: GroupSizeHistogram::default(),
             cycle: 0,
             clock: SystemClock::default(),
             records: false,
@@ -124,8 +124,8 @@ impl<W: World> Run<W> {
         stats
     }
 
-    fn header(&self) -> Header {
-        Header {
+    fn header(&self) -> CheckpointHeader {
+        CheckpointHeader {
             format: checkpoint::FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").into(),
             world: W::NAME.into(),
@@ -236,7 +236,7 @@ impl<W: WorldControl> Run<W> {
         }
         // Moved out while its orders are applied, which borrows the run.
         let order_log = std::mem::take(&mut self.order_log);
-        for orders in order_log.due(self.cycle) {
+        for orders in order_log.orders_due(self.cycle) {
             self.apply_orders(&orders).expect("`replay_orders` has checked it");
         }
         self.order_log = order_log;
@@ -267,7 +267,7 @@ impl<W: WorldMetrics> Run<W> {
 
 impl<W: WorldRecording> Run<W> {
     /// Sets up all workers for gathering the rows and events that are now enabled.
-    fn prepare(&mut self) {
+    fn prepare_workers(&mut self) {
         let Self { world, collector, engine, .. } = self;
         for worker in engine.worker_states_mut() {
             world.prepare(collector, &mut worker.scratch);
@@ -376,7 +376,7 @@ where
         self.state = self.world.restore(snapshot, &mut self.collector)?;
         self.groups_before = groups;
         for worker in self.engine.worker_states_mut() {
-            worker.stats.groups = GroupSizes::default();
+            worker.stats.groups = GroupSizeHistogram::default();
         }
         self.cycle = cycle;
         self.last_applied = None;
@@ -392,7 +392,7 @@ where
         if self.world.records_controls(&self.collector) {
             self.control_rows.start(Some(control::controls_table()));
         }
-        self.prepare();
+        self.prepare_workers();
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
@@ -423,12 +423,12 @@ where
 
     fn enable_events(&mut self) {
         self.world.enable_events(&mut self.collector);
-        self.prepare();
+        self.prepare_workers();
     }
 
     fn enable_odometry(&mut self) {
         self.world.enable_odometry(&mut self.collector);
-        self.prepare();
+        self.prepare_workers();
     }
 
     fn frame(&mut self, options: FrameOptions) -> Frame {
@@ -474,7 +474,7 @@ where
         self.last_applied = None;
     }
 
-    fn position_columns(&self) -> Vec<PositionColumns> {
+    fn position_columns(&self) -> Vec<PositionTableColumns> {
         self.world.position_columns(&self.collector)
     }
 
@@ -494,11 +494,11 @@ where
         self.world.summary_lines(&Run::metrics(self))
     }
 
-    fn poses(&self) -> Description {
+    fn poses(&self) -> StateDescription {
         self.world.poses(&self.state, self.cycle)
     }
 
     fn phase_times(&self) -> PhaseTimes {
-        self.engine.times()
+        self.engine.phase_times()
     }
 }

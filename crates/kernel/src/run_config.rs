@@ -28,14 +28,14 @@ impl RunConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunStats {
     /// The conflict groups, those before a resumed checkpoint included.
-    pub groups: GroupSizes,
+    pub groups: GroupSizeHistogram,
     /// Processor time of all workers, in nanoseconds.
     pub cpu_ns: u64,
 }
 
 /// Conflict groups by size: a sum over cycles, which checkpoints keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct GroupSizes {
+pub struct GroupSizeHistogram {
     /// Number of groups by size: index k counts groups of `2^k .. 2^(k+1)` bodies, up to the 2^32 that slots can
     /// number.
     pub counts: [u64; 32],
@@ -43,7 +43,7 @@ pub struct GroupSizes {
     pub largest: u64,
 }
 
-impl GroupSizes {
+impl GroupSizeHistogram {
     /// Counts a group of several bodies.
     pub(crate) fn add(&mut self, size: usize) {
         self.counts[size.ilog2() as usize] += 1;

@@ -7,9 +7,9 @@ use crate::digest::Digest;
 use crate::interrupt::Interrupt;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::run_config::RunConfig;
-use crate::text::{Description, KeyValues};
+use crate::text::{KeyValues, StateDescription};
 use crate::units::{Cycle, EntityId};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::DecisionMode;
 use std::any::Any;
 
@@ -147,7 +147,7 @@ pub trait Simulation: Any + Send {
     fn replay_controls(&mut self, _: ControlLog) {}
 
     /// The recorded tables and columns that hold the positions of bodies.
-    fn position_columns(&self) -> Vec<PositionColumns>;
+    fn position_columns(&self) -> Vec<PositionTableColumns>;
 
     /// Returns the metrics of the run so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;
@@ -162,7 +162,7 @@ pub trait Simulation: Any + Send {
     fn summary_lines(&self) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self) -> Description;
+    fn poses(&self) -> StateDescription;
 
     /// Returns the time spent in each phase in this process.
     fn phase_times(&self) -> PhaseTimes;

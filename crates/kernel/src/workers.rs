@@ -115,7 +115,7 @@ impl Worker<'_> {
     }
 
     /// Returns whether `own` is true for any worker. All must call it, because it waits for all.
-    pub fn any(&self, own: bool) -> bool {
+    pub fn any_worker(&self, own: bool) -> bool {
         let Some(WorkerTeam { votes, .. }) = self.team else { return own };
         if own {
             votes.fetch_add(1, Ordering::Relaxed);
@@ -144,7 +144,7 @@ pub(crate) struct WorkerTeam {
     /// `POOLS` cursors per worker.
     cursors: Vec<CachePadded>,
     barrier: Barrier,
-    /// Number of workers that answer yes, see [`Worker::any`].
+    /// Number of workers that answer yes, see [`Worker::any_worker`].
     votes: AtomicUsize,
     /// 0 where there are more workers than processors: spinning would keep the others from working.
     spins: u32,
@@ -234,9 +234,9 @@ impl Barrier {
         let generation = self.generation.load(Ordering::Acquire);
         if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == size {
             self.arrived.store(0, Ordering::Relaxed);
-            self.open(generation.wrapping_add(1));
+            self.release_generation(generation.wrapping_add(1));
         } else {
-            self.wait_for_end(generation, spins);
+            self.wait_for_generation(generation, spins);
         }
         if self.broken.load(Ordering::Relaxed) {
             unwind_worker_lost();
@@ -244,7 +244,7 @@ impl Barrier {
     }
 
     /// Ends the present generation, and wakes its sleepers.
-    fn open(&self, next: u32) {
+    fn release_generation(&self, next: u32) {
         // Both sides store first and then read the other's word (SeqCst), so either the sleeper
         // sees the new generation or this worker sees the sleeper.
         self.generation.store(next, Ordering::SeqCst);
@@ -257,7 +257,7 @@ impl Barrier {
 
     /// Waits until a generation has ended, in three steps of which each uses less processor time than the one before,
     /// and takes longer to wake up.
-    fn wait_for_end(&self, generation: u32, spins: u32) {
+    fn wait_for_generation(&self, generation: u32, spins: u32) {
         for _ in 0..spins {
             if self.has_ended(generation) {
                 return;
@@ -294,7 +294,7 @@ impl Drop for ReleaseOnPanic<'_> {
         if std::thread::panicking() {
             let barrier = &self.0.barrier;
             barrier.broken.store(true, Ordering::SeqCst);
-            barrier.open(barrier.generation.load(Ordering::SeqCst).wrapping_add(1));
+            barrier.release_generation(barrier.generation.load(Ordering::SeqCst).wrapping_add(1));
         }
     }
 }
@@ -353,7 +353,7 @@ mod tests {
             run(&mut vec![(); team], |worker, ()| {
                 for round in 0..20 {
                     let own = round % 3 == 0 && worker.index() == round % team;
-                    assert_eq!(worker.any(own), round % 3 == 0);
+                    assert_eq!(worker.any_worker(own), round % 3 == 0);
                 }
             });
         }

@@ -17,9 +17,9 @@ use crate::control::{BufferMut, Order, OrderError, Teams};
 use crate::digest::Digest;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::run_config::RunStats;
-use crate::text::{Description, KeyValues};
+use crate::text::{KeyValues, StateDescription};
 use crate::units::{Cycle, EntityId, Slot};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -53,7 +53,7 @@ pub enum DecisionMode {
 ///
 /// Each is called by several workers at once on disjoint parts, and everything a worker writes in
 /// one phase is seen by all in the next. The state is shared, so its fields are
-/// [`crate::column::Column`]s (or other cells) with one writer per slot and phase. No result may
+/// [`crate::column::AtomicColumn`]s (or other cells) with one writer per slot and phase. No result may
 /// depend on a clock, a shared generator, or anything else that is not in the state.
 pub trait Phases: Sync + Sized {
     /// The mutable state: everything that changes from cycle to cycle.
@@ -183,7 +183,7 @@ pub trait WorldRecording: World {
     ) -> Result<(), RecordError>;
 
     /// Returns the recorded tables and columns that hold the positions of bodies.
-    fn position_columns(&self, _: &Self::Collector) -> Vec<PositionColumns> {
+    fn position_columns(&self, _: &Self::Collector) -> Vec<PositionTableColumns> {
         Vec::new()
     }
 }
@@ -310,5 +310,5 @@ pub trait WorldMetrics: World {
     fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self, state: &Self::State, now: Cycle) -> Description;
+    fn poses(&self, state: &Self::State, now: Cycle) -> StateDescription;
 }

@@ -6,7 +6,7 @@
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
-use sidestep_link::protocol::{Incarnation, Member};
+use sidestep_link::protocol::{FleetMember, Incarnation};
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{Peer, Wire};
@@ -47,11 +47,11 @@ fn main() {
 fn rounds(team: u32, rounds: usize) {
     let free = || reserve_port("tcp/127.0.0.1:0").expect("a free port");
     let server = free().endpoint;
-    let _server = ZenohWire::server(std::slice::from_ref(&server), None).expect("a server");
+    let _server = ZenohWire::server_wire(std::slice::from_ref(&server), None).expect("a server");
     let held: Vec<_> = (0..team).map(|_| free()).collect();
-    let members: Vec<Member> = (0..)
+    let members: Vec<FleetMember> = (0..)
         .zip(&held)
-        .map(|(agent, held)| Member {
+        .map(|(agent, held)| FleetMember {
             agent,
             incarnation: Incarnation(0),
             listens: vec![held.endpoint.clone()],
@@ -64,7 +64,7 @@ fn rounds(team: u32, rounds: usize) {
             let (server, members, barrier) = (server.clone(), members.clone(), barrier.clone());
             std::thread::spawn(move || {
                 let me = Peer::Node(agent);
-                let wire = ZenohWire::node(me, &[server], None, TIMEOUT).expect("it answers");
+                let wire = ZenohWire::node_wire(me, &[server], None, TIMEOUT).expect("it answers");
                 let own = members[agent as usize].listens.iter();
                 let held = own.map(|endpoint| reserve_port(endpoint).expect("free")).collect();
                 let mut wire = wire.with_listeners(held);

@@ -6,7 +6,7 @@ pub use sidestep::kernel::network::OutgoingPacket;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// Controls of agents in the form that their world reads, at most one of each.
-pub type Controls = Vec<(EntityId, Vec<u8>)>;
+pub type SerializedControls = Vec<(EntityId, Vec<u8>)>;
 
 /// Everything that an agent perceives at the start of a cycle.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub struct InvalidControl {
 
 /// The present activity of an agent, for logs and tables.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Activity {
+pub struct AgentActivity {
     /// Its name, e.g. `optimize`.
     pub name: &'static str,
     /// Number of rounds of the conversation so far.
@@ -68,7 +68,7 @@ pub trait AgentProgram: Send {
     fn control(&self) -> Option<Vec<u8>>;
 
     /// Returns its present activity; nothing depends on it.
-    fn activity(&self) -> Activity;
+    fn activity(&self) -> AgentActivity;
 
     /// Returns the other agents that it has heard in this cycle, or in the one before if it has heard none yet.
     fn heard_agents(&self) -> Vec<EntityId>;
@@ -93,7 +93,7 @@ pub struct Transmission {
 
 /// An arrival of a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Arrival {
+pub struct PacketTiming {
     /// The tick in which its last byte leaves the sender: a large packet occupies the link for some time.
     pub departs: u64,
     /// The tick in which it arrives.
@@ -101,9 +101,9 @@ pub struct Arrival {
 }
 
 /// The faults of packets from one agent to others, drawn from the scenario's seed.
-pub trait Channel: Send {
+pub trait ChannelModel: Send {
     /// Returns the arrivals of a packet: none if it is lost, two if it is duplicated.
-    fn arrivals(&mut self, packet: &Transmission) -> Vec<Arrival>;
+    fn arrivals(&mut self, packet: &Transmission) -> Vec<PacketTiming>;
 
     /// Duration of a tick, in seconds of the scenario.
     fn tick_s(&self) -> f64;

@@ -1,7 +1,8 @@
 //! Airplanes: their world at the server, and the program of a pilot at each node.
 
 use crate::agent::{
-    Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
+    AgentActivity, AgentPercept, AgentProgram, ChannelModel, InvalidControl, OutgoingPacket,
+    SerializedControls,
 };
 use crate::distributed::DistributedWorld;
 use crate::faults::FaultyChannel;
@@ -11,7 +12,7 @@ use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId, Simulation, World};
 use sidestep::worlds::airspace::pilot::{Percept, Pilot};
 use sidestep::worlds::airspace::settings::Deployment;
-use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld, Fleet};
+use sidestep::worlds::airspace::{AirspaceRun, AirspaceWorld, RemotePilotRun};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -78,7 +79,7 @@ impl DistributedWorld for DistributedAirspace {
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
         let run = airspace_run(run);
         let out_of_range: BTreeMap<EntityId, Vec<EntityId>> =
-            run.out_of_range().into_iter().collect();
+            run.out_of_radio_range().into_iter().collect();
         let mut agent_percepts = Vec::new();
         for percept in run.percepts() {
             let agent = percept.own.id;
@@ -92,7 +93,11 @@ impl DistributedWorld for DistributedAirspace {
         agent_percepts
     }
 
-    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
+    fn invalid_controls(
+        &self,
+        run: &dyn Simulation,
+        controls: &SerializedControls,
+    ) -> Vec<InvalidControl> {
         let invalid = airspace_run(run).invalid_controls(controls).into_iter();
         invalid.map(|(agent, reason)| InvalidControl { agent, reason }).collect()
     }
@@ -106,7 +111,7 @@ impl DistributedWorld for DistributedAirspace {
         })
     }
 
-    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn ChannelModel>> {
         let world = self.world.clone();
         let injector = self.world.fault_injector()?;
         Some(Box::new(FaultyChannel::new(injector, agent, move |cycle| {
@@ -161,7 +166,7 @@ impl AgentProgram for PilotProgram {
         self.pilot.is_done()
     }
 
-    fn activity(&self) -> Activity {
+    fn activity(&self) -> AgentActivity {
         let name = if self.pilot.is_done() {
             "done"
         } else if self.pilot.has_decided() {
@@ -172,7 +177,7 @@ impl AgentProgram for PilotProgram {
             "group"
         };
         let progress = self.pilot.progress().unwrap_or_default();
-        Activity { name, round: progress.round, epoch: progress.epoch.into() }
+        AgentActivity { name, round: progress.round, epoch: progress.epoch.into() }
     }
 
     fn heard_agents(&self) -> Vec<EntityId> {

@@ -63,7 +63,7 @@ impl Default for ArqLink {
 
 /// What has to be sent to the other end now.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct DueFrames {
+pub(crate) struct DueMessages {
     /// Messages to retransmit, with their sequence numbers.
     pub(crate) retransmissions: Vec<(u64, Arc<Message>)>,
     /// Whether an acknowledgment is due in a frame of its own.
@@ -86,7 +86,7 @@ impl ArqLink {
     }
 
     /// Accepts a message if it is the next one in order, and returns whether it is.
-    pub(crate) fn accept(&mut self, sequence: u64, now: Duration) -> bool {
+    pub(crate) fn accept_in_order(&mut self, sequence: u64, now: Duration) -> bool {
         let is_next = sequence == self.next_received;
         if is_next {
             self.next_received += 1;
@@ -111,8 +111,8 @@ impl ArqLink {
     }
 
     /// Returns what is due by now, and sets the time of the next retransmission.
-    pub(crate) fn take_due(&mut self, now: Duration) -> DueFrames {
-        let mut due = DueFrames::default();
+    pub(crate) fn take_due(&mut self, now: Duration) -> DueMessages {
+        let mut due = DueMessages::default();
         if self.retransmit_at.is_some_and(|at| at <= now) {
             let sequence = (self.oldest..).zip(&self.unacked).take(MAX_RETRANSMIT_BURST);
             due.retransmissions =
@@ -180,7 +180,7 @@ mod tests {
         fn arrive(&mut self, (to, (ack, message)): (usize, InTransit)) {
             self.links[to].on_ack(ack, self.now);
             if let Some((sequence, message)) = message
-                && self.links[to].accept(sequence, self.now)
+                && self.links[to].accept_in_order(sequence, self.now)
             {
                 self.accepted.push(message);
             }

@@ -1,7 +1,8 @@
 //! Connectors of chains: their world at the server, and the program of one at each node.
 
 use crate::agent::{
-    Activity, AgentPercept, AgentProgram, Channel, Controls, InvalidControl, OutgoingPacket,
+    AgentActivity, AgentPercept, AgentProgram, ChannelModel, InvalidControl, OutgoingPacket,
+    SerializedControls,
 };
 use crate::distributed::DistributedWorld;
 use crate::faults::FaultyChannel;
@@ -149,7 +150,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         &self,
         run: &dyn Simulation,
         groups: &[Vec<EntityId>],
-        controls: &mut Controls,
+        controls: &mut SerializedControls,
         lost: &[EntityId],
     ) -> Vec<InvalidControl> {
         let run = self.chain_run(run);
@@ -167,7 +168,11 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         invalid
     }
 
-    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl> {
+    fn invalid_controls(
+        &self,
+        run: &dyn Simulation,
+        controls: &SerializedControls,
+    ) -> Vec<InvalidControl> {
         let mut invalid = Vec::new();
         for (agent, bytes) in controls {
             let reason = match self.world.read_control(run.cycle(), *agent, bytes) {
@@ -191,7 +196,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         })
     }
 
-    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>> {
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn ChannelModel>> {
         let world = self.world.clone();
         let injector = self.world.fault_injector()?;
         Some(Box::new(FaultyChannel::new(injector, agent, move |cycle| {
@@ -246,8 +251,8 @@ impl<const D: usize> AgentProgram for ConnectorProgram<D> {
         self.agent.is_done()
     }
 
-    fn activity(&self) -> Activity {
-        Activity { name: self.agent.role_name(), ..Activity::default() }
+    fn activity(&self) -> AgentActivity {
+        AgentActivity { name: self.agent.role_name(), ..AgentActivity::default() }
     }
 
     fn heard_agents(&self) -> Vec<EntityId> {

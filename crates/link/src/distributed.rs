@@ -1,6 +1,6 @@
 //! A world whose agents may be processes: the interface that a server and its nodes use.
 
-use crate::agent::{AgentPercept, AgentProgram, Channel, Controls, InvalidControl};
+use crate::agent::{AgentPercept, AgentProgram, ChannelModel, InvalidControl, SerializedControls};
 use sidestep::kernel::{EntityId, InputError, Simulation};
 use sidestep_session::fleet::AgentName;
 
@@ -52,20 +52,24 @@ pub trait DistributedWorld: Send + Sync {
         &self,
         _run: &dyn Simulation,
         _groups: &[Vec<EntityId>],
-        _controls: &mut Controls,
+        _controls: &mut SerializedControls,
         _lost: &[EntityId],
     ) -> Vec<InvalidControl> {
         Vec::new()
     }
 
     /// Returns the controls of the present cycle that cannot be read or carried out.
-    fn invalid_controls(&self, run: &dyn Simulation, controls: &Controls) -> Vec<InvalidControl>;
+    fn invalid_controls(
+        &self,
+        run: &dyn Simulation,
+        controls: &SerializedControls,
+    ) -> Vec<InvalidControl>;
 
     /// Returns the program of an agent, which accepts packets only from programs of the same build.
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram>;
 
     /// Returns the faults of the scenario's network for packets of an agent; none where it has no network.
-    fn channel(&self, agent: EntityId) -> Option<Box<dyn Channel>>;
+    fn channel(&self, agent: EntityId) -> Option<Box<dyn ChannelModel>>;
 
     /// Returns the id of a named agent.
     ///

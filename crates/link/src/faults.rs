@@ -1,6 +1,6 @@
 //! The faults of a scenario's network, for the packets of one agent.
 
-use crate::agent::{Arrival, Channel, Transmission};
+use crate::agent::{ChannelModel, PacketTiming, Transmission};
 use sidestep::kernel::network::FaultInjector;
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, EntityId};
@@ -26,8 +26,8 @@ impl FaultyChannel {
     }
 }
 
-impl Channel for FaultyChannel {
-    fn arrivals(&mut self, packet: &Transmission) -> Vec<Arrival> {
+impl ChannelModel for FaultyChannel {
+    fn arrivals(&mut self, packet: &Transmission) -> Vec<PacketTiming> {
         let &Transmission { to, tick, sequence, bytes } = packet;
         let envelope = Envelope {
             // A transport of the kernel counts ticks where an envelope has its cycle.
@@ -39,7 +39,7 @@ impl Channel for FaultyChannel {
             payload: vec![0; bytes],
         };
         let arrivals = self.injector.arrivals(envelope).into_iter();
-        arrivals.map(|(departs, arrives)| Arrival { departs, arrives }).collect()
+        arrivals.map(|(departs, arrives)| PacketTiming { departs, arrives }).collect()
     }
 
     fn tick_s(&self) -> f64 {

@@ -1,6 +1,6 @@
 //! The run at the server of a fleet: recorded, and with agents that decide at their nodes.
 
-use crate::agent::{AgentPercept, Controls, InvalidControl};
+use crate::agent::{AgentPercept, InvalidControl, SerializedControls};
 use crate::distributed::DistributedWorld;
 use sidestep::kernel::view::{Frame, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, Simulation};
@@ -16,7 +16,7 @@ pub struct HostedRun {
     watcher: &'static dyn Watcher,
     world: Arc<dyn DistributedWorld>,
     /// Controls of the present cycle.
-    controls: Controls,
+    controls: SerializedControls,
     keeps_events: bool,
 }
 
@@ -46,7 +46,7 @@ impl HostedRun {
     }
 
     /// Returns the agents that have nodes, in ascending order.
-    pub fn agents(&self) -> impl Iterator<Item = EntityId> + use<> {
+    pub fn all_agents(&self) -> impl Iterator<Item = EntityId> + use<> {
         0..self.world.count() as EntityId
     }
 
@@ -82,7 +82,7 @@ impl HostedRun {
     pub fn accept_controls(
         &mut self,
         groups: &[Vec<EntityId>],
-        mut controls: Controls,
+        mut controls: SerializedControls,
         lost: &[EntityId],
     ) -> Vec<InvalidControl> {
         let invalid =

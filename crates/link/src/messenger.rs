@@ -1,7 +1,7 @@
 //! A peer's messages to and from all others over one wire: best-effort ones, which may be lost, and reliable ones.
 
 use crate::arq::ArqLink;
-use crate::protocol::{Frame, Incarnation, Member, Message, Recipient};
+use crate::protocol::{FleetMember, Incarnation, Message, MessageFrame, RecipientHeader};
 use crate::wire::{Peer, Wire, WireError};
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
@@ -47,8 +47,8 @@ struct PeerState {
 
 impl PeerState {
     /// Returns the recipient of a frame to this peer; `sequence` is that of a reliable message.
-    fn recipient(&mut self, peer: Peer, sequence: Option<u64>) -> Recipient {
-        Recipient {
+    fn recipient_header(&mut self, peer: Peer, sequence: Option<u64>) -> RecipientHeader {
+        RecipientHeader {
             peer,
             incarnation: Some(self.incarnation),
             ack: self.link.take_cumulative_ack(),
@@ -59,7 +59,7 @@ impl PeerState {
 
 /// A received message.
 #[derive(Debug, PartialEq)]
-pub struct Received {
+pub struct ReceivedMessage {
     /// The sender.
     pub from: Peer,
     /// The sender's incarnation.
@@ -136,7 +136,7 @@ impl Messenger {
 
     /// Returns whether the direct link to another node is half-open: no message arrives there, and the link's other end
     /// has left probes unanswered for the given time.
-    pub fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
+    pub fn is_half_open(&mut self, member: &FleetMember, within: Duration) -> bool {
         let state = self.peers.get(&Peer::Node(member.agent));
         let Some(since) = state.and_then(|state| state.link.unacked_since()) else { return false };
         self.now().saturating_sub(since) > LINK_CHECK_TIMEOUT
@@ -166,8 +166,8 @@ impl Messenger {
         let mut recipients = Vec::with_capacity(to.len());
         for &peer in to {
             recipients.push(match self.peers.get_mut(&peer) {
-                Some(state) => state.recipient(peer, None),
-                None => Recipient { peer, incarnation: None, ack: 0, sequence: None },
+                Some(state) => state.recipient_header(peer, None),
+                None => RecipientHeader { peer, incarnation: None, ack: 0, sequence: None },
             });
         }
         self.transmit(recipients, Some(message));
@@ -177,7 +177,7 @@ impl Messenger {
     /// second process for an agent that has a node already must be answered, too.
     pub fn reply(&mut self, to: Peer, incarnation: Incarnation, message: Message) {
         let recipient =
-            Recipient { peer: to, incarnation: Some(incarnation), ack: 0, sequence: None };
+            RecipientHeader { peer: to, incarnation: Some(incarnation), ack: 0, sequence: None };
         self.transmit(vec![recipient], Some(&message));
     }
 
@@ -198,17 +198,18 @@ impl Messenger {
                 continue;
             };
             let sequence = state.link.send(message.clone(), now);
-            recipients.push(state.recipient(peer, Some(sequence)));
+            recipients.push(state.recipient_header(peer, Some(sequence)));
         }
         self.transmit(recipients, Some(&message));
     }
 
-    fn transmit(&mut self, to: Vec<Recipient>, message: Option<&Message>) {
+    fn transmit(&mut self, to: Vec<RecipientHeader>, message: Option<&Message>) {
         if to.is_empty() {
             return;
         }
         let peers: Vec<Peer> = to.iter().map(|recipient| recipient.peer).collect();
-        let frame = Frame { from: self.me, incarnation: self.incarnation, to, message }.encode();
+        let frame =
+            MessageFrame { from: self.me, incarnation: self.incarnation, to, message }.encode();
         self.stats.frames += 1;
         self.stats.bytes += frame.len() as u64;
         self.wire.send(&peers, &frame);
@@ -230,10 +231,10 @@ impl Messenger {
         for peer in due_peers {
             let Some(state) = self.peers.get_mut(&peer) else { continue };
             let due = state.link.take_due(now);
-            let recipient = state.recipient(peer, None);
+            let recipient = state.recipient_header(peer, None);
             self.stats.retries += due.retransmissions.len() as u64;
             for (sequence, message) in due.retransmissions {
-                let recipient = Recipient { sequence: Some(sequence), ..recipient };
+                let recipient = RecipientHeader { sequence: Some(sequence), ..recipient };
                 self.transmit(vec![recipient], Some(&message));
             }
             if due.acknowledge {
@@ -246,13 +247,13 @@ impl Messenger {
     ///
     /// # Errors
     /// When an endpoint cannot be bound.
-    pub fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+    pub fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
         self.wire.connect_mesh(me, members)
     }
 
     /// Returns the next message that arrives within some time, if any. Reliable messages arrive in the order in which
     /// their sender has sent them. Peers that are not connected can send only best-effort messages.
-    pub fn receive(&mut self, within: Duration) -> Option<Received> {
+    pub fn receive(&mut self, within: Duration) -> Option<ReceivedMessage> {
         let until = self.now().saturating_add(within);
         loop {
             self.send_due();
@@ -270,15 +271,15 @@ impl Messenger {
         }
     }
 
-    fn decode_frame(&mut self, bytes: &[u8]) -> Option<Received> {
-        let frame = match Frame::decode(bytes) {
+    fn decode_frame(&mut self, bytes: &[u8]) -> Option<ReceivedMessage> {
+        let frame = match MessageFrame::decode(bytes) {
             Ok(frame) => frame,
             Err(reason) => {
                 self.count_drop(reason.name());
                 return None;
             }
         };
-        let Frame { from, incarnation, to, message } = frame;
+        let MessageFrame { from, incarnation, to, message } = frame;
         // A frame for most nodes is published to all of them, so some frames are not for this peer.
         let recipient = to.into_iter().find(|recipient| recipient.peer == self.me)?;
         // A frame to the process that was here before has sequence numbers that mean nothing to this one.
@@ -290,7 +291,7 @@ impl Messenger {
             self.count_drop(reason);
             return None;
         }
-        Some(Received { from, incarnation, message: message? })
+        Some(ReceivedMessage { from, incarnation, message: message? })
     }
 
     /// Processes the acknowledgment and the sequence number of a frame; an error is the reason why its message is dropped.
@@ -298,7 +299,7 @@ impl Messenger {
         &mut self,
         from: Peer,
         incarnation: Incarnation,
-        header: &Recipient,
+        header: &RecipientHeader,
     ) -> Result<(), &'static str> {
         let now = self.now();
         let state = self.peers.get_mut(&from).filter(|state| state.incarnation == incarnation);
@@ -311,7 +312,9 @@ impl Messenger {
             state.link.on_ack(header.ack, now);
         }
         match header.sequence {
-            Some(sequence) if !state.link.accept(sequence, now) => Err(drop_reason::OUT_OF_ORDER),
+            Some(sequence) if !state.link.accept_in_order(sequence, now) => {
+                Err(drop_reason::OUT_OF_ORDER)
+            }
             _ => Ok(()),
         }
     }
@@ -354,7 +357,7 @@ mod tests {
     }
 
     fn messenger(hub: &MemoryHub, me: Peer, drops: usize) -> Messenger {
-        Messenger::new(me, Box::new(Lossy { wire: Box::new(hub.wire(me)), drops }))
+        Messenger::new(me, Box::new(Lossy { wire: Box::new(hub.peer_wire(me)), drops }))
     }
 
     #[test]
@@ -394,7 +397,7 @@ mod tests {
         first.multicast_reliable(&[b, c], Message::Close(1));
         assert_eq!(first.stats().dropped["stranger"], 1, "one of them is not connected");
         first.connect(c, peers[1].incarnation());
-        first.wire = Box::new(Lossy { wire: Box::new(hub.wire(a)), drops: 1 });
+        first.wire = Box::new(Lossy { wire: Box::new(hub.peer_wire(a)), drops: 1 });
         first.multicast_reliable(&[b, c], Message::Close(2));
         for peer in &mut peers {
             peer.connect(a, first.incarnation());
@@ -424,7 +427,7 @@ mod tests {
         first.send_reliable(b, Message::End);
         assert_eq!(second.receive(SOON), None, "it has not connected with the server");
         assert_eq!(second.stats().dropped["stranger"], 1);
-        hub.wire(Peer::Node(9)).send(&[b], b"something else");
+        hub.peer_wire(Peer::Node(9)).send(&[b], b"something else");
         assert_eq!(second.receive(SOON), None);
         assert_eq!(second.stats().dropped["foreign"], 1);
     }

@@ -20,20 +20,20 @@ pub struct Incarnation(pub u64);
 
 /// A frame on a wire: a message for some peers, or only acknowledgments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Frame<M = Message> {
+pub struct MessageFrame<M = Message> {
     /// The sender.
     pub from: Peer,
     /// The sender's incarnation.
     pub incarnation: Incarnation,
     /// The receivers; another peer that gets the frame ignores it.
-    pub to: Vec<Recipient>,
+    pub to: Vec<RecipientHeader>,
     /// The message, the same for all receivers; none in a frame that only acknowledges.
     pub message: Option<M>,
 }
 
 /// A receiver of a frame, with the header fields that differ by receiver: so a message to many is serialized once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Recipient {
+pub struct RecipientHeader {
     /// The receiver.
     pub peer: Peer,
     /// Its incarnation, if the sender knows it.
@@ -51,7 +51,7 @@ pub struct Recipient {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Message {
     /// Node to server, best-effort: asks to join.
-    Join(Join),
+    Join(JoinRequest),
     /// Server to node, best-effort: the node may join.
     Welcome(Welcome),
     /// Server to node, best-effort: the node may not join, or has lost its place, with the reasons.
@@ -59,7 +59,7 @@ pub enum Message {
     /// Node to server, best-effort: its status.
     Status(Status),
     /// Server to node: all nodes, sent when they are complete or have changed.
-    Roster(Vec<Member>),
+    Roster(Vec<FleetMember>),
     /// Node to node: a test whether the other one receives it; the acknowledgment is the answer.
     Hello,
     /// Node to server: all other nodes have acknowledged its `Hello`.
@@ -88,11 +88,11 @@ pub enum Message {
 
 /// A node that wants to join.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Join {
+pub struct JoinRequest {
     /// The agent that it would run.
     pub agent: EntityId,
     /// Fingerprint of the scenario that it has read.
-    pub scenario: Fingerprint,
+    pub scenario: ScenarioFingerprint,
     /// The build of its program.
     pub build: String,
     /// Endpoints at which other nodes reach it; none in a star.
@@ -103,7 +103,7 @@ pub struct Join {
 
 /// A digest of a scenario and its files, in hexadecimal digits: two processes that differ in it would simulate
 /// different worlds.
-pub type Fingerprint = String;
+pub type ScenarioFingerprint = String;
 
 /// The server's answer to a node that may join.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -129,7 +129,7 @@ pub struct JoinError {
 
 /// A node of a fleet, as known to others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Member {
+pub struct FleetMember {
     /// The agent that it runs; there is one node for each.
     pub agent: EntityId,
     /// Its present incarnation.
@@ -255,14 +255,14 @@ pub enum DecodeError {
     TooLong,
 }
 
-impl<M: Serialize> Frame<M> {
+impl<M: Serialize> MessageFrame<M> {
     /// Returns the frame as a wire carries it, the magic number first.
     pub fn encode(&self) -> Vec<u8> {
         postcard::to_extend(self, MAGIC.to_vec()).expect("frames are plain data")
     }
 }
 
-impl Frame {
+impl MessageFrame {
     /// Reads a frame.
     ///
     /// # Errors
@@ -325,9 +325,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn frame(payload: Vec<u8>) -> Frame {
+    fn frame(payload: Vec<u8>) -> MessageFrame {
         let packet = Packet { cycle: 3, departs: 5, sequence: 7, arrives: 6, payload };
-        let recipient = |id, sequence| Recipient {
+        let recipient = |id, sequence| RecipientHeader {
             peer: Peer::Node(id),
             incarnation: Some(Incarnation(2)),
             ack: 11,
@@ -335,14 +335,14 @@ mod tests {
         };
         let to = vec![recipient(5, Some(9)), recipient(6, None)];
         let message = Some(Message::Packets(vec![packet.clone(), packet]));
-        Frame { from: Peer::Node(4), incarnation: Incarnation(1), to, message }
+        MessageFrame { from: Peer::Node(4), incarnation: Incarnation(1), to, message }
     }
 
     proptest! {
         #[test]
         fn frames_are_read_as_they_were_written(payload: Vec<u8>) {
             let frame = frame(payload);
-            prop_assert_eq!(Frame::decode(&frame.encode()), Ok(frame));
+            prop_assert_eq!(MessageFrame::decode(&frame.encode()), Ok(frame));
         }
 
         #[test]
@@ -350,16 +350,16 @@ mod tests {
             if is_ours {
                 bytes.splice(0..0, MAGIC);
             }
-            let _ = Frame::decode(&bytes);
+            let _ = MessageFrame::decode(&bytes);
         }
 
         #[test]
         fn a_frame_that_is_cut_short_or_goes_on_is_not_read(payload: Vec<u8>, cut in 0usize..40) {
             let mut bytes = frame(payload).encode();
             bytes.push(0);
-            prop_assert_eq!(Frame::decode(&bytes), Err(DecodeError::Damaged));
+            prop_assert_eq!(MessageFrame::decode(&bytes), Err(DecodeError::Damaged));
             let length = bytes.len() - 2 - cut.min(bytes.len() - 2);
-            prop_assert!(Frame::decode(&bytes[..length]).is_err());
+            prop_assert!(MessageFrame::decode(&bytes[..length]).is_err());
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::airspace::DistributedAirspace;
 use crate::chain::DistributedChains;
 use crate::distributed::DistributedWorld;
-use crate::protocol::Fingerprint;
+use crate::protocol::ScenarioFingerprint;
 use sidestep::kernel::{Digest, InputError};
 use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::{airspace, chain};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub fn fingerprint(
     compiled: &dyn CompiledScenario,
     source: &Source,
-) -> Result<Fingerprint, InputError> {
+) -> Result<ScenarioFingerprint, InputError> {
     let resolved = compiled.resolve(source)?;
     let mut bytes = resolved.text.into_bytes();
     for (name, content) in resolved.files {

@@ -17,7 +17,7 @@ fn bytes(values: &Values) -> Vec<u8> {
         Values::U64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
         Values::I32(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
         Values::F64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
-        other => panic!("robots record no column of {}", other.ty().name()),
+        other => panic!("robots record no column of {}", other.column_type().name()),
     }
 }
 

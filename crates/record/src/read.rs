@@ -13,7 +13,7 @@ use parquet::file::reader::{ChunkReader, FileReader, Length};
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::statistics::Statistics;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::table::Texts;
+use sidestep_kernel::ports::table::TextCells;
 use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, RecordError, TableSchema, Values};
 
 use crate::disk;
@@ -445,8 +445,8 @@ pub(crate) fn read_cells<T: DataType, V: Clone + Default>(
 pub(crate) fn read_texts(
     reader: ColumnReaderImpl<ByteArrayType>,
     is_nullable: bool,
-) -> ParquetResult<Texts> {
-    let mut texts = Texts::default();
+) -> ParquetResult<TextCells> {
+    let mut texts = TextCells::default();
     read_values(reader, is_nullable, |bytes| {
         texts.push(bytes.as_ref().map(ByteArray::as_utf8).transpose()?);
         Ok(())

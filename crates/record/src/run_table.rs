@@ -204,7 +204,7 @@ fn parquet_schema<R>(columns: &[&RoleColumn<R>]) -> ParquetResult<TypePtr> {
 }
 
 fn field<R>(column: &RoleColumn<R>) -> ParquetResult<TypePtr> {
-    let (physical, logical) = match column.values.ty() {
+    let (physical, logical) = match column.values.column_type() {
         ColumnType::I64 => (PhysicalType::INT64, None),
         ColumnType::F64 => (PhysicalType::DOUBLE, None),
         ColumnType::Bool => (PhysicalType::BOOLEAN, None),
@@ -243,7 +243,7 @@ fn write_column<R>(
             let texts = rows.filter_map(|row| v.get(row)).map(ByteArray::from).collect();
             write_values::<ByteArrayType>(column.typed(), &levels, texts)
         }
-        other => Err(wrong_type(name, other.ty())),
+        other => Err(wrong_type(name, other.column_type())),
     }?;
     column.close()
 }

@@ -10,7 +10,7 @@ use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_rods::geometry::{Point, add, add_scaled, first_axis, norm, normalized, scaled, sub};
 use sidestep_rods::{
-    Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, wavefront,
+    Chain, Connector, MotionOutcome, MotionRequest, Obstacle, Obstacles, Propagator, Rod, wavefront,
 };
 
 /// Numbers in [0, 1), always the same.
@@ -103,7 +103,7 @@ fn pull_open(case: &OpenCase, to: impl Fn(Point<3>, usize) -> Point<3>) {
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;
-            let request = Request::exact(by, to(home, k));
+            let request = MotionRequest::operator_request(by, to(home, k));
             let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
             touched += outcome.motion().map_or(0, |moved| moved.touched.len());
         }
@@ -143,7 +143,7 @@ fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;
-            let request = Request::exact(0, head(k));
+            let request = MotionRequest::operator_request(0, head(k));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
             assert!(outcome.motion().is_some(), "nothing is in the way");
         }
@@ -197,14 +197,14 @@ fn field() {
         // Near the border it heads home.
         let inward = if from.iter().any(|x| x.abs() > half_m - 1.0) { -0.1 } else { 0.0 };
         u = normalized(add_scaled(u, from, inward)).expect("not zero");
-        let request = Request::exact(0, add_scaled(from, u, 0.0099));
+        let request = MotionRequest::operator_request(0, add_scaled(from, u, 0.0099));
         match propagator.propagate(&mut chain, &obstacles, &request).expect("right") {
-            Outcome::Moved(moved) => {
+            MotionOutcome::Moved(moved) => {
                 moves += 1;
                 rotated += moved.rotated;
                 touched += moved.changed;
             }
-            Outcome::Vetoed(veto) => {
+            MotionOutcome::Vetoed(veto) => {
                 own_vetoes += usize::from(veto.by == 0);
                 vetoes += usize::from(veto.by != 0);
                 u = normalized(numbers.point(1.0)).expect("not zero");
@@ -299,15 +299,15 @@ fn pull(width_m: f64, followers: usize, rod: Rod, look_at_every_step: bool) -> P
     let started = ProcessTime::now();
     for (at, _) in line[..line.len() - 100].iter().filter(|(at, _)| is_ahead(at)) {
         let way_m = norm(sub(*at, chain.points()[0]));
-        let request = Request::exact(0, *at);
+        let request = MotionRequest::operator_request(0, *at);
         let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
         steps += 1;
         match outcome {
-            Outcome::Moved(moved) => {
+            MotionOutcome::Moved(moved) => {
                 turns += moved.rotated;
                 longest_slave_steps = longest_slave_steps.max(moved.max_slave_step_m / way_m);
             }
-            Outcome::Vetoed(_) => vetoes += 1,
+            MotionOutcome::Vetoed(_) => vetoes += 1,
         }
         if look_at_every_step {
             least_m = least_m.min(clearance_m(&chain, &obstacles));

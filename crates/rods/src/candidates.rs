@@ -2,7 +2,7 @@
 
 use super::chain::{Mobility, Rod};
 use super::geometry::{
-    Core, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
+    ConvexCore, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
     normalized, scaled, sub, with_dimensions,
 };
 use super::interval::{
@@ -10,17 +10,18 @@ use super::interval::{
     min_turn_rad,
 };
 use super::motion_context::{
-    Block, BlockOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep, is_length_allowed,
+    BlockingPart, BlockingPartOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep,
+    is_length_allowed,
 };
 use super::obstacle::bounds_around;
 use super::reaction::{MasterMove, Reaction};
-use super::rules::Rotation;
+use super::rules::RotationRule;
 use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
 use super::veto::VetoReason;
 use std::f64::consts::PI;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Candidate<const D: usize> {
+pub(super) struct CandidatePosition<const D: usize> {
     pub(super) at: Point<D>,
     /// Whether the rod turned from the guide line.
     pub(super) rotated: bool,
@@ -31,7 +32,7 @@ pub(super) struct Candidate<const D: usize> {
 /// allocated.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CandidateScratch<const D: usize> {
-    blocks: Vec<Block<D>>,
+    blocks: Vec<BlockingPart<D>>,
     arcs: BlockedArcs,
     /// Whether a rod that turns tries all its lengths, or others only if its present one is
     /// blocked.
@@ -40,7 +41,7 @@ pub(super) struct CandidateScratch<const D: usize> {
     /// nearer has none.
     pub(super) both_sides: bool,
     /// Positions found by [`MotionContext::candidates`], best first.
-    pub(super) found: Vec<Candidate<D>>,
+    pub(super) found: Vec<CandidatePosition<D>>,
     /// Whether one side has not been examined yet.
     pub(super) has_other_side: bool,
     /// Whether any rod has found a free direction by turning since this was last reset; if none has,
@@ -50,7 +51,7 @@ pub(super) struct CandidateScratch<const D: usize> {
 
 /// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
 #[inline]
-pub(super) fn guide<const D: usize>(
+pub(super) fn follow_guide_line<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
     min_move_m: f64,
@@ -105,12 +106,13 @@ impl<const D: usize> MotionContext<'_, D> {
         if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
             return self.place_on_line(step, scratch);
         }
-        let guided = guide([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+        let guided =
+            follow_guide_line([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
         if let Some(reaction) = self.reaction {
             return self.place_by_reaction(reaction, step, guided, scratch);
         }
         let Err(objection) = self.check_place(step, guided) else {
-            scratch.found.push(Candidate { at: guided, rotated: false, turn_rad: 0.0 });
+            scratch.found.push(CandidatePosition { at: guided, rotated: false, turn_rad: 0.0 });
             return Ok(());
         };
         // Lines and planes were handled above, so it is a box that forbids the place.
@@ -118,13 +120,13 @@ impl<const D: usize> MotionContext<'_, D> {
             && let Some(at) = self.place_in_box(step, guided)
             && self.check_slave(step, at).is_ok()
         {
-            scratch.found.push(Candidate { at, rotated: false, turn_rad: 0.0 });
+            scratch.found.push(CandidatePosition { at, rotated: false, turn_rad: 0.0 });
             return Ok(());
         }
         match self.rules.rotation {
-            Rotation::Never => Err(objection),
-            Rotation::Literal => self.rotate_once(step, guided, scratch),
-            Rotation::Union => self.rotate(step, guided, objection, scratch),
+            RotationRule::Never => Err(objection),
+            RotationRule::Literal => self.rotate_once(step, guided, scratch),
+            RotationRule::Union => self.rotate(step, guided, objection, scratch),
         }
     }
 
@@ -153,7 +155,7 @@ impl<const D: usize> MotionContext<'_, D> {
         };
         let at = with_dimensions(reaction.react(&percept).map_err(PendingVeto::new)?);
         self.check_rod_and_place(step, at)?;
-        scratch.found.push(Candidate { at, rotated: at != guided, turn_rad: 0.0 });
+        scratch.found.push(CandidatePosition { at, rotated: at != guided, turn_rad: 0.0 });
         Ok(())
     }
 
@@ -201,7 +203,7 @@ impl<const D: usize> MotionContext<'_, D> {
             return Err(PendingVeto::new(self.chain.connectors()[step.slave].still_reason()));
         }
         self.check_slave(step, step.so)?;
-        scratch.found.push(Candidate { at: step.so, rotated: false, turn_rad: 0.0 });
+        scratch.found.push(CandidatePosition { at: step.so, rotated: false, turn_rad: 0.0 });
         Ok(())
     }
 
@@ -227,7 +229,9 @@ impl<const D: usize> MotionContext<'_, D> {
         let mut last_objection = PendingVeto::new(VetoReason::Mobility);
         for at in places.into_iter().flatten() {
             match self.check_slave(step, at) {
-                Ok(()) => scratch.found.push(Candidate { at, rotated: false, turn_rad: 0.0 }),
+                Ok(()) => {
+                    scratch.found.push(CandidatePosition { at, rotated: false, turn_rad: 0.0 })
+                }
                 Err(objection) => last_objection = objection,
             }
         }
@@ -251,7 +255,7 @@ impl<const D: usize> MotionContext<'_, D> {
         if !self.may_be_at(step.slave, at) {
             return Err(PendingVeto::new(VetoReason::Mobility));
         }
-        scratch.found.push(Candidate { at, rotated: true, turn_rad: 0.0 });
+        scratch.found.push(CandidatePosition { at, rotated: true, turn_rad: 0.0 });
         Ok(())
     }
 
@@ -294,7 +298,7 @@ impl<const D: usize> MotionContext<'_, D> {
         length_m: f64,
         scratch: &mut CandidateScratch<D>,
         informative: &mut Option<PendingVeto>,
-    ) -> Option<BlockOwner> {
+    ) -> Option<BlockingPartOwner> {
         let u0 = guide_line(step);
         let CandidateScratch { blocks, arcs, found, has_other_side, .. } = scratch;
         let finds_all = scratch.all_lengths || scratch.both_sides;
@@ -356,11 +360,11 @@ struct RodHit<const D: usize> {
     radius_m: f64,
     /// Distance from the master at which the rod meets it.
     from_master_m: f64,
-    name: BlockOwner,
+    name: BlockingPartOwner,
 }
 
 impl<const D: usize> RodHit<D> {
-    fn find(step: &SlaveStep<D>, guided: Point<D>, block: &Block<D>) -> Option<Self> {
+    fn find(step: &SlaveStep<D>, guided: Point<D>, block: &BlockingPart<D>) -> Option<Self> {
         let nearest = block.core.nearest_to_segment([step.mn, guided]);
         let radius_m = block.radius_m + step.rod.radius_m;
         (nearest.distance_m < radius_m).then(|| Self {
@@ -387,7 +391,7 @@ struct TurnedPlaces<'a, const D: usize> {
     step: &'a SlaveStep<D>,
     length_m: f64,
     u0: Point<D>,
-    found: &'a mut Vec<Candidate<D>>,
+    found: &'a mut Vec<CandidatePosition<D>>,
     informative: &'a mut Option<PendingVeto>,
 }
 
@@ -411,7 +415,7 @@ impl<const D: usize> TurnedPlaces<'_, D> {
         match self.context.check_place(self.step, at) {
             Ok(()) => {
                 let turn_rad = angle_rad(self.u0, u);
-                self.found.push(Candidate { at, rotated: true, turn_rad });
+                self.found.push(CandidatePosition { at, rotated: true, turn_rad });
                 true
             }
             Err(objection) => {
@@ -430,12 +434,12 @@ fn keep_informative(informative: &mut Option<PendingVeto>, objection: PendingVet
     }
 }
 
-fn contains_master<const D: usize>(step: &SlaveStep<D>, block: &Block<D>) -> bool {
+fn contains_master<const D: usize>(step: &SlaveStep<D>, block: &BlockingPart<D>) -> bool {
     let radius_m = block.radius_m + step.rod.radius_m;
     block.stops_rod && block.core.nearest_to_point(step.mn).distance_m < radius_m
 }
 
-fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [Candidate<D>]) {
+fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [CandidatePosition<D>]) {
     // The sort is stable, so of equal candidates the counterclockwise one, found first, stays
     // first.
     found.sort_by(|a, b| {
@@ -452,7 +456,7 @@ struct BlockedArcs {
     /// Whether the arcs of each block have been computed.
     known: Vec<bool>,
     /// The block that contains the master.
-    inside: Option<BlockOwner>,
+    inside: Option<BlockingPartOwner>,
 }
 
 /// A plane rod of one length that looks for a free direction near `u0`.
@@ -460,7 +464,7 @@ struct PlanarRod<'a, const D: usize> {
     step: &'a SlaveStep<D>,
     length_m: f64,
     u0: Point<2>,
-    blocks: &'a [Block<D>],
+    blocks: &'a [BlockingPart<D>],
 }
 
 impl<const D: usize> PlanarRod<'_, D> {
@@ -492,7 +496,7 @@ impl<const D: usize> PlanarRod<'_, D> {
         has_added
     }
 
-    fn meets(&self, s: Point<D>, block: &Block<D>) -> bool {
+    fn meets(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
         // More than the skin in the arcs, so that no direction in an arc looks free by rounding.
         let near_m = block.radius_m + 2.0 * SKIN_M;
         let rod = [self.step.mn, s];
@@ -500,7 +504,7 @@ impl<const D: usize> PlanarRod<'_, D> {
             || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
     }
 
-    fn add_block(&self, block: &Block<D>, known: &mut BlockedArcs) {
+    fn add_block(&self, block: &BlockingPart<D>, known: &mut BlockedArcs) {
         let step = self.step;
         let reach = MasterRod { master: to_plane(step.mn), length_m: self.length_m };
         let core = core_to_plane(&block.core);
@@ -569,11 +573,11 @@ fn to_plane<const D: usize>(p: Point<D>) -> Point<2> {
     [p[0], p[1]]
 }
 
-fn core_to_plane<const D: usize>(core: &Core<D>) -> Core<2> {
+fn core_to_plane<const D: usize>(core: &ConvexCore<D>) -> ConvexCore<2> {
     match core {
-        Core::Point(c) => Core::Point(to_plane(*c)),
-        Core::Segment([a, b]) => Core::Segment([to_plane(*a), to_plane(*b)]),
-        Core::Cuboid(c) => Core::Cuboid(Cuboid {
+        ConvexCore::Point(c) => ConvexCore::Point(to_plane(*c)),
+        ConvexCore::Segment([a, b]) => ConvexCore::Segment([to_plane(*a), to_plane(*b)]),
+        ConvexCore::Cuboid(c) => ConvexCore::Cuboid(Cuboid {
             center: to_plane(c.center),
             axes: [to_plane(c.axes[0]), to_plane(c.axes[1])],
             half_m: to_plane(c.half_m),

@@ -189,7 +189,7 @@ impl<const D: usize> Cuboid<D> {
 
 /// The inner part of an obstacle or of a chain's own part; with a radius it becomes the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Core<const D: usize> {
+pub enum ConvexCore<const D: usize> {
     /// A disc or a sphere.
     Point(Point<D>),
     /// A wall or a capsule.
@@ -198,7 +198,7 @@ pub enum Core<const D: usize> {
     Cuboid(Cuboid<D>),
 }
 
-impl<const D: usize> Core<D> {
+impl<const D: usize> ConvexCore<D> {
     /// Returns the nearest points of a segment and the core; their distance is 0 where they
     /// overlap.
     pub fn nearest_to_segment(&self, body: [Point<D>; 2]) -> NearestPoints<D> {
@@ -258,12 +258,12 @@ impl<const D: usize> Core<D> {
     }
 
     /// Returns the box around the core.
-    pub fn bounds(&self) -> Bounds<D> {
+    pub fn bounds(&self) -> Aabb<D> {
         match self {
-            Self::Point(c) => Bounds::from_points(&[*c]),
-            Self::Segment(ends) => Bounds::from_points(ends),
+            Self::Point(c) => Aabb::from_points(&[*c]),
+            Self::Segment(ends) => Aabb::from_points(ends),
             Self::Cuboid(b) => {
-                Bounds::from_points(&[sub(b.center, b.extent()), add(b.center, b.extent())])
+                Aabb::from_points(&[sub(b.center, b.extent()), add(b.center, b.extent())])
             }
         }
     }
@@ -327,14 +327,14 @@ fn is_on_one_side<const D: usize>(
 
 /// A box along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds<const D: usize> {
+pub struct Aabb<const D: usize> {
     /// Its lower corner.
     pub lo: Point<D>,
     /// Its upper corner.
     pub hi: Point<D>,
 }
 
-impl<const D: usize> Bounds<D> {
+impl<const D: usize> Aabb<D> {
     /// Returns the least box around points.
     #[inline]
     pub fn from_points(points: &[Point<D>]) -> Self {
@@ -398,7 +398,7 @@ mod tests {
     use proptest::prelude::*;
     use sidestep_kernel::math;
 
-    fn sampled_distance<const D: usize>(body: [Point<D>; 2], core: &Core<D>) -> f64 {
+    fn sampled_distance<const D: usize>(body: [Point<D>; 2], core: &ConvexCore<D>) -> f64 {
         let at = |k: i32| lerp(body[0], body[1], f64::from(k) / 2000.0);
         (0..=2000).map(|k| core.nearest_to_point(at(k)).distance_m).fold(f64::INFINITY, f64::min)
     }
@@ -413,7 +413,7 @@ mod tests {
             p in point::<3>(), q in point::<3>(), a in point::<3>(), b in point::<3>(),
         ) {
             let nearest = between_segments([p, q], [a, b]);
-            let sampled = sampled_distance([p, q], &Core::Segment([a, b]));
+            let sampled = sampled_distance([p, q], &ConvexCore::Segment([a, b]));
             prop_assert!(nearest.distance_m <= sampled + 1e-12);
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
             let apart_m = distance(nearest.on_body, nearest.on_core);
@@ -470,7 +470,7 @@ mod tests {
             p in point::<2>(), q in point::<2>(), a in point::<2>(), b in point::<2>(),
             reach_m in 0.0..2.0f64,
         ) {
-            let core = Core::Segment([a, b]);
+            let core = ConvexCore::Segment([a, b]);
             let nearest = core.nearest_to_segment([p, q]);
             let sampled = sampled_distance([p, q], &core);
             prop_assert!(nearest.distance_m <= sampled + 1e-12);
@@ -484,7 +484,7 @@ mod tests {
             p in point::<3>(), q in point::<3>(), a in point::<3>(), b in point::<3>(),
             reach_m in -0.1..3.0f64,
         ) {
-            for core in [Core::Point(a), Core::Segment([a, b])] {
+            for core in [ConvexCore::Point(a), ConvexCore::Segment([a, b])] {
                 let apart_m = core.nearest_to_segment([p, q]).distance_m;
                 prop_assert_eq!(core.is_clear_of_segment([p, q], reach_m), apart_m >= reach_m);
                 let apart_m = core.nearest_to_point(p).distance_m;
@@ -501,7 +501,7 @@ mod tests {
             let v = perpendicular(u);
             let cuboid = Cuboid { center, axes: [u, v, cross(u, v)], half_m };
             let nearest = cuboid.nearest_to_segment([p, q]);
-            let sampled = sampled_distance([p, q], &Core::Cuboid(cuboid));
+            let sampled = sampled_distance([p, q], &ConvexCore::Cuboid(cuboid));
             prop_assert!(nearest.distance_m <= sampled + 1e-9);
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
         }

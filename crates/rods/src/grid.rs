@@ -1,16 +1,16 @@
 //! A uniform grid that finds the boxes nearby: the broad phase of collision detection.
 
-use super::geometry::{Bounds, Point};
+use super::geometry::{Aabb, Point};
 
 /// Boxes, and for every cell the list of the boxes that meet it. The lists lie one after the other in one vector, so
 /// that a new grid allocates nothing once its vectors are large enough.
 #[derive(Debug, Clone, Default)]
-pub struct Grid<const D: usize> {
+pub struct SpatialGrid<const D: usize> {
     cells: CellLayout<D>,
     /// Start of the list of every cell in `entries`, and the end of the last one.
     starts: Vec<u32>,
     entries: Vec<u32>,
-    bounds: Vec<Bounds<D>>,
+    bounds: Vec<Aabb<D>>,
     /// The lowest cell of every box.
     first: Vec<CellIndex<D>>,
 }
@@ -34,10 +34,10 @@ const MIN_CELL_M: f64 = 1e-6;
 /// Factor by which cells grow until they are few enough.
 const GROWTH: f64 = 1.5;
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> SpatialGrid<D> {
     /// Builds the grid anew, in the memory it has. Queries measure about `reach_m`, which determines
     /// the size of the cells, never the result.
-    pub fn rebuild(&mut self, bounds: impl Iterator<Item = Bounds<D>>, reach_m: f64) {
+    pub fn rebuild(&mut self, bounds: impl Iterator<Item = Aabb<D>>, reach_m: f64) {
         self.bounds.clear();
         self.bounds.extend(bounds);
         if !self.bounds.is_empty() {
@@ -76,7 +76,7 @@ impl<const D: usize> Grid<D> {
 
     /// Visits every box that meets `near`, each once.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Aabb<D>, mut visit_one: impl FnMut(usize)) {
         if self.bounds.is_empty() {
             return;
         }
@@ -98,7 +98,7 @@ impl<const D: usize> Grid<D> {
 }
 
 /// Returns the longest side of a box, meters.
-fn extent_m<const D: usize>(b: &Bounds<D>) -> f64 {
+fn extent_m<const D: usize>(b: &Aabb<D>) -> f64 {
     (0..D).map(|i| b.hi[i] - b.lo[i]).fold(0.0, f64::max)
 }
 
@@ -121,9 +121,9 @@ impl<const D: usize> Default for CellLayout<D> {
 
 impl<const D: usize> CellLayout<D> {
     /// Chooses cells for boxes, of which there is at least one, and queries of about `reach_m`.
-    fn choose(bounds: &[Bounds<D>], reach_m: f64) -> Self {
+    fn choose(bounds: &[Aabb<D>], reach_m: f64) -> Self {
         let n = bounds.len();
-        let around = bounds.iter().fold(Bounds::empty(), |all, b| all.joined(b));
+        let around = bounds.iter().fold(Aabb::empty(), |all, b| all.joined(b));
         let mean_m = bounds.iter().map(extent_m).sum::<f64>() / n as f64;
         let mut cell_m = (CELL_PER_BOX * mean_m)
             .max(CELL_PER_REACH * reach_m)
@@ -141,14 +141,14 @@ impl<const D: usize> CellLayout<D> {
     }
 
     /// Returns the cells of a side that cover a box.
-    fn cover(around: &Bounds<D>, cell_m: f64) -> Self {
+    fn cover(around: &Aabb<D>, cell_m: f64) -> Self {
         let per_m = 1.0 / cell_m;
         let n = std::array::from_fn(|i| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1);
         Self { origin: around.lo, per_m, n }
     }
 
     /// Returns the number of cells that boxes meet, summed over the boxes.
-    fn count_entries(&self, bounds: &[Bounds<D>]) -> usize {
+    fn count_entries(&self, bounds: &[Aabb<D>]) -> usize {
         bounds.iter().map(|b| self.count_cells(b)).sum()
     }
 
@@ -156,7 +156,7 @@ impl<const D: usize> CellLayout<D> {
         self.n.iter().map(|&n| n as usize).product()
     }
 
-    fn count_cells(&self, b: &Bounds<D>) -> usize {
+    fn count_cells(&self, b: &Aabb<D>) -> usize {
         let [lo, hi] = self.range(b);
         (0..D).map(|i| (hi[i] - lo[i]) as usize + 1).product()
     }
@@ -169,7 +169,7 @@ impl<const D: usize> CellLayout<D> {
 
     /// Returns the lowest and the highest cell that a box meets.
     #[inline]
-    fn range(&self, b: &Bounds<D>) -> [CellIndex<D>; 2] {
+    fn range(&self, b: &Aabb<D>) -> [CellIndex<D>; 2] {
         [self.cell_at(b.lo), self.cell_at(b.hi)]
     }
 

@@ -8,7 +8,7 @@
 //! obstacle hit nearest to the master and leads from there into the next one, up to 0.19 m deep where
 //! measured; one obstacle after the other turns back and forth between two walls without end.
 
-use super::geometry::{Core, Point, cross_2d, dot, nearest_on_segment, norm, sub};
+use super::geometry::{ConvexCore, Point, cross_2d, dot, nearest_on_segment, norm, sub};
 use sidestep_kernel::math;
 use std::f64::consts::TAU;
 
@@ -45,14 +45,14 @@ pub(super) struct MasterRod {
 /// core. Returns false, and adds nothing, where the master itself is inside.
 pub(super) fn block_rod(
     reach: &MasterRod,
-    core: &Core<2>,
+    core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
 ) -> bool {
     match core {
-        Core::Point(c) => block_by_capsule(reach, [*c, *c], radius_m, arcs),
-        Core::Segment(ends) => block_by_capsule(reach, *ends, radius_m, arcs),
-        Core::Cuboid(cuboid) => {
+        ConvexCore::Point(c) => block_by_capsule(reach, [*c, *c], radius_m, arcs),
+        ConvexCore::Segment(ends) => block_by_capsule(reach, *ends, radius_m, arcs),
+        ConvexCore::Cuboid(cuboid) => {
             let is_outside = core.nearest_to_point(reach.master).distance_m >= radius_m
                 && core.nearest_to_point(reach.master).distance_m > 0.0;
             is_outside
@@ -172,14 +172,14 @@ fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
 /// circle on which it turns, up to four for a capsule.
 pub(super) fn block_tip(
     reach: &MasterRod,
-    core: &Core<2>,
+    core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
 ) {
     match core {
-        Core::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
-        Core::Segment(ends) => block_tip_by_capsule(reach, *ends, radius_m, arcs),
-        Core::Cuboid(cuboid) => {
+        ConvexCore::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
+        ConvexCore::Segment(ends) => block_tip_by_capsule(reach, *ends, radius_m, arcs),
+        ConvexCore::Cuboid(cuboid) => {
             for edge in cuboid.edges_2d() {
                 block_tip_by_capsule(reach, edge, radius_m, arcs);
             }
@@ -381,7 +381,7 @@ mod tests {
     #[derive(Debug, Clone)]
     struct Case {
         reach: MasterRod,
-        core: Core<2>,
+        core: ConvexCore<2>,
         radius_m: f64,
         tip_radius_m: f64,
         angles_rad: Vec<f64>,
@@ -390,13 +390,13 @@ mod tests {
     fn case() -> impl Strategy<Value = Case> {
         let point = || prop::array::uniform2(-2.0..2.0f64);
         let core = prop_oneof![
-            point().prop_map(Core::Point),
-            [point(), point()].prop_map(Core::Segment),
+            point().prop_map(ConvexCore::Point),
+            [point(), point()].prop_map(ConvexCore::Segment),
             (point(), 0.0..TAU, prop::array::uniform2(0.01..1.0f64)).prop_map(
                 |(center, a, half_m)| {
                     let u = [math::cos(a), math::sin(a)];
                     let axes = [u, [-u[1], u[0]]];
-                    Core::Cuboid(super::super::geometry::Cuboid { center, axes, half_m })
+                    ConvexCore::Cuboid(super::super::geometry::Cuboid { center, axes, half_m })
                 }
             ),
         ];
@@ -438,7 +438,7 @@ mod tests {
                 rod_m.abs() < 1e-9 || says_rod == (rod_m < 0.0),
                 "rod {angle_rad} {rod_m}"
             );
-            let hidden = matches!(core, Core::Cuboid(_)) && rod_m < 0.0;
+            let hidden = matches!(core, ConvexCore::Cuboid(_)) && rod_m < 0.0;
             prop_assert!(
                 hidden || tip_m.abs() < 1e-9 || says_tip == (tip_m < 0.0),
                 "tip {angle_rad} {tip_m}"
@@ -467,12 +467,12 @@ mod tests {
     /// Returns the depth of the rod, or its end, in any core, meters.
     fn depth_m(
         reach: &MasterRod,
-        cores: &[Core<2>],
+        cores: &[ConvexCore<2>],
         [rod_m, tip_m]: [f64; 2],
         angle_rad: f64,
     ) -> f64 {
         let end = tip(reach, angle_rad);
-        let depth_m = |core: &Core<2>| {
+        let depth_m = |core: &ConvexCore<2>| {
             let rod_m = rod_m - core.nearest_to_segment([reach.master, end]).distance_m;
             rod_m.max(tip_m - core.nearest_to_point(end).distance_m)
         };
@@ -492,7 +492,7 @@ mod tests {
             // Walls in a row: where one ends the next begins.
             let reach = MasterRod { master, length_m };
             let cores: Vec<_> =
-                corners.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).collect();
+                corners.windows(2).map(|ends| ConvexCore::Segment([ends[0], ends[1]])).collect();
             let (mut arcs, radii_m) = (Vec::new(), [rod_m, rod_m + more_m]);
             for core in &cores {
                 prop_assume!(block_rod(&reach, core, rod_m, &mut arcs));

@@ -35,19 +35,20 @@ pub mod wavefront;
 pub use chain::{
     Chain, Connector, LENGTH_TOLERANCE_M, MAX_COORDINATE_M, Mobility, Rod, is_in_range,
 };
-pub use grid::Grid;
+pub use grid::SpatialGrid;
 pub use motion_context::{
     BEND_TOLERANCE_RAD, PendingVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
 };
-pub use obstacle::{Obstacle, Obstacles, bounds_around, outline};
+pub use obstacle::{Obstacle, Obstacles, bounds_around, outline_walls};
 pub use propagate::{Propagator, local_solver};
-pub use reach::{ReachOutcome, ReachRequest, reach};
+pub use reach::{ReachOutcome, ReachRequest, reach_target};
 pub use reaction::{MasterMove, Reaction};
 pub use rod_bvh::RodBvh;
-pub use rules::{Rotation, Rules};
+pub use rules::{ReactionRules, RotationRule};
 pub use sidestep_kernel::InputError;
-pub use sweep::Sweep;
+pub use sweep::RodSweep;
 pub use tunneling::{TunneledRod, blocking_obstacle, find_tunneling};
 pub use veto::{
-    CompletedMotion, Motion, Outcome, Request, RequestSource, Veto, VetoEffect, VetoReason,
+    CompletedMotion, MotionOutcome, MotionRequest, RequestSource, RequestedMotion, Veto,
+    VetoEffect, VetoReason,
 };

@@ -6,9 +6,7 @@
 //! is used up are measured again; most need not be for many motions.
 
 use super::chain::Chain;
-use super::geometry::{
-    Bounds, Point, add, between_segments, distance, dot, nearest_on_segment, sub,
-};
+use super::geometry::{Aabb, Point, add, between_segments, distance, dot, nearest_on_segment, sub};
 use super::rod_bvh::RodBvh;
 
 /// Index distance of rods between which no distance is measured: they touch by construction, or nearly
@@ -45,7 +43,7 @@ pub(super) struct MotionBounds<const D: usize> {
 
 impl<const D: usize> MotionBounds<D> {
     /// Returns whether a chain is long enough for this to be worth the effort.
-    pub(super) fn is_worthwhile(chain: &Chain<D>) -> bool {
+    pub(super) fn is_long_enough(chain: &Chain<D>) -> bool {
         chain.rods().len() >= MIN_RODS
     }
 
@@ -118,13 +116,13 @@ impl<const D: usize> MotionBounds<D> {
         let search_m = needed_m + SEARCH_LENGTHS * chain.max_rod_m();
         if self.odometer_m - self.built_at_m > STALE_FRACTION * search_m {
             let ends = chain.points().windows(2);
-            self.tree.rebuild(ends.map(Bounds::from_points));
+            self.tree.rebuild(ends.map(Aabb::from_points));
             self.built_at_m = self.odometer_m;
         }
         let points = chain.points();
         let ends = [points[rod], points[rod + 1]];
         let mut clearance_m = search_m.min(end_distance_m(points, rod));
-        let near = Bounds::from_points(&ends).grown(search_m + self.odometer_m - self.built_at_m);
+        let near = Aabb::from_points(&ends).grown(search_m + self.odometer_m - self.built_at_m);
         self.tree.visit(&near, |other| {
             let other_ends = [points[other], points[other + 1]];
             if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends, other_ends, clearance_m) {

@@ -4,12 +4,12 @@
 //! surroundings (slide E4), never on anything farther along the chain.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
-use super::geometry::{Bounds, Core, Point, angle_rad, distance, sub};
+use super::geometry::{Aabb, ConvexCore, Point, angle_rad, distance, sub};
 use super::obstacle::{Obstacles, swept_bounds};
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
-use super::rules::Rules;
-use super::sweep::Sweep;
+use super::rules::ReactionRules;
+use super::sweep::RodSweep;
 use super::veto::VetoReason;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -43,7 +43,7 @@ impl<const D: usize> TentativePositions<D> {
     }
 
     /// Returns the connectors that have a new position.
-    pub(super) fn run(&self) -> Range<usize> {
+    pub(super) fn moved_range(&self) -> Range<usize> {
         self.from..self.to
     }
 
@@ -66,10 +66,10 @@ impl<const D: usize> TentativePositions<D> {
 
 /// A part that may be in the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Block<const D: usize> {
-    pub(super) core: Core<D>,
+pub(super) struct BlockingPart<const D: usize> {
+    pub(super) core: ConvexCore<D>,
     pub(super) radius_m: f64,
-    pub(super) name: BlockOwner,
+    pub(super) name: BlockingPartOwner,
     /// Whether it is in the way of the rod, and of the connector at its end.
     pub(super) stops_rod: bool,
     pub(super) stops_tip: bool,
@@ -78,13 +78,13 @@ pub(super) struct Block<const D: usize> {
 /// The owner of a block. Its order breaks ties, because the order in which blocks are visited depends on
 /// the grid and must not matter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum BlockOwner {
+pub(super) enum BlockingPartOwner {
     Obstacle(u32),
     OwnRod(usize),
     OwnConnector(usize),
 }
 
-impl BlockOwner {
+impl BlockingPartOwner {
     #[inline]
     pub(super) fn obstacle(self) -> Option<u32> {
         match self {
@@ -110,7 +110,7 @@ impl PendingVeto {
     }
 
     #[inline]
-    pub(super) fn from_owner(reason: VetoReason, name: BlockOwner) -> Self {
+    pub(super) fn from_owner(reason: VetoReason, name: BlockingPartOwner) -> Self {
         let reason = if name.obstacle().is_none() { VetoReason::SelfCollision } else { reason };
         Self { reason, obstacle: name.obstacle() }
     }
@@ -136,8 +136,8 @@ pub(super) struct SlaveStep<const D: usize> {
 }
 
 impl<const D: usize> SlaveStep<D> {
-    fn sweep(&self, s: Point<D>) -> Sweep<D> {
-        Sweep { from: [self.mo, self.so], to: [self.mn, s] }
+    fn sweep(&self, s: Point<D>) -> RodSweep<D> {
+        RodSweep { from: [self.mo, self.so], to: [self.mn, s] }
     }
 
     /// Returns whether the master's bend is within its limit with the slave at `s`.
@@ -160,7 +160,7 @@ pub fn contact_distance_m(radius_m: f64) -> f64 {
 pub(super) struct MotionContext<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
-    pub(super) rules: &'a Rules,
+    pub(super) rules: &'a ReactionRules,
     pub(super) tentative: &'a TentativePositions<D>,
     pub(super) own_rods: &'a RodBvh<D>,
     /// The reaction of free connectors, unless it is the built-in one.
@@ -177,16 +177,16 @@ impl<'a, const D: usize> MotionContext<'a, D> {
     /// `None`, the connector `tip` is alone.
     pub(super) fn visit_blocks(
         &self,
-        near: &Bounds<D>,
+        near: &Aabb<D>,
         rod: Option<usize>,
         tip: usize,
-        mut visit_one: impl FnMut(&Block<D>),
+        mut visit_one: impl FnMut(&BlockingPart<D>),
     ) {
         self.obstacles.visit(near, |o| {
-            visit_one(&Block {
+            visit_one(&BlockingPart {
                 core: o.core,
                 radius_m: o.radius_m,
-                name: BlockOwner::Obstacle(o.id),
+                name: BlockingPartOwner::Obstacle(o.id),
                 stops_rod: true,
                 stops_tip: true,
             });
@@ -202,11 +202,16 @@ impl<'a, const D: usize> MotionContext<'a, D> {
 
     /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
     /// Neighbors are exempt because they touch by construction, or nearly so in a tight bend.
-    fn own_blocks(&self, other: usize, rod: Option<usize>, tip: usize) -> [Option<Block<D>>; 3] {
-        let own_rod = Block {
-            core: Core::Segment([self.position(other), self.position(other + 1)]),
+    fn own_blocks(
+        &self,
+        other: usize,
+        rod: Option<usize>,
+        tip: usize,
+    ) -> [Option<BlockingPart<D>>; 3] {
+        let own_rod = BlockingPart {
+            core: ConvexCore::Segment([self.position(other), self.position(other + 1)]),
             radius_m: self.chain.rods()[other].radius_m,
-            name: BlockOwner::OwnRod(other),
+            name: BlockingPartOwner::OwnRod(other),
             stops_rod: rod.is_some_and(|r| other.abs_diff(r) > 2),
             stops_tip: tip + 1 < other || tip > other + 2,
         };
@@ -218,11 +223,11 @@ impl<'a, const D: usize> MotionContext<'a, D> {
     }
 
     #[inline]
-    fn own_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> Block<D> {
-        Block {
-            core: Core::Point(self.position(c)),
+    fn own_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> BlockingPart<D> {
+        BlockingPart {
+            core: ConvexCore::Point(self.position(c)),
             radius_m: self.chain.connectors()[c].radius_m,
-            name: BlockOwner::OwnConnector(c),
+            name: BlockingPartOwner::OwnConnector(c),
             stops_rod: rod.is_some_and(|r| c + 1 < r || c > r + 2),
             stops_tip: c.abs_diff(tip) > 1,
         }
@@ -239,7 +244,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         }
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);
         let near = swept_bounds([step.mo, step.so, step.mn, s], reach_m);
-        let mut worst: Option<(f64, BlockOwner, VetoReason)> = None;
+        let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
         let rod = step.master.min(step.slave);
         let travel_m = step.sweep(s).max_travel_m();
         self.visit_blocks(&near, Some(rod), step.slave, |block| {
@@ -271,7 +276,7 @@ fn depth_and_reason<const D: usize>(
     step: &SlaveStep<D>,
     s: Point<D>,
     travel_m: f64,
-    block: &Block<D>,
+    block: &BlockingPart<D>,
 ) -> Option<(f64, VetoReason)> {
     let rod = [step.mn, s];
     let core = &block.core;
@@ -279,7 +284,7 @@ fn depth_and_reason<const D: usize>(
     let tip_m = block.radius_m + step.tip_radius_m;
     let tip_is_clear = !block.stops_tip || core.is_clear_of_point(s, contact_distance_m(tip_m));
     // One distance clears both the end of the path and the path itself: the usual case.
-    let sure_m = contact_distance_m(rod_m).max(Sweep::<D>::safe_distance_m(travel_m, rod_m));
+    let sure_m = contact_distance_m(rod_m).max(RodSweep::<D>::safe_distance_m(travel_m, rod_m));
     if tip_is_clear && (!block.stops_rod || core.is_clear_of_segment(rod, sure_m)) {
         return None;
     }
@@ -301,12 +306,17 @@ fn depth_and_reason<const D: usize>(
     Some((now_m, reason))
 }
 
-fn was_inside<const D: usize>(step: &SlaveStep<D>, block: &Block<D>) -> bool {
+fn was_inside<const D: usize>(step: &SlaveStep<D>, block: &BlockingPart<D>) -> bool {
     depth_m(step.mo, step.so, step, block) > TOLERANCE_M
 }
 
 /// Returns the depth of a rod, or of the connector at its end, in a block, meters; negative outside.
-fn depth_m<const D: usize>(m: Point<D>, s: Point<D>, step: &SlaveStep<D>, block: &Block<D>) -> f64 {
+fn depth_m<const D: usize>(
+    m: Point<D>,
+    s: Point<D>,
+    step: &SlaveStep<D>,
+    block: &BlockingPart<D>,
+) -> f64 {
     let rod_m =
         block.radius_m + step.rod.radius_m - block.core.nearest_to_segment([m, s]).distance_m;
     let tip_m = block.radius_m + step.tip_radius_m - block.core.nearest_to_point(s).distance_m;

@@ -4,8 +4,8 @@
 //! of its own if they are many. A query is a box and visits every obstacle whose own box meets it
 //! exactly once, without allocating (slide P3: proximity is sensed locally).
 
-use super::geometry::{self, Bounds, Core, Point, add, scaled};
-use super::grid::Grid;
+use super::geometry::{self, Aabb, ConvexCore, Point, add, scaled};
+use super::grid::SpatialGrid;
 use sidestep_kernel::InputError;
 use std::any::Any;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ pub struct Obstacle<const D: usize> {
     /// Its id in vetoes. Several obstacles may share one, as the walls of a room do.
     pub id: u32,
     /// Its shape without the radius.
-    pub core: Core<D>,
+    pub core: ConvexCore<D>,
     /// Its reach beyond its core, meters; 0 for a thin wall.
     pub radius_m: f64,
     /// Its velocity; zero for static obstacles.
@@ -25,18 +25,18 @@ pub struct Obstacle<const D: usize> {
 
 impl<const D: usize> Obstacle<D> {
     /// Returns a static obstacle.
-    pub fn still(id: u32, core: Core<D>, radius_m: f64) -> Self {
+    pub fn still(id: u32, core: ConvexCore<D>, radius_m: f64) -> Self {
         Self { id, core, radius_m, velocity_m_s: [0.0; D] }
     }
 
     /// Returns a static disc or sphere.
     pub fn ball(id: u32, center: Point<D>, radius_m: f64) -> Self {
-        Self::still(id, Core::Point(center), radius_m)
+        Self::still(id, ConvexCore::Point(center), radius_m)
     }
 
     /// Returns a static thin wall or capsule.
     pub fn capsule(id: u32, ends: [Point<D>; 2], radius_m: f64) -> Self {
-        Self::still(id, Core::Segment(ends), radius_m)
+        Self::still(id, ConvexCore::Segment(ends), radius_m)
     }
 
     /// Returns whether it has a velocity; the grid of static obstacles leaves it out then.
@@ -46,7 +46,7 @@ impl<const D: usize> Obstacle<D> {
 
     /// Returns the box around it, its radius included.
     #[inline]
-    pub fn bounds(&self) -> Bounds<D> {
+    pub fn bounds(&self) -> Aabb<D> {
         self.core.bounds().grown(self.radius_m)
     }
 
@@ -77,7 +77,7 @@ impl<const D: usize> Obstacle<D> {
 
 /// Returns the walls of a plane polygon, all with one id. They guard its inside: a chain that
 /// starts outside never gets in.
-pub fn outline(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
+pub fn outline_walls(id: u32, corners: &[Point<2>], radius_m: f64) -> Vec<Obstacle<2>> {
     let walls = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
     walls.map(|ends| Obstacle::capsule(id, ends, radius_m)).collect()
 }
@@ -93,14 +93,14 @@ pub struct Obstacles<const D: usize> {
     still: Arc<StillObstacles<D>>,
     moving: Vec<Obstacle<D>>,
     /// Index of the moving ones, if they are many.
-    moving_grid: Grid<D>,
+    moving_grid: SpatialGrid<D>,
     reach_m: f64,
 }
 
 #[derive(Debug, Default)]
 struct StillObstacles<const D: usize> {
     all: Vec<Obstacle<D>>,
-    grid: Grid<D>,
+    grid: SpatialGrid<D>,
 }
 
 /// Number of moving obstacles up to which a linear scan is taken for faster than a grid, which is built anew whenever
@@ -123,10 +123,10 @@ impl<const D: usize> Obstacles<D> {
         all.iter().try_for_each(Obstacle::check)?;
         all.sort_by_key(|o| o.id);
         let (moving, still): (Vec<_>, Vec<_>) = all.into_iter().partition(Obstacle::is_moving);
-        let mut grid = Grid::default();
+        let mut grid = SpatialGrid::default();
         grid.rebuild(still.iter().map(Obstacle::bounds), reach_m);
         let still = Arc::new(StillObstacles { all: still, grid });
-        let mut obstacles = Self { still, moving, moving_grid: Grid::default(), reach_m };
+        let mut obstacles = Self { still, moving, moving_grid: SpatialGrid::default(), reach_m };
         obstacles.index_moving();
         Ok(obstacles)
     }
@@ -179,7 +179,7 @@ impl<const D: usize> Obstacles<D> {
     /// Visits every obstacle whose box meets `near`, each once: the static ones first, in an order
     /// that depends only on the obstacles and the box.
     #[inline]
-    pub fn visit<'a>(&'a self, near: &Bounds<D>, mut visit_one: impl FnMut(&'a Obstacle<D>)) {
+    pub fn visit<'a>(&'a self, near: &Aabb<D>, mut visit_one: impl FnMut(&'a Obstacle<D>)) {
         self.still.grid.visit(near, |k| visit_one(&self.still.all[k]));
         if self.moving.len() > MAX_LINEAR_SCAN {
             return self.moving_grid.visit(near, |k| visit_one(&self.moving[k]));
@@ -193,7 +193,7 @@ impl<const D: usize> Obstacles<D> {
     pub fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
         // A negative radius asks for overlaps that are deeper than it.
-        self.visit(&Bounds::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
+        self.visit(&Aabb::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
             if apart_m < 0.0 && first.is_none_or(|id| o.id < id) {
                 first = Some(o.id);
@@ -206,7 +206,7 @@ impl<const D: usize> Obstacles<D> {
     /// `look_m` if none is as near.
     pub fn clearance_m(&self, [p, q]: [Point<D>; 2], radius_m: f64, look_m: f64) -> f64 {
         let mut least_m = look_m;
-        self.visit(&Bounds::from_points(&[p, q]).grown(radius_m + look_m), |o| {
+        self.visit(&Aabb::from_points(&[p, q]).grown(radius_m + look_m), |o| {
             let apart_m = o.core.nearest_to_segment([p, q]).distance_m - o.radius_m - radius_m;
             least_m = least_m.min(apart_m);
         });
@@ -216,14 +216,14 @@ impl<const D: usize> Obstacles<D> {
 
 /// Returns the box around a segment and its earlier place.
 #[inline]
-pub(super) fn swept_bounds<const D: usize>(points: [Point<D>; 4], by_m: f64) -> Bounds<D> {
-    Bounds::from_points(&points).grown(by_m)
+pub(super) fn swept_bounds<const D: usize>(points: [Point<D>; 4], by_m: f64) -> Aabb<D> {
+    Aabb::from_points(&points).grown(by_m)
 }
 
 /// Returns the box of a query around a point, `half_m` to every side.
 #[inline]
-pub fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Bounds<D> {
-    Bounds { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }
+pub fn bounds_around<const D: usize>(at: Point<D>, half_m: f64) -> Aabb<D> {
+    Aabb { lo: add(at, [-half_m; D]), hi: add(at, [half_m; D]) }
 }
 
 #[cfg(test)]
@@ -242,7 +242,7 @@ mod tests {
         (from..).zip(balls).map(|(id, (c, r))| Obstacle::ball(id, *c, *r)).collect()
     }
 
-    fn seen(obstacles: &Obstacles<2>, near: &Bounds<2>) -> Vec<u32> {
+    fn seen(obstacles: &Obstacles<2>, near: &Aabb<2>) -> Vec<u32> {
         let mut seen = Vec::new();
         obstacles.visit(near, |o| seen.push(o.id));
         seen.sort_unstable();

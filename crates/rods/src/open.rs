@@ -7,11 +7,11 @@
 //! motions of the same connector overlap likewise: each follows the one before it, two connectors
 //! behind.
 
-use super::candidates::guide;
+use super::candidates::follow_guide_line;
 use super::chain::{Chain, Rod};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
-use super::pass::{Direction, MotionTally};
+use super::pass::{ChainDirection, MotionTally};
 
 /// The rule by which a slave counts as staying in place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub(super) enum StayRule {
 }
 
 /// Moves connector `k`, and all connectors that must follow.
-pub(super) fn pull<const D: usize>(
+pub(super) fn pull_connector<const D: usize>(
     chain: &mut Chain<D>,
     k: usize,
     to: Point<D>,
@@ -48,7 +48,7 @@ fn sweep<const D: usize, const NEARLY: bool>(
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
     let from = std::mem::replace(&mut points[k], to);
-    let mut sweeps = Direction::BOTH.map(|direction| OpenSweep::start(direction, k, from, to));
+    let mut sweeps = ChainDirection::BOTH.map(|direction| OpenSweep::start(direction, k, from, to));
     let [up, down] = &mut sweeps;
     // In turn until one has ended, then the rest of the other one.
     while up.advance::<NEARLY>(points, rods, min_move_m)
@@ -79,7 +79,7 @@ pub(super) fn pull_batch<const D: usize>(
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
     let at = points[k];
-    let mut sweeps = Direction::BOTH.map(|direction| {
+    let mut sweeps = ChainDirection::BOTH.map(|direction| {
         std::array::from_fn::<_, MAX_BATCH, _>(|j| {
             // Sweeps beyond the last motion fill the array and are never advanced.
             let j = j.min(to.len() - 1);
@@ -130,7 +130,7 @@ fn advance_batch<const D: usize>(
 
 /// One sweep, outward from the initiator.
 struct OpenSweep<const D: usize> {
-    direction: Direction,
+    direction: ChainDirection,
     /// The connector that moved last, and its position before and after.
     master: usize,
     mo: Point<D>,
@@ -142,7 +142,7 @@ struct OpenSweep<const D: usize> {
 
 impl<const D: usize> OpenSweep<D> {
     /// Returns the sweep of connector `k` that moves.
-    fn start(direction: Direction, k: usize, mo: Point<D>, mn: Point<D>) -> Self {
+    fn start(direction: ChainDirection, k: usize, mo: Point<D>, mn: Point<D>) -> Self {
         Self { direction, master: k, mo, mn, changed: 0, longest2: 0.0 }
     }
 
@@ -157,7 +157,7 @@ impl<const D: usize> OpenSweep<D> {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];
-        let guided = guide([self.mo, self.mn, so], rod, min_move_m);
+        let guided = follow_guide_line([self.mo, self.mn, so], rod, min_move_m);
         let new = if NEARLY && distance(guided, so) <= min_move_m { so } else { guided };
         if new == so && self.may_end_at(slave, points, rods) {
             return false;

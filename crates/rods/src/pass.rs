@@ -47,14 +47,14 @@ impl MotionTally {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Direction {
+pub(super) enum ChainDirection {
     /// Toward higher indices.
     Up,
     /// Toward lower indices.
     Down,
 }
 
-impl Direction {
+impl ChainDirection {
     /// Both directions, in the order in which sweeps are made.
     pub(super) const BOTH: [Self; 2] = [Self::Up, Self::Down];
 

@@ -4,22 +4,24 @@
 //! becoming the next one's master. Both sweeps write to tentative positions, which are committed
 //! only once both have succeeded: a veto leaves every bit of the chain as it was.
 
-use super::candidates::{Candidate, CandidateScratch};
+use super::candidates::{CandidatePosition, CandidateScratch};
 use super::chain::{Chain, is_in_range, out_of_range};
-use super::geometry::{Bounds, Point, distance, lerp};
+use super::geometry::{Aabb, Point, distance, lerp};
 use super::motion_bounds::MotionBounds;
 use super::motion_context::{
-    BlockOwner, MotionContext, PendingVeto, SlaveStep, TOLERANCE_M, TentativePositions,
+    BlockingPartOwner, MotionContext, PendingVeto, SlaveStep, TOLERANCE_M, TentativePositions,
     contact_distance_m, is_length_allowed,
 };
 use super::obstacle::{Obstacles, swept_bounds};
 use super::open::{self, StayRule};
-use super::pass::{Direction, MotionTally};
+use super::pass::{ChainDirection, MotionTally};
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
-use super::rules::{Rotation, Rules};
-use super::veto::{CompletedMotion, Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
-use separation::ProofSchedule;
+use super::rules::{ReactionRules, RotationRule};
+use super::veto::{
+    CompletedMotion, MotionOutcome, MotionRequest, RequestedMotion, Veto, VetoEffect, VetoReason,
+};
+use separation::SeparationProofSchedule;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 use std::sync::Arc;
@@ -36,18 +38,18 @@ const INTERRUPT_CHECK_INTERVAL: usize = 16;
 #[derive(Debug, Clone, Default)]
 pub struct Propagator<const D: usize> {
     /// Rules by which it moves chains; they may change from one request to the next.
-    pub rules: Rules,
+    pub rules: ReactionRules,
     /// The reaction of free connectors, unless it is the built-in one.
     reaction: Option<Arc<dyn Reaction>>,
     tentative: TentativePositions<D>,
     own_rods: RodBvh<D>,
     motion_bounds: MotionBounds<D>,
     /// When to try proofs of single sub-steps.
-    proofs: ProofSchedule,
+    proofs: SeparationProofSchedule,
     /// When to try proofs of all sub-steps of a request at once.
-    request_proofs: ProofSchedule,
+    request_proofs: SeparationProofSchedule,
     scratch: CandidateScratch<D>,
-    alternatives: Vec<Alternative<D>>,
+    alternatives: Vec<BacktrackAlternative<D>>,
     /// Positions before the request, of the run of connectors that have moved since: a veto in a
     /// later sub-step takes back the earlier ones.
     original: TentativePositions<D>,
@@ -56,9 +58,9 @@ pub struct Propagator<const D: usize> {
 
 /// A choice point of the depth-first search: another reaction of an earlier slave.
 #[derive(Debug, Clone, Copy)]
-enum Alternative<const D: usize> {
+enum BacktrackAlternative<const D: usize> {
     /// A valid place, worse than the one that was taken.
-    Place { slave: usize, candidate: Candidate<D> },
+    Place { slave: usize, candidate: CandidatePosition<D> },
     /// A turn of its rod to the other side. It is computed only on backtracking, because that is
     /// rare and a turn is the costly part of a reaction.
     OtherSide { slave: usize, tried: Point<D> },
@@ -73,10 +75,10 @@ struct DrivenConnectors<const D: usize> {
 }
 
 impl<const D: usize> DrivenConnectors<D> {
-    fn from_motion(motion: &Motion<D>) -> Self {
+    fn from_motion(motion: &RequestedMotion<D>) -> Self {
         match *motion {
-            Motion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
-            Motion::Rod { i, to } => Self { first: i, n: 2, to },
+            RequestedMotion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
+            RequestedMotion::Rod { i, to } => Self { first: i, n: 2, to },
         }
     }
 
@@ -103,13 +105,13 @@ type ConnectorVeto = (usize, PendingVeto);
 
 /// The inputs of one sweep outward from the initiator; nothing changes them before the commit.
 #[derive(Clone, Copy)]
-struct SweepContext<'a, const D: usize> {
+struct PropagationContext<'a, const D: usize> {
     chain: &'a Chain<D>,
     obstacles: &'a Obstacles<D>,
-    direction: Direction,
+    direction: ChainDirection,
 }
 
-impl<const D: usize> SweepContext<'_, D> {
+impl<const D: usize> PropagationContext<'_, D> {
     /// Returns the connector after `i`, if there is one.
     fn next(&self, i: usize) -> Option<usize> {
         self.direction.next(i, self.chain.points().len())
@@ -118,7 +120,7 @@ impl<const D: usize> SweepContext<'_, D> {
 
 impl<const D: usize> Propagator<D> {
     /// Returns a propagator with the built-in reaction of free connectors.
-    pub fn new(rules: Rules) -> Self {
+    pub fn new(rules: ReactionRules) -> Self {
         Self { rules, ..Self::default() }
     }
 
@@ -137,19 +139,19 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        request: &Request<D>,
-    ) -> Result<Outcome<D>, InputError> {
+        request: &MotionRequest<D>,
+    ) -> Result<MotionOutcome<D>, InputError> {
         let mut driven = DrivenConnectors::from_motion(&request.motion);
         check(chain, &driven)?;
         let from = driven.positions(chain);
         self.tally = MotionTally::start(driven.first);
         self.original.start(chain.points().len(), driven.first);
         if let Err((by, objection)) = project(chain, &mut driven, request.mode) {
-            return Ok(Outcome::Vetoed(make_veto(chain, driven.first, by, objection)));
+            return Ok(MotionOutcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
         if self.reaction.is_none() && self.pull_all_if_separated(chain, obstacles, &driven, n) {
-            return Ok(Outcome::Moved(self.completed_motion(None)));
+            return Ok(MotionOutcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
             if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
@@ -158,10 +160,10 @@ impl<const D: usize> Propagator<D> {
             let driven = DrivenConnectors { to: driven.positions_at(from, [k, n]), ..driven };
             if let Err((by, objection)) = self.sub_step(chain, obstacles, driven, k == n) {
                 let veto = make_veto(chain, driven.first, by, objection);
-                return Ok(self.stop(chain, request.mode, veto));
+                return Ok(self.end_at_veto(chain, request.mode, veto));
             }
         }
-        Ok(Outcome::Moved(self.completed_motion(None)))
+        Ok(MotionOutcome::Moved(self.completed_motion(None)))
     }
 
     /// Returns as many sub-steps as the connector needs that goes farthest.
@@ -178,13 +180,18 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Ends a request at a veto: keeps the sub-steps so far, or takes them back.
-    fn stop(&mut self, chain: &mut Chain<D>, mode: VetoEffect, veto: Veto<D>) -> Outcome<D> {
+    fn end_at_veto(
+        &mut self,
+        chain: &mut Chain<D>,
+        mode: VetoEffect,
+        veto: Veto<D>,
+    ) -> MotionOutcome<D> {
         if mode == VetoEffect::AsFarAsPossible && self.tally.changed > 0 {
-            return Outcome::Moved(self.completed_motion(Some(veto)));
+            return MotionOutcome::Moved(self.completed_motion(Some(veto)));
         }
-        let run = self.original.run();
+        let run = self.original.moved_range();
         chain.points_mut()[run].copy_from_slice(self.original.positions());
-        Outcome::Vetoed(veto)
+        MotionOutcome::Vetoed(veto)
     }
 
     fn completed_motion(&self, cut_short: Option<Veto<D>>) -> CompletedMotion<D> {
@@ -210,7 +217,13 @@ impl<const D: usize> Propagator<D> {
         let is_built_in = self.reaction.is_none();
         let is_open = is_built_in && is_open(chain, obstacles, &driven);
         if is_open && !self.rules.self_collision {
-            open::pull(chain, driven.first, driven.to[0], StayRule::Exactly, &mut self.tally);
+            open::pull_connector(
+                chain,
+                driven.first,
+                driven.to[0],
+                StayRule::Exactly,
+                &mut self.tally,
+            );
             return Ok(());
         }
         if is_open && self.pull_if_separated(chain, &driven, is_last) {
@@ -244,8 +257,8 @@ impl<const D: usize> Propagator<D> {
         self.place_driven(chain, obstacles, driven)?;
         // A fixed order: the second sweep sees the new places of the first one, for the bend at the
         // initiator and for collisions of the chain with itself.
-        let up = SweepContext { chain, obstacles, direction: Direction::Up };
-        let down = SweepContext { direction: Direction::Down, ..up };
+        let up = PropagationContext { chain, obstacles, direction: ChainDirection::Up };
+        let down = PropagationContext { direction: ChainDirection::Down, ..up };
         self.sweep(up, driven.first + driven.n - 1)?;
         self.sweep(down, driven.first)
     }
@@ -280,7 +293,7 @@ impl<const D: usize> Propagator<D> {
     ) -> Result<(), ConnectorVeto> {
         let slave = driven.first + 1;
         let context = self.context(chain, obstacles);
-        let step = SlaveStep { mn: driven.to[0], ..context.step(slave, Direction::Up) };
+        let step = SlaveStep { mn: driven.to[0], ..context.step(slave, ChainDirection::Up) };
         if !is_length_allowed(step.rod, distance(driven.to[0], driven.to[1])) {
             return Err((slave, PendingVeto::new(VetoReason::Mobility)));
         }
@@ -302,14 +315,18 @@ impl<const D: usize> Propagator<D> {
     /// Sweeps from a driven connector outward. Rods keep their lengths when they turn, which is cheap
     /// and nearly always enough; if that ends in a veto, the sweep is repeated with every length they
     /// may have. Without a rod that has turned the repetition would end in the same veto.
-    fn sweep(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
+    fn sweep(
+        &mut self,
+        sweep: PropagationContext<'_, D>,
+        head: usize,
+    ) -> Result<(), ConnectorVeto> {
         let rotated = self.tally.rotated;
         self.scratch.all_lengths = false;
         self.scratch.has_turned = false;
         let followed = self.follow(sweep, head);
         let Some(first) = sweep.next(head) else { return followed };
         if followed.is_ok()
-            || self.rules.rotation != Rotation::Union
+            || self.rules.rotation != RotationRule::Union
             || !self.scratch.has_turned
             || !has_more_places(sweep.chain, head, sweep.direction)
         {
@@ -322,7 +339,11 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Follows the chain from a driven connector outward, until a slave need not move or the chain ends.
-    fn follow(&mut self, sweep: SweepContext<'_, D>, head: usize) -> Result<(), ConnectorVeto> {
+    fn follow(
+        &mut self,
+        sweep: PropagationContext<'_, D>,
+        head: usize,
+    ) -> Result<(), ConnectorVeto> {
         self.alternatives.clear();
         let chain = sweep.chain;
         let mut first_objection: Option<ConnectorVeto> = None;
@@ -352,18 +373,19 @@ impl<const D: usize> Propagator<D> {
     /// Returns the best place for a slave; its alternatives are remembered.
     fn react(
         &mut self,
-        sweep: SweepContext<'_, D>,
+        sweep: PropagationContext<'_, D>,
         slave: usize,
-    ) -> Result<Candidate<D>, PendingVeto> {
+    ) -> Result<CandidatePosition<D>, PendingVeto> {
         self.find_candidates(sweep, slave)?;
         let Self { scratch, alternatives, .. } = self;
         let chosen = scratch.found[0];
         // A stack: the next best goes on top, and the side not examined yet above all, because it may hold a shorter
         // move than the places found on this side.
         let rest = scratch.found[1..].iter().rev();
-        alternatives.extend(rest.map(|&candidate| Alternative::Place { slave, candidate }));
+        alternatives
+            .extend(rest.map(|&candidate| BacktrackAlternative::Place { slave, candidate }));
         if scratch.has_other_side {
-            alternatives.push(Alternative::OtherSide { slave, tried: chosen.at });
+            alternatives.push(BacktrackAlternative::OtherSide { slave, tried: chosen.at });
         }
         Ok(chosen)
     }
@@ -371,7 +393,7 @@ impl<const D: usize> Propagator<D> {
     /// Fills `scratch.found` with places for a slave.
     fn find_candidates(
         &mut self,
-        SweepContext { chain, obstacles, direction }: SweepContext<'_, D>,
+        PropagationContext { chain, obstacles, direction }: PropagationContext<'_, D>,
         slave: usize,
     ) -> Result<(), PendingVeto> {
         let Self { rules, reaction, tentative, own_rods, scratch, .. } = self;
@@ -384,10 +406,10 @@ impl<const D: usize> Propagator<D> {
     /// Returns that slave and its new place, or the objection if no alternative is left.
     fn backtrack(
         &mut self,
-        sweep: SweepContext<'_, D>,
+        sweep: PropagationContext<'_, D>,
         backtracks_left: &mut usize,
         objection: ConnectorVeto,
-    ) -> Result<(usize, Candidate<D>), ConnectorVeto> {
+    ) -> Result<(usize, CandidatePosition<D>), ConnectorVeto> {
         while let Some(alternative) = self.alternatives.pop() {
             if *backtracks_left == 0 {
                 let (by, veto) = objection;
@@ -395,11 +417,11 @@ impl<const D: usize> Propagator<D> {
             }
             *backtracks_left -= 1;
             match alternative {
-                Alternative::Place { slave, candidate } => {
+                BacktrackAlternative::Place { slave, candidate } => {
                     self.revert(sweep.chain, slave, sweep.direction);
                     return Ok((slave, candidate));
                 }
-                Alternative::OtherSide { slave, tried } => {
+                BacktrackAlternative::OtherSide { slave, tried } => {
                     self.revert(sweep.chain, slave, sweep.direction);
                     self.scratch.both_sides = true;
                     let result = self.find_candidates(sweep, slave);
@@ -416,7 +438,7 @@ impl<const D: usize> Propagator<D> {
 
     /// Returns whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
     /// and the rod beyond it are allowed as they are.
-    fn may_stop(&self, sweep: SweepContext<'_, D>, slave: usize) -> bool {
+    fn may_stop(&self, sweep: PropagationContext<'_, D>, slave: usize) -> bool {
         let Some(next) = sweep.next(slave) else { return true };
         let step = self.context(sweep.chain, sweep.obstacles).step(next, sweep.direction);
         // The bend counts as well: its inner rod has turned, though its outer one stays. Without this
@@ -441,14 +463,14 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Forgets the new places from a slave outward.
-    fn revert(&mut self, chain: &Chain<D>, slave: usize, direction: Direction) {
-        let Range { start, end } = self.tentative.run();
+    fn revert(&mut self, chain: &Chain<D>, slave: usize, direction: ChainDirection) {
+        let Range { start, end } = self.tentative.moved_range();
         let reverted = match direction {
-            Direction::Up => {
+            ChainDirection::Up => {
                 self.tentative.to = slave.min(end);
                 slave..end
             }
-            Direction::Down => {
+            ChainDirection::Down => {
                 self.tentative.from = (slave + 1).max(start);
                 start..slave + 1
             }
@@ -461,7 +483,7 @@ impl<const D: usize> Propagator<D> {
     /// Moves the chain; where a connector was before the request is kept the first time that it
     /// moves.
     fn commit(&mut self, chain: &mut Chain<D>, driven: &DrivenConnectors<D>) {
-        let run = self.tentative.run();
+        let run = self.tentative.moved_range();
         // Outward from the driven connectors, so that the run of original positions has no gap.
         for i in (driven.first..run.end).chain((run.start..driven.first).rev()) {
             let old = chain.points()[i];
@@ -499,7 +521,7 @@ fn is_open<const D: usize>(
 /// Returns the number of sub-steps in which an initiator moves by `travel_m`. `is_empty` says that
 /// there is no obstacle.
 fn count_sub_steps(
-    rules: &Rules,
+    rules: &ReactionRules,
     default_step_m: f64,
     is_empty: bool,
     travel_m: f64,
@@ -523,27 +545,31 @@ fn count_sub_steps(
 
 /// Returns whether a second try finds slaves more places: rods of other lengths, and in the plane also the
 /// other side.
-fn has_more_places<const D: usize>(chain: &Chain<D>, head: usize, direction: Direction) -> bool {
+fn has_more_places<const D: usize>(
+    chain: &Chain<D>,
+    head: usize,
+    direction: ChainDirection,
+) -> bool {
     let rods = match direction {
-        Direction::Up => &chain.rods()[head..],
-        Direction::Down => &chain.rods()[..head],
+        ChainDirection::Up => &chain.rods()[head..],
+        ChainDirection::Down => &chain.rods()[..head],
     };
     D == 2 || rods.iter().any(|rod| rod.min_m < rod.max_m)
 }
 
 impl<const D: usize> MotionContext<'_, D> {
     /// Returns the step of a slave whose master's new place is settled.
-    fn step(&self, slave: usize, direction: Direction) -> SlaveStep<D> {
+    fn step(&self, slave: usize, direction: ChainDirection) -> SlaveStep<D> {
         let points = self.chain.points();
         let master = direction.master(slave);
         let behind_master = match direction {
-            Direction::Up => master.checked_sub(1),
-            Direction::Down => (master + 1 < points.len()).then_some(master + 1),
+            ChainDirection::Up => master.checked_sub(1),
+            ChainDirection::Down => (master + 1 < points.len()).then_some(master + 1),
         };
         // In the first sweep the connector on the initiator's other side has yet to move, and the
         // second sweep will check the bend.
         let prev = behind_master
-            .filter(|&b| direction == Direction::Down || self.tentative.get(b).is_some());
+            .filter(|&b| direction == ChainDirection::Down || self.tentative.get(b).is_some());
         SlaveStep {
             master,
             slave,
@@ -560,13 +586,13 @@ impl<const D: usize> MotionContext<'_, D> {
     /// Checks whether the path of an initiator is free of obstacles and of the chain's own parts.
     fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
         // The slides know collisions with obstacles only, so without any there is nothing to check.
-        if self.rules.rotation == Rotation::Literal && self.obstacles.is_empty() {
+        if self.rules.rotation == RotationRule::Literal && self.obstacles.is_empty() {
             return Ok(());
         }
         let from = self.chain.points()[k];
         let radius_m = self.chain.connectors()[k].radius_m;
         let near = swept_bounds([from, from, to, to], radius_m);
-        let mut worst: Option<(f64, BlockOwner, VetoReason)> = None;
+        let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
         self.visit_blocks(&near, None, k, |block| {
             let keep_m = block.radius_m + radius_m;
             if !block.stops_tip
@@ -621,10 +647,10 @@ fn project<const D: usize>(
 
 /// Returns the box around a rod and the connectors at its ends, which are at `ends`.
 #[inline]
-fn rod_box<const D: usize>(chain: &Chain<D>, i: usize, ends: [Point<D>; 2]) -> Bounds<D> {
+fn rod_box<const D: usize>(chain: &Chain<D>, i: usize, ends: [Point<D>; 2]) -> Aabb<D> {
     // Rods are no thicker than their connectors.
     let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
-    Bounds::from_points(&ends).grown(radius_m)
+    Aabb::from_points(&ends).grown(radius_m)
 }
 
 /// Returns the veto of an objection, with the chain where its motion has ended.

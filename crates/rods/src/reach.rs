@@ -12,7 +12,7 @@ use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
 use super::propagate::Propagator;
 use super::tunneling::find_tunneling;
-use super::veto::{Motion, Request, RequestSource, Veto, VetoEffect, VetoReason};
+use super::veto::{MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect, VetoReason};
 use sidestep_kernel::{InputError, interrupt};
 
 /// Largest number of double passes before the search is given up. One held connector converges in few passes (a
@@ -95,7 +95,7 @@ struct ReachPasses<'a, const D: usize> {
 ///
 /// # Errors
 /// As [`Propagator::propagate`]; also when the chain does not have the base.
-pub fn reach<const D: usize>(
+pub fn reach_target<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
@@ -174,12 +174,12 @@ impl<const D: usize> ReachPasses<'_, D> {
     /// there is one.
     fn double_pass(&mut self) -> Result<Option<Veto<D>>, InputError> {
         let ReachRequest { k, target, .. } = *self.request;
-        if let Some(veto) = self.lead(k, target)? {
+        if let Some(veto) = self.lead_connector(k, target)? {
             return Ok(Some(veto));
         }
         for h in self.held {
             let home = h.home_position(self.chain);
-            if let Some(veto) = self.lead(h.k, home)? {
+            if let Some(veto) = self.lead_connector(h.k, home)? {
                 return Ok(Some(veto));
             }
             // A last move shorter than the least counts as none, so a held connector is put exactly
@@ -190,9 +190,10 @@ impl<const D: usize> ReachPasses<'_, D> {
     }
 
     /// Moves one connector, or returns the veto.
-    fn lead(&mut self, k: usize, to: Point<D>) -> Result<Option<Veto<D>>, InputError> {
-        let motion = Motion::Connector { k, to };
-        let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
+    fn lead_connector(&mut self, k: usize, to: Point<D>) -> Result<Option<Veto<D>>, InputError> {
+        let motion = RequestedMotion::Connector { k, to };
+        let request =
+            MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
         let outcome = self.propagator.propagate(self.chain, self.obstacles, &request)?;
         Ok(outcome.veto().copied())
     }
@@ -271,7 +272,7 @@ mod tests {
         let mut chain = arm();
         let request = ReachRequest { k: 6, target: [3.0, 2.5], base: 0, tolerance_m: 1e-6 };
         let outcome =
-            reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
+            reach_target(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
         assert!(matches!(outcome.unwrap(), ReachOutcome::There { .. }));
         assert_eq!(chain.points()[0], [0.0, 0.0]);
         assert!(distance(chain.points()[6], request.target) <= 1e-6);
@@ -285,11 +286,11 @@ mod tests {
         let before = chain.clone();
         let request = ReachRequest { k: 6, target: [0.0, 9.0], base: 0, tolerance_m: 1e-6 };
         let outcome =
-            reach(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
+            reach_target(&mut Propagator::default(), &mut chain, &Obstacles::default(), &request);
         assert!(matches!(outcome.unwrap(), ReachOutcome::Short { veto: None, .. }));
         assert_eq!(chain, before);
         assert!(
-            reach(
+            reach_target(
                 &mut Propagator::default(),
                 &mut chain,
                 &Obstacles::default(),
@@ -305,7 +306,8 @@ mod tests {
         let before = chain.clone();
         let obstacles = Obstacles::new(vec![Obstacle::ball(4, [4.0, 2.0], 0.5)], 1.0).unwrap();
         let request = ReachRequest { k: 6, target: [4.0, 2.0], base: 0, tolerance_m: 1e-6 };
-        let outcome = reach(&mut Propagator::default(), &mut chain, &obstacles, &request).unwrap();
+        let outcome =
+            reach_target(&mut Propagator::default(), &mut chain, &obstacles, &request).unwrap();
         let ReachOutcome::Short { veto: Some(veto), .. } = outcome else { panic!("{outcome:?}") };
         assert_eq!((veto.reason, veto.obstacle), (VetoReason::TargetBlocked, Some(4)));
         assert_eq!(chain, before);

@@ -6,15 +6,15 @@
 //! parts only just reach, passes converge too slowly, and the parts are laid out instead. If the gap is
 //! longer than the remaining parts, one end is pulled nearer, if it is allowed to move.
 
-use super::candidates::guide;
+use super::candidates::follow_guide_line;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Point, distance, lerp};
 use super::motion_context::is_length_allowed;
 use super::obstacle::Obstacles;
-use super::pass::Direction;
+use super::pass::ChainDirection;
 use super::propagate::Propagator;
 use super::span::joints;
-use super::veto::Request;
+use super::veto::MotionRequest;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
 
@@ -71,7 +71,7 @@ pub enum ReformResult {
 /// # Errors
 /// When the chain does not have the scattered connectors, or there is no connector beside them on
 /// both sides.
-pub fn reform<const D: usize>(
+pub fn reform_chain<const D: usize>(
     chain: &mut Chain<D>,
     scattered: RangeInclusive<usize>,
     movable: MovableEnd,
@@ -99,8 +99,8 @@ pub fn reform<const D: usize>(
         if is_whole(chain, low, high) {
             return Ok(ReformResult::Whole { double_passes });
         }
-        run_pass(chain, low, high, Direction::Up);
-        run_pass(chain, high, low, Direction::Down);
+        run_pass(chain, low, high, ChainDirection::Up);
+        run_pass(chain, high, low, ChainDirection::Down);
     }
     if !is_whole(chain, low, high) {
         let [a, b] = [chain.points()[low], chain.points()[high]];
@@ -157,7 +157,12 @@ fn lay_out<const D: usize>(chain: &mut Chain<D>, low: usize, high: usize, have_m
 }
 
 /// Passes from one stub to the connector before the other.
-fn run_pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direction: Direction) {
+fn run_pass<const D: usize>(
+    chain: &mut Chain<D>,
+    from: usize,
+    to: usize,
+    direction: ChainDirection,
+) {
     let min_move_m = chain.min_move_m();
     let mut master = from;
     let mut mo = chain.points()[from];
@@ -165,7 +170,7 @@ fn run_pass<const D: usize>(chain: &mut Chain<D>, from: usize, to: usize, direct
         let mn = chain.points()[master];
         let so = chain.points()[slave];
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = guide([mo, mn, so], rod, min_move_m);
+        chain.points_mut()[slave] = follow_guide_line([mo, mn, so], rod, min_move_m);
         master = slave;
         mo = so;
     }
@@ -191,7 +196,7 @@ fn pull_end<const D: usize>(
         chain.connectors()[low..=high].to_vec(),
         chain.rods()[low..high].to_vec(),
     )?;
-    let request = Request::exact(stub - low, target);
+    let request = MotionRequest::operator_request(stub - low, target);
     // If the end cannot move, the check of all rods that follows says so.
     let _ = Propagator::default().propagate(&mut alone, &Obstacles::default(), &request)?;
     chain.points_mut()[low..=high].copy_from_slice(alone.points());
@@ -229,7 +234,7 @@ mod tests {
             let mut chain =
                 broken::<2>(seed, scattered.clone(), [1.0, 10.0, 100.0][seed as usize / 20]);
             let before = chain.clone();
-            let result = reform(&mut chain, scattered.clone(), MovableEnd::Nobody).unwrap();
+            let result = reform_chain(&mut chain, scattered.clone(), MovableEnd::Nobody).unwrap();
             assert!(matches!(result, ReformResult::Whole { .. }), "{seed}: {result:?}");
             assert!(chain.max_rod_violation_m() <= 1e-9);
             assert_eq!(chain.points()[..*scattered.start()], before.points()[..*scattered.start()]);
@@ -251,7 +256,7 @@ mod tests {
             for p in &mut chain.points_mut()[3..n - 2] {
                 *p = add(*p, numbers.point(5.0));
             }
-            let result = reform(&mut chain, 3..=n - 3, MovableEnd::Nobody).unwrap();
+            let result = reform_chain(&mut chain, 3..=n - 3, MovableEnd::Nobody).unwrap();
             assert_eq!(result, ReformResult::Whole { double_passes: 0 });
             assert!(chain.max_rod_violation_m() <= 1e-9);
         }
@@ -265,18 +270,18 @@ mod tests {
             p[0] += 2.0;
         }
         let before = chain.clone();
-        let result = reform(&mut chain, 18..=21, MovableEnd::Nobody).unwrap();
+        let result = reform_chain(&mut chain, 18..=21, MovableEnd::Nobody).unwrap();
         let ReformResult::GapTooLong { have_m, need_m, missing } = result else {
             panic!("{result:?}")
         };
         assert!((have_m - 5.5).abs() < 1e-12 && (need_m - 7.0).abs() < 1e-12);
         assert_eq!(missing, 2, "1.5 m of rods of 1.1 m");
         assert_eq!(chain, before);
-        let result = reform(&mut chain, 18..=21, MovableEnd::Last).unwrap();
+        let result = reform_chain(&mut chain, 18..=21, MovableEnd::Last).unwrap();
         assert!(matches!(result, ReformResult::Whole { .. }), "{result:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
         assert_eq!(chain.points()[..18], before.points()[..18]);
-        assert!(reform(&mut chain, 0..=3, MovableEnd::Nobody).is_err());
+        assert!(reform_chain(&mut chain, 0..=3, MovableEnd::Nobody).is_err());
     }
 
     /// Chains with missing parts, so that those left reach across the gap with `part` of their length.
@@ -302,7 +307,7 @@ mod tests {
             let part = 1.01 - 0.02 * (seed as f64 / 400.0) * (seed as f64 / 400.0);
             let mut chain = chain_with_missing_parts::<2>(seed, part);
             let scattered = 3..=chain.points().len() - 4;
-            let result = reform(&mut chain, scattered, MovableEnd::Nobody).unwrap();
+            let result = reform_chain(&mut chain, scattered, MovableEnd::Nobody).unwrap();
             let reaches = part <= 1.0;
             assert_eq!(
                 matches!(result, ReformResult::Whole { .. }),
@@ -320,7 +325,7 @@ mod tests {
         let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
         let mut chain =
             Chain::new_broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();
-        let result = reform(&mut chain, 1..=6, MovableEnd::Nobody).unwrap();
+        let result = reform_chain(&mut chain, 1..=6, MovableEnd::Nobody).unwrap();
         assert!(matches!(result, ReformResult::Whole { .. }), "{result:?}");
         assert!(chain.max_rod_violation_m() <= 1e-9);
     }

@@ -4,7 +4,7 @@
 //! and never changes its shape. A rod that moves gets its new box at once; the boxes above it grow
 //! as far as they must, and shrink at the start of the next motion, which refits the changed leaves.
 
-use super::geometry::Bounds;
+use super::geometry::Aabb;
 use std::ops::Range;
 
 /// Rods per leaf. More rods make a smaller tree, which is refitted in less time (with four it has a quarter of the
@@ -15,9 +15,9 @@ const RODS_PER_LEAF: usize = 4;
 /// Boxes around the rods and their connectors, and around groups of them.
 #[derive(Debug, Clone, Default)]
 pub struct RodBvh<const D: usize> {
-    rods: Vec<Bounds<D>>,
+    rods: Vec<Aabb<D>>,
     /// A binary heap: node 1 is the root, `leaves..2 * leaves` are the leaves.
-    nodes: Vec<Bounds<D>>,
+    nodes: Vec<Aabb<D>>,
     leaves: usize,
     /// Leaves whose boxes, or the ones above, may be larger than necessary.
     loose: Range<usize>,
@@ -25,7 +25,7 @@ pub struct RodBvh<const D: usize> {
 
 impl<const D: usize> RodBvh<D> {
     /// Fits the tree to boxes: all of it if their number is new, otherwise only around those that differ.
-    pub fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Bounds<D>>) {
+    pub fn refit(&mut self, boxes: impl ExactSizeIterator<Item = Aabb<D>>) {
         if boxes.len() != self.rods.len() {
             return self.rebuild(boxes);
         }
@@ -39,12 +39,12 @@ impl<const D: usize> RodBvh<D> {
     }
 
     /// Builds the tree anew, in the memory that it has.
-    pub fn rebuild(&mut self, boxes: impl Iterator<Item = Bounds<D>>) {
+    pub fn rebuild(&mut self, boxes: impl Iterator<Item = Aabb<D>>) {
         self.rods.clear();
         self.rods.extend(boxes);
         self.leaves = self.rods.len().div_ceil(RODS_PER_LEAF).next_power_of_two();
         self.nodes.clear();
-        self.nodes.resize(2 * self.leaves, Bounds::empty());
+        self.nodes.resize(2 * self.leaves, Aabb::empty());
         self.loose = 0..self.leaves;
         self.fit_loose();
     }
@@ -77,14 +77,14 @@ impl<const D: usize> RodBvh<D> {
         }
     }
 
-    fn leaf_bounds(&self, leaf: usize) -> Bounds<D> {
+    fn leaf_bounds(&self, leaf: usize) -> Aabb<D> {
         let from = (leaf * RODS_PER_LEAF).min(self.rods.len());
         let to = (from + RODS_PER_LEAF).min(self.rods.len());
-        self.rods[from..to].iter().fold(Bounds::empty(), |all, b| all.joined(b))
+        self.rods[from..to].iter().fold(Aabb::empty(), |all, b| all.joined(b))
     }
 
     /// Updates the box of a rod that has moved.
-    pub fn set(&mut self, rod: usize, bounds: Bounds<D>) {
+    pub fn set(&mut self, rod: usize, bounds: Aabb<D>) {
         self.rods[rod] = bounds;
         self.mark_loose(rod / RODS_PER_LEAF);
         let mut node = self.leaves + rod / RODS_PER_LEAF;
@@ -97,7 +97,7 @@ impl<const D: usize> RodBvh<D> {
 
     /// Visits the rods whose boxes meet `near`, in the order of the chain.
     #[inline]
-    pub fn visit(&self, near: &Bounds<D>, mut visit_one: impl FnMut(usize)) {
+    pub fn visit(&self, near: &Aabb<D>, mut visit_one: impl FnMut(usize)) {
         // The depth of the tree is at most the 64 bits of a usize, and each level leaves one node on the stack besides
         // the two on top.
         let mut stack = [0usize; 66];
@@ -138,17 +138,17 @@ mod tests {
             moved in prop::array::uniform2(-9.0..9.0f64),
             at in prop::array::uniform2(-9.0..9.0f64),
         ) {
-            let mut boxes: Vec<_> = corners.iter().map(|p| Bounds::from_points(&[*p]).grown(0.5)).collect();
+            let mut boxes: Vec<_> = corners.iter().map(|p| Aabb::from_points(&[*p]).grown(0.5)).collect();
             let mut tree = RodBvh::default();
             tree.rebuild(boxes.iter().copied());
             if let Some(last) = boxes.last_mut() {
-                *last = Bounds::from_points(&[moved]).grown(1.0);
+                *last = Aabb::from_points(&[moved]).grown(1.0);
                 tree.set(boxes.len() - 1, *boxes.last().unwrap());
             }
             check(&tree, &boxes, at)?;
             // The next motion starts there, and moves another part.
             if let Some(first) = boxes.first_mut() {
-                *first = Bounds::from_points(&[at]).grown(0.1);
+                *first = Aabb::from_points(&[at]).grown(0.1);
             }
             tree.refit(boxes.iter().copied());
             check(&tree, &boxes, at)?;
@@ -158,8 +158,8 @@ mod tests {
         }
     }
 
-    fn check(tree: &RodBvh<2>, boxes: &[Bounds<2>], at: [f64; 2]) -> Result<(), TestCaseError> {
-        let near = Bounds::from_points(&[at]).grown(2.0);
+    fn check(tree: &RodBvh<2>, boxes: &[Aabb<2>], at: [f64; 2]) -> Result<(), TestCaseError> {
+        let near = Aabb::from_points(&[at]).grown(2.0);
         let mut seen = Vec::new();
         tree.visit(&near, |k| seen.push(k));
         let expected: Vec<_> = (0..boxes.len()).filter(|&k| boxes[k].meets(&near)).collect();

@@ -2,7 +2,7 @@
 
 /// Reaction of a rod that hits an obstacle (slides A7, A8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Rotation {
+pub enum RotationRule {
     /// Turns to the nearest direction free of all obstacles at once: the default.
     #[default]
     Union,
@@ -16,9 +16,9 @@ pub enum Rotation {
 
 /// Rules by which a chain reacts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rules {
+pub struct ReactionRules {
     /// Reaction of a rod that hits an obstacle.
-    pub rotation: Rotation,
+    pub rotation: RotationRule,
     /// Whether the chain's own parts are obstacles to it (discs more than one index apart, rods
     /// more than two).
     pub self_collision: bool,
@@ -34,10 +34,10 @@ pub struct Rules {
     pub step_m: Option<f64>,
 }
 
-impl Default for Rules {
+impl Default for ReactionRules {
     fn default() -> Self {
         Self {
-            rotation: Rotation::Union,
+            rotation: RotationRule::Union,
             self_collision: false,
             slave_step_max_m: f64::INFINITY,
             joint_step_max_m: f64::INFINITY,

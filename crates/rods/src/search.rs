@@ -8,7 +8,9 @@
 use super::geometry::{
     Point, add, add_scaled, angle_rad, dot, norm, normalized, perpendicular, scaled, sub,
 };
-use super::motion_context::{Block, BlockOwner, SKIN_M, SlaveStep, contact_distance_m};
+use super::motion_context::{
+    BlockingPart, BlockingPartOwner, SKIN_M, SlaveStep, contact_distance_m,
+};
 use sidestep_kernel::math;
 use std::f64::consts::{PI, TAU};
 
@@ -33,7 +35,7 @@ const BISECTIONS: usize = 20;
 pub(super) struct DirectionSearch<'a, const D: usize> {
     pub(super) step: &'a SlaveStep<D>,
     pub(super) length_m: f64,
-    pub(super) blocks: &'a [Block<D>],
+    pub(super) blocks: &'a [BlockingPart<D>],
 }
 
 /// The point to turn away from.
@@ -43,7 +45,7 @@ struct WorstBlock<const D: usize> {
     radius_m: f64,
     /// Whether the connector at the rod's end is in it, not the rod.
     by_tip: bool,
-    name: BlockOwner,
+    name: BlockingPartOwner,
 }
 
 impl<const D: usize> WorstBlock<D> {

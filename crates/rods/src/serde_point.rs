@@ -36,12 +36,12 @@ pub fn serialize<const D: usize, S: Serializer>(
 pub fn deserialize<'de, const D: usize, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Point<D>, S::Error> {
-    deserializer.deserialize_tuple(D, Coordinates::<D>)
+    deserializer.deserialize_tuple(D, CoordinatesVisitor::<D>)
 }
 
-struct Coordinates<const D: usize>;
+struct CoordinatesVisitor<const D: usize>;
 
-impl<'de, const D: usize> Visitor<'de> for Coordinates<D> {
+impl<'de, const D: usize> Visitor<'de> for CoordinatesVisitor<D> {
     type Value = Point<D>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

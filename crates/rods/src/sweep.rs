@@ -7,11 +7,11 @@
 //! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the guarantees of
 //! that and their limits.
 
-use super::geometry::{Core, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
+use super::geometry::{ConvexCore, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
 
 /// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sweep<const D: usize> {
+pub struct RodSweep<const D: usize> {
     /// The rod before: master, slave.
     pub from: [Point<D>; 2],
     /// The rod after.
@@ -25,7 +25,7 @@ const KEPT_FRACTION: f64 = 0.5;
 /// more than the distance that it keeps; a veto there is safe.
 const MAX_ADVANCES: usize = 64;
 
-impl<const D: usize> Sweep<D> {
+impl<const D: usize> RodSweep<D> {
     /// Returns the longest distance that any point of the rod moves, meters.
     pub(super) fn max_travel_m(&self) -> f64 {
         // The distance of a point is a convex function of its place on the rod, so the farthest is an end.
@@ -36,7 +36,7 @@ impl<const D: usize> Sweep<D> {
 
     /// Returns whether the rod passes no point of the core on its path; in space, whether it stays half as
     /// far away as `keep_m`, the distance that it must keep at rest.
-    pub fn is_clear(&self, core: &Core<D>, keep_m: f64) -> bool {
+    pub fn is_clear(&self, core: &ConvexCore<D>, keep_m: f64) -> bool {
         let travel_m = self.max_travel_m();
         core.is_clear_of_segment(self.to, Self::safe_distance_m(travel_m, keep_m))
             || self.is_path_clear(core, keep_m, travel_m)
@@ -54,13 +54,13 @@ impl<const D: usize> Sweep<D> {
     }
 
     /// Returns whether the path is clear, without a check of its end.
-    pub(super) fn is_path_clear(&self, core: &Core<D>, keep_m: f64, travel_m: f64) -> bool {
+    pub(super) fn is_path_clear(&self, core: &ConvexCore<D>, keep_m: f64, travel_m: f64) -> bool {
         match core {
-            Core::Point(c) if D == 2 => !self.is_crossed_by(*c),
-            Core::Segment([a, b]) if D == 2 => {
+            ConvexCore::Point(c) if D == 2 => !self.is_crossed_by(*c),
+            ConvexCore::Segment([a, b]) if D == 2 => {
                 !self.crosses([*a, *b]) && !self.is_crossed_by(*a) && !self.is_crossed_by(*b)
             }
-            Core::Cuboid(cuboid) if D == 2 => {
+            ConvexCore::Cuboid(cuboid) if D == 2 => {
                 cuboid.edges_2d().iter().all(|e| !self.crosses(*e) && !self.is_crossed_by(e[0]))
             }
             _ => self.stays_away(core, Self::kept_m(keep_m), travel_m),
@@ -93,7 +93,7 @@ impl<const D: usize> Sweep<D> {
 
     /// Conservative advancement: each step is as long as the clearance allows at the highest speed of
     /// any point, so nothing is skipped however the ends move.
-    fn stays_away(&self, core: &Core<D>, kept_m: f64, travel_m: f64) -> bool {
+    fn stays_away(&self, core: &ConvexCore<D>, kept_m: f64, travel_m: f64) -> bool {
         let mut time = 0.0;
         for _ in 0..MAX_ADVANCES {
             let rod = [0, 1].map(|end| lerp(self.from[end], self.to[end], time));
@@ -134,7 +134,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// Returns whether a rod crosses a wall at one of many times between.
-    fn sampled(sweep: &Sweep<2>, wall: [Point<2>; 2]) -> bool {
+    fn sampled(sweep: &RodSweep<2>, wall: [Point<2>; 2]) -> bool {
         (0..=4000).any(|k| {
             let rod = [0, 1].map(|e| lerp(sweep.from[e], sweep.to[e], f64::from(k) / 4000.0));
             segments_cross(rod, wall)
@@ -150,13 +150,13 @@ mod tests {
         fn what_crosses_at_some_time_is_found(
             from in [point(), point()], to in [point(), point()], wall in [point(), point()],
         ) {
-            let sweep = Sweep { from, to };
+            let sweep = RodSweep { from, to };
             // The master's own way was checked when the master was a slave.
             let master_crosses = segments_cross([from[0], to[0]], wall);
             let starts_crossing = segments_cross(from, wall);
             prop_assume!(!master_crosses && !starts_crossing);
             if sampled(&sweep, wall) {
-                prop_assert!(!sweep.is_clear(&Core::Segment(wall), 0.0));
+                prop_assert!(!sweep.is_clear(&ConvexCore::Segment(wall), 0.0));
             }
         }
 
@@ -167,7 +167,7 @@ mod tests {
             center in prop::array::uniform3(-1.0..1.0f64),
         ) {
             let to = [0, 1].map(|e| super::super::geometry::add(from[e], by[e]));
-            let (sweep, core) = (Sweep { from, to }, Core::Point(center));
+            let (sweep, core) = (RodSweep { from, to }, ConvexCore::Point(center));
             if sweep.is_clear(&core, 0.2) {
                 for k in 0..=100 {
                     let rod = [0, 1].map(|e| lerp(from[e], to[e], f64::from(k) / 100.0));
@@ -179,8 +179,8 @@ mod tests {
 
     #[test]
     fn a_rod_that_turns_over_the_end_of_a_wall_is_caught() {
-        let sweep = Sweep { from: [[0.0, 0.0], [1.0, 0.5]], to: [[0.0, 0.0], [1.0, -0.5]] };
-        assert!(!sweep.is_clear(&Core::Segment([[0.5, 0.0], [0.7, 0.0]]), 0.0));
-        assert!(sweep.is_clear(&Core::Segment([[1.5, 0.0], [1.7, 0.0]]), 0.0));
+        let sweep = RodSweep { from: [[0.0, 0.0], [1.0, 0.5]], to: [[0.0, 0.0], [1.0, -0.5]] };
+        assert!(!sweep.is_clear(&ConvexCore::Segment([[0.5, 0.0], [0.7, 0.0]]), 0.0));
+        assert!(sweep.is_clear(&ConvexCore::Segment([[1.5, 0.0], [1.7, 0.0]]), 0.0));
     }
 }

@@ -12,9 +12,9 @@
 //! [`find_tunneling`], which checks the motion relative to each of them.
 
 use super::chain::Chain;
-use super::geometry::{Bounds, Point, add, norm, scaled};
+use super::geometry::{Aabb, Point, add, norm, scaled};
 use super::obstacle::Obstacles;
-use super::sweep::Sweep;
+use super::sweep::RodSweep;
 
 /// A rod that passed through an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,12 +44,12 @@ pub fn find_tunneling<const D: usize>(
         let to = [after[rod], after[rod + 1]];
         let radius_m = chain.rods()[rod].radius_m;
         let near =
-            Bounds::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);
+            Aabb::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m + furthest_m);
         let mut hit: Option<u32> = None;
         obstacles.visit(&near, |o| {
             // In the frame of a moving obstacle, the rod started elsewhere.
             let by = scaled(o.velocity_m_s, dt_s);
-            let sweep = Sweep { from: from.map(|p| add(p, by)), to };
+            let sweep = RodSweep { from: from.map(|p| add(p, by)), to };
             let is_first = hit.is_none_or(|id| o.id < id);
             if is_first && !sweep.is_clear(&o.core, o.radius_m + radius_m) {
                 hit = Some(o.id);
@@ -66,12 +66,12 @@ const ROUNDING_M: f64 = 1e-12;
 /// ends move straight from one place to another; of several the one with the lowest id. A ball is a
 /// capsule of no length.
 pub fn blocking_obstacle<const D: usize>(
-    Sweep { from, to }: Sweep<D>,
+    RodSweep { from, to }: RodSweep<D>,
     radius_m: f64,
     obstacles: &Obstacles<D>,
 ) -> Option<u32> {
     let is_ball = from[0] == from[1] && to[0] == to[1];
-    let near = Bounds::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m);
+    let near = Aabb::from_points(&[from[0], from[1], to[0], to[1]]).grown(radius_m);
     let mut hit: Option<u32> = None;
     obstacles.visit(&near, |o| {
         let keep_m = o.radius_m + radius_m;
@@ -83,7 +83,7 @@ pub fn blocking_obstacle<const D: usize>(
             o.core.nearest_to_segment([from[0], to[0]]).distance_m - keep_m < least_m
         } else {
             o.core.nearest_to_segment(to).distance_m - keep_m < least_m
-                || !Sweep { from, to }.is_clear(&o.core, keep_m)
+                || !RodSweep { from, to }.is_clear(&o.core, keep_m)
         };
         if is_blocked && hit.is_none_or(|id| o.id < id) {
             hit = Some(o.id);
@@ -95,7 +95,7 @@ pub fn blocking_obstacle<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::super::chain::{Connector, Rod};
-    use super::super::geometry::{Core, distance, lerp};
+    use super::super::geometry::{ConvexCore, distance, lerp};
     use super::super::obstacle::Obstacle;
     use super::*;
     use proptest::prelude::*;
@@ -147,7 +147,7 @@ mod tests {
                 let time = f64::from(k) / 2000.0;
                 let rod = [0, 1].map(|end| lerp(before[end], after[end], time));
                 let at = add(from, scaled(velocity_m_s, time));
-                Core::Point(at).nearest_to_segment(rod).distance_m
+                ConvexCore::Point(at).nearest_to_segment(rod).distance_m
             };
             let least_m = (0..=2000).map(apart_m).fold(f64::INFINITY, f64::min);
             prop_assert!(least_m < 5e-3 || !is_reported, "{least_m}");

@@ -30,7 +30,7 @@ pub enum VetoEffect {
 
 /// What moves, and where to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Motion<const D: usize> {
+pub enum RequestedMotion<const D: usize> {
     /// One connector, which all others follow.
     Connector {
         /// Which one, counted from 0.
@@ -49,20 +49,20 @@ pub enum Motion<const D: usize> {
 
 /// A motion that is wanted of a chain, and what a veto means for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Request<const D: usize> {
+pub struct MotionRequest<const D: usize> {
     /// What is to move, and where to.
-    pub motion: Motion<D>,
+    pub motion: RequestedMotion<D>,
     /// Who asked, and handles a veto.
     pub source: RequestSource,
     /// Effect of a veto before the end of the path.
     pub mode: VetoEffect,
 }
 
-impl<const D: usize> Request<D> {
+impl<const D: usize> MotionRequest<D> {
     /// Returns an operator's request that connector `k` goes to `to`, or nothing moves.
-    pub fn exact(k: usize, to: Point<D>) -> Self {
+    pub fn operator_request(k: usize, to: Point<D>) -> Self {
         Self {
-            motion: Motion::Connector { k, to },
+            motion: RequestedMotion::Connector { k, to },
             source: RequestSource::Operator,
             mode: VetoEffect::Exact,
         }
@@ -207,14 +207,14 @@ pub struct CompletedMotion<const D: usize> {
 
 /// Outcome of a request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Outcome<const D: usize> {
+pub enum MotionOutcome<const D: usize> {
     /// The chain moved, all of the way unless that was cut short.
     Moved(CompletedMotion<D>),
     /// Nothing moved; every bit is as before.
     Vetoed(Veto<D>),
 }
 
-impl<const D: usize> Outcome<D> {
+impl<const D: usize> MotionOutcome<D> {
     /// Returns the motion, if there was one.
     pub fn motion(&self) -> Option<&CompletedMotion<D>> {
         match self {

@@ -13,13 +13,13 @@
     reason = "an index is a lane or a coordinate of several arrays"
 )]
 
-use super::candidates::{clamped, guide};
+use super::candidates::{clamped, follow_guide_line};
 use super::chain::{Chain, MAX_COORDINATE_M, Rod, is_in_range, out_of_range};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
 use super::propagate::Propagator;
-use super::veto::Request;
-use super::{Obstacles, Rules};
+use super::veto::MotionRequest;
+use super::{Obstacles, ReactionRules};
 use sidestep_kernel::InputError;
 
 /// Motions at once: enough to keep the units for roots and divisions busy. A connector takes 19 ns one motion at a time,
@@ -54,14 +54,18 @@ pub fn pull_first<const D: usize>(
     if let Some(head) = heads.iter().find(|head| !is_in_range(head)) {
         return Err(out_of_range(head));
     }
-    let mut propagator = Propagator::new(Rules::default());
+    let mut propagator = Propagator::new(ReactionRules::default());
     for group in heads.chunks(LANES) {
         if group.len() >= MIN_MOTIONS {
             pull_lanes::<D, false>(chain, group);
             continue;
         }
         for head in group {
-            propagator.propagate(chain, &Obstacles::default(), &Request::exact(0, *head))?;
+            propagator.propagate(
+                chain,
+                &Obstacles::default(),
+                &MotionRequest::operator_request(0, *head),
+            )?;
         }
     }
     Ok(())
@@ -219,7 +223,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         w < self.n && w < j && j - w < self.connectors
     }
 
-    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guide`], lane
+    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`follow_guide_line`], lane
     /// by lane. Before the call, `next` holds the positions of one connector ago; after it, those of
     /// the slaves that now become masters.
     #[inline]
@@ -296,7 +300,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = guide([mo, mn, so], rod, self.min_move_m);
+            let new = follow_guide_line([mo, mn, so], rod, self.min_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
@@ -396,7 +400,7 @@ mod tests {
         let mut at_once = one_by_one.clone();
         let mut propagator = Propagator::default();
         for head in &heads {
-            let request = Request::exact(0, *head);
+            let request = MotionRequest::operator_request(0, *head);
             propagator.propagate(&mut one_by_one, &Obstacles::default(), &request).unwrap();
         }
         let start = at_once.clone();
@@ -411,7 +415,7 @@ mod tests {
             let (mut at_once, mut single) = (start.clone(), start.clone());
             let mut expected = WavefrontMeasures::default();
             for head in group {
-                let request = Request::exact(0, *head);
+                let request = MotionRequest::operator_request(0, *head);
                 let mut propagator = Propagator::default();
                 let outcome =
                     propagator.propagate(&mut single, &Obstacles::default(), &request).unwrap();
@@ -447,7 +451,7 @@ mod tests {
         let (mut at_once, mut single) = (start.clone(), start.clone());
         pull_first(&mut at_once, &heads).unwrap();
         for head in &heads {
-            let request = Request::exact(0, *head);
+            let request = MotionRequest::operator_request(0, *head);
             Propagator::default().propagate(&mut single, &Obstacles::default(), &request).unwrap();
         }
         assert_eq!(at_once.points(), single.points());
@@ -473,7 +477,7 @@ mod tests {
             Chain::straight([0.0; 2], [1.0, 0.0], 3, rod, Connector::free(0.0)).unwrap();
         let mut single = chain.clone();
         pull_first(&mut chain, &[[1.0, 0.0]; LANES]).unwrap();
-        let request = Request::exact(0, [1.0, 0.0]);
+        let request = MotionRequest::operator_request(0, [1.0, 0.0]);
         Propagator::default().propagate(&mut single, &Obstacles::default(), &request).unwrap();
         assert_eq!(chain.points(), single.points());
     }

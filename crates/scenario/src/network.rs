@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
-    GilbertElliott, Network, Partition, RadioOutage, TimeWindow, UnidirectionalLink,
+    GilbertElliott, Network, NetworkPartition, RadioOutage, TimeWindow, UnidirectionalLink,
 };
 use std::fmt::Debug;
 use std::marker::PhantomData;
@@ -46,7 +46,7 @@ pub trait AgentNaming {
     ///
     /// # Errors
     /// When there are no such agents or sides, or the times are impossible.
-    fn partition(&self, section: &Self::Partition) -> Result<Partition, SectionError>;
+    fn partition(&self, section: &Self::Partition) -> Result<NetworkPartition, SectionError>;
 
     /// Returns a link by its agents' ids on the network.
     ///

@@ -2,7 +2,7 @@
 
 use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::text::{KeyValues, StateDescription};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
 use std::path::Path;
@@ -85,7 +85,7 @@ pub trait CompiledScenario: Send + Sync {
     fn body_count(&self) -> usize;
 
     /// Returns the contents of the scenario, for people to check.
-    fn contents(&self, source: &Source) -> Description;
+    fn contents(&self, source: &Source) -> StateDescription;
 
     /// Returns the effects that the scenario's author may not expect, warnings first.
     fn remarks(&self) -> Vec<Remark> {

@@ -10,7 +10,7 @@ use sidestep_kernel::Simulation;
 use sidestep_kernel::view::FrameOptions;
 use sidestep_scenario::Source;
 use sidestep_server::protocol::FrameText;
-use sidestep_server::{Encoder, Options, Studio};
+use sidestep_server::{FrameEncoder, ServerOptions, StudioServer};
 use std::net::TcpStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -65,7 +65,7 @@ fn frame() {
     run.enable_events();
     run.advance(20);
     let text = FrameText { scans: Vec::new(), events: Vec::new(), events_left_out: 0 };
-    let mut encoder = Encoder::new(1, &run.scenery());
+    let mut encoder = FrameEncoder::new(1, &run.scenery());
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let made = cpu_ms(20, || drop(run.frame(FrameOptions::WITHOUT_SCANS)));
     let encoded = cpu_ms(20, || drop(encoder.encode(&frame, &text, 0)));
@@ -87,7 +87,7 @@ struct Page {
 }
 
 impl Page {
-    fn open(studio: &Studio) -> Self {
+    fn open(studio: &StudioServer) -> Self {
         let host = studio.url().trim_start_matches("http://").trim_end_matches('/').to_string();
         let stream = TcpStream::connect(&host).expect("it listens");
         let (socket, _) =
@@ -135,9 +135,9 @@ impl Page {
     }
 }
 
-fn studio(folder: &Path, text: &str) -> (Studio, Page) {
+fn studio(folder: &Path, text: &str) -> (StudioServer, Page) {
     std::fs::write(folder.join("s.toml"), text).expect("written");
-    let options = Options {
+    let options = ServerOptions {
         worlds: WORLDS.clone(),
         program: "bench".into(),
         targets: vec![folder.to_path_buf()],
@@ -148,7 +148,7 @@ fn studio(folder: &Path, text: &str) -> (Studio, Page) {
         foxglove: None,
         fleets: Vec::new(),
     };
-    let studio = Studio::start(options).unwrap_or_else(|e| panic!("{e}"));
+    let studio = StudioServer::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);
     let path = folder.join("s.toml").display().to_string();
     page.ask(

@@ -82,7 +82,7 @@ impl EventStore {
     }
 
     /// Returns the cycle before which all events are known.
-    pub(crate) fn frontier(&self) -> Cycle {
+    pub(crate) fn known_until(&self) -> Cycle {
         self.frontier
     }
 
@@ -105,7 +105,7 @@ impl EventStore {
     }
 
     /// Returns at most the given number of events of some cycles, after the first `skip` ones.
-    pub(crate) fn answer(&self, cycles: Range<Cycle>, skip: u32, limit: u32) -> ReplyBody {
+    pub(crate) fn events_reply(&self, cycles: Range<Cycle>, skip: u32, limit: u32) -> ReplyBody {
         let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
         let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);
         let start = start.saturating_add(skip as usize).min(end);
@@ -143,10 +143,13 @@ mod tests {
         events.record(&mut frame(10, &[1, 5, 9]));
         events.record(&mut frame(6, &[5]));
         events.record(&mut frame(14, &[9, 10, 12]));
-        assert_eq!(cycles(&events.answer(0..99, 0, 99)), (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0));
-        assert_eq!(cycles(&events.answer(5..12, 0, 99)), (vec![5.0, 9.0, 10.0], 0));
-        assert_eq!(cycles(&events.answer(0..99, 0, 2)), (vec![1.0, 5.0], 3));
-        assert_eq!(cycles(&events.answer(Range { start: 9, end: 3 }, 0, 2)), (vec![], 0));
+        assert_eq!(
+            cycles(&events.events_reply(0..99, 0, 99)),
+            (vec![1.0, 5.0, 9.0, 10.0, 12.0], 0)
+        );
+        assert_eq!(cycles(&events.events_reply(5..12, 0, 99)), (vec![5.0, 9.0, 10.0], 0));
+        assert_eq!(cycles(&events.events_reply(0..99, 0, 2)), (vec![1.0, 5.0], 3));
+        assert_eq!(cycles(&events.events_reply(Range { start: 9, end: 3 }, 0, 2)), (vec![], 0));
         assert_eq!(events.take_unsent().0.len(), 7, "a frame shows what led to it");
         assert_eq!(events.take_unsent().0.len(), 0);
     }
@@ -155,9 +158,9 @@ mod tests {
     fn a_cycle_of_more_events_than_an_answer_holds_is_told_in_parts() {
         let mut events = EventStore::default();
         events.record(&mut frame(10, &[3, 3, 3, 3, 3, 7]));
-        assert_eq!(cycles(&events.answer(3..9, 2, 2)), (vec![3.0, 3.0], 2));
-        assert_eq!(cycles(&events.answer(3..9, 4, 2)), (vec![3.0, 7.0], 0));
-        assert_eq!(cycles(&events.answer(3..9, u32::MAX, 2)), (vec![], 0));
+        assert_eq!(cycles(&events.events_reply(3..9, 2, 2)), (vec![3.0, 3.0], 2));
+        assert_eq!(cycles(&events.events_reply(3..9, 4, 2)), (vec![3.0, 7.0], 0));
+        assert_eq!(cycles(&events.events_reply(3..9, u32::MAX, 2)), (vec![], 0));
     }
 
     #[test]
@@ -170,6 +173,6 @@ mod tests {
             (shown.len(), left_out),
             (MAX_FRAME_EVENTS, (MAX_EVENTS + 7 - MAX_FRAME_EVENTS + 2) as u64)
         );
-        assert_eq!(cycles(&events.answer(0..9, 0, u32::MAX)).1, 9);
+        assert_eq!(cycles(&events.events_reply(0..9, 0, u32::MAX)).1, 9);
     }
 }

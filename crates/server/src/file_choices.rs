@@ -39,7 +39,7 @@ impl AllowedFiles {
         let mut found = Vec::new();
         let mut examined = 0;
         while let Some((below, depth)) = queue.pop_front() {
-            for name in entries(&folder.join(&below), MAX_ENTRIES - examined) {
+            for name in folder_entries(&folder.join(&below), MAX_ENTRIES - examined) {
                 examined += 1;
                 let path = below.join(&name);
                 let whole = folder.join(&path);
@@ -58,7 +58,7 @@ impl AllowedFiles {
 
 /// Returns the names in a folder that are not hidden, sorted, so that the limit cuts off the same ones on every
 /// system.
-fn entries(folder: &Path, limit: usize) -> Vec<PathBuf> {
+fn folder_entries(folder: &Path, limit: usize) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let names =
         entries.take(limit).filter_map(|entry| Some(PathBuf::from(entry.ok()?.file_name())));

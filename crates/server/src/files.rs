@@ -22,14 +22,14 @@ const MAX_FOREIGN_FILES: usize = 50;
 /// The folders and files that may be read.
 #[derive(Debug, Clone)]
 pub(crate) struct AllowedFiles {
-    roots: Arc<Vec<Root>>,
+    roots: Arc<Vec<AllowedRoot>>,
     /// Files elsewhere to which the scenarios given at start refer, links resolved.
     granted: Arc<BTreeSet<PathBuf>>,
 }
 
 /// A folder or a file given at start.
 #[derive(Debug)]
-struct Root {
+struct AllowedRoot {
     /// The path as it was given, which listings show.
     path: PathBuf,
     /// The path with links resolved.
@@ -67,7 +67,7 @@ impl AllowedFiles {
                 let remedy = "give a scenario, a recording or a folder that is there";
                 Problem::new(path.display().to_string(), e.to_string(), remedy)
             })?;
-            roots.push(Root { path: path.clone(), real });
+            roots.push(AllowedRoot { path: path.clone(), real });
         }
         Ok(Self { roots: Arc::new(roots), granted: Arc::default() })
     }
@@ -139,14 +139,14 @@ impl AllowedFiles {
     ///
     /// # Errors
     /// When it is no folder that may be read.
-    pub(crate) fn list(
+    pub(crate) fn list_folder(
         &self,
         folder: Option<&str>,
         worlds: &Worlds,
     ) -> Result<Vec<FileEntry>, Problem> {
         let Some(folder) = folder else {
             let roots = self.roots.iter();
-            return Ok(roots.filter_map(|root| entry(&root.path, worlds, &mut 0)).collect());
+            return Ok(roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect());
         };
         let path = self.resolve(folder)?;
         let mut paths = paths_in(&path).map_err(|e| {
@@ -158,7 +158,7 @@ impl AllowedFiles {
         for path in &paths {
             // A link may lead elsewhere.
             if path.canonicalize().is_ok_and(|real| self.contains(&real)) {
-                entries.extend(entry(path, worlds, &mut foreign));
+                entries.extend(file_entry(path, worlds, &mut foreign));
             }
         }
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
@@ -197,7 +197,7 @@ fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
 
 /// Returns the entry of a file or folder; `None` if it cannot be opened. `foreign` counts the files of other programs
 /// that were read.
-fn entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
+fn file_entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
     let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
     if name.starts_with('.') && name.len() > 1 && name != ".." {
         return None;
@@ -295,7 +295,7 @@ mod tests {
     fn a_folder_lists_what_can_be_opened() {
         let (folder, files) = places();
         let inside = folder.path().join("in");
-        let listed = files.list(inside.to_str(), &WORLDS).expect("listed");
+        let listed = files.list_folder(inside.to_str(), &WORLDS).expect("listed");
         let told: Vec<_> =
             listed.iter().map(|e| (e.name.as_str(), e.kind, e.about.as_str())).collect();
         assert_eq!(
@@ -311,7 +311,7 @@ mod tests {
                 ("t.scn", FileKind::Foreign, ""),
             ]
         );
-        let roots = files.list(None, &WORLDS).expect("listed");
+        let roots = files.list_folder(None, &WORLDS).expect("listed");
         assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
         assert!(files.resolve(&listed[1].path).is_ok());
     }
@@ -338,10 +338,10 @@ mod tests {
             problems.iter().all(|p| p.cause == problems[0].cause),
             "nothing is told of what is there"
         );
-        assert!(files.list(Some(&path("out")), &WORLDS).is_err());
-        assert!(files.list(Some(&path("in/..")), &WORLDS).is_err());
+        assert!(files.list_folder(Some(&path("out")), &WORLDS).is_err());
+        assert!(files.list_folder(Some(&path("in/..")), &WORLDS).is_err());
         assert!(files.resolve("/etc/passwd").is_err() && files.resolve("").is_err());
-        let listed = files.list(Some(&path("in")), &WORLDS).expect("listed");
+        let listed = files.list_folder(Some(&path("in")), &WORLDS).expect("listed");
         assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
         assert!(files.resolve(&path("in/deep/../a.toml")).is_ok());
     }
@@ -383,6 +383,6 @@ mod tests {
         assert!(
             check("a = \"../out/secret.toml\"").is_err() && files.resolve(&path("out")).is_err()
         );
-        assert!(files.target(&path("out/map.txt")).is_err(), "it may be read, not written");
+        assert!(files.write_target(&path("out/map.txt")).is_err(), "it may be read, not written");
     }
 }

@@ -43,7 +43,7 @@ impl FleetFeed {
     }
 
     /// Replaces the view.
-    pub fn publish(&self, view: FleetFrame) {
+    pub fn replace_view(&self, view: FleetFrame) {
         let mut snapshot = self.lock();
         snapshot.view = Some(Arc::new(view));
         snapshot.last_heard = Instant::now();

@@ -35,7 +35,7 @@ impl MemoryBudget {
     }
 
     /// Returns the number of bytes that each run may use now; it changes as runs start and end.
-    fn share(&self) -> usize {
+    fn bytes_per_run(&self) -> usize {
         (self.total_bytes / self.runs.load(Relaxed).max(1)).min(self.max_bytes_per_run)
     }
 }
@@ -87,15 +87,15 @@ impl Keyframes {
         // Other runs shrink to their shares only when it is their turn: until then this one gets less than its own.
         while self.budget.used.load(Relaxed) > self.budget.total_bytes && self.checkpoints.len() > 1
         {
-            self.thin();
+            self.drop_every_second();
         }
         self.shrink_to_budget();
     }
 
     /// Drops keyframes beyond the run's share, which shrinks whenever another run starts.
     pub(crate) fn shrink_to_budget(&mut self) {
-        while self.bytes > self.budget.share() && self.checkpoints.len() > 1 {
-            self.thin();
+        while self.bytes > self.budget.bytes_per_run() && self.checkpoints.len() > 1 {
+            self.drop_every_second();
         }
     }
 
@@ -109,7 +109,7 @@ impl Keyframes {
     }
 
     /// Drops every second keyframe, but never the first: a seek to any cycle needs one before it.
-    fn thin(&mut self) {
+    fn drop_every_second(&mut self) {
         let mut is_odd = true;
         self.checkpoints.retain(|_, _| {
             is_odd = !is_odd;
@@ -120,7 +120,7 @@ impl Keyframes {
     }
 
     /// Returns the last keyframe that is not after a cycle.
-    pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &[u8])> {
+    pub(crate) fn latest_until(&self, cycle: Cycle) -> Option<(Cycle, &[u8])> {
         self.checkpoints.range(..=cycle).next_back().map(|(&at, bytes)| (at, bytes.as_slice()))
     }
 }
@@ -152,10 +152,10 @@ mod tests {
         let mut others: Vec<Keyframes> = (0..3).map(|_| Keyframes::new(&budget)).collect();
         for cycle in 0..40 {
             others.iter_mut().for_each(|other| other.push(cycle, vec![0; 50], MS));
-            assert!(budget.used.load(Relaxed) <= 1000 && others[0].before(0).is_some());
+            assert!(budget.used.load(Relaxed) <= 1000 && others[0].latest_until(0).is_some());
         }
         first.shrink_to_budget();
-        assert!(first.bytes <= 250 && first.before(0).is_some());
+        assert!(first.bytes <= 250 && first.latest_until(0).is_some());
         assert!(others.iter().all(|other| other.bytes <= 250));
         drop((first, others));
         assert_eq!((budget.used.load(Relaxed), budget.runs.load(Relaxed)), (0, 0));
@@ -177,11 +177,11 @@ mod tests {
     #[test]
     fn the_nearest_before_is_found_and_nothing_in_an_empty_store() {
         let mut keyframes = alone(1000);
-        assert_eq!(keyframes.before(5), None);
+        assert_eq!(keyframes.latest_until(5), None);
         for cycle in [0, 10, 20] {
             keyframes.push(cycle, vec![cycle as u8], MS);
         }
-        let at = |cycle| keyframes.before(cycle).map(|(at, bytes)| (at, bytes[0]));
+        let at = |cycle| keyframes.latest_until(cycle).map(|(at, bytes)| (at, bytes[0]));
         assert_eq!(
             [at(0), at(9), at(10), at(99)],
             [Some((0, 0)), Some((0, 0)), Some((10, 10)), Some((20, 20))]
@@ -198,7 +198,7 @@ mod tests {
                 keyframes.push(cycle, vec![0; size], MS);
                 let kept: usize = keyframes.checkpoints.values().map(Vec::len).sum();
                 prop_assert!(kept <= 1000 && kept == keyframes.bytes);
-                prop_assert_eq!(keyframes.before(0).map(|(at, _)| at), Some(0));
+                prop_assert_eq!(keyframes.latest_until(0).map(|(at, _)| at), Some(0));
             }
         }
 

@@ -37,7 +37,7 @@ mod socket;
 mod state;
 mod write;
 
-pub use encode::Encoder;
+pub use encode::FrameEncoder;
 pub use fleet_feed::FleetFeed;
 pub use request::{MAX_REQUEST_BYTES, decode};
 
@@ -71,7 +71,7 @@ pub const SPEED_RANGE: RangeInclusive<f64> = 0.1..=100.0;
 
 /// Options for the start of a server.
 #[derive(Clone)]
-pub struct Options {
+pub struct ServerOptions {
     /// The worlds whose scenarios can be opened, with the build that runs them.
     pub worlds: Worlds,
     /// The program and its build, for people: the page shows it.
@@ -93,19 +93,19 @@ pub struct Options {
 }
 
 /// A running server, until it is ended or dropped.
-pub struct Studio {
+pub struct StudioServer {
     address: SocketAddr,
     token: Option<String>,
     shutdown: watch::Sender<bool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Studio {
+impl StudioServer {
     /// Starts a server in its own thread.
     ///
     /// # Errors
     /// When something that was named does not exist, or the port cannot be bound.
-    pub fn start(options: Options) -> Result<Self, Error> {
+    pub fn start(options: ServerOptions) -> Result<Self, Error> {
         let (folders, mut open) = split_targets(&options.targets);
         for fleet in &options.fleets {
             open.push(TargetRef { kind: "fleet".into(), path: fleet.endpoint.clone() });
@@ -176,7 +176,7 @@ impl Studio {
     }
 }
 
-impl Drop for Studio {
+impl Drop for StudioServer {
     /// Ends all sessions, and waits for them, some seconds at most.
     fn drop(&mut self) {
         self.shutdown.send_replace(true);

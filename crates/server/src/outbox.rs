@@ -125,7 +125,7 @@ impl Outbox {
     }
 
     /// Removes the frame and the status of a session that were not sent; returns whether there was a frame.
-    pub(crate) fn clear(&self, session: SessionId) -> bool {
+    pub(crate) fn clear_session(&self, session: SessionId) -> bool {
         let newest = self.lock().newest.remove(&session);
         newest.is_some_and(|newest| newest.frame.is_some())
     }
@@ -207,7 +207,7 @@ mod tests {
     fn what_was_taken_back_is_not_sent() {
         let outbox = Outbox::default();
         outbox.send_frame(1, None, vec![1]);
-        assert!(outbox.clear(1) && !outbox.clear(1));
+        assert!(outbox.clear_session(1) && !outbox.clear_session(1));
         assert_eq!(outbox.pop(), None);
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 /// A file of the page, in the table that `build.rs` writes.
-struct Asset {
+struct PageAsset {
     /// Its path below the page's address.
     path: &'static str,
     /// Its media type.

@@ -18,7 +18,7 @@ struct RequestNumber {
 /// A request before its call is read: the presence of a session decides which methods there are.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Envelope {
+struct RequestEnvelope {
     id: u32,
     session: Option<SessionId>,
     call: Map<String, Value>,
@@ -34,7 +34,7 @@ pub fn decode(text: &str) -> Result<ClientRequest, Box<(u32, Problem)>> {
         let remedy = "make the text shorter, or change the file with another program";
         return Err(Box::new((request_number(text), Problem::new("request", cause, remedy))));
     }
-    let envelope: Envelope = serde_json::from_str(text).map_err(|error| {
+    let envelope: RequestEnvelope = serde_json::from_str(text).map_err(|error| {
         let cause = format!("it cannot be read: {error}");
         let remedy =
             r#"send {"id": 1, "call": {"do": "files"}}, with "session": 2 for a call to session 2"#;
@@ -45,7 +45,9 @@ pub fn decode(text: &str) -> Result<ClientRequest, Box<(u32, Problem)>> {
 }
 
 /// Reads the call of a request to the server or to a session.
-fn read_call(Envelope { id, session, call }: Envelope) -> Result<ClientRequest, Problem> {
+fn read_call(
+    RequestEnvelope { id, session, call }: RequestEnvelope,
+) -> Result<ClientRequest, Problem> {
     let name = method_name(id, &call)?;
     let Some(session) = session else {
         if !ServerMethod::NAMES.contains(&name.as_str()) {

@@ -17,7 +17,7 @@ const MIN_SPACING: Duration = Duration::from_millis(100);
 const MIN_COST_RATIO: u32 = 100;
 
 /// The samples of one run.
-pub(crate) struct Samples {
+pub(crate) struct MetricSamples {
     infos: &'static [MetricInfo],
     names: Vec<MetricName>,
     cycles: Vec<Cycle>,
@@ -30,7 +30,7 @@ pub(crate) struct Samples {
     last_cost: Duration,
 }
 
-impl Samples {
+impl MetricSamples {
     /// Returns an empty store for the metrics of a world.
     pub(crate) fn new(infos: &'static [MetricInfo]) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl Samples {
             }
         }
         if self.cycles.len() > MAX_SAMPLES {
-            self.thin();
+            self.drop_every_second();
         }
     }
 
@@ -85,7 +85,7 @@ impl Samples {
     }
 
     /// Drops every second sample, but never the first.
-    fn thin(&mut self) {
+    fn drop_every_second(&mut self) {
         fn halve<T: Copy>(all: &mut Vec<T>) {
             *all = all.iter().copied().step_by(2).collect();
         }
@@ -96,7 +96,7 @@ impl Samples {
     }
 
     /// Returns the samples from a number on; none if there are not so many, as after a thinning.
-    pub(crate) fn answer(&self, from: u32) -> ReplyBody {
+    pub(crate) fn samples_reply(&self, from: u32) -> ReplyBody {
         let first = (from as usize).min(self.cycles.len());
         ReplyBody::Metrics {
             names: self.names.clone(),
@@ -135,8 +135,9 @@ mod tests {
         values: Vec<Vec<Option<f64>>>,
     }
 
-    fn sampled(samples: &Samples, from: u32) -> Sampled {
-        let ReplyBody::Metrics { names, first, cycles, values, .. } = samples.answer(from) else {
+    fn sampled(samples: &MetricSamples, from: u32) -> Sampled {
+        let ReplyBody::Metrics { names, first, cycles, values, .. } = samples.samples_reply(from)
+        else {
             panic!("no metrics");
         };
         Sampled { keys: names.into_iter().map(|name| name.key).collect(), first, cycles, values }
@@ -144,7 +145,7 @@ mod tests {
 
     #[test]
     fn numbers_are_named_by_their_path_and_new_ones_have_no_past() {
-        let mut samples = Samples::new(&[]);
+        let mut samples = MetricSamples::new(&[]);
         samples.push(
             0,
             &json!({ "a": 1, "list": [1], "of": { "b": 2.5, "word": "x" } }),
@@ -163,7 +164,7 @@ mod tests {
 
     #[test]
     fn samples_stay_within_their_bound_and_keep_the_first() {
-        let mut samples = Samples::new(&[]);
+        let mut samples = MetricSamples::new(&[]);
         (0..5000).for_each(|cycle| samples.push(cycle, &json!({ "n": cycle }), Duration::ZERO));
         let Sampled { cycles, values, .. } = sampled(&samples, 0);
         assert!(cycles.len() <= MAX_SAMPLES && cycles.len() > MAX_SAMPLES / 4);
@@ -175,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_sample_is_wanted_of_later_cycles_alone() {
-        let mut samples = Samples::new(&[]);
+        let mut samples = MetricSamples::new(&[]);
         assert!(samples.is_due(0, Duration::ZERO));
         samples.push(7, &json!({}), Duration::from_millis(5));
         assert!(!samples.is_due(7, MIN_SPACING * 100) && !samples.is_new(7));

@@ -71,7 +71,7 @@ pub(crate) async fn serve(
         let _ = stream.set_nodelay(true);
         if let Some(permit) = limiter.acquire(address.ip()) {
             let connection =
-                Connection { stream, stall_timer: StallTimer::default(), _permit: permit };
+                PermittedConnection { stream, stall_timer: StallTimer::default(), _permit: permit };
             tokio::spawn(serve_connection(connection, routes.clone(), shutdown.clone(), timeouts));
         } else if let Ok(permit) = refusals.clone().try_acquire_owned() {
             tokio::spawn(async move {
@@ -94,7 +94,7 @@ async fn wait_until_empty(limiter: &ConnectionLimiter) {
 /// progress then is completed, however long it takes to make or to send (an export may take minutes), unless its peer
 /// does not read it.
 async fn serve_connection(
-    connection: Connection,
+    connection: PermittedConnection,
     routes: Router,
     shutdown: watch::Receiver<bool>,
     timeouts: Timeouts,
@@ -161,13 +161,13 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
 }
 
 /// A connection that keeps its permit also after it has become a WebSocket.
-struct Connection {
+struct PermittedConnection {
     stream: TcpStream,
     stall_timer: StallTimer,
     _permit: ConnectionPermit,
 }
 
-impl AsyncRead for Connection {
+impl AsyncRead for PermittedConnection {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -177,7 +177,7 @@ impl AsyncRead for Connection {
     }
 }
 
-impl AsyncWrite for Connection {
+impl AsyncWrite for PermittedConnection {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,

@@ -6,9 +6,10 @@ use crate::protocol::{
     SessionMethod,
 };
 use crate::request::decode;
-use crate::results::runs;
+use crate::results::list_sweep_runs;
 use crate::session::{
-    OpenRequest, Session, SessionDeps, apply_edits, model, no_such_session, text_problems,
+    OpenRequest, Session, SessionDeps, apply_edits, no_such_session, text_problems,
+    text_values_reply,
 };
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
@@ -48,7 +49,7 @@ pub(crate) async fn serve(
     _permit: OwnedSemaphorePermit,
 ) {
     let outbox = Arc::new(Outbox::default());
-    outbox.send_notification(&state.hello());
+    outbox.send_notification(&state.hello_notification());
     let sessions = SocketSessions {
         state: state.clone(),
         outbox: outbox.clone(),
@@ -81,7 +82,7 @@ async fn run(socket: &mut WebSocket, mut sessions: SocketSessions, outbox: &Outb
                     }
                 }
             }
-            message = socket.recv(), if has_room(outbox) => {
+            message = socket.recv(), if can_read_request(outbox) => {
                 last_heard = Instant::now();
                 match message {
                     Some(Ok(Message::Text(text))) => sessions.on_request(&text),
@@ -101,7 +102,7 @@ async fn run(socket: &mut WebSocket, mut sessions: SocketSessions, outbox: &Outb
 }
 
 /// Returns whether a further request may be read.
-fn has_room(outbox: &Outbox) -> bool {
+fn can_read_request(outbox: &Outbox) -> bool {
     outbox.backlog() < MAX_BACKLOG && outbox.long_bytes() < MAX_LONG_REQUEST_BYTES
 }
 
@@ -184,20 +185,20 @@ impl SocketSessions {
             ServerMethod::Files { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || {
-                    let entries = deps.files.list(folder.as_deref(), &deps.worlds)?;
+                    let entries = deps.files.list_folder(folder.as_deref(), &deps.worlds)?;
                     Ok(ReplyBody::Files { entries })
                 });
                 None
             }
             ServerMethod::Runs { folder } => {
                 let deps = self.state.deps.clone();
-                self.answer_in_thread(id, move || runs(&deps.files.resolve(&folder)?));
+                self.answer_in_thread(id, move || list_sweep_runs(&deps.files.resolve(&folder)?));
                 None
             }
             ServerMethod::Open { target, seed } => self.open(id, target, seed).err().map(Err),
             ServerMethod::Schema { world } => {
                 let worlds = self.state.deps.worlds.clone();
-                self.answer_in_thread(id, move || schema(&worlds, &world));
+                self.answer_in_thread(id, move || schema_reply(&worlds, &world));
                 None
             }
         }
@@ -213,7 +214,7 @@ impl SocketSessions {
         match call {
             SessionMethod::Close {} => {
                 let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
-                self.outbox.clear(session);
+                self.outbox.clear_session(session);
                 Some(closed.map(|_| ReplyBody::Done))
             }
             SessionMethod::Check { text } => self.on_text(id, session, move |deps, source| {
@@ -225,7 +226,7 @@ impl SocketSessions {
                 })
             }
             SessionMethod::Model { text } => {
-                self.on_text(id, session, move |deps, source| model(deps, source, text))
+                self.on_text(id, session, move |deps, source| text_values_reply(deps, source, text))
             }
             SessionMethod::Run(call) => {
                 let Some(session) = self.sessions.get(&session) else {
@@ -288,7 +289,7 @@ impl SocketSessions {
 ///
 /// # Errors
 /// When there is no such world.
-pub(crate) fn schema(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
+pub(crate) fn schema_reply(worlds: &Worlds, world: &str) -> Result<ReplyBody, Problem> {
     let world_type = worlds.find(world).ok_or_else(|| {
         let names = worlds.names().join(", ");
         Problem::new(world, "no such world", format!("give one of {names}"))

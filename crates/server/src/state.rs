@@ -55,7 +55,7 @@ impl AppState {
     }
 
     /// Returns the first notice for a page: version, worlds, and what the command line asked to open.
-    pub(crate) fn hello(&self) -> ServerNotification {
+    pub(crate) fn hello_notification(&self) -> ServerNotification {
         ServerNotification::Hello {
             version: VERSION,
             program: self.program.clone(),

@@ -34,7 +34,7 @@ impl AllowedFiles {
     ///
     /// # Errors
     /// When it is elsewhere, hidden, or no plain file.
-    pub(crate) fn target(&self, path: &str) -> Result<WriteTarget, Problem> {
+    pub(crate) fn write_target(&self, path: &str) -> Result<WriteTarget, Problem> {
         let given = PathBuf::from(path);
         // A missing folder and a forbidden one are reported alike.
         let real = real_path(&given).unwrap_or_default();
@@ -80,7 +80,7 @@ pub(crate) fn replace_file(
     is_own: bool,
     may_replace: impl Fn(Option<&str>) -> bool,
 ) -> Result<Option<String>, Problem> {
-    let old = read(target)?;
+    let old = read_old_content(target)?;
     if let Some(old) = &old {
         check_replaceable(target, old, is_own)?;
     }
@@ -92,7 +92,7 @@ pub(crate) fn replace_file(
         .and_then(|partial| partial.with_text(text, old.as_ref()))
         .map_err(|error| write_error(target, &error))?;
     // Writing takes some time, in which another program may have changed the file.
-    if let Some(present) = read(target)?
+    if let Some(present) = read_old_content(target)?
         && Some(present.text.as_str()) != found
         && !may_replace(Some(&present.text))
     {
@@ -102,7 +102,7 @@ pub(crate) fn replace_file(
     Ok(None)
 }
 
-fn read(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
+fn read_old_content(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
     let place = target.path.display().to_string();
     let other_name = "save it under another name";
     let (bytes, permissions) = match try_read(&target.real) {

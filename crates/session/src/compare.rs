@@ -5,7 +5,7 @@ use crate::run_tables::has_rows;
 use sidestep_kernel::InputError;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{MemoryRecorder, Values};
-use sidestep_kernel::view::{BodyId, PositionColumns};
+use sidestep_kernel::view::{BodyId, PositionTableColumns};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub(crate) fn compare_poses(
     folder: &Path,
 ) -> Result<usize, Error> {
     let cycle = run.cycle();
-    let mut recorded: Vec<(PositionColumns, Table)> = Vec::new();
+    let mut recorded: Vec<(PositionTableColumns, Table)> = Vec::new();
     for rows in run.position_columns().into_iter().filter(|rows| has_rows(folder, rows.table)) {
         let table = read_table(folder, rows.table, cycle..=cycle)?;
         if table.rows() > 0 {
@@ -62,7 +62,7 @@ fn pose_mismatch(cycle: u64, bodies: usize, first: BodyId) -> Error {
 
 /// Returns the bodies with recorded rows that differ from the present ones.
 fn differing_bodies(
-    rows: &PositionColumns,
+    rows: &PositionTableColumns,
     table: &Table,
     present: &MemoryRecorder,
 ) -> Vec<BodyId> {
@@ -78,13 +78,13 @@ fn differing_bodies(
     differing
 }
 
-fn count_bodies(rows: &PositionColumns, table: &Table) -> usize {
+fn count_bodies(rows: &PositionTableColumns, table: &Table) -> usize {
     bits_by_body(rows, &[], |name| table.column(name)).len()
 }
 
 /// Returns the bits of all columns by body, so that missing values and negative zeros count, too.
 fn bits_by_body<'a>(
-    rows: &PositionColumns,
+    rows: &PositionTableColumns,
     names: &[&str],
     column: impl Fn(&str) -> Option<&'a Values>,
 ) -> BTreeMap<BodyId, Vec<u64>> {
@@ -123,16 +123,16 @@ fn bits(values: &Values, row: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::view::{Axis, BodyKind};
+    use sidestep_kernel::view::{BodyKind, CoordinateColumn};
 
     #[test]
     fn one_changed_cell_is_found() {
-        let rows = PositionColumns {
+        let rows = PositionTableColumns {
             table: "trajectories",
             kind: BodyKind::Connector,
             number: "chain",
             part: Some("connector"),
-            axes: vec![Axis::meters("x_m")],
+            axes: vec![CoordinateColumn::meters("x_m")],
             plane: None,
             is_corner: false,
             heading: None,

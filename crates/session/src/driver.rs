@@ -76,7 +76,7 @@ pub(crate) fn with_interrupt<T>(
     // An interrupt leaves the cycle by unwinding, because it may be raised deep in a search that returns no errors.
     match catch_unwind(AssertUnwindSafe(|| work(&mut *run))) {
         Ok(result) => result,
-        Err(payload) if interrupt.caused(payload.as_ref()) => {
+        Err(payload) if interrupt.has_caused_unwind(payload.as_ref()) => {
             Err(Error::InterruptedInCycle(run.cycle()))
         }
         Err(payload) => resume_unwind(payload),

@@ -4,7 +4,7 @@ use serde_json::Value;
 use sidestep_draw::bodies_with_trails;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::{Frame, PositionColumns, Scenery, Trail};
+use sidestep_kernel::view::{Frame, PositionTableColumns, Scenery, Trail};
 use sidestep_record::{Table, read_table};
 use std::path::Path;
 
@@ -16,7 +16,7 @@ const MAX_TRAIL_ROWS: u64 = 4_000_000;
 /// # Errors
 /// When a table is damaged.
 pub(crate) fn read_trails(
-    tables: &[PositionColumns],
+    tables: &[PositionTableColumns],
     folder: &Path,
     scenery: &Scenery,
     frame: &Frame,

@@ -195,7 +195,7 @@ fn plain_loop() {
         let mut now = 0;
         let mut members = Vec::new();
         let mut plain_cycle = || {
-            (0..n as u32).for_each(|slot| groups.reset(slot));
+            (0..n as u32).for_each(|slot| groups.make_singleton(slot));
             let turn =
                 &mut PhaseContext { world: &*world, state, now, clock, scratch: &mut scratch };
             RobotsWorld::claim(turn, 0..n);

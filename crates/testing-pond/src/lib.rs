@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_kernel::{Column, Cycle, PhaseContext, Phases, Slot};
+use sidestep_kernel::{AtomicColumn, Cycle, PhaseContext, Phases, Slot};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -38,13 +38,13 @@ pub(crate) struct PondWorld {
 /// The pads of all frogs: everything that changes in a run, except sums.
 pub(crate) struct PondState {
     /// The pad under each frog.
-    pad: Column<u32>,
+    pad: AtomicColumn<u32>,
     /// The pad that each frog wants.
-    goal: Column<u32>,
+    goal: AtomicColumn<u32>,
     /// The frog on each pad, counted from 1; 0 if there is none.
-    frog: Column<u32>,
+    frog: AtomicColumn<u32>,
     /// The ordered hop of each frog, as a number of [`Hop`]; that of [`Hop::Stay`] without an order.
-    order: Column<u32>,
+    order: AtomicColumn<u32>,
 }
 
 /// A hop of a frog.
@@ -86,7 +86,7 @@ impl PondWorld {
     }
 
     fn state(&self, pads: Vec<u32>, orders: Vec<u32>) -> PondState {
-        let frog = Column::filled((self.width * self.height) as usize, 0);
+        let frog = AtomicColumn::filled((self.width * self.height) as usize, 0);
         (1u32..).zip(&pads).for_each(|(number, &pad)| frog.set(pad as usize, number));
         PondState {
             goal: pads.iter().copied().collect(),
@@ -156,7 +156,9 @@ impl Phases for PondWorld {
         for frog in bodies {
             let own = claims(frog);
             let meets = |other: &usize| claims(*other).iter().any(|pad| own.contains(pad));
-            (0..frog).filter(meets).for_each(|other| groups.join(frog as Slot, other as Slot));
+            (0..frog)
+                .filter(meets)
+                .for_each(|other| groups.join_groups(frog as Slot, other as Slot));
         }
     }
 

@@ -7,9 +7,10 @@ use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, Teams};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{Description, KeyValues, key_value};
+use sidestep_kernel::text::{KeyValues, StateDescription, key_value};
 use sidestep_kernel::view::{
-    Axis, Body, BodyKind, Frame, FrameOptions, Pose, PositionColumns, Scenery, Shape,
+    Body, BodyKind, CoordinateColumn, Frame, FrameOptions, Pose, PositionTableColumns, Scenery,
+    Shape,
 };
 use sidestep_kernel::{
     Cycle, Digest, RunStats, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
@@ -78,13 +79,13 @@ impl WorldRecording for PondWorld {
         books.rows.record(recorder)
     }
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
-        vec![PositionColumns {
+    fn position_columns(&self, _: &Collector) -> Vec<PositionTableColumns> {
+        vec![PositionTableColumns {
             table: "trajectories",
             kind: BodyKind::Robot,
             number: "frog",
             part: None,
-            axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
+            axes: vec![CoordinateColumn::meters("x_m"), CoordinateColumn::meters("y_m")],
             plane: None,
             is_corner: false,
             heading: None,
@@ -188,8 +189,8 @@ impl WorldMetrics for PondWorld {
         vec![key_value("hops", metrics["hops"].to_string())]
     }
 
-    fn poses(&self, state: &PondState, _: Cycle) -> Description {
+    fn poses(&self, state: &PondState, _: Cycle) -> StateDescription {
         let pads: Vec<u32> = state.pad.iter().collect();
-        Description { text: format!("  pads {pads:?}\n"), json: json!(pads) }
+        StateDescription { text: format!("  pads {pads:?}\n"), json: json!(pads) }
     }
 }

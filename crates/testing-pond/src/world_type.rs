@@ -4,7 +4,7 @@ use super::world_impl::Collector;
 use super::{PondWorld, external};
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::text::{Description, align_pairs, key_value};
+use sidestep_kernel::text::{StateDescription, align_pairs, key_value};
 use sidestep_kernel::{InputError, Run, RunConfig, RunStart, Seed, Simulation};
 use sidestep_scenario::{
     CompiledScenario, Editing, ResolvedScenario, Source, WorldFacts, WorldType,
@@ -127,10 +127,10 @@ impl CompiledScenario for CompiledPond {
         self.world.frogs as usize
     }
 
-    fn contents(&self, _: &Source) -> Description {
+    fn contents(&self, _: &Source) -> StateDescription {
         let frogs = self.world.frogs;
         let text = align_pairs(&[key_value("frogs", frogs.to_string())]);
-        Description { json: serde_json::json!({ "frogs": frogs }), text }
+        StateDescription { json: serde_json::json!({ "frogs": frogs }), text }
     }
 
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {

@@ -5,8 +5,8 @@
 //! push and the pull of the chain (slides A2 and A3). Rods of variable length that need not change
 //! keep their length (A4), so far fewer passes are needed.
 
-use super::dls::bow;
-use super::limb::Span;
+use super::dls::bend_to_arc;
+use super::limb::RodLengthRange;
 use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
 
 /// Largest number of double passes before the search is given up: FABRIK takes a median of 135 for a target within 0.9 of
@@ -22,7 +22,7 @@ const MIN_GAIN: f64 = 1e-4;
 /// Returns the number of double passes and the remaining error.
 pub(super) fn solve<const D: usize>(
     points: &mut [Point<D>],
-    spans: &[Span],
+    spans: &[RodLengthRange],
     target: Point<D>,
     tolerance_m: f64,
 ) -> (usize, f64) {
@@ -55,7 +55,11 @@ pub(super) fn solve<const D: usize>(
 
 /// Returns the slave's place after a push, pull or resize.
 #[inline(always)]
-fn slave_position<const D: usize>(master: Point<D>, slave: Point<D>, span: Span) -> Point<D> {
+fn slave_position<const D: usize>(
+    master: Point<D>,
+    slave: Point<D>,
+    span: RodLengthRange,
+) -> Point<D> {
     let g = sub(slave, master);
     let d = norm(g);
     if d > 0.0 {
@@ -70,7 +74,7 @@ fn slave_position<const D: usize>(master: Point<D>, slave: Point<D>, span: Span)
 /// with the target, where passes get stuck, is bowed once.
 pub(super) fn solve_vectors<const D: usize>(
     vectors: &mut [Point<D>],
-    spans: &[Span],
+    spans: &[RodLengthRange],
     target: Point<D>,
     tolerance_m: f64,
 ) -> (usize, f64) {
@@ -78,7 +82,7 @@ pub(super) fn solve_vectors<const D: usize>(
     let mut passes = 0;
     for attempt in 0..2 {
         if attempt == 1 {
-            bow(vectors, target);
+            bend_to_arc(vectors, target);
         }
         points.clear();
         points.push([0.0; D]);

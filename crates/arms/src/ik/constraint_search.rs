@@ -4,7 +4,7 @@
 //! the present one, its mirror image, and random ones, until one is good.
 
 use super::constraints::ConstraintChecker;
-use super::goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, Engine, SolutionKind};
+use super::goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, IkEngine, MotionOrPosture};
 use super::motion::{self, MotionResult};
 use super::relax::{self, RelaxResult};
 use super::{IkSolver, direct, limb, starts};
@@ -24,22 +24,22 @@ pub(super) fn solve<const D: usize>(
         checker: ConstraintChecker { chain, obstacles, self_collision },
         goal,
         best: chain.points().to_vec(),
-        engine: Engine::Chain,
+        engine: IkEngine::Chain,
         iterations: 0,
         veto: None,
     };
-    if matches!(goal.engine, Engine::Auto | Engine::Chain) && search.search_by_motion(solver)? {
-        return Ok(search.success(SolutionKind::Motion));
+    if matches!(goal.engine, IkEngine::Auto | IkEngine::Chain) && search.search_by_motion(solver)? {
+        return Ok(search.success(MotionOrPosture::Motion));
     }
-    if goal.motion_only || goal.engine == Engine::Chain {
+    if goal.motion_only || goal.engine == IkEngine::Chain {
         return Ok(search.failure(1));
     }
-    if goal.engine == Engine::Direct {
+    if goal.engine == IkEngine::Direct {
         return Ok(search.search_by_closed_form(solver));
     }
     for start in 0..=goal.restarts {
         if search.search_by_relaxation(solver, start) {
-            return Ok(search.success(SolutionKind::Posture));
+            return Ok(search.success(MotionOrPosture::Posture));
         }
     }
     Ok(search.failure(goal.restarts + 1))
@@ -50,7 +50,7 @@ struct ConstraintSearch<'a, const D: usize> {
     goal: &'a ChainIkGoal<D>,
     /// The valid posture whose tip is nearest to the target so far.
     best: Vec<Point<D>>,
-    engine: Engine,
+    engine: IkEngine,
     iterations: usize,
     /// The first objection: the one to the motion from the present posture, which tells a user more than
     /// those to random starts.
@@ -82,7 +82,7 @@ impl<const D: usize> ConstraintSearch<'_, D> {
         let is_good = veto.is_none() && tip_m <= self.goal.tolerance_m;
         if is_good {
             self.best = points;
-            self.engine = Engine::Dls;
+            self.engine = IkEngine::Dls;
         }
         is_good
     }
@@ -93,21 +93,21 @@ impl<const D: usize> ConstraintSearch<'_, D> {
         let limb = &mut solver.limb;
         direct::solve(&mut limb.vectors, &limb.spans, sub(target, points[base]));
         let mut at = points[base];
-        for (i, v) in limb::path(base, k).skip(1).zip(&limb.vectors) {
+        for (i, v) in limb::connector_path(base, k).skip(1).zip(&limb.vectors) {
             at = add(at, *v);
             points[i] = at;
         }
         super::follow_beyond(&mut points, self.checker.chain, self.goal);
         self.veto = self.checker.find_veto(&points, k);
-        self.engine = Engine::Direct;
+        self.engine = IkEngine::Direct;
         if self.veto.is_some() {
             return self.failure(1);
         }
         self.best = points;
-        self.success(SolutionKind::Posture)
+        self.success(MotionOrPosture::Posture)
     }
 
-    fn success(self, kind: SolutionKind) -> ChainIkResult<D> {
+    fn success(self, kind: MotionOrPosture) -> ChainIkResult<D> {
         self.result(true, kind, None)
     }
 
@@ -118,13 +118,13 @@ impl<const D: usize> ConstraintSearch<'_, D> {
         };
         // The best posture is then one that the motion came to: relaxed ones are kept only if they
         // meet the goal.
-        self.result(false, SolutionKind::Motion, Some(reason))
+        self.result(false, MotionOrPosture::Motion, Some(reason))
     }
 
     fn result(
         self,
         reached: bool,
-        kind: SolutionKind,
+        kind: MotionOrPosture,
         reason: Option<ChainIkFailure<D>>,
     ) -> ChainIkResult<D> {
         ChainIkResult {

@@ -1,7 +1,7 @@
 //! A validity check of postures (OMPL's state validity checker): rods, bends, mobilities, obstacles and
 //! the chain's own body, as propagation checks them, but without a motion that leads there.
 
-use sidestep_rods::geometry::{Bounds, Point, angle_rad, between_segments, distance, sub};
+use sidestep_rods::geometry::{Aabb, Point, angle_rad, between_segments, distance, sub};
 use sidestep_rods::{
     BEND_TOLERANCE_RAD, Chain, Obstacle, Obstacles, Veto, VetoReason, contact_distance_m,
     is_length_allowed,
@@ -98,7 +98,7 @@ impl<const D: usize> ConstraintChecker<'_, D> {
     ) {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m) + margin_m;
-        self.obstacles.visit(&Bounds::from_points(ends).grown(by_m), visit);
+        self.obstacles.visit(&Aabb::from_points(ends).grown(by_m), visit);
     }
 
     /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
@@ -115,10 +115,10 @@ impl<const D: usize> ConstraintChecker<'_, D> {
             .flat_map(move |j| self.own_pairs_of(points, i, j))
     }
 
-    fn bounds(&self, points: &[Point<D>], i: usize) -> Bounds<D> {
+    fn bounds(&self, points: &[Point<D>], i: usize) -> Aabb<D> {
         let connectors = self.chain.connectors();
         let by_m = connectors[i].radius_m.max(connectors[i + 1].radius_m);
-        Bounds::from_points(&[points[i], points[i + 1]]).grown(by_m)
+        Aabb::from_points(&[points[i], points[i + 1]]).grown(by_m)
     }
 
     fn own_pairs_of(

@@ -6,15 +6,19 @@
 //! give the bends. The engines use it as a last resort, so that they always succeed; near the full
 //! reach every other posture looks like it.
 
-use super::limb::{Shell, Span};
+use super::limb::{ReachShell, RodLengthRange};
 use sidestep_rods::geometry::{
     Point, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 
 /// Lays `vectors` so that their sum is `target`, or as near as possible. Lengths of rods are kept
 /// if the target allows it.
-pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], target: Point<D>) {
-    let target = Shell::from_spans(spans).nearest(target);
+pub(super) fn solve<const D: usize>(
+    vectors: &mut [Point<D>],
+    spans: &[RodLengthRange],
+    target: Point<D>,
+) {
+    let target = ReachShell::from_spans(spans).nearest(target);
     let far_m = norm(target);
     let toward = normalized(target).unwrap_or(first_axis());
     let side = perpendicular(toward);
@@ -42,7 +46,7 @@ pub(super) fn solve<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], ta
 }
 
 /// Changes lengths as little as possible so that they allow the tip's distance.
-fn fit_lengths(lengths_m: &mut [f64], spans: &[Span], far_m: f64) {
+fn fit_lengths(lengths_m: &mut [f64], spans: &[RodLengthRange], far_m: f64) {
     let sum_m: f64 = lengths_m.iter().sum();
     let longest =
         (0..lengths_m.len()).max_by(|&i, &j| lengths_m[i].total_cmp(&lengths_m[j])).unwrap_or(0);

@@ -15,7 +15,7 @@
 //! the nearest to that. A limb that is almost straight, and might buckle to any side, is bowed
 //! first if it has far to go.
 
-use super::limb::Span;
+use super::limb::RodLengthRange;
 use sidestep_rods::geometry::{
     Point, add, add_scaled, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
@@ -49,7 +49,7 @@ const MIN_PIVOT: f64 = 1e-14;
 #[derive(Clone, Copy)]
 struct TipProblem<'a, const D: usize> {
     vectors: &'a [Point<D>],
-    spans: &'a [Span],
+    spans: &'a [RodLengthRange],
     target: Point<D>,
 }
 
@@ -66,7 +66,7 @@ struct TipPosition<const D: usize> {
 /// the vectors are then within their lengths.
 pub(super) fn solve<const D: usize>(
     vectors: &mut [Point<D>],
-    spans: &[Span],
+    spans: &[RodLengthRange],
     target: Point<D>,
     tolerance_m: f64,
 ) -> (usize, f64) {
@@ -80,7 +80,7 @@ pub(super) fn solve<const D: usize>(
         // In the middle of each interval, so that a limb has had some references to converge without a bow.
         let is_stuck = reference % BOW_INTERVAL == BOW_INTERVAL / 2;
         if is_stuck || (reference == 0 && is_straight) {
-            bow(vectors, target);
+            bend_to_arc(vectors, target);
             start = TipProblem { vectors, spans, target }.tip_position([0.0; D]);
         }
         let problem = TipProblem { vectors, spans, target };
@@ -183,7 +183,7 @@ fn solve_damped<const D: usize>(slope: &[[f64; D]; D], error: Point<D>, damping:
 }
 
 /// Makes the rods of a multiplier the vectors; a rod at a kink has no direction and keeps its own.
-fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) {
+fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[RodLengthRange], y: Point<D>) {
     for (v, span) in vectors.iter_mut().zip(spans) {
         let w = add(*v, y);
         let r = norm(w);
@@ -193,7 +193,7 @@ fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[Span], y: Point<D>) 
 }
 
 /// Bends the limb to an arc, to the side given by `perpendicular`.
-pub(super) fn bow<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
+pub(super) fn bend_to_arc<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
     let total = vectors.iter().fold([0.0; D], |sum, v| add(sum, *v));
     let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(first_axis()));
     let n = vectors.len() as f64;

@@ -6,7 +6,7 @@ use std::fmt;
 
 /// Methods to find a posture, which differ in time and in which posture they find.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Engine {
+pub enum IkEngine {
     /// The fastest: without constraints the chain's own rule up to 10 rods and damped least squares
     /// beyond; otherwise a motion by the rules of the chain, then postures.
     #[default]
@@ -22,7 +22,7 @@ pub enum Engine {
     Direct,
 }
 
-impl Engine {
+impl IkEngine {
     /// Returns its name in files and commands.
     pub fn name(self) -> &'static str {
         match self {
@@ -46,7 +46,7 @@ pub struct ChainIkGoal<const D: usize> {
     /// Distance at which the target counts as reached, meters.
     pub tolerance_m: f64,
     /// The method to use; the result has the one that found the posture.
-    pub engine: Engine,
+    pub engine: IkEngine,
     /// Postures to start from, besides the present one, if an obstacle is in the way.
     pub restarts: usize,
     /// Random seed of these postures: the same one gives the same result.
@@ -63,7 +63,7 @@ impl<const D: usize> ChainIkGoal<D> {
             base,
             target,
             tolerance_m: 1e-6,
-            engine: Engine::Auto,
+            engine: IkEngine::Auto,
             restarts: 100,
             seed: 0,
             motion_only: false,
@@ -73,7 +73,7 @@ impl<const D: usize> ChainIkGoal<D> {
 
 /// Whether anything is known about the path to a posture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SolutionKind {
+pub enum MotionOrPosture {
     /// A motion: the chain can go there from its present posture, and every state of the path has been
     /// checked.
     Motion,
@@ -93,9 +93,9 @@ pub struct ChainIkResult<const D: usize> {
     /// Steps or passes of the engine, over all starts.
     pub iterations: usize,
     /// The engine that found the posture.
-    pub engine: Engine,
+    pub engine: IkEngine,
     /// Whether a motion leads to it.
-    pub kind: SolutionKind,
+    pub kind: MotionOrPosture,
     /// The reason why the goal is not met; `None` if it is.
     pub reason: Option<ChainIkFailure<D>>,
 }

@@ -8,18 +8,18 @@ use sidestep_rods::{Chain, Mobility, Rod};
 #[derive(Debug, Clone, Default)]
 pub(super) struct Limb<const D: usize> {
     /// Their least and greatest lengths.
-    pub(super) spans: Vec<Span>,
+    pub(super) spans: Vec<RodLengthRange>,
     /// Each rod as a vector from its inner to its outer connector.
     pub(super) vectors: Vec<Point<D>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Span {
+pub(super) struct RodLengthRange {
     pub(super) min_m: f64,
     pub(super) max_m: f64,
 }
 
-impl Span {
+impl RodLengthRange {
     pub(super) fn from_rod(rod: &Rod) -> Self {
         Self { min_m: rod.min_m, max_m: rod.max_m }
     }
@@ -32,16 +32,16 @@ impl Span {
 
 /// Least and greatest distance of a limb's tip from its base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shell {
+pub struct ReachShell {
     /// 0 unless one rod is longer than all the others together.
     pub hole_m: f64,
     /// The sum of the greatest lengths.
     pub reach_m: f64,
 }
 
-impl Shell {
+impl ReachShell {
     /// Returns the distances at which these rods can hold their ends, if they bend without limit.
-    pub(super) fn from_spans(spans: &[Span]) -> Self {
+    pub(super) fn from_spans(spans: &[RodLengthRange]) -> Self {
         let reach_m: f64 = spans.iter().map(|s| s.max_m).sum();
         // Take one rod as short as possible, against all others as long as possible.
         let longest_m = spans.iter().map(|s| s.min_m + s.max_m).fold(0.0, f64::max);
@@ -64,7 +64,7 @@ impl Shell {
 }
 
 /// Returns the indices of the connectors from `base` to `k`, both included.
-pub(super) fn path(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone {
+pub(super) fn connector_path(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone {
     let n = base.abs_diff(k);
     (0..=n).map(move |i| if k > base { base + i } else { base - i })
 }
@@ -76,10 +76,10 @@ impl<const D: usize> Limb<D> {
         self.vectors.clear();
         let rods = chain.rods();
         if k > base {
-            self.spans.extend(rods[base..k].iter().map(Span::from_rod));
+            self.spans.extend(rods[base..k].iter().map(RodLengthRange::from_rod));
             self.vectors.extend(points[base..=k].windows(2).map(|p| sub(p[1], p[0])));
         } else {
-            self.spans.extend(rods[k..base].iter().rev().map(Span::from_rod));
+            self.spans.extend(rods[k..base].iter().rev().map(RodLengthRange::from_rod));
             self.vectors.extend(points[k..=base].windows(2).rev().map(|p| sub(p[0], p[1])));
         }
     }
@@ -87,7 +87,7 @@ impl<const D: usize> Limb<D> {
 
 /// Returns the connector nearest to `k` between it and `base` that never moves: the effective base.
 pub(super) fn nearest_fixed<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
-    let inward = path(k, base).skip(1);
+    let inward = connector_path(k, base).skip(1);
     let mut still = inward.filter(|&i| chain.connectors()[i].is_still());
     still.next().unwrap_or(base)
 }

@@ -14,7 +14,7 @@
 //! If nothing constrains the connectors every target within reach is reached: the remaining error
 //! of an engine is removed in closed form. Constrained chains are first *moved* there by the rules of
 //! propagation, with every state of the path checked; if that fails, valid postures are searched, and
-//! [`SolutionKind`] says which of the two a result is.
+//! [`MotionOrPosture`] says which of the two a result is.
 
 mod alternate;
 mod constraint_search;
@@ -29,13 +29,13 @@ mod starts;
 #[cfg(test)]
 mod tests;
 
-pub use goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, Engine, SolutionKind};
-pub use limb::Shell;
+pub use goal::{ChainIkFailure, ChainIkGoal, ChainIkResult, IkEngine, MotionOrPosture};
+pub use limb::ReachShell;
 
-use limb::{Limb, Span};
+use limb::{Limb, RodLengthRange};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, is_finite, norm, sub};
-use sidestep_rods::{Chain, Obstacles, Propagator, Rules};
+use sidestep_rods::{Chain, Obstacles, Propagator, ReactionRules};
 
 /// Number of rods up to which the chain's own rule is faster (bench `ik`, part `free`).
 const MAX_CHAIN_RULE_RODS: usize = 10;
@@ -50,13 +50,13 @@ pub struct IkSolver<const D: usize> {
 
 struct EngineResult {
     iterations: usize,
-    engine: Engine,
+    engine: IkEngine,
 }
 
 impl<const D: usize> IkSolver<D> {
     /// Returns a solver for chains that react by `rules`; of these only self-collision concerns
     /// postures, the others concern motions.
-    pub fn new(rules: Rules) -> Self {
+    pub fn new(rules: ReactionRules) -> Self {
         Self { propagator: Propagator::new(rules), ..Self::default() }
     }
 
@@ -77,7 +77,7 @@ impl<const D: usize> IkSolver<D> {
         let base = limb::nearest_fixed(chain, goal.base, goal.k);
         let goal = &ChainIkGoal { base, ..*goal };
         self.limb.read(chain, chain.points(), base, goal.k);
-        let shell = Shell::from_spans(&self.limb.spans);
+        let shell = ReachShell::from_spans(&self.limb.spans);
         let home = chain.points()[base];
         // A target out of reach is replaced by the nearest one within it, so that every engine can converge.
         let reachable = add(home, shell.nearest(sub(goal.target, home)));
@@ -110,7 +110,7 @@ impl<const D: usize> IkSolver<D> {
             points: self.points.clone(),
             iterations,
             engine,
-            kind: SolutionKind::Posture,
+            kind: MotionOrPosture::Posture,
             reason: None,
         }
     }
@@ -119,15 +119,18 @@ impl<const D: usize> IkSolver<D> {
     fn free_posture(&mut self, goal: &ChainIkGoal<D>) -> EngineResult {
         let Self { limb: Limb { spans, vectors }, points, .. } = self;
         let target = sub(goal.target, points[goal.base]);
-        let engines: &[Engine] = match goal.engine {
-            Engine::Auto if spans.len() <= MAX_CHAIN_RULE_RODS => &[Engine::Chain, Engine::Dls],
-            Engine::Auto | Engine::Dls => &[Engine::Dls],
-            Engine::Chain => &[Engine::Chain],
-            Engine::Direct => &[],
+        let engines: &[IkEngine] = match goal.engine {
+            IkEngine::Auto if spans.len() <= MAX_CHAIN_RULE_RODS => {
+                &[IkEngine::Chain, IkEngine::Dls]
+            }
+            IkEngine::Auto | IkEngine::Dls => &[IkEngine::Dls],
+            IkEngine::Chain => &[IkEngine::Chain],
+            IkEngine::Direct => &[],
         };
         let mut iterations = 0;
         for &engine in engines {
-            let solve = if engine == Engine::Chain { alternate::solve_vectors } else { dls::solve };
+            let solve =
+                if engine == IkEngine::Chain { alternate::solve_vectors } else { dls::solve };
             let (used, left_m) = solve(vectors, spans, target, goal.tolerance_m);
             iterations += used;
             if left_m <= goal.tolerance_m {
@@ -135,13 +138,13 @@ impl<const D: usize> IkSolver<D> {
             }
         }
         direct::solve(vectors, spans, target);
-        EngineResult { iterations, engine: Engine::Direct }
+        EngineResult { iterations, engine: IkEngine::Direct }
     }
 
     /// Writes the limb's positions from the base on.
     fn write_points(&mut self, goal: &ChainIkGoal<D>) {
         let mut at = self.points[goal.base];
-        for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
+        for (i, v) in limb::connector_path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
             at = add(at, *v);
             self.points[i] = at;
         }
@@ -152,8 +155,8 @@ impl<const D: usize> IkSolver<D> {
 fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &ChainIkGoal<D>) {
     let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
     let mut master = goal.k;
-    for slave in limb::path(goal.k, end).skip(1) {
-        let span = Span::from_rod(&chain.rod_between(master, slave));
+    for slave in limb::connector_path(goal.k, end).skip(1) {
+        let span = RodLengthRange::from_rod(&chain.rod_between(master, slave));
         let g = sub(points[slave], points[master]);
         let d = norm(g);
         points[slave] = if d > 0.0 {
@@ -193,12 +196,12 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> Result<(), 
 
 impl<const D: usize> ChainIkResult<D> {
     /// Returns the answer compared with the goal as it was given, which may be out of reach.
-    fn relative_to(mut self, goal: &ChainIkGoal<D>, shell: &Shell, home: Point<D>) -> Self {
+    fn relative_to(mut self, goal: &ChainIkGoal<D>, shell: &ReachShell, home: Point<D>) -> Self {
         self.error_m = distance(self.points[goal.k], goal.target);
         self.reached = self.error_m <= goal.tolerance_m && self.reason.is_none();
         if !self.reached {
             let far_m = distance(goal.target, home);
-            let Shell { hole_m, reach_m } = *shell;
+            let ReachShell { hole_m, reach_m } = *shell;
             if far_m > reach_m + goal.tolerance_m {
                 self.reason = Some(ChainIkFailure::TooFar { far_m, reach_m });
             } else if far_m < hole_m - goal.tolerance_m {

@@ -6,7 +6,7 @@ use sidestep_kernel::{InputError, math};
 use sidestep_rods::geometry::{
     Point, add, add_scaled, distance, first_axis, normalized, perpendicular, scaled, sub,
 };
-use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach};
+use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach_target};
 
 /// Headings to either side of the target's, in rad: a fan of the directions from ahead to somewhat back, in steps of 23
 /// degrees, because an obstacle in the way is mostly passed on one of its sides.
@@ -94,7 +94,7 @@ impl<const D: usize> StepwiseMotion<'_, D> {
         self.attempts += 1;
         let ChainIkGoal { k, base, .. } = *self.goal;
         let request = ReachRequest { k, target, base, tolerance_m };
-        match reach(self.propagator, chain, self.obstacles, &request)? {
+        match reach_target(self.propagator, chain, self.obstacles, &request)? {
             ReachOutcome::There { .. } => Ok(true),
             ReachOutcome::Short { veto, .. } => {
                 self.veto = veto.or(self.veto);

@@ -80,7 +80,7 @@ fn lay_out<const D: usize>(
     goal: &ChainIkGoal<D>,
 ) {
     let mut at = points[goal.base];
-    for (i, v) in limb::path(goal.base, goal.k).skip(1).zip(&limb.vectors) {
+    for (i, v) in limb::connector_path(goal.base, goal.k).skip(1).zip(&limb.vectors) {
         at = add(at, *v);
         points[i] = at;
     }

@@ -35,7 +35,7 @@ pub(super) fn start<const D: usize>(
 fn mirror<const D: usize>(points: &mut [Point<D>], goal: &ChainIkGoal<D>, end: usize) {
     let home = points[goal.base];
     let u = normalized(sub(goal.target, home)).unwrap_or(first_axis());
-    for i in limb::path(goal.base, end).skip(1) {
+    for i in limb::connector_path(goal.base, end).skip(1) {
         let v = sub(points[i], home);
         points[i] = add_scaled(add(home, scaled(u, 2.0 * dot(v, u))), v, -1.0);
     }
@@ -52,7 +52,7 @@ fn random_walk<const D: usize>(
     let spread = SPREADS[draws.uniform_below(SPREADS.len() as u32) as usize];
     let mut u = random_direction(&mut draws);
     let mut inner = goal.base;
-    for i in limb::path(goal.base, end).skip(1) {
+    for i in limb::connector_path(goal.base, end).skip(1) {
         points[i] = add_scaled(points[inner], u, chain.length_m(inner.min(i)));
         u = normalized(add_scaled(u, random_direction(&mut draws), spread)).unwrap_or(u);
         inner = i;

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use sidestep_rods::geometry::{angle_rad, nearest_on_segment, normalized};
 use sidestep_rods::{Connector, Mobility, Obstacle, Rod, VetoReason};
 
-const ENGINES: [Engine; 4] = [Engine::Auto, Engine::Chain, Engine::Dls, Engine::Direct];
+const ENGINES: [IkEngine; 4] = [IkEngine::Auto, IkEngine::Chain, IkEngine::Dls, IkEngine::Direct];
 
 /// A chain through directions that are made of three numbers in [-1, 1] each.
 fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
@@ -23,8 +23,8 @@ fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
 
 /// The point at a part of the shell's thickness from the base, in a direction.
 fn target_of<const D: usize>(chain: &Chain<D>, part: f64, toward: [f64; 3]) -> Point<D> {
-    let spans: Vec<Span> = chain.rods().iter().map(Span::from_rod).collect();
-    let Shell { hole_m, reach_m } = Shell::from_spans(&spans);
+    let spans: Vec<RodLengthRange> = chain.rods().iter().map(RodLengthRange::from_rod).collect();
+    let ReachShell { hole_m, reach_m } = ReachShell::from_spans(&spans);
     let u = normalized(std::array::from_fn(|k| toward[k])).unwrap_or(first_axis());
     add_scaled(chain.points()[0], u, hole_m + part * (reach_m - hole_m))
 }
@@ -88,8 +88,8 @@ proptest! {
         let n = chain.points().len();
         let (base, k) = (base % n, k % n);
         prop_assume!(base != k);
-        let spans: Vec<Span> = chain.rods()[base.min(k)..base.max(k)].iter().map(Span::from_rod).collect();
-        let Shell { hole_m, reach_m } = Shell::from_spans(&spans);
+        let spans: Vec<RodLengthRange> = chain.rods()[base.min(k)..base.max(k)].iter().map(RodLengthRange::from_rod).collect();
+        let ReachShell { hole_m, reach_m } = ReachShell::from_spans(&spans);
         let u = normalized(toward).unwrap_or(first_axis());
         let target = add_scaled(chain.points()[base], u, hole_m + part * (reach_m - hole_m));
         let goal = ChainIkGoal::new(k, base, target);
@@ -125,7 +125,7 @@ proptest! {
             })
             .collect();
         let target = other.iter().fold(chain.points()[0], |at, v| add(at, *v));
-        let goal = ChainIkGoal { tolerance_m: 1e-10, engine: Engine::Dls, ..ChainIkGoal::new(n, 0, target) };
+        let goal = ChainIkGoal { tolerance_m: 1e-10, engine: IkEngine::Dls, ..ChainIkGoal::new(n, 0, target) };
         let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
         let way = |new: &[Point<3>]| -> f64 {
             new.iter().zip(&old).map(|(a, b)| distance(*a, *b) * distance(*a, *b)).sum()
@@ -159,7 +159,7 @@ fn one_double_pass_is_one_iteration_of_fabrik() {
             std::array::from_fn(|k| (1.0 - lambda) * expected[i][k] + lambda * expected[i + 1][k]);
     }
     let mut points = chain.points().to_vec();
-    let spans: Vec<Span> = chain.rods().iter().map(Span::from_rod).collect();
+    let spans: Vec<RodLengthRange> = chain.rods().iter().map(RodLengthRange::from_rod).collect();
     let after_one = distance(expected[3], target);
     let (passes, left_m) = alternate::solve(&mut points, &spans, target, after_one + 1e-12);
     assert_eq!(passes, 1);
@@ -278,7 +278,7 @@ fn arms_among_discs_reach_without_touching_them() {
         kinds.push(answer.kind);
     }
     assert!(
-        kinds.contains(&SolutionKind::Motion) && kinds.contains(&SolutionKind::Posture),
+        kinds.contains(&MotionOrPosture::Motion) && kinds.contains(&MotionOrPosture::Posture),
         "{kinds:?}"
     );
 }
@@ -309,7 +309,7 @@ fn whoever_wants_a_motion_gets_no_mere_posture() {
     for target in [[5.0, 4.0], [-4.0, 4.0], [-5.0, -2.0]] {
         let goal = ChainIkGoal { motion_only: true, ..ChainIkGoal::new(8, 0, target) };
         let answer = IkSolver::default().solve(&chain, &obstacles, &goal).expect("right");
-        assert_eq!(answer.kind, SolutionKind::Motion);
+        assert_eq!(answer.kind, MotionOrPosture::Motion);
     }
 }
 
@@ -318,7 +318,7 @@ fn a_chain_that_minds_itself_does_not_cross_itself() {
     let rod = Rod::fixed(1.0, 0.05);
     let chain =
         Chain::<2>::straight([0.0, 0.0], [1.0, 0.0], 10, rod, Connector::free(0.1)).expect("right");
-    let rules = Rules { self_collision: true, ..Rules::default() };
+    let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
     for target in [[0.6, 0.6], [-3.0, 1.0], [2.0, -2.0]] {
         let goal = ChainIkGoal::new(10, 0, target);
         let answer =

@@ -38,7 +38,7 @@ impl SerialChain {
     fn bend_limit(&self, skeleton: &Skeleton, at: usize) -> Option<BendLimit> {
         let here = &skeleton.connectors[at];
         let next = skeleton.connectors.get(at + 1)?;
-        let frames = self.forward(&vec![0.0; self.variables.len()]);
+        let frames = self.forward_kinematics(&vec![0.0; self.variables.len()]);
         let here_m = here.position_m(&frames);
         // The outermost link that holds the rod before, and the innermost that holds the next.
         let (before, held_by) = match at.checked_sub(1).map(|i| &skeleton.connectors[i]) {
@@ -54,7 +54,7 @@ impl SerialChain {
             return None;
         }
         let after = sub(next.position_m(&frames), here_m);
-        let bend = Bend::new(before, after, joint.line(&frames.links[held_by]).along)?;
+        let bend = BendFunction::new(before, after, joint.line(&frames.links[held_by]).along)?;
         let (max_bend_rad, is_exact) = match joint.limits {
             Some(limits) => bend.limit(limits.lower, limits.upper),
             None => (bend.max_rad(), bend.can_be_straight()),
@@ -64,13 +64,13 @@ impl SerialChain {
 }
 
 /// cos(bend) = `along` + `across` cos(q - `straight_rad`).
-struct Bend {
+struct BendFunction {
     along: f64,
     across: f64,
     straight_rad: f64,
 }
 
-impl Bend {
+impl BendFunction {
     /// Returns the bend, or none if the joint turns one of the rods about itself.
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
         let before = scaled(before, 1.0 / norm(before));

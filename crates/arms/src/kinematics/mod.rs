@@ -18,7 +18,7 @@
 //! constant distance: a rod of fixed length. Two on either side of a prismatic joint have the
 //! distance sqrt(offset^2 + (a + q)^2): a rod of variable length.
 //!
-//! A point says nothing about the twist of a rod about itself. [`recover`](SerialChain::recover)
+//! A point says nothing about the twist of a rod about itself. [`recover_joint_values`](SerialChain::recover_joint_values)
 //! reports which joints that leaves open, and refuses with a reason if points do not determine the
 //! joints at all.
 
@@ -38,10 +38,10 @@ pub use bend::BendLimit;
 pub use body::ArmBody;
 pub use inverse::{
     ArmGoal, ArmPart, Axis, CollidesWith, Collision, IkFailure, IkResult, IkSolution,
-    MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere,
+    MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask,
 };
 pub use inverse::{ConnectorTarget, JointTracker};
 pub use recover::{RecoverError, RecoveredJoints};
-pub use serial::{Dof, Frames, JointMotion, SerialChain};
+pub use serial::{Dof, JointMotion, LinkFrames, SerialChain};
 pub use skeleton::{Skeleton, SkeletonRod};
 pub use transform::{Transform, Vector};

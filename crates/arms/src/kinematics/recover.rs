@@ -102,7 +102,7 @@ impl SerialChain {
     ///
     /// # Panics
     /// If `reference` has not one value for each variable.
-    pub fn recover(
+    pub fn recover_joint_values(
         &self,
         skeleton: &Skeleton,
         positions_m: &[Vector],
@@ -186,7 +186,7 @@ impl JointSearch<'_> {
         let until = anchor.first.max(known);
         if until == known {
             // This connector is fixed in a link that is already placed.
-            let frames = self.chain.forward(&self.values);
+            let frames = self.chain.forward_kinematics(&self.values);
             return self.fits(connector, sub(anchor.position_m(&frames), target_m))
                 && self.place_connectors(connector + 1, known, link);
         }
@@ -339,7 +339,7 @@ impl JointSearch<'_> {
     }
 
     fn finish(self) -> RecoveredJoints {
-        let frames = self.chain.forward(&self.values);
+        let frames = self.chain.forward_kinematics(&self.values);
         let found = self.chain.connectors(self.skeleton, &frames);
         let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| norm(sub(a, b)));
         let variables = self.chain.variables.iter().zip(&self.open);

@@ -118,7 +118,7 @@ impl MovingJoint {
 
 /// Poses of all links, in the base's frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frames {
+pub struct LinkFrames {
     /// Link 0 (the base), then the link that each joint carries.
     pub links: Vec<Transform>,
     /// The frame of the tip link, which is fixed in the last of them.
@@ -203,7 +203,7 @@ impl SerialChain {
     ///
     /// # Panics
     /// If there are not as many values as variables.
-    pub fn forward(&self, values: &[f64]) -> Frames {
+    pub fn forward_kinematics(&self, values: &[f64]) -> LinkFrames {
         assert_eq!(values.len(), self.variables.len(), "one value for each variable");
         let mut links = Vec::with_capacity(self.joints.len() + 1);
         let mut link = Transform::IDENTITY;
@@ -212,7 +212,7 @@ impl SerialChain {
             link = link.compose(&joint.origin).compose(&joint.transform(joint.drive.value(values)));
             links.push(link);
         }
-        Frames { tip: link.compose(&self.to_tip), links }
+        LinkFrames { tip: link.compose(&self.to_tip), links }
     }
 
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at

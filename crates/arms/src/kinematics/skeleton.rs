@@ -5,7 +5,7 @@
 //! the one farthest out that shares a link with the last one, so that points between which no joint
 //! bends (such as the elbow offsets of a Panda) drop out.
 
-use super::serial::{Frames, JointMotion, MovingJoint, SerialChain};
+use super::serial::{JointMotion, LinkFrames, MovingJoint, SerialChain};
 use super::transform::{Line, Transform, Vector};
 use sidestep_kernel::geometry::{add, dot, norm, rejection, scaled, sub};
 
@@ -46,7 +46,7 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
-    pub(super) fn position_m(&self, frames: &Frames) -> Vector {
+    pub(super) fn position_m(&self, frames: &LinkFrames) -> Vector {
         frames.links[self.first].transform_point(self.point_m)
     }
 }
@@ -54,9 +54,10 @@ impl Anchor {
 impl SerialChain {
     /// Returns the arm's connectors and rods. They do not depend on the posture.
     pub fn skeleton(&self) -> Skeleton {
-        let frames = self.forward(&vec![0.0; self.variables.len()]);
+        let frames = self.forward_kinematics(&vec![0.0; self.variables.len()]);
         let reach_m = self.reach_m();
-        let builder = SkeletonBuilder { chain: self, lines: self.lines(&frames), frames, reach_m };
+        let builder =
+            SkeletonBuilder { chain: self, lines: self.joint_axes(&frames), frames, reach_m };
         let connectors = builder.connectors();
         let rods = connectors.windows(2).map(|pair| builder.rod(&pair[0], &pair[1])).collect();
         Skeleton { rods, base_direction: builder.base_direction(&connectors), reach_m, connectors }
@@ -64,7 +65,7 @@ impl SerialChain {
 
     /// Returns the positions of the connectors of `skeleton` (this chain's) at `frames`, in m in
     /// the base's frame.
-    pub fn connectors(&self, skeleton: &Skeleton, frames: &Frames) -> Vec<Vector> {
+    pub fn connectors(&self, skeleton: &Skeleton, frames: &LinkFrames) -> Vec<Vector> {
         skeleton.connectors.iter().map(|anchor| anchor.position_m(frames)).collect()
     }
 
@@ -80,7 +81,7 @@ impl SerialChain {
         }
     }
 
-    fn lines(&self, frames: &Frames) -> Vec<Line> {
+    fn joint_axes(&self, frames: &LinkFrames) -> Vec<Line> {
         self.joints.iter().zip(&frames.links).map(|(joint, before)| joint.line(before)).collect()
     }
 
@@ -101,7 +102,7 @@ fn slide_limit_m(joint: &MovingJoint) -> f64 {
 struct SkeletonBuilder<'a> {
     chain: &'a SerialChain,
     /// The posture in which points are compared.
-    frames: Frames,
+    frames: LinkFrames,
     lines: Vec<Line>,
     reach_m: f64,
 }

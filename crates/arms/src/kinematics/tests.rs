@@ -56,13 +56,17 @@ fn hand_computed_poses() {
         ("revolute", X, O, Z, TURN),
         ("fixed", X, O, X, TURN),
     ]);
-    assert_near(planar.forward(&[0.0, 0.0]).tip.origin_m, [2.0, 0.0, 0.0], 1e-15);
-    assert_near(planar.forward(&[FRAC_PI_2, -FRAC_PI_2]).tip.origin_m, [1.0, 1.0, 0.0], 1e-15);
+    assert_near(planar.forward_kinematics(&[0.0, 0.0]).tip.origin_m, [2.0, 0.0, 0.0], 1e-15);
+    assert_near(
+        planar.forward_kinematics(&[FRAC_PI_2, -FRAC_PI_2]).tip.origin_m,
+        [1.0, 1.0, 0.0],
+        1e-15,
+    );
     // Roll first, then pitch, then yaw about fixed axes: x goes to y, y to z, z to x.
     let turned =
         serial(&[("prismatic", [0.0, 0.0, 1.0], [FRAC_PI_2, 0.0, FRAC_PI_2], X, [0.0, 1.0])]);
-    assert_near(turned.forward(&[0.5]).tip.origin_m, [0.0, 0.5, 1.0], 1e-15);
-    assert_near(turned.forward(&[0.5]).tip.transform_direction(Y), Z, 1e-15);
+    assert_near(turned.forward_kinematics(&[0.5]).tip.origin_m, [0.0, 0.5, 1.0], 1e-15);
+    assert_near(turned.forward_kinematics(&[0.5]).tip.transform_direction(Y), Z, 1e-15);
 }
 
 #[test]
@@ -79,7 +83,7 @@ fn forward_kinematics_agrees_with_the_oracle() {
         let q_test: Vec<f64> = serde_json::from_value(expected["q_test"].clone()).expect("numbers");
         for (values, key) in [(vec![0.0; names.len()], "fk_zero"), (q_test, "fk_test")] {
             let rows: Vec<[f64; 4]> = serde_json::from_value(expected[key].clone()).expect("rows");
-            let tip = chain.forward(&values).tip;
+            let tip = chain.forward_kinematics(&values).tip;
             for (i, row) in rows[..3].iter().enumerate() {
                 assert_near(tip.rotation[i], [row[0], row[1], row[2]], 2e-6);
                 assert!((tip.origin_m[i] - row[3]).abs() < 1e-6, "{name} {key}: {tip:?}");
@@ -95,7 +99,7 @@ fn every_shared_arm_has_rods_of_its_lengths_in_every_posture() {
         let skeleton = chain.skeleton();
         for seed in 0..50 {
             let values = posture(&chain, seed);
-            let frames = chain.forward(&values);
+            let frames = chain.forward_kinematics(&values);
             check_rotation(&frames.tip);
             let connectors = chain.connectors(&skeleton, &frames);
             assert_near(connectors[connectors.len() - 1], frames.tip.origin_m, 1e-9);
@@ -137,7 +141,7 @@ fn rod_lengths(skeleton: &Skeleton) -> Vec<f64> {
 fn connectors_are_where_axes_meet_and_not_the_origins_of_joints() {
     let Some(iiwa) = shared_chain("chain/iiwa7.urdf", None) else { return };
     let skeleton = iiwa.skeleton();
-    let connectors = iiwa.connectors(&skeleton, &iiwa.forward(&[0.0; 7]));
+    let connectors = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&[0.0; 7]));
     let expected = [0.34, 0.74, 1.14, 1.266].map(|z| [0.0, 0.0, z]);
     assert_eq!(connectors.len(), 4);
     for (found, expected) in connectors.iter().zip(expected) {
@@ -195,8 +199,9 @@ fn a_prismatic_joint_is_a_rod_of_variable_length_also_off_its_axis() {
 
 fn check_recovery(chain: &SerialChain, values: &[f64], reference: &[f64]) -> RecoveredJoints {
     let skeleton = chain.skeleton();
-    let connectors = chain.connectors(&skeleton, &chain.forward(values));
-    let found = chain.recover(&skeleton, &connectors, reference).expect("joint values");
+    let connectors = chain.connectors(&skeleton, &chain.forward_kinematics(values));
+    let found =
+        chain.recover_joint_values(&skeleton, &connectors, reference).expect("joint values");
     assert!(found.residual_m < 1e-9, "{values:?}: {found:?}");
     chain.check_limits("recovered", &found.values).expect("inside the limits");
     found
@@ -244,8 +249,8 @@ fn what_cannot_be_recovered_has_a_reason() {
     let Some(panda) = shared_chain("chain/panda.urdf", Some("panda_link8")) else { return };
     let skeleton = panda.skeleton();
     let values = panda.rest_values();
-    let connectors = panda.connectors(&skeleton, &panda.forward(&values));
-    let error = panda.recover(&skeleton, &connectors, &values).expect_err("offsets");
+    let connectors = panda.connectors(&skeleton, &panda.forward_kinematics(&values));
+    let error = panda.recover_joint_values(&skeleton, &connectors, &values).expect_err("offsets");
     assert!(
         matches!(&error, RecoverError::Coupled { connector: 1, joints } if joints.len() == 3),
         "{error}"
@@ -255,20 +260,20 @@ fn what_cannot_be_recovered_has_a_reason() {
     let skeleton = iiwa.skeleton();
     let mut bent = [0.0; 7];
     bent[3] = 2.5;
-    let connectors = iiwa.connectors(&skeleton, &iiwa.forward(&bent));
-    let error = iiwa.recover(&skeleton, &connectors, &[0.0; 7]).expect_err("a limit");
+    let connectors = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&bent));
+    let error = iiwa.recover_joint_values(&skeleton, &connectors, &[0.0; 7]).expect_err("a limit");
     assert!(
         matches!(&error, RecoverError::OutsideLimits { joint, .. } if joint == "iiwa_joint_4"),
         "{error}"
     );
     bent[3] = 1.5;
-    let mut torn = iiwa.connectors(&skeleton, &iiwa.forward(&bent));
+    let mut torn = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&bent));
     torn[2][0] += 0.1;
-    let error = iiwa.recover(&skeleton, &torn, &[0.0; 7]).expect_err("torn");
+    let error = iiwa.recover_joint_values(&skeleton, &torn, &[0.0; 7]).expect_err("torn");
     assert!(matches!(error, RecoverError::DoesNotFit { connector: 2, .. }), "{error}");
     torn[2][0] = f64::NAN;
-    assert!(iiwa.recover(&skeleton, &torn, &[0.0; 7]).is_err());
-    assert!(iiwa.recover(&skeleton, &connectors[1..], &[0.0; 7]).is_err());
+    assert!(iiwa.recover_joint_values(&skeleton, &torn, &[0.0; 7]).is_err());
+    assert!(iiwa.recover_joint_values(&skeleton, &connectors[1..], &[0.0; 7]).is_err());
 }
 
 #[test]
@@ -277,12 +282,14 @@ fn mimic_joints_follow_their_driver() {
     assert_eq!(hand.variables.last().expect("eight").name, "panda_finger_joint1");
     assert_eq!(hand.variables.len(), 8);
     let mut values = hand.rest_values();
-    let closed = hand.forward(&values).tip.origin_m;
+    let closed = hand.forward_kinematics(&values).tip.origin_m;
     values[7] = 0.03;
-    assert!((norm(sub(hand.forward(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12);
+    assert!(
+        (norm(sub(hand.forward_kinematics(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12
+    );
     let skeleton = hand.skeleton();
-    let connectors = hand.connectors(&skeleton, &hand.forward(&values));
-    assert!(hand.recover(&skeleton, &connectors, &values).is_err());
+    let connectors = hand.connectors(&skeleton, &hand.forward_kinematics(&values));
+    assert!(hand.recover_joint_values(&skeleton, &connectors, &values).is_err());
 }
 
 #[test]
@@ -318,7 +325,7 @@ proptest! {
             joints.iter().map(|&(xyz, rpy, axis, s)| (kind(s), xyz, rpy, unit(axis), [-2.0, 2.0])).collect();
         let chain = serial(&rows);
         let skeleton = chain.skeleton();
-        let frames = chain.forward(&values[..joints.len()]);
+        let frames = chain.forward_kinematics(&values[..joints.len()]);
         let connectors = chain.connectors(&skeleton, &frames);
         prop_assert_eq!(connectors.len(), skeleton.rods.len() + 1);
         for (pair, rod) in connectors.windows(2).zip(&skeleton.rods) {
@@ -339,10 +346,10 @@ proptest! {
         };
         let (values, reference) = (at(&shares), at(&reference));
         let skeleton = chain.skeleton();
-        let connectors = chain.connectors(&skeleton, &chain.forward(&values));
-        let found = chain.recover(&skeleton, &connectors, &reference).expect("joint values");
+        let connectors = chain.connectors(&skeleton, &chain.forward_kinematics(&values));
+        let found = chain.recover_joint_values(&skeleton, &connectors, &reference).expect("joint values");
         prop_assert!(found.residual_m < 1e-9);
-        let again = chain.connectors(&skeleton, &chain.forward(&found.values));
+        let again = chain.connectors(&skeleton, &chain.forward_kinematics(&found.values));
         for (a, b) in again.iter().zip(&connectors) {
             prop_assert!(norm(sub(*a, *b)) < 1e-9);
         }
@@ -386,7 +393,7 @@ fn arms_far_from_their_base_have_connectors_from_base_to_tip() {
     for offset in ["1e3", "1e4", "1e5", "1e6", "-1e6", "123456.789"] {
         let arm = chain_of(&mimic([offset, "-1", "1", "1"]).expect("a model"), None);
         let skeleton = arm.skeleton();
-        let places = arm.connectors(&skeleton, &arm.forward(&arm.rest_values()));
+        let places = arm.connectors(&skeleton, &arm.forward_kinematics(&arm.rest_values()));
         assert_eq!(places.len(), skeleton.rods.len() + 1, "{offset}");
         assert!(places.iter().flatten().all(|x| x.is_finite()), "{offset}");
     }

@@ -81,7 +81,7 @@ impl<'a, const D: usize> JointSpace<'a, D> {
 impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     type Posture = Vec<f64>;
 
-    fn present(&self) -> Vec<f64> {
+    fn present_posture(&self) -> Vec<f64> {
         self.present.to_vec()
     }
 

@@ -21,7 +21,7 @@ pub use joints::{JointPosture, JointSpace};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
-use sidestep_rods::{Chain, Obstacles, Rules};
+use sidestep_rods::{Chain, Obstacles, ReactionRules};
 pub use space::RodSpace;
 
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
@@ -53,7 +53,7 @@ pub trait ConfigurationSpace {
     type Posture: Clone;
 
     /// Returns the posture that paths start from.
-    fn present(&self) -> Self::Posture;
+    fn present_posture(&self) -> Self::Posture;
 
     /// Returns the length by which strides are scaled, such as that of the stretched body, meters.
     fn length_m(&self) -> f64;
@@ -86,7 +86,7 @@ pub trait ConfigurationSpace {
 pub fn plan<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
-    rules: Rules,
+    rules: ReactionRules,
     query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
@@ -117,14 +117,14 @@ fn find_path<S: ConfigurationSpace>(
         return None;
     }
     let path = tree::find_path(space, goals, draws)?;
-    Some(tree::shorten(space, path, draws))
+    Some(tree::shorten_path(space, path, draws))
 }
 
 /// Returns valid postures that reach the target: the first sought from the present posture, the others
 /// from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
     space: &RodSpace<'_, D>,
-    rules: Rules,
+    rules: ReactionRules,
     query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Vec<ChainPosture<D>>, InputError> {

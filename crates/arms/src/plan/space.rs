@@ -64,7 +64,7 @@ impl<'a, const D: usize> RodSpace<'a, D> {
 impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     type Posture = ChainPosture<D>;
 
-    fn present(&self) -> ChainPosture<D> {
+    fn present_posture(&self) -> ChainPosture<D> {
         self.checker.chain.points().to_vec()
     }
 
@@ -121,7 +121,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
     }
 
     fn sample(&self, draws: &mut Draws) -> ChainPosture<D> {
-        let mut posture = self.present();
+        let mut posture = self.present_posture();
         let stiffness = STIFFNESS[draws.uniform_below(STIFFNESS.len() as u32) as usize];
         let mut u: Point<D> = direction(draws);
         for pair in self.limb.windows(2) {

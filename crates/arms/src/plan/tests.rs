@@ -41,7 +41,8 @@ const BEHIND: PlanningQuery<2> = PlanningQuery { k: 5, target: [1.0, 0.9], toler
 fn a_way_round_a_wall_is_found_and_free_all_along() {
     let (chain, obstacles) = (arm(), wall());
     for seed in 0..20 {
-        let way = plan(&chain, &obstacles, Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+        let way =
+            plan(&chain, &obstacles, ReactionRules::default(), &BEHIND, &mut draws(seed)).unwrap();
         let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
         let space = RodSpace::new(&chain, &obstacles, false, 5).unwrap();
         let mut at = chain.clone();
@@ -73,7 +74,7 @@ fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
         .collect();
     let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();
-    let rules = Rules { self_collision: true, ..Rules::default() };
+    let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
     let errand = PlanningQuery { k: 3, target: [0.630_251_8, 0.731_368_6], tolerance_m: 5e-4 };
     for seed in 0..10 {
         let way = plan(&arm, &Obstacles::default(), rules, &errand, &mut draws(seed)).unwrap();
@@ -83,7 +84,8 @@ fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
 
 #[test]
 fn the_same_draws_give_the_same_way() {
-    let once = |seed| plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(seed)).unwrap();
+    let once =
+        |seed| plan(&arm(), &wall(), ReactionRules::default(), &BEHIND, &mut draws(seed)).unwrap();
     assert_eq!(once(3), once(3));
     assert_ne!(once(3), once(4));
 }
@@ -92,7 +94,7 @@ fn the_same_draws_give_the_same_way() {
 fn no_way_leads_into_an_obstacle_or_out_of_reach() {
     for target in [[1.0, 0.35], [0.0, 3.0]] {
         let errand = PlanningQuery { target, ..BEHIND };
-        let way = plan(&arm(), &wall(), Rules::default(), &errand, &mut draws(1)).unwrap();
+        let way = plan(&arm(), &wall(), ReactionRules::default(), &errand, &mut draws(1)).unwrap();
         assert_eq!(way, None);
     }
 }
@@ -101,7 +103,8 @@ fn no_way_leads_into_an_obstacle_or_out_of_reach() {
 fn a_chain_without_a_base_has_no_plan() {
     let rod = Rod::fixed(0.4, 0.02);
     let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
-    let error = plan(&chain, &wall(), Rules::default(), &BEHIND, &mut draws(1)).unwrap_err();
+    let error =
+        plan(&chain, &wall(), ReactionRules::default(), &BEHIND, &mut draws(1)).unwrap_err();
     assert_eq!(error.place(), "planner");
 }
 
@@ -111,8 +114,8 @@ fn a_search_heeds_an_interrupt() {
     interrupt.raise();
     let search = || {
         let _heeded = interrupt.attach();
-        plan(&arm(), &wall(), Rules::default(), &BEHIND, &mut draws(1))
+        plan(&arm(), &wall(), ReactionRules::default(), &BEHIND, &mut draws(1))
     };
     let payload = catch_unwind(AssertUnwindSafe(search)).expect_err("it unwinds");
-    assert!(interrupt.caused(payload.as_ref()));
+    assert!(interrupt.has_caused_unwind(payload.as_ref()));
 }

@@ -17,12 +17,12 @@ const MAX_SEGMENT: f64 = 4.0;
 const MAX_SHORTCUTS: usize = 120;
 
 /// Postures, each with its parent.
-struct Tree<S: ConfigurationSpace> {
+struct PostureTree<S: ConfigurationSpace> {
     postures: Vec<S::Posture>,
     parents: Vec<Option<usize>>,
 }
 
-impl<S: ConfigurationSpace> Tree<S> {
+impl<S: ConfigurationSpace> PostureTree<S> {
     fn new(roots: Vec<S::Posture>) -> Self {
         Self { parents: vec![None; roots.len()], postures: roots }
     }
@@ -77,10 +77,10 @@ pub(super) fn find_path<S: ConfigurationSpace>(
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
-    let present = space.present();
+    let present = space.present_posture();
     let stride_m = MAX_STRIDE * space.length_m();
     let max_strides = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
-    let mut trees = [Tree::new(vec![present.clone()]), Tree::new(goals.clone())];
+    let mut trees = [PostureTree::new(vec![present.clone()]), PostureTree::new(goals.clone())];
     let towards_goals = goals.into_iter().map(|goal| (goal, max_strides));
     let drawn = std::iter::repeat_with(|| None).take(MAX_SAMPLES);
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
@@ -105,7 +105,7 @@ pub(super) fn find_path<S: ConfigurationSpace>(
 
 /// Returns the path after its first posture, with shortcuts between random postures of it where they are
 /// free.
-pub(super) fn shorten<S: ConfigurationSpace>(
+pub(super) fn shorten_path<S: ConfigurationSpace>(
     space: &S,
     mut path: Vec<S::Posture>,
     draws: &mut Draws,

@@ -5,7 +5,7 @@ use crate::console::{align_pairs, format_fixed};
 use clap::Args;
 use serde::Serialize;
 use sidestep::arms::kinematics::{
-    ArmFiles, ArmSelection, Dof, SkeletonRod, Sphere, Transform, Vector,
+    ArmFiles, ArmSelection, Dof, ObstacleSphere, SkeletonRod, Transform, Vector,
 };
 use sidestep::kernel::InputError;
 use std::path::PathBuf;
@@ -132,7 +132,7 @@ struct RodLimits {
 impl Arm {
     pub(crate) fn positions(&self, values: &[f64]) -> ArmPositions {
         let chain = &self.selection.chain;
-        let frames = chain.forward(values);
+        let frames = chain.forward_kinematics(values);
         let skeleton = chain.skeleton();
         let Transform { rotation, origin_m } = frames.tip;
         ArmPositions {
@@ -173,7 +173,7 @@ impl ArmPositions {
     pub(crate) fn picture<'a>(
         &'a self,
         target: Option<Vector>,
-        obstacles: &'a [Sphere],
+        obstacles: &'a [ObstacleSphere],
     ) -> ArmPicture<'a> {
         ArmPicture { robot: &self.robot, connectors: &self.connectors, target, obstacles }
     }

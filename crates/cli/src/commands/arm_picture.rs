@@ -1,7 +1,7 @@
 //! An arm in a posture as a picture.
 
 use crate::exit::Failure;
-use sidestep::arms::kinematics::{Sphere, Vector};
+use sidestep::arms::kinematics::{ObstacleSphere, Vector};
 use sidestep::kernel::view::{Body, BodyKind, Frame, Pose, Scenery, Shape};
 use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
@@ -24,7 +24,7 @@ pub(crate) struct ArmPicture<'a> {
     /// Target position of the tip, in m.
     pub(crate) target: Option<Vector>,
     /// Spheres in m that the posture had to avoid.
-    pub(crate) obstacles: &'a [Sphere],
+    pub(crate) obstacles: &'a [ObstacleSphere],
 }
 
 impl ArmPicture<'_> {

@@ -10,7 +10,7 @@ use crate::scenario_args::WorkersArg;
 use crate::worlds;
 use clap::Args;
 use serde_json::json;
-use sidestep_server::{Options, Studio};
+use sidestep_server::{ServerOptions, StudioServer};
 use sidestep_session::ViewerAddress;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -81,7 +81,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     for endpoint in &fleets {
         watched.push(fleet_watch::start_watching(endpoint, args.tls.files())?);
     }
-    let studio = Studio::start(Options {
+    let studio = StudioServer::start(ServerOptions {
         worlds: worlds().clone(),
         program: format!("sidestep {}", worlds().build()),
         targets,
@@ -102,7 +102,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
 }
 
 /// Prints the address of the studio and whether others can reach it, and opens it in a browser where that is safe.
-fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Failure> {
+fn announce(studio: &StudioServer, no_open: bool, console: Console) -> Result<(), Failure> {
     let url = studio.url();
     if studio.is_open_to_others() {
         console.warn(
@@ -129,7 +129,7 @@ fn announce(studio: &Studio, no_open: bool, console: Console) -> Result<(), Fail
 }
 
 /// Waits until the command is interrupted, or the server ends by itself.
-fn wait_for_end(studio: &Studio) -> Result<(), Failure> {
+fn wait_for_end(studio: &StudioServer) -> Result<(), Failure> {
     while !interrupt::is_requested() {
         if studio.has_ended() {
             let remedy = "please report it with the lines above";

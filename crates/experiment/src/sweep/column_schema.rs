@@ -111,7 +111,7 @@ pub(super) fn common_type(a: Option<ColumnType>, b: Option<ColumnType>) -> Optio
 pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
     let n = values.len();
     match ty {
-        _ if values.ty() == ty => values,
+        _ if values.column_type() == ty => values,
         _ if (0..n).all(|row| values.is_missing(row)) => {
             let mut missing = Values::empty(ty);
             missing.resize(n);

@@ -90,7 +90,12 @@ impl RunTableBuilder {
         for ColumnBuilder { column, first } in &self.columns {
             let values = &column.values;
             let has_values = (0..values.len()).any(|row| !values.is_missing(row));
-            schema.add_column(column.role, &column.name, has_values.then(|| values.ty()), *first);
+            schema.add_column(
+                column.role,
+                &column.name,
+                has_values.then(|| values.column_type()),
+                *first,
+            );
         }
         schema
     }
@@ -282,13 +287,13 @@ fn push_value(values: &mut Values, value: &Value) {
 
 /// Widens the column's type so that it can hold the value.
 fn widen(values: &mut Values, value: &Value) {
-    if type_of(value) == Some(values.ty()) {
+    if type_of(value) == Some(values.column_type()) {
         return;
     }
     let has_values = (0..values.len()).any(|row| !values.is_missing(row));
-    let own = has_values.then(|| values.ty());
+    let own = has_values.then(|| values.column_type());
     let ty = common_type(own, type_of(value)).unwrap_or(ColumnType::F64);
-    if ty != values.ty() {
+    if ty != values.column_type() {
         *values = widened(std::mem::replace(values, Values::empty(ty)), ty);
     }
 }

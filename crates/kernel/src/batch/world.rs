@@ -112,7 +112,7 @@ impl BatchWorld {
     pub(super) fn observe(&mut self, index: usize, team: usize, layouts: &[BufferLayout]) {
         let mut buffers = std::mem::take(&mut self.buffers);
         let fits = buffers.len() == layouts.len()
-            && buffers.iter().zip(layouts).all(|(buffer, &layout)| buffer.fits(layout));
+            && buffers.iter().zip(layouts).all(|(buffer, &layout)| buffer.matches_layout(layout));
         // Another team than in the call before.
         if !fits {
             buffers = layouts.iter().map(|&layout| ObservationBuffer::new(layout)).collect();
@@ -151,7 +151,7 @@ impl ObservationBuffer {
         }
     }
 
-    fn fits(&self, layout: BufferLayout) -> bool {
+    fn matches_layout(&self, layout: BufferLayout) -> bool {
         match self {
             Self::Integer(values) => layout.is_integer && values.len() == layout.length,
             Self::Real(values) => !layout.is_integer && values.len() == layout.length,

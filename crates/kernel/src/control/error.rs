@@ -7,7 +7,7 @@ use crate::units::EntityId;
 #[non_exhaustive]
 pub enum OrderError {
     /// The agent does not exist, or the body is no agent.
-    #[error("there is no {agent} that can be ordered; {}", last_agent(noun, *last))]
+    #[error("there is no {agent} that can be ordered; {}", valid_agents_text(noun, *last))]
     NoAgent {
         /// Noun and id of the agent, e.g. `robot 3`.
         agent: String,
@@ -95,7 +95,7 @@ pub enum OrderError {
 }
 
 /// Returns the range of valid agents in words.
-fn last_agent(noun: &str, last: Option<EntityId>) -> String {
+fn valid_agents_text(noun: &str, last: Option<EntityId>) -> String {
     match last {
         None => format!("this scenario has no {noun} that observes or takes orders"),
         Some(last) => format!("the last {noun} that observes or takes orders is {last}"),

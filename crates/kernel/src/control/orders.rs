@@ -90,7 +90,7 @@ impl OrderLog {
     }
 
     /// Iterates over the orders that are given before `cycle`.
-    pub(crate) fn due(&self, cycle: Cycle) -> impl Iterator<Item = Orders<'_>> {
+    pub(crate) fn orders_due(&self, cycle: Cycle) -> impl Iterator<Item = Orders<'_>> {
         let due = self.count_before(cycle)..self.count_before(cycle.saturating_add(1));
         self.entries[due].iter().map(|entry| self.orders(entry))
     }
@@ -133,7 +133,8 @@ mod tests {
         for (cycle, agent) in [(5, 2), (3, 1), (5, 0), (5, 7), (9, 4)] {
             book.add(cycle, &Orders { order: "a", agents: &[agent], values: &[f64::from(agent)] });
         }
-        let agents = |cycle| book.due(cycle).flat_map(|o| o.agents.to_vec()).collect::<Vec<_>>();
+        let agents =
+            |cycle| book.orders_due(cycle).flat_map(|o| o.agents.to_vec()).collect::<Vec<_>>();
         assert_eq!((agents(5), agents(3), agents(4)), (vec![2, 0, 7], vec![1], vec![]));
         let next = [0, 3, 4, 5, 9].map(|now| book.next_after(now));
         assert_eq!(next, [Some(3), Some(5), Some(5), Some(9), None]);

@@ -54,7 +54,7 @@ impl Space {
     }
 
     /// Number of values of one agent: the product of the shape, 1 for a single number.
-    pub fn width(&self) -> usize {
+    pub fn value_count(&self) -> usize {
         self.shape.iter().product()
     }
 
@@ -166,7 +166,7 @@ mod tests {
         assert!(!whole.contains(-3.0) && !whole.contains(1.5) && !whole.contains(f64::INFINITY));
         let real =
             Space::new("rate_rad_s", SpaceKind::Real { low: -1.0, high: 1.0 }, "").with_shape([3]);
-        assert_eq!((real.width(), real.unit(), choice.width()), (3, Some("rad/s"), 1));
+        assert_eq!((real.value_count(), real.unit(), choice.value_count()), (3, Some("rad/s"), 1));
         assert!(real.contains(-1.0) && !real.contains(1.1) && !real.contains(f64::NAN));
         let free = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
         assert!(!Space::new("x_m", free, "").contains(f64::INFINITY));

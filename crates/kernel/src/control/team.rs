@@ -108,7 +108,7 @@ impl Teams {
         let Some(&first) = agents.first() else { return check_empty(orders) };
         // Usually all agents are of one team, so its space is looked up once.
         let mut action = self.action_space(order, first)?;
-        let width = action.space.width();
+        let width = action.space.value_count();
         if values.len() != agents.len() * width {
             let expected = format!("{} x {width}", agents.len());
             return Err(OrderError::Shape { order: order.into(), expected, found: values.len() });
@@ -118,8 +118,8 @@ impl Teams {
                 action = self.action_space(order, agent)?;
             }
             let ActionSpace { team, index, space } = action;
-            if space.width() != width {
-                let expected = format!("{} values for {} {agent}", space.width(), self.noun);
+            if space.value_count() != width {
+                let expected = format!("{} values for {} {agent}", space.value_count(), self.noun);
                 return Err(OrderError::Shape { order: order.into(), expected, found: width });
             }
             let values = &values[k * width..(k + 1) * width];
@@ -171,7 +171,7 @@ impl Teams {
         };
         let fits = spaces.len() == buffers.len()
             && spaces.iter().zip(buffers).all(|(space, buffer)| {
-                buffer.len() == agents.len() * space.width()
+                buffer.len() == agents.len() * space.value_count()
                     && space.is_integer() == matches!(buffer, BufferMut::Integer(_))
             });
         if fits {
@@ -179,7 +179,12 @@ impl Teams {
         }
         let expected = spaces.iter().map(|space| {
             let number_type = if space.is_integer() { "whole" } else { "real" };
-            format!("{} of {} x {} {number_type} values", space.name, agents.len(), space.width())
+            format!(
+                "{} of {} x {} {number_type} values",
+                space.name,
+                agents.len(),
+                space.value_count()
+            )
         });
         Err(OrderError::BufferShape { expected: expected.collect::<Vec<_>>().join(", ") })
     }

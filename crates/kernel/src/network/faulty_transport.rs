@@ -11,7 +11,7 @@ use crate::units::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
 /// Distances between agents at the start of a cycle, for the range of radios.
-pub trait Distances {
+pub trait AgentDistances {
     /// Returns the distance between two agents in meters.
     fn distance_m(&self, link: [EntityId; 2]) -> f64;
 }
@@ -23,7 +23,7 @@ pub struct FaultyTransport<'a, T> {
     network: Option<&'a Network>,
     streams: FaultStreams,
     /// Without them, every agent reaches every other.
-    distances: Option<&'a dyn Distances>,
+    distances: Option<&'a dyn AgentDistances>,
     /// First tick of each conversation, and its time in seconds after the start of the run, both rising.
     conversations: &'a [(u64, f64)],
     /// Tick from which on each direction of a link is free, where messages take time by their size.
@@ -36,7 +36,7 @@ impl<'a> FaultyTransport<'a, MemoryTransport> {
     pub fn in_memory(
         network: Option<&'a Network>,
         streams: FaultStreams,
-        distances: Option<&'a dyn Distances>,
+        distances: Option<&'a dyn AgentDistances>,
         conversations: &'a [(u64, f64)],
     ) -> Self {
         let faults = network.map(Network::faults).unwrap_or_default();
@@ -50,23 +50,23 @@ impl<T: Transport> FaultyTransport<'_, T> {
     fn time_s(&self, network: &Network, tick: u64) -> f64 {
         let started = self.conversations.partition_point(|(first, _)| *first <= tick);
         let (first_tick, start_s) = self.conversations[started.saturating_sub(1)];
-        start_s + network.seconds(tick.saturating_sub(first_tick))
+        start_s + network.ticks_to_s(tick.saturating_sub(first_tick))
     }
 
     /// Returns whether the link of a message lets it through: it is not cut, within range, and not
     /// in a burst that destroys the message.
-    fn passes(&self, envelope: &Envelope) -> bool {
+    fn can_pass(&self, envelope: &Envelope) -> bool {
         let Some(network) = self.network else { return true };
         let &Envelope { cycle: tick, sender, receiver, sequence, .. } = envelope;
         let link = [sender, receiver];
         let at_s = self.time_s(network, tick);
         let distance_m = self.distances.map_or(0.0, |distances| distances.distance_m(link));
-        if !network.carries(link, at_s) || distance_m > network.range_m {
+        if !network.can_carry(link, at_s) || distance_m > network.range_m {
             return false;
         }
         let Some(bursts) = &network.bursts else { return true };
         let FaultStreams { streams, burst_loss, .. } = self.streams;
-        let words = streams.pair(sender, receiver, tick, burst_loss, sequence);
+        let words = streams.pair_words(sender, receiver, tick, burst_loss, sequence);
         // The message's own draw comes first: it is one block, and the state of the link may take several.
         let is_lost = Bernoulli::new(bursts.loss).sample(words[0])
             && bursts.is_in_burst(&self.streams, link, at_s);
@@ -89,7 +89,7 @@ impl<T: Transport> FaultyTransport<'_, T> {
 
 impl<T: Transport> Transport for FaultyTransport<'_, T> {
     fn send(&mut self, mut envelope: Envelope) {
-        let is_carried = self.passes(&envelope);
+        let is_carried = self.can_pass(&envelope);
         // A message that is lost occupies the link all the same.
         envelope.cycle = self.departure_tick(&envelope);
         if is_carried {

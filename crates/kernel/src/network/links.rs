@@ -30,7 +30,7 @@ pub struct RadioOutage {
 /// A period in which no message gets from one side to another. Agents on no side reach all others, and are reached
 /// by all.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Partition {
+pub struct NetworkPartition {
     /// Ids of the agents on each side.
     pub sides: Vec<Vec<EntityId>>,
     /// When the sides are apart, in simulated time.
@@ -83,26 +83,26 @@ impl TimeWindow {
     }
 }
 
-impl Partition {
+impl NetworkPartition {
     /// Returns whether the partition separates two agents at a time.
-    pub(super) fn separates(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
+    pub(super) fn is_separated(&self, [a, b]: [EntityId; 2], at_s: f64) -> bool {
         if !self.window.contains(at_s) {
             return false;
         }
-        match (self.side(a), self.side(b)) {
+        match (self.side_of(a), self.side_of(b)) {
             (Some(side_a), Some(side_b)) => side_a != side_b,
             _ => false,
         }
     }
 
-    fn side(&self, agent: EntityId) -> Option<usize> {
+    fn side_of(&self, agent: EntityId) -> Option<usize> {
         self.sides.iter().position(|side| side.contains(&agent))
     }
 }
 
 impl UnidirectionalLink {
     /// Returns whether the fault stops a message at a time.
-    pub(super) fn blocks(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
+    pub(super) fn is_blocking(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
         self.window.contains(at_s) && (self.receiver, self.sender) == (sender, receiver)
     }
 }
@@ -127,7 +127,7 @@ impl GilbertElliott {
         let mut step = (at_s / step_s) as u64;
         // Back to the step in which the present state was drawn.
         loop {
-            let words = streams.streams.pair(link[0], link[1], step, streams.burst, 0);
+            let words = streams.streams.pair_words(link[0], link[1], step, streams.burst, 0);
             if step == 0 || is_renewed.sample(words[0]) {
                 return is_burst.sample(words[1]);
             }
@@ -165,10 +165,11 @@ mod tests {
     #[test]
     fn a_partition_cuts_between_its_sides_and_nowhere_else() {
         let sides = vec![vec![0, 2], vec![1, 3]];
-        let partition = Partition { sides, window: TimeWindow { from_s: 10.0, until_s: 20.0 } };
-        assert!(partition.separates([0, 3], 10.0) && partition.separates([3, 0], 19.9));
+        let partition =
+            NetworkPartition { sides, window: TimeWindow { from_s: 10.0, until_s: 20.0 } };
+        assert!(partition.is_separated([0, 3], 10.0) && partition.is_separated([3, 0], 19.9));
         for (pair, at_s) in [([0, 2], 15.0), ([0, 4], 15.0), ([0, 3], 9.9), ([0, 3], 20.0)] {
-            assert!(!partition.separates(pair, at_s), "{pair:?} at {at_s}");
+            assert!(!partition.is_separated(pair, at_s), "{pair:?} at {at_s}");
         }
     }
 }

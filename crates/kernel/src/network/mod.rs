@@ -19,13 +19,13 @@ mod packet;
 mod retry;
 
 use crate::math;
-use crate::ports::Faults;
+use crate::ports::NetworkFaults;
 use crate::units::EntityId;
 pub use agent::{AgentLoop, NetworkAgent, OutgoingPacket, ReplyTiming};
 pub use fault_injector::FaultInjector;
-pub use faulty_transport::{Distances, FaultyTransport};
+pub use faulty_transport::{AgentDistances, FaultyTransport};
 pub use links::{
-    FaultStreams, GilbertElliott, Partition, RadioOutage, TimeWindow, UnidirectionalLink,
+    FaultStreams, GilbertElliott, NetworkPartition, RadioOutage, TimeWindow, UnidirectionalLink,
 };
 pub use packet::{
     ConversationId, DropCounts, DropReason, HEADER_BYTES, PacketBuffer, PacketHeader, Protocol,
@@ -65,7 +65,7 @@ pub struct Network {
     /// Agents whose radio is off, and the periods.
     pub radio_outages: Vec<RadioOutage>,
     /// Sides that do not reach each other, and the periods.
-    pub partitions: Vec<Partition>,
+    pub partitions: Vec<NetworkPartition>,
     /// Links that work in one direction only, and the periods.
     pub unidirectional_links: Vec<UnidirectionalLink>,
 }
@@ -77,18 +77,24 @@ impl Network {
     }
 
     /// Returns whether a link carries messages at a time, regardless of its length.
-    pub fn carries(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
-        let is_cut =
-            self.partitions.iter().any(|partition| partition.separates([sender, receiver], at_s));
-        !is_cut && !self.unidirectional_links.iter().any(|link| link.blocks(sender, receiver, at_s))
+    pub fn can_carry(&self, [sender, receiver]: [EntityId; 2], at_s: f64) -> bool {
+        let is_cut = self
+            .partitions
+            .iter()
+            .any(|partition| partition.is_separated([sender, receiver], at_s));
+        !is_cut
+            && !self
+                .unidirectional_links
+                .iter()
+                .any(|link| link.is_blocking(sender, receiver, at_s))
     }
 
-    fn ticks(&self, seconds: f64) -> u64 {
+    fn s_to_ticks(&self, seconds: f64) -> u64 {
         (seconds / self.latency_s).round().max(1.0) as u64
     }
 
     /// Returns the time in seconds that some ticks take.
-    pub fn seconds(&self, ticks: u64) -> f64 {
+    pub fn ticks_to_s(&self, ticks: u64) -> f64 {
         ticks as f64 * self.latency_s
     }
 
@@ -99,13 +105,13 @@ impl Network {
 
     /// Returns the number of ticks of a conversation.
     pub fn deadline_ticks(&self) -> u64 {
-        self.ticks(self.deadline_s)
+        self.s_to_ticks(self.deadline_s)
     }
 
     /// Returns the time that an agent waits before it asks again, and the number of its requests.
     pub fn retry_policy(&self) -> RetryPolicy {
         RetryPolicy {
-            ticks: self.ticks(self.patience_s),
+            ticks: self.s_to_ticks(self.patience_s),
             bits_per_tick: self.bits_per_tick(),
             tries: self.max_tries(FALSE_GIVE_UP_PROBABILITY),
             first_tries: self.max_tries(FALSE_GIVE_UP_PROBABILITY_AFTER_MISS),
@@ -139,8 +145,8 @@ impl Network {
     }
 
     /// Returns the faults that a transport draws for every message.
-    pub fn faults(&self) -> Faults {
-        Faults {
+    pub fn faults(&self) -> NetworkFaults {
+        NetworkFaults {
             loss: self.loss,
             duplication: self.duplication,
             max_delay_cycles: (self.max_delay_s / self.latency_s).round() as u32,

@@ -267,7 +267,7 @@ pub fn digest(pieces: [&[u8]; 2]) -> u64 {
     let mut sum = FACTOR;
     for piece in pieces {
         // With the length, so that a byte that moves from one piece to the other changes the digest.
-        sum = mix(sum ^ digest_bytes(piece), FACTOR ^ piece.len() as u64);
+        sum = fold_product(sum ^ digest_bytes(piece), FACTOR ^ piece.len() as u64);
     }
     sum
 }
@@ -278,7 +278,7 @@ const FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
 const OTHER_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
 
 /// Folds a 128-bit product to 64 bits, as wyhash does: every input bit reaches every output bit.
-fn mix(a: u64, b: u64) -> u64 {
+fn fold_product(a: u64, b: u64) -> u64 {
     let product = u128::from(a) * u128::from(b);
     product as u64 ^ (product >> 64) as u64
 }
@@ -294,7 +294,7 @@ fn digest_bytes(bytes: &[u8]) -> u64 {
     for block in blocks {
         sums = std::array::from_fn(|lane| mix_pair(sums[lane], &block[lane]));
     }
-    let sum = sums.into_iter().fold(0, |sum, lane| mix(sum ^ FACTOR, lane ^ OTHER_FACTOR));
+    let sum = sums.into_iter().fold(0, |sum, lane| fold_product(sum ^ FACTOR, lane ^ OTHER_FACTOR));
     // Data that end in zeros differ from this padding by their length, which `digest` mixes in.
     let mut last = [0; 16];
     last[..rest.len()].copy_from_slice(rest);
@@ -304,7 +304,7 @@ fn digest_bytes(bytes: &[u8]) -> u64 {
 fn mix_pair(sum: u64, bytes: &[u8; 16]) -> u64 {
     let (words, _) = bytes.as_chunks::<8>();
     let [a, b] = [words[0], words[1]].map(u64::from_le_bytes);
-    mix(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
+    fold_product(sum ^ a ^ FACTOR, b ^ OTHER_FACTOR)
 }
 
 /// Returns the digest of a scenario's text and seed.

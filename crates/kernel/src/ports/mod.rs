@@ -9,7 +9,7 @@ pub mod transport;
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use recorder::{MemoryRecorder, RecordError, Recorder};
 pub use table::{
-    BlockBuffer, Buffer, Buffers, Cells, ColumnSpec, ColumnType, RoleColumn, RowBuffer, Table,
-    TableSchema, Values,
+    Buffer, Buffers, Cells, ColumnBlockBuffer, ColumnSpec, ColumnType, RoleColumn, RowBuffer,
+    Table, TableSchema, Values,
 };
-pub use transport::{Envelope, Faults, MemoryTransport, Transport};
+pub use transport::{Envelope, MemoryTransport, NetworkFaults, Transport};

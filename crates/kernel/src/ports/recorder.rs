@@ -141,8 +141,8 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
 
 /// Returns the reason why values do not fit a column of a block with this number of rows.
 fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<String> {
-    if values.ty() != column.ty {
-        return Some(format!("is {:?}, not {:?}", column.ty, values.ty()));
+    if values.column_type() != column.ty {
+        return Some(format!("is {:?}, not {:?}", column.ty, values.column_type()));
     }
     if values.len() != rows {
         return Some("differs in length from the first".into());
@@ -153,7 +153,8 @@ fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<Str
     // The maximum, not the first wrong one: a loop without an exit is vectorized, and this one runs over every row
     // of a recorded run.
     if let Values::Label(indices) = values
-        && let Some(index) = largest(indices).filter(|&&i| i as usize >= column.labels.len())
+        && let Some(index) =
+            max_valid_value(indices).filter(|&&i| i as usize >= column.labels.len())
     {
         return Some(format!("has no label {index}"));
     }
@@ -161,7 +162,7 @@ fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<Str
 }
 
 /// Returns the largest of the values that are not missing.
-fn largest(indices: &Cells<u32>) -> Option<&u32> {
+fn max_valid_value(indices: &Cells<u32>) -> Option<&u32> {
     match indices.valid() {
         None => indices.iter().max(),
         Some(_) => indices.options().flatten().max(),
@@ -205,14 +206,14 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
 }
 
 /// A function that returns a table's column, both by index, after the recording is finished.
-pub type ReadBack = Box<dyn Fn(usize, usize) -> Values>;
+pub type ColumnReadBack = Box<dyn Fn(usize, usize) -> Values>;
 
 /// Checks the guarantees of a [`Recorder`]. `recorder` is fresh, made with [`conformance_schemas`];
 /// `read_back` opens the finished recording.
 ///
 /// # Panics
 /// When a guarantee is broken.
-pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ReadBack) {
+pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ColumnReadBack) {
     recorder.append(0, &first_block(10)).expect("a block that fits is stored");
     recorder.append(1, &second_block()).expect("tables are independent");
     recorder.append(1, &second(vec![], vec![])).expect("no rows are fine");

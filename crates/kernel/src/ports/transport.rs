@@ -41,7 +41,7 @@ pub trait Transport {
 
 /// The faults of a network; the default is a network without any.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Faults {
+pub struct NetworkFaults {
     /// Probability that a message is lost.
     pub loss: f64,
     /// Probability that a message arrives twice.
@@ -50,7 +50,7 @@ pub struct Faults {
     pub max_delay_cycles: u32,
 }
 
-impl Default for Faults {
+impl Default for NetworkFaults {
     fn default() -> Self {
         Self { loss: 0.0, duplication: 0.0, max_delay_cycles: 0 }
     }
@@ -61,7 +61,7 @@ impl Default for Faults {
 pub struct MemoryTransport {
     streams: Streams,
     purpose: Purpose,
-    faults: Faults,
+    faults: NetworkFaults,
     /// Envelopes by receiver, then by the cycle of arrival.
     waiting: BTreeMap<(EntityId, Cycle), Vec<Envelope>>,
     /// Messages sent so far, lost ones included.
@@ -72,7 +72,7 @@ pub struct MemoryTransport {
 
 impl MemoryTransport {
     /// Creates an empty network with these faults, drawn for `purpose`.
-    pub fn new(streams: Streams, purpose: Purpose, faults: Faults) -> Self {
+    pub fn new(streams: Streams, purpose: Purpose, faults: NetworkFaults) -> Self {
         Self { streams, purpose, faults, waiting: BTreeMap::new(), messages: 0, bytes: 0 }
     }
 
@@ -90,7 +90,7 @@ impl Transport for MemoryTransport {
         self.messages += 1;
         self.bytes += envelope.payload.len() as u64;
         let Envelope { cycle, sender, sequence, receiver, .. } = envelope;
-        let words = self.streams.pair(sender, receiver, cycle, self.purpose, sequence);
+        let words = self.streams.pair_words(sender, receiver, cycle, self.purpose, sequence);
         if Bernoulli::new(self.faults.loss).sample(words[0]) {
             return;
         }
@@ -146,13 +146,13 @@ mod tests {
     use super::*;
     use crate::units::Seed;
 
-    fn network(faults: Faults) -> MemoryTransport {
+    fn network(faults: NetworkFaults) -> MemoryTransport {
         MemoryTransport::new(Streams::new(Seed(1)), Purpose(9), faults)
     }
 
     #[test]
     fn the_memory_transport_conforms_and_counts() {
-        let mut transport = network(Faults::default());
+        let mut transport = network(NetworkFaults::default());
         conformance(&mut transport);
         assert_eq!((transport.messages, transport.bytes), (5, 15));
         let payload = Vec::new();
@@ -163,7 +163,8 @@ mod tests {
     #[test]
     fn faults_happen_as_often_as_stated() {
         let n = 10_000;
-        let mut transport = network(Faults { loss: 0.1, duplication: 0.05, max_delay_cycles: 3 });
+        let mut transport =
+            network(NetworkFaults { loss: 0.1, duplication: 0.05, max_delay_cycles: 3 });
         for sequence in 0..n {
             let payload = Vec::new();
             transport.send(Envelope { cycle: 0, sender: 1, sequence, receiver: 2, payload });

@@ -10,13 +10,13 @@
 //! Claims are not withdrawn, because a claim of an earlier cycle is only ever read by a body that
 //! has written its own over it.
 
-use crate::column::{AtomicValue, Column};
+use crate::column::{AtomicColumn, AtomicValue};
 use crate::units::Slot;
 use std::ops::BitAnd;
 
 /// The content of a box in one word. The highest bit means that nothing stands there, so the
 /// bitwise conjunction of several boxes is free when all are.
-pub trait BoxWord: AtomicValue + Eq + BitAnd<Output = Self> {
+pub trait OccupantWord: AtomicValue + Eq + BitAnd<Output = Self> {
     /// Nothing stands here, and no body claims it.
     const FREE: Self;
     /// A wall stands here.
@@ -24,9 +24,9 @@ pub trait BoxWord: AtomicValue + Eq + BitAnd<Output = Self> {
     /// The number of bodies that can be distinguished.
     const MAX_BODIES: usize;
     /// The body in `slot` stands here.
-    fn standing(slot: Slot) -> Self;
+    fn from_body(slot: Slot) -> Self;
     /// Nothing stands here; the body in `slot` claims it.
-    fn claimed(slot: Slot) -> Self;
+    fn from_claim(slot: Slot) -> Self;
     /// Returns whether nothing stands here.
     fn is_free(self) -> bool;
     /// The slot of the body that stands here or claims it; an invalid slot for a wall or an
@@ -36,16 +36,16 @@ pub trait BoxWord: AtomicValue + Eq + BitAnd<Output = Self> {
 
 macro_rules! box_word {
     ($t:ty) => {
-        impl BoxWord for $t {
+        impl OccupantWord for $t {
             const FREE: Self = <$t>::MAX;
             const WALL: Self = <$t>::MAX >> 1;
             const MAX_BODIES: usize = (<$t>::MAX >> 1) as usize;
             #[inline(always)]
-            fn standing(slot: Slot) -> Self {
+            fn from_body(slot: Slot) -> Self {
                 slot as Self
             }
             #[inline(always)]
-            fn claimed(slot: Slot) -> Self {
+            fn from_claim(slot: Slot) -> Self {
                 slot as Self | !(Self::MAX >> 1)
             }
             #[inline(always)]
@@ -66,9 +66,9 @@ box_word! { u32 }
 #[derive(Debug, Clone)]
 pub enum Floor {
     /// Indices of up to 32,767 bodies.
-    Narrow(Column<u16>),
+    Narrow(AtomicColumn<u16>),
     /// Indices of more bodies.
-    Wide(Column<u32>),
+    Wide(AtomicColumn<u32>),
 }
 
 /// The occupant of a box.
@@ -86,7 +86,7 @@ impl Floor {
     /// Creates a floor for `bodies` bodies, none of which stands on it yet; `walls` has one entry
     /// per box.
     pub fn new(walls: impl Iterator<Item = bool>, bodies: usize) -> Self {
-        fn column<T: BoxWord>(walls: impl Iterator<Item = bool>) -> Column<T> {
+        fn column<T: OccupantWord>(walls: impl Iterator<Item = bool>) -> AtomicColumn<T> {
             walls.map(|wall| if wall { T::WALL } else { T::FREE }).collect()
         }
         // Half the memory where the slots fit: the boxes around a body then lie in fewer cache lines.
@@ -99,7 +99,7 @@ impl Floor {
 
     /// Returns what stands in the box with this index, row by row from the first; claims do not count.
     pub fn occupant(&self, index: usize) -> Occupant {
-        fn occupant<T: BoxWord>(word: T) -> Occupant {
+        fn occupant<T: OccupantWord>(word: T) -> Occupant {
             match word {
                 _ if word.is_free() => Occupant::Empty,
                 _ if word == T::WALL => Occupant::Wall,
@@ -115,8 +115,8 @@ impl Floor {
     /// Places the body in `slot` on the box with this index.
     pub fn place(&self, index: usize, slot: Slot) {
         match self {
-            Self::Narrow(boxes) => boxes.set(index, BoxWord::standing(slot)),
-            Self::Wide(boxes) => boxes.set(index, BoxWord::standing(slot)),
+            Self::Narrow(boxes) => boxes.set(index, OccupantWord::from_body(slot)),
+            Self::Wide(boxes) => boxes.set(index, OccupantWord::from_body(slot)),
         }
     }
 
@@ -134,8 +134,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn words_tell_all_states_apart<T: BoxWord + std::fmt::Debug>(slot: Slot) {
-        let (standing, claimed) = (T::standing(slot), T::claimed(slot));
+    fn words_tell_all_states_apart<T: OccupantWord + std::fmt::Debug>(slot: Slot) {
+        let (standing, claimed) = (T::from_body(slot), T::from_claim(slot));
         assert!(!standing.is_free() && !T::WALL.is_free());
         assert!(claimed.is_free() && T::FREE.is_free());
         assert_eq!((standing.slot(), claimed.slot()), (slot, slot));

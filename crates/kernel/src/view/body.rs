@@ -6,7 +6,7 @@ use std::fmt;
 
 /// The identity of a body, which it keeps during the run; displayed as `robot/3` or `connector/0/7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(from = "Parts", into = "Parts")]
+#[serde(from = "BodyIdTuple", into = "BodyIdTuple")]
 pub struct BodyId {
     /// Its kind.
     pub kind: BodyKind,
@@ -17,7 +17,7 @@ pub struct BodyId {
 }
 
 /// An identity as files and the page have it: kind, number and part.
-type Parts = (BodyKind, u32, Option<u32>);
+type BodyIdTuple = (BodyKind, u32, Option<u32>);
 
 impl BodyId {
     /// Returns the identity of a body.
@@ -26,13 +26,13 @@ impl BodyId {
     }
 }
 
-impl From<Parts> for BodyId {
-    fn from((kind, number, part): Parts) -> Self {
+impl From<BodyIdTuple> for BodyId {
+    fn from((kind, number, part): BodyIdTuple) -> Self {
         Self { kind, number, part }
     }
 }
 
-impl From<BodyId> for Parts {
+impl From<BodyId> for BodyIdTuple {
     fn from(BodyId { kind, number, part }: BodyId) -> Self {
         (kind, number, part)
     }

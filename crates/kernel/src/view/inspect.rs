@@ -153,12 +153,12 @@ fn body_fields<S: Serializer>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
-    struct Fields {
+    struct BodyIdFields {
         kind: BodyKind,
         number: u32,
         part: Option<u32>,
     }
-    Fields { kind, number, part }.serialize(serializer)
+    BodyIdFields { kind, number, part }.serialize(serializer)
 }
 
 impl MarkRole {

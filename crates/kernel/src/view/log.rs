@@ -159,7 +159,7 @@ pub enum Severity {
 
 /// Events kept for the next frame, up to a maximum; further ones are only counted.
 #[derive(Debug, Clone)]
-pub struct Log<E> {
+pub struct EventBuffer<E> {
     events: Vec<E>,
     dropped: u64,
     /// Whether events are kept, because somebody reads frames.
@@ -170,13 +170,13 @@ pub struct Log<E> {
 /// whose viewer reads no frames for hours.
 const MAX_EVENTS: usize = 10_000;
 
-impl<E> Default for Log<E> {
+impl<E> Default for EventBuffer<E> {
     fn default() -> Self {
         Self { events: Vec::new(), dropped: 0, is_enabled: false }
     }
 }
 
-impl<E> Log<E> {
+impl<E> EventBuffer<E> {
     /// Keeps an event, if events are kept.
     pub fn push(&mut self, event: E) {
         if !self.is_enabled {
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_log_keeps_nothing_unless_somebody_watches_and_counts_what_is_too_much() {
-        let mut log = Log::default();
+        let mut log = EventBuffer::default();
         log.push(1);
         assert_eq!(log.take(), (vec![], 0));
         log.is_enabled = true;

@@ -17,9 +17,9 @@ pub use appearance::{
 };
 pub use body::{Body, BodyId, BodyKind, Condition, Shape};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
-pub use log::{Log, LogEvent, LogEventKind, Quantity, Severity};
+pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
 pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
-pub use trails::{Axis, PositionColumns, Trail, corner};
+pub use trails::{CoordinateColumn, PositionTableColumns, Trail, corner};
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};

@@ -18,7 +18,7 @@ pub struct Trail {
 
 /// The table and the columns with the recorded positions of bodies.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PositionColumns {
+pub struct PositionTableColumns {
     /// Name of the table; its column `cycle` has the cycle of each row.
     pub table: &'static str,
     /// The kind of all bodies of the table.
@@ -28,7 +28,7 @@ pub struct PositionColumns {
     /// The column with the numbers of their parts.
     pub part: Option<&'static str>,
     /// Columns with the coordinates x, y and perhaps z.
-    pub axes: Vec<Axis>,
+    pub axes: Vec<CoordinateColumn>,
     /// The plane of the coordinates x and y, that of the world unless given.
     pub plane: Option<Isometry2>,
     /// Whether the positions are those of a body's corner with the lowest coordinates, not those of
@@ -45,7 +45,7 @@ pub struct PositionColumns {
 
 /// A column with coordinates: a coordinate in meters is `offset_m` plus the value times `scale_m`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
+pub struct CoordinateColumn {
     /// Name of the column in the table.
     pub column: &'static str,
     /// Meters per unit of the value.
@@ -55,14 +55,14 @@ pub struct Axis {
 }
 
 #[derive(Debug, PartialEq)]
-struct Row {
+struct PositionRow {
     cycle: Cycle,
     at_m: Vec3,
     /// Heading in quarter turns from east.
     heading: Option<u32>,
 }
 
-impl PositionColumns {
+impl PositionTableColumns {
     /// Returns the trails of some bodies up to the moment of a frame, from the columns of the
     /// table; `None` where it has other columns. A body with rows that end before that moment,
     /// though it is still there, has no trail, because its trail would jump.
@@ -77,7 +77,7 @@ impl PositionColumns {
         let mut trails = Vec::new();
         for (id, rows) in rows {
             let body = frame.bodies.iter().find(|body| body.id() == id);
-            let is_current = |last: &Row| last.cycle + self.interval >= frame.cycle;
+            let is_current = |last: &PositionRow| last.cycle + self.interval >= frame.cycle;
             if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
                 // A body that is gone has no shape in the frame, so that of its start is used.
                 let start = || scenery.bodies.iter().find(|body| is_start(body, id.number));
@@ -95,7 +95,7 @@ impl PositionColumns {
         before: Cycle,
         bodies: &[BodyId],
         column: impl Fn(&str) -> Option<&'a Values>,
-    ) -> Option<BTreeMap<BodyId, Vec<Row>>> {
+    ) -> Option<BTreeMap<BodyId, Vec<PositionRow>>> {
         let Values::U64(cycles) = column("cycle")? else { return None };
         let integers = |name| match column(name)? {
             Values::U32(values) | Values::Label(values) => Some(values),
@@ -106,8 +106,8 @@ impl PositionColumns {
         let parts = self.part.map(|name| integers(name).ok_or(())).transpose().ok()?;
         let headings = self.heading.map(|name| integers(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
-        let axes: Vec<(&Axis, &Values)> = axes.collect::<Option<_>>()?;
-        let mut rows: BTreeMap<BodyId, Vec<Row>> =
+        let axes: Vec<(&CoordinateColumn, &Values)> = axes.collect::<Option<_>>()?;
+        let mut rows: BTreeMap<BodyId, Vec<PositionRow>> =
             bodies.iter().map(|&id| (id, Vec::new())).collect();
         for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
             let id = BodyId::new(self.kind, numbers[k], parts.map(|parts| parts[k]));
@@ -116,7 +116,7 @@ impl PositionColumns {
             for (x, (axis, values)) in at_m.iter_mut().zip(&axes) {
                 *x = axis.offset_m + axis.scale_m * number(values, k)?;
             }
-            own.push(Row { cycle, at_m, heading: headings.map(|headings| headings[k]) });
+            own.push(PositionRow { cycle, at_m, heading: headings.map(|headings| headings[k]) });
         }
         rows.values_mut().for_each(|rows| rows.sort_by_key(|row| row.cycle));
         Some(rows)
@@ -126,7 +126,7 @@ impl PositionColumns {
     /// position. `like` is a body of the same shape.
     fn points(
         &self,
-        rows: Vec<Row>,
+        rows: Vec<PositionRow>,
         like: Option<&Body>,
         present: Option<(Cycle, Vec3)>,
     ) -> Vec<(Cycle, Vec3)> {
@@ -136,7 +136,7 @@ impl PositionColumns {
         };
         let mut points: Vec<(Cycle, Vec3)> = Vec::new();
         let mut previous: Option<(Vec3, u32)> = None;
-        for Row { cycle, at_m, heading } in rows {
+        for PositionRow { cycle, at_m, heading } in rows {
             let center_m = std::array::from_fn(|k| {
                 if k < self.axes.len() {
                     at_m[k] + half_m[k]
@@ -197,7 +197,7 @@ fn number(values: &Values, row: usize) -> Option<f64> {
     values.number(row).filter(|_| values.is_numeric())
 }
 
-impl Axis {
+impl CoordinateColumn {
     /// Creates the axis of a column that is in meters already.
     pub fn meters(column: &'static str) -> Self {
         Self { column, scale_m: 1.0, offset_m: 0.0 }
@@ -223,9 +223,9 @@ mod tests {
         assert_eq!(corner([5.0, 5.0, 0.0], east, [5.0, 5.0, 0.0]), [5.0, 5.0, 0.0]);
     }
 
-    fn rows() -> PositionColumns {
-        let axis = |column| Axis { column, scale_m: 0.5, offset_m: 10.0 };
-        PositionColumns {
+    fn rows() -> PositionTableColumns {
+        let axis = |column| CoordinateColumn { column, scale_m: 0.5, offset_m: 10.0 };
+        PositionTableColumns {
             table: "trajectories",
             kind: BodyKind::Robot,
             number: "body",

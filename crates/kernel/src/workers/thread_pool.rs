@@ -23,19 +23,19 @@ pub type Job = Arc<dyn Fn(usize) + Send + Sync>;
 pub struct ThreadPool {
     workers: usize,
     /// None before the first call.
-    threads: Option<Threads>,
+    threads: Option<PoolThreads>,
 }
 
 /// Threads of one process: a forked child of it has none of them.
 #[derive(Debug)]
-struct Threads {
+struct PoolThreads {
     process: u32,
     shared: Arc<PoolState>,
 }
 
 #[derive(Debug)]
 struct PoolState {
-    call: Mutex<Call>,
+    call: Mutex<PoolCall>,
     called: Condvar,
     done: Condvar,
     /// The number of the present call, outside of the lock for polling.
@@ -49,7 +49,7 @@ struct PoolState {
 
 /// The present call, or the last one.
 #[derive(Default)]
-struct Call {
+struct PoolCall {
     number: u64,
     n: usize,
     /// `None` when it is over; a thread that wakes later goes back to sleep.
@@ -57,7 +57,7 @@ struct Call {
     is_last: bool,
 }
 
-impl std::fmt::Debug for Call {
+impl std::fmt::Debug for PoolCall {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { number, n, is_last, .. } = self;
         write!(f, "Call({number}, {n} tasks, last: {is_last})")
@@ -89,7 +89,7 @@ impl ThreadPool {
         shared.start(n, task);
         // A guard, because the threads must be done with the caller's data also when `own_task` unwinds.
         let guard = JoinGuard(&shared);
-        shared.work(0, n, &mut own_task);
+        shared.do_share(0, n, &mut own_task);
         drop(guard);
         if shared.is_broken.load(Ordering::Relaxed) {
             self.threads = None;
@@ -97,7 +97,7 @@ impl ThreadPool {
         }
     }
 
-    fn threads(&mut self) -> &Threads {
+    fn threads(&mut self) -> &PoolThreads {
         let process = std::process::id();
         if let Some(threads) = self.threads.take() {
             if threads.process != process {
@@ -110,11 +110,11 @@ impl ThreadPool {
             // Otherwise the last call unwound, and some of its threads are gone.
         }
         let workers = self.workers;
-        self.threads.get_or_insert_with(|| Threads::new(workers, process))
+        self.threads.get_or_insert_with(|| PoolThreads::new(workers, process))
     }
 }
 
-impl Threads {
+impl PoolThreads {
     fn new(workers: usize, process: u32) -> Self {
         let shared = Arc::new(PoolState {
             call: Mutex::default(),
@@ -136,22 +136,22 @@ impl Threads {
     }
 }
 
-impl Drop for Threads {
+impl Drop for PoolThreads {
     fn drop(&mut self) {
-        self.shared.call().is_last = true;
+        self.shared.lock_call().is_last = true;
         self.shared.called.notify_all();
     }
 }
 
 impl PoolState {
-    fn call(&self) -> MutexGuard<'_, Call> {
+    fn lock_call(&self) -> MutexGuard<'_, PoolCall> {
         self.call.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Resets the cursors before the call is visible, and wakes the threads.
     fn start(&self, n: usize, task: Job) {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
-        let mut call = self.call();
+        let mut call = self.lock_call();
         call.number += 1;
         call.n = n;
         call.task = Some(task);
@@ -165,7 +165,7 @@ impl PoolState {
         let mut last_number = 0;
         loop {
             poll_until(|| self.number.load(Ordering::Acquire) != last_number);
-            let mut call = self.call();
+            let mut call = self.lock_call();
             while (call.number == last_number || call.task.is_none()) && !call.is_last {
                 call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
             }
@@ -178,7 +178,7 @@ impl PoolState {
             last_number = call.number;
             drop(call);
             let _guard = CompletionGuard(self);
-            self.work(index, n, &mut |k| task(k));
+            self.do_share(index, n, &mut |k| task(k));
             // Before the guard reports completion: after it no thread holds a caller's data.
             drop(task);
         }
@@ -190,7 +190,7 @@ impl PoolState {
     }
 
     /// Does one worker's share, and then the remaining parts of the others'.
-    fn work(&self, index: usize, n: usize, task: &mut dyn FnMut(usize)) {
+    fn do_share(&self, index: usize, n: usize, task: &mut dyn FnMut(usize)) {
         let size = self.cursors.len();
         let chunk = (n / (size * MIN_CHUNKS_PER_SHARE)).clamp(1, MAX_CHUNK);
         for k in 0..size {
@@ -229,7 +229,7 @@ impl Drop for CompletionGuard<'_> {
         }
         if self.0.working.fetch_sub(1, Ordering::Release) == 1 {
             // Under the lock, so that a caller that is about to sleep is not missed.
-            drop(self.0.call());
+            drop(self.0.lock_call());
             self.0.done.notify_all();
         }
     }
@@ -242,9 +242,9 @@ impl Drop for JoinGuard<'_> {
     fn drop(&mut self) {
         // All numbers are taken: a thread that has not started, because its processor has other work, would find
         // nothing to do, and is not waited for.
-        self.0.call().task = None;
+        self.0.lock_call().task = None;
         poll_until(|| self.0.is_idle());
-        let mut call = self.0.call();
+        let mut call = self.0.lock_call();
         while !self.0.is_idle() {
             call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);
         }

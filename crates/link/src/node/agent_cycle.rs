@@ -1,6 +1,6 @@
 //! One cycle of an agent at its node: packets out and in, until its control is ready.
 
-use crate::agent::{AgentProgram, Arrival, Channel, OutgoingPacket, Transmission};
+use crate::agent::{AgentProgram, ChannelModel, OutgoingPacket, PacketTiming, Transmission};
 use crate::messenger::Messenger;
 use crate::protocol::{
     AdvanceDone, AdvanceGrant, ClockMode, Control, CycleStart, Message, Packet, PacketRecord,
@@ -28,7 +28,7 @@ enum TimeMode {
 /// What a cycle works with: the agent's program, and its connection to others.
 pub(super) struct AgentIo<'a> {
     pub(super) program: &'a mut dyn AgentProgram,
-    pub(super) channel: Option<&'a mut (dyn Channel + 'static)>,
+    pub(super) channel: Option<&'a mut (dyn ChannelModel + 'static)>,
     pub(super) messenger: &'a mut Messenger,
 }
 
@@ -121,12 +121,12 @@ impl AgentCycle {
         }
     }
 
-    pub(super) fn number(&self) -> Cycle {
+    pub(super) fn cycle_number(&self) -> Cycle {
         self.number
     }
 
     /// Takes the count of packets and bytes sent since the last call.
-    pub(super) fn take_sent(&mut self) -> TrafficCounters {
+    pub(super) fn take_traffic(&mut self) -> TrafficCounters {
         std::mem::take(&mut self.sent)
     }
 
@@ -173,16 +173,16 @@ impl AgentCycle {
     pub(super) fn advance(&mut self, io: &mut AgentIo<'_>) {
         match self.time {
             TimeMode::Untimed => {
-                self.step(u64::MAX, io);
+                self.process_tick(u64::MAX, io);
             }
             TimeMode::Ticks => self.advance_to_grant(io),
             TimeMode::RealTime { speed } => {
                 self.tick = self.current_tick(speed).max(self.tick);
-                self.step(u64::MAX, io);
+                self.process_tick(u64::MAX, io);
                 self.release_delayed();
             }
         }
-        self.flush(io.messenger);
+        self.flush_packets(io.messenger);
         self.send_control(io);
     }
 
@@ -215,7 +215,7 @@ impl AgentCycle {
             self.tick = grant.tick;
         }
         self.has_stepped = true;
-        let sent = self.step(self.tick, io);
+        let sent = self.process_tick(self.tick, io);
         let report = AdvanceDone {
             cycle: self.number,
             tick: self.tick,
@@ -228,7 +228,7 @@ impl AgentCycle {
 
     /// Gives the program the packets that have arrived by a tick, does everything that is due, and sends the resulting
     /// packets. Returns the receivers of these, with the ticks of arrival.
-    fn step(&mut self, by: u64, io: &mut AgentIo<'_>) -> Vec<(EntityId, u64)> {
+    fn process_tick(&mut self, by: u64, io: &mut AgentIo<'_>) -> Vec<(EntityId, u64)> {
         let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
         let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
@@ -283,27 +283,27 @@ impl AgentCycle {
                 arrival.arrives = self.tick + (arrival.arrives - draw_tick);
             }
             self.log_packet(transmission, &arrivals);
-            for Arrival { departs, arrives } in arrivals {
+            for PacketTiming { departs, arrives } in arrivals {
                 sent.push((to, arrives));
                 let payload = packet.payload.clone();
                 let packet = Packet { cycle: self.number, departs, sequence, arrives, payload };
-                self.schedule(to, packet);
+                self.schedule_packet(to, packet);
             }
         }
     }
 
     /// Returns the arrivals of a packet, counted from the tick for which its faults are drawn.
-    fn arrivals(&self, packet: &Transmission, io: &mut AgentIo<'_>) -> Vec<Arrival> {
+    fn arrivals(&self, packet: &Transmission, io: &mut AgentIo<'_>) -> Vec<PacketTiming> {
         if self.out_of_range.binary_search(&packet.to).is_ok() {
             return Vec::new();
         }
         match &mut io.channel {
             Some(channel) => channel.arrivals(packet),
-            None => vec![Arrival { departs: packet.tick, arrives: packet.tick + 1 }],
+            None => vec![PacketTiming { departs: packet.tick, arrives: packet.tick + 1 }],
         }
     }
 
-    fn log_packet(&mut self, packet: Transmission, arrivals: &[Arrival]) {
+    fn log_packet(&mut self, packet: Transmission, arrivals: &[PacketTiming]) {
         let Some(log) = &mut self.log else { return };
         let first_arrival = arrivals.iter().map(|arrival| arrival.arrives).min();
         log.push(PacketRecord {
@@ -318,7 +318,7 @@ impl AgentCycle {
     }
 
     /// Schedules the sending of a packet: at the end of the step, or after its delay.
-    fn schedule(&mut self, to: EntityId, packet: Packet) {
+    fn schedule_packet(&mut self, to: EntityId, packet: Packet) {
         // One tick of delay is what the real network takes, so only the rest is waited for.
         let delay = packet.arrives.saturating_sub(self.tick + 1);
         match self.time {
@@ -340,7 +340,7 @@ impl AgentCycle {
 
     /// Sends the packets of a step: one message to all that get the same packets. A broadcast to a team is then encoded
     /// once, and published once.
-    fn flush(&mut self, messenger: &mut Messenger) {
+    fn flush_packets(&mut self, messenger: &mut Messenger) {
         let mut multicasts: Vec<(Vec<Packet>, Vec<Peer>)> = Vec::new();
         for (to, packets) in std::mem::take(&mut self.outgoing) {
             let to = Peer::Node(to);

@@ -1,8 +1,8 @@
 //! Joining: a node asks the server until it gets an answer.
 
 use super::NodeError;
-use crate::messenger::{Messenger, Received};
-use crate::protocol::{Join, Message, Welcome};
+use crate::messenger::{Messenger, ReceivedMessage};
+use crate::protocol::{JoinRequest, Message, Welcome};
 use crate::wire::Peer;
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ const JOIN_RETRY_DELAY: Duration = Duration::from_millis(100);
 #[derive(Debug, Clone)]
 pub struct JoinConfig {
     /// The request, the same each time that it is sent.
-    pub join: Join,
+    pub join: JoinRequest,
     /// Time after which it gives up.
     pub timeout: Duration,
 }
@@ -31,7 +31,7 @@ pub fn join(messenger: &mut Messenger, config: &JoinConfig) -> Result<Welcome, N
             messenger.receive(retry_at.saturating_duration_since(Instant::now()))
         {
             match received {
-                Received {
+                ReceivedMessage {
                     from: Peer::Server,
                     message: Message::Welcome(welcome),
                     incarnation,
@@ -39,7 +39,9 @@ pub fn join(messenger: &mut Messenger, config: &JoinConfig) -> Result<Welcome, N
                     messenger.connect(Peer::Server, incarnation);
                     return Ok(welcome);
                 }
-                Received { from: Peer::Server, message: Message::Refused(error), .. } => {
+                ReceivedMessage {
+                    from: Peer::Server, message: Message::Refused(error), ..
+                } => {
                     return Err(NodeError::Refused(error));
                 }
                 // A heartbeat to an earlier process of this agent, for instance.

@@ -9,9 +9,11 @@
 mod agent_cycle;
 mod join;
 
-use crate::agent::{Activity, AgentProgram, Channel};
-use crate::messenger::{Messenger, Received};
-use crate::protocol::{ClockMode, CycleStart, JoinError, Member, Message, Packet, Status, Welcome};
+use crate::agent::{AgentActivity, AgentProgram, ChannelModel};
+use crate::messenger::{Messenger, ReceivedMessage};
+use crate::protocol::{
+    ClockMode, CycleStart, FleetMember, JoinError, Message, Packet, Status, Welcome,
+};
 use crate::wire::{Peer, WireError};
 use agent_cycle::{AgentCycle, AgentIo};
 pub use join::{JoinConfig, join};
@@ -69,12 +71,12 @@ pub struct Node {
     messenger: Messenger,
     program: Box<dyn AgentProgram>,
     /// The faults of the scenario's network; none where it has none.
-    channel: Option<Box<dyn Channel>>,
+    channel: Option<Box<dyn ChannelModel>>,
     clock: ClockMode,
     logs_packets: bool,
     /// Time without a message from the server after which the node ends.
     lease: Duration,
-    members: Vec<Member>,
+    members: Vec<FleetMember>,
     /// Whether all other nodes have acknowledged its `Hello`.
     is_ready: bool,
     cycle: Option<AgentCycle>,
@@ -97,7 +99,7 @@ impl Node {
         agent: EntityId,
         messenger: Messenger,
         program: Box<dyn AgentProgram>,
-        channel: Option<Box<dyn Channel>>,
+        channel: Option<Box<dyn ChannelModel>>,
         welcome: &Welcome,
     ) -> Self {
         Self {
@@ -189,7 +191,7 @@ impl Node {
     }
 
     /// Processes a message. Returns whether the fleet has ended.
-    fn on_message(&mut self, received: Received) -> Result<bool, NodeError> {
+    fn on_message(&mut self, received: ReceivedMessage) -> Result<bool, NodeError> {
         match (received.from, received.message) {
             (Peer::Server, Message::End) => return Ok(true),
             (Peer::Server, Message::Refused(error)) => return Err(NodeError::Dismissed(error)),
@@ -201,7 +203,9 @@ impl Node {
                 }
             }
             (Peer::Server, Message::Close(number)) => {
-                if let Some(cycle) = self.cycle.as_mut().filter(|cycle| cycle.number() == number) {
+                if let Some(cycle) =
+                    self.cycle.as_mut().filter(|cycle| cycle.cycle_number() == number)
+                {
                     cycle.close();
                 }
             }
@@ -235,7 +239,7 @@ impl Node {
     }
 
     /// Connects with the other nodes, and sends each a `Hello` to find out whether it receives this node's messages.
-    fn on_roster(&mut self, members: Vec<Member>) -> Result<(), NodeError> {
+    fn on_roster(&mut self, members: Vec<FleetMember>) -> Result<(), NodeError> {
         self.messenger.connect_mesh(self.agent, &members)?;
         for member in &members {
             if member.agent == self.agent || self.members.contains(member) {
@@ -250,7 +254,7 @@ impl Node {
     }
 
     fn on_packet(&mut self, from: EntityId, packet: Packet) {
-        let current = self.cycle.as_ref().map(AgentCycle::number);
+        let current = self.cycle.as_ref().map(AgentCycle::cycle_number);
         match &mut self.cycle {
             Some(cycle) if current == Some(packet.cycle) => cycle.on_packet(from, packet),
             // Another node may have heard of the cycle before this one.
@@ -276,7 +280,7 @@ impl Node {
                 channel: self.channel.as_deref_mut(),
                 messenger: &mut self.messenger,
             });
-            let sent = cycle.take_sent();
+            let sent = cycle.take_traffic();
             self.status.packets += sent.packets;
             self.status.bytes += sent.bytes;
             self.log_activity();
@@ -285,7 +289,7 @@ impl Node {
 
     /// Logs the agent's activity if it has changed.
     fn log_activity(&mut self) {
-        let Activity { name, round, epoch } = self.program.activity();
+        let AgentActivity { name, round, epoch } = self.program.activity();
         let agent = self.agent;
         let cycle = self.status.cycle;
         if self.logged_activity != (cycle, name) {

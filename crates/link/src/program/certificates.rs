@@ -9,11 +9,11 @@ use x509_parser::pem::Pem;
 ///
 /// # Errors
 /// With the first thing that is wrong.
-pub(super) fn check_all<'a>(
+pub(super) fn check_encryption<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
     tls: Option<&Tls>,
 ) -> Result<(), InputError> {
-    tls.map_or(Ok(()), check)?;
+    tls.map_or(Ok(()), check_certificates)?;
     check_endpoints(endpoints, tls)
 }
 
@@ -21,7 +21,7 @@ pub(super) fn check_all<'a>(
 ///
 /// # Errors
 /// With the first that is not.
-fn check(tls: &Tls) -> Result<(), InputError> {
+fn check_certificates(tls: &Tls) -> Result<(), InputError> {
     for (option, file) in [("--tls-ca", &tls.authority), ("--tls-cert", &tls.certificate)] {
         let place = format!("{option} {}", file.display());
         check_certificate(&place, &read(&place, file)?)?;

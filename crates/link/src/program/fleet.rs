@@ -14,7 +14,7 @@ use crate::messenger::Messenger;
 use crate::protocol::{ClockMode, PacketRecord, Topology, Welcome};
 use crate::server::histogram::Histogram;
 use crate::server::{
-    FleetError, FleetView, NodeEntry, SILENCE_TIMEOUT, Server, ServerConfig, ServerHooks,
+    FleetError, FleetServer, FleetView, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
 };
 use crate::wire::Peer;
 use crate::wire::endpoint::{PortReservation, WireError, reserve_port, with_port};
@@ -48,8 +48,8 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let overrides = scenario.required_overrides(job.clock, job.out.is_some());
     let scenario = scenario.with_overrides(&overrides)?;
     let listen = resolve_ports(&job.listen).map_err(endpoint_error)?;
-    let wire = ZenohWire::server(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
-    let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
+    let wire = ZenohWire::server_wire(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
+    let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
     // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
@@ -77,7 +77,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let mut supervisor = FleetSupervisor::new(children, parent, run_config.cycles, exporter, views);
     supervisor.packets = create_packet_table(job, &scenario.source.text, run_config.seed)?;
     let mut run = HostedRun::new(run, scenario.world, &TracingWatcher);
-    let (result, _) = Server::new(messenger, &mut run, &mut supervisor, config).run();
+    let (result, _) = FleetServer::new(messenger, &mut run, &mut supervisor, config).run();
     supervisor.children.shut_down();
     let result = result.and_then(|()| supervisor.finish_packets());
     let FleetSupervisor { status, views, .. } = supervisor;
@@ -103,7 +103,7 @@ fn quantile_ms(durations: &Histogram, fraction: f64) -> Option<f64> {
 }
 
 /// Returns the increase of a count; 0 for a process that was restarted meanwhile, which counts from 0.
-fn increase(last: u64, now: u64) -> f64 {
+fn counter_increase(last: u64, now: u64) -> f64 {
     now.saturating_sub(last) as f64
 }
 
@@ -307,18 +307,18 @@ impl<'a> FleetSupervisor<'a> {
             lives: node.joins,
             packets: status.packets,
             bytes: status.bytes,
-            packets_per_s: increase(last_packets, status.packets) / passed_s,
-            bytes_per_s: increase(last_bytes, status.bytes) / passed_s,
+            packets_per_s: counter_increase(last_packets, status.packets) / passed_s,
+            bytes_per_s: counter_increase(last_bytes, status.bytes) / passed_s,
             silent_s: silent.map(|silent| silent.as_secs_f64()),
         }
     }
 
     fn report(&mut self, fleet: &FleetView<'_>) {
         self.update_status(fleet);
-        self.exporter.publish(|| fleet_metrics(&self.status, fleet));
+        self.exporter.replace_text(|| fleet_metrics(&self.status, fleet));
         print_message(&LinkMessage::Fleet(self.status.clone()));
         if self.views.is_watched() {
-            self.views.publish(&self.status, false);
+            self.views.publish_view(&self.status, false);
         }
     }
 }
@@ -355,7 +355,7 @@ impl ServerHooks for FleetSupervisor<'_> {
 
     fn on_end(&mut self, fleet: &FleetView<'_>) {
         self.update_status(fleet);
-        self.views.publish(&self.status, true);
+        self.views.publish_view(&self.status, true);
     }
 
     fn wants_frame(&self, cycle: Cycle) -> bool {
@@ -365,7 +365,7 @@ impl ServerHooks for FleetSupervisor<'_> {
     fn on_frame(&mut self, frame: Frame) {
         self.status.cycle = frame.cycle;
         self.views.push_frame(frame);
-        self.views.publish(&self.status, false);
+        self.views.publish_view(&self.status, false);
     }
 
     fn on_packets(&mut self, packets: Vec<(EntityId, PacketRecord)>) {

@@ -18,7 +18,7 @@ impl MetricsExporter {
     ///
     /// # Errors
     /// When the address cannot be bound.
-    pub(super) fn open(address: Option<&str>) -> Result<Self, InputError> {
+    pub(super) fn serve_at(address: Option<&str>) -> Result<Self, InputError> {
         let Some(address) = address else { return Ok(Self::default()) };
         let text = Arc::new(Mutex::new(String::new()));
         serve(address, text.clone()).map_err(|e| {
@@ -29,7 +29,7 @@ impl MetricsExporter {
     }
 
     /// Replaces the text that is served; it is made only if there is an address.
-    pub(super) fn publish(&self, text: impl FnOnce() -> String) {
+    pub(super) fn replace_text(&self, text: impl FnOnce() -> String) {
         if let Some(served) = &self.0 {
             *served.lock().unwrap_or_else(PoisonError::into_inner) = text();
         }
@@ -53,7 +53,7 @@ impl MetricsText {
 
     fn push_histogram(&mut self, name: &str, help: &str, histogram: &Histogram) {
         self.push_header(name, "histogram", help);
-        for (bound_s, count) in histogram.cumulative() {
+        for (bound_s, count) in histogram.cumulative_counts() {
             self.push_sample(&format!("{name}_bucket"), &format!("le=\"{bound_s}\""), count);
         }
         self.push_sample(&format!("{name}_bucket"), "le=\"+Inf\"", histogram.count());

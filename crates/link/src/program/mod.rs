@@ -42,7 +42,7 @@ and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 pub fn main() -> ExitCode {
     if let Some(word) = std::env::args().nth(1) {
         let is_version = ["--version", "-V"].contains(&word.as_str());
-        let text = if is_version { version() } else { USAGE.into() };
+        let text = if is_version { program_and_build() } else { USAGE.into() };
         println!("{text}");
         let is_known = is_version || ["--help", "-h", "help"].contains(&word.as_str());
         return ExitCode::from(if is_known { 0 } else { 2 });
@@ -59,7 +59,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn version() -> String {
+fn program_and_build() -> String {
     format!("sidestep-link {}", WORLDS.build())
 }
 
@@ -67,7 +67,7 @@ fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
             check_and_start_log(&job.common, &job.listen)?;
-            fleet::run(&job, &ParentMonitor::watch())
+            fleet::run(&job, &ParentMonitor::watch_stdin())
         }
         Job::Node(job) => {
             check_and_start_log(&job.common, job.connect.iter().chain(&job.listen))?;
@@ -76,8 +76,8 @@ fn run_job(job: Job) -> Result<(), Error> {
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
-            certificates::check_all(&job.connect, job.tls.as_ref())?;
-            watch::watch(&job, &ParentMonitor::watch())
+            certificates::check_encryption(&job.connect, job.tls.as_ref())?;
+            watch::watch(&job, &ParentMonitor::watch_stdin())
         }
     }
 }
@@ -89,7 +89,7 @@ fn check_and_start_log<'a>(
 ) -> Result<(), Error> {
     log::start(common.json_log, &common.log)?;
     check_build(&common.flown.build)?;
-    certificates::check_all(endpoints, common.tls.as_ref())?;
+    certificates::check_encryption(endpoints, common.tls.as_ref())?;
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use super::metrics::{MetricsExporter, node_metrics};
 use super::scenario::Scenario;
 use crate::messenger::Messenger;
 use crate::node::{JoinConfig, Node, NodeError, join};
-use crate::protocol::{Join, JoinError, Topology};
+use crate::protocol::{JoinError, JoinRequest, Topology};
 use crate::wire::Peer;
 use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
@@ -27,19 +27,20 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
         .map(|endpoint| reserve_port(endpoint))
         .collect::<Result<_, _>>()
         .map_err(endpoint_error)?;
-    let exporter = MetricsExporter::open(job.common.metrics.as_deref())?;
+    let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let timeout = Duration::from_secs_f64(job.patience_s);
     let build = WORLDS.build();
-    let request = Join {
+    let request = JoinRequest {
         agent,
         scenario: scenario.fingerprint()?,
         build: build.into(),
         listens: ports.iter().map(|port| port.endpoint.clone()).collect(),
         process: std::process::id(),
     };
-    let wire = ZenohWire::node(Peer::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
-        .map_err(endpoint_error)?
-        .with_listeners(ports);
+    let wire =
+        ZenohWire::node_wire(Peer::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
+            .map_err(endpoint_error)?
+            .with_listeners(ports);
     let mut messenger = Messenger::new(Peer::Node(agent), Box::new(wire));
     let welcome = join(&mut messenger, &JoinConfig { join: request, timeout })
         .map_err(|e| node_error(e, job))?;
@@ -57,7 +58,7 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
     let node = Node::new(agent, messenger, program, channel, &welcome)
         .with_lease(Duration::from_secs_f64(job.common.lease_s))
-        .with_listener(move |status| exporter.publish(|| node_metrics(&name, status)));
+        .with_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)));
     node.run().map(drop).map_err(|e| node_error(e, job))
 }
 

@@ -22,7 +22,7 @@ pub(super) struct PacketTable {
     rows: Vec<PacketRow>,
 }
 
-fn table() -> Table<PacketRow> {
+fn packets_table() -> Table<PacketRow> {
     Table::new("packets")
         .u64("cycle", "cycle of the talk", |(_, packet): &PacketRow| packet.cycle)
         .u64("sent", "tick in which it was sent", |(_, packet)| packet.sent)
@@ -52,7 +52,7 @@ impl PacketTable {
     /// # Errors
     /// When it cannot be written.
     pub(super) fn create(folder: &Path, scenario: &str, seed: u64) -> Result<Self, RecordError> {
-        let table = table();
+        let table = packets_table();
         let provenance =
             Provenance { program_version: VERSION.into(), scenario: scenario.into(), seed };
         let recorder = ParquetRecorder::create(folder, &[table.schema()], &provenance)?;

@@ -20,11 +20,11 @@ pub(super) struct ParentMonitor(Arc<AtomicBool>);
 
 impl ParentMonitor {
     /// Watches standard input from now on.
-    pub(super) fn watch() -> Self {
+    pub(super) fn watch_stdin() -> Self {
         let has_ended = Arc::new(AtomicBool::new(false));
         let ended = has_ended.clone();
         std::thread::spawn(move || {
-            wait_for_end();
+            wait_for_stdin_end();
             ended.store(true, Ordering::Relaxed);
             std::thread::sleep(SHUTDOWN_TIMEOUT);
             std::process::exit(INTERRUPTED_EXIT_CODE);
@@ -35,7 +35,7 @@ impl ParentMonitor {
     /// Exits when standard input ends: for a process that has nothing to store.
     pub(super) fn exit_with_parent() {
         std::thread::spawn(|| {
-            wait_for_end();
+            wait_for_stdin_end();
             std::process::exit(INTERRUPTED_EXIT_CODE);
         });
     }
@@ -46,7 +46,7 @@ impl ParentMonitor {
     }
 }
 
-fn wait_for_end() {
+fn wait_for_stdin_end() {
     let mut bytes = [0; 64];
     // Anything else on standard input is ignored.
     while std::io::stdin().lock().read(&mut bytes).is_ok_and(|read| read > 0) {}

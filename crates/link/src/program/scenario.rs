@@ -1,7 +1,7 @@
 //! The scenario of a server and its nodes.
 
 use crate::distributed::DistributedWorld;
-use crate::protocol::{ClockMode, Fingerprint};
+use crate::protocol::{ClockMode, ScenarioFingerprint};
 use crate::worlds::{distributed_world, fingerprint};
 use sidestep::kernel::InputError;
 use sidestep::scenario::{CompiledScenario, Source};
@@ -52,7 +52,7 @@ impl Scenario {
     ///
     /// # Errors
     /// When a file to which it refers cannot be read.
-    pub(super) fn fingerprint(&self) -> Result<Fingerprint, InputError> {
+    pub(super) fn fingerprint(&self) -> Result<ScenarioFingerprint, InputError> {
         fingerprint(self.compiled.as_ref(), &self.source)
     }
 

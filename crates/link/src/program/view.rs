@@ -43,12 +43,12 @@ impl ViewPublisher {
     }
 
     /// Publishes the newest frame with the present state of the nodes.
-    pub(super) fn publish(&mut self, fleet: &FleetStatus, is_over: bool) {
+    pub(super) fn publish_view(&mut self, fleet: &FleetStatus, is_over: bool) {
         let Some(frame) = &self.frame else { return };
         self.number += 1;
         let frame = Frame { log: self.events.clone(), ..frame.clone() };
         let view = FleetFrame { number: self.number, frame, fleet: fleet.clone(), is_over };
-        self.server.publish(self.number, to_json(&view));
+        self.server.set_latest(self.number, to_json(&view));
     }
 
     pub(super) fn is_watched(&self) -> bool {

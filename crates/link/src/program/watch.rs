@@ -24,12 +24,12 @@ pub(super) fn watch(job: &WatchJob, parent: &ParentMonitor) -> Result<(), Error>
     let client =
         ViewClient::new(&job.connect, job.tls.as_ref(), timeout).map_err(endpoint_error)?;
     let mut poller = ViewPoller { job, parent, timeout, last_reply: Instant::now() };
-    let Some(scene) = poller.poll_until_answered(|| client.scene())? else { return Ok(()) };
+    let Some(scene) = poller.poll_until_answered(|| client.query_scene())? else { return Ok(()) };
     // Before the rest is read: the scene of another build may have another form.
     check_build(&scene, job)?;
     print_message(&LinkMessage::Scene(Box::new(read::<FleetScene>(&scene, job)?)));
     let mut number = 0;
-    while let Some(text) = poller.poll_until_answered(|| client.view(number))? {
+    while let Some(text) = poller.poll_until_answered(|| client.query_view(number))? {
         if !text.is_empty() {
             let view: FleetFrame = read(&text, job)?;
             let is_over = view.is_over;

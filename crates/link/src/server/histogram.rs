@@ -38,12 +38,12 @@ impl Histogram {
             return None;
         }
         let rank = (fraction * self.count() as f64).ceil().max(1.0) as u64;
-        let bound = self.cumulative().find(|(_, count)| *count >= rank);
+        let bound = self.cumulative_counts().find(|(_, count)| *count >= rank);
         Some(bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
     }
 
     /// Returns, for each bound, the number of durations that do not exceed it.
-    pub fn cumulative(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
+    pub fn cumulative_counts(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         BUCKET_BOUNDS_S.iter().zip(&self.counts).scan(0, |sum, (&bound, &count)| {
             *sum += count;
             Some((bound, *sum))
@@ -62,7 +62,7 @@ mod tests {
             histogram.record(Duration::from_millis(ms));
         }
         let at_most = |bound_s: f64| {
-            histogram.cumulative().find(|(bound, _)| *bound == bound_s).expect("a bound").1
+            histogram.cumulative_counts().find(|(bound, _)| *bound == bound_s).expect("a bound").1
         };
         assert_eq!((at_most(0.001), at_most(0.002), at_most(0.005), at_most(60.0)), (1, 2, 3, 3));
         assert_eq!(histogram.count(), 4);

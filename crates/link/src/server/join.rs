@@ -1,25 +1,25 @@
 //! Joining: nodes ask, until every agent has one and all have received a message from each other.
 
-use super::{FleetError, NodeEntry, Server};
-use crate::protocol::{Incarnation, Join, JoinError, Member, Message};
+use super::{FleetError, FleetServer, NodeEntry};
+use crate::protocol::{FleetMember, Incarnation, JoinError, JoinRequest, Message};
 use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 
 /// A refusal of a node.
-struct Refusal {
+struct JoinRefusal {
     /// The name of the reason in metrics.
     reason: &'static str,
     /// The reason and the remedy, for the node's user.
     error: JoinError,
 }
 
-impl Refusal {
+impl JoinRefusal {
     fn new(reason: &'static str, cause: String, remedy: &str) -> Self {
         Self { reason, error: JoinError { cause, remedy: remedy.into() } }
     }
 }
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Waits until all nodes have joined and are ready.
     ///
     /// # Errors
@@ -31,8 +31,8 @@ impl Server<'_> {
     }
 
     /// Answers a node that asks to join. It repeats its request until it receives the answer.
-    pub(super) fn on_join(&mut self, agent: EntityId, incarnation: Incarnation, join: Join) {
-        if let Err(Refusal { reason, error }) = self.check_join(agent, incarnation, &join) {
+    pub(super) fn on_join(&mut self, agent: EntityId, incarnation: Incarnation, join: JoinRequest) {
+        if let Err(JoinRefusal { reason, error }) = self.check_join(agent, incarnation, &join) {
             let JoinError { cause, remedy } = &error;
             tracing::warn!(agent, process = join.process, cause, remedy, "a node is refused");
             *self.metrics.refused.entry(reason).or_default() += 1;
@@ -48,7 +48,7 @@ impl Server<'_> {
         }
         let process = join.process;
         if let Some(node) = self.nodes.get_mut(&agent) {
-            node.assign(Member { agent, incarnation, listens: join.listens }, process);
+            node.assign(FleetMember { agent, incarnation, listens: join.listens }, process);
         }
         let who = self.run.agent_label(agent);
         tracing::info!(agent, who, process, "a node has joined");
@@ -58,7 +58,7 @@ impl Server<'_> {
     /// Sends all nodes the list of members, once all have joined.
     fn send_roster(&mut self) {
         let members = self.nodes.values().map(|node| node.member.clone());
-        let Some(members) = members.collect::<Option<Vec<Member>>>() else { return };
+        let Some(members) = members.collect::<Option<Vec<FleetMember>>>() else { return };
         let joined: Vec<EntityId> = self.joined_agents().collect();
         for agent in joined {
             self.messenger.send_reliable(Peer::Node(agent), Message::Roster(members.clone()));
@@ -70,32 +70,36 @@ impl Server<'_> {
         &self,
         agent: EntityId,
         incarnation: Incarnation,
-        join: &Join,
-    ) -> Result<(), Refusal> {
+        join: &JoinRequest,
+    ) -> Result<(), JoinRefusal> {
         // A frame whose sender and content differ is of a faulty program.
         let Some(entry) = self.nodes.get(&agent).filter(|_| join.agent == agent) else {
             let cause = format!("the fleet has no agent {agent}");
-            return Err(Refusal::new("unknown", cause, &self.run.world().agent_hint()));
+            return Err(JoinRefusal::new("unknown", cause, &self.run.world().agent_hint()));
         };
         self.check_program(join)?;
         self.check_entry(entry, incarnation, join)
     }
 
     /// Refuses a node of another build or scenario.
-    fn check_program(&self, join: &Join) -> Result<(), Refusal> {
+    fn check_program(&self, join: &JoinRequest) -> Result<(), JoinRefusal> {
         if join.build != self.config.build {
             let cause = format!(
                 "the server is of sidestep {}, this node of {}",
                 self.config.build, join.build
             );
-            return Err(Refusal::new("build", cause, "install the same build on both machines"));
+            return Err(JoinRefusal::new(
+                "build",
+                cause,
+                "install the same build on both machines",
+            ));
         }
         if join.scenario != self.config.scenario {
             let cause = format!(
                 "the server flies another scenario (fingerprint {}, this node has read {})",
                 self.config.scenario, join.scenario
             );
-            return Err(Refusal::new(
+            return Err(JoinRefusal::new(
                 "scenario",
                 cause,
                 "give the node the same file and the same --set, --seed and --cycles as the server",
@@ -109,14 +113,14 @@ impl Server<'_> {
         &self,
         entry: &NodeEntry,
         incarnation: Incarnation,
-        join: &Join,
-    ) -> Result<(), Refusal> {
+        join: &JoinRequest,
+    ) -> Result<(), JoinRefusal> {
         let who = self.run.agent_label(join.agent);
         if entry.incarnation().is_some_and(|present| present != incarnation) {
             let cause = format!("{who} has a node already (process {})", entry.process);
             let noun = self.run.world().name(join.agent).noun;
             let remedy = format!("give the --{noun} of one that has none");
-            return Err(Refusal::new("taken", cause, &remedy));
+            return Err(JoinRefusal::new("taken", cause, &remedy));
         }
         let replaces_lost_node = entry.joins > 0 && entry.incarnation().is_none();
         if !replaces_lost_node || !self.has_begun {
@@ -124,14 +128,14 @@ impl Server<'_> {
         }
         if !self.allows_rejoin() {
             let cause = "the fleet flies in lockstep, and has begun".to_string();
-            return Err(Refusal::new("begun", cause, "start the fleet again"));
+            return Err(JoinRefusal::new("begun", cause, "start the fleet again"));
         }
         // The other nodes keep the endpoints of the first roster: their Zenoh sessions reconnect to these.
         if let Some(member) = &entry.member
             && member.listens != join.listens
         {
             let cause = format!("the other nodes look for {who} at {}", member.listens.join(", "));
-            return Err(Refusal::new("moved", cause, "give the same --listen as before"));
+            return Err(JoinRefusal::new("moved", cause, "give the same --listen as before"));
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Liveness of nodes: lost ones, and silent ones, for which a fleet in lockstep waits.
 
-use super::{FleetError, POLL_INTERVAL, Server};
+use super::{FleetError, FleetServer, POLL_INTERVAL};
 use crate::protocol::{ClockMode, Incarnation, JoinError, Message};
 use crate::wire::Peer;
 use sidestep::kernel::EntityId;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// Time after which a node that is not heard counts as silent: two of its reports are missing then.
 pub const SILENCE_TIMEOUT: Duration = Duration::from_secs(1);
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Returns whether a node that has joined was not heard for longer than some time.
     pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
         self.messenger.silent_for(Peer::Node(agent)).is_some_and(|silent| silent > time)

@@ -1,10 +1,10 @@
 //! Lockstep: the server waits for every control, so that a fleet gives the same results as one process, bit for bit.
 
-use super::rounds::Group;
-use super::{FleetError, POLL_INTERVAL, Server};
+use super::rounds::DecisionGroup;
+use super::{FleetError, FleetServer, POLL_INTERVAL};
 use std::time::Instant;
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Runs a cycle.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ impl Server<'_> {
 
     /// Returns whether all of a group have sent their controls, or one has no node: then the others may wait for its
     /// messages forever.
-    pub(super) fn has_decided(&self, group: &Group) -> bool {
+    pub(super) fn has_decided(&self, group: &DecisionGroup) -> bool {
         let has_lost = group.iter().any(|&agent| self.has_no_node(agent));
         has_lost || group.iter().all(|&agent| self.has_control(agent))
     }

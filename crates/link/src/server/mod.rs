@@ -20,8 +20,10 @@ mod rounds;
 mod ticks;
 
 use crate::hosted_run::HostedRun;
-use crate::messenger::{Messenger, Received};
-use crate::protocol::{AdvanceDone, ClockMode, Fingerprint, Message, PacketRecord, Welcome};
+use crate::messenger::{Messenger, ReceivedMessage};
+use crate::protocol::{
+    AdvanceDone, ClockMode, Message, PacketRecord, ScenarioFingerprint, Welcome,
+};
 use crate::wire::Peer;
 use histogram::Histogram;
 pub use liveness::SILENCE_TIMEOUT;
@@ -42,7 +44,7 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
     /// Fingerprint of the scenario, which every node must have found as well.
-    pub scenario: Fingerprint,
+    pub scenario: ScenarioFingerprint,
     /// The build of the program, which every node must have.
     pub build: String,
     /// The answer to nodes that may join.
@@ -134,7 +136,7 @@ pub struct ServerMetrics {
 }
 
 /// The server of a fleet.
-pub struct Server<'a> {
+pub struct FleetServer<'a> {
     messenger: Messenger,
     run: &'a mut HostedRun,
     hooks: &'a mut dyn ServerHooks,
@@ -153,7 +155,7 @@ pub struct Server<'a> {
     packets: Vec<(EntityId, PacketRecord)>,
 }
 
-impl<'a> Server<'a> {
+impl<'a> FleetServer<'a> {
     /// Returns a server that no node has joined yet.
     pub fn new(
         messenger: Messenger,
@@ -161,7 +163,7 @@ impl<'a> Server<'a> {
         hooks: &'a mut dyn ServerHooks,
         config: ServerConfig,
     ) -> Self {
-        let nodes = run.agents().map(|agent| (agent, NodeEntry::default())).collect();
+        let nodes = run.all_agents().map(|agent| (agent, NodeEntry::default())).collect();
         let now = Instant::now();
         Self {
             messenger,
@@ -293,7 +295,7 @@ impl<'a> Server<'a> {
         }
     }
 
-    fn on_message(&mut self, Received { from, incarnation, message }: Received) {
+    fn on_message(&mut self, ReceivedMessage { from, incarnation, message }: ReceivedMessage) {
         let Peer::Node(agent) = from else { return };
         if let Message::Join(join) = message {
             self.on_join(agent, incarnation, join);

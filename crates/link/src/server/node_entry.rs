@@ -1,12 +1,12 @@
 //! What the server knows of the node of an agent.
 
-use crate::protocol::{Incarnation, Member, Status};
+use crate::protocol::{FleetMember, Incarnation, Status};
 
 /// The entry of an agent in the server's list of nodes.
 #[derive(Debug, Default)]
 pub struct NodeEntry {
     /// Its node, if one has joined.
-    pub member: Option<Member>,
+    pub member: Option<FleetMember>,
     /// The process id of the node on its machine; 0 before any has joined.
     pub process: u32,
     /// Whether all other nodes have acknowledged the node's `Hello`.
@@ -38,7 +38,7 @@ impl NodeEntry {
 
     /// Records that a node has joined, in place of any other. The same node may join more than once, because its first
     /// answer may be lost.
-    pub fn assign(&mut self, member: Member, process: u32) {
+    pub fn assign(&mut self, member: FleetMember, process: u32) {
         let is_new =
             self.member.as_ref().is_none_or(|known| known.incarnation != member.incarnation);
         // A new process has received no `Hello` yet. One that only repeats its request stays as ready as it was.

@@ -4,8 +4,8 @@
 //! All times are the server's own, by its monotonic clock; each node measures the remaining time from the moment at which
 //! the cycle's start arrives. Clocks are never compared, so one that is wrong, or jumps, changes nothing.
 
-use super::rounds::Group;
-use super::{FleetError, Server};
+use super::rounds::DecisionGroup;
+use super::{FleetError, FleetServer};
 use std::time::{Duration, Instant};
 
 /// Fraction of a cycle by which it may start later than due without being counted as late. Without it each cycle would
@@ -15,7 +15,7 @@ const LATE_FRACTION: f64 = 0.1;
 /// The shortest cycle: timers are no more exact than that, so below it only lateness would be measured.
 const MIN_CYCLE: Duration = Duration::from_millis(1);
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Runs the world to its end, `speed` times as fast as in the scenario.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ impl Server<'_> {
     /// Waits for the controls of all agents that have nodes. Returns whether they have arrived by a time.
     fn receive_controls_until(
         &mut self,
-        groups: &[Group],
+        groups: &[DecisionGroup],
         until: Instant,
     ) -> Result<bool, FleetError> {
         while self.is_any_missing(groups) {
@@ -77,7 +77,7 @@ impl Server<'_> {
     }
 
     /// Returns whether the control of an agent that has a node is missing.
-    fn is_any_missing(&self, groups: &[Group]) -> bool {
+    fn is_any_missing(&self, groups: &[DecisionGroup]) -> bool {
         let mut agents = groups.iter().flatten();
         agents.any(|&agent| !self.has_no_node(agent) && !self.has_control(agent))
     }

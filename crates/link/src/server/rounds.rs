@@ -1,19 +1,19 @@
 //! Rounds of a cycle: percepts go out to the agents that decide next, and controls come in; after the last round the
 //! world advances.
 
-use super::{FleetError, Server};
-use crate::agent::{AgentPercept, Controls, InvalidControl};
+use super::{FleetError, FleetServer};
+use crate::agent::{AgentPercept, InvalidControl, SerializedControls};
 use crate::protocol::{Control, Message};
 use crate::wire::Peer;
 use sidestep::kernel::EntityId;
 use std::time::Instant;
 
 /// The agents that decide together.
-pub(super) type Group = Vec<EntityId>;
+pub(super) type DecisionGroup = Vec<EntityId>;
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Sends each agent that decides next its percept; returns the groups of agents that decide together.
-    pub(super) fn send_percepts(&mut self) -> Vec<Group> {
+    pub(super) fn send_percepts(&mut self) -> Vec<DecisionGroup> {
         self.nodes.values_mut().for_each(|node| node.control = None);
         let mut groups = Vec::new();
         for AgentPercept { agent, group, start } in self.run.percepts() {
@@ -40,8 +40,8 @@ impl Server<'_> {
     }
 
     /// Hands the world the controls that have arrived, and counts those that have not.
-    pub(super) fn accept_controls(&mut self, groups: &[Group]) {
-        let mut controls = Controls::new();
+    pub(super) fn accept_controls(&mut self, groups: &[DecisionGroup]) {
+        let mut controls = SerializedControls::new();
         let mut lost = Vec::new();
         for &agent in groups.iter().flatten() {
             if self.has_no_node(agent) {
@@ -90,7 +90,7 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Counts controls that [`Server::take_control`] has counted as carried out, and were not.
+    /// Counts controls that [`FleetServer::take_control`] has counted as carried out, and were not.
     fn record_invalid(&mut self, invalid: Vec<InvalidControl>) {
         for InvalidControl { agent, reason } in invalid {
             let who = self.run.agent_label(agent);
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::hosted_run::HostedRun;
     use crate::messenger::Messenger;
-    use crate::protocol::{ClockMode, Incarnation, Member, Topology, Welcome};
+    use crate::protocol::{ClockMode, FleetMember, Incarnation, Topology, Welcome};
     use crate::server::{FleetView, ServerConfig, ServerHooks};
     use crate::wire::memory::MemoryHub;
     use crate::worlds::distributed_world;
@@ -162,7 +162,7 @@ mod tests {
     }
 
     /// Returns the decisions of agents with these percepts that hear each other completely.
-    fn decide(run: &HostedRun, percepts: &[AgentPercept]) -> Controls {
+    fn decide(run: &HostedRun, percepts: &[AgentPercept]) -> SerializedControls {
         let program = |percept: &AgentPercept| {
             let mut program = run.world().program(percept.agent, "test");
             program.start_cycle(percept.start.cycle, &percept.start.percept).expect("a percept");
@@ -192,11 +192,11 @@ mod tests {
         let controls = decide(run, &percepts);
         let mut hooks = NoHooks;
         let messenger =
-            Messenger::new(Peer::Server, Box::new(MemoryHub::default().wire(Peer::Server)));
-        let mut server = Server::new(messenger, run, &mut hooks, config());
+            Messenger::new(Peer::Server, Box::new(MemoryHub::default().peer_wire(Peer::Server)));
+        let mut server = FleetServer::new(messenger, run, &mut hooks, config());
         server.has_begun = true;
         for agent in 0..3 {
-            let member = Member { agent, incarnation: Incarnation(1), listens: Vec::new() };
+            let member = FleetMember { agent, incarnation: Incarnation(1), listens: Vec::new() };
             server.nodes.get_mut(&agent).expect("an entry").assign(member, 0);
         }
         let groups = server.send_percepts();

@@ -6,8 +6,8 @@
 //! happens to the nodes at which it happens. No node advances to a tick before all packets that arrive by then are
 //! there: the grant says how many.
 
-use super::rounds::Group;
-use super::{FleetError, POLL_INTERVAL, Server};
+use super::rounds::DecisionGroup;
+use super::{FleetError, FleetServer, POLL_INTERVAL};
 use crate::protocol::{AdvanceDone, AdvanceGrant, Message};
 use crate::wire::Peer;
 use sidestep::kernel::EntityId;
@@ -100,12 +100,12 @@ impl GroupClock {
     }
 }
 
-impl Server<'_> {
+impl FleetServer<'_> {
     /// Runs the conversations of groups, tick by tick, until each agent has a control.
     ///
     /// # Errors
     /// When a node that the fleet needs is lost, or the fleet is asked to end.
-    pub(super) fn run_ticks(&mut self, groups: &[Group]) -> Result<(), FleetError> {
+    pub(super) fn run_ticks(&mut self, groups: &[DecisionGroup]) -> Result<(), FleetError> {
         let cycle = self.run.cycle();
         let mut clocks: Vec<GroupClock> =
             groups.iter().map(|group| GroupClock::new(group)).collect();

@@ -24,7 +24,7 @@ pub(super) fn certificate_problem(endpoint: &str, tls: &Tls) -> Option<String> {
     stream.set_read_timeout(Some(STEP_TIMEOUT)).ok()?;
     stream.set_write_timeout(Some(STEP_TIMEOUT)).ok()?;
     let name = ServerName::try_from(bare.to_string()).ok()?;
-    let mut connection = match config(tls) {
+    let mut connection = match tls_client_config(tls) {
         Ok(config) => ClientConnection::new(Arc::new(config), name).ok()?,
         Err(error) => return Some(format!("{}: {error}", tls.certificate.display())),
     };
@@ -34,7 +34,7 @@ pub(super) fn certificate_problem(endpoint: &str, tls: &Tls) -> Option<String> {
     describe_error(read.err()?, tls)
 }
 
-fn config(tls: &Tls) -> Result<ClientConfig, Error> {
+fn tls_client_config(tls: &Tls) -> Result<ClientConfig, Error> {
     let mut roots = RootCertStore::empty();
     for certificate in read_certificates(&tls.authority)? {
         roots.add(certificate)?;

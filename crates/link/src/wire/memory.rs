@@ -12,7 +12,7 @@ pub struct MemoryHub(Arc<Mutex<BTreeMap<Peer, Sender<Vec<u8>>>>>);
 
 impl MemoryHub {
     /// Returns the wire of a peer. Frames to the peer go to its newest wire.
-    pub fn wire(&self, me: Peer) -> MemoryWire {
+    pub fn peer_wire(&self, me: Peer) -> MemoryWire {
         let (sender, arrived) = channel();
         self.lock().insert(me, sender);
         MemoryWire { hub: self.clone(), arrived }

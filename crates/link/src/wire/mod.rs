@@ -19,7 +19,7 @@ pub mod view_server;
 pub mod zenoh;
 
 pub use crate::peer::Peer;
-use crate::protocol::Member;
+use crate::protocol::FleetMember;
 pub use endpoint::WireError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
@@ -36,13 +36,13 @@ pub trait Wire: Send {
     ///
     /// # Errors
     /// When an endpoint cannot be bound.
-    fn connect_mesh(&mut self, _me: EntityId, _members: &[Member]) -> Result<(), WireError> {
+    fn connect_mesh(&mut self, _me: EntityId, _members: &[FleetMember]) -> Result<(), WireError> {
         Ok(())
     }
 
     /// Probes a direct link, and returns whether it is half-open: it seems to be open, and its other end has answered no
     /// probe for some time. The ends answer by themselves, however busy their nodes are.
-    fn is_half_open(&mut self, _member: &Member, _within: Duration) -> bool {
+    fn is_half_open(&mut self, _member: &FleetMember, _within: Duration) -> bool {
         false
     }
 
@@ -64,11 +64,11 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
         (**self).receive(within)
     }
 
-    fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+    fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
         (**self).connect_mesh(me, members)
     }
 
-    fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
+    fn is_half_open(&mut self, member: &FleetMember, within: Duration) -> bool {
         (**self).is_half_open(member, within)
     }
 

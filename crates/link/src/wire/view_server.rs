@@ -74,13 +74,13 @@ impl ViewServer {
     /// # Errors
     /// When the wire is closed.
     pub fn open(wire: &ZenohWire, scene: String) -> Result<Self, WireError> {
-        let session = wire.session().clone();
+        let session = wire.server_session().clone();
         let latest = Arc::new(Mutex::new(LatestView::default()));
         let scenes = session
             .declare_queryable(SCENE_KEY)
             .callback(move |query| reply(&query, scene.clone()))
             .wait()
-            .map_err(|e| closed(&e))?;
+            .map_err(|e| closed_wire_error(&e))?;
         let queried = latest.clone();
         let views = session
             .declare_queryable(VIEW_KEY)
@@ -90,7 +90,7 @@ impl ViewServer {
                 reply(&query, text);
             })
             .wait()
-            .map_err(|e| closed(&e))?;
+            .map_err(|e| closed_wire_error(&e))?;
         Ok(Self { latest, _queryables: [scenes, views], _session: session })
     }
 
@@ -100,7 +100,7 @@ impl ViewServer {
     }
 
     /// Makes a view the newest one; its number is above all earlier ones.
-    pub fn publish(&self, number: u64, text: String) {
+    pub fn set_latest(&self, number: u64, text: String) {
         let mut latest = lock(&self.latest);
         latest.number = number;
         latest.text = text;
@@ -120,7 +120,7 @@ impl ViewServer {
     }
 }
 
-fn closed(error: &zenoh::Error) -> WireError {
+fn closed_wire_error(error: &zenoh::Error) -> WireError {
     WireError::Taken { endpoint: VIEW_KEY.into(), reason: error.to_string() }
 }
 
@@ -148,12 +148,12 @@ impl ViewClient {
     }
 
     /// Queries the unchanging part; `None` when there is no reply.
-    pub fn scene(&self) -> Option<String> {
+    pub fn query_scene(&self) -> Option<String> {
         self.query(SCENE_KEY)
     }
 
     /// Queries a view newer than the one with a number: empty if there is none. `None` when there is no reply.
-    pub fn view(&self, after: u64) -> Option<String> {
+    pub fn query_view(&self, after: u64) -> Option<String> {
         self.query(&format!("{VIEW_KEY}?after={after}"))
     }
 

@@ -8,7 +8,7 @@ mod echo;
 
 use super::endpoint::{PortReservation, WireError, check_vacant, endpoint_in_use, host_and_port};
 use super::{Peer, Wire, handshake};
-use crate::protocol::Member;
+use crate::protocol::FleetMember;
 use echo::EchoProbes;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
@@ -146,7 +146,7 @@ struct ZenohLink {
 const ZENOH_ID_MASK: u128 = u128::MAX >> 32;
 
 /// Returns the id of a node in its present incarnation.
-fn zenoh_id(member: &Member) -> u128 {
+fn zenoh_id(member: &FleetMember) -> u128 {
     u128::from(member.agent) << 64 | u128::from(member.incarnation.0)
 }
 
@@ -207,11 +207,11 @@ impl ZenohLink {
         let key = self.keys.entry(to).or_insert_with(|| {
             KeyExpr::try_from(peer_key(to)).expect("a path of letters and digits is a key")
         });
-        put(&self.session, key, frame, None);
+        put_frame(&self.session, key, frame, None);
     }
 
     /// Returns whether there is a link to another node that shows signs of life, even if nothing else arrives through it.
-    fn is_open_to(&self, member: &Member) -> bool {
+    fn is_open_to(&self, member: &FleetMember) -> bool {
         let wanted = zenoh_id(member);
         let mut peers = self.session.info().peers_zid().wait();
         peers.any(|id| u128::from_le_bytes(id.to_le_bytes()) & ZENOH_ID_MASK == wanted)
@@ -220,12 +220,17 @@ impl ZenohLink {
     /// Sends a frame to all nodes that this session reaches, except itself.
     fn broadcast(&self, frame: &[u8]) {
         let key = KeyExpr::try_from(BROADCAST_KEY).expect("a path of letters is a key");
-        put(&self.session, &key, frame, None);
+        put_frame(&self.session, &key, frame, None);
     }
 }
 
 /// Publishes a frame, or with an attachment a probe.
-fn put(session: &Session, key: &KeyExpr<'_>, frame: &[u8], attachment: Option<&'static [u8]>) {
+fn put_frame(
+    session: &Session,
+    key: &KeyExpr<'_>,
+    frame: &[u8],
+    attachment: Option<&'static [u8]>,
+) {
     // Not by a declared publisher: declaring one in a client waits for the other end first.
     let put = session.put(key, frame).attachment(attachment).allowed_destination(Locality::Remote);
     // An error is like a loss in transit.
@@ -237,7 +242,7 @@ impl ZenohWire {
     ///
     /// # Errors
     /// When one of them cannot be bound.
-    pub fn server(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
+    pub fn server_wire(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
         // Zenoh's own error names no endpoint.
         listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
         let config = ZenohConfig { mode: "router", listen, tls, ..ZenohConfig::default() };
@@ -249,7 +254,7 @@ impl ZenohWire {
     ///
     /// # Errors
     /// When none of them answers within some time, or a certificate is rejected.
-    pub fn node(
+    pub fn node_wire(
         me: Peer,
         connect: &[String],
         tls: Option<&Tls>,
@@ -317,7 +322,7 @@ impl ZenohWire {
 
 impl ZenohWire {
     /// Returns the server's session, for queries of viewers.
-    pub(super) fn session(&self) -> &Session {
+    pub(super) fn server_session(&self) -> &Session {
         &self.hub.session
     }
 }
@@ -374,7 +379,7 @@ impl Wire for ZenohWire {
         self.frames.recv_timeout(within).ok()
     }
 
-    fn connect_mesh(&mut self, me: EntityId, members: &[Member]) -> Result<(), WireError> {
+    fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
         let others = members.iter().map(|member| Peer::Node(member.agent));
         self.other_nodes = others.filter(|&peer| peer != self.me).collect();
         self.other_nodes.sort_unstable();
@@ -389,7 +394,7 @@ impl Wire for ZenohWire {
         self.open_mesh()
     }
 
-    fn is_half_open(&mut self, member: &Member, within: Duration) -> bool {
+    fn is_half_open(&mut self, member: &FleetMember, within: Duration) -> bool {
         let (Some(mesh), Peer::Node(me)) = (&self.mesh, self.me) else { return false };
         mesh.is_open_to(member) && self.echoes.probe(&mesh.session, me, member.agent, within)
     }

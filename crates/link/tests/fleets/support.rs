@@ -4,14 +4,14 @@ use serde_json::Value;
 use sidestep::kernel::{Cycle, EntityId};
 use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::WORLDS;
-use sidestep_link::agent::{Activity, AgentProgram, OutgoingPacket};
+use sidestep_link::agent::{AgentActivity, AgentProgram, OutgoingPacket};
 use sidestep_link::distributed::DistributedWorld;
 use sidestep_link::hosted_run::HostedRun;
 use sidestep_link::messenger::Messenger;
 use sidestep_link::node::{JoinConfig, Node, NodeError, join};
-use sidestep_link::protocol::{ClockMode, Join, Status, Topology, Welcome};
+use sidestep_link::protocol::{ClockMode, JoinRequest, Status, Topology, Welcome};
 use sidestep_link::server::{
-    FleetError, FleetView, Server, ServerConfig, ServerHooks, ServerMetrics,
+    FleetError, FleetServer, FleetView, ServerConfig, ServerHooks, ServerMetrics,
 };
 use sidestep_link::wire::{Peer, Wire};
 use sidestep_link::worlds::{distributed_world, fingerprint};
@@ -155,7 +155,7 @@ impl AgentProgram for FaultyProgram {
         self.0.control().map(|control| control[..control.len() / 2].to_vec())
     }
 
-    fn activity(&self) -> Activity {
+    fn activity(&self) -> AgentActivity {
         self.0.activity()
     }
 
@@ -196,7 +196,7 @@ pub(crate) fn run_in_threads(
     let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.count() as EntityId)
         .map(|agent| {
             let messenger = Messenger::new(Peer::Node(agent), (setup.wire)(Peer::Node(agent)));
-            let join = Join {
+            let join = JoinRequest {
                 agent,
                 scenario: scenario.clone(),
                 build: "test".into(),
@@ -209,7 +209,7 @@ pub(crate) fn run_in_threads(
             spawn(move || run_node(messenger, join, world, lease, is_liar))
         })
         .collect();
-    let (flown, metrics) = Server::new(messenger, &mut run, setup.hooks, config).run();
+    let (flown, metrics) = FleetServer::new(messenger, &mut run, setup.hooks, config).run();
     for node in nodes {
         let ended = node.join().expect("no panic");
         match (&flown, ended) {
@@ -222,7 +222,7 @@ pub(crate) fn run_in_threads(
 
 fn run_node(
     mut messenger: Messenger,
-    request: Join,
+    request: JoinRequest,
     world: Arc<dyn DistributedWorld>,
     lease: Duration,
     is_liar: bool,

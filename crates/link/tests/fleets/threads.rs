@@ -26,7 +26,7 @@ pub(crate) fn run_over_memory(text: &str) -> crate::support::RunResult {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
-        wire: &|me| Box::new(exchange.wire(me)),
+        wire: &|me| Box::new(exchange.peer_wire(me)),
         listens: &|_| Vec::new(),
         hooks: &mut NoHooks,
         liar: None,
@@ -90,9 +90,10 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
         let wire = |me: Peer| -> Box<dyn Wire> {
             let at = std::slice::from_ref(&server);
             let Peer::Node(agent) = me else {
-                return Box::new(ZenohWire::server(at, None).expect("a server"));
+                return Box::new(ZenohWire::server_wire(at, None).expect("a server"));
             };
-            let wire = ZenohWire::node(me, at, None, TEST_TIMEOUT).expect("the server answers");
+            let wire =
+                ZenohWire::node_wire(me, at, None, TEST_TIMEOUT).expect("the server answers");
             let held = ports.get(agent as usize).map(|port| reserve_port(port).expect("free"));
             Box::new(wire.with_listeners(held.into_iter().collect()))
         };
@@ -122,7 +123,7 @@ fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
-        wire: &|me| Box::new(exchange.wire(me)),
+        wire: &|me| Box::new(exchange.peer_wire(me)),
         listens: &|_| Vec::new(),
         hooks: &mut NoHooks,
         liar: Some(1),

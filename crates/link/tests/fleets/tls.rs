@@ -140,8 +140,9 @@ fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
     let Some(ours) = authority(folder.path(), "ours", 2) else { return };
     let Some(old) = certificate(folder.path(), "ours", "old", -1) else { return };
     let at = [reserve_port("tls/127.0.0.1:0").expect("a free port").endpoint];
-    let _server = ZenohWire::server(&at, Some(&ours)).expect("a server");
-    let node = |tls: &Tls| ZenohWire::node(Peer::Node(0), &at, Some(tls), Duration::from_secs(30));
+    let _server = ZenohWire::server_wire(&at, Some(&ours)).expect("a server");
+    let node =
+        |tls: &Tls| ZenohWire::node_wire(Peer::Node(0), &at, Some(tls), Duration::from_secs(30));
     match node(&old).map(drop) {
         Err(WireError::Distrust { endpoint, reason }) => {
             assert_eq!(endpoint, at[0]);

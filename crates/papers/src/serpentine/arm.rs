@@ -86,7 +86,7 @@ fn target(arm: &SerialChain, draws: &mut Draws) -> Point<3> {
     let skeleton = arm.skeleton();
     loop {
         let values = joint_values_at_random(arm, draws);
-        let places = arm.connectors(&skeleton, &arm.forward(&values));
+        let places = arm.connectors(&skeleton, &arm.forward_kinematics(&values));
         let is_above = places.iter().all(|p| p[2] > MIN_PILLAR_DISTANCE_M);
         if is_above && is_apart(&places) && places.windows(2).all(is_clear_of_pillars) {
             return places[places.len() - 1];
@@ -185,7 +185,7 @@ impl JointMeasures {
         if speed > 1.0 + 1e-9 {
             self.too_fast += 1;
         }
-        let placed = arm.forward(&now).tip.origin_m;
+        let placed = arm.forward_kinematics(&now).tip.origin_m;
         if let Some(tool) = run.state().body(0).chain.points().last() {
             for axis in 0..3 {
                 self.off_m = self.off_m.max((tool[axis] - placed[axis]).abs());

@@ -12,7 +12,7 @@ use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::stream::Draws;
 use sidestep::rods::geometry::{Point, add_scaled, distance};
-use sidestep::rods::rebuild::{MovableEnd, ReformResult, reform};
+use sidestep::rods::rebuild::{MovableEnd, ReformResult, reform_chain};
 use sidestep::rods::{Chain, Connector, Rod};
 use sidestep_document::{Table, estimate::format_short};
 
@@ -127,7 +127,7 @@ pub(super) fn before_and_after(seed: u64) -> Result<[Vec<Point<2>>; 2], InputErr
     let case = BreakCase { scattered: 20, by_m: 5.0, gone: 2, may_come: true };
     let (mut chain, scattered) = broken_chain(&case, seed)?;
     let before = chain.points().to_vec();
-    reform(&mut chain, scattered, MovableEnd::Last)?;
+    reform_chain(&mut chain, scattered, MovableEnd::Last)?;
     Ok([before, chain.points().to_vec()])
 }
 
@@ -137,7 +137,7 @@ fn rejoin(case: &BreakCase, seed: u64) -> Result<Json, InputError> {
     let (low, high) = (*scattered.start() - 1, *scattered.end() + 1);
     let can = distance(before[low], before[high]) <= ROD.max_m * (high - low) as f64;
     let may_come = if case.may_come { MovableEnd::Last } else { MovableEnd::Nobody };
-    let came = reform(&mut chain, scattered, may_come)?;
+    let came = reform_chain(&mut chain, scattered, may_come)?;
     let passes = match came {
         ReformResult::Whole { double_passes } => Some(double_passes),
         _ => None,

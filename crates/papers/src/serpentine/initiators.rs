@@ -10,8 +10,8 @@ use sidestep::kernel::distr::normal;
 use sidestep::kernel::stream::Draws;
 use sidestep::rods::geometry::{Point, add_scaled, distance, normalized};
 use sidestep::rods::{
-    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, Obstacles, Outcome, Propagator, Request, Rod,
-    VetoReason,
+    BEND_TOLERANCE_RAD, Chain, Connector, Mobility, MotionOutcome, MotionRequest, Obstacles,
+    Propagator, Rod, VetoReason,
 };
 use sidestep::worlds::chain::{ChainRun, chain_run};
 use sidestep_document::Table;
@@ -103,8 +103,12 @@ fn part(chain: &Chain<3>, range: std::ops::RangeInclusive<usize>) -> Result<Chai
     )
 }
 
-fn propagate(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<Outcome<3>, InputError> {
-    Propagator::default().propagate(chain, &Obstacles::default(), &Request::exact(k, to))
+fn propagate(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<MotionOutcome<3>, InputError> {
+    Propagator::default().propagate(
+        chain,
+        &Obstacles::default(),
+        &MotionRequest::operator_request(k, to),
+    )
 }
 
 fn count_motions(seed: u64) -> Result<InitiatorCounts, InputError> {
@@ -202,7 +206,8 @@ fn wander<const D: usize>(limit_rad: f64, seed: u64) -> Result<BendLimitRun, Inp
         u = normalized(add_scaled(u, direction(draws), 0.3)).unwrap_or(u);
         let k = draws.uniform_below(CONNECTORS as u32) as usize;
         let to = add_scaled(chain.points()[k], u, STEP_M);
-        let outcome = propagator.propagate(&mut chain, &nothing, &Request::exact(k, to))?;
+        let outcome =
+            propagator.propagate(&mut chain, &nothing, &MotionRequest::operator_request(k, to))?;
         came.moved.push(outcome.motion().is_some());
         let is_other = outcome.veto().is_some_and(|veto| veto.reason != VetoReason::BendLimit);
         came.other_vetoes += u64::from(is_other);

@@ -7,14 +7,16 @@ use crate::study::{Progress, Study, outcome_from_values, setting, setting_number
 use cpu_time::ThreadTime;
 use serde::Serialize;
 use serde_json::{Value as Json, json};
-use sidestep::arms::ik::{ChainIkGoal, Engine, IkSolver};
+use sidestep::arms::ik::{ChainIkGoal, IkEngine, IkSolver};
 use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::kernel::math::powf;
 use sidestep::kernel::stream::Draws;
 use sidestep::rods::geometry::{Point, add_scaled, distance, normalized, scaled};
-use sidestep::rods::{Chain, Connector, Mobility, Obstacles, Propagator, Request, Rod, Rules};
+use sidestep::rods::{
+    Chain, Connector, Mobility, MotionRequest, Obstacles, Propagator, ReactionRules, Rod,
+};
 use sidestep_document::figure::Scale;
 use sidestep_document::{Figure, FigureKind, Table};
 
@@ -162,28 +164,28 @@ fn solve(case: &PostureCase, seed: u64) -> Result<Json, InputError> {
     let target = scaled(direction(draws), TARGET_REACH_FRACTION * reach_m * radius_fraction);
     let engine = match case.way {
         IkMethod::Veto | IkMethod::FreeBase => return pull(&mut chain, tip, target),
-        IkMethod::ThereAndBack => Engine::Chain,
-        IkMethod::LeastSquares => Engine::Dls,
+        IkMethod::ThereAndBack => IkEngine::Chain,
+        IkMethod::LeastSquares => IkEngine::Dls,
     };
     let goal = ChainIkGoal {
         engine,
         tolerance_m: TOLERANCE_FRACTION * reach_m,
         ..ChainIkGoal::new(tip, 0, target)
     };
-    let mut solver = IkSolver::new(Rules::default());
+    let mut solver = IkSolver::new(ReactionRules::default());
     let began = ThreadTime::now();
     let answer = solver.solve(&chain, &Obstacles::default(), &goal)?;
     let us = 1e6 * began.elapsed().as_secs_f64();
     Ok(json!({
         "reached": answer.reached,
-        "finished": answer.engine == Engine::Direct,
+        "finished": answer.engine == IkEngine::Direct,
         "us": us,
         "iterations": answer.iterations,
     }))
 }
 
 fn pull(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
-    let request = Request::exact(tip, target);
+    let request = MotionRequest::operator_request(tip, target);
     let began = ThreadTime::now();
     let outcome = Propagator::default().propagate(chain, &Obstacles::default(), &request)?;
     let us = 1e6 * began.elapsed().as_secs_f64();

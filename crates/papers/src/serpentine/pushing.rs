@@ -12,8 +12,10 @@ use sidestep::experiment::sweep::{Setting, Variant};
 use sidestep::kernel::InputError;
 use sidestep::kernel::distr::normal;
 use sidestep::rods::geometry::add_scaled;
-use sidestep::rods::{Chain, Connector, Obstacles, Outcome, Propagator, Request, Rod, Rules};
-use sidestep::worlds::chain::ground::{Corridor, Leg};
+use sidestep::rods::{
+    Chain, Connector, MotionOutcome, MotionRequest, Obstacles, Propagator, ReactionRules, Rod,
+};
+use sidestep::worlds::chain::ground::{Corridor, CorridorLeg};
 use sidestep_document::{Figure, FigureKind, Table};
 use std::collections::BTreeSet;
 
@@ -107,11 +109,14 @@ fn chain(max_bend_deg: f64) -> Result<Chain<2>, InputError> {
 
 /// Runs a case until some part objects; returns the distance and the measures on the way.
 fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
-    let walls = Corridor::new(vec![Leg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
+    let walls = Corridor::new(vec![CorridorLeg::Straight { length_m: 40.0 }], WIDTH_M)?.walls(0);
     // The longest rod, 0.8 m, with the radii of its ends.
     let obstacles = Obstacles::new(walls, 1.3)?;
     let mut chain = chain(setting_number(case, "max_bend_deg"))?;
-    let rules = Rules { self_collision: is_set(case, "self_collision"), ..Rules::default() };
+    let rules = ReactionRules {
+        self_collision: is_set(case, "self_collision"),
+        ..ReactionRules::default()
+    };
     let mut propagator = Propagator::new(rules);
     let draws = &mut draws(seed);
     let k = if is_set(case, "by_head") { 0 } else { TAIL };
@@ -124,8 +129,8 @@ fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
         let way_m = STEP_M * step as f64;
         let to =
             add_scaled(add_scaled(start, [-1.0, 0.0], way_m), [0.0, 1.0], NOISE_M * normal(draws));
-        if let Outcome::Vetoed(veto) =
-            propagator.propagate(&mut chain, &obstacles, &Request::exact(k, to))?
+        if let MotionOutcome::Vetoed(veto) =
+            propagator.propagate(&mut chain, &obstacles, &MotionRequest::operator_request(k, to))?
         {
             reason = Some(veto.reason.name());
             break;

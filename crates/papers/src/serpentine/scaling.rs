@@ -9,7 +9,7 @@ use serde::Serialize;
 use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::{Digest, InputError};
 use sidestep::rods::geometry::{Point, add_scaled, normalized};
-use sidestep::rods::{Chain, Connector, Obstacle, Obstacles, Propagator, Request, Rod};
+use sidestep::rods::{Chain, Connector, MotionRequest, Obstacle, Obstacles, Propagator, Rod};
 use sidestep_document::figure::{Point as FigurePoint, Scale};
 use sidestep_document::{Estimate, Figure, Series, Table};
 
@@ -105,7 +105,8 @@ fn lead(
     let mut moved = 0;
     let began = ThreadTime::now();
     for k in motions {
-        let outcome = propagator.propagate(chain, obstacles, &Request::exact(0, head(k)))?;
+        let outcome =
+            propagator.propagate(chain, obstacles, &MotionRequest::operator_request(0, head(k)))?;
         moved += outcome.motion().map_or(0, |m| m.touched.len());
     }
     Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))

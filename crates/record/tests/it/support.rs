@@ -39,7 +39,7 @@ pub(crate) fn rows(from: u64, to: u64) -> Vec<Values> {
 
 /// `blocks` put behind each other.
 pub(crate) fn joined(blocks: &[Vec<Values>]) -> Vec<Values> {
-    let mut all: Vec<_> = blocks[0].iter().map(|v| Values::empty(v.ty())).collect();
+    let mut all: Vec<_> = blocks[0].iter().map(|v| Values::empty(v.column_type())).collect();
     for block in blocks {
         all.iter_mut().zip(block).for_each(|(column, values)| column.append(values));
     }

@@ -243,8 +243,9 @@ fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
         Values::Text(all().map(|v| v.map(|k| format!("a{}", k % 7))).collect()),
     ];
     let spec = |values: &Values| {
-        let labels = if values.ty() == ColumnType::Label { &["no", "yes"][..] } else { &[] };
-        let spec = column(values.ty().name(), values.ty(), labels);
+        let labels =
+            if values.column_type() == ColumnType::Label { &["no", "yes"][..] } else { &[] };
+        let spec = column(values.column_type().name(), values.column_type(), labels);
         ColumnSpec { is_nullable: missing <= rows, ..spec }
     };
     (TableSchema::new("t", blocks.iter().map(spec).collect()), blocks)

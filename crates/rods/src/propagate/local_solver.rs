@@ -3,7 +3,7 @@
 //! surroundings, and nothing else (slide E4), so that it can run as an agent aboard a robot.
 
 use super::{DrivenConnectors, check, count_sub_steps, project};
-use crate::candidates::{CandidateScratch, guide};
+use crate::candidates::{CandidateScratch, follow_guide_line};
 use crate::chain::{Chain, Rod};
 use crate::geometry::{Point, distance};
 use crate::motion_context::{
@@ -12,8 +12,8 @@ use crate::motion_context::{
 use crate::obstacle::Obstacles;
 use crate::reaction::Reaction;
 use crate::rod_bvh::RodBvh;
-use crate::rules::{Rotation, Rules};
-use crate::veto::{Motion, VetoEffect};
+use crate::rules::{ReactionRules, RotationRule};
+use crate::veto::{RequestedMotion, VetoEffect};
 use sidestep_kernel::InputError;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ pub struct LocalSolver<const D: usize> {
     /// A chain of this connector only. It has the least move and the step length of the whole one,
     /// so that the connector decides as it would inside it.
     chain: Chain<D>,
-    rules: Rules,
+    rules: ReactionRules,
     /// Its reaction, unless it is the built-in one.
     reaction: Option<Arc<dyn Reaction>>,
     scratch: CandidateScratch<D>,
@@ -82,8 +82,8 @@ pub struct SlaveReaction<const D: usize> {
 impl<const D: usize> LocalSolver<D> {
     /// Returns connector `k` of a chain, which reacts by the chain's rules, except that it does not
     /// check for collisions of the chain with itself: it does not know where the other parts are.
-    pub fn new(chain: &Chain<D>, k: usize, rules: &Rules) -> Self {
-        let rules = Rules { self_collision: false, ..*rules };
+    pub fn new(chain: &Chain<D>, k: usize, rules: &ReactionRules) -> Self {
+        let rules = ReactionRules { self_collision: false, ..*rules };
         Self {
             chain: chain.single_connector(k),
             rules,
@@ -120,7 +120,7 @@ impl<const D: usize> LocalSolver<D> {
 
     /// Returns whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
     pub fn should_repeat(&self) -> bool {
-        self.rules.rotation == Rotation::Union
+        self.rules.rotation == RotationRule::Union
     }
 
     /// Returns its reaction as a slave to the motion of its master.
@@ -184,7 +184,7 @@ impl<const D: usize> LocalSolver<D> {
     /// Returns its reaction where nothing can object.
     fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> SlaveReaction<D> {
         let SlavePosition { so, rod, next } = *slave;
-        let at = guide([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
+        let at = follow_guide_line([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
         let is_next_allowed =
             next.is_none_or(|(beyond, rod)| is_length_allowed(rod, distance(so, beyond)));
         let ends = at == so && is_next_allowed;
@@ -204,7 +204,7 @@ impl<const D: usize> LocalSolver<D> {
     ) -> Result<usize, InputError> {
         check(
             &self.chain,
-            &DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to }),
+            &DrivenConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to }),
         )?;
         count_sub_steps(&self.rules, self.chain.step_m(), is_empty, distance(from, to))
     }
@@ -215,7 +215,8 @@ impl<const D: usize> LocalSolver<D> {
     /// The constraint because of which it objects.
     pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
-        let mut driven = DrivenConnectors::from_motion(&Motion::Connector { k: SELF_INDEX, to });
+        let mut driven =
+            DrivenConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to });
         project(&self.chain, &mut driven, VetoEffect::Exact).map_err(|(_, objection)| objection)
     }
 

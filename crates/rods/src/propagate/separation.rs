@@ -15,7 +15,7 @@ use std::ops::Range;
 /// The schedule of proofs: exponential backoff. The effort of a proof that fails is lost, so every
 /// failure doubles the number of motions until the next attempt. No result depends on it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct ProofSchedule {
+pub(super) struct SeparationProofSchedule {
     until_next: u32,
     pause: u32,
 }
@@ -24,7 +24,7 @@ pub(super) struct ProofSchedule {
 /// that has opened up again moves fast after 256 motions at the latest. The value trades these off, and was not tuned.
 const MAX_PAUSE: u32 = 256;
 
-impl ProofSchedule {
+impl SeparationProofSchedule {
     /// Returns whether a proof is due for this motion, and counts the motion.
     #[inline]
     fn is_due(&mut self) -> bool {
@@ -57,13 +57,13 @@ impl<const D: usize> Propagator<D> {
         driven: &DrivenConnectors<D>,
         is_last: bool,
     ) -> bool {
-        if !MotionBounds::is_worthwhile(chain) {
+        if !MotionBounds::is_long_enough(chain) {
             return false;
         }
         self.motion_bounds.record(chain);
         let mut tally = MotionTally::start(driven.first);
         let head_m = distance(chain.points()[driven.first], driven.to[0]);
-        open::pull(chain, driven.first, driven.to[0], StayRule::Nearly, &mut tally);
+        open::pull_connector(chain, driven.first, driven.to[0], StayRule::Nearly, &mut tally);
         let travel_m = head_m.max(tally.max_slave_step_m);
         let holds = self.is_proven(chain, &tally, travel_m);
         if holds {
@@ -90,7 +90,7 @@ impl<const D: usize> Propagator<D> {
         let is_eligible = self.rules.self_collision
             && (2..=open::MAX_BATCH).contains(&n)
             && is_open(chain, obstacles, driven)
-            && MotionBounds::is_worthwhile(chain);
+            && MotionBounds::is_long_enough(chain);
         let k = driven.first;
         let from = driven.positions(chain);
         // Sub-steps below the least move are skipped one by one, and must not be in a batch.
@@ -137,7 +137,7 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         driven: &DrivenConnectors<D>,
     ) -> bool {
-        if !MotionBounds::is_worthwhile(chain) || !self.proofs.is_due() {
+        if !MotionBounds::is_long_enough(chain) || !self.proofs.is_due() {
             return false;
         }
         let rotated = self.tally.rotated;
@@ -158,7 +158,7 @@ impl<const D: usize> Propagator<D> {
     /// Returns whether the new places bring no part near another.
     fn are_separated(&mut self, chain: &mut Chain<D>) -> bool {
         self.motion_bounds.record(chain);
-        let run = self.tentative.run();
+        let run = self.tentative.moved_range();
         let moves = self.tentative.positions().iter().zip(&chain.points()[run.clone()]);
         let travel_m = moves.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
         // The bounds measure a chain, so it is moved for them and put back.

@@ -51,8 +51,10 @@ fn go<const D: usize>(
     obstacles: &Obstacles<D>,
     k: usize,
     to: Point<D>,
-) -> Outcome<D> {
-    Propagator::default().propagate(chain, obstacles, &Request::exact(k, to)).unwrap()
+) -> MotionOutcome<D> {
+    Propagator::default()
+        .propagate(chain, obstacles, &MotionRequest::operator_request(k, to))
+        .unwrap()
 }
 
 /// A random walk of rods within limits.
@@ -68,7 +70,7 @@ fn crooked<const D: usize>(seed: u64, n_rods: usize, rod: Rod, radius_m: f64) ->
 }
 
 /// Wanders through a field of balls; the laws hold at every step.
-fn wander<const D: usize>(seed: u64, rules: Rules, steps: usize, max_bend_rad: f64) {
+fn wander<const D: usize>(seed: u64, rules: ReactionRules, steps: usize, max_bend_rad: f64) {
     let rod = Rod { min_m: 0.25, max_m: 0.3, radius_m: 0.02 };
     let mut connector = Connector::free(0.05);
     connector.max_bend_rad = max_bend_rad;
@@ -83,13 +85,16 @@ fn wander<const D: usize>(seed: u64, rules: Rules, steps: usize, max_bend_rad: f
     for _ in 0..steps {
         let before = bits(&chain);
         let to = walk.next(chain.points()[0], 0.03);
-        match propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to)).unwrap() {
-            Outcome::Vetoed(_) => {
+        match propagator
+            .propagate(&mut chain, &obstacles, &MotionRequest::operator_request(0, to))
+            .unwrap()
+        {
+            MotionOutcome::Vetoed(_) => {
                 assert_eq!(bits(&chain), before, "a veto leaves every bit");
                 vetoes += 1;
                 walk.turn_anywhere();
             }
-            Outcome::Moved(moved) => {
+            MotionOutcome::Moved(moved) => {
                 moves += 1;
                 let after = bits(&chain);
                 let changed: Vec<_> = (0..after.len()).filter(|&i| after[i] != before[i]).collect();
@@ -110,20 +115,20 @@ fn wander<const D: usize>(seed: u64, rules: Rules, steps: usize, max_bend_rad: f
 
 const BEND_TOLERANCE: f64 = 1.1e-9;
 
-fn own() -> Rules {
-    Rules { self_collision: true, ..Rules::default() }
+fn own() -> ReactionRules {
+    ReactionRules { self_collision: true, ..ReactionRules::default() }
 }
 
 #[test]
 fn laws_hold_in_the_plane() {
-    (0..6).for_each(|seed| wander::<2>(seed, Rules::default(), 150, std::f64::consts::PI));
+    (0..6).for_each(|seed| wander::<2>(seed, ReactionRules::default(), 150, std::f64::consts::PI));
     (0..4).for_each(|seed| wander::<2>(seed, own(), 100, std::f64::consts::PI));
-    (0..4).for_each(|seed| wander::<2>(seed, Rules::default(), 100, 1.2));
+    (0..4).for_each(|seed| wander::<2>(seed, ReactionRules::default(), 100, 1.2));
 }
 
 #[test]
 fn laws_hold_in_space() {
-    (0..4).for_each(|seed| wander::<3>(seed, Rules::default(), 100, std::f64::consts::PI));
+    (0..4).for_each(|seed| wander::<3>(seed, ReactionRules::default(), 100, std::f64::consts::PI));
     (0..3).for_each(|seed| wander::<3>(seed, own(), 60, std::f64::consts::PI));
     (0..3).for_each(|seed| wander::<3>(seed, own(), 60, 1.2));
 }
@@ -133,9 +138,9 @@ fn laws_hold_in_space() {
 fn laws_hold_for_long() {
     for seed in 0..100 {
         wander::<2>(seed, own(), 1000, 1.2);
-        wander::<2>(seed, Rules::default(), 1000, std::f64::consts::PI);
+        wander::<2>(seed, ReactionRules::default(), 1000, std::f64::consts::PI);
         wander::<3>(seed, own(), 1000, 1.2);
-        wander::<3>(seed, Rules::default(), 1000, std::f64::consts::PI);
+        wander::<3>(seed, ReactionRules::default(), 1000, std::f64::consts::PI);
     }
 }
 
@@ -201,14 +206,14 @@ fn as_far_as_possible_stops_at_the_obstacle_and_says_why() {
     let rod = Rod { min_m: 0.5, max_m: 1.0, radius_m: 0.0 };
     let mut chain = Chain::straight([0.0, 0.0], [-1.0, 0.0], 3, rod, Connector::free(0.1)).unwrap();
     let obstacles = Obstacles::new(vec![Obstacle::ball(9, [2.0, 0.0], 0.5)], 1.0).unwrap();
-    let exact = Request::exact(0, [2.0, 0.0]);
+    let exact = MotionRequest::operator_request(0, [2.0, 0.0]);
     let before = bits(&chain);
     let mut propagator = Propagator::default();
     let vetoed = propagator.propagate(&mut chain, &obstacles, &exact).unwrap();
     let veto = vetoed.veto().unwrap();
     assert_eq!((veto.reason, veto.obstacle), (VetoReason::TargetBlocked, Some(9)));
     assert!(veto.reached[0] > 1.3 && bits(&chain) == before);
-    let far = Request { mode: VetoEffect::AsFarAsPossible, ..exact };
+    let far = MotionRequest { mode: VetoEffect::AsFarAsPossible, ..exact };
     let outcome = propagator.propagate(&mut chain, &obstacles, &far).unwrap();
     assert_eq!(outcome.motion().unwrap().cut_short, Some(*veto));
     assert_eq!(chain.points()[0], veto.reached);
@@ -218,15 +223,15 @@ fn as_far_as_possible_stops_at_the_obstacle_and_says_why() {
 fn a_rod_as_initiator_moves_rigidly() {
     let rod = Rod { min_m: 0.8, max_m: 1.0, radius_m: 0.0 };
     let mut chain = Chain::straight([0.0, 0.0], [1.0, 0.0], 5, rod, Connector::free(0.0)).unwrap();
-    let motion = Motion::Rod { i: 2, to: [[2.0, 0.3], [3.0, 0.3]] };
-    let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
+    let motion = RequestedMotion::Rod { i: 2, to: [[2.0, 0.3], [3.0, 0.3]] };
+    let request = MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let outcome = Propagator::default().propagate(&mut chain, &Obstacles::default(), &request);
     assert_eq!(outcome.unwrap().motion().unwrap().touched, 0..6);
     assert_eq!(chain.points()[2..4], [[2.0, 0.3], [3.0, 0.3]]);
     assert!(chain.max_rod_violation_m() < 1e-12);
-    let stretched = Motion::Rod { i: 2, to: [[2.0, 0.3], [3.5, 0.3]] };
+    let stretched = RequestedMotion::Rod { i: 2, to: [[2.0, 0.3], [3.5, 0.3]] };
     let before = bits(&chain);
-    let request = Request { motion: stretched, ..request };
+    let request = MotionRequest { motion: stretched, ..request };
     let outcome = Propagator::default().propagate(&mut chain, &Obstacles::default(), &request);
     assert_eq!(outcome.unwrap().veto().unwrap().reason, VetoReason::Mobility);
     assert_eq!(bits(&chain), before);

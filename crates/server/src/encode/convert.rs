@@ -111,7 +111,7 @@ pub(crate) fn event(entry: &LogEvent) -> RunEvent {
 }
 
 /// Returns the body that a page asks for; `None` where there is no such kind.
-pub(crate) fn body(id: &BodyId) -> Option<view::BodyId> {
+pub(crate) fn requested_body(id: &BodyId) -> Option<view::BodyId> {
     let kind = view::BodyKind::from_name(&id.kind)?;
     Some(view::BodyId::new(kind, id.number, id.part))
 }
@@ -122,10 +122,10 @@ pub(crate) fn problem(error: &InputError) -> Problem {
     let (end_line, end_column) = error.end().unzip();
     Problem {
         place: error.place().into(),
-        line: small(line),
-        column: small(column),
-        end_line: small(end_line),
-        end_column: small(end_column),
+        line: position_to_u32(line),
+        column: position_to_u32(column),
+        end_line: position_to_u32(end_line),
+        end_column: position_to_u32(end_column),
         key: error.key().map(Into::into),
         cause: error.cause().into(),
         remedy: error.remedy().into(),
@@ -134,6 +134,6 @@ pub(crate) fn problem(error: &InputError) -> Problem {
 }
 
 /// Returns a line or column of a text, whose limit of bytes is far below 4 GiB.
-fn small(number: Option<usize>) -> Option<u32> {
+fn position_to_u32(number: Option<usize>) -> Option<u32> {
     number.and_then(|number| u32::try_from(number).ok())
 }

@@ -3,7 +3,7 @@
 mod body_set;
 mod convert;
 
-pub(crate) use convert::{body, event, problem, scan, scene};
+pub(crate) use convert::{event, problem, requested_body, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
@@ -16,7 +16,7 @@ const MAGIC: u32 = 0x4654_5353;
 const HEADER_BYTES: usize = 56;
 
 /// Encodes the frames of a session, and a body table whenever the bodies are no longer those of the last one.
-pub struct Encoder {
+pub struct FrameEncoder {
     session: SessionId,
     dimensions: u8,
     names: BTreeMap<(BodyKind, u32), String>,
@@ -24,7 +24,7 @@ pub struct Encoder {
     tables: u32,
 }
 
-impl Encoder {
+impl FrameEncoder {
     /// Creates an encoder for a run with this scenery, whose first frame begins a body table.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();

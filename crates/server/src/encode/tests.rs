@@ -58,7 +58,7 @@ impl Reader<'_> {
 fn a_frame_of_a_plane_has_the_documented_layout() {
     let touching = robot(1, [3.0, 4.0, 0.5], 1.0).with_state_if(true, Condition::Touching);
     let bodies = vec![robot(0, [1.0, 2.0, 0.5], -2.0), touching];
-    let mut encoder = Encoder::new(9, &scenery(2));
+    let mut encoder = FrameEncoder::new(9, &scenery(2));
     let (table, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
     let mut read = Reader(&bytes);
     assert_eq!(read.take(), *b"SSTF");
@@ -86,7 +86,7 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
 fn a_frame_of_space_has_quaternions_and_points_of_lines() {
     let rods = line(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
     let bodies = vec![rods.clone(), robot(0, [7.0, 8.0, 9.0], 0.0), rods];
-    let (table, bytes) = Encoder::new(1, &scenery(3)).encode(&frame(bodies), &NOTHING, 0);
+    let (table, bytes) = FrameEncoder::new(1, &scenery(3)).encode(&frame(bodies), &NOTHING, 0);
     let mut read = Reader(&bytes[32..]);
     assert_eq!(read.u32s::<3>(), [3, 2, 4], "bodies, lines, points");
     read.0 = &bytes[56..];
@@ -105,7 +105,7 @@ fn a_frame_of_space_has_quaternions_and_points_of_lines() {
 fn every_column_starts_at_a_multiple_of_four_bytes() {
     for n in 0..9 {
         let bodies = (0..n).map(|k| robot(k, [0.0; 3], 0.0)).collect();
-        let (_, bytes) = Encoder::new(1, &scenery(2)).encode(&frame(bodies), &NOTHING, 0);
+        let (_, bytes) = FrameEncoder::new(1, &scenery(2)).encode(&frame(bodies), &NOTHING, 0);
         let text = serde_json::to_vec(&NOTHING).expect("text").len();
         assert_eq!((bytes.len() - text) % 4, 0, "{n} bodies");
     }
@@ -113,7 +113,7 @@ fn every_column_starts_at_a_multiple_of_four_bytes() {
 
 #[test]
 fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
-    let mut encoder = Encoder::new(1, &scenery(2));
+    let mut encoder = FrameEncoder::new(1, &scenery(2));
     let mut begins = |bodies| encoder.encode(&frame(bodies), &NOTHING, 0).0.map(|table| table.id);
     let two = || vec![robot(0, [0.0; 3], 0.0), line(vec![[0.0; 3]; 2])];
     assert_eq!(begins(two()), Some(1));
@@ -133,7 +133,7 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
         frame(vec![Body::new(BodyKind::Door, 0, Pose::from_position([0.0; 3]), shape)])
     };
     for (dimensions, begins) in [(2, false), (3, true)] {
-        let mut encoder = Encoder::new(1, &scenery(dimensions));
+        let mut encoder = FrameEncoder::new(1, &scenery(dimensions));
         encoder.encode(&door(2.0), &NOTHING, 0);
         assert_eq!(encoder.encode(&door(0.1), &NOTHING, 0).0.is_some(), begins);
     }
@@ -152,7 +152,7 @@ fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
     };
     let scans: Vec<Scan> = vec![scan(&seen)];
     let text = FrameText { scans, events: Vec::new(), events_left_out: 3 };
-    let (_, bytes) = Encoder::new(1, &scenery(2)).encode(&frame(vec![]), &text, 0);
+    let (_, bytes) = FrameEncoder::new(1, &scenery(2)).encode(&frame(vec![]), &text, 0);
     let read: serde_json::Value = serde_json::from_slice(&bytes[60..]).expect("JSON");
     assert_eq!(read["scans"][0]["ranges_m"], serde_json::json!([2.0, null]));
     assert_eq!(read["scans"][0]["true_m"], serde_json::json!([null, 3.0]));

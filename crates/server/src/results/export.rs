@@ -90,7 +90,7 @@ impl ExportSpec {
             _ => format!(".{}", fields.require("as")?),
         };
         let cycle =
-            fields.get("cycle").map(|cycle| cycle.parse().map_err(|_| no_such_cycle(cycle)));
+            fields.get("cycle").map(|cycle| cycle.parse().map_err(|_| invalid_cycle_number(cycle)));
         Ok(Self { format, suffix, media, cycle: cycle.transpose()? })
     }
 
@@ -103,7 +103,7 @@ impl ExportSpec {
     }
 }
 
-fn no_such_cycle(text: &str) -> Problem {
+fn invalid_cycle_number(text: &str) -> Problem {
     Problem::new("export", format!("`{text}` is no cycle"), "give a whole number")
 }
 

@@ -18,7 +18,7 @@ mod runs;
 pub(crate) use export::answer as export;
 pub(crate) use job_queue::JobQueue;
 pub(crate) use report::answer as report;
-pub(crate) use runs::runs;
+pub(crate) use runs::list_sweep_runs;
 
 use crate::protocol::Problem;
 use axum::http::StatusCode;

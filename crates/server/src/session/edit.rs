@@ -29,7 +29,7 @@ pub(crate) fn apply_edits(
 ///
 /// # Errors
 /// When the text is not TOML.
-pub(crate) fn model(
+pub(crate) fn text_values_reply(
     deps: &SessionDeps,
     source: &Source,
     text: String,

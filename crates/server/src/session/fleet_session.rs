@@ -65,7 +65,7 @@ impl FleetSession {
         self.take_view();
         match worker.catch_panic(|| self.run_until_closed(worker, id)) {
             Ok(()) | Err(SessionExit::Interrupted) => {}
-            Err(SessionExit::Bug(message)) => self.fail(super::internal_error(&message)),
+            Err(SessionExit::Bug(message)) => self.report_failure(super::internal_error(&message)),
         }
     }
 
@@ -82,7 +82,7 @@ impl FleetSession {
             }
             let snapshot = self.take_view();
             if !Arc::ptr_eq(&snapshot.scene, &self.fleet_scene) {
-                return self.fail(self.fleet_was_replaced());
+                return self.report_failure(self.fleet_was_replaced());
             }
             let now = Instant::now();
             if self.number > 0 {
@@ -90,7 +90,7 @@ impl FleetSession {
             }
             self.page_view.report_status(self.status(&snapshot), now);
             if let Some(problem) = snapshot.lost {
-                return self.fail(problem);
+                return self.report_failure(problem);
             }
         }
     }
@@ -144,7 +144,7 @@ impl FleetSession {
             // A fleet has no scans, but the page selects bodies of every session.
             RunMethod::SelectScans { bodies: _ } => Ok(ReplyBody::Done),
             RunMethod::Events { from, until, skip, limit } => {
-                Ok(self.log.answer(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
+                Ok(self.log.events_reply(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
             }
             RunMethod::Tables {} => Ok(ReplyBody::Tables { names: Vec::new() }),
             RunMethod::Play { .. }
@@ -191,7 +191,7 @@ impl FleetSession {
     }
 
     /// Reports that no more views will arrive.
-    fn fail(&mut self, problem: Problem) {
+    fn report_failure(&mut self, problem: Problem) {
         if let Some(last) = self.page_view.last_reported() {
             let status = SessionStatus { state: SessionState::Failed, ..last };
             self.outbox.send_status(self.session, &ServerNotification::Status(status));

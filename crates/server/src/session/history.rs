@@ -2,17 +2,17 @@
 
 use crate::event_store::EventStore;
 use crate::keyframes::{Keyframes, MemoryBudget};
-use crate::samples::Samples;
+use crate::samples::MetricSamples;
 use sidestep_kernel::Simulation;
 use sidestep_scenario::MetricInfo;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The history of one run. Each cycle is recorded by the computation that gets there first: the played one, or the
-/// [`Prefetcher`](super::prefetcher::Prefetcher).
+/// [`AheadRun`](super::prefetcher::AheadRun).
 pub(super) struct RunHistory {
     pub(super) keyframes: Keyframes,
-    pub(super) samples: Samples,
+    pub(super) samples: MetricSamples,
     pub(super) log: EventStore,
     last_sample: Instant,
 }
@@ -26,7 +26,7 @@ impl RunHistory {
     ) -> Self {
         let mut history = Self {
             keyframes: Keyframes::new(budget),
-            samples: Samples::new(infos),
+            samples: MetricSamples::new(infos),
             log: EventStore::default(),
             last_sample: Instant::now(),
         };

@@ -1,6 +1,6 @@
 //! Percepts, decisions and actions of a body.
 
-use crate::encode::body;
+use crate::encode::requested_body;
 use crate::protocol::{BodyId, Problem};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::Inspection;
@@ -10,7 +10,7 @@ use sidestep_kernel::view::Inspection;
 /// # Errors
 /// If there is no such body, or it cannot be inspected.
 pub(super) fn inspection(run: &dyn Simulation, of: &BodyId) -> Result<Inspection, Problem> {
-    let inspection = body(of).and_then(|body| run.inspect(body));
+    let inspection = requested_body(of).and_then(|body| run.inspect(body));
     inspection.ok_or_else(|| {
         let part = of.part.map(|part| format!("/{part}")).unwrap_or_default();
         let place = format!("{}/{}{part}", of.kind, of.number);

@@ -15,7 +15,7 @@ mod player;
 mod prefetcher;
 mod save;
 
-pub(crate) use edit::{apply_edits, model};
+pub(crate) use edit::{apply_edits, text_values_reply};
 pub(crate) use foxglove::FoxgloveHost;
 pub(crate) use open_run::{SessionDeps, problem_of, text_problems};
 
@@ -175,7 +175,7 @@ impl SessionWorker {
         };
         let result = ReplyResult::Answer(player.opened_reply());
         self.outbox.send_reply(&Reply { id, result });
-        match self.catch_panic(|| self.play(&mut player)) {
+        match self.catch_panic(|| self.play_until_closed(&mut player)) {
             Ok(()) | Err(SessionExit::Interrupted) => player.cancel_seek("the session was closed"),
             Err(SessionExit::Bug(message)) => player.fail(internal_error(&message)),
         }
@@ -188,7 +188,7 @@ impl SessionWorker {
         }
     }
 
-    fn play(&self, player: &mut Player) {
+    fn play_until_closed(&self, player: &mut Player) {
         loop {
             let wait = player.poll().unwrap_or(MAX_WAIT);
             match self.requests.recv_timeout(wait) {
@@ -208,7 +208,7 @@ impl SessionWorker {
 
     fn catch_panic<T>(&self, work: impl FnOnce() -> T) -> Result<T, SessionExit> {
         catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
-            if self.interrupt.caused(payload.as_ref()) {
+            if self.interrupt.has_caused_unwind(payload.as_ref()) {
                 SessionExit::Interrupted
             } else {
                 SessionExit::Bug(panic_message(payload.as_ref()))

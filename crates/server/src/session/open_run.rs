@@ -216,7 +216,7 @@ impl OpenRun {
             Some(to) => to,
             None => session_path(self.file.as_ref(), &self.source.place)?,
         };
-        let target = self.deps.files.target(&path)?;
+        let target = self.deps.files.write_target(&path)?;
         let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
         let source = Source::new(path, text, folder);
         check_writable(&self.deps.files, &self.deps.worlds, &source)?;
@@ -232,13 +232,13 @@ impl OpenRun {
     }
 
     /// Starts a recording once more, to be computed ahead; none if the run is no recording.
-    pub(crate) fn recorded_run_again(&self) -> Option<Box<dyn Simulation>> {
+    pub(crate) fn restart_recorded_run(&self) -> Option<Box<dyn Simulation>> {
         // It could be started before. If it cannot now, because its file was deleted for instance, nothing is computed ahead.
         self.recorded.as_ref()?.start_for_viewing(self.deps.workers).ok()
     }
 
     /// Compares the end of a recorded run with the recording, in a sentence; `None` before the end.
-    pub(crate) fn verdict(&self, run: &dyn Simulation) -> Option<String> {
+    pub(crate) fn replay_verdict(&self, run: &dyn Simulation) -> Option<String> {
         let recorded = self.recorded.as_ref()?;
         if let Some(build) = recorded.other_build() {
             return Some(format!(
@@ -269,7 +269,7 @@ impl OpenRun {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_build().is_none())
     }
 
-    pub(crate) fn budget(&self) -> &Arc<MemoryBudget> {
+    pub(crate) fn keyframe_budget(&self) -> &Arc<MemoryBudget> {
         &self.deps.budget
     }
 

@@ -11,15 +11,15 @@ const RATE_WINDOW: Duration = Duration::from_secs(1);
 
 /// The number of cycles that take about [`SLICE_DURATION`], by the times of the slices before.
 #[derive(Debug)]
-pub(super) struct SliceSize(u64);
+pub(super) struct CyclesPerSlice(u64);
 
-impl Default for SliceSize {
+impl Default for CyclesPerSlice {
     fn default() -> Self {
         Self(1)
     }
 }
 
-impl SliceSize {
+impl CyclesPerSlice {
     pub(super) fn cycles(&self) -> u64 {
         self.0
     }

@@ -1,7 +1,7 @@
 //! The output of a session to its page: frames for which there is credit, and the status when it changes.
 
 use crate::MAX_FRAMES_PER_S;
-use crate::encode::{Encoder, body, scan};
+use crate::encode::{FrameEncoder, requested_body, scan};
 use crate::event_store::EventStore;
 use crate::outbox::Outbox;
 use crate::protocol::{BodyId, FrameText, ServerNotification, SessionId, SessionStatus};
@@ -25,7 +25,7 @@ pub(super) const MAX_SCANNED_BODIES: usize = 16;
 pub(super) struct PageView {
     session: SessionId,
     outbox: Arc<Outbox>,
-    encoder: Encoder,
+    encoder: FrameEncoder,
     /// Number of frames that the page is ready to receive; each one sent takes one.
     credit: u32,
     /// Number of frames that were due and could not be sent.
@@ -48,7 +48,7 @@ impl PageView {
         Self {
             session,
             outbox,
-            encoder: Encoder::new(session, scenery),
+            encoder: FrameEncoder::new(session, scenery),
             credit: 0,
             left_out: 0,
             scans_of: Vec::new(),
@@ -64,7 +64,7 @@ impl PageView {
     /// Switches to another run.
     pub(super) fn restart(&mut self, scenery: &Scenery) {
         // An unsent frame of the run before is of no use, and its credit is given back.
-        if self.outbox.clear(self.session) {
+        if self.outbox.clear_session(self.session) {
             self.credit += 1;
         }
         self.encoder.restart(scenery);
@@ -80,7 +80,7 @@ impl PageView {
     }
 
     /// Requests a frame even if the run has not moved.
-    pub(super) fn refresh(&mut self) {
+    pub(super) fn request_frame(&mut self) {
         self.is_stale = true;
     }
 
@@ -104,15 +104,15 @@ impl PageView {
         if !self.is_due(now) {
             return;
         }
-        if !self.spend_credit(now) {
+        if !self.check_credit(now) {
             if now >= self.events_due {
-                self.drain(run, log, now);
+                self.take_events(run, log, now);
             }
             return;
         }
         self.events_due = now + EVENTS_INTERVAL;
         let mut frame = run.frame(FrameOptions {
-            scans: ScanSelection::Of(self.scans_of.iter().filter_map(body).collect()),
+            scans: ScanSelection::Of(self.scans_of.iter().filter_map(requested_body).collect()),
         });
         log.record(&mut frame);
         self.send_frame(&frame, log);
@@ -120,7 +120,7 @@ impl PageView {
 
     /// Forwards a frame of another process, whose events are recorded already, if one is due and there is credit.
     pub(super) fn forward_frame(&mut self, frame: &Frame, log: &mut EventStore, now: Instant) {
-        if self.is_due(now) && self.spend_credit(now) {
+        if self.is_due(now) && self.check_credit(now) {
             self.send_frame(frame, log);
         }
     }
@@ -130,7 +130,7 @@ impl PageView {
     }
 
     /// Returns whether there is credit for the frame that is due. One for which there is none is counted as left out.
-    fn spend_credit(&mut self, now: Instant) -> bool {
+    fn check_credit(&mut self, now: Instant) -> bool {
         let has_credit = self.credit > 0;
         if has_credit {
             self.is_stale = false;
@@ -161,7 +161,12 @@ impl PageView {
     }
 
     /// Takes the events of a run without showing a frame.
-    pub(super) fn drain(&mut self, run: &mut dyn Simulation, log: &mut EventStore, now: Instant) {
+    pub(super) fn take_events(
+        &mut self,
+        run: &mut dyn Simulation,
+        log: &mut EventStore,
+        now: Instant,
+    ) {
         log.record(&mut run.frame(FrameOptions::WITHOUT_SCANS));
         self.events_due = now + EVENTS_INTERVAL;
     }

@@ -7,9 +7,9 @@ use super::foxglove::FoxgloveLease;
 use super::history::RunHistory;
 use super::inspect::inspection;
 use super::open_run::OpenRun;
-use super::pace::{CycleRate, SliceSize};
+use super::pace::{CycleRate, CyclesPerSlice};
 use super::page_view::{MAX_SCANNED_BODIES, PageView};
-use super::prefetcher::Prefetcher;
+use super::prefetcher::AheadRun;
 use super::save::SaveOptions;
 use crate::SPEED_RANGE;
 use crate::encode::scene;
@@ -39,7 +39,7 @@ pub(super) struct Player {
     foxglove: FoxgloveLease,
     history: RunHistory,
     /// The second computation of a recording, until it is at its end.
-    prefetcher: Option<Prefetcher>,
+    prefetcher: Option<AheadRun>,
     state: SessionState,
     speed: Speed,
     /// The pacer of a run that is played at a speed; none where it is played as fast as possible.
@@ -47,7 +47,7 @@ pub(super) struct Player {
     seek: Option<Seek>,
     /// The request that is being answered.
     request_in_progress: Option<u32>,
-    slice: SliceSize,
+    slice: CyclesPerSlice,
     rate: CycleRate,
     /// Digest of the state at its cycle: computed once for each pause, because it reads the whole state.
     digest: Option<(Cycle, String)>,
@@ -72,7 +72,7 @@ impl Player {
             history: RunHistory::from_run(
                 open_run.run.as_ref(),
                 open_run.metric_infos(),
-                open_run.budget(),
+                open_run.keyframe_budget(),
             ),
             prefetcher: None,
             state: SessionState::Paused,
@@ -80,20 +80,20 @@ impl Player {
             pacer: None,
             seek: None,
             request_in_progress: None,
-            slice: SliceSize::default(),
+            slice: CyclesPerSlice::default(),
             rate: CycleRate::default(),
             digest: None,
             verdict: None,
             open_run,
             scenery,
         };
-        player.prepare();
+        player.prepare_run();
         player.restart_viewers()?;
         Ok(player)
     }
 
     /// Prepares a run that is at its start.
-    fn prepare(&mut self) {
+    fn prepare_run(&mut self) {
         self.open_run.run.set_interrupt(self.interrupt.clone());
         self.open_run.run.enable_events();
         if self.foxglove.is_enabled() {
@@ -101,8 +101,8 @@ impl Player {
         }
         self.prefetcher = self
             .open_run
-            .recorded_run_again()
-            .map(|run| Prefetcher::new(run, self.open_run.until, self.interrupt.clone()));
+            .restart_recorded_run()
+            .map(|run| AheadRun::new(run, self.open_run.until, self.interrupt.clone()));
         self.pause();
     }
 
@@ -114,12 +114,12 @@ impl Player {
         self.history = RunHistory::from_run(
             self.open_run.run.as_ref(),
             self.open_run.metric_infos(),
-            self.open_run.budget(),
+            self.open_run.keyframe_budget(),
         );
         self.digest = None;
-        self.slice = SliceSize::default();
+        self.slice = CyclesPerSlice::default();
         self.rate = CycleRate::default();
-        self.prepare();
+        self.prepare_run();
         // A server for viewers serves one scenario, at any of its cycles.
         if is_new_scenario {
             self.restart_viewers()?;
@@ -190,12 +190,12 @@ impl Player {
             RunMethod::Inspect { body } => {
                 inspection(self.open_run.run.as_ref(), &body).map(ReplyBody::Inspection)
             }
-            RunMethod::Metrics { from } => Ok(self.history.samples.answer(from)),
+            RunMethod::Metrics { from } => Ok(self.history.samples.samples_reply(from)),
             RunMethod::Events { from, until, skip, limit } => {
                 let run = self.open_run.run.as_mut();
-                self.page_view.drain(run, &mut self.history.log, Instant::now());
+                self.page_view.take_events(run, &mut self.history.log, Instant::now());
                 let limit = limit.min(MAX_EVENTS);
-                Ok(self.history.log.answer(from..until, skip.unwrap_or(0), limit))
+                Ok(self.history.log.events_reply(from..until, skip.unwrap_or(0), limit))
             }
             RunMethod::Source {} => Ok(self.source()),
             RunMethod::Tables {} => self.open_run.tables().map(|names| ReplyBody::Tables { names }),
@@ -252,13 +252,14 @@ impl Player {
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
         self.seek = None;
         self.rate = CycleRate::default();
-        self.page_view.refresh();
+        self.page_view.request_frame();
         let cycle = self.cycle();
         self.history.record_pause(self.open_run.run.as_ref());
         if self.digest.as_ref().is_none_or(|(digest_cycle, _)| *digest_cycle != cycle) {
             self.digest = Some((cycle, self.open_run.run.digest().to_string()));
         }
-        self.verdict = self.open_run.verdict(self.open_run.run.as_ref()).or(self.verdict.take());
+        self.verdict =
+            self.open_run.replay_verdict(self.open_run.run.as_ref()).or(self.verdict.take());
     }
 
     /// Does the work that is due, for some milliseconds at most. Returns the time until there is more, unless a
@@ -284,7 +285,7 @@ impl Player {
         self.page_view.report_status(status.clone(), now);
         self.update_viewers(now);
         let is_idle = self.work_due(now).is_none_or(|due| due > now);
-        if is_idle && self.prefetch() {
+        if is_idle && self.compute_ahead() {
             return Some(Duration::ZERO);
         }
         let status_due = self.status_due(&status);
@@ -346,10 +347,10 @@ impl Player {
     }
 
     /// Computes a recording ahead for some milliseconds; returns whether there was anything left to compute.
-    fn prefetch(&mut self) -> bool {
+    fn compute_ahead(&mut self) -> bool {
         let Some(prefetcher) = &mut self.prefetcher else { return false };
         if let Some(run) = prefetcher.advance_slice(&mut self.history) {
-            self.verdict = self.open_run.verdict(run).or(self.verdict.take());
+            self.verdict = self.open_run.replay_verdict(run).or(self.verdict.take());
             self.prefetcher = None;
         }
         true

@@ -3,7 +3,7 @@
 //! to its end.
 
 use super::history::RunHistory;
-use super::pace::SliceSize;
+use super::pace::CyclesPerSlice;
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Cycle, Interrupt, Simulation};
 use std::time::{Duration, Instant};
@@ -12,19 +12,19 @@ use std::time::{Duration, Instant};
 const EVENTS_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A second copy of a recorded run, which nobody sees.
-pub(super) struct Prefetcher {
+pub(super) struct AheadRun {
     run: Box<dyn Simulation>,
     until: Cycle,
-    pace: SliceSize,
+    pace: CyclesPerSlice,
     events_taken: Instant,
 }
 
-impl Prefetcher {
+impl AheadRun {
     /// Returns a prefetcher for a run that is at its start.
     pub(super) fn new(mut run: Box<dyn Simulation>, until: Cycle, interrupt: Interrupt) -> Self {
         run.set_interrupt(interrupt);
         run.enable_events();
-        Self { run, until, pace: SliceSize::default(), events_taken: Instant::now() }
+        Self { run, until, pace: CyclesPerSlice::default(), events_taken: Instant::now() }
     }
 
     /// Advances for some milliseconds. Returns the run once it is at its end.
@@ -46,7 +46,7 @@ impl Prefetcher {
 
     /// Skips the cycles that the played run was the first to compute.
     fn skip_known(&mut self, history: &mut RunHistory) {
-        let known = history.keyframes.before(history.log.frontier());
+        let known = history.keyframes.latest_until(history.log.known_until());
         if let Some((at, checkpoint)) = known
             && at > self.run.cycle()
         {

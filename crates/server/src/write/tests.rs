@@ -60,11 +60,11 @@ fn nothing_is_written_outside_hidden_or_in_place_of_what_is_no_file() {
         "in/..",
         "in",
     ] {
-        assert!(files.target(&path(name)).is_err(), "{name}");
+        assert!(files.write_target(&path(name)).is_err(), "{name}");
     }
-    assert!(files.target("").is_err() && files.target("/etc/new.toml").is_err());
+    assert!(files.write_target("").is_err() && files.write_target("/etc/new.toml").is_err());
     for name in ["in/a.toml", "in/new.toml", "in/deep/../new.toml"] {
-        assert!(files.target(&path(name)).is_ok(), "{name}");
+        assert!(files.write_target(&path(name)).is_ok(), "{name}");
     }
 }
 
@@ -80,7 +80,8 @@ fn a_file_is_replaced_whole_with_its_permissions_and_its_mark() {
         std::os::unix::fs::symlink("a.toml", folder.path().join("in/link.toml")).expect("linked");
     }
     let named = if cfg!(unix) { "in/link.toml" } else { "in/a.toml" };
-    let target = files.target(&folder.path().join(named).display().to_string()).expect("a file");
+    let target =
+        files.write_target(&folder.path().join(named).display().to_string()).expect("a file");
     let seen = Cell::new(false);
     let may = |found: Option<&str>| {
         seen.set(found == Some(SCENARIO));
@@ -102,7 +103,7 @@ fn a_file_is_replaced_whole_with_its_permissions_and_its_mark() {
 fn what_another_program_writes_meanwhile_is_not_lost() {
     let (folder, files) = places();
     let path = folder.path().join("in/a.toml");
-    let target = files.target(&path.display().to_string()).expect("a file");
+    let target = files.write_target(&path.display().to_string()).expect("a file");
     let asked = Cell::new(0);
     let may = |found: Option<&str>| {
         asked.set(asked.get() + 1);
@@ -136,12 +137,12 @@ fn what_cannot_be_replaced_stays_as_it_is() {
         ("other.toml", false, "else than a scenario"),
     ] {
         let old = fs::read(inside.join(name)).expect("read");
-        let target = files.target(&place(name)).expect("a file");
+        let target = files.write_target(&place(name)).expect("a file");
         let problem = replace_file(&target, "new", is_own, |_| true).expect_err(name);
         assert!(problem.cause.contains(cause), "{problem:?}");
         assert_eq!(fs::read(inside.join(name)).expect("read"), old);
     }
-    let target = files.target(&place("new.toml")).expect("a file");
+    let target = files.write_target(&place("new.toml")).expect("a file");
     assert_eq!(replace_file(&target, "new", false, |found| found.is_none()), Ok(None));
     assert_eq!(
         replace_file(&target, "newer", true, |_| true),
@@ -149,7 +150,7 @@ fn what_cannot_be_replaced_stays_as_it_is() {
         "its own need be no scenario"
     );
     // The folder is gone.
-    let target = files.target(&place("deep/new.toml")).expect("a file");
+    let target = files.write_target(&place("deep/new.toml")).expect("a file");
     fs::remove_dir_all(inside.join("deep")).expect("removed");
     let problem = replace_file(&target, "new", false, |_| true).expect_err("no folder");
     assert!(problem.cause.contains("cannot be written"), "{problem:?}");

@@ -5,7 +5,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionColumns, Quantity, Severity,
+    Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionTableColumns, Quantity, Severity,
 };
 use sidestep_record::{Table, read_table};
 use std::ops::Range;
@@ -21,7 +21,7 @@ const MAX_EVENTS: usize = 200_000;
 /// When the table is damaged.
 pub(super) fn read_events(
     folder: &std::path::Path,
-    places: &[PositionColumns],
+    places: &[PositionTableColumns],
     first: &[Body],
 ) -> Result<Vec<LogEvent>, InputError> {
     let Some(place) = places.first() else { return Ok(Vec::new()) };
@@ -37,7 +37,7 @@ pub(super) fn read_events(
 
 struct EventRows<'a> {
     table: &'a Table,
-    place: &'a PositionColumns,
+    place: &'a PositionTableColumns,
     first: &'a [Body],
 }
 

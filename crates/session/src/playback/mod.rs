@@ -11,9 +11,9 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::text::{KeyValues, StateDescription};
 use sidestep_kernel::view::{
-    Body, BodyId, Frame, FrameOptions, Inspection, LogEvent, PositionColumns, Scenery,
+    Body, BodyId, Frame, FrameOptions, Inspection, LogEvent, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::world::DecisionMode;
 use sidestep_kernel::{Cycle, Digest, InputError, Interrupt, RunConfig, Simulation};
@@ -190,7 +190,7 @@ impl Simulation for RecordedPlayback {
         None
     }
 
-    fn position_columns(&self) -> Vec<PositionColumns> {
+    fn position_columns(&self) -> Vec<PositionTableColumns> {
         self.start.position_columns()
     }
 
@@ -210,8 +210,8 @@ impl Simulation for RecordedPlayback {
         KeyValues::new()
     }
 
-    fn poses(&self) -> Description {
-        Description { json: json!([]), text: String::new() }
+    fn poses(&self) -> StateDescription {
+        StateDescription { json: json!([]), text: String::new() }
     }
 
     fn phase_times(&self) -> PhaseTimes {

@@ -3,7 +3,7 @@
 use crate::run_tables::has_rows;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Frame, Pose, PositionColumns, Scenery, Shape, Trail, Vec3,
+    Body, BodyId, BodyKind, Frame, Pose, PositionTableColumns, Scenery, Shape, Trail, Vec3,
 };
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, read_table};
@@ -18,7 +18,7 @@ const WINDOW_ROWS: u64 = 200_000;
 /// Reads the poses of all bodies, window by window.
 pub(super) struct PoseReader {
     folder: PathBuf,
-    rows: Vec<PositionColumns>,
+    rows: Vec<PositionTableColumns>,
     scenery: Scenery,
     /// The bodies at the start, for their appearance.
     first: Vec<Body>,
@@ -40,7 +40,7 @@ impl PoseReader {
     /// When one of them is damaged.
     pub(super) fn new(
         folder: &Path,
-        rows: Vec<PositionColumns>,
+        rows: Vec<PositionTableColumns>,
         scenery: Scenery,
         first: Vec<Body>,
         until: Cycle,
@@ -56,7 +56,7 @@ impl PoseReader {
 
     /// Returns the window around a cycle. Windows start at multiples of their length, so playback reads one after the
     /// other.
-    fn window_range(&self, rows: &PositionColumns, cycle: Cycle) -> Range<Cycle> {
+    fn window_range(&self, rows: &PositionTableColumns, cycle: Cycle) -> Range<Cycle> {
         let bodies = self.first.iter().filter(|body| body.kind == rows.kind).count();
         let cycles = (WINDOW_ROWS / bodies.max(1) as u64).max(1) * rows.interval;
         let from = cycle / cycles * cycles;
@@ -96,7 +96,12 @@ impl PoseReader {
     }
 
     /// Returns the poses of the bodies of a table that have a recent row.
-    fn poses(&self, rows: &PositionColumns, table: &Table, cycle: Cycle) -> Vec<(BodyId, Pose)> {
+    fn poses(
+        &self,
+        rows: &PositionTableColumns,
+        table: &Table,
+        cycle: Cycle,
+    ) -> Vec<(BodyId, Pose)> {
         let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
         let whose: Vec<BodyId> = headings.keys().copied().collect();
         let mut bodies = Vec::new();
@@ -167,7 +172,7 @@ impl PoseReader {
 /// Returns the pose of a body at a cycle, from its recorded points: with its recorded heading in quarter turns, or in
 /// the direction of its last motion. `None` if its last point is older than the interval of rows: it is gone.
 fn last_pose(
-    rows: &PositionColumns,
+    rows: &PositionTableColumns,
     points: &[(Cycle, Vec3)],
     heading: Option<u32>,
     cycle: Cycle,
@@ -185,7 +190,7 @@ fn last_pose(
 }
 
 /// Returns whether a table is for bodies of this kind; people share that of the robots.
-fn has_rows_in(rows: &PositionColumns, body: &Body) -> bool {
+fn has_rows_in(rows: &PositionTableColumns, body: &Body) -> bool {
     let is_kind =
         body.kind == rows.kind || (rows.kind == BodyKind::Robot && body.kind == BodyKind::Person);
     is_kind && body.part.is_some() == rows.part.is_some()
@@ -207,7 +212,7 @@ fn rods_body(body: &Body, poses: &BTreeMap<BodyId, Pose>, joint: &mut u32) -> Op
 
 /// Returns all bodies that have rows up to a cycle, with the last recorded heading in quarter turns.
 fn last_headings(
-    rows: &PositionColumns,
+    rows: &PositionTableColumns,
     table: &Table,
     cycle: Cycle,
 ) -> Option<BTreeMap<BodyId, Option<u32>>> {

@@ -122,7 +122,7 @@ impl TrialRunner<'_> {
             Ok(Err(Error::InterruptedInCycle(_))) => None,
             // What cannot be stored would fail for every run, so it stops the sweep.
             Ok(Err(failure)) => Some(Err(failure)),
-            Err(payload) if self.watcher.interrupt().caused(payload.as_ref()) => None,
+            Err(payload) if self.watcher.interrupt().has_caused_unwind(payload.as_ref()) => None,
             // A bug in one run costs only that run, not a sweep of days.
             Err(_) => {
                 Some(Ok(Outcome::from_failure(trial, "a bug in sidestep: see standard error")))

@@ -3,7 +3,7 @@
 
 use crate::support::SHIPPED_WORLDS;
 use sidestep_airspace::pilot::{Control, Percept, Pilot};
-use sidestep_airspace::{AirspaceRun, Fleet};
+use sidestep_airspace::{AirspaceRun, RemotePilotRun};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep_scenario::Source;

@@ -257,7 +257,7 @@ fn no_cycle_of_many_airplanes_works_long_without_a_look_at_the_interrupt() {
         let interrupt = Interrupt::default();
         run.set_interrupt(interrupt.clone());
         run.advance(1);
-        interrupt.checks()
+        interrupt.check_count()
     };
     let team = "deployment = \"compact-team\"";
     for more in ["", "shield = \"off\"", team, "preset = \"paper\""] {
@@ -280,7 +280,7 @@ fn starting_up_takes_nearly_linear_work() {
         let started = run(&Source::new("s", text, ""), 1);
         drop(heeded);
         assert_eq!(started.agents(), n as usize);
-        interrupt.checks() as f64
+        interrupt.check_count() as f64
     };
     // Four times as many may take eight times the work; the square would be sixteen.
     let ratio = looks(1600) / looks(400);

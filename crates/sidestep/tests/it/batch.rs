@@ -133,8 +133,9 @@ fn batch_digests(workers: usize) -> (Vec<Digest>, Vec<i64>) {
             let some = (0..seeds.len() as u64).map(|k| (k % 5 == 2).then_some(100 + k));
             batch.restart(&some.collect::<Vec<_>>()).expect("room");
         }
-        let room =
-            |space: &sidestep::kernel::control::Space| vec![-7; seeds.len() * 6 * space.width()];
+        let room = |space: &sidestep::kernel::control::Space| {
+            vec![-7; seeds.len() * 6 * space.value_count()]
+        };
         let mut rooms: Vec<Vec<i64>> = team.observation_spaces.iter().map(room).collect();
         let mut cells: Vec<_> = rooms.iter_mut().map(|room| BufferMut::Integer(room)).collect();
         batch.observe(0, &mut cells).expect("room");

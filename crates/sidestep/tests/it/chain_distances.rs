@@ -8,7 +8,7 @@ use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Cuboid as Box3, Segment, Shape};
 use proptest::prelude::*;
-use sidestep::rods::geometry::{Core, Cuboid, Point};
+use sidestep::rods::geometry::{ConvexCore, Cuboid, Point};
 
 /// A plane point lies in the plane z = 0.
 fn vector<const D: usize>(p: Point<D>) -> Vector {
@@ -38,7 +38,7 @@ fn two_segments<const D: usize>() -> impl Strategy<Value = [[Point<D>; 2]; 2]> {
 }
 
 fn segments_agree<const D: usize>([body, core]: [[Point<D>; 2]; 2]) -> Result<(), TestCaseError> {
-    let ours_m = Core::Segment(core).nearest_to_segment(body).distance_m;
+    let ours_m = ConvexCore::Segment(core).nearest_to_segment(body).distance_m;
     let theirs_m = apart_m(&segment(body), &segment(core), &Pose::IDENTITY);
     prop_assert!(ours_m <= theirs_m + 1e-12 && ours_m >= theirs_m - 1e-6, "{ours_m} {theirs_m}");
     Ok(())
@@ -47,7 +47,7 @@ fn segments_agree<const D: usize>([body, core]: [[Point<D>; 2]; 2]) -> Result<()
 /// Both ways: the point as a ball of no size, and the segment or box as it is.
 fn points_agree<const D: usize>(
     p: Point<D>,
-    ours: &Core<D>,
+    ours: &ConvexCore<D>,
     theirs: &dyn Shape,
     pose: &Pose,
 ) -> Result<(), TestCaseError> {
@@ -75,10 +75,10 @@ proptest! {
         plane in [point::<2>(), point(), point()], space in [point::<3>(), point(), point()],
     ) {
         let [p, a, b] = plane;
-        points_agree(p, &Core::Segment([a, b]), &segment([a, b]), &Pose::IDENTITY)?;
+        points_agree(p, &ConvexCore::Segment([a, b]), &segment([a, b]), &Pose::IDENTITY)?;
         let [p, a, b] = space;
-        points_agree(p, &Core::Segment([a, b]), &segment([a, b]), &Pose::IDENTITY)?;
-        let ours_m = Core::Point(a).nearest_to_segment([p, b]).distance_m;
+        points_agree(p, &ConvexCore::Segment([a, b]), &segment([a, b]), &Pose::IDENTITY)?;
+        let ours_m = ConvexCore::Point(a).nearest_to_segment([p, b]).distance_m;
         let at = Pose::from_translation(vector(a));
         let theirs_m = apart_m(&segment([p, b]), &Ball::new(0.0), &at);
         prop_assert!((ours_m - theirs_m).abs() < 1e-12, "{ours_m} {theirs_m}");
@@ -95,7 +95,7 @@ proptest! {
             let turned = pose.rotation * e;
             [turned.x, turned.y, turned.z]
         });
-        let ours = Core::Cuboid(Cuboid { center, axes, half_m });
+        let ours = ConvexCore::Cuboid(Cuboid { center, axes, half_m });
         let theirs = Box3::new(vector(half_m));
         points_agree(p, &ours, &theirs, &pose)?;
         let ours_m = ours.nearest_to_segment([p, q]).distance_m;
@@ -113,7 +113,7 @@ proptest! {
             let turned = pose.rotation * e;
             [turned.x, turned.y]
         });
-        let ours = Core::Cuboid(Cuboid { center, axes, half_m });
+        let ours = ConvexCore::Cuboid(Cuboid { center, axes, half_m });
         let theirs = Box3::new(Vector::new(half_m[0], half_m[1], 1.0));
         points_agree(p, &ours, &theirs, &pose)?;
         let ours_m = ours.nearest_to_segment([p, q]).distance_m;

@@ -6,10 +6,10 @@
 use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
-    Action, AfterLastWaypoint, Autopilot, Legs, Levels, Model, Point, Pose2, Timing, WaypointRule,
-    actions,
+    Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourLegs, FlightLevelRange, Point,
+    Pose2, StepTiming, WaypointRule, actions,
 };
-use sidestep_airspace::objective::{ActionPredictions, Objective, game};
+use sidestep_airspace::objective::{ActionPredictions, Objective, group_game};
 use sidestep_collectives::{
     Choice, Estimator, Game, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility, optimize,
 };
@@ -18,21 +18,21 @@ use sidestep_kernel::{Seed, Simulation};
 use sidestep_scenario::Source;
 use std::time::Instant;
 
-const TIMING: Timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
+const TIMING: StepTiming = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
 
 /// Airplanes on a circle around the conflict, near enough for every pair to matter.
 struct Conflict {
-    model: Model,
+    model: AircraftModel,
     poses: Vec<Pose2>,
     goals: Vec<[Point; 1]>,
     actions: Vec<Action>,
-    timing: Timing,
+    timing: StepTiming,
     objective: Objective,
 }
 
 impl Conflict {
-    fn new(n: usize, horizon: usize, legs: &Legs, objective: Objective) -> Self {
-        let model = Model {
+    fn new(n: usize, horizon: usize, legs: &DetourLegs, objective: Objective) -> Self {
+        let model = AircraftModel {
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
             separation_m: 500.0,
@@ -49,7 +49,7 @@ impl Conflict {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),
             actions: actions(&model, TIMING.dt_s, &[], legs),
-            timing: Timing { horizon, ..TIMING },
+            timing: StepTiming { horizon, ..TIMING },
             model,
             objective,
         }
@@ -69,7 +69,11 @@ impl Conflict {
         let of = |i: usize| {
             let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &self.timing);
             let predictions = self.actions.iter().map(predict).collect();
-            ActionPredictions::new(predictions, self.model.separation_m, Levels::at(0.0))
+            ActionPredictions::new(
+                predictions,
+                self.model.separation_m,
+                FlightLevelRange::from_level(0.0),
+            )
         };
         (0..self.poses.len()).map(of).collect()
     }
@@ -97,9 +101,9 @@ impl Game for UncachedGame<'_> {
         let mut sum = 0.0;
         for (i, a) in predictions.iter().enumerate() {
             let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, timing);
-            sum += objective.alpha * objective.deviation(a, &best);
+            sum += objective.alpha * objective.deviation_cost(a, &best);
             for b in &predictions[i + 1..] {
-                sum += objective.collision(a, b, r).iter().sum::<f64>();
+                sum += objective.collision_costs(a, b, r).iter().sum::<f64>();
             }
         }
         sum
@@ -143,15 +147,15 @@ fn exact() {
         vertical_m: 300.0,
     };
     for (name, horizon, legs, inflation, cooling) in [
-        ("the paper's actions", 125, Legs::default(), 1.05, 0.8),
-        ("the default preset", 90, Legs::default_preset(), 1.12, 0.7),
+        ("the paper's actions", 125, DetourLegs::default(), 1.05, 0.8),
+        ("the default preset", 90, DetourLegs::default_preset(), 1.12, 0.7),
     ] {
         let objective = preset(inflation);
         let conflict = Conflict::new(10, horizon, &legs, objective);
         let predict_s = best_s(20, || drop(conflict.action_predictions()));
         let options = conflict.action_predictions();
-        let tables_s = best_s(20, || drop(game(&objective, &options)));
-        let built = game(&objective, &options);
+        let tables_s = best_s(20, || drop(group_game(&objective, &options)));
+        let built = group_game(&objective, &options);
         let settings = settings(Estimator::Exact, cooling, 200);
         let rounds_s = best_s(20, || drop(optimize(&built, &settings, uniform)));
         let rounds = optimize(&built, &settings, uniform).rounds;
@@ -168,10 +172,10 @@ fn exact() {
 fn sampled() {
     let objective =
         Objective { alpha: 1.0, beta: 0.995, inflation: 1.0, mask: true, vertical_m: 300.0 };
-    let conflict = Conflict::new(10, 125, &Legs::default(), objective);
+    let conflict = Conflict::new(10, 125, &DetourLegs::default(), objective);
     let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {
-        let built = game(&objective, &conflict.action_predictions());
+        let built = group_game(&objective, &conflict.action_predictions());
         drop(optimize(&built, &settings, uniform));
     });
     let strategies = vec![conflict.actions.len(); 10];

@@ -22,7 +22,7 @@ mod step;
 use super::decide::{ManeuverCandidates, straight_profile};
 use super::deploy;
 use super::join::ControlledGroup;
-use super::non_cooperative::NonCooperative;
+use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{known_aircraft, non_cooperative_aircraft, ownship_state};
 use super::pilot::{Control, OwnshipState};
 use super::scratch::PhaseContext;
@@ -56,7 +56,7 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[Slot]) {
 /// Flies a group for one `dt`; `group` are the airplanes in the air, by id.
 fn fly(context: &mut PhaseContext<'_>, group: &[Slot]) {
     let PhaseContext { world, state, now, .. } = *context;
-    let flown = prepare(context, group);
+    let flown = prepare_decisions(context, group);
     let non_cooperative = non_cooperative_aircraft(context, group);
     let mut profiles = turn_profiles(context, &flown, &non_cooperative).into_iter();
     let flights = group.iter().map(|&slot| {
@@ -78,7 +78,7 @@ fn fly(context: &mut PhaseContext<'_>, group: &[Slot]) {
 
 /// Prepares the decisions: airplanes enter, exemptions of pairs begin and end, and orders that are due are executed.
 /// Returns the airplanes of a group that the method flies; `group` are those in the air, by id.
-pub(super) fn prepare(context: &mut PhaseContext<'_>, group: &[Slot]) -> ControlledGroup {
+pub(super) fn prepare_decisions(context: &mut PhaseContext<'_>, group: &[Slot]) -> ControlledGroup {
     // Nearness is that at the time when the group was formed, because orders change levels.
     let flown = ControlledGroup::from_group(context, group);
     if context.world.shield {
@@ -95,7 +95,7 @@ pub(super) fn prepare(context: &mut PhaseContext<'_>, group: &[Slot]) -> Control
 fn turn_profiles(
     context: &mut PhaseContext<'_>,
     flown: &ControlledGroup,
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
 ) -> Vec<TurnProfile> {
     let PhaseContext { world, state, now, .. } = *context;
     let own: Vec<OwnshipState> =

@@ -12,13 +12,13 @@
 //! back, if it flew straight on after `dt`, and the other all the time.
 
 use crate::flight::{Point, Pose2, distance_m};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{ShieldedAircraft, TurnProfile, stays_apart_for};
 use std::f64::consts::PI;
 
 /// The clearance of a path from all others. The derived order prefers clear paths, and then wide margins.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
-struct Clearance {
+struct PathClearance {
     /// Whether no other can come too near within `dt`.
     is_clear: bool,
     /// Meters beyond the desired distance, at the closest; at most 0.
@@ -29,14 +29,14 @@ struct Clearance {
 pub(crate) struct NonCooperativeAvoidance<'a> {
     aircraft: &'a ShieldedAircraft,
     /// Those on its levels.
-    others: Vec<&'a NonCooperative>,
+    others: Vec<&'a NonCooperativeAircraft>,
     dtau_s: f64,
 }
 
 impl<'a> NonCooperativeAvoidance<'a> {
     pub(crate) fn new(
         aircraft: &'a ShieldedAircraft,
-        non_cooperative: &'a [NonCooperative],
+        non_cooperative: &'a [NonCooperativeAircraft],
         dtau_s: f64,
     ) -> Self {
         let others = non_cooperative
@@ -57,9 +57,9 @@ impl<'a> NonCooperativeAvoidance<'a> {
             return (0..candidates.len()).collect();
         }
         let required = self.clearance(&fallback());
-        let full = Clearance { is_clear: true, margin_m: 0.0 };
+        let full = PathClearance { is_clear: true, margin_m: 0.0 };
         let clearances = candidates.iter().map(|profile| self.clearance(profile)).enumerate();
-        let mut better: Vec<(usize, Clearance)> = clearances
+        let mut better: Vec<(usize, PathClearance)> = clearances
             .filter(|(_, clearance)| *clearance == full || *clearance > required)
             .collect();
         // A stable sort by falling clearance.
@@ -71,15 +71,15 @@ impl<'a> NonCooperativeAvoidance<'a> {
     pub(crate) fn threats<'b>(
         &'b self,
         profile: &'b TurnProfile,
-    ) -> impl Iterator<Item = &'a NonCooperative> + 'b {
+    ) -> impl Iterator<Item = &'a NonCooperativeAircraft> + 'b {
         let poses = self.poses(profile);
         self.others.iter().copied().filter(move |one| !self.is_clear(&poses, profile, one))
     }
 
-    fn clearance(&self, profile: &TurnProfile) -> Clearance {
+    fn clearance(&self, profile: &TurnProfile) -> PathClearance {
         let poses = self.poses(profile);
         let margins_m = self.others.iter().map(|one| self.margin_m(&poses, one));
-        Clearance {
+        PathClearance {
             is_clear: self.others.iter().all(|one| self.is_clear(&poses, profile, one)),
             margin_m: margins_m.fold(0.0, f64::min),
         }
@@ -95,11 +95,16 @@ impl<'a> NonCooperativeAvoidance<'a> {
     }
 
     /// Returns the distance in meters that it has to keep from another one, as both are seen.
-    fn gap_m(&self, one: &NonCooperative) -> f64 {
+    fn gap_m(&self, one: &NonCooperativeAircraft) -> f64 {
         self.aircraft.separation_m.max(one.separation_m) + self.aircraft.error_m + one.error_m
     }
 
-    fn is_clear(&self, poses: &[Pose2], profile: &TurnProfile, one: &NonCooperative) -> bool {
+    fn is_clear(
+        &self,
+        poses: &[Pose2],
+        profile: &TurnProfile,
+        one: &NonCooperativeAircraft,
+    ) -> bool {
         let v_m_s = self.aircraft.v_m_s;
         profile.omegas_rad_s.iter().zip(poses).enumerate().all(|(k, (&omega, pose))| {
             let step_s = k as f64 * self.dtau_s;
@@ -113,7 +118,7 @@ impl<'a> NonCooperativeAvoidance<'a> {
 
     /// Returns the meters beyond the desired distance if it flew straight on after a path, and the other all the
     /// time; at most 0.
-    fn margin_m(&self, poses: &[Pose2], one: &NonCooperative) -> f64 {
+    fn margin_m(&self, poses: &[Pose2], one: &NonCooperativeAircraft) -> f64 {
         let steps = poses.len() - 1;
         let desired_m = self.gap_m(one) + one.top_m_s * one.dt_s;
         let during_m = (1..steps)
@@ -127,13 +132,13 @@ impl<'a> NonCooperativeAvoidance<'a> {
         let place = one.position_after(steps as f64 * self.dtau_s);
         let from = [place[0] - end.at[0], place[1] - end.at[1]];
         let half_turn_s = PI / self.aircraft.orbit_rad_s;
-        let after_m = min_distance_m(from, relative_velocity, half_turn_s);
+        let after_m = closest_approach_to_origin_m(from, relative_velocity, half_turn_s);
         (during_m.min(after_m) - desired_m).min(0.0)
     }
 }
 
 /// Returns the smallest distance from the origin to a point that moves straight on for some time.
-fn min_distance_m(from: Point, velocity: Point, for_s: f64) -> f64 {
+fn closest_approach_to_origin_m(from: Point, velocity: Point, for_s: f64) -> f64 {
     let speed2 = velocity[0] * velocity[0] + velocity[1] * velocity[1];
     let toward = -(from[0] * velocity[0] + from[1] * velocity[1]);
     let at_s = if speed2 > 0.0 { (toward / speed2).clamp(0.0, for_s) } else { 0.0 };

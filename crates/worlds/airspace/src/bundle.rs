@@ -9,7 +9,7 @@ use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 ///
 /// # Errors
 /// When the text is no longer a valid scenario.
-pub(crate) fn resolve(
+pub(crate) fn resolve_scenario(
     source: &Source,
     compiled: &CompiledAirspace,
 ) -> Result<ResolvedScenario, InputError> {

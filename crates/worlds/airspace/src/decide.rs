@@ -11,8 +11,8 @@ use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
 use super::method::MethodKind;
-use super::non_cooperative::NonCooperative;
-use super::objective::{ActionPredictions, game};
+use super::non_cooperative::NonCooperativeAircraft;
+use super::objective::{ActionPredictions, group_game};
 use super::purpose;
 use super::shield::TurnProfile;
 use super::world::AirspaceWorld;
@@ -24,7 +24,7 @@ use sidestep_kernel::{Cycle, EntityId};
 
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Optimization {
+pub struct OptimizationRecord {
     /// Cycle for which the actions were chosen.
     pub cycle: Cycle,
     /// The member of the group with the smallest id.
@@ -56,7 +56,7 @@ pub struct OptimizationStats {
 
 impl OptimizationStats {
     /// Adds an optimization that has ended; beacons are not part of one.
-    pub fn add(&mut self, one: &Optimization) {
+    pub fn add(&mut self, one: &OptimizationRecord) {
         self.optimizations += 1;
         self.rounds += u64::from(one.rounds);
         self.unconverged += u64::from(!one.converged);
@@ -155,7 +155,7 @@ pub(super) fn candidates_by_choice(
 pub(super) fn candidates_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
     memory: &mut [ActiveResolutions],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
@@ -178,12 +178,12 @@ pub(super) fn straight_profile(world: &AirspaceWorld, known: KnownAircraft) -> T
 pub(super) fn decide_centrally(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
     now: Cycle,
 ) -> Vec<Option<ActionChoice>> {
     let options: Vec<ActionPredictions> =
         group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
-    let game = game(&world.objective, &options);
+    let game = group_game(&world.objective, &options);
     let outcome = optimize(&game, &world.settings, |player: usize, k: u64| {
         purpose::sample(&world.streams, group[player].slot, now, k)
     });

@@ -39,7 +39,7 @@ pub enum EventKind {
 
 /// The quantity that the value of an event measures: each has a column of its own in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Measure {
+pub(super) enum EventQuantity {
     /// Meters.
     Distance,
     /// Seconds.
@@ -48,7 +48,7 @@ pub(super) enum Measure {
     Number,
 }
 
-impl Measure {
+impl EventQuantity {
     /// Returns its unit; empty for a number.
     pub(super) fn unit(self) -> &'static str {
         match self {
@@ -61,11 +61,11 @@ impl Measure {
 
 impl EventKind {
     /// Returns the quantity that its value measures; `None` for kinds without one.
-    pub(super) fn measure(self) -> Option<Measure> {
+    pub(super) fn value_quantity(self) -> Option<EventQuantity> {
         match self {
-            Self::LossOfSeparation | Self::Intruder => Some(Measure::Distance),
-            Self::Arrival => Some(Measure::Delay),
-            Self::Override | Self::GroupTooLarge | Self::BeyondBound => Some(Measure::Number),
+            Self::LossOfSeparation | Self::Intruder => Some(EventQuantity::Distance),
+            Self::Arrival => Some(EventQuantity::Delay),
+            Self::Override | Self::GroupTooLarge | Self::BeyondBound => Some(EventQuantity::Number),
             Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack | Self::Absent => None,
         }
     }
@@ -139,13 +139,13 @@ pub struct Event {
 
 impl Event {
     /// Returns the other airplane involved, if there is one.
-    pub(super) fn partner(&self) -> Option<EntityId> {
+    pub(super) fn other_airplane(&self) -> Option<EntityId> {
         (self.other != self.airplane).then_some(self.other)
     }
 
     /// Returns the value, if it is measured so.
-    pub(super) fn value_in(&self, measure: Measure) -> Option<f64> {
-        (self.kind.measure() == Some(measure)).then_some(self.value)
+    pub(super) fn value_in(&self, measure: EventQuantity) -> Option<f64> {
+        (self.kind.value_quantity() == Some(measure)).then_some(self.value)
     }
 
     /// Returns an event of one airplane, without a value.
@@ -166,7 +166,7 @@ impl Event {
 
     /// Returns the sort key of the table's rows, which does not depend on the order in which groups
     /// were handled.
-    pub(super) fn key(&self) -> (Cycle, EntityId, EventKind, EntityId) {
+    pub(super) fn sort_key(&self) -> (Cycle, EntityId, EventKind, EntityId) {
         (self.cycle, self.airplane, self.kind, self.other)
     }
 }

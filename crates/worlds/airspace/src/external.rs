@@ -8,7 +8,7 @@ use super::external_action::ExternalAction;
 use super::flight::KnownAircraft;
 use super::join::ControlledGroup;
 use super::method::MethodKind;
-use super::non_cooperative::NonCooperative;
+use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{known_aircraft, non_cooperative_aircraft};
 use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
@@ -47,7 +47,7 @@ impl AirspaceWorld {
         } else {
             Vec::new()
         };
-        let observation_spaces = observation::spaces(self, &agents);
+        let observation_spaces = observation::observation_spaces(self, &agents);
         Team { name, agents, observation_spaces, action_spaces }
     }
 
@@ -131,7 +131,7 @@ impl AirspaceWorld {
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut visit: impl FnMut(&PhaseContext<'_>, &ControlledGroup, &[NonCooperative]),
+        mut visit: impl FnMut(&PhaseContext<'_>, &ControlledGroup, &[NonCooperativeAircraft]),
     ) {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
         let clock = ManualClock::default();
@@ -143,13 +143,13 @@ impl AirspaceWorld {
             clock: &clock,
             scratch: &mut scratch,
         };
-        let groups = join::groups(context);
+        let groups = join::form_groups(context);
         let mut group = Vec::new();
         for leader in (0..self.airplanes.len() as Slot).filter(|&slot| groups.is_leader(slot)) {
             groups.members(leader, &mut group);
             group.retain(|&slot| copy.is_active(self, slot, now));
             group.sort_unstable();
-            let controlled = act::prepare(context, &group);
+            let controlled = act::prepare_decisions(context, &group);
             visit(context, &controlled, &non_cooperative_aircraft(context, &group));
         }
     }

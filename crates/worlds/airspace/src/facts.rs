@@ -55,7 +55,7 @@ pub(crate) const FACTS: WorldFacts = WorldFacts {
 /// Sections of airplanes that are given one by one.
 const AIRPLANES: &str = "airplanes";
 
-pub(crate) fn editing() -> Editing {
+pub(crate) fn editing_tools() -> Editing {
     Editing {
         tools: vec![
             EditTool::SELECT,

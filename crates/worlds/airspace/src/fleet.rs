@@ -14,7 +14,7 @@ use sidestep_kernel::{Cycle, EntityId, Simulation};
 use std::collections::BTreeMap;
 
 /// A run in which airplanes may be flown by pilots outside of it.
-pub trait Fleet {
+pub trait RemotePilotRun {
     /// Returns the percepts of the airplanes that decide in the cycle to come, by rising id. No result depends on
     /// it.
     fn percepts(&self) -> Vec<Percept>;
@@ -33,10 +33,10 @@ pub trait Fleet {
 
     /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
     /// not reach, both by rising id.
-    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)>;
+    fn out_of_radio_range(&self) -> Vec<(EntityId, Vec<EntityId>)>;
 }
 
-impl Fleet for AirspaceRun {
+impl RemotePilotRun for AirspaceRun {
     fn percepts(&self) -> Vec<Percept> {
         self.world().percepts(self.state(), self.cycle())
     }
@@ -62,7 +62,7 @@ impl Fleet for AirspaceRun {
         invalid
     }
 
-    fn out_of_range(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+    fn out_of_radio_range(&self) -> Vec<(EntityId, Vec<EntityId>)> {
         self.world().out_of_range(self.state(), self.cycle())
     }
 }

@@ -1,7 +1,7 @@
 //! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its orders.
 
 use super::flight::{FlightOrder, FlightTask, MAX_ORDERS, Track, TrackPoint};
-use super::settings::{SeparationM, Speed, TurnRate, Turns};
+use super::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
@@ -10,23 +10,23 @@ use sidestep_scenario::{Closed, LeftOpen, Number, Point, Source, Spanned};
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
 /// A position, height or angle within reasonable bounds.
-type Value = Number<Closed<-1_000_000_000, 1_000_000_000>>;
+type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.
-type Time = Number<Closed<0, 1_000_000_000>>;
-type Place = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
+type BoundedTime = Number<Closed<0, 1_000_000_000>>;
+type BoundedPoint = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AirplaneSection {
     callsign: Option<Spanned<String>>,
     /// Place at the start.
-    pub(super) at_m: Option<Place>,
+    pub(super) at_m: Option<BoundedPoint>,
     /// Heading at the start, counterclockwise from east.
-    pub(super) heading_deg: Option<Value>,
+    pub(super) heading_deg: Option<BoundedNumber>,
     /// Places to fly to, one after the other.
-    way_points_m: Option<Vec<Place>>,
-    pub(super) altitude_m: Option<Value>,
-    pub(super) appears_s: Option<Time>,
+    way_points_m: Option<Vec<BoundedPoint>>,
+    pub(super) altitude_m: Option<BoundedNumber>,
+    pub(super) appears_s: Option<BoundedTime>,
     /// Recorded track: [t_s, x_m, y_m, altitude_m], ...
     track: Option<Spanned<Vec<[f64; 4]>>>,
     /// Orders on its way, one thing each.
@@ -39,7 +39,7 @@ pub(super) struct AirplaneSection {
     /// Distance that others have to keep, if not that of all.
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
-    pub(super) turns: Option<Turns>,
+    pub(super) turns: Option<TurnCount>,
     non_cooperative: Option<bool>,
     /// Earlier name of non_cooperative.
     intruder: Option<Spanned<bool>>,
@@ -49,17 +49,17 @@ pub(super) struct AirplaneSection {
 #[serde(deny_unknown_fields, default)]
 struct OrderSection {
     /// Time of the order.
-    at_s: Option<Time>,
+    at_s: Option<BoundedTime>,
     /// Heading to fly until sent to a way-point.
-    heading_deg: Option<Value>,
+    heading_deg: Option<BoundedNumber>,
     /// Speed to fly with.
     speed_m_s: Option<Number<Speed>>,
     /// Level to go to.
-    altitude_m: Option<Value>,
+    altitude_m: Option<BoundedNumber>,
     /// Rate of the change of level.
     climb_m_s: Option<Number<LeftOpen<0, 1_000_000_000>>>,
     /// Way-points instead of those it has.
-    way_points_m: Option<Vec<Place>>,
+    way_points_m: Option<Vec<BoundedPoint>>,
     /// Whether it goes on to its next way-point.
     proceeds: Option<bool>,
     /// Whether it leaves the airspace.
@@ -67,9 +67,9 @@ struct OrderSection {
 }
 
 /// Orders in their order, and when the airplane is removed: infinity for never.
-type Orders = (Vec<FlightOrder>, f64);
+type OrdersAndRemoval = (Vec<FlightOrder>, f64);
 
-fn points_m(given: Option<&Vec<Place>>) -> Vec<[f64; 2]> {
+fn points_m(given: Option<&Vec<BoundedPoint>>) -> Vec<[f64; 2]> {
     given.into_iter().flatten().map(|place| place.get()).collect()
 }
 
@@ -136,7 +136,7 @@ impl AirplaneSection {
     }
 
     /// Returns its orders, and the time at which it is removed.
-    pub(super) fn orders(&self, source: &Source) -> Result<Orders, InputError> {
+    pub(super) fn orders(&self, source: &Source) -> Result<OrdersAndRemoval, InputError> {
         let mut orders = Vec::new();
         let mut leaves_s = f64::INFINITY;
         let mut last_s = 0.0;
@@ -149,7 +149,7 @@ impl AirplaneSection {
                 return Err(error(cause, "sort orders by at_s, from 0"));
             }
             last_s = at_s;
-            match order.task().map_err(|(cause, remedy)| error(cause, remedy))? {
+            match order.parse_task().map_err(|(cause, remedy)| error(cause, remedy))? {
                 Some(task) => orders.push(FlightOrder { at_s, task }),
                 None => leaves_s = at_s.min(leaves_s),
             }
@@ -164,7 +164,7 @@ impl AirplaneSection {
 
 impl OrderSection {
     /// Returns the one task of the order; `None` for leaving.
-    fn task(&self) -> Result<Option<FlightTask>, (&'static str, &'static str)> {
+    fn parse_task(&self) -> Result<Option<FlightTask>, (&'static str, &'static str)> {
         if self.climb_m_s.is_some() && self.altitude_m.is_none() {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));
         }

@@ -1,6 +1,6 @@
 //! Generated traffic: the super-conflict, random crossings, and converging streams.
 
-use super::flight::{Airplane, Model, Point, Pose2, distance_m};
+use super::flight::{AircraftModel, Airplane, Point, Pose2, distance_m};
 use super::purpose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,7 @@ pub(super) struct GeneratorParams<'a> {
     pub(super) n: usize,
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
-    pub(super) model: &'a Model,
+    pub(super) model: &'a AircraftModel,
     /// Further meters between the starts of random traffic, for errors that the shield allows for.
     pub(super) errors_m: f64,
 }
@@ -43,8 +43,8 @@ pub(super) fn generate(
 ) -> Result<Vec<Airplane>, usize> {
     match params.kind {
         GeneratorKind::Superconflict => Ok(superconflict(params, streams)),
-        GeneratorKind::Random => random(params, streams),
-        GeneratorKind::Streams => Ok(converging(params, streams)),
+        GeneratorKind::Random => random_traffic(params, streams),
+        GeneratorKind::Streams => Ok(converging_streams(params, streams)),
     }
 }
 
@@ -92,7 +92,7 @@ fn superconflict(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplan
 /// Returns airplanes anywhere in a disc, each flying to a point of the disc at least half its
 /// radius away. Starts are so far apart that first fallbacks are, too: an orbit's diameter each,
 /// and the separation.
-fn random(params: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
+fn random_traffic(params: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplane>, usize> {
     let gap_m =
         4.0 * params.model.turn_radius_m() + params.model.separation_m + params.errors_m + 1.0;
     let mut starts = SpacedPoints { gap_m, by_square: BTreeMap::new() };
@@ -100,11 +100,11 @@ fn random(params: &GeneratorParams<'_>, streams: &Streams) -> Result<Vec<Airplan
     for id in 0..params.n {
         let mut draws = airplane_draws(streams, id);
         let start = (0..MAX_TRIES)
-            .map(|_| in_disc(params.radius_m, &mut draws))
+            .map(|_| random_point_in_disc(params.radius_m, &mut draws))
             .find(|at| starts.has_room_at(*at));
         let start = start.ok_or(id)?;
         let goal = (0..MAX_TRIES)
-            .map(|_| in_disc(params.radius_m, &mut draws))
+            .map(|_| random_point_in_disc(params.radius_m, &mut draws))
             .find(|goal| distance_m(start, *goal) >= 0.5 * params.radius_m);
         starts.add(start);
         // Many draws are far enough, so the point opposite hardly ever has to do.
@@ -140,7 +140,7 @@ impl SpacedPoints {
     }
 }
 
-fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
+fn random_point_in_disc(radius_m: f64, draws: &mut Draws) -> Point {
     // The root makes all places of the disc equally likely.
     let r = radius_m * draws.uniform().sqrt();
     on_circle(r, TAU * draws.uniform())
@@ -149,7 +149,7 @@ fn in_disc(radius_m: f64, draws: &mut Draws) -> Point {
 /// Returns three streams that meet at the center and continue together. Airplanes of a stream
 /// follow each other at four separations; the first of each stream reach the center at the same
 /// time, and so do the second, and so on.
-fn converging(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
+fn converging_streams(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplane> {
     let spacing_m = 4.0 * params.model.separation_m;
     let mut airplanes = Vec::with_capacity(params.n);
     for k in 0..params.n {

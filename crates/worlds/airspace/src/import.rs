@@ -11,21 +11,21 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Forms of files, by the ends of their names.
-enum FileFormat {
+enum TrafficFileFormat {
     Bluesky,
     Tracks,
     Other,
 }
 
-fn file_format(file: &Path) -> FileFormat {
+fn file_format(file: &Path) -> TrafficFileFormat {
     let name = file.to_string_lossy().to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     if name.ends_with(".scn") {
-        FileFormat::Bluesky
+        TrafficFileFormat::Bluesky
     } else if name.ends_with(".csv") {
-        FileFormat::Tracks
+        TrafficFileFormat::Tracks
     } else {
-        FileFormat::Other
+        TrafficFileFormat::Other
     }
 }
 
@@ -33,16 +33,16 @@ fn file_format(file: &Path) -> FileFormat {
 ///
 /// # Errors
 /// When the file cannot be read.
-pub(super) fn translate(file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (scenario, (mut json, lines)) = match file_format(file) {
-        FileFormat::Other => return Ok(None),
-        FileFormat::Bluesky => {
+        TrafficFileFormat::Other => return Ok(None),
+        TrafficFileFormat::Bluesky => {
             let scn = bluesky::read(file)?;
             let rules = bluesky_settings(&file.display().to_string(), &scn);
             (from_bluesky(&name, &scn), bluesky_report(&scn, &rules.refused))
         }
-        FileFormat::Tracks => {
+        TrafficFileFormat::Tracks => {
             let tracks = traffic::read(file)?;
             (from_tracks(&name, &tracks), track_report(&tracks))
         }

@@ -55,7 +55,7 @@ impl AirspaceWorld {
     ) -> Vec<Slot> {
         let clock = &ManualClock::default();
         let context = &mut PhaseContext { world: self, state, now, clock, scratch };
-        let groups = join::groups(context);
+        let groups = join::form_groups(context);
         let mut group = Vec::new();
         groups.members(groups.leader(id), &mut group);
         act::act(context, &group);
@@ -89,13 +89,13 @@ impl Inspector<'_> {
     }
 
     /// Returns the airplane as its group sees it.
-    fn known(&self) -> KnownAircraft {
+    fn known_airplane(&self) -> KnownAircraft {
         let own = self.trace.own_part(&self.trace.group).copied();
         own.unwrap_or_else(|| perceive::known_aircraft(self.world, self.before, self.now, self.id))
     }
 
     /// Returns a point on the level of the airplane.
-    fn place(&self, [x_m, y_m]: Point) -> view::Vec3 {
+    fn point_on_level(&self, [x_m, y_m]: Point) -> view::Vec3 {
         [x_m, y_m, self.before.airplanes[self.id as usize].altitude_m.get()]
     }
 
@@ -113,7 +113,7 @@ impl Inspector<'_> {
         let ahead = segment.mission.get(next);
         inspection.add_section(
             FactSection::new("Now")
-                .fact("place", self.place(current.pose().at))
+                .fact("place", self.point_on_level(current.pose().at))
                 .fact("heading", FactValue::degrees(current.pose().heading_rad))
                 .fact("airspeed", FactValue::number(segment.model.v_m_s, "m/s"))
                 .fact("separation", FactValue::meters(segment.model.separation_m))
@@ -121,12 +121,12 @@ impl Inspector<'_> {
                     "way-points left",
                     FactValue::count(segment.mission.len().saturating_sub(next)),
                 )
-                .fact("next way-point", ahead.map(|&at| self.place(at)))
+                .fact("next way-point", ahead.map(|&at| self.point_on_level(at)))
                 .fact("minds", avoids),
         );
         let way_points = segment.mission.iter().skip(next).copied();
         let route = [current.pose().at].into_iter().chain(way_points);
-        let points_m: Vec<view::Vec3> = route.map(|at| self.place(at)).collect();
+        let points_m: Vec<view::Vec3> = route.map(|at| self.point_on_level(at)).collect();
         if points_m.len() > 1 {
             inspection.add_mark(MarkRole::Target, "way-points", MarkShape::Line { points_m });
         }
@@ -135,7 +135,7 @@ impl Inspector<'_> {
     /// Adds its group, and where the others are seen.
     fn add_group(&self, inspection: &mut Inspection) {
         let mut table = FactTable::new(["airplane", "distance", "minds others"]);
-        let own = self.known().pose.at;
+        let own = self.known_airplane().pose.at;
         for &other in self.group.iter().filter(|&&other| other != self.id) {
             let current = &self.before.airplanes[other as usize];
             let [x_m, y_m] = observed_pose(self.world, other, self.now, current.pose()).at;
@@ -168,7 +168,7 @@ impl Inspector<'_> {
         ]);
         let cycle = |cycle: Cycle| FactValue::number(cycle as f64, "");
         for (&other, contact) in &self.trace.contacts {
-            let at_m = self.place(contact.beacon.pose.at);
+            let at_m = self.point_on_level(contact.beacon.pose.at);
             table.push_row([
                 airplane(other).into(),
                 cycle(contact.heard_in),

@@ -1,7 +1,7 @@
 //! Groups: airplanes that have to avoid each other decide together.
 
-use super::flight::{FlightTask, Levels, distance_m};
-use super::non_cooperative::NonCooperative;
+use super::flight::{FlightLevelRange, FlightTask, distance_m};
+use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{claim, ownship_state, surveillance_report};
 use super::pilot::{Percept, SurveillanceReport};
 use super::scratch::PhaseContext;
@@ -37,7 +37,7 @@ impl ControlledGroup {
     pub(super) fn percepts(
         &self,
         context: &PhaseContext<'_>,
-        non_cooperative: &[NonCooperative],
+        non_cooperative: &[NonCooperativeAircraft],
     ) -> Vec<Percept> {
         let group: Vec<SurveillanceReport> =
             self.ids.iter().map(|&slot| surveillance_report(context, slot)).collect();
@@ -70,7 +70,8 @@ fn nearby(context: &PhaseContext<'_>, group: &[Slot], own: Slot) -> Vec<Slot> {
     let mut near = vec![own];
     let mut due = vec![own];
     while let Some(from) = due.pop() {
-        for &other in group.iter().filter(|&&other| is_near(context, from, other)) {
+        for &other in group.iter().filter(|&&other| have_to_avoid_each_other(context, from, other))
+        {
             if !near.contains(&other) {
                 near.push(other);
                 if world.is_non_cooperative(other, now) {
@@ -84,7 +85,7 @@ fn nearby(context: &PhaseContext<'_>, group: &[Slot], own: Slot) -> Vec<Slot> {
 }
 
 /// Starts a cycle for all: returns the groups that airplanes form in it.
-pub(super) fn groups(context: &mut PhaseContext<'_>) -> ConflictGroups {
+pub(super) fn form_groups(context: &mut PhaseContext<'_>) -> ConflictGroups {
     let n = context.world.airplanes.len();
     let groups = ConflictGroups::new(n);
     claim(context, 0..n);
@@ -101,15 +102,15 @@ pub(super) fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups:
         }
         let at = state.airplanes[slot as usize].pose().at;
         state.neighborhood.for_each_near(at, now, |other| {
-            if other < slot && is_near(context, slot, other) {
-                groups.join(slot, other);
+            if other < slot && have_to_avoid_each_other(context, slot, other) {
+                groups.join_groups(slot, other);
             }
         });
     }
 }
 
 /// Returns whether two airplanes have to avoid each other.
-fn is_near(context: &PhaseContext<'_>, a: Slot, b: Slot) -> bool {
+fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: Slot, b: Slot) -> bool {
     let PhaseContext { world, state, .. } = context;
     let at_a = state.airplanes[a as usize].pose().at;
     let at_b = state.airplanes[b as usize].pose().at;
@@ -118,21 +119,23 @@ fn is_near(context: &PhaseContext<'_>, a: Slot, b: Slot) -> bool {
 }
 
 /// Returns all levels that an airplane is on, or has been ordered to change to by now.
-fn levels(context: &PhaseContext<'_>, slot: Slot) -> Levels {
+fn levels(context: &PhaseContext<'_>, slot: Slot) -> FlightLevelRange {
     let PhaseContext { world, state, now, .. } = context;
     if world.is_replayed(slot, *now) {
-        return Levels::ALL;
+        return FlightLevelRange::ALL;
     }
     let current = &state.airplanes[slot as usize];
     let done = current.orders.get();
-    let mut levels =
-        Levels::between(current.altitude_m.get(), world.segment(slot, done.into()).altitude_m);
+    let mut levels = FlightLevelRange::between(
+        current.altitude_m.get(),
+        world.segment(slot, done.into()).altitude_m,
+    );
     let orders = &world.airplanes[slot as usize].orders;
     let now_s = world.cycle_start_s(*now);
     let due = orders.iter().skip(done.into()).take_while(|order| order.at_s <= now_s);
     for order in due {
         if let FlightTask::Altitude { altitude_m, .. } = order.task {
-            levels = levels.including(altitude_m);
+            levels = levels.extended_by_level(altitude_m);
         }
     }
     levels

@@ -57,8 +57,8 @@ pub mod world;
 mod world_impl;
 mod world_type;
 
-pub use decide::{Optimization, OptimizationStats};
-pub use fleet::Fleet;
+pub use decide::{OptimizationRecord, OptimizationStats};
+pub use fleet::RemotePilotRun;
 use scratch::PhaseContext;
 pub use scratch::Scratch;
 use sidestep_kernel::conflict::ConflictGroups;

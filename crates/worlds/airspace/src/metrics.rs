@@ -117,15 +117,15 @@ metrics! {
         /// Times that an order waited for the next `dt`. It waits while no orbit is apart from those of others.
         pub orders_delayed: u64 => "orders delayed",
         /// Pairs for which the shield promises nothing, and since when.
-        pub too_close: Vec<TooClose> => "pairs without a promise",
+        pub too_close: Vec<UnprotectedPair> => "pairs without a promise",
         /// Airplanes whose errors exceeded the bounds, and since when. The shield promises nothing for their pairs.
-        pub beyond_bound: Vec<BeyondBound> => "airplanes beyond their bounds",
+        pub beyond_bound: Vec<ErrorBoundViolation> => "airplanes beyond their bounds",
     }
 }
 
 /// An airplane with errors beyond the shield's bounds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct BeyondBound {
+pub struct ErrorBoundViolation {
     /// Time of the first such error, in seconds after the start of the run.
     pub at_s: f64,
     /// Id of the airplane.
@@ -138,7 +138,7 @@ pub struct BeyondBound {
 /// Two airplanes that were too near each other for the shield when the later one came in, or one of
 /// which minds no other and could reach the second one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TooClose {
+pub struct UnprotectedPair {
     /// Time when that began, in seconds after the start of the run.
     pub at_s: f64,
     /// Ids of the two.
@@ -332,15 +332,15 @@ pub(crate) fn metrics(
 
 /// Returns the time that conversations took on the network, in seconds; none where that is reliable.
 fn network_s(world: &AirspaceWorld, ticks: u64) -> Option<f64> {
-    world.network.as_ref().map(|network| network.seconds(ticks))
+    world.network.as_ref().map(|network| network.ticks_to_s(ticks))
 }
 
 /// Returns the airplanes whose errors exceeded the shield's bounds, by ids.
-fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<BeyondBound> {
+fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<ErrorBoundViolation> {
     counters
         .beyond_bound
         .iter()
-        .map(|(&airplane, &cycle)| BeyondBound {
+        .map(|(&airplane, &cycle)| ErrorBoundViolation {
             at_s: world.cycle_start_s(cycle),
             airplane,
             callsign: world.callsign(airplane),
@@ -349,13 +349,13 @@ fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<BeyondBound> 
 }
 
 /// Returns the pairs whose separation the shield does not guarantee, by the time when that began.
-fn too_close(world: &AirspaceWorld, counters: &Counters) -> Vec<TooClose> {
+fn too_close(world: &AirspaceWorld, counters: &Counters) -> Vec<UnprotectedPair> {
     let mut pairs: Vec<_> =
         counters.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
     pairs.sort_unstable();
     pairs
         .into_iter()
-        .map(|(cycle, (a, b))| TooClose {
+        .map(|(cycle, (a, b))| UnprotectedPair {
             at_s: world.cycle_start_s(cycle),
             airplanes: [a, b],
             callsigns: world.callsigns([a, b]),
@@ -371,7 +371,7 @@ pub fn have_all_ended(state: &AirspaceState) -> bool {
 #[cfg(test)]
 mod tests {
     use crate::airspace_run;
-    use crate::state::End;
+    use crate::state::FlightEnd;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
@@ -388,7 +388,7 @@ mod tests {
         run.advance(30);
         let world = run.world();
         assert_eq!(world.alone_s[0], f64::INFINITY);
-        run.state().airplanes[0].set_end(End::Arrived(20));
+        run.state().airplanes[0].set_end(FlightEnd::Arrived(20));
         let first = super::airplane_metrics(world, run.state(), 0);
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();

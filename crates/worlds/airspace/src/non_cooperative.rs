@@ -4,7 +4,7 @@
 //! is bound for. Methods assume that it flies straight on. The shield knows where it can be within `dt`:
 //! anywhere in a circle that grows at its greatest speed.
 
-use crate::flight::{Levels, Point};
+use crate::flight::{FlightLevelRange, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::Slot;
@@ -18,7 +18,7 @@ const MAX_DT_S: f64 = 1e4;
 
 /// A non-cooperative airplane as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NonCooperative {
+pub struct NonCooperativeAircraft {
     pub(crate) slot: Slot,
     /// Its position as all see it, with the error of the cycle.
     pub(crate) at: Point,
@@ -30,12 +30,12 @@ pub struct NonCooperative {
     /// Bound in meters on how far it may be from where it is seen.
     pub(crate) error_m: f64,
     /// The levels that it can be on within `dt`.
-    pub(crate) levels: Levels,
+    pub(crate) levels: FlightLevelRange,
     /// Seconds of a `dt`.
     pub(crate) dt_s: f64,
 }
 
-impl NonCooperative {
+impl NonCooperativeAircraft {
     /// Returns the distance in meters to keep from where it would be if it flew straight on: the
     /// separation, and as far as it gets within `dt`.
     pub(crate) fn clearance_m(&self, separation_m: f64) -> f64 {

@@ -6,8 +6,8 @@
 //! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
 //! ```
 
-use super::flight::{Levels, Point, Prediction};
-use super::non_cooperative::NonCooperative;
+use super::flight::{FlightLevelRange, Point, Prediction};
+use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
 use sidestep_kernel::interrupt;
@@ -32,7 +32,7 @@ impl Objective {
     /// assumed to fly straight on.
     fn non_cooperative_cost(
         &self,
-        one: &NonCooperative,
+        one: &NonCooperativeAircraft,
         prediction: &Prediction,
         separation_m: f64,
         dtau_s: f64,
@@ -40,13 +40,13 @@ impl Objective {
         let points: Vec<Point> =
             (1..=prediction.points.len()).map(|k| one.position_after(k as f64 * dtau_s)).collect();
         let straight = Prediction { counted: points.len(), points };
-        self.collision(prediction, &straight, [one.clearance_m(separation_m), 0.0])[0]
+        self.collision_costs(prediction, &straight, [one.clearance_m(separation_m), 0.0])[0]
     }
 
     /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
     /// meters (eq. 9). Sums slice by slice of time, so that a caller that skips slices which are
     /// apart gets the same bits.
-    pub fn collision(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
+    pub fn collision_costs(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
         let end = self.counted_points(a).min(self.counted_points(b));
         let mut sums = [0.0; 2];
         let mut weight = 1.0;
@@ -93,7 +93,7 @@ impl Objective {
     }
 
     /// Returns `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
-    pub fn deviation(&self, of: &Prediction, optimal: &Prediction) -> f64 {
+    pub fn deviation_cost(&self, of: &Prediction, optimal: &Prediction) -> f64 {
         match (of.points.last(), optimal.points.last()) {
             (Some(p), Some(q)) => {
                 let dx = p[0] - q[0];
@@ -117,18 +117,18 @@ pub struct ActionPredictions {
     /// Separation asked for, in meters.
     pub separation_m: f64,
     /// The levels that the airplane occupies.
-    pub levels: Levels,
+    pub levels: FlightLevelRange,
     /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
     non_cooperative_costs: Vec<f64>,
-    slices: Vec<Slice>,
+    slices: Vec<TimeSlice>,
 }
 
 impl ActionPredictions {
     /// Returns options with their slices.
-    pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: Levels) -> Self {
+    pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: FlightLevelRange) -> Self {
         let max_points = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
         let slices =
-            (0..max_points).step_by(SLICE).map(|from| Slice::new(&predictions, from)).collect();
+            (0..max_points).step_by(SLICE).map(|from| TimeSlice::new(&predictions, from)).collect();
         Self { predictions, separation_m, levels, non_cooperative_costs: Vec::new(), slices }
     }
 
@@ -136,14 +136,14 @@ impl ActionPredictions {
     #[must_use]
     pub(crate) fn with_non_cooperative(
         mut self,
-        non_cooperative: &[NonCooperative],
+        non_cooperative: &[NonCooperativeAircraft],
         objective: &Objective,
         dtau_s: f64,
     ) -> Self {
         if non_cooperative.is_empty() {
             return self;
         }
-        let on_level: Vec<&NonCooperative> = non_cooperative
+        let on_level: Vec<&NonCooperativeAircraft> = non_cooperative
             .iter()
             .filter(|one| one.levels.overlaps(&self.levels, objective.vertical_m))
             .collect();
@@ -162,7 +162,7 @@ impl ActionPredictions {
         self
     }
 
-    fn piece(&self, piece: &Piece, from: usize, mask: bool) -> &[Point] {
+    fn piece(&self, piece: &SharedPoints, from: usize, mask: bool) -> &[Point] {
         let points = &self.predictions[piece.actions[0]].points;
         let end = if mask { piece.counted } else { points.len().min(from + SLICE) };
         &points[from.min(end)..end]
@@ -171,15 +171,15 @@ impl ActionPredictions {
 
 /// The paths of all actions of an airplane in one slice of time.
 #[derive(Debug, Clone)]
-struct Slice {
-    pieces: Vec<Piece>,
+struct TimeSlice {
+    pieces: Vec<SharedPoints>,
     /// Bounds around all of them.
     all: BoundingBox,
 }
 
 /// Points of a slice that some actions share: actions with the same turn differ only later.
 #[derive(Debug, Clone)]
-struct Piece {
+struct SharedPoints {
     /// The actions, at least one.
     actions: Vec<usize>,
     /// Point of the prediction at which the counted part of the slice ends.
@@ -187,9 +187,9 @@ struct Piece {
     bounds: BoundingBox,
 }
 
-impl Slice {
+impl TimeSlice {
     fn new(predictions: &[Prediction], from: usize) -> Self {
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut pieces: Vec<SharedPoints> = Vec::new();
         for (action, prediction) in predictions.iter().enumerate() {
             let points = slice_points(prediction, from);
             let end = prediction.points.len().min(from + SLICE);
@@ -203,7 +203,7 @@ impl Slice {
                 Some(piece) => piece.actions.push(action),
                 None => {
                     let bounds = BoundingBox::from_points(points);
-                    pieces.push(Piece { actions: vec![action], counted, bounds });
+                    pieces.push(SharedPoints { actions: vec![action], counted, bounds });
                 }
             }
         }
@@ -244,7 +244,7 @@ impl BoundingBox {
 /// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
 ///
 /// Everything that does not change during an optimization is computed here, once.
-pub fn game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
+pub fn group_game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
     let own = group.iter().map(|options| own_costs(objective, options)).collect();
     let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
@@ -261,7 +261,7 @@ pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> V
     let mut costs: Vec<f64> = options
         .predictions
         .iter()
-        .map(|prediction| objective.alpha * objective.deviation(prediction, optimal))
+        .map(|prediction| objective.alpha * objective.deviation_cost(prediction, optimal))
         .collect();
     for (cost, further) in costs.iter_mut().zip(&options.non_cooperative_costs) {
         *cost += further;
@@ -337,7 +337,7 @@ fn add_to_all(
 #[cfg(test)]
 mod tests {
     use super::super::flight::{
-        Action, AfterLastWaypoint, Autopilot, Model, Pose2, Timing, WaypointRule,
+        Action, AfterLastWaypoint, AircraftModel, Autopilot, Pose2, StepTiming, WaypointRule,
     };
     use super::*;
     use serde_json::Value;
@@ -371,8 +371,11 @@ mod tests {
         let name = case["name"].as_str().expect("a name");
         let params = &case["params"];
         let number = |key: &str| params[key].as_f64().expect("a number");
-        let timing =
-            Timing { dt_s: number("dt"), dtau_s: number("dtau"), horizon: number("kmax") as usize };
+        let timing = StepTiming {
+            dt_s: number("dt"),
+            dtau_s: number("dtau"),
+            horizon: number("kmax") as usize,
+        };
         let objective = Objective {
             alpha: number("alpha"),
             beta: number("beta"),
@@ -392,7 +395,7 @@ mod tests {
         let actions = case["actions"].as_array().expect("actions");
         for (i, (plane, action)) in planes.iter().zip(actions).enumerate() {
             let number = |key: &str| plane[key].as_f64().expect("a number");
-            let model = Model {
+            let model = AircraftModel {
                 v_m_s: number("v"),
                 omega_max_rad_s: number("omega_max"),
                 separation_m: number("R"),
@@ -419,15 +422,15 @@ mod tests {
                 (0..2).for_each(|c| near(prediction.points[k][c], &expected[key][i][c], name));
             }
             assert_eq!(expected["ka"][i].as_u64(), Some(prediction.counted as u64), "{name}");
-            near(objective.deviation(&prediction, &optimal), &expected["G_dev_i"][i], name);
+            near(objective.deviation_cost(&prediction, &optimal), &expected["G_dev_i"][i], name);
             predictions.push((prediction, optimal, model.separation_m));
         }
         let mut total = [0.0; 2];
         for (i, (a, optimal, ra)) in predictions.iter().enumerate() {
-            let mut own = objective.alpha * objective.deviation(a, optimal);
-            total[1] += objective.deviation(a, optimal);
+            let mut own = objective.alpha * objective.deviation_cost(a, optimal);
+            total[1] += objective.deviation_cost(a, optimal);
             for (j, (b, _, rb)) in predictions.iter().enumerate().filter(|(j, _)| *j != i) {
-                let [of_a, _] = objective.collision(a, b, [*ra, *rb]);
+                let [of_a, _] = objective.collision_costs(a, b, [*ra, *rb]);
                 near(of_a, &expected["G_col_ij"][i][j], name);
                 own += of_a;
                 total[0] += of_a;
@@ -440,22 +443,27 @@ mod tests {
         let options: Vec<ActionPredictions> = predictions
             .iter()
             .map(|(p, optimal, r)| {
-                ActionPredictions::new(vec![p.clone(), optimal.clone()], *r, Levels::at(0.0))
+                ActionPredictions::new(
+                    vec![p.clone(), optimal.clone()],
+                    *r,
+                    FlightLevelRange::from_level(0.0),
+                )
             })
             .collect();
-        let game = game(&objective, &options);
+        let game = group_game(&objective, &options);
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);
     }
 
     /// The parts left out by slices, bounds and shared pieces cost nothing, to the bit.
     #[test]
     fn tables_hold_what_two_predictions_cost_to_the_bit() {
-        use super::super::flight::{Legs, actions};
-        let model = Model { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
-        let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
+        use super::super::flight::{DetourLegs, actions};
+        let model =
+            AircraftModel { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
+        let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = WaypointRule { tolerance_m: 100.0, passes: true };
-        let all =
-            [Legs::default(), Legs::default_preset()].map(|legs| actions(&model, 5.0, &[], &legs));
+        let all = [DetourLegs::default(), DetourLegs::default_preset()]
+            .map(|legs| actions(&model, 5.0, &[], &legs));
         let mut meetings = 0;
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
             let options = [0.0, 1.0].map(|side| {
@@ -471,7 +479,7 @@ mod tests {
                 ActionPredictions::new(
                     predictions,
                     model.separation_m * (1.0 - 0.1 * side),
-                    Levels::at(0.0),
+                    FlightLevelRange::from_level(0.0),
                 )
             });
             let [a, b] = &options;
@@ -483,7 +491,7 @@ mod tests {
                 a.predictions.iter().flat_map(|p| b.predictions.iter().map(move |q| (p, q)));
             let r = [a.separation_m, b.separation_m];
             for ((p, q), found) in pairs.zip(&table) {
-                assert_eq!(*found, objective.collision(p, q, r));
+                assert_eq!(*found, objective.collision_costs(p, q, r));
                 meetings += usize::from(*found != [0.0; 2]);
             }
         }

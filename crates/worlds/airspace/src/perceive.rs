@@ -1,7 +1,7 @@
 //! *Perceive*: airplanes enter the spatial index, and what each of them and its group perceives.
 
-use super::flight::{KnownAircraft, Levels, Pose2};
-use super::non_cooperative::NonCooperative;
+use super::flight::{FlightLevelRange, KnownAircraft, Pose2};
+use super::non_cooperative::NonCooperativeAircraft;
 use super::pilot::{OwnshipState, SurveillanceReport};
 use super::purpose;
 use super::scratch::PhaseContext;
@@ -93,7 +93,7 @@ pub(super) fn surveillance_report(context: &PhaseContext<'_>, slot: Slot) -> Sur
 pub(super) fn non_cooperative_aircraft(
     context: &PhaseContext<'_>,
     group: &[Slot],
-) -> Vec<NonCooperative> {
+) -> Vec<NonCooperativeAircraft> {
     group
         .iter()
         .filter(|slot| context.world.is_non_cooperative(**slot, context.now))
@@ -101,7 +101,7 @@ pub(super) fn non_cooperative_aircraft(
         .collect()
 }
 
-fn non_cooperative_at(context: &PhaseContext<'_>, slot: Slot) -> NonCooperative {
+fn non_cooperative_at(context: &PhaseContext<'_>, slot: Slot) -> NonCooperativeAircraft {
     let PhaseContext { world, state, now, .. } = *context;
     let airplane = &world.airplanes[slot as usize];
     let current = &state.airplanes[slot as usize];
@@ -117,15 +117,15 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: Slot) -> NonCooperative 
             let [vx, vy] = along(track.speed_m_s(world.cycle_start_s(now)));
             let top_m_s = world.top_m_s[slot as usize] + math::hypot(wx, wy);
             let climb_m = track.max_climb_m_s() * dt_s;
-            let levels = Levels::between(altitude_m - climb_m, altitude_m + climb_m);
+            let levels = FlightLevelRange::between(altitude_m - climb_m, altitude_m + climb_m);
             ([vx - wx, vy - wy], top_m_s, levels)
         }
         _ => {
-            let levels = Levels::between(altitude_m, segment.altitude_m);
+            let levels = FlightLevelRange::between(altitude_m, segment.altitude_m);
             (along(segment.model.v_m_s), world.top_m_s[slot as usize], levels)
         }
     };
-    NonCooperative {
+    NonCooperativeAircraft {
         slot,
         at,
         velocity_m_s,

@@ -1,7 +1,7 @@
 //! The tables that a run records, and their rows until they are recorded.
 
-use super::decide::Optimization;
-use super::events::{Event, EventKind, Measure};
+use super::decide::OptimizationRecord;
+use super::events::{Event, EventKind, EventQuantity};
 use super::flight::Leg;
 use super::settings::RecordSection;
 use super::world::AirspaceWorld;
@@ -25,7 +25,7 @@ impl FlownLeg {
     }
 }
 
-fn trajectories(callsigns: &[Option<String>]) -> Table<FlownLeg> {
+fn trajectories_table(callsigns: &[Option<String>]) -> Table<FlownLeg> {
     let mut names: Vec<String> = callsigns.iter().flatten().cloned().collect();
     names.sort_unstable();
     names.dedup();
@@ -55,7 +55,7 @@ fn trajectories(callsigns: &[Option<String>]) -> Table<FlownLeg> {
         })
 }
 
-fn events(callsigns: Vec<Option<String>>) -> Table<Event> {
+fn events_table(callsigns: Vec<Option<String>>) -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
@@ -64,15 +64,17 @@ fn events(callsigns: Vec<Option<String>>) -> Table<Event> {
         .text("callsign", "its call sign", move |e: &Event| {
             callsigns.get(e.airplane as usize).cloned().flatten()
         })
-        .u32("other", "the other airplane", Event::partner)
-        .f64("distance_m", "how near they were", |e| e.value_in(Measure::Distance))
-        .f64("delay_s", "time beyond that of the flight alone", |e| e.value_in(Measure::Delay))
-        .f64("number", "a number, by event", |e| e.value_in(Measure::Number))
+        .u32("other", "the other airplane", Event::other_airplane)
+        .f64("distance_m", "how near they were", |e| e.value_in(EventQuantity::Distance))
+        .f64("delay_s", "time beyond that of the flight alone", |e| {
+            e.value_in(EventQuantity::Delay)
+        })
+        .f64("number", "a number, by event", |e| e.value_in(EventQuantity::Number))
 }
 
-fn optimizations() -> Table<Optimization> {
+fn optimizations_table() -> Table<OptimizationRecord> {
     Table::new("optimizations")
-        .u64("cycle", "cycle of dt before which it was made", |o: &Optimization| o.cycle)
+        .u64("cycle", "cycle of dt before which it was made", |o: &OptimizationRecord| o.cycle)
         .u32("airplane", "smallest entity id of the group", |o| o.airplane)
         .u32("airplanes", "members of the group", |o| o.airplanes)
         .u32("rounds", "rounds made", |o| o.rounds)
@@ -89,14 +91,14 @@ fn callsigns(world: &AirspaceWorld) -> Vec<Option<String>> {
 
 /// Rows that wait to be recorded.
 #[derive(Debug, Default)]
-pub(super) struct Rows {
+pub(super) struct RecordBuffers {
     record: RecordSection,
     flown: RowBuffer<FlownLeg>,
     events: RowBuffer<Event>,
-    optimizations: RowBuffer<Optimization>,
+    optimizations: RowBuffer<OptimizationRecord>,
 }
 
-impl Rows {
+impl RecordBuffers {
     /// Returns empty rows, which later keep the tables that `record` asks for.
     pub(super) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
@@ -109,9 +111,9 @@ impl Rows {
 
     /// Starts to keep rows of the tables that the scenario asks for; before this call none are kept.
     pub(super) fn start(&mut self, world: &AirspaceWorld) {
-        self.flown.start(self.record.trajectories.then(|| trajectories(&callsigns(world))));
-        self.events.start(self.record.events.then(|| events(callsigns(world))));
-        self.optimizations.start(self.record.optimizations.then(optimizations));
+        self.flown.start(self.record.trajectories.then(|| trajectories_table(&callsigns(world))));
+        self.events.start(self.record.events.then(|| events_table(callsigns(world))));
+        self.optimizations.start(self.record.optimizations.then(optimizations_table));
     }
 
     pub(super) fn push_leg(&mut self, flown: FlownLeg) {
@@ -122,12 +124,12 @@ impl Rows {
         self.events.push(event);
     }
 
-    pub(super) fn push_optimization(&mut self, optimization: Optimization) {
+    pub(super) fn push_optimization(&mut self, optimization: OptimizationRecord) {
         self.optimizations.push(optimization);
     }
 }
 
-impl Buffers for Rows {
+impl Buffers for RecordBuffers {
     fn buffers(&self) -> Vec<&dyn Buffer> {
         vec![&self.flown, &self.events, &self.optimizations]
     }

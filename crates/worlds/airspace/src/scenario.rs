@@ -11,15 +11,15 @@ use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
     BuiltInMethod, Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise,
-    Inflation, LevelGap, LookAhead, RecordSection, Rounds, Step, Tolerance, Weight,
+    Inflation, LevelGap, LookAhead, RecordSection, RoundCount, Step, Tolerance, Weight,
 };
-use super::shield::Side;
-use super::state::{AirplaneRecord, PackedEnd, Snapshot};
+use super::shield::OrbitSide;
+use super::state::{AirplaneRecord, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
-use optimizer::{LegsSection, ReactiveSection, Switch, Times};
+use optimizer::{LegsSection, OnOffSwitch, ReactiveSection, TimeList};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -63,7 +63,7 @@ struct AirspaceFile {
 struct AirspaceSection {
     preset: Preset,
     method: ByName<BuiltInMethod>,
-    shield: Switch,
+    shield: OnOffSwitch,
     deployment: Deployment,
     groups: Option<Spanned<Grouping>>,
     network: Option<Spanned<NetworkSection>>,
@@ -78,7 +78,7 @@ struct AirspaceSection {
     alpha: Option<Number<Weight>>,
     beta: Option<Number<Fading>>,
     inflation: Option<Number<Inflation>>,
-    holds_s: Times,
+    holds_s: TimeList,
     legs: Option<Spanned<LegsSection>>,
     mvp: ReactiveSection,
     orca: ReactiveSection,
@@ -87,10 +87,10 @@ struct AirspaceSection {
     order: Option<UpdateOrder>,
     utility: Option<Spanned<Utility>>,
     cooling: Option<Number<Cooling>>,
-    max_rounds: Option<Rounds>,
+    max_rounds: Option<RoundCount>,
     choice: Option<Choice>,
     vertical_m: Option<Number<LevelGap>>,
-    replay_until_s: Option<Number<ReplayEnd>>,
+    replay_until_s: Option<Number<ReplayEndRule>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
     /// Latitude and longitude of the origin.
@@ -104,7 +104,7 @@ struct AirspaceSection {
 }
 
 /// Returns the JSON Schema of a scenario's sections; `own` are methods beside the built-in ones.
-pub(super) fn sections(own: &Methods) -> Value {
+pub(super) fn sections_schema(own: &Methods) -> Value {
     let mut sections = schema::for_type::<AirspaceFile>();
     schema::add_names(&mut sections, "Method", own.keys().map(String::as_str));
     sections
@@ -112,9 +112,9 @@ pub(super) fn sections(own: &Methods) -> Value {
 
 /// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
-struct ReplayEnd;
+struct ReplayEndRule;
 
-impl Rule for ReplayEnd {
+impl Rule for ReplayEndRule {
     fn allows(number: f64) -> bool {
         number >= 0.0
     }
@@ -144,7 +144,7 @@ pub struct CompiledAirspace {
     /// The tables that a run keeps, and the interval of its checkpoints.
     pub record: RecordSection,
     /// Sides of the first fallbacks, by id.
-    pub fallbacks: Arc<Vec<Side>>,
+    pub fallbacks: Arc<Vec<OrbitSide>>,
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
     /// The text that it was compiled from.
@@ -220,10 +220,10 @@ impl CompiledAirspace {
 }
 
 /// Returns the state of an airplane at the start of its flight.
-fn start_record(airplane: &Airplane, fallback: Side) -> AirplaneRecord {
+fn start_record(airplane: &Airplane, fallback: OrbitSide) -> AirplaneRecord {
     AirplaneRecord {
         pose: airplane.start,
-        ended: PackedEnd::NONE,
+        ended: PackedFlightEnd::NONE,
         counts: [0; 4],
         fallback,
         altitude_m: match &airplane.track {
@@ -294,8 +294,8 @@ mod tests {
                 };
                 let a = straight(-2000.0, 35.0);
                 let b = straight(2000.0, -35.0);
-                let [cost, _] = world.objective.collision(&a, &b, [500.0; 2]);
-                cost / world.objective.deviation(&a, &straight(-1300.0, 35.0))
+                let [cost, _] = world.objective.collision_costs(&a, &b, [500.0; 2]);
+                cost / world.objective.deviation_cost(&a, &straight(-1300.0, 35.0))
                     / world.objective.alpha
             };
             let ratio = price(&half) / price(&one);

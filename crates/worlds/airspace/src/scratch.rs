@@ -1,7 +1,7 @@
 //! What a worker needs in a phase: the borrowed inputs, and its own buffers.
 
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::decide::Optimization;
+use crate::decide::OptimizationRecord;
 use crate::events::Event;
 use crate::rows::FlownLeg;
 use crate::state::PairRecord;
@@ -18,7 +18,7 @@ pub(crate) type PhaseContext<'a> = sidestep_kernel::PhaseContext<'a, AirspaceWor
 pub struct Scratch {
     /// Pairs that came near each other.
     pub(crate) pairs: BTreeMap<(Slot, Slot), PairRecord>,
-    pub(crate) optimizations: Vec<Optimization>,
+    pub(crate) optimizations: Vec<OptimizationRecord>,
     /// Beacons by which airplanes have found their groups.
     pub(crate) grouped: NetworkTraffic,
     /// Messages and bytes that the shield has sent.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
 pub(crate) use values::{
     Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation, LevelGap, LookAhead,
-    Rounds, SeparationM, Speed, Step, Tolerance, TurnRate, Turns, Weight,
+    RoundCount, SeparationM, Speed, Step, Tolerance, TurnCount, TurnRate, Weight,
 };
 
 /// The methods by which airplanes choose their actions.

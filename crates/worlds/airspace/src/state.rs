@@ -9,11 +9,11 @@ use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{FlightSegment, Pose2};
 use super::method::MethodKind;
-use super::pilot::{Control, Memory};
-use super::shield::{ExemptIds, Side};
+use super::pilot::{Control, PilotMemory};
+use super::shield::{ExemptIds, OrbitSide};
 use super::world::AirspaceWorld;
-pub use end::{End, PackedEnd};
-use neighborhood::Neighborhood;
+pub use end::{FlightEnd, PackedFlightEnd};
+use neighborhood::SpatialIndex;
 use sidestep_kernel::column::AtomicCell;
 use sidestep_kernel::{Cycle, EntityId, Slot, math};
 pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
@@ -25,7 +25,7 @@ use std::sync::{Mutex, PoisonError};
 pub struct AirspaceState {
     /// The changing part of each airplane.
     pub airplanes: Box<[AirplaneState]>,
-    pub(super) neighborhood: Neighborhood,
+    pub(super) neighborhood: SpatialIndex,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     contacts: Box<[Mutex<TrafficPicture>]>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
@@ -61,7 +61,7 @@ pub struct AirplaneState {
     /// Altitude in meters.
     pub altitude_m: AtomicCell<f64>,
     /// The end of its flight, if it has ended.
-    pub end: AtomicCell<PackedEnd>,
+    pub end: AtomicCell<PackedFlightEnd>,
     /// Number of way-points done with.
     pub next: AtomicCell<u32>,
     /// Number of times that the shield did not allow its preferred maneuver.
@@ -75,7 +75,7 @@ pub struct AirplaneState {
     /// Number of times that an order had to wait for the next `dt`.
     pub waits: AtomicCell<u16>,
     /// Side of the stored fallback.
-    pub fallback: AtomicCell<Side>,
+    pub fallback: AtomicCell<OrbitSide>,
 }
 
 /// A pose on an orbit, in cells, so that workers can store those of their groups at the same time.
@@ -128,30 +128,30 @@ impl AirplaneState {
 
     /// Returns whether it has not arrived yet.
     pub fn is_flying(&self) -> bool {
-        self.end.get() == PackedEnd::NONE
+        self.end.get() == PackedFlightEnd::NONE
     }
 
     /// Returns the end of its flight, if it has ended.
-    pub fn end(&self) -> Option<End> {
-        self.end.get().get()
+    pub fn end(&self) -> Option<FlightEnd> {
+        self.end.get().unpack()
     }
 
     /// Stores the end of its flight.
-    pub(super) fn set_end(&self, end: End) {
+    pub(super) fn set_end(&self, end: FlightEnd) {
         self.end.set(end.into());
     }
 
     /// Returns the steps of `dtau` since the run's start when it arrived, if it has.
     pub fn arrived_step(&self) -> Option<u64> {
         match self.end() {
-            Some(End::Arrived(step)) => Some(step),
+            Some(FlightEnd::Arrived(step)) => Some(step),
             _ => None,
         }
     }
 
     /// Returns whether it was removed before it arrived.
     pub fn has_left(&self) -> bool {
-        matches!(self.end(), Some(End::Left(_)))
+        matches!(self.end(), Some(FlightEnd::Left(_)))
     }
 }
 
@@ -172,7 +172,7 @@ fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
 }
 
 /// Puts back what [`take`] has taken out; nothing where airplanes have no memory.
-fn put<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
+fn put_memories<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
     for (&slot, memory) in group.iter().zip(memories) {
         if let Some(one) = all.get(slot as usize) {
             *lock(one) = memory;
@@ -213,7 +213,7 @@ impl AirspaceState {
         controls_cycle.set(NEVER);
         let state = Self {
             airplanes,
-            neighborhood: Neighborhood::new(n, max_range_m),
+            neighborhood: SpatialIndex::new(n, max_range_m),
             contacts: restore_memories(with_contacts, &snapshot.contacts),
             resolving: restore_memories(with_resolutions, &snapshot.resolving),
             exempt: (0..n).map(|_| Mutex::default()).collect(),
@@ -284,15 +284,15 @@ impl AirspaceState {
     }
 
     /// Takes out the memories of the airplanes of a group.
-    pub(super) fn take_memories(&self, group: &[Slot]) -> Vec<Memory> {
+    pub(super) fn take_memories(&self, group: &[Slot]) -> Vec<PilotMemory> {
         let both = take(&self.contacts, group).into_iter().zip(take(&self.resolving, group));
-        both.map(|(contacts, resolving)| Memory { contacts, resolving }).collect()
+        both.map(|(contacts, resolving)| PilotMemory { contacts, resolving }).collect()
     }
 
     /// Puts back the memory of an airplane.
-    pub(super) fn put_memory(&self, slot: Slot, Memory { contacts, resolving }: Memory) {
-        put(&self.contacts, &[slot], vec![contacts]);
-        put(&self.resolving, &[slot], vec![resolving]);
+    pub(super) fn put_memory(&self, slot: Slot, PilotMemory { contacts, resolving }: PilotMemory) {
+        put_memories(&self.contacts, &[slot], vec![contacts]);
+        put_memories(&self.resolving, &[slot], vec![resolving]);
     }
 
     /// Returns the knowledge that an airplane has of others.
@@ -329,7 +329,7 @@ impl AirspaceState {
 
     /// Stores the action that was ordered for an airplane, in place of any other.
     pub(super) fn set_external_action(&self, slot: Slot, action: ExternalAction) {
-        put(&self.external_actions, &[slot], vec![Some(action)]);
+        put_memories(&self.external_actions, &[slot], vec![Some(action)]);
     }
 
     /// Returns the turn rate of an airplane in the step that it flew last, in radians per second.

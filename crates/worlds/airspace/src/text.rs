@@ -1,16 +1,16 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the pose of every airplane.
 
-use super::metrics::{BeyondBound, Metrics, TooClose};
+use super::metrics::{ErrorBoundViolation, Metrics, UnprotectedPair};
 use super::scenario::CompiledAirspace;
 use super::state::Snapshot;
 use super::world::AirspaceWorld;
 use serde_json::json;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands, key_value};
+use sidestep_kernel::text::{KeyValues, StateDescription, align_pairs, group_thousands, key_value};
 use std::fmt::Write;
 
 /// Returns what is known of a scenario before it runs.
-pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
+pub(super) fn contents(compiled: &CompiledAirspace) -> StateDescription {
     let world = &*compiled.world;
     let shield = if world.shield { "on" } else { "off" };
     let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
@@ -40,7 +40,7 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
     if non_cooperative > 0 {
         lines.push(key_value("intruders", group_thousands(non_cooperative)));
     }
-    lines.extend(abilities(world));
+    lines.extend(abilities_text(world));
     if recorded > 0 {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
         lines.push(key_value(
@@ -48,14 +48,14 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> Description {
             format!("{}, replayed {until}", group_thousands(recorded)),
         ));
     }
-    lines.extend(times(compiled));
-    lines.extend(origin(world));
+    lines.extend(times_text(compiled));
+    lines.extend(origin_text(world));
     lines.extend(too_close(world, &compiled.too_close));
-    Description { json, text: align_pairs(&lines) }
+    StateDescription { json, text: align_pairs(&lines) }
 }
 
 /// Returns how often the airplanes decide, and for how long they fly.
-fn times(compiled: &CompiledAirspace) -> KeyValues {
+fn times_text(compiled: &CompiledAirspace) -> KeyValues {
     let dt_s = compiled.world.timing.dt_s;
     let cycles = group_thousands(compiled.cycles);
     let duration_s = compiled.cycles as f64 * dt_s;
@@ -70,13 +70,13 @@ fn times(compiled: &CompiledAirspace) -> KeyValues {
 }
 
 /// Returns the position of the origin on earth, if it has one.
-fn origin(world: &AirspaceWorld) -> Option<(String, String)> {
+fn origin_text(world: &AirspaceWorld) -> Option<(String, String)> {
     let [lat, lon] = world.origin_deg?;
     Some(key_value("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
-fn abilities(world: &AirspaceWorld) -> KeyValues {
+fn abilities_text(world: &AirspaceWorld) -> KeyValues {
     let models = || world.airplanes.iter().map(|airplane| &airplane.model);
     let height_m = world.vertical_m.round();
     let method = world.method.name();
@@ -118,17 +118,17 @@ fn round_to_tenth(number: f64) -> f64 {
 
 /// Returns the outcome of a run; parts of which there is nothing to say have no line.
 pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
-    let mut lines = flights(metrics);
+    let mut lines = flights_text(metrics);
     lines.extend(not_appeared(metrics));
     lines.extend(network(metrics));
     lines.extend(orders_and_tracks(metrics));
-    lines.extend(warning(&metrics.too_close));
+    lines.extend(unprotected_pairs_warning(&metrics.too_close));
     lines.extend(beyond_bound(&metrics.beyond_bound));
     lines
 }
 
 /// Returns the pose of every airplane, by entity id.
-pub(super) fn poses(snapshot: &Snapshot) -> Description {
+pub(super) fn poses(snapshot: &Snapshot) -> StateDescription {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
     let mut text = "  airplane       x_m         y_m    heading_deg\n".to_string();
     for (id, airplane) in snapshot.airplanes.iter().enumerate() {
@@ -137,7 +137,7 @@ pub(super) fn poses(snapshot: &Snapshot) -> Description {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}");
     }
-    Description { json, text }
+    StateDescription { json, text }
 }
 
 /// Returns the first pairs with first fallbacks that are not apart, and the number of others.
@@ -228,7 +228,7 @@ fn first_names<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
 }
 
 /// Returns the first airplanes with errors beyond the shield's bounds, and the number of others.
-fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
+fn beyond_bound(all: &[ErrorBoundViolation]) -> Option<(String, String)> {
     let names = first_names(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
         format!("{name} at {} s", one.at_s)
@@ -237,15 +237,15 @@ fn beyond_bound(all: &[BeyondBound]) -> Option<(String, String)> {
 }
 
 /// Returns the first pairs whose separation the shield does not guarantee, and the number of others.
-fn warning(too_close: &[TooClose]) -> Option<(String, String)> {
-    let names = first_names(too_close, |TooClose { at_s, airplanes, callsigns }| {
+fn unprotected_pairs_warning(too_close: &[UnprotectedPair]) -> Option<(String, String)> {
+    let names = first_names(too_close, |UnprotectedPair { at_s, airplanes, callsigns }| {
         let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
     })?;
     Some(key_value("WARNING", format!("too close for the shield: {names}")))
 }
 
-fn flights(m: &Metrics) -> KeyValues {
+fn flights_text(m: &Metrics) -> KeyValues {
     let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),

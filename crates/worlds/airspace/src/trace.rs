@@ -6,9 +6,9 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
 use crate::flight::{Action, KnownAircraft};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{Control, Maneuver, OwnshipState};
-use crate::shield::{SafeManeuver, ShieldDecision, ShieldedAircraft, Side, TurnProfile};
+use crate::shield::{OrbitSide, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, Slot};
 
@@ -20,7 +20,7 @@ pub(crate) struct InspectionTrace {
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<KnownAircraft>,
     /// The non-cooperative ones of the group.
-    pub(crate) non_cooperative: Vec<NonCooperative>,
+    pub(crate) non_cooperative: Vec<NonCooperativeAircraft>,
     /// Its knowledge of others before.
     pub(crate) contacts: TrafficPicture,
     /// The optimizer's decision for it.
@@ -51,7 +51,7 @@ pub(crate) struct InspectionTrace {
 /// airplane in the group.
 pub(crate) struct GroupDecisions<'a> {
     pub(crate) own: &'a [OwnshipState],
-    pub(crate) non_cooperative: &'a [NonCooperative],
+    pub(crate) non_cooperative: &'a [NonCooperativeAircraft],
     /// `None` for an airplane whose pilot has not decided in time.
     pub(crate) controls: &'a [Option<Control>],
     pub(crate) considered: &'a [ManeuverCandidates],
@@ -148,7 +148,13 @@ impl ShieldOutcome<'_> {
     }
 
     /// Returns the plan of an airplane with a candidate, or else on its stored orbit.
-    fn plan(&self, k: usize, candidate: Option<usize>, side: Side, steps: usize) -> SafeManeuver {
+    fn plan(
+        &self,
+        k: usize,
+        candidate: Option<usize>,
+        side: OrbitSide,
+        steps: usize,
+    ) -> SafeManeuver {
         let aircraft = self.group[k].clone();
         match candidate {
             Some(candidate) => {

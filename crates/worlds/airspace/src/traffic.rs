@@ -15,7 +15,7 @@
 
 mod import_settings;
 
-use super::flight::{Point, Zone};
+use super::flight::{Point, SeparationMinima};
 use super::flight_plan::CLIMB_M_S;
 use import_settings::{ImportSettings, import_settings};
 use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft, ScnFile};
@@ -36,7 +36,8 @@ const UNROUTED_FLIGHT_S: f64 = 1800.0;
 /// creation counts as known at once.
 const DT_S: f64 = 10.0;
 /// Separation of recorded traffic in meters: five nautical miles and a thousand feet.
-const ZONE: Zone = Zone { gap_m: 5.0 * NAUTICAL_MILE_M, vertical_m: 1000.0 * FOOT_M };
+const ZONE: SeparationMinima =
+    SeparationMinima { gap_m: 5.0 * NAUTICAL_MILE_M, vertical_m: 1000.0 * FOOT_M };
 
 /// Smallest speed in meters per second at which an aircraft counts as in the air.
 const MIN_SPEED_M_S: f64 = 1.0;
@@ -48,7 +49,7 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let aircraft: Vec<MovingAircraft> =
         traffic.aircraft.iter().filter_map(moving_aircraft).collect();
     let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
-    let zone = Zone {
+    let zone = SeparationMinima {
         gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
         vertical_m: traffic.zone_half_height_ft * FOOT_M,
     };
@@ -370,8 +371,8 @@ fn banked_turn_deg_s(v_m_s: f64) -> f64 {
     (BANKED_TURN_M_S2 / v_m_s).to_degrees()
 }
 
-fn header_text(name: &str, zone: Zone, horizon_s: Option<f64>, more: &str) -> String {
-    let Zone { gap_m, vertical_m } = zone;
+fn header_text(name: &str, zone: SeparationMinima, horizon_s: Option<f64>, more: &str) -> String {
+    let SeparationMinima { gap_m, vertical_m } = zone;
     // Airliners fly seven times as fast as the paper's airplanes and turn more slowly, so all times are longer.
     let horizon_s = horizon_s.unwrap_or(300.0);
     // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.

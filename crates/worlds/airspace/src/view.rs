@@ -5,8 +5,8 @@ use super::flight::{Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::view::{
-    Axis, Body, BodyId, BodyKind, Condition, LogEvent, Pose, PositionColumns, Quantity, Scenery,
-    Severity, Shape,
+    Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
+    Quantity, Scenery, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, Slot};
 
@@ -37,7 +37,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     }
     Scenery {
         name: name.into(),
-        dimensions: if is_level(world) { 2 } else { 3 },
+        dimensions: if is_single_level_world(world) { 2 } else { 3 },
         cycle_s: world.timing.dt_s,
         floor: None,
         bodies,
@@ -54,13 +54,13 @@ fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
 }
 
 /// Returns the columns of recorded tables that give the positions of airplanes.
-pub(super) fn position_columns() -> Vec<PositionColumns> {
-    vec![PositionColumns {
+pub(super) fn position_columns() -> Vec<PositionTableColumns> {
+    vec![PositionTableColumns {
         table: "trajectories",
         kind: BodyKind::Airplane,
         number: "airplane",
         part: None,
-        axes: ["x_m", "y_m", "altitude_m"].map(Axis::meters).to_vec(),
+        axes: ["x_m", "y_m", "altitude_m"].map(CoordinateColumn::meters).to_vec(),
         plane: None,
         is_corner: false,
         heading: None,
@@ -70,7 +70,7 @@ pub(super) fn position_columns() -> Vec<PositionColumns> {
 }
 
 /// Returns whether all airplanes fly on one level from start to end.
-fn is_level(world: &AirspaceWorld) -> bool {
+fn is_single_level_world(world: &AirspaceWorld) -> bool {
     let first_m = world.airplanes.first().map_or(0.0, |airplane| airplane.altitude_m);
     world.airplanes.iter().all(|airplane| {
         let keeps_level = airplane.track.is_none() && airplane.orders.is_empty();
@@ -184,9 +184,9 @@ pub(super) fn log_event(event: &Event) -> LogEvent {
         level,
         kind: event.kind.log_event_kind(),
         who: airplane(event.airplane),
-        with: event.partner().map(airplane),
+        with: event.other_airplane().map(airplane),
         at_m: event.at_m,
-        value: event.kind.measure().map(|measure| Quantity::new(value, measure.unit())),
+        value: event.kind.value_quantity().map(|measure| Quantity::new(value, measure.unit())),
         words,
     }
 }

@@ -5,14 +5,15 @@ mod solo_flight;
 mod tests;
 
 use super::flight::{
-    Action, Air, Airplane, FlightSegment, FlightTask, KnownAircraft, Legs, Levels, Point,
-    RoutePosition, SegmentAfterOrder, Timing, Track, WaypointRule, actions, segments_after_orders,
+    Action, Air, Airplane, DetourLegs, FlightLevelRange, FlightSegment, FlightTask, KnownAircraft,
+    Point, RoutePosition, SegmentAfterOrder, StepTiming, Track, WaypointRule, actions,
+    segments_after_orders,
 };
 use super::method::MethodKind;
-use super::non_cooperative::NonCooperative;
+use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
-use super::shield::{ErrorBounds, Side, common_rates};
+use super::shield::{ErrorBounds, OrbitSide, common_rates};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::Teams;
 use sidestep_kernel::network::Network;
@@ -26,7 +27,7 @@ pub struct AirspaceWorld {
     /// The airplanes by id.
     pub airplanes: Arc<Vec<Airplane>>,
     /// Lengths of a cycle, of the steps in it, and of the horizon.
-    pub timing: Timing,
+    pub timing: StepTiming,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The objective that is minimized.
@@ -36,7 +37,7 @@ pub struct AirspaceWorld {
     /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
     /// Legs to the sides, which take the place of held turns.
-    pub legs: Legs,
+    pub legs: DetourLegs,
     /// The method by which airplanes choose their actions.
     pub method: MethodKind,
     /// Settings of MVP; without effect on other methods.
@@ -84,7 +85,7 @@ pub struct AirspaceWorld {
     /// Seconds that each airplane would need if it were alone.
     pub(crate) alone_s: Arc<Vec<f64>>,
     /// Sides of the first fallbacks.
-    pub(crate) first_fallbacks: Arc<Vec<Side>>,
+    pub(crate) first_fallbacks: Arc<Vec<OrbitSide>>,
     /// The airplanes that decide, by the orders that they may be given.
     pub(crate) teams: Arc<Teams>,
 }
@@ -181,7 +182,7 @@ impl AirspaceWorld {
     }
 
     /// Returns whether an airplane's radio is off in a cycle.
-    pub(crate) fn is_silent(&self, id: EntityId, cycle: Cycle) -> bool {
+    pub(crate) fn is_radio_off(&self, id: EntityId, cycle: Cycle) -> bool {
         self.network
             .as_ref()
             .is_some_and(|network| network.is_radio_off(id, self.cycle_start_s(cycle)))
@@ -303,15 +304,18 @@ impl AirspaceWorld {
     }
 
     /// Returns the levels that an airplane is on and changes to.
-    pub(crate) fn levels(&self, known: KnownAircraft) -> Levels {
-        Levels::between(known.altitude_m, self.segment(known.slot, known.orders).altitude_m)
+    pub(crate) fn levels(&self, known: KnownAircraft) -> FlightLevelRange {
+        FlightLevelRange::between(
+            known.altitude_m,
+            self.segment(known.slot, known.orders).altitude_m,
+        )
     }
 
     /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft.
     pub(crate) fn action_predictions(
         &self,
         known: KnownAircraft,
-        non_cooperative: &[NonCooperative],
+        non_cooperative: &[NonCooperativeAircraft],
     ) -> ActionPredictions {
         let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.actions(known.slot);

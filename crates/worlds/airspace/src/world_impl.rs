@@ -1,9 +1,9 @@
 //! The hooks by which a run asks the world for more than its phases.
 
-use super::decide::Optimization;
+use super::decide::OptimizationRecord;
 use super::events::Event;
 use super::metrics::{self, Counters, Metrics};
-use super::rows::{FlownLeg, Rows};
+use super::rows::{FlownLeg, RecordBuffers};
 use super::scenario::CompiledAirspace;
 use super::scratch::Scratch;
 use super::state::{AirspaceState, Snapshot};
@@ -13,9 +13,9 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::text::{KeyValues, StateDescription};
 use sidestep_kernel::view::{
-    BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
+    BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
@@ -24,7 +24,7 @@ use sidestep_kernel::{
 use sidestep_scenario::Source;
 use std::sync::Arc;
 
-/// A run of an airspace, which is a [`Fleet`](crate::Fleet) as well.
+/// A run of an airspace, which is a [`RemotePilotRun`](crate::RemotePilotRun) as well.
 pub type AirspaceRun = Run<AirspaceWorld>;
 
 /// Returns a run of a scenario at its start.
@@ -43,7 +43,7 @@ impl CompiledAirspace {
         let mut counters = Counters::default();
         self.too_close.iter().for_each(|&pair| counters.add_too_close(0, pair));
         let collector =
-            Collector { counters, rows: Rows::new(self.record), ..Collector::default() };
+            Collector { counters, rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
         let start = RunStart { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
@@ -62,9 +62,9 @@ impl CompiledAirspace {
 
 /// Rows in the order in which the workers have gathered them.
 #[derive(Debug, Default)]
-struct PendingRows {
+struct WorkerRows {
     events: Vec<Event>,
-    optimizations: Vec<Optimization>,
+    optimizations: Vec<OptimizationRecord>,
     flown: Vec<FlownLeg>,
 }
 
@@ -76,11 +76,11 @@ pub struct Collector {
     /// Processor time in nanoseconds spent deciding in this process.
     decide_ns: u64,
     /// Rows that wait to be recorded; none without recording.
-    rows: Rows,
+    rows: RecordBuffers,
     /// Events that wait for the next frame.
-    log: Log<Event>,
+    log: EventBuffer<Event>,
     /// Rows as the workers have gathered them.
-    pending: PendingRows,
+    pending: WorkerRows,
 }
 
 impl World for AirspaceWorld {
@@ -119,10 +119,10 @@ impl World for AirspaceWorld {
     }
 
     fn commit(&self, collector: &mut Collector) {
-        let PendingRows { mut events, mut optimizations, mut flown } =
+        let WorkerRows { mut events, mut optimizations, mut flown } =
             std::mem::take(&mut collector.pending);
         // Stable, because a pair may lose separation more than once in a cycle.
-        events.sort_by_key(Event::key);
+        events.sort_by_key(Event::sort_key);
         optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
         // Stable, because an airplane may fly several legs in a cycle.
         flown.sort_by_key(FlownLeg::key);
@@ -162,7 +162,7 @@ impl WorldRecording for AirspaceWorld {
         collector.rows.record(recorder)
     }
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+    fn position_columns(&self, _: &Collector) -> Vec<PositionTableColumns> {
         view::position_columns()
     }
 }
@@ -297,7 +297,7 @@ impl WorldMetrics for AirspaceWorld {
         text::outcome(metrics)
     }
 
-    fn poses(&self, state: &AirspaceState, now: Cycle) -> Description {
+    fn poses(&self, state: &AirspaceState, now: Cycle) -> StateDescription {
         text::poses(&state.snapshot(now))
     }
 }

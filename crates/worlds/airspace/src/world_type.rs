@@ -3,7 +3,7 @@
 use super::method::{Method, Methods};
 use super::scenario::CompiledAirspace;
 use super::{AirspaceWorld, bundle, import, text};
-use sidestep_kernel::text::Description;
+use sidestep_kernel::text::StateDescription;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
     CompiledScenario as AnyCompiled, Editing, ImportedScenario, MetricInfo, ResolvedScenario,
@@ -51,7 +51,7 @@ impl WorldType for Airspace {
     }
 
     fn sections(&self) -> serde_json::Value {
-        super::scenario::sections(&self.own)
+        super::scenario::sections_schema(&self.own)
     }
 
     fn random_quantities(&self) -> &'static str {
@@ -68,11 +68,11 @@ impl WorldType for Airspace {
     }
 
     fn editing(&self) -> Editing {
-        super::facts::editing()
+        super::facts::editing_tools()
     }
 
     fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
-        import::translate(file)
+        import::import_file(file)
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
@@ -93,7 +93,7 @@ impl AnyCompiled for CompiledAirspace {
         self.world.airplanes.len()
     }
 
-    fn contents(&self, _: &Source) -> Description {
+    fn contents(&self, _: &Source) -> StateDescription {
         text::contents(self)
     }
 
@@ -102,7 +102,7 @@ impl AnyCompiled for CompiledAirspace {
     }
 
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
-        bundle::resolve(source, self)
+        bundle::resolve_scenario(source, self)
     }
 
     fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {

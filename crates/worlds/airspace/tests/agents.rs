@@ -4,7 +4,7 @@
 use sidestep_airspace::agents::traffic_state::TrafficPicture;
 use sidestep_airspace::pilot::{Control, Percept, Pilot};
 use sidestep_airspace::world::AirspaceWorld;
-use sidestep_airspace::{Fleet, airspace_run};
+use sidestep_airspace::{RemotePilotRun, airspace_run};
 use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep_kernel::{Digest, EntityId, Simulation};
 use sidestep_scenario::Source;

@@ -4,12 +4,15 @@
 //! speeds of discs, for reactions and for limits of the robots' speed, how often a part of the
 //! chain is more than 1 mm in a disc after it has reacted.
 
-use sidestep_chain::{EscapeMethod, EscapePlan, EscapeRules, EscapeTick, Escaper};
+use sidestep_chain::{
+    EscapeMethod, EscapePlan, ObstacleEscapeInput, ObstacleEscapeRules, ObstacleEscaper,
+};
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{InputError, Seed, math};
-use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, normalized, scaled, sub};
+use sidestep_rods::geometry::{Aabb, Point, add_scaled, distance, dot, normalized, scaled, sub};
 use sidestep_rods::{
-    Chain, Connector, Obstacle, Obstacles, Outcome, Propagator, Request, Rod, Rules,
+    Chain, Connector, MotionOutcome, MotionRequest, Obstacle, Obstacles, Propagator, ReactionRules,
+    Rod,
 };
 use std::f64::consts::TAU;
 
@@ -143,7 +146,7 @@ fn keep_apart(obstacles: &mut Obstacles<2>) {
 }
 
 fn center(disc: &Obstacle<2>) -> Point<2> {
-    let Bounds { lo, hi } = disc.bounds();
+    let Aabb { lo, hi } = disc.bounds();
     [0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])]
 }
 
@@ -172,22 +175,30 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
     let mut chain = chain()?;
     let mut obstacles = Obstacles::new(discs(cell, &chain, &mut numbers), 1.0)?;
     let slave_step_max_m = cell.limit_m_s * DT_S;
-    let mut propagator = Propagator::new(Rules { slave_step_max_m, ..Rules::default() });
+    let mut propagator =
+        Propagator::new(ReactionRules { slave_step_max_m, ..ReactionRules::default() });
     let ticks_ahead = match cell.reaction {
         Reaction::None => 0.0,
         Reaction::Escape(ticks) => ticks,
     };
-    let usual = EscapeRules::new(DT_S, cell.limit_m_s);
-    let mut escaper =
-        Escaper::new(EscapeRules { ticks_ahead, method: EscapeMethod::Literal, ..usual });
+    let usual = ObstacleEscapeRules::new(DT_S, cell.limit_m_s);
+    let mut escaper = ObstacleEscaper::new(ObstacleEscapeRules {
+        ticks_ahead,
+        method: EscapeMethod::Literal,
+        ..usual
+    });
     let mut leader = Leader { heading_rad: 0.0 };
     for _ in 0..TICKS {
         let start = chain.points().to_vec();
         if cell.leader_moves {
             let to = leader.target(start[0], &mut numbers);
-            let came = propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to))?;
+            let came = propagator.propagate(
+                &mut chain,
+                &obstacles,
+                &MotionRequest::operator_request(0, to),
+            )?;
             tally.steps += 1;
-            if let Outcome::Vetoed(_) = came {
+            if let MotionOutcome::Vetoed(_) = came {
                 tally.vetoes += 1;
                 leader.turn(&mut numbers);
             }
@@ -199,7 +210,7 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
         }
         if cell.reaction != Reaction::None {
             let escaped = escaper.escape(
-                EscapeTick {
+                ObstacleEscapeInput {
                     chain: &mut chain,
                     obstacles: &obstacles,
                     propagator: &mut propagator,

@@ -19,7 +19,7 @@ const PLAIN_FILE_KEYS: [&str; 3] = ["script_file", "urdf", "srdf"];
 ///
 /// # Errors
 /// When such a file can no longer be read.
-pub(crate) fn resolve<const D: usize>(
+pub(crate) fn resolve_scenario<const D: usize>(
     source: &Source,
     compiled: &ChainScenario<D>,
 ) -> Result<ResolvedScenario, InputError> {
@@ -46,7 +46,7 @@ fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), In
         Value::Object(table) => table.iter().try_for_each(|(name, item)| {
             let key = format!("{key}.{name}");
             match item.as_str().filter(|_| PLAIN_FILE_KEYS.contains(&name.as_str())) {
-                Some(path) => copy(bundle, &key, path),
+                Some(path) => copy_into_bundle(bundle, &key, path),
                 None => add_plain(bundle, item, &key),
             }
         }),
@@ -54,7 +54,7 @@ fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), In
     }
 }
 
-fn copy(bundle: &mut Bundle<'_>, key: &str, path: &str) -> Result<(), InputError> {
+fn copy_into_bundle(bundle: &mut Bundle<'_>, key: &str, path: &str) -> Result<(), InputError> {
     let file = Path::new(path).file_name().unwrap_or_default().display();
     // Numbered, because files of different folders may have the same name.
     let path = bundle.copy(&format!("{}-{file}", bundle.count()), path)?;
@@ -74,32 +74,32 @@ fn add_stage(bundle: &mut Bundle<'_>, world: &stage::World) {
     let mut text = String::from("# The world as the simulation saw it.\n");
     for (k, plan) in world.floor_plans.iter().enumerate() {
         let bitmap = format!("floor-{k}.pgm");
-        text.push_str(&floor_plan(plan, &bitmap));
+        text.push_str(&floor_plan_text(plan, &bitmap));
         // Black marks solid pixels.
         let grays = plan.solid.iter().map(|solid| if *solid { 0 } else { 255 });
         bundle.add(&bitmap, pgm(plan.width, plan.height, grays));
     }
-    text.extend(world.boxes.iter().map(solid));
+    text.extend(world.boxes.iter().map(solid_text));
     let path = bundle.add("stage.world", text.into_bytes());
     bundle.set("ground.stage", format_args!("{path:?}"));
 }
 
 /// Stage expects degrees; these digits parse back to exactly the same angle.
-fn pose(pose: &Pose2) -> String {
+fn pose_text(pose: &Pose2) -> String {
     format!("[{:?} {:?} 0.0 {:?}]", pose.x_m, pose.y_m, pose.yaw_rad.to_degrees())
 }
 
-fn floor_plan(plan: &FloorPlan, bitmap: &str) -> String {
+fn floor_plan_text(plan: &FloorPlan, bitmap: &str) -> String {
     let [width_m, height_m] = plan.size_m;
     format!(
         "model\n(\n  bitmap \"{bitmap}\"\n  size [{width_m:?} {height_m:?} 1.0]\n  pose {}\n  \
          boundary {}\n)\n",
-        pose(&plan.pose),
+        pose_text(&plan.pose),
         u8::from(plan.has_boundary)
     )
 }
 
-fn solid(body: &BoxObstacle) -> String {
+fn solid_text(body: &BoxObstacle) -> String {
     let [x_m, y_m] = body.size_m;
-    format!("model\n(\n  size [{x_m:?} {y_m:?} 1.0]\n  pose {}\n)\n", pose(&body.pose))
+    format!("model\n(\n  size [{x_m:?} {y_m:?} 1.0]\n  pose {}\n)\n", pose_text(&body.pose))
 }

@@ -2,10 +2,10 @@
 //! enter during the cycle.
 
 use super::perceive::Perceiver;
-use super::state::Body;
+use super::state::ChainBodyState;
 use super::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
-use sidestep_rods::geometry::{Bounds, with_dimensions};
+use sidestep_rods::geometry::{Aabb, with_dimensions};
 
 /// Claims the box of one chain, and keeps its navigator's decision, which is made before anything
 /// moves.
@@ -20,7 +20,7 @@ pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>,
 pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
     let &mut PhaseContext { world, state, now, .. } = phase;
     // A chain alone is in no other's way, wherever it goes; and to read it would make a copy of it.
-    if !world.is_open() {
+    if !world.is_unobstructed() {
         state.set_claim(slot, reach_box(world, &world.chains[slot], &state.body(slot), now));
     }
 }
@@ -29,9 +29,9 @@ pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<
 fn reach_box<const D: usize>(
     world: &ChainWorld<D>,
     spec: &ChainSpec<D>,
-    body: &Body<D>,
+    body: &ChainBodyState<D>,
     now: Cycle,
-) -> Bounds<D> {
+) -> Aabb<D> {
     let chain = &body.chain;
     let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
     let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
@@ -51,15 +51,19 @@ fn reach_box<const D: usize>(
     let gathering_m_s = body.scattered.as_ref().map_or(0.0, |scattered| scattered.speed_m_s);
     let changes = spec.changes.iter();
     let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
-    let chain_box = Bounds::from_points(chain.points())
+    let chain_box = Aabb::from_points(chain.points())
         .grown(radius_m + moved_m + thrown_m + back_m_s * world.dt_s);
     chain_box.joined(&robots_reach_box(spec, body, world.dt_s))
 }
 
 /// Returns the box that the robots of a chain may enter during one cycle. A robot that lags is far from its connector.
-fn robots_reach_box<const D: usize>(spec: &ChainSpec<D>, body: &Body<D>, dt_s: f64) -> Bounds<D> {
-    let Some(robots) = &spec.robots else { return Bounds::empty() };
+fn robots_reach_box<const D: usize>(
+    spec: &ChainSpec<D>,
+    body: &ChainBodyState<D>,
+    dt_s: f64,
+) -> Aabb<D> {
+    let Some(robots) = &spec.robots else { return Aabb::empty() };
     let reach_m = robots.follower.reach_m(dt_s);
     let places = body.robots.iter().map(|robot| with_dimensions(robot.pose.at));
-    places.fold(Bounds::empty(), |all, at| all.joined(&Bounds::from_points(&[at]).grown(reach_m)))
+    places.fold(Aabb::empty(), |all, at| all.joined(&Aabb::from_points(&[at]).grown(reach_m)))
 }

@@ -1,7 +1,7 @@
 //! Distances of a chain's parts from the obstacles around them, and from each other.
 
 use sidestep_rods::geometry::{
-    Bounds, Point, between_segments, distance, nearest_on_segment, scaled, sub,
+    Aabb, Point, between_segments, distance, nearest_on_segment, scaled, sub,
 };
 use sidestep_rods::{Chain, Obstacles, RodBvh};
 
@@ -37,7 +37,7 @@ pub(crate) fn part_clearance<const D: usize>(
     let rod_radius_m = chain.rods().get(k).map_or(0.0, |rod| rod.radius_m);
     // Below 0 if a part is inside by `look_m` already: then only obstacles count that it is deeper in.
     let room_m = (radius_m.max(connectors[end].radius_m) + look_m).max(0.0) + MARGIN_M;
-    let room = Bounds::from_points(&[at, points[end]]).grown(room_m);
+    let room = Aabb::from_points(&[at, points[end]]).grown(room_m);
     obstacles.visit(&room, |o| {
         let nearest = o.core.nearest_to_point(at);
         let gap_m = nearest.distance_m - radius_m - o.radius_m;
@@ -127,10 +127,10 @@ fn rod_ends<const D: usize>(chain: &Chain<D>, rod: usize) -> [Point<D>; 2] {
 /// Returns the box around a rod and the connectors at its ends, grown by `by_m`: rods are no thicker than their
 /// connectors.
 #[inline]
-fn part_bounds<const D: usize>(chain: &Chain<D>, rod: usize, by_m: f64) -> Bounds<D> {
+fn part_bounds<const D: usize>(chain: &Chain<D>, rod: usize, by_m: f64) -> Aabb<D> {
     let connectors = chain.connectors();
     let radius_m = connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
-    Bounds::from_points(&rod_ends(chain, rod)).grown((radius_m + by_m).max(0.0))
+    Aabb::from_points(&rod_ends(chain, rod)).grown((radius_m + by_m).max(0.0))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, InputError, math};
-use sidestep_rods::geometry::{Bounds, Point, normalized, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, normalized, with_dimensions};
 use sidestep_rods::{RequestSource, VetoReason};
 use std::sync::Arc;
 
@@ -79,7 +79,7 @@ pub(crate) struct Wander<const D: usize> {
     /// Standard deviation of the turn per square root of a meter of travel.
     pub(crate) turn_rad: f64,
     /// Region to stay in, if any: outside it the initiator turns back.
-    pub(crate) within: Option<Bounds<D>>,
+    pub(crate) within: Option<Aabb<D>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -5,11 +5,11 @@ use super::clearance::part_clearance;
 use super::driver::external::{OrderOutcome, Orders};
 use super::driver::{Task, TaskKind, VetoRecord};
 use super::scratch::Scratch;
-use super::state::{Body, ChainState};
+use super::state::{ChainBodyState, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
 use sidestep_kernel::{Cycle, EntityId, Slot};
-use sidestep_rods::geometry::{Bounds as Box, Point, distance};
+use sidestep_rods::geometry::{Aabb as Box, Point, distance};
 use sidestep_rods::{MAX_COORDINATE_M, Obstacles, VetoReason, is_length_allowed};
 
 #[cfg(test)]
@@ -76,18 +76,23 @@ impl<const D: usize> ChainWorld<D> {
              where nothing is as near"
         );
         vec![
-            Space::new("joints_m", any_coordinate(), "places of its connectors").with_shape([n, D]),
+            Space::new("joints_m", coordinate_space(), "places of its connectors")
+                .with_shape([n, D]),
             Space::new("gap_m", up_to_look.clone(), gap).with_shape([n]),
             Space::new(
                 "nearest_m",
-                any_coordinate(),
+                coordinate_space(),
                 "way from each connector's middle to the surface of that; 0 where nothing is near",
             )
             .with_shape([n, D]),
             Space::new("rod_gap_m", up_to_look, "the same gap of each rod").with_shape([n - 1]),
             Space::new("leads", part.clone(), "connector that leads; -1 where none does"),
-            Space::new("is_broken", choice(["no", "yes"]), "whether its parts are scattered"),
-            Space::new("veto", choice(reasons), "reason of the last objection to what it wanted"),
+            Space::new("is_broken", choice_space(["no", "yes"]), "whether its parts are scattered"),
+            Space::new(
+                "veto",
+                choice_space(reasons),
+                "reason of the last objection to what it wanted",
+            ),
             Space::new("veto_part", part, "connector that objected; -1 where none did"),
         ]
     }
@@ -150,19 +155,19 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns the box around a chain.
-    fn bounding_box(&self, body: &Body<D>) -> Box<D> {
+    fn bounding_box(&self, body: &ChainBodyState<D>) -> Box<D> {
         let radii_m = body.chain.connectors().iter().map(|connector| connector.radius_m);
         Box::from_points(body.chain.points()).grown(radii_m.fold(0.0, f64::max))
     }
 
-    fn current_task(&self, id: EntityId, body: &Body<D>) -> Option<&Task<D>> {
+    fn current_task(&self, id: EntityId, body: &ChainBodyState<D>) -> Option<&Task<D>> {
         self.chains[id as usize].tasks.get(body.driving.task as usize)
     }
 
     fn observe_body(
         &self,
         id: EntityId,
-        body: &Body<D>,
+        body: &ChainBodyState<D>,
         obstacles: &Obstacles<D>,
         row: &mut ObservationRow<'_, '_>,
     ) {
@@ -188,7 +193,12 @@ impl<const D: usize> ChainWorld<D> {
         row.push_integer(veto.map_or(-1, |VetoRecord { by, .. }| i64::from(by)));
     }
 
-    fn observe_order_result(&self, id: EntityId, body: &Body<D>, row: &mut ObservationRow<'_, '_>) {
+    fn observe_order_result(
+        &self,
+        id: EntityId,
+        body: &ChainBodyState<D>,
+        row: &mut ObservationRow<'_, '_>,
+    ) {
         let answer = &body.external.answer;
         let (cause, number) = match answer.obstacle {
             None => (0, -1),
@@ -212,20 +222,20 @@ fn order_result_spaces<const D: usize>() -> Vec<Space> {
     let number = SpaceKind::Integer { low: -1, high: i64::from(u32::MAX) };
     let share = SpaceKind::Real { low: 0.0, high: 1.0 };
     vec![
-        Space::new("veto_cause", choice(CAUSES), "sort of thing because of which it objected"),
+        Space::new("veto_cause", choice_space(CAUSES), "sort of thing because of which it objected"),
         Space::new("veto_cause_id", number, "number of that obstacle or chain; -1 for none"),
-        Space::new("heeds", choice(["no", "yes"]), "whether it takes orders in this cycle"),
-        Space::new("answer", choice(OrderOutcome::NAMES), "what came of the orders in the last cycle"),
+        Space::new("heeds", choice_space(["no", "yes"]), "whether it takes orders in this cycle"),
+        Space::new("answer", choice_space(OrderOutcome::NAMES), "what came of the orders in the last cycle"),
         Space::new(
             "wish_m",
-            any_coordinate(),
+            coordinate_space(),
             "places that both ends of the rod, or twice that the connector, should have reached in the \
              last cycle; 0 where there was no errand",
         )
         .with_shape([2, D]),
         Space::new(
             "reached_m",
-            any_coordinate(),
+            coordinate_space(),
             "place that the first of them has reached or, vetoed, could have reached; 0 where there was \
              no errand",
         )
@@ -252,7 +262,7 @@ fn order_spaces<const D: usize>(n: usize) -> Vec<Space> {
         ),
         Space::new(
             Orders::REACH,
-            choice(["exact", "as-far-as-it-goes"]),
+            choice_space(["exact", "as-far-as-it-goes"]),
             "what comes of a cycle's way that cannot all be gone: nothing, or as much as goes; exact where \
              this is not ordered",
         ),
@@ -275,11 +285,11 @@ fn order_spaces<const D: usize>(n: usize) -> Vec<Space> {
     spaces
 }
 
-fn any_coordinate() -> SpaceKind {
+fn coordinate_space() -> SpaceKind {
     SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY }
 }
 
-fn choice<'a>(names: impl IntoIterator<Item = &'a str>) -> SpaceKind {
+fn choice_space<'a>(names: impl IntoIterator<Item = &'a str>) -> SpaceKind {
     SpaceKind::Discrete(names.into_iter().map(String::from).collect())
 }
 

@@ -12,13 +12,13 @@ use sidestep_rods::{Chain, Connector, Obstacle, Rod};
 
 /// Poses along the center line of the corridor of the measurements.
 pub(super) fn corridor_line(step_m: f64) -> Vec<([f64; 2], f64)> {
-    let line = Corridor::pinned(1.0).expect("a width").center_line(step_m);
+    let line = Corridor::reference_corridor(1.0).expect("a width").center_line(step_m);
     line.into_iter().map(|pose| (pose.at, pose.heading_rad)).collect()
 }
 
 /// The walls of that corridor.
 pub(super) fn corridor_walls(width_m: f64) -> Vec<Obstacle<2>> {
-    Corridor::pinned(width_m).expect("a width").walls(0)
+    Corridor::reference_corridor(width_m).expect("a width").walls(0)
 }
 
 /// A straight chain on the first axis, its leader at `lead_m`; the tail of a long one is still outside

@@ -8,7 +8,7 @@ mod tests;
 use super::driver::{Task, TaskKind};
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
-use super::state::{Body, ChainState};
+use super::state::{ChainBodyState, ChainState};
 use super::trace::InspectionTrace;
 use super::view::obstacle_body_id;
 use super::world::ChainWorld;
@@ -85,7 +85,7 @@ impl<const D: usize> ChainWorld<D> {
         phase: &mut PhaseContext<'_, Self>,
         slot: Slot,
         inspection: &mut Inspection,
-    ) -> (Body<D>, Vec<Slot>) {
+    ) -> (ChainBodyState<D>, Vec<Slot>) {
         let &mut PhaseContext { state, now, .. } = phase;
         let groups = ConflictGroups::new(state.len());
         for slot in 0..state.len() {
@@ -151,8 +151,8 @@ struct ConnectorInspection<'a, const D: usize> {
     slot: Slot,
     kind: BodyKind,
     k: usize,
-    before: Body<D>,
-    after: Body<D>,
+    before: ChainBodyState<D>,
+    after: ChainBodyState<D>,
     trace: InspectionTrace<D>,
     scratch: Scratch<D>,
 }
@@ -179,7 +179,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
-    fn position(&self, body: &Body<D>) -> [f64; 3] {
+    fn position(&self, body: &ChainBodyState<D>) -> [f64; 3] {
         match self.kind {
             BodyKind::Robot => with_dimensions(body.robots[self.k].pose.at),
             _ => with_dimensions(body.chain.points()[self.k]),

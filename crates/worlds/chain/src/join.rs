@@ -20,7 +20,7 @@ pub(crate) fn join<const D: usize>(
     }
     let neighbors = state.neighbors();
     for slot in bodies {
-        neighbors.visit(slot, |other| groups.join(slot as Slot, other));
+        neighbors.visit(slot, |other| groups.join_groups(slot as Slot, other));
     }
 }
 
@@ -33,6 +33,6 @@ fn join_each<const D: usize>(
     let state = phase.state;
     let claim = state.claim(slot);
     for other in (0..slot).filter(|&other| state.claim(other).meets(&claim)) {
-        groups.join(slot as Slot, other as Slot);
+        groups.join_groups(slot as Slot, other as Slot);
     }
 }

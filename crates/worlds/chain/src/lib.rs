@@ -58,16 +58,19 @@ mod world_type;
 
 pub use deploy::Deployment;
 pub use driver::VetoRecord;
-pub use driver::own_driver::{Driver, DriverPercept, Drivers, Memory, NearbyObstacle, Proposal};
+pub use driver::own_driver::{
+    Driver, DriverMemory, DriverPercept, Drivers, NearbyObstacle, Proposal,
+};
 pub use motion::escape::{
-    EscapeMethod, EscapePlan, EscapeReport, EscapeRules, EscapeTick, Escaper,
+    EscapeMethod, EscapePlan, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules,
+    ObstacleEscaper,
 };
 pub use motion::recovery::{
-    DirectMover, RecoveryLadder, RecoveryLimits, RecoveryOutcome, Situation,
+    DirectMover, InitiatorSituation, RecoveryLadder, RecoveryLimits, RecoveryOutcome,
 };
 pub use own_parts::{OwnParts, Reactions};
 pub use sidestep_rods::{MasterMove, Reaction};
-pub use state::{Body, BodyRef, ChainState};
+pub use state::{ChainBodyState, ChainBodyStateRef, ChainState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};
 pub use world_type::Chains;

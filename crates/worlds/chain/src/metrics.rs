@@ -1,6 +1,6 @@
 //! Metrics of a run.
 
-use super::agents::traffic::Traffic;
+use super::agents::traffic::NetworkTraffic;
 use super::motion::escape::EscapeReport;
 use super::motion::recovery::RecoveryOutcome;
 use super::swarm::follower::FollowResult;
@@ -49,7 +49,7 @@ pub struct ChainTally {
     /// Tasks done, targets reached.
     pub done: u64,
     /// Tasks and targets that were given up.
-    pub given_up: Vec<AbandonedPart>,
+    pub given_up: Vec<AbandonedTaskPart>,
     /// Number of times that broken parts were joined again,
     pub reformed: u64,
     /// and that they could not be.
@@ -150,7 +150,7 @@ impl EscapeTally {
         self.capped += escaped.capped as u64;
     }
 
-    fn joined(self, other: &Self) -> Self {
+    fn sum_with(self, other: &Self) -> Self {
         Self {
             moves: self.moves + other.moves,
             vetoes: self.vetoes + other.vetoes,
@@ -224,7 +224,7 @@ impl ChainTally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
-    pub(crate) fn add_traffic(&mut self, traffic: Traffic) {
+    pub(crate) fn add_traffic(&mut self, traffic: NetworkTraffic) {
         self.messages += traffic.messages;
         self.bytes += traffic.bytes;
         self.dropped += traffic.dropped;
@@ -283,7 +283,7 @@ impl Default for ChainTally {
 
 /// A motion or target that an initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AbandonedPart {
+pub struct AbandonedTaskPart {
     /// Number of the task, from 0.
     pub task: u32,
     /// The motion of its script, or the target.
@@ -340,7 +340,7 @@ metrics! {
         /// Greatest number of parts that were missing when parts could not be joined. Of each chain the most, summed.
         pub missing_parts: u64 => "missing parts",
         /// Motions and targets that were given up, by chain, with who objected and why.
-        pub given_up: Vec<ChainAbandonedPart> => "tasks given up",
+        pub given_up: Vec<ChainAbandonedTaskPart> => "tasks given up",
         /// Rungs by which initiators continued after vetoes.
         pub rungs: RungTally,
         /// Counts of parts that got out of the way.
@@ -401,12 +401,12 @@ impl RobotMetrics {
 
 /// A motion or target that a chain's initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChainAbandonedPart {
+pub struct ChainAbandonedTaskPart {
     /// Id of the chain.
     pub chain: EntityId,
     /// What it gave up, and why.
     #[serde(flatten)]
-    pub what: AbandonedPart,
+    pub what: AbandonedTaskPart,
 }
 
 /// What a run reports about one chain.
@@ -434,7 +434,7 @@ impl Metrics {
         cpu_s: f64,
         timed_steps: u64,
     ) -> Self {
-        let steps = sum(tallies, |t| t.steps);
+        let steps = sum_over_chains(tallies, |t| t.steps);
         let robots = tallies.iter().fold(RobotTally::default(), |all, t| all.add(&t.robots));
         let mut vetoes_by_reason = BTreeMap::new();
         for (k, reason) in VetoReason::ALL.iter().enumerate() {
@@ -444,56 +444,56 @@ impl Metrics {
         Self {
             steps,
             vetoes: vetoes_by_reason.values().sum(),
-            penetrations: sum(tallies, |t| t.penetrations),
-            min_clearance_m: least(tallies, |t| t.min_clearance_m),
-            max_rod_violation_m: greatest(tallies, |t| t.max_rod_violation_m),
+            penetrations: sum_over_chains(tallies, |t| t.penetrations),
+            min_clearance_m: min_over_chains(tallies, |t| t.min_clearance_m),
+            max_rod_violation_m: max_over_chains(tallies, |t| t.max_rod_violation_m),
             progress: progress.iter().sum::<f64>() / progress.len().max(1) as f64,
             steps_per_cpu_s: timed_steps as f64 / cpu_s.max(1e-9),
             vetoes_by_reason,
-            rotations: sum(tallies, |t| t.rotations),
-            moved_per_step: sum(tallies, |t| t.moved) as f64 / steps.max(1) as f64,
-            max_slave_step_m: greatest(tallies, |t| t.max_slave_step_m),
-            max_speed_m_s: greatest(tallies, |t| t.max_speed_m_s),
+            rotations: sum_over_chains(tallies, |t| t.rotations),
+            moved_per_step: sum_over_chains(tallies, |t| t.moved) as f64 / steps.max(1) as f64,
+            max_slave_step_m: max_over_chains(tallies, |t| t.max_slave_step_m),
+            max_speed_m_s: max_over_chains(tallies, |t| t.max_speed_m_s),
             longest_inside_steps: tallies.iter().map(|t| t.longest_inside_steps).max().unwrap_or(0),
-            min_own_gap_m: least(tallies, |t| t.min_own_gap_m),
-            done: sum(tallies, |t| t.done),
-            reformed: sum(tallies, |t| t.reformed),
-            not_reformed: sum(tallies, |t| t.not_reformed),
-            missing_parts: sum(tallies, |t| t.missing_parts),
+            min_own_gap_m: min_over_chains(tallies, |t| t.min_own_gap_m),
+            done: sum_over_chains(tallies, |t| t.done),
+            reformed: sum_over_chains(tallies, |t| t.reformed),
+            not_reformed: sum_over_chains(tallies, |t| t.not_reformed),
+            missing_parts: sum_over_chains(tallies, |t| t.missing_parts),
             given_up: abandoned_parts(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
-            escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.joined(&t.escapes)),
-            messages: sum(tallies, |t| t.messages),
-            bytes: sum(tallies, |t| t.bytes),
-            dropped: sum(tallies, |t| t.dropped),
-            contacts_lost: sum(tallies, |t| t.contacts_lost),
-            deadlines_missed: sum(tallies, |t| t.deadlines_missed),
-            stood: sum(tallies, |t| t.stood),
+            escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.sum_with(&t.escapes)),
+            messages: sum_over_chains(tallies, |t| t.messages),
+            bytes: sum_over_chains(tallies, |t| t.bytes),
+            dropped: sum_over_chains(tallies, |t| t.dropped),
+            contacts_lost: sum_over_chains(tallies, |t| t.contacts_lost),
+            deadlines_missed: sum_over_chains(tallies, |t| t.deadlines_missed),
+            stood: sum_over_chains(tallies, |t| t.stood),
             robots: RobotMetrics::from_tally(&robots),
         }
     }
 }
 
-fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedPart> {
+fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedTaskPart> {
     let mut parts = Vec::new();
     for (chain, tally) in (0..).zip(tallies) {
         for what in tally.given_up.iter().cloned() {
-            parts.push(ChainAbandonedPart { chain, what });
+            parts.push(ChainAbandonedTaskPart { chain, what });
         }
     }
     parts
 }
 
-fn sum(tallies: &[ChainTally], count: fn(&ChainTally) -> u64) -> u64 {
+fn sum_over_chains(tallies: &[ChainTally], count: fn(&ChainTally) -> u64) -> u64 {
     tallies.iter().map(count).sum()
 }
 
-fn greatest(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> f64 {
+fn max_over_chains(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> f64 {
     tallies.iter().map(value).fold(0.0, f64::max)
 }
 
 /// Returns the least value; none if no chain has one, which is infinite then.
-fn least(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> Option<f64> {
+fn min_over_chains(tallies: &[ChainTally], value: fn(&ChainTally) -> f64) -> Option<f64> {
     let least = tallies.iter().map(value).fold(f64::INFINITY, f64::min);
     Some(least).filter(|m| m.is_finite())
 }

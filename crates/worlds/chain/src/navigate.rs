@@ -126,7 +126,7 @@ fn nearest(line: &[Point<2>], among: Range<usize>, at: Point<2>) -> Option<usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::{Corridor, Leg};
+    use crate::ground::{Corridor, CorridorLeg};
 
     /// Two legs of 5 m, 4 m apart, and the way from one to the other.
     fn hairpin() -> NavigationGoal {
@@ -140,7 +140,7 @@ mod tests {
     }
 
     /// The middle of a corridor of 2 m.
-    fn middle(legs: &[Leg]) -> NavigationGoal {
+    fn middle(legs: &[CorridorLeg]) -> NavigationGoal {
         let corridor = Corridor::new(legs.to_vec(), 2.0).unwrap();
         let line = corridor.center_line(0.1).iter().map(|pose| pose.at).collect();
         NavigationGoal::EndOf { line, width_m: 2.0 }
@@ -161,8 +161,8 @@ mod tests {
 
     #[test]
     fn a_line_that_ends_where_it_begins_is_passed_as_a_whole() {
-        let turn = |turn_deg| Leg::Bend { radius_m: 3.0, turn_deg };
-        let straight = Leg::Straight { length_m: 10.0 };
+        let turn = |turn_deg| CorridorLeg::Bend { radius_m: 3.0, turn_deg };
+        let straight = CorridorLeg::Straight { length_m: 10.0 };
         let round = middle(&[straight, turn(180.0), straight, turn(180.0)]);
         for at in [[-0.2, 0.0], [0.0, 0.0], [0.03, 0.4]] {
             let begins = round.start_index(at);
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn progress_along_a_line_counts_from_where_it_began() {
-        let goal = middle(&[Leg::Straight { length_m: 20.0 }]);
+        let goal = middle(&[CorridorLeg::Straight { length_m: 20.0 }]);
         let start = [10.0, 0.3];
         let begins = goal.start_index(start);
         assert_eq!(begins, 100);

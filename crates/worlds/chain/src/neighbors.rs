@@ -1,34 +1,34 @@
 //! Claims of many chains by where they begin, so that a chain is compared with its neighbors only.
 
 use sidestep_kernel::Slot;
-use sidestep_rods::geometry::Bounds;
+use sidestep_rods::geometry::Aabb;
 
 /// The claims of one cycle along the axis on which they are spread farthest.
 #[derive(Debug, Clone)]
-pub(crate) struct Neighbors<const D: usize> {
+pub(crate) struct ClaimIndex<const D: usize> {
     /// The number of claims ever made up to those that are sorted.
     made: u64,
     axis: usize,
     /// The claims by their lower end.
-    sorted: Vec<(Bounds<D>, Slot)>,
+    sorted: Vec<(Aabb<D>, Slot)>,
     /// The place of each slot among them.
     places: Vec<u32>,
 }
 
-impl<const D: usize> Default for Neighbors<D> {
+impl<const D: usize> Default for ClaimIndex<D> {
     fn default() -> Self {
         Self { made: u64::MAX, axis: 0, sorted: Vec::new(), places: Vec::new() }
     }
 }
 
-impl<const D: usize> Neighbors<D> {
+impl<const D: usize> ClaimIndex<D> {
     /// Returns whether these are the claims after `made` claims.
     pub(crate) fn is_current(&self, made: u64) -> bool {
         self.made == made
     }
 
     /// Sorts the claims of all slots, after `made` claims.
-    pub(crate) fn sort(&mut self, made: u64, claims: impl Iterator<Item = Bounds<D>>) {
+    pub(crate) fn sort(&mut self, made: u64, claims: impl Iterator<Item = Aabb<D>>) {
         self.made = made;
         self.sorted.clear();
         self.sorted.extend(claims.zip(0..));
@@ -58,7 +58,7 @@ impl<const D: usize> Neighbors<D> {
 }
 
 /// Returns the axis on which the lower ends of boxes are spread farthest.
-fn widest<const D: usize>(boxes: &[(Bounds<D>, Slot)]) -> usize {
+fn widest<const D: usize>(boxes: &[(Aabb<D>, Slot)]) -> usize {
     let mut widest = 0;
     let mut widest_m = spread_m(boxes, 0);
     for axis in 1..D {
@@ -72,7 +72,7 @@ fn widest<const D: usize>(boxes: &[(Bounds<D>, Slot)]) -> usize {
 }
 
 /// Returns the distance on an axis from the least lower end of a box to the greatest.
-fn spread_m<const D: usize>(boxes: &[(Bounds<D>, Slot)], axis: usize) -> f64 {
+fn spread_m<const D: usize>(boxes: &[(Aabb<D>, Slot)], axis: usize) -> f64 {
     let mut lo = f64::INFINITY;
     let mut hi = f64::NEG_INFINITY;
     for (claim, _) in boxes {
@@ -97,10 +97,10 @@ mod tests {
                 .iter()
                 .map(|(at, half_m)| {
                     let at = [0, 1].map(|i| (at[i] * stretch[i]).round());
-                    Bounds { lo: at, hi: at }.grown(*half_m)
+                    Aabb { lo: at, hi: at }.grown(*half_m)
                 })
                 .collect();
-            let mut neighbors = Neighbors::default();
+            let mut neighbors = ClaimIndex::default();
             neighbors.sort(1, claims.iter().copied());
             let mut found = Vec::new();
             for slot in 0..claims.len() {
@@ -118,9 +118,9 @@ mod tests {
 
     #[test]
     fn chains_in_a_row_are_compared_with_those_beside_them_only() {
-        let mut neighbors = Neighbors::default();
+        let mut neighbors = ClaimIndex::default();
         let row =
-            (0..10_000).map(|k| Bounds { lo: [0.0, f64::from(k)], hi: [9.0, f64::from(k) + 1.5] });
+            (0..10_000).map(|k| Aabb { lo: [0.0, f64::from(k)], hi: [9.0, f64::from(k) + 1.5] });
         neighbors.sort(1, row);
         let mut met = 0;
         (0..10_000).for_each(|slot| neighbors.visit(slot, |_| met += 1));

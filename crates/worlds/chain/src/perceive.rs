@@ -5,7 +5,7 @@ use super::driver::TaskKind;
 use super::navigate::{NavigationGoal, Navigator};
 use super::scratch::Scratch;
 use super::state::ChainState;
-use super::swarm::leader::{Decision, LeaderState, Percept, Surroundings};
+use super::swarm::leader::{LeaderDecision, LeaderPercept, LeaderState, LeaderSurroundings};
 use super::world::{ChainWorld, purpose};
 use sidestep_kernel::{Cycle, Slot};
 use sidestep_rods::geometry::distance;
@@ -27,12 +27,12 @@ pub(crate) struct NavigatorPercept<'a> {
     pub(crate) navigator: &'a Navigator,
     pub(crate) agent: usize,
     pub(crate) leader: LeaderState,
-    pub(crate) percept: Percept,
+    pub(crate) percept: LeaderPercept,
 }
 
 impl<'a, const D: usize> Perceiver<'a, D> {
     /// Returns a navigator's decision; none for other drivers.
-    pub(crate) fn decide(&mut self, slot: Slot) -> Option<Decision> {
+    pub(crate) fn decide(&mut self, slot: Slot) -> Option<LeaderDecision> {
         let own = self.percept(slot)?;
         Some(own.navigator.leader.decide(own.leader.followed, &own.percept))
     }
@@ -53,7 +53,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         let Scratch { nearby, scan, robot_bodies, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(NavigationGoal::target);
         let obstacles = nearby.all.in_plane()?;
-        let around = Surroundings { obstacles, bodies: robot_bodies, target };
+        let around = LeaderSurroundings { obstacles, bodies: robot_bodies, target };
         let is_patient = world.start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
         navigator.leader.scan(&leader.pose, &around, noise, scan);
         let percept = navigator.leader.perceive(&leader.pose, &around, scan, is_patient);

@@ -1,14 +1,14 @@
 //! Progress of a chain through its tasks.
 
 use super::driver::{Task, TaskKind};
-use super::state::{Body, ChainState};
+use super::state::{ChainBodyState, ChainState};
 use super::world::ChainWorld;
 use sidestep_rods::geometry::with_dimensions;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the part of its tasks that a chain has done, from 0 to 1. Several tasks have equal
     /// weight; parts that were given up do not count as done.
-    pub fn progress(&self, slot: usize, body: &Body<D>) -> f64 {
+    pub fn progress(&self, slot: usize, body: &ChainBodyState<D>) -> f64 {
         let tasks = &self.chains[slot].tasks;
         let part = tasks.get(body.driving.task as usize).map(|task| self.fraction_done(body, task));
         let undone: f64 = body.tally.given_up.iter().map(|what| what.undone).sum();
@@ -20,7 +20,7 @@ impl<const D: usize> ChainWorld<D> {
     /// for targets by targets, for timed tasks by time; for wandering the part of the distance that
     /// its speed allows in the whole run; for resting, for orders from outside and for drivers of the
     /// program's own the part of the run.
-    pub(crate) fn fraction_done(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+    pub(crate) fn fraction_done(&self, body: &ChainBodyState<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
             _ if task.lasts_s.is_finite() => self.start_time_s(body.driving.cycles) / task.lasts_s,
             TaskKind::Rest | TaskKind::External | TaskKind::Own(_) => {
@@ -42,7 +42,7 @@ impl<const D: usize> ChainWorld<D> {
         part.clamp(0.0, 1.0)
     }
 
-    fn path_fraction(&self, body: &Body<D>, task: &Task<D>) -> f64 {
+    fn path_fraction(&self, body: &ChainBodyState<D>, task: &Task<D>) -> f64 {
         body.driving.way_m.gone / (task.speed_m_s * self.start_time_s(self.cycles.max(1)))
     }
 

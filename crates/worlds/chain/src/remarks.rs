@@ -1,7 +1,7 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
 use super::scenario::ChainScenario;
-use super::world::{ChainSpec, ChainWorld, ChangeKind};
+use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
 use sidestep_arms::kinematics::JointMotion;
 use sidestep_rods::Mobility;
 use sidestep_scenario::Remark;
@@ -41,7 +41,7 @@ fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
     let mut changes = spec.changes.iter();
     connectors.any(|c| c.mobility != Mobility::Free || c.failed)
         || changes.any(|change| {
-            matches!(change.what, ChangeKind::Mobility { .. } | ChangeKind::Failed { .. })
+            matches!(change.what, ChainChangeKind::Mobility { .. } | ChainChangeKind::Failed { .. })
         })
 }
 

@@ -9,7 +9,7 @@
 //! ([`sidestep_kernel::Simulation::submit_controls`]): in such a cycle no chain talks in memory, and one whose connectors
 //! said nothing stands.
 
-use super::agents::{ChainControls, ChainPercepts, Control};
+use super::agents::{ChainControls, ChainPercepts, ConnectorControl};
 use super::deploy::Deployment;
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
@@ -89,14 +89,14 @@ impl<const D: usize> ChainWorld<D> {
         now: Cycle,
         id: EntityId,
         bytes: &[u8],
-    ) -> Result<Option<Control<D>>, String> {
+    ) -> Result<Option<ConnectorControl<D>>, String> {
         let Some((chain, connector)) = self.find_connector(id) else {
             return Err("there is no such connector; give ids of connectors".into());
         };
         if bytes == ChainControls::<D>::ABSENT_CONTROL {
             return Ok(None);
         }
-        let read = postcard::take_from_bytes::<Control<D>>(bytes).ok();
+        let read = postcard::take_from_bytes::<ConnectorControl<D>>(bytes).ok();
         let Some((control, _)) = read.filter(|(_, rest)| rest.is_empty()) else {
             return Err("its bytes are none of a decision of this build".into());
         };

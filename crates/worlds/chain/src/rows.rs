@@ -9,7 +9,7 @@ use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::VetoReason;
-use sidestep_rods::geometry::{Core, Point, with_dimensions};
+use sidestep_rods::geometry::{ConvexCore, Point, with_dimensions};
 
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ fn position_table(name: &str) -> Table<PositionRow> {
     Table::new(name).u64("cycle", meaning, |p: &PositionRow| p.cycle)
 }
 
-fn trajectories(dimensions: usize) -> Table<PositionRow> {
+fn trajectories_table(dimensions: usize) -> Table<PositionRow> {
     let table = position_table("trajectories").u32("chain", "entity id", |p| p.chain).u32(
         "connector",
         "its index",
@@ -51,7 +51,7 @@ fn trajectories(dimensions: usize) -> Table<PositionRow> {
     add_axis_columns(table, dimensions)
 }
 
-fn robots() -> Table<PositionRow> {
+fn robots_table() -> Table<PositionRow> {
     position_table("robots")
         .u32("chain", "entity id", |p| p.chain)
         .u32("robot", "the connector that it follows", |p| p.id)
@@ -60,7 +60,7 @@ fn robots() -> Table<PositionRow> {
         .f64("heading_rad", "heading, counterclockwise from east", |p| p.at[2])
 }
 
-fn joints() -> Table<JointRow> {
+fn joints_table() -> Table<JointRow> {
     Table::new("joints")
         .u64("cycle", "cycle of dt at whose start this holds", |j: &JointRow| j.cycle)
         .u32("chain", "entity id", |j| j.chain)
@@ -68,11 +68,11 @@ fn joints() -> Table<JointRow> {
         .f64("value", "rad, or m where it slides", |j| j.value)
 }
 
-fn movers(dimensions: usize) -> Table<PositionRow> {
+fn movers_table(dimensions: usize) -> Table<PositionRow> {
     add_axis_columns(position_table("movers").u32("obstacle", "its number", |p| p.id), dimensions)
 }
 
-fn events() -> Table<Event> {
+fn events_table() -> Table<Event> {
     let kinds = EventKind::ALL.map(EventKind::name);
     // The first label stands for events without a reason.
     let reasons = std::iter::once("none").chain(VetoReason::ALL.map(VetoReason::name));
@@ -91,7 +91,7 @@ fn events() -> Table<Event> {
 
 /// Rows waiting to be recorded.
 #[derive(Debug, Default)]
-pub(super) struct Rows {
+pub(super) struct RecordBuffers {
     record: RecordSection,
     trajectories: RowBuffer<PositionRow>,
     joints: RowBuffer<JointRow>,
@@ -100,14 +100,14 @@ pub(super) struct Rows {
     events: RowBuffer<Event>,
 }
 
-impl Rows {
+impl RecordBuffers {
     /// Returns no rows yet; later they hold the tables in `record`.
     pub(super) fn new(record: RecordSection) -> Self {
         Self { record, ..Self::default() }
     }
 
     /// Returns the number of cycles from one recorded cycle to the next.
-    pub(super) fn interval(&self) -> Cycle {
+    pub(super) fn recording_interval(&self) -> Cycle {
         self.record.every
     }
 
@@ -122,11 +122,11 @@ impl Rows {
         let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
         let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
-        self.trajectories.start(record.trajectories.then(|| trajectories(D)));
-        self.joints.start((record.joints && has_arms).then(joints));
-        self.robots.start((record.robots && has_robots).then(robots));
-        self.movers.start((record.movers && has_movers).then(|| movers(D)));
-        self.events.start(record.events.then(events));
+        self.trajectories.start(record.trajectories.then(|| trajectories_table(D)));
+        self.joints.start((record.joints && has_arms).then(joints_table));
+        self.robots.start((record.robots && has_robots).then(robots_table));
+        self.movers.start((record.movers && has_movers).then(|| movers_table(D)));
+        self.events.start(record.events.then(events_table));
     }
 
     /// Keeps the positions of everything at the start of cycle `now`.
@@ -192,15 +192,15 @@ fn connectors<const D: usize>(
 }
 
 /// Returns a point of a core that moves with it.
-fn middle<const D: usize>(core: &Core<D>) -> [f64; D] {
+fn middle<const D: usize>(core: &ConvexCore<D>) -> [f64; D] {
     match core {
-        Core::Point(c) => *c,
-        Core::Segment([a, b]) => std::array::from_fn(|i| 0.5 * (a[i] + b[i])),
-        Core::Cuboid(cuboid) => cuboid.center,
+        ConvexCore::Point(c) => *c,
+        ConvexCore::Segment([a, b]) => std::array::from_fn(|i| 0.5 * (a[i] + b[i])),
+        ConvexCore::Cuboid(cuboid) => cuboid.center,
     }
 }
 
-impl Buffers for Rows {
+impl Buffers for RecordBuffers {
     fn buffers(&self) -> Vec<&dyn Buffer> {
         vec![&self.trajectories, &self.joints, &self.robots, &self.movers, &self.events]
     }

@@ -16,22 +16,22 @@ mod tasks;
 mod tests;
 
 use super::deploy::deployment::Deployment;
-use super::ground::{Movers, Site};
-use super::motion::escape::{EscapeMethod, EscapeRules};
+use super::ground::{MovingObstacles, Site};
+use super::motion::escape::{EscapeMethod, ObstacleEscapeRules};
 use super::motion::recovery::RecoveryLimits;
 use super::own_parts::OwnParts;
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use network::NetworkSection;
-use obstacles::{FieldSection, Ground, GroundSection, ObstacleSection, to_dimensions};
+use obstacles::{FieldSection, GroundObstacles, GroundSection, ObstacleSection, to_dimensions};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_rods::geometry::{Bounds, norm};
-use sidestep_rods::{Reaction, Rotation, Rules};
+use sidestep_rods::geometry::{Aabb, norm};
+use sidestep_rods::{Reaction, ReactionRules, RotationRule};
 use sidestep_scenario::{
     ByName, Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
 };
@@ -67,15 +67,15 @@ const MIN_REACH_M: f64 = 1e-3;
 const FAST_FACTOR: f64 = 2.0;
 
 /// A length, time or speed.
-type Measure = Number<LeftOpen<0, 1_000_000>>;
+type PositiveNumber = Number<LeftOpen<0, 1_000_000>>;
 /// A place or a direction.
-type PointValue<const D: usize> = sidestep_scenario::Point<D, Coordinate>;
+type PointValue<const D: usize> = sidestep_scenario::Point<D, CoordinateRule>;
 
 /// Coordinates that a world accepts.
 #[derive(Debug, Clone, Copy)]
-struct Coordinate;
+struct CoordinateRule;
 
-impl Rule for Coordinate {
+impl Rule for CoordinateRule {
     fn allows(number: f64) -> bool {
         number.abs() <= MAX_VALUE
     }
@@ -95,9 +95,9 @@ impl Rule for Coordinate {
 
 /// Numbers above 0; infinity means no bound.
 #[derive(Debug, Clone, Copy)]
-struct Unbounded;
+struct PositiveRule;
 
-impl Rule for Unbounded {
+impl Rule for PositiveRule {
     fn allows(number: f64) -> bool {
         number > 0.0
     }
@@ -131,13 +131,13 @@ impl Rule for StepLimitRule {
 
 /// A box given by its lower and its upper corner.
 #[derive(Debug, Clone, Copy)]
-struct BoxSection<const D: usize>(Bounds<D>);
+struct BoxSection<const D: usize>(Aabb<D>);
 
 impl<'de, const D: usize> Deserialize<'de> for BoxSection<D> {
     fn deserialize<S: serde::Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let [lo, hi] = <[PointValue<D>; 2]>::deserialize(deserializer)?.map(PointValue::get);
         if (0..D).all(|i| lo[i] < hi[i]) {
-            return Ok(Self(Bounds { lo, hi }));
+            return Ok(Self(Aabb { lo, hi }));
         }
         let remedy = "give the lower corner first, then the upper";
         Err(invalid_value(format_args!("[{lo:?}, {hi:?}]"), remedy))
@@ -164,8 +164,8 @@ impl<const D: usize> JsonSchema for BoxSection<D> {
 
 impl<const D: usize> BoxSection<D> {
     /// Returns the floor of the box.
-    fn floor(&self) -> Bounds<2> {
-        Bounds { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
+    fn floor(&self) -> Aabb<2> {
+        Aabb { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
     }
 }
 
@@ -202,7 +202,7 @@ struct ChainFile<const D: usize> {
 
 /// Returns the JSON Schema of a scenario's sections, with places in the plane and in space; `own` are drivers and
 /// reactions beside the built-in ones.
-pub(super) fn sections(own: &OwnParts) -> Value {
+pub(super) fn sections_schema(own: &OwnParts) -> Value {
     let plane = schema::for_type::<ChainFile<2>>();
     let mut sections = schema::widened(&plane, &schema::for_type::<ChainFile<3>>());
     schema::add_names(&mut sections, "Kind", own.drivers.keys().map(String::as_str));
@@ -226,18 +226,18 @@ struct RulesSection {
     #[serde(rename = "dimensions")]
     #[schemars(range(min = 2, max = 3))]
     _dimensions: Option<usize>,
-    dt_s: Option<Measure>,
+    dt_s: Option<PositiveNumber>,
     rotation: ByName<RotationWord>,
     self_collision: Option<bool>,
     slave_step_max_m: Option<Number<StepLimitRule>>,
-    joint_speed_m_s: Option<Number<Unbounded>>,
-    step_m: Option<Measure>,
+    joint_speed_m_s: Option<Number<PositiveRule>>,
+    step_m: Option<PositiveNumber>,
     backtracks: Option<usize>,
-    look_m: Option<Measure>,
+    look_m: Option<PositiveNumber>,
     escape: EscapeWord,
     escape_by: Option<EscapeMethod>,
-    escape_speed_m_s: Option<Measure>,
-    escape_ahead_s: Option<Measure>,
+    escape_speed_m_s: Option<PositiveNumber>,
+    escape_ahead_s: Option<PositiveNumber>,
     may_start_inside: bool,
     deployment: Deployment,
     network: Option<Spanned<NetworkSection>>,
@@ -414,7 +414,7 @@ impl<const D: usize> Compiler<'_, D> {
         self.check_escapes(&chains, escape.as_ref())?;
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
-        let rules = Rules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
+        let rules = ReactionRules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
         let network = self.network(dt_s, &chains)?;
         self.check_local(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {
@@ -451,9 +451,9 @@ impl<const D: usize> Compiler<'_, D> {
     fn escape(
         &self,
         chains: &[ChainSpec<D>],
-        movers: &Movers<D>,
+        movers: &MovingObstacles<D>,
         dt_s: f64,
-    ) -> Option<EscapeRules> {
+    ) -> Option<ObstacleEscapeRules> {
         let section = &self.file.chain;
         if section.escape == EscapeWord::Off || movers.is_empty() {
             return None;
@@ -462,11 +462,16 @@ impl<const D: usize> Compiler<'_, D> {
         // Every course keeps its speed, so the start shows how fast movers ever are.
         let fastest = movers.at(0.0).map(|mover| norm(mover.velocity_m_s)).fold(0.0, f64::max);
         let usual_m_s = FAST_FACTOR * led.fold(fastest, f64::max);
-        let usual = EscapeRules::new(dt_s, section.escape_speed_m_s.map_or(usual_m_s, f64::from));
+        let usual =
+            ObstacleEscapeRules::new(dt_s, section.escape_speed_m_s.map_or(usual_m_s, f64::from));
         let ahead_s = section.escape_ahead_s.map_or(usual.ticks_ahead * dt_s, f64::from);
         let looks_ahead = section.escape == EscapeWord::LookAhead;
         let ticks_ahead = if looks_ahead { ahead_s / dt_s } else { 0.0 };
-        Some(EscapeRules { ticks_ahead, method: section.escape_by.unwrap_or_default(), ..usual })
+        Some(ObstacleEscapeRules {
+            ticks_ahead,
+            method: section.escape_by.unwrap_or_default(),
+            ..usual
+        })
     }
 
     /// Refuses keys of escapes that the kind of escape leaves without effect.
@@ -495,8 +500,8 @@ impl<const D: usize> Compiler<'_, D> {
     fn slave_step_max_m(
         &self,
         chains: &[ChainSpec<D>],
-        ground: &Ground<D>,
-        escape: Option<&EscapeRules>,
+        ground: &GroundObstacles<D>,
+        escape: Option<&ObstacleEscapeRules>,
         dt_s: f64,
     ) -> f64 {
         let given_m = self.file.chain.slave_step_max_m.map(f64::from);
@@ -521,21 +526,21 @@ impl<const D: usize> Compiler<'_, D> {
         MAX_SLAVE_STEP_FACTOR * longest_m
     }
 
-    fn rules(&self, joint_step_max_m: f64) -> Rules {
+    fn rules(&self, joint_step_max_m: f64) -> ReactionRules {
         let section = &self.file.chain;
-        Rules {
+        ReactionRules {
             rotation: match section.rotation {
                 // Predictions of leaders among obstacles that move are made by the default, for a reaction of the
                 // program's own as well.
-                ByName::BuiltIn(RotationWord::Union) | ByName::Own(_) => Rotation::Union,
-                ByName::BuiltIn(RotationWord::Literal) => Rotation::Literal,
-                ByName::BuiltIn(RotationWord::Never) => Rotation::Never,
+                ByName::BuiltIn(RotationWord::Union) | ByName::Own(_) => RotationRule::Union,
+                ByName::BuiltIn(RotationWord::Literal) => RotationRule::Literal,
+                ByName::BuiltIn(RotationWord::Never) => RotationRule::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
             // Chosen by the caller, who knows all chains and the ground.
             slave_step_max_m: f64::INFINITY,
             joint_step_max_m,
-            backtracks: section.backtracks.unwrap_or(Rules::default().backtracks),
+            backtracks: section.backtracks.unwrap_or(ReactionRules::default().backtracks),
             step_m: section.step_m.map(f64::from),
         }
     }

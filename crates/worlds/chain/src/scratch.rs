@@ -2,9 +2,9 @@
 
 use super::agents::percept::ChainPercepts;
 use super::events::Event;
-use super::motion::escape::Escaper;
-use super::state::{Body, ChainState};
-use super::swarm::laser::{RobotBody, Scan};
+use super::motion::escape::ObstacleEscaper;
+use super::state::{ChainBodyState, ChainState};
+use super::swarm::laser::{LaserScan, RobotBody};
 use super::trace::InspectionTrace;
 use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
 use sidestep_kernel::{Cycle, Slot};
@@ -15,14 +15,14 @@ use sidestep_rods::{Obstacle, Obstacles, Propagator, RodBvh};
 #[derive(Debug, Clone)]
 pub struct Scratch<const D: usize> {
     pub(crate) propagator: Propagator<D>,
-    pub(crate) escaper: Option<Escaper<D>>,
+    pub(crate) escaper: Option<ObstacleEscaper<D>>,
     /// The obstacles around a chain.
     pub(crate) nearby: NearbyObstacles<D>,
     /// Robots that another robot can perceive.
     pub(crate) robot_bodies: Vec<RobotBody>,
     /// Chains near a robot.
     pub(crate) near: Vec<Slot>,
-    pub(crate) scan: Scan,
+    pub(crate) scan: LaserScan,
     /// Boxes around a chain's rods.
     pub(crate) own_rods: RodBvh<D>,
     /// Positions of a chain before a cycle.
@@ -63,11 +63,11 @@ impl<const D: usize> Scratch<D> {
     pub(crate) fn new(world: &ChainWorld<D>) -> Self {
         Self {
             propagator: Propagator::new(world.rules).with_reaction(world.reaction.clone()),
-            escaper: world.escape.map(Escaper::new),
+            escaper: world.escape.map(ObstacleEscaper::new),
             nearby: NearbyObstacles::new(world),
             robot_bodies: Vec::new(),
             near: Vec::new(),
-            scan: Scan::default(),
+            scan: LaserScan::default(),
             own_rods: RodBvh::default(),
             before: PositionBuffer::default(),
             escaped: PositionBuffer::default(),
@@ -130,7 +130,7 @@ impl<const D: usize> NearbyObstacles<D> {
 }
 
 impl<const D: usize> PositionBuffer<D> {
-    pub(crate) fn record(&mut self, body: &Body<D>) {
+    pub(crate) fn record(&mut self, body: &ChainBodyState<D>) {
         self.points.clear();
         self.points.extend_from_slice(body.chain.points());
         self.joints.clear();
@@ -138,7 +138,7 @@ impl<const D: usize> PositionBuffer<D> {
     }
 
     /// Moves a chain back to these positions.
-    pub(crate) fn restore(&self, body: &mut Body<D>) {
+    pub(crate) fn restore(&self, body: &mut ChainBodyState<D>) {
         body.chain.points_mut().copy_from_slice(&self.points);
         if let Some(joints) = &mut body.joints {
             joints.clone_from(&self.joints);

@@ -3,19 +3,19 @@
 mod body;
 mod snapshot;
 
-pub use body::Body;
+pub use body::ChainBodyState;
 pub(crate) use body::{MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten};
 pub(crate) use snapshot::Snapshot;
 
 use super::metrics::ChainTally;
-use super::neighbors::Neighbors;
-use super::swarm::leader::Decision;
+use super::neighbors::ClaimIndex;
+use super::swarm::leader::LeaderDecision;
 use super::world::ChainWorld;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::{Cycle, EntityId, InputError, Slot};
-use sidestep_rods::geometry::{Bounds, Point};
-use sidestep_rods::{Grid, bounds_around};
-use snapshot::{Component, ComponentList};
+use sidestep_rods::geometry::{Aabb, Point};
+use sidestep_rods::{SpatialGrid, bounds_around};
+use snapshot::{SnapshotComponent, SnapshotComponentRecords};
 use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -28,33 +28,33 @@ const ROUNDING_M: f64 = 1e-6;
 /// State of a world of chains; slots are ids.
 #[derive(Debug)]
 pub struct ChainState<const D: usize> {
-    cells: Box<[ChainCell<D>]>,
+    cells: Box<[ChainEntry<D>]>,
     /// Number of claims ever made, by which workers see whether sorted claims are out of date.
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
-    neighbors: RwLock<Neighbors<D>>,
+    neighbors: RwLock<ClaimIndex<D>>,
     /// Whether some body may have changed since the boxes below were made.
     has_changed: AtomicBool,
     /// The boxes around the solid parts of all chains in the plane, made by the first worker that needs them.
-    crowd: RwLock<Grid<2>>,
+    crowd: RwLock<SpatialGrid<2>>,
 }
 
 /// One chain's share of the state. No worker ever waits for one of its locks: in the first phase all workers
 /// only read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
-struct ChainCell<const D: usize> {
-    body: RwLock<Body<D>>,
+struct ChainEntry<const D: usize> {
+    body: RwLock<ChainBodyState<D>>,
     /// The box that the chain may enter during this cycle.
-    claim: Mutex<Bounds<D>>,
+    claim: Mutex<Aabb<D>>,
     /// Decision of its navigator in this cycle.
-    decision: Mutex<Option<Decision>>,
+    decision: Mutex<Option<LeaderDecision>>,
 }
 
-impl<const D: usize> ChainCell<D> {
-    fn new(body: Body<D>) -> Self {
+impl<const D: usize> ChainEntry<D> {
+    fn new(body: ChainBodyState<D>) -> Self {
         Self {
             body: RwLock::new(body),
-            claim: Mutex::new(Bounds::empty()),
+            claim: Mutex::new(Aabb::empty()),
             decision: Mutex::new(None),
         }
     }
@@ -62,17 +62,17 @@ impl<const D: usize> ChainCell<D> {
 
 /// One chain as it is read: locked against changes or, while it has motions to follow, a copy that has followed them.
 #[derive(Debug)]
-pub enum BodyRef<'a, const D: usize> {
+pub enum ChainBodyStateRef<'a, const D: usize> {
     /// The chain itself.
-    Locked(RwLockReadGuard<'a, Body<D>>),
+    Locked(RwLockReadGuard<'a, ChainBodyState<D>>),
     /// A copy, after the motions that the chain has yet to follow.
-    Followed(Box<Body<D>>),
+    Followed(Box<ChainBodyState<D>>),
 }
 
-impl<const D: usize> Deref for BodyRef<'_, D> {
-    type Target = Body<D>;
+impl<const D: usize> Deref for ChainBodyStateRef<'_, D> {
+    type Target = ChainBodyState<D>;
 
-    fn deref(&self) -> &Body<D> {
+    fn deref(&self) -> &ChainBodyState<D> {
         match self {
             Self::Locked(body) => body,
             Self::Followed(body) => body,
@@ -81,9 +81,9 @@ impl<const D: usize> Deref for BodyRef<'_, D> {
 }
 
 impl<const D: usize> ChainState<D> {
-    fn from_bodies(bodies: impl Iterator<Item = Body<D>>) -> Self {
+    fn from_bodies(bodies: impl Iterator<Item = ChainBodyState<D>>) -> Self {
         Self {
-            cells: bodies.map(ChainCell::new).collect(),
+            cells: bodies.map(ChainEntry::new).collect(),
             claims: AtomicU64::new(0),
             neighbors: RwLock::default(),
             has_changed: AtomicBool::new(true),
@@ -96,7 +96,7 @@ impl<const D: usize> ChainState<D> {
     /// # Errors
     /// When a script contains no motions.
     pub fn new(world: &ChainWorld<D>) -> Result<Self, InputError> {
-        let bodies = world.chains.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
+        let bodies = world.chains.iter().map(ChainBodyState::new).collect::<Result<Vec<_>, _>>()?;
         Ok(Self::from_bodies(bodies.into_iter()))
     }
 
@@ -113,8 +113,9 @@ impl<const D: usize> ChainState<D> {
             return Err(CheckpointError::Damaged);
         }
         let all = world.chains.iter().zip(&snapshot.chains).zip(tallies);
-        let bodies =
-            all.map(|((spec, record), tally)| Body::restore(spec, record, tally, snapshot.cycle));
+        let bodies = all.map(|((spec, record), tally)| {
+            ChainBodyState::restore(spec, record, tally, snapshot.cycle)
+        });
         let mut bodies = bodies.collect::<Result<Vec<_>, _>>()?;
         snapshot.restore_components(&mut bodies)?;
         Ok(Self::from_bodies(bodies.into_iter()))
@@ -136,14 +137,14 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Returns one chain, for reading: it is as if it had followed its deferred motions, and keeps them.
-    pub fn body(&self, slot: usize) -> BodyRef<'_, D> {
+    pub fn body(&self, slot: usize) -> ChainBodyStateRef<'_, D> {
         let body = self.deferred_body(slot);
         if body.deferred.is_empty() {
-            return BodyRef::Locked(body);
+            return ChainBodyStateRef::Locked(body);
         }
         let mut followed = Box::new(body.clone());
         followed.catch_up();
-        BodyRef::Followed(followed)
+        ChainBodyStateRef::Followed(followed)
     }
 
     /// Lets all chains follow their deferred motions. A caller that reads them in each cycle does this first,
@@ -157,7 +158,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Locks one chain for reading as it is: all connectors except the initiator may have motions still to follow.
-    pub(crate) fn deferred_body(&self, slot: usize) -> RwLockReadGuard<'_, Body<D>> {
+    pub(crate) fn deferred_body(&self, slot: usize) -> RwLockReadGuard<'_, ChainBodyState<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -168,7 +169,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Locks one chain for writing; the grid of solid parts is then out of date.
-    pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, Body<D>> {
+    pub(crate) fn body_mut(&self, slot: usize) -> RwLockWriteGuard<'_, ChainBodyState<D>> {
         // Reading first: if every worker wrote the flag, its cache line would move between them in each cycle.
         if !self.has_changed.load(Relaxed) {
             self.has_changed.store(true, Relaxed);
@@ -177,14 +178,14 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Returns the box that a chain has claimed for this cycle.
-    pub(crate) fn claim(&self, slot: usize) -> Bounds<D> {
+    pub(crate) fn claim(&self, slot: usize) -> Aabb<D> {
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns the claims by their lower ends; valid while no chain claims anything.
-    pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, Neighbors<D>> {
+    pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, ClaimIndex<D>> {
         let made = self.claims.load(Relaxed);
-        refresh(
+        refresh_if_stale(
             &self.neighbors,
             |neighbors| neighbors.is_current(made),
             |neighbors| neighbors.sort(made, (0..self.len()).map(|slot| self.claim(slot))),
@@ -198,7 +199,7 @@ impl<const D: usize> ChainState<D> {
         if self.len() <= MAX_LINEAR_SCAN {
             return slots.extend(0..self.len() as Slot);
         }
-        let crowd = refresh(
+        let crowd = refresh_if_stale(
             &self.crowd,
             |_| !self.has_changed.load(Relaxed),
             |crowd| {
@@ -211,18 +212,18 @@ impl<const D: usize> ChainState<D> {
         slots.sort_unstable();
     }
 
-    pub(crate) fn set_claim(&self, slot: usize, claim: Bounds<D>) {
+    pub(crate) fn set_claim(&self, slot: usize, claim: Aabb<D>) {
         // Relaxed: the barrier between two phases orders this before all readers.
         self.claims.fetch_add(1, Relaxed);
         *self.cells[slot].claim.lock().unwrap_or_else(PoisonError::into_inner) = claim;
     }
 
     /// Returns what a chain's navigator has decided in this cycle; none where none leads.
-    pub(crate) fn decision(&self, slot: usize) -> Option<Decision> {
+    pub(crate) fn decision(&self, slot: usize) -> Option<LeaderDecision> {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(crate) fn set_decision(&self, slot: usize, decision: Option<Decision>) {
+    pub(crate) fn set_decision(&self, slot: usize, decision: Option<LeaderDecision>) {
         *self.cells[slot].decision.lock().unwrap_or_else(PoisonError::into_inner) = decision;
     }
 
@@ -245,11 +246,11 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Returns the records of those chains where there is something to save, by slot.
-    fn save_component<C: Component>(
+    fn save_component<C: SnapshotComponent>(
         &self,
         cycle: Cycle,
-        component: fn(&Body<D>) -> &C,
-    ) -> ComponentList<C::Record> {
+        component: fn(&ChainBodyState<D>) -> &C,
+    ) -> SnapshotComponentRecords<C::Record> {
         let mut records = Vec::new();
         for slot in 0..self.len() {
             // Deferred motions change places and sums, and no component.
@@ -267,7 +268,7 @@ impl<const D: usize> ChainState<D> {
 }
 
 /// Returns the content of a lock, renewed by the first worker that needs it if it is out of date.
-fn refresh<T>(
+fn refresh_if_stale<T>(
     lock: &RwLock<T>,
     is_current: impl Fn(&T) -> bool,
     renew: impl FnOnce(&mut T),

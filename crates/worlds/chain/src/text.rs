@@ -1,18 +1,18 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
 use super::deploy::deployment::Deployment;
-use super::metrics::{ChainAbandonedPart, Metrics, RobotMetrics};
+use super::metrics::{ChainAbandonedTaskPart, Metrics, RobotMetrics};
 use super::scenario::ChainScenario;
 use super::state::Snapshot;
 use serde_json::{Value, json};
 use sidestep_kernel::World;
 use sidestep_kernel::text::{
-    Description, KeyValues, align_pairs, format_fixed, group_thousands, key_value,
+    KeyValues, StateDescription, align_pairs, format_fixed, group_thousands, key_value,
 };
 
 /// Returns what a scenario has and how long it lasts, before it runs.
-pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> Description {
-    Description { json: contents_json(compiled), text: align_pairs(&contents_lines(compiled)) }
+pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> StateDescription {
+    StateDescription { json: contents_json(compiled), text: align_pairs(&contents_lines(compiled)) }
 }
 
 fn contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
@@ -65,7 +65,7 @@ fn contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
     lines
 }
 
-pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Description {
+pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> StateDescription {
     let mut rows = Vec::new();
     let axes: String =
         ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
@@ -77,22 +77,22 @@ pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> Description {
             text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
         }
     }
-    Description { json: Value::Array(rows), text }
+    StateDescription { json: Value::Array(rows), text }
 }
 
 /// Returns the outcome of a run; what did not occur is mostly left out.
 pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
     let mut lines = motion(m);
     lines.extend(m.robots.as_ref().map(robots));
-    lines.extend(after_vetoes(m));
+    lines.extend(recovery_text(m));
     lines.extend(network(m));
     if m.reformed > 0 {
         lines.push(key_value("re-formed", format!("{} times", group_thousands(m.reformed))));
     }
     if m.not_reformed > 0 {
-        lines.push(key_value("NOT re-formed", not_reformed(m)));
+        lines.push(key_value("NOT re-formed", not_reformed_text(m)));
     }
-    lines.extend(m.given_up.iter().take(MAX_LISTED_PARTS).map(abandoned_part));
+    lines.extend(m.given_up.iter().take(MAX_LISTED_PARTS).map(abandoned_part_text));
     if m.given_up.len() > MAX_LISTED_PARTS {
         let more = group_thousands((m.given_up.len() - MAX_LISTED_PARTS) as u64);
         lines.push(key_value("given up", format!("and {more} more")));
@@ -103,7 +103,7 @@ pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
 /// Length below which a rod out of its limits is a matter of rounding, m.
 const ROUNDING_M: f64 = 1e-9;
 
-fn rods(violation_m: f64) -> String {
+fn rods_text(violation_m: f64) -> String {
     if violation_m <= ROUNDING_M {
         "within their limits".into()
     } else {
@@ -132,19 +132,19 @@ fn motion(m: &Metrics) -> KeyValues {
     let turned = group_thousands(m.rotations);
     let mut lines = vec![
         key_value("progress", format!("{:.1} %", 100.0 * m.progress)),
-        key_value("vetoes", vetoes(m)),
+        key_value("vetoes", vetoes_text(m)),
         key_value("penetrations", penetrations),
         key_value("least clearance", clearance),
-        key_value("rods", rods(m.max_rod_violation_m)),
+        key_value("rods", rods_text(m.max_rod_violation_m)),
         key_value("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
         key_value("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
     ];
-    lines.extend(m.min_own_gap_m.map(|gap_m| key_value("own parts", own_parts(gap_m))));
+    lines.extend(m.min_own_gap_m.map(|gap_m| key_value("own parts", own_parts_text(gap_m))));
     lines
 }
 
 /// Returns how near the parts of a chain came to each other.
-fn own_parts(gap_m: f64) -> String {
+fn own_parts_text(gap_m: f64) -> String {
     match gap_m {
         overlap_m if overlap_m < -TOUCH_M => {
             format!("overlapped by up to {} m", format_fixed(-gap_m, 4))
@@ -170,7 +170,7 @@ fn robots(robots: &RobotMetrics) -> (String, String) {
     )
 }
 
-fn not_reformed(m: &Metrics) -> String {
+fn not_reformed_text(m: &Metrics) -> String {
     let times = format!("{} times", group_thousands(m.not_reformed));
     match m.missing_parts {
         0 => times,
@@ -181,7 +181,7 @@ fn not_reformed(m: &Metrics) -> String {
 
 /// Returns how initiators continued after vetoes, and the results of getting out of the way; no
 /// lines if there were none.
-fn after_vetoes(m: &Metrics) -> KeyValues {
+fn recovery_text(m: &Metrics) -> KeyValues {
     let rungs = &m.rungs;
     let went_on = count_list(&[
         (rungs.shorter, "shorter steps"),
@@ -235,7 +235,7 @@ const TOUCH_M: f64 = 1e-6;
 /// Largest number of given-up parts that are listed; the others are only counted.
 const MAX_LISTED_PARTS: usize = 5;
 
-fn vetoes(m: &Metrics) -> String {
+fn vetoes_text(m: &Metrics) -> String {
     if m.vetoes == 0 {
         return "none".into();
     }
@@ -244,7 +244,7 @@ fn vetoes(m: &Metrics) -> String {
     format!("{}: {}", group_thousands(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
 }
 
-fn abandoned_part(abandoned: &ChainAbandonedPart) -> (String, String) {
+fn abandoned_part_text(abandoned: &ChainAbandonedTaskPart) -> (String, String) {
     let what = &abandoned.what;
     let why = match (&what.by, &what.reason) {
         (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),

@@ -5,14 +5,14 @@ use super::events::{Event, EventKind};
 use super::navigate::NavigationGoal;
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
-use super::state::{Body as ChainBody, ChainState};
+use super::state::{ChainBodyState as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::view::{
-    Axis, Body, BodyId, BodyKind, Condition, LogEvent, Pose, PositionColumns, Quantity, Scan,
-    ScanSelection, Scenery, Severity, Shape, Vec3,
+    Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
+    Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
 };
 use sidestep_kernel::{Cycle, EntityId, Slot};
-use sidestep_rods::geometry::{Core, Cuboid, cross, with_dimensions};
+use sidestep_rods::geometry::{ConvexCore, Cuboid, cross, with_dimensions};
 use sidestep_rods::{Chain, Obstacle};
 use std::ops::RangeInclusive;
 
@@ -46,13 +46,16 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Describes recorded positions as places of connectors, one row interval `interval` cycles.
-    pub(crate) fn position_columns(interval: Cycle) -> Vec<PositionColumns> {
-        vec![PositionColumns {
+    pub(crate) fn position_columns(interval: Cycle) -> Vec<PositionTableColumns> {
+        vec![PositionTableColumns {
             table: "trajectories",
             kind: BodyKind::Connector,
             number: "chain",
             part: Some("connector"),
-            axes: ["x_m", "y_m", "z_m"][..D].iter().map(|axis| Axis::meters(axis)).collect(),
+            axes: ["x_m", "y_m", "z_m"][..D]
+                .iter()
+                .map(|axis| CoordinateColumn::meters(axis))
+                .collect(),
             plane: None,
             is_corner: false,
             heading: None,
@@ -216,17 +219,19 @@ fn whole_parts<const D: usize>(chain: &Chain<D>) -> Vec<RangeInclusive<usize>> {
 fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {
-        Core::Point(at) if D == 2 => (
+        ConvexCore::Point(at) if D == 2 => (
             Pose::from_position(with_dimensions(*at)),
             Shape::Cylinder { radius_m, height_m: HEIGHT_M },
         ),
-        Core::Point(at) => (Pose::from_position(with_dimensions(*at)), Shape::Sphere { radius_m }),
-        Core::Segment(ends) => {
+        ConvexCore::Point(at) => {
+            (Pose::from_position(with_dimensions(*at)), Shape::Sphere { radius_m })
+        }
+        ConvexCore::Segment(ends) => {
             let points_m = ends.iter().map(|p| with_dimensions(*p)).collect();
             let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
             (Pose::from_position([0.0; 3]), line)
         }
-        Core::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
+        ConvexCore::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
     Body::new(BodyKind::Obstacle, obstacle.id, pose, shape)
         .with_velocity(with_dimensions(obstacle.velocity_m_s))

@@ -3,8 +3,8 @@
 use super::deploy::deployment::Deployment;
 use super::driver::{Task, TaskKind, TaskProgress};
 use super::formation::{Robot, Robots};
-use super::ground::Movers;
-use super::motion::escape::EscapeRules;
+use super::ground::MovingObstacles;
+use super::motion::escape::ObstacleEscapeRules;
 use super::motion::recovery::RecoveryLimits;
 use super::script::ScriptMotion;
 use super::swarm::drive::Pose2;
@@ -16,7 +16,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, InputError, Slot};
 use sidestep_rods::geometry::{Point, norm, with_dimensions};
 use sidestep_rods::rebuild::MovableEnd;
-use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Reaction, Rules};
+use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Reaction, ReactionRules};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -59,17 +59,17 @@ pub struct ChainWorld<const D: usize> {
     /// Obstacles that stand still.
     pub obstacles: Arc<Obstacles<D>>,
     /// Obstacles that move.
-    pub movers: Arc<Movers<D>>,
+    pub movers: Arc<MovingObstacles<D>>,
     /// Duration of a cycle, s.
     pub dt_s: f64,
     /// Cycles of the run, by which the progress of an endless task is measured.
     pub(crate) cycles: Cycle,
     /// Rules of all chains; limits that a scenario leaves out follow from its speeds.
-    pub(crate) rules: Rules,
+    pub(crate) rules: ReactionRules,
     /// The reaction of free connectors, unless it is the built-in one.
     pub(crate) reaction: Option<Arc<dyn Reaction>>,
     /// Rule for getting out of the way of moving obstacles, if they do.
-    pub(crate) escape: Option<EscapeRules>,
+    pub(crate) escape: Option<ObstacleEscapeRules>,
     /// Time that initiators spend on each rung of the ladder after a veto.
     pub(crate) rungs: RecoveryLimits,
     /// Distance up to which the clearance of a chain's parts is measured, meters.
@@ -95,7 +95,7 @@ pub(crate) struct ChainSpec<const D: usize> {
     /// Tasks of its initiators, one after the other; at least one.
     pub(crate) tasks: Vec<Task<D>>,
     /// Changes to it, by cycle.
-    pub(crate) changes: Vec<Change<D>>,
+    pub(crate) changes: Vec<ChainChange<D>>,
     /// The arm that it represents, if any.
     pub(crate) arm: Option<Arc<Arm>>,
     /// Behavior of the robots that keep to its connectors, if it is a swarm on wheels.
@@ -104,16 +104,16 @@ pub(crate) struct ChainSpec<const D: usize> {
 
 /// A change to a chain at the start of a cycle (slides R8, R10, F3).
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Change<const D: usize> {
+pub(crate) struct ChainChange<const D: usize> {
     /// The cycle at whose start it takes effect.
     pub(crate) cycle: Cycle,
     /// What changes, and to what.
-    pub(crate) what: ChangeKind<D>,
+    pub(crate) what: ChainChangeKind<D>,
 }
 
 /// What a scenario may change in the course of a run.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum ChangeKind<const D: usize> {
+pub(crate) enum ChainChangeKind<const D: usize> {
     /// A connector breaks down, or works again.
     Failed {
         connector: usize,
@@ -149,11 +149,11 @@ pub(crate) enum ChangeKind<const D: usize> {
     },
 }
 
-impl<const D: usize> Change<D> {
+impl<const D: usize> ChainChange<D> {
     /// Returns how far the change may throw parts in a cycle, meters.
     pub(crate) fn max_throw_m(&self, now: Cycle) -> f64 {
         match &self.what {
-            ChangeKind::Scatter { by_m, apart_m, .. } if self.cycle == now => {
+            ChainChangeKind::Scatter { by_m, apart_m, .. } if self.cycle == now => {
                 MAX_THROW_SIGMAS * by_m + norm(*apart_m)
             }
             _ => 0.0,
@@ -163,25 +163,25 @@ impl<const D: usize> Change<D> {
     /// Returns the speed at which scattered parts set out in a cycle because of the change, m/s.
     pub(crate) fn gather_speed_m_s(&self, now: Cycle) -> f64 {
         match &self.what {
-            ChangeKind::Reform { speed_m_s, .. } if self.cycle == now => *speed_m_s,
+            ChainChangeKind::Reform { speed_m_s, .. } if self.cycle == now => *speed_m_s,
             _ => 0.0,
         }
     }
 
     /// Puts new limits into the chain; breaking and joining change places, not limits.
-    pub(crate) fn constrain(&self, chain: &mut Chain<D>) {
+    pub(crate) fn apply_constraints(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
-            ChangeKind::Failed { connector, failed } => {
+            ChainChangeKind::Failed { connector, failed } => {
                 chain.set_failed(*connector, *failed);
                 Ok(())
             }
-            ChangeKind::Mobility { connector, mobility } => {
+            ChainChangeKind::Mobility { connector, mobility } => {
                 chain.set_mobility(*connector, *mobility)
             }
-            ChangeKind::MaxBend { connector, max_bend_rad } => {
+            ChainChangeKind::MaxBend { connector, max_bend_rad } => {
                 chain.set_max_bend_rad(*connector, *max_bend_rad)
             }
-            ChangeKind::Scatter { .. } | ChangeKind::Reform { .. } => Ok(()),
+            ChainChangeKind::Scatter { .. } | ChainChangeKind::Reform { .. } => Ok(()),
         };
         done.expect("a change was checked when the scenario was compiled");
     }
@@ -214,7 +214,7 @@ impl<const D: usize> ChainSpec<D> {
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns whether nothing is in the way of the only chain, not even the chain itself.
-    pub(crate) fn is_open(&self) -> bool {
+    pub(crate) fn is_unobstructed(&self) -> bool {
         let is_empty = self.obstacles.is_empty() && self.movers.is_empty();
         is_empty && self.chains.len() == 1 && !self.rules.self_collision
     }

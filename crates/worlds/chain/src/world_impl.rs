@@ -2,7 +2,7 @@
 
 use super::events::Event;
 use super::metrics::{ChainMetrics, ChainTally, Metrics};
-use super::rows::Rows;
+use super::rows::RecordBuffers;
 use super::scenario::{AnyChainScenario, ChainScenario};
 use super::scratch::Scratch;
 use super::state::{ChainState, Snapshot};
@@ -13,9 +13,9 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
 use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{Description, KeyValues};
+use sidestep_kernel::text::{KeyValues, StateDescription};
 use sidestep_kernel::view::{
-    BodyId, Frame, FrameOptions, Inspection, Log, PositionColumns, Scenery,
+    BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, Simulation, World,
@@ -47,7 +47,7 @@ impl<const D: usize> ChainScenario<D> {
     /// Never, because scripts are tried out when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
         let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
-        let collector = Collector { rows: Rows::new(self.record), ..Collector::default() };
+        let collector = Collector { rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
         let start = RunStart { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
@@ -70,9 +70,9 @@ pub struct Collector {
     /// Steps made before this process resumed the run.
     steps_before: u64,
     /// Rows to be recorded; none without recording.
-    rows: Rows,
+    rows: RecordBuffers,
     /// Events that wait for the next frame.
-    log: Log<Event>,
+    log: EventBuffer<Event>,
     /// Events of a cycle in the order of the workers, until [`World::commit`] sorts them.
     gathered: Vec<Event>,
 }
@@ -159,8 +159,8 @@ impl<const D: usize> WorldRecording for ChainWorld<D> {
         collector.rows.record(recorder)
     }
 
-    fn position_columns(&self, collector: &Collector) -> Vec<PositionColumns> {
-        ChainWorld::<D>::position_columns(collector.rows.interval())
+    fn position_columns(&self, collector: &Collector) -> Vec<PositionTableColumns> {
+        ChainWorld::<D>::position_columns(collector.rows.recording_interval())
     }
 }
 
@@ -282,7 +282,7 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &ChainState<D>, now: Cycle) -> Description {
+    fn poses(&self, state: &ChainState<D>, now: Cycle) -> StateDescription {
         text::poses::<D>(&state.snapshot(now))
     }
 }

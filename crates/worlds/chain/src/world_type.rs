@@ -4,7 +4,7 @@ use super::driver::own_driver::Driver;
 use super::own_parts::OwnParts;
 use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
 use super::{bundle, remarks, text, world::ChainWorld};
-use sidestep_kernel::text::Description;
+use sidestep_kernel::text::StateDescription;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_rods::Reaction;
 use sidestep_scenario::{
@@ -63,7 +63,7 @@ impl WorldType for Chains {
     }
 
     fn sections(&self) -> serde_json::Value {
-        super::scenario::sections(&self.own)
+        super::scenario::sections_schema(&self.own)
     }
 
     fn random_quantities(&self) -> &'static str {
@@ -103,7 +103,7 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
         self.world.agents()
     }
 
-    fn contents(&self, _: &Source) -> Description {
+    fn contents(&self, _: &Source) -> StateDescription {
         text::contents(self)
     }
 
@@ -121,7 +121,7 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
     }
 
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
-        bundle::resolve(source, self)
+        bundle::resolve_scenario(source, self)
     }
 
     fn reseeded(&self, seed: u64) -> Option<Result<Box<dyn AnyCompiled>, InputError>> {

@@ -9,7 +9,7 @@ use super::world::Role;
 use super::{Event, EventKind, MotionSample, Scratch};
 use sidestep_kernel::Slot;
 use sidestep_kernel::distr::Categorical;
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 
 /// The result that a walk would have in the present state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub(super) struct Blocker {
     pub(super) by: Option<Slot>,
 }
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Lets one body act with the draw of its own stream.
     #[inline]
     pub(super) fn act_with_draw(&self, slot: Slot, scratch: &mut Scratch) {
@@ -91,7 +91,10 @@ impl<T: BoxWord> CycleContext<'_, T> {
         }
         let whole = &walk.whole;
         whole.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
-        whole.fill.iter().for_each(|&offset| floor.set(box_index(base, offset), T::standing(slot)));
+        whole
+            .fill
+            .iter()
+            .for_each(|&offset| floor.set(box_index(base, offset), T::from_body(slot)));
         body.anchor.set(body.position().offset(whole.delta.0, whole.delta.1).word());
         body.moves.set(body.moves.get() + walk.steps.len() as u32);
         if self.type_of(body).marks {
@@ -187,7 +190,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
             step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
             for &offset in &step.enter {
                 let index = box_index(base, offset);
-                floor.set(index, T::standing(slot));
+                floor.set(index, T::from_body(slot));
                 first_visits += u32::from(marks && self.state.visited.insert(index));
             }
             moved = moved.offset(step.delta.0, step.delta.1);
@@ -226,7 +229,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
         if !opens && !are_free(floor, base, own) {
             return;
         }
-        let word = if opens { T::FREE } else { T::standing(slot) };
+        let word = if opens { T::FREE } else { T::from_body(slot) };
         own.iter().for_each(|&offset| floor.set(box_index(base, offset), word));
         body.facing.set(if opens { Facing::OPEN } else { Facing::CLOSED });
         if scratch.keep_events {

@@ -1,7 +1,7 @@
 //! Actions prepared for a body on the padded grid: the boxes that each transition enters and leaves.
 
 use super::effector::{HEADINGS, Side, Transition};
-use sidestep_kernel::distr::{Categorical, RowError};
+use sidestep_kernel::distr::{Categorical, DistributionError};
 
 /// A unit step of a body of given size at a given heading, as box offsets from the anchor
 /// that the body had before the whole transition.
@@ -112,7 +112,7 @@ impl Action {
         heading: u8,
         body: (u32, u32),
         stride: u32,
-    ) -> Result<Self, RowError> {
+    ) -> Result<Self, DistributionError> {
         let probabilities: Vec<f64> = transitions.iter().map(|t| t.p).collect();
         let own = own_boxes(body, stride);
         let mut walks = Vec::with_capacity(transitions.len());

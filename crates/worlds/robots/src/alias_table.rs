@@ -1,7 +1,7 @@
 //! The readings of a sensor, ready to be drawn.
 
 use super::sensor::{NOTHING, Reading, SensorModel};
-use sidestep_kernel::distr::{RowError, check_row};
+use sidestep_kernel::distr::{DistributionError, check_row};
 
 /// Stands for the class of a sector in which nothing is reported; greater than any class.
 pub const UNSEEN: u8 = u8::MAX;
@@ -60,7 +60,7 @@ impl AliasTable {
     /// # Errors
     /// Returns an error when a row is not a distribution; scenarios check that earlier and say
     /// where.
-    pub(crate) fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, RowError> {
+    pub(crate) fn new(sensor: &SensorModel, reliable: bool) -> Result<Self, DistributionError> {
         let classes = sensor.distance_classes.len() + 1;
         let observations = sensor.observations.len();
         // Nothing, or one of the other observations in one of the classes but `beyond`. A power of 2, so that

@@ -6,7 +6,7 @@
 
 use super::cycle_context::{CycleContext, box_index, with_cycle};
 use super::world::RobotsWorld;
-use sidestep_kernel::space::{BoxWord, Position};
+use sidestep_kernel::space::{OccupantWord, Position};
 use sidestep_kernel::world::Auction;
 use sidestep_kernel::{PhaseContext, Slot};
 use std::sync::atomic::Ordering::Relaxed;
@@ -23,7 +23,7 @@ pub(super) struct Bid {
     value: u64,
 }
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Bids for all boxes that a body covers or may come to cover.
     fn bid(&self, slot: Slot) -> Bid {
         let body = self.body(slot);

@@ -23,9 +23,9 @@ use super::metrics::Metrics;
 use super::scenario::Compiled;
 use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::workers::{self, Worker};
-use sidestep_kernel::{Cycle, EntityId, GroupSizes, Slot};
+use sidestep_kernel::{Cycle, EntityId, GroupSizeHistogram, Slot};
 use sidestep_map::Cell;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -116,7 +116,7 @@ impl BaselineRun {
 
     /// Returns the metrics so far; there are no conflict groups.
     pub fn metrics(&self) -> Metrics {
-        self.compiled.world.metrics(&self.state, self.cycle, &GroupSizes::default())
+        self.compiled.world.metrics(&self.state, self.cycle, &GroupSizeHistogram::default())
     }
 
     /// Returns the share of the bodies' cycles that one worker did while all others waited.
@@ -160,7 +160,7 @@ impl BaselineRun {
 
 /// Runs a worker's part of one cycle: its own bodies perceive; barrier, because no body may act while
 /// others perceive; those inside the band act; barrier; one worker moves the rest and hands over; barrier.
-fn partition_cycle<T: BoxWord>(
+fn partition_cycle<T: OccupantWord>(
     cycle: &CycleContext<'_, T>,
     exchange: &HaloExchange,
     worker: &Worker<'_>,
@@ -232,7 +232,7 @@ impl RobotsWorld {
     }
 }
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
     fn is_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
         let world = self.world;

@@ -1,6 +1,6 @@
 //! The words of the radio: the last broadcast of each robot.
 
-use sidestep_kernel::{Column, Cycle, EntityId};
+use sidestep_kernel::{AtomicColumn, Cycle, EntityId};
 
 /// The last broadcast of each robot by id; empty without radio.
 ///
@@ -13,9 +13,9 @@ pub(crate) struct BroadcastBuffer([BroadcastPage; 2]);
 
 #[derive(Debug, Clone)]
 struct BroadcastPage {
-    words: Column<u64>,
+    words: AtomicColumn<u64>,
     /// 1 for a robot that has broadcast a word, because every word is a possible one.
-    spoken: Column<u8>,
+    spoken: AtomicColumn<u8>,
 }
 
 impl BroadcastBuffer {
@@ -57,7 +57,7 @@ impl BroadcastBuffer {
 
 impl BroadcastPage {
     fn silent(bodies: usize) -> Self {
-        Self { words: Column::filled(bodies, 0), spoken: Column::filled(bodies, 0) }
+        Self { words: AtomicColumn::filled(bodies, 0), spoken: AtomicColumn::filled(bodies, 0) }
     }
 
     fn set(&self, id: EntityId, word: u64) {

@@ -3,16 +3,16 @@
 use super::RobotsState;
 use super::state::BodyState;
 use super::world::{BodyType, RobotsWorld};
-use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::{Column, Cycle, EntityId, Slot};
+use sidestep_kernel::space::OccupantWord;
+use sidestep_kernel::{AtomicColumn, Cycle, EntityId, Slot};
 
 /// The world and its state in one cycle, as every phase sees them.
 #[derive(Debug)]
-pub(super) struct CycleContext<'a, T: BoxWord> {
+pub(super) struct CycleContext<'a, T: OccupantWord> {
     pub(super) world: &'a RobotsWorld,
     pub(super) state: &'a RobotsState,
     /// The body that stands in each box or claims it.
-    pub(super) floor: &'a Column<T>,
+    pub(super) floor: &'a AtomicColumn<T>,
     pub(super) now: Cycle,
 }
 
@@ -38,7 +38,7 @@ macro_rules! with_cycle {
 }
 pub(super) use with_cycle;
 
-impl<'a, T: BoxWord> CycleContext<'a, T> {
+impl<'a, T: OccupantWord> CycleContext<'a, T> {
     /// Returns the changing part of a body.
     #[inline(always)]
     pub(super) fn body(&self, slot: Slot) -> &'a BodyState {
@@ -73,7 +73,11 @@ pub(super) fn box_index(base: u32, offset: i32) -> usize {
 
 /// Returns whether some boxes are all empty.
 #[inline]
-pub(super) fn are_free<T: BoxWord>(floor: &Column<T>, base: u32, offsets: &[i32]) -> bool {
+pub(super) fn are_free<T: OccupantWord>(
+    floor: &AtomicColumn<T>,
+    base: u32,
+    offsets: &[i32],
+) -> bool {
     // Free is the highest bit of a word, so one branch at the end answers for all boxes.
     offsets.iter().fold(T::FREE, |all, &offset| all & floor.get(box_index(base, offset))).is_free()
 }

@@ -8,7 +8,7 @@ use super::effector::{HEADING_NAMES, Side};
 use super::state::RobotsState;
 use super::world::{BodyType, RobotModel, RobotsWorld, Role};
 use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::{Cycle, EntityId, Phases, World};
 use std::sync::Arc;
 
@@ -165,7 +165,7 @@ impl RobotsWorld {
     }
 }
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Writes a robot's percept into its row of each buffer, in the order of the spaces.
     fn observe(
         &self,

@@ -14,7 +14,7 @@ use super::policy::ConflictPolicy;
 use super::state::RobotsState;
 use super::world::{RobotsWorld, Role};
 use sidestep_kernel::conflict::ConflictGroups;
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
     self, BodyId, FactSection, FactTable, FactValue, Inspection, MarkShape,
 };
@@ -52,14 +52,14 @@ impl RobotsWorld {
 }
 
 /// An inspection of one body in the making, on a copy of the state.
-struct Inspector<'a, T: BoxWord> {
+struct Inspector<'a, T: OccupantWord> {
     cycle: &'a CycleContext<'a, T>,
     slot: Slot,
     id: EntityId,
     inspection: Inspection,
 }
 
-impl<'a, T: BoxWord> Inspector<'a, T> {
+impl<'a, T: OccupantWord> Inspector<'a, T> {
     fn inspect(mut self) -> Inspection {
         let scratch = &mut self.cycle.world.scratch();
         // Robots decided from outside perceive within a cycle only where readings are recorded.

@@ -13,7 +13,7 @@ use super::state::BodyState;
 use super::world::{BodyType, Role};
 use sidestep_kernel::Slot;
 use sidestep_kernel::conflict::ConflictGroups;
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 
 /// A body's place in the order of its group.
 #[derive(Debug, Clone, Copy)]
@@ -36,16 +36,16 @@ impl NeighborJoiner<'_> {
     /// Joins the body with the one that stands in a box of the floor or claims it. The same neighbor is
     /// mostly met in several boxes one after the other, and joining it once is enough.
     #[inline(always)]
-    fn meet<T: BoxWord>(&mut self, word: T) {
+    fn meet<T: OccupantWord>(&mut self, word: T) {
         let other = word.slot();
         if other != self.slot && other != self.last_met {
             self.last_met = other;
-            self.groups.join(self.slot, other);
+            self.groups.join_groups(self.slot, other);
         }
     }
 }
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Joins a body with all bodies that have claims meeting its own: those named in a box that
     /// it may come to cover, because they stand there or may come there too.
     #[inline]

@@ -3,7 +3,7 @@
 use super::state::RobotsState;
 use super::world::RobotsWorld;
 use serde::Serialize;
-use sidestep_kernel::{Cycle, EntityId, GroupSizes, Run};
+use sidestep_kernel::{Cycle, EntityId, GroupSizeHistogram, Run};
 use sidestep_map::Cell;
 use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
@@ -93,7 +93,12 @@ impl RobotsWorld {
     }
 
     /// Returns the metrics of a run, with its conflict groups.
-    pub fn metrics(&self, state: &RobotsState, cycle: Cycle, groups: &GroupSizes) -> Metrics {
+    pub fn metrics(
+        &self,
+        state: &RobotsState,
+        cycle: Cycle,
+        groups: &GroupSizeHistogram,
+    ) -> Metrics {
         let total = self.totals(state, cycle);
         let free = self.map.count(Cell::Free).max(1);
         // Empty bins at the end are left out.

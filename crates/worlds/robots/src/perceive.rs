@@ -10,10 +10,10 @@ use super::sensor::Reading;
 use super::state::{BodyState, Facing, Intent, PackedPose};
 use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
-use sidestep_kernel::space::BoxWord;
-use sidestep_kernel::{Column, Slot};
+use sidestep_kernel::space::OccupantWord;
+use sidestep_kernel::{AtomicColumn, Slot};
 
-impl<T: BoxWord> CycleContext<'_, T> {
+impl<T: OccupantWord> CycleContext<'_, T> {
     /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
     #[inline]
     pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
@@ -203,7 +203,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
     fn claim(&self, slot: Slot, intent: Intent) -> bool {
         let floor = self.floor;
         let body = self.body(slot);
-        let claim = T::claimed(slot);
+        let claim = T::from_claim(slot);
         let base = self.base(body);
         let ty = self.type_of(body);
         if !ty.actions.is_empty() {
@@ -253,7 +253,7 @@ impl<T: BoxWord> CycleContext<'_, T> {
             }
             let Some(word) = state.voices.last_broadcast(sender, self.now) else { continue };
             // Drawn per pair, because each listener loses a word or not by itself.
-            let draws = world.streams.pair(id, sender, self.now, purpose::RADIO, 0);
+            let draws = world.streams.pair_words(id, sender, self.now, purpose::RADIO, 0);
             if !radio.loss.sample(draws[0]) {
                 heard.push(ReceivedMessage { sender, word });
             }
@@ -278,8 +278,8 @@ impl<T: BoxWord> CycleContext<'_, T> {
 
 /// Walks the tree of an action's steps, and leaves out the boxes behind a wall.
 #[inline]
-fn for_each_swept<T: BoxWord>(
-    floor: &Column<T>,
+fn for_each_swept<T: OccupantWord>(
+    floor: &AtomicColumn<T>,
     sweep: &SweptVolume,
     base: u32,
     mut each: impl FnMut(usize, T),
@@ -305,7 +305,7 @@ fn for_each_swept<T: BoxWord>(
 /// This and [`sample_reports`] are two small loops, each in a function of its own, because together they
 /// would run out of registers.
 #[inline(never)]
-fn cast_beams<T: BoxWord>(
+fn cast_beams<T: OccupantWord>(
     cycle: &CycleContext<'_, T>,
     sensor: &MountedSensor,
     body: &BodyState,
@@ -329,7 +329,11 @@ fn cast_beams<T: BoxWord>(
 
 /// Returns the first box along a beam that holds something: its content and distance class.
 #[inline]
-fn first_hit<T: BoxWord>(floor: &Column<T>, base: u32, beam: &[BeamBoxes]) -> Option<(T, u8)> {
+fn first_hit<T: OccupantWord>(
+    floor: &AtomicColumn<T>,
+    base: u32,
+    beam: &[BeamBoxes],
+) -> Option<(T, u8)> {
     for BeamBoxes { offsets, classes } in beam {
         let words = offsets.map(|offset| floor.get(box_index(base, offset)));
         let [a, b, c, d] = words;

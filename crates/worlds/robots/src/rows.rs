@@ -8,10 +8,10 @@ use super::state::{PoseBuffer, RobotsState};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
-    BlockBuffer, Buffer, Buffers, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer, Table,
-    TableSchema, Values,
+    Buffer, Buffers, ColumnBlockBuffer, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer,
+    Table, TableSchema, Values,
 };
-use sidestep_kernel::view::{Isometry2, Log};
+use sidestep_kernel::view::{EventBuffer, Isometry2};
 use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
@@ -134,7 +134,7 @@ fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
 /// The tables, and their rows until they are recorded.
 #[derive(Debug, Default)]
 struct RowBuffers {
-    trajectories: BlockBuffer,
+    trajectories: ColumnBlockBuffer,
     events: RowBuffer<Event>,
     readings: RowBuffer<ReadingRow>,
     motions: RowBuffer<MotionSample>,
@@ -161,7 +161,7 @@ pub struct Collector {
     /// Events as the workers have gathered them,
     gathered: Vec<Event>,
     /// and those that wait for the next frame.
-    pub(super) log: Log<Event>,
+    pub(super) log: EventBuffer<Event>,
     /// The pose that each robot's wheels report, by id, while odometry is watched.
     odometry: Option<Vec<DeadReckoning>>,
     sensor_samples: Vec<SensorSample>,

@@ -11,8 +11,8 @@ pub(crate) use packed::{Intent, PackedPose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::{AtomicCell, Packed};
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::space::{AtomicBitSet, BoxWord, Floor, Position};
-use sidestep_kernel::{Column, Cycle, Digest, EntityId, Slot};
+use sidestep_kernel::space::{AtomicBitSet, Floor, OccupantWord, Position};
+use sidestep_kernel::{AtomicColumn, Cycle, Digest, EntityId, Slot};
 use std::sync::atomic::AtomicU64;
 
 /// Rows of the map that are stored together, see [`RobotsState::arrange`]. One row would leave neighbors above
@@ -34,7 +34,7 @@ pub struct RobotsState {
     pub(crate) slot_of_id: Box<[Slot]>,
     /// Number of contacts of each body by kind touched, at `id * kinds + kind`; apart from `bodies`, because
     /// contacts are rare and the number of kinds is the scenario's.
-    pub(crate) contacts: Column<u32>,
+    pub(crate) contacts: AtomicColumn<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub(crate) bids: Box<[AtomicU64]>,
     /// Last broadcast of each robot; empty without radio.
@@ -101,13 +101,13 @@ pub(crate) struct PoseBuffer {
     /// Number of poses per cycle, one for each body.
     pub(crate) bodies: usize,
     /// Poses at `(cycle - first) * bodies + id`.
-    pub(crate) poses: Column<PackedPose>,
+    pub(crate) poses: AtomicColumn<PackedPose>,
 }
 
 impl PoseBuffer {
     /// Returns room for `capacity` cycles of `bodies` bodies, starting with cycle `first`.
     pub(crate) fn new(first: Cycle, capacity: usize, bodies: usize) -> Self {
-        let poses = Column::filled(capacity * bodies, PackedPose::default());
+        let poses = AtomicColumn::filled(capacity * bodies, PackedPose::default());
         Self { first, capacity, bodies, poses }
     }
 }
@@ -163,7 +163,7 @@ impl RobotsState {
                 .map(|&id| BodyState::from_body(&world.bodies[id as usize]))
                 .collect(),
             slot_of_id,
-            contacts: Column::filled(n * world.kinds.len(), 0),
+            contacts: AtomicColumn::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
@@ -188,7 +188,7 @@ impl RobotsState {
 
     /// Returns the kind of the occupant that a word of the floor stands for.
     #[inline(always)]
-    pub(crate) fn kind_of<T: BoxWord>(&self, word: T) -> u8 {
+    pub(crate) fn kind_of<T: OccupantWord>(&self, word: T) -> u8 {
         match word {
             _ if word.is_free() => FREE,
             _ if word == T::WALL => WALL,

@@ -7,7 +7,7 @@ use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
 use super::world::{RobotsWorld, Role};
 use serde_json::{Value, json};
-use sidestep_kernel::text::{Description, KeyValues, align_pairs, group_thousands, key_value};
+use sidestep_kernel::text::{KeyValues, StateDescription, align_pairs, group_thousands, key_value};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
@@ -61,7 +61,7 @@ fn groups(metrics: &Metrics) -> String {
 }
 
 /// Returns every body by entity id.
-pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> Description {
+pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateDescription {
     let bodies: Vec<BodyText<'_>> = snapshot
         .bodies
         .iter()
@@ -70,7 +70,7 @@ pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> Description {
         .collect();
     let heading = "  body  kind        col_boxes  row_boxes  heading\n".to_string();
     let text = bodies.iter().fold(heading, |text, body| text + &body.row());
-    Description { json: bodies.iter().map(BodyText::json).collect(), text }
+    StateDescription { json: bodies.iter().map(BodyText::json).collect(), text }
 }
 
 struct BodyText<'a> {
@@ -126,7 +126,7 @@ impl BodyText<'_> {
 }
 
 /// Returns map, bodies, sensors and effectors of a scenario.
-pub(super) fn contents(compiled: &Compiled, source: &Source) -> Description {
+pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateDescription {
     let file: Value = source.parse().unwrap_or_default();
     let world = &*compiled.world;
     let json = json!({
@@ -144,7 +144,7 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> Description {
         "effectors": effectors(world),
     });
     let text = text(&json);
-    Description { json, text }
+    StateDescription { json, text }
 }
 
 fn map(world: &RobotsWorld) -> Value {

@@ -8,7 +8,7 @@ use super::state::{BodyState, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
     self, Body, BodyId, BodyKind, CachedIsometry2, Condition, LogEvent, LogEventKind, Pose, Scan,
     ScanSelection, Severity, Shape,
@@ -36,11 +36,14 @@ impl RobotsWorld {
     }
 
     /// Returns the columns of recorded poses that hold the places of robots and people.
-    pub(super) fn position_columns(&self) -> Vec<view::PositionColumns> {
+    pub(super) fn position_columns(&self) -> Vec<view::PositionTableColumns> {
         let scale_m = self.map.box_size_m;
-        let [col, row] =
-            ["col_boxes", "row_boxes"].map(|column| view::Axis { column, scale_m, offset_m: 0.0 });
-        vec![view::PositionColumns {
+        let [col, row] = ["col_boxes", "row_boxes"].map(|column| view::CoordinateColumn {
+            column,
+            scale_m,
+            offset_m: 0.0,
+        });
+        vec![view::PositionTableColumns {
             table: "trajectories",
             kind: BodyKind::Robot,
             number: "body",
@@ -134,7 +137,7 @@ impl RobotsWorld {
 
     /// Returns the true distance in meters from the body's boundary to the thing that each
     /// beam meets; infinite where that reads as nothing.
-    fn true_ranges_m<T: BoxWord>(
+    fn true_ranges_m<T: OccupantWord>(
         &self,
         cycle: &CycleContext<'_, T>,
         sensor: &MountedSensor,

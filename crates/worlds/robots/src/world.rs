@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_error_models::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::control::Teams;
-use sidestep_kernel::distr::{Bernoulli, RowError};
+use sidestep_kernel::distr::{Bernoulli, DistributionError};
 use sidestep_kernel::space::Position;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
@@ -263,7 +263,7 @@ impl MountedSensor {
         box_size_m: f64,
         stride: u32,
         reliable: bool,
-    ) -> Result<Self, RowError> {
+    ) -> Result<Self, DistributionError> {
         let range = model.range_m / box_size_m;
         let bearings_deg = model.bearings_deg.iter();
         let beams: Vec<Vec<[Crossing; BEAM_CHUNK_BOXES]>> =

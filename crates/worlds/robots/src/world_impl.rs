@@ -11,8 +11,10 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{BufferMut, Order, Teams};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{Description, KeyValues};
-use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Inspection, PositionColumns, Scenery};
+use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::view::{
+    BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
+};
 use sidestep_kernel::{
     Cycle, Digest, InputError, Run, RunConfig, RunStart, RunStats, World, WorldCheckpoint,
     WorldControl, WorldMetrics, WorldRecording, WorldView,
@@ -128,7 +130,7 @@ impl WorldRecording for RobotsWorld {
         collector.record(self, state, now, recorder)
     }
 
-    fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
+    fn position_columns(&self, _: &Collector) -> Vec<PositionTableColumns> {
         RobotsWorld::position_columns(self)
     }
 }
@@ -225,7 +227,7 @@ impl WorldMetrics for RobotsWorld {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &RobotsState, now: Cycle) -> Description {
+    fn poses(&self, state: &RobotsState, now: Cycle) -> StateDescription {
         text::poses(self, &state.snapshot(self, now))
     }
 }

@@ -3,7 +3,7 @@
 use super::decide::Behaviour;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, text};
-use sidestep_kernel::text::Description;
+use sidestep_kernel::text::StateDescription;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
     CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
@@ -102,7 +102,7 @@ impl AnyCompiled for Compiled {
         self.world.bodies.len()
     }
 
-    fn contents(&self, source: &Source) -> Description {
+    fn contents(&self, source: &Source) -> StateDescription {
         text::contents(self, source)
     }
 

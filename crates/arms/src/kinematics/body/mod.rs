@@ -14,7 +14,7 @@ mod pairs;
 #[cfg(test)]
 mod tests;
 
-use super::serial::{Frames, SerialChain};
+use super::serial::{LinkFrames, SerialChain};
 use super::transform::{Transform, Vector};
 use mount::Mounts;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
@@ -109,7 +109,7 @@ impl ArmBody {
     /// values.
     pub fn overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
         let mut shapes = Vec::new();
-        self.place_shapes(&chain.forward(values), values, &mut shapes);
+        self.place_shapes(&chain.forward_kinematics(values), values, &mut shapes);
         let placed = PlacedBody { body: self, shapes: &shapes };
         let mut overlaps = Vec::new();
         for &(a, b) in &self.pairs {
@@ -120,7 +120,7 @@ impl ArmBody {
         overlaps
     }
 
-    /// Returns whether a link of the arm, counted as [`Frames::links`] are, has a shape.
+    /// Returns whether a link of the arm, counted as [`LinkFrames::links`] are, has a shape.
     pub(super) fn has_shape(&self, link: usize) -> bool {
         self.parts.iter().any(|part| part.mount.link == link)
     }
@@ -145,7 +145,7 @@ impl ArmBody {
     /// Computes the places of all parts; `values` move those beside the arm that follow its joints.
     pub(super) fn place_shapes(
         &self,
-        frames: &Frames,
+        frames: &LinkFrames,
         values: &[f64],
         placed: &mut Vec<PlacedShape>,
     ) {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, Sphere};
+use crate::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, ObstacleSphere};
 use proptest::prelude::*;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_testing::robot_model as shared;
@@ -81,14 +81,14 @@ fn what_hangs_beside_the_arm_follows_its_joints() {
     let body = body_of(&model, &chain, &[]);
     let right = body.parts.iter().find(|part| part.link == "right").expect("a finger");
     let values = [0.0, 0.0, 0.0, 0.07];
-    let at = right.mount.transform(&chain.forward(&values).links, &values);
+    let at = right.mount.transform(&chain.forward_kinematics(&values).links, &values);
     assert!(apart_m(at.origin_m, [3.0, -0.07, 1.0]) < 1e-12, "{at:?}");
     // From the bar `a` out, the column stands behind it.
     let [base, tip] = ["a", "tip"].map(|name| model.link("", name).expect("a link"));
     let outer = SerialChain::new(&model, base, tip, "tip").expect("a chain");
     let body = body_of(&model, &outer, &[]);
     let column = body.parts.iter().find(|part| part.link == "column").expect("a column");
-    let at = column.mount.transform(&outer.forward(&[0.0, 0.0]).links, &[0.0, 0.0]);
+    let at = column.mount.transform(&outer.forward_kinematics(&[0.0, 0.0]).links, &[0.0, 0.0]);
     assert!(apart_m(at.origin_m, [0.0, 0.0, -0.5]) < 1e-12, "{at:?}");
 }
 
@@ -100,13 +100,13 @@ proptest! {
     ) {
         let (model, chain) = bars("tip");
         let body = body_of(&model, &chain, &[]);
-        let target = chain.forward(&there).tip.origin_m;
-        let sphere = Sphere { center_m: [at[0], at[1], 1.0], radius_m: 0.2 };
+        let target = chain.forward_kinematics(&there).tip.origin_m;
+        let sphere = ObstacleSphere { center_m: [at[0], at[1], 1.0], radius_m: 0.2 };
         let is_clear = |values: &[f64]| {
             let mut shapes = Vec::new();
-            body.place_shapes(&chain.forward(values), values, &mut shapes);
+            body.place_shapes(&chain.forward_kinematics(values), values, &mut shapes);
             let placed = PlacedBody { body: &body, shapes: &shapes };
-            let Sphere { center_m, radius_m } = sphere;
+            let ObstacleSphere { center_m, radius_m } = sphere;
             let mut parts = 0..body.len();
             body.overlaps(&chain, values).is_empty()
                 && !parts.any(|part| placed.ball_proximity(part, center_m, radius_m, 0.0).is_some())
@@ -129,9 +129,9 @@ proptest! {
 fn the_link_that_is_in_the_way_is_named() {
     let (model, chain) = bars("tip");
     let body = Some(body_of(&model, &chain, &[]));
-    let target = chain.forward(&[0.0; 3]).tip.origin_m;
+    let target = chain.forward_kinematics(&[0.0; 3]).tip.origin_m;
     // Straight, there is no other posture. The bar is 0.05 m thick, so that its rod is not hit.
-    let sphere = Sphere { center_m: [0.5, 0.14, 1.0], radius_m: 0.1 };
+    let sphere = ObstacleSphere { center_m: [0.5, 0.14, 1.0], radius_m: 0.1 };
     let goal = ArmGoal { spheres: vec![sphere], ..ArmGoal::new(target) };
     assert!(chain.solve(&goal, &chain.rest_values()).expect("right").reached);
     let answer = chain.solve(&ArmGoal { body, ..goal }, &chain.rest_values()).expect("right");

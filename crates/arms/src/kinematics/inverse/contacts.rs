@@ -4,7 +4,7 @@ use super::super::body::{self, ArmBody, PlacedBody, Proximity};
 use super::super::skeleton::{Anchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::LinkTransforms;
-use super::goal::{ArmGoal, Sphere};
+use super::goal::{ArmGoal, ObstacleSphere};
 use super::result::{ArmPart, CollidesWith, Collision};
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 use sidestep_rods::geometry::nearest_on_segment;
@@ -18,7 +18,7 @@ pub(super) struct ContactFinder<'a> {
     anchors: &'a [Anchor],
     /// Indices of the rods that stand for links without shapes.
     rods: Vec<usize>,
-    spheres: &'a [Sphere],
+    spheres: &'a [ObstacleSphere],
     body: Option<&'a ArmBody>,
     own_body: bool,
     margin_m: f64,
@@ -73,7 +73,7 @@ impl<'a> ContactFinder<'a> {
         let anchors = &skeleton.connectors;
         let mut rods = Vec::new();
         for (rod, ends) in anchors.windows(2).enumerate() {
-            let mut links = holders(&ends[0], &ends[1]);
+            let mut links = holder_links(&ends[0], &ends[1]);
             if body.is_none_or(|body| !links.any(|link| body.has_shape(link))) {
                 rods.push(rod);
             }
@@ -111,7 +111,7 @@ impl<'a> ContactFinder<'a> {
     fn rod_in_spheres(&self, rod: usize, placed: &LinkTransforms, touched: &mut ContactSet) {
         let pair = [self.anchors[rod], self.anchors[rod + 1]];
         let ends = pair.map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m));
-        for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
+        for (sphere, &ObstacleSphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             let nearest = nearest_on_segment(center_m, ends[0], ends[1]);
             let apart_m = norm(sub(nearest, center_m));
             let depth_m = radius_m - apart_m;
@@ -137,7 +137,7 @@ impl<'a> ContactFinder<'a> {
 
     fn parts_in_spheres(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
         let body = placed.body;
-        for (sphere, &Sphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
+        for (sphere, &ObstacleSphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             for part in 0..body.len() {
                 let near = placed.ball_proximity(part, center_m, radius_m, self.margin_m);
                 if let Some(near) = near {
@@ -176,7 +176,7 @@ impl<'a> ContactFinder<'a> {
 }
 
 /// Returns the links that hold the rod between two anchors, or on either side of its slide.
-fn holders(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
+fn holder_links(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
     let first = outer.first.max(inner.first);
     let last = inner.last.min(outer.last);
     first.min(last)..=first.max(last)

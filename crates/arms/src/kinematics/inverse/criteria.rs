@@ -30,7 +30,7 @@ pub(super) struct IkCriteria<'a> {
 
 /// Kept from posture to posture, so that none allocates.
 #[derive(Debug, Clone)]
-pub(super) struct Evaluation {
+pub(super) struct PostureEvaluation {
     pub(super) placed: LinkTransforms,
     /// Wanted changes of the rows: those of the tip, then one for each contact.
     pub(super) wanted: Vec<f64>,
@@ -41,7 +41,7 @@ pub(super) struct Evaluation {
     pub(super) turn_rad: f64,
 }
 
-impl Evaluation {
+impl PostureEvaluation {
     /// Returns the square of the quantity that steps must reduce.
     pub(super) fn merit(&self) -> f64 {
         self.wanted.iter().map(|x| x * x).sum()
@@ -64,8 +64,8 @@ impl<'a> IkCriteria<'a> {
     }
 
     /// Returns an evaluation of no posture, as a buffer for [`IkCriteria::evaluate`].
-    pub(super) fn empty_evaluation(chain: &SerialChain) -> Evaluation {
-        Evaluation {
+    pub(super) fn empty_evaluation(chain: &SerialChain) -> PostureEvaluation {
+        PostureEvaluation {
             placed: LinkTransforms::from_chain(chain),
             wanted: Vec::new(),
             about: Vec::new(),
@@ -76,7 +76,7 @@ impl<'a> IkCriteria<'a> {
     }
 
     /// Computes the links' poses and the errors at `values`; the Jacobian needs both.
-    pub(super) fn evaluate(&self, values: &[f64], evaluation: &mut Evaluation) {
+    pub(super) fn evaluate(&self, values: &[f64], evaluation: &mut PostureEvaluation) {
         self.fast_fk.compute(values, &mut evaluation.placed);
         let tip = evaluation.placed.tip;
         let missing = sub(self.goal.target.origin_m, tip.origin_m);
@@ -90,7 +90,7 @@ impl<'a> IkCriteria<'a> {
             .extend(evaluation.touched.contacts.iter().map(|contact| contact.wanted_m));
     }
 
-    fn evaluate_orientation(&self, tip: &Transform, evaluation: &mut Evaluation) {
+    fn evaluate_orientation(&self, tip: &Transform, evaluation: &mut PostureEvaluation) {
         evaluation.about.clear();
         let target = &self.goal.target;
         match self.goal.asked.turn {
@@ -117,7 +117,7 @@ impl<'a> IkCriteria<'a> {
 
     /// Returns the distance of a tip from the target in m, along the axes that count, and the angle
     /// of its orientation error.
-    pub(super) fn errors(&self, tip: &Transform) -> (f64, f64) {
+    pub(super) fn tip_errors(&self, tip: &Transform) -> (f64, f64) {
         let missing = sub(self.goal.target.origin_m, tip.origin_m);
         let squares = self.along.iter().map(|axis| dot(missing, *axis) * dot(missing, *axis));
         let target = &self.goal.target;
@@ -134,7 +134,7 @@ impl<'a> IkCriteria<'a> {
 
     /// Computes the Jacobian at a posture that was evaluated: rows of an entry for each of `n`
     /// variables, one row after the other.
-    pub(super) fn jacobian(&self, evaluation: &Evaluation, n: usize, rows: &mut Vec<f64>) {
+    pub(super) fn jacobian(&self, evaluation: &PostureEvaluation, n: usize, rows: &mut Vec<f64>) {
         rows.clear();
         rows.resize(evaluation.wanted.len() * n, 0.0);
         let LinkTransforms { lines, tip, .. } = &evaluation.placed;

@@ -1,9 +1,9 @@
 //! Damped steps from one posture.
 
 use super::super::serial::{JointMotion, SerialChain};
-use super::criteria::{Evaluation, IkCriteria};
+use super::criteria::{IkCriteria, PostureEvaluation};
 use super::goal::ArmGoal;
-use super::step::{JointRanges, StepInput, Stepper};
+use super::step::{IkStepInput, IkStepper, JointRanges};
 use sidestep_kernel::math::wrap_angle;
 
 /// The first damping, in parts of the mean of the matrix's diagonal: measured, as all numbers here,
@@ -36,7 +36,7 @@ impl DescentLimits {
 #[derive(Debug, Clone)]
 pub(super) struct DescentResult {
     pub(super) values: Vec<f64>,
-    pub(super) evaluation: Evaluation,
+    pub(super) evaluation: PostureEvaluation,
     pub(super) steps: usize,
 }
 
@@ -46,11 +46,11 @@ pub(super) struct Descender<'a> {
     pub(super) goal: &'a ArmGoal,
     pub(super) criteria: IkCriteria<'a>,
     pub(super) bounds: JointRanges,
-    pub(super) stepper: Stepper,
+    pub(super) stepper: IkStepper,
 }
 
 impl Descender<'_> {
-    pub(super) fn is_met(&self, evaluation: &Evaluation) -> bool {
+    pub(super) fn is_met(&self, evaluation: &PostureEvaluation) -> bool {
         // Forward kinematics in another order differs in the last digits.
         const SLACK: f64 = 1.0 - 1e-9;
         evaluation.tip_m <= SLACK * self.goal.tolerance_m
@@ -80,7 +80,7 @@ impl Descender<'_> {
                 self.criteria.jacobian(&evaluation, n, &mut self.stepper.rows);
             }
             let wanted = &evaluation.wanted;
-            let input = StepInput { values: &values, wanted, damping, bounds: &self.bounds };
+            let input = IkStepInput { values: &values, wanted, damping, bounds: &self.bounds };
             self.stepper.step(input, &mut next);
             self.criteria.evaluate(&next, &mut next_evaluation);
             is_new = next_evaluation.merit() < evaluation.merit();

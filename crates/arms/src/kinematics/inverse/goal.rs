@@ -2,7 +2,7 @@
 
 use super::super::body::ArmBody;
 use super::super::transform::{Transform, Vector};
-use crate::ik::Engine;
+use crate::ik::IkEngine;
 use sidestep_kernel::InputError;
 
 /// Most postures that one goal may ask for: each one found is compared with all before it.
@@ -11,14 +11,14 @@ pub const MAX_SOLUTIONS: usize = 1000;
 /// A sphere that no part of the arm may enter. Where the arm's links have no shapes, its rods are
 /// thin lines, so the radius must include the arm's thickness.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sphere {
+pub struct ObstacleSphere {
     /// Center in m, in the base's frame.
     pub center_m: Vector,
     /// Radius in m; 0 for a point.
     pub radius_m: f64,
 }
 
-impl Sphere {
+impl ObstacleSphere {
     fn is_in_range(&self) -> bool {
         let mut numbers = self.center_m.iter().chain([&self.radius_m]);
         numbers.all(|x| x.abs() <= 1e7) && self.radius_m >= 0.0
@@ -118,9 +118,9 @@ pub struct ArmGoal {
     pub tolerance_m: f64,
     /// Angle at which the orientation counts as reached, in rad.
     pub tolerance_rad: f64,
-    /// The engine. [`Engine::Chain`] starts from the connectors' solution; all others work on the
+    /// The engine. [`IkEngine::Chain`] starts from the connectors' solution; all others work on the
     /// joints from the first step.
-    pub engine: Engine,
+    pub engine: IkEngine,
     /// Random postures to start from after the given one.
     pub restarts: usize,
     /// Random seed of these postures: the same one gives the same result.
@@ -138,7 +138,7 @@ pub struct ArmGoal {
     /// Whether joints may be outside their limits, to learn what these prevent.
     pub ignore_limits: bool,
     /// Spheres that the arm may not enter.
-    pub spheres: Vec<Sphere>,
+    pub spheres: Vec<ObstacleSphere>,
     /// The shapes of the arm's links; without them, and where links have none, the arm is its rods.
     pub body: Option<ArmBody>,
     /// Whether links of the body must not touch each other, except for those that may.
@@ -161,7 +161,7 @@ impl ArmGoal {
             asked: PoseMask::POSE,
             tolerance_m: 1e-6,
             tolerance_rad: 1e-6,
-            engine: Engine::Auto,
+            engine: IkEngine::Auto,
             restarts: 100,
             seed: 0,
             solutions: 1,

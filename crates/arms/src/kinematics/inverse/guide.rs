@@ -7,7 +7,7 @@ use super::goal::ArmGoal;
 use crate::ik::{ChainIkGoal, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_kernel::geometry::{add, scaled};
-use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod, Rules};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, ReactionRules, Rod};
 
 /// Least length, in m, of rods that a prismatic joint can close altogether.
 const MIN_ROD_M: f64 = 1e-6;
@@ -27,7 +27,7 @@ pub(super) fn posture(
     goal: &ArmGoal,
     start: &[f64],
 ) -> Option<(Vec<f64>, usize)> {
-    let connectors = arm.connectors(skeleton, &arm.forward(start));
+    let connectors = arm.connectors(skeleton, &arm.forward_kinematics(start));
     let (chain, before) = arm_chain(arm, skeleton, goal, &connectors).ok()?;
     let balls =
         goal.spheres.iter().zip(0..).map(|(s, id)| Obstacle::ball(id, s.center_m, s.radius_m));
@@ -40,11 +40,11 @@ pub(super) fn posture(
         seed: goal.seed,
         ..ChainIkGoal::new(tip, before, goal.target.origin_m)
     };
-    let answer = IkSolver::new(Rules::default()).solve(&chain, &obstacles, &wanted).ok()?;
+    let answer = IkSolver::new(ReactionRules::default()).solve(&chain, &obstacles, &wanted).ok()?;
     if !answer.reached {
         return None;
     }
-    let recovered = arm.recover(skeleton, &answer.points[before..], start).ok()?;
+    let recovered = arm.recover_joint_values(skeleton, &answer.points[before..], start).ok()?;
     Some((recovered.values, answer.iterations))
 }
 

@@ -1,7 +1,7 @@
 //! Inverse kinematics of real arms: joint values that bring the tip to a target.
 //!
 //! Damped least squares on the joints themselves, inside their limits: points leave twist open and
-//! couple the joints of some arms, joints do not. The engine [`Engine::Chain`] solves for the
+//! couple the joints of some arms, joints do not. The engine [`IkEngine::Chain`] solves for the
 //! connectors first, with joint limits as bend limits, reads the joints off them, and leaves only the
 //! undecided rest to the joints.
 //!
@@ -35,7 +35,7 @@ mod step;
 mod tests;
 mod tracking;
 
-pub use goal::{ArmGoal, Axis, MAX_SOLUTIONS, OrientationMask, PoseMask, Sphere};
+pub use goal::{ArmGoal, Axis, MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask};
 pub use result::{ArmPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
 pub use tracking::{ConnectorTarget, JointTracker};
 

@@ -1,6 +1,6 @@
 //! Answers to the goals of an arm.
 
-use crate::ik::Engine;
+use crate::ik::IkEngine;
 
 /// The posture that meets a goal, or else the one that came nearest.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,8 +20,8 @@ pub struct IkResult {
     /// Further postures that meet the goal, distinct from this one and from each other, the nearest
     /// to the start first; only where the goal asks for several.
     pub others: Vec<IkSolution>,
-    /// The engine that found the answer; [`Engine::Chain`] if the connectors led to it.
-    pub engine: Engine,
+    /// The engine that found the answer; [`IkEngine::Chain`] if the connectors led to it.
+    pub engine: IkEngine,
     /// Steps over all starts.
     pub iterations: usize,
     /// Postures that it started from.

@@ -4,11 +4,11 @@ use super::super::serial::{JointMotion, SerialChain};
 use super::super::skeleton::Skeleton;
 use super::criteria::IkCriteria;
 use super::descent::{Descender, DescentLimits, DescentResult};
-use super::goal::{ArmGoal, OrientationMask, PoseMask, Sphere};
+use super::goal::{ArmGoal, ObstacleSphere, OrientationMask, PoseMask};
 use super::guide;
 use super::result::{Collision, IkFailure, IkResult, IkSolution};
-use super::step::{JointRanges, Stepper};
-use crate::ik::Engine;
+use super::step::{IkStepper, JointRanges};
+use crate::ik::IkEngine;
 use sidestep_kernel::Seed;
 use sidestep_kernel::geometry::{norm, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
@@ -47,13 +47,13 @@ impl<'a> IkSearch<'a> {
             JointRanges::from_chain(chain)
         };
         let criteria = IkCriteria::new(chain, skeleton, goal);
-        let by = Descender { chain, goal, criteria, bounds, stepper: Stepper::default() };
+        let by = Descender { chain, goal, criteria, bounds, stepper: IkStepper::default() };
         Self { skeleton, by }
     }
 
     pub(super) fn run(mut self, start: &[f64]) -> IkResult {
         let guided = self.solve_by_guide(start);
-        let engine = if guided.is_some() { Engine::Chain } else { Engine::Dls };
+        let engine = if guided.is_some() { IkEngine::Chain } else { IkEngine::Dls };
         let (first, steps) = guided.unwrap_or_else(|| (start.to_vec(), 0));
         let out_of_reach = self.out_of_reach(start);
         if self.by.goal.is_multi_solution() && out_of_reach.is_none() {
@@ -66,7 +66,7 @@ impl<'a> IkSearch<'a> {
         let mut best = self.find_best(first, self.by.goal.restarts.min(max_restarts));
         best.steps += steps;
         // The connectors' solution was only the first of the starts.
-        let engine = if best.starts == 1 { engine } else { Engine::Dls };
+        let engine = if best.starts == 1 { engine } else { IkEngine::Dls };
         let reason =
             (!best.is_met).then(|| out_of_reach.unwrap_or_else(|| self.find_reason(&best)));
         self.result(best, engine, reason)
@@ -75,7 +75,7 @@ impl<'a> IkSearch<'a> {
     /// Returns the connectors' solution and its steps, if that engine is asked for and finds one.
     fn solve_by_guide(&self, start: &[f64]) -> Option<(Vec<f64>, usize)> {
         let Descender { chain, goal, .. } = &self.by;
-        let is_asked = goal.engine == Engine::Chain && goal.asked.has_whole_position();
+        let is_asked = goal.engine == IkEngine::Chain && goal.asked.has_whole_position();
         is_asked.then(|| guide::posture(chain, self.skeleton, goal, start)).flatten()
     }
 
@@ -104,7 +104,7 @@ impl<'a> IkSearch<'a> {
         BestDescent { descent, steps, starts: restarts + 1, is_met }
     }
 
-    fn result(&self, best: BestDescent, engine: Engine, reason: Option<IkFailure>) -> IkResult {
+    fn result(&self, best: BestDescent, engine: IkEngine, reason: Option<IkFailure>) -> IkResult {
         let BestDescent { descent, steps, starts, is_met } = best;
         let IkSolution { values, error_m, error_rad } = self.solution(descent.values);
         IkResult {
@@ -145,7 +145,7 @@ impl<'a> IkSearch<'a> {
     fn out_of_reach(&self, start: &[f64]) -> Option<IkFailure> {
         let Descender { chain, goal, .. } = &self.by;
         let rods = &self.skeleton.rods;
-        let connectors = chain.connectors(self.skeleton, &chain.forward(start));
+        let connectors = chain.connectors(self.skeleton, &chain.forward_kinematics(start));
         let far_m = norm(sub(goal.target.origin_m, connectors[0]));
         let reach_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
         let longest_m = rods.iter().map(|rod| rod.min_m + rod.max_m).fold(0.0, f64::max);
@@ -205,7 +205,7 @@ impl<'a> IkSearch<'a> {
         if few.spheres.is_empty() && !few.own_body {
             return None;
         }
-        let spheres: Vec<Sphere> = Vec::new();
+        let spheres: Vec<ObstacleSphere> = Vec::new();
         let bare = ArmGoal { spheres, body: None, own_body: false, ..few.clone() };
         let values = self.solve_other(&bare, best)?;
         let mut evaluation = IkCriteria::empty_evaluation(self.by.chain);
@@ -231,7 +231,7 @@ fn result_from_solutions(found: SolutionSet, steps: usize) -> Option<IkResult> {
         error_rad,
         values,
         others: postures.collect(),
-        engine: Engine::Dls,
+        engine: IkEngine::Dls,
         iterations: steps + found.steps,
         starts: found.starts,
         reason: None,

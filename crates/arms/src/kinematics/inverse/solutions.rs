@@ -61,8 +61,8 @@ impl IkSearch<'_> {
 
     /// Returns a posture with its errors by forward kinematics.
     pub(super) fn solution(&self, values: Vec<f64>) -> IkSolution {
-        let tip = self.by.chain.forward(&values).tip;
-        let (error_m, error_rad) = self.by.criteria.errors(&tip);
+        let tip = self.by.chain.forward_kinematics(&values).tip;
+        let (error_m, error_rad) = self.by.criteria.tip_errors(&tip);
         IkSolution { values, error_m, error_rad }
     }
 

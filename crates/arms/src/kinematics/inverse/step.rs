@@ -58,7 +58,7 @@ impl JointRanges {
 
 /// The matrices of a step, kept so that steps allocate nothing.
 #[derive(Default)]
-pub(super) struct Stepper {
+pub(super) struct IkStepper {
     /// The Jacobian: rows of an entry for each variable, one row after the other.
     pub(super) rows: Vec<f64>,
     is_free: Vec<bool>,
@@ -70,7 +70,7 @@ pub(super) struct Stepper {
 
 /// The posture that a step starts from, and its aim.
 #[derive(Clone, Copy)]
-pub(super) struct StepInput<'a> {
+pub(super) struct IkStepInput<'a> {
     pub(super) values: &'a [f64],
     pub(super) wanted: &'a [f64],
     /// Damping as a fraction of the mean of the matrix's diagonal.
@@ -78,11 +78,11 @@ pub(super) struct StepInput<'a> {
     pub(super) bounds: &'a JointRanges,
 }
 
-impl Stepper {
+impl IkStepper {
     /// Puts the values after one damped step toward the wanted changes into `next`. A
     /// variable that would leave its range stops at its end, and the others do without it.
-    pub(super) fn step(&mut self, input: StepInput<'_>, next: &mut Vec<f64>) {
-        let StepInput { values, wanted, damping, bounds } = input;
+    pub(super) fn step(&mut self, input: IkStepInput<'_>, next: &mut Vec<f64>) {
+        let IkStepInput { values, wanted, damping, bounds } = input;
         let n = values.len();
         next.clear();
         next.extend_from_slice(values);

@@ -8,7 +8,7 @@ use super::super::serial::{JointMotion, MovingJoint, SerialChain};
 use super::super::skeleton::{Anchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::{FastFk, LinkTransforms};
-use super::step::{JointRanges, StepInput, Stepper};
+use super::step::{IkStepInput, IkStepper, JointRanges};
 use sidestep_kernel::geometry::{norm, sub};
 use std::f64::consts::PI;
 
@@ -177,12 +177,17 @@ struct TrackingDescent<'a> {
     arm: &'a JointTracker,
     values: Vec<f64>,
     placed: LinkTransforms,
-    stepper: Stepper,
+    stepper: IkStepper,
 }
 
 impl<'a> TrackingDescent<'a> {
     fn new(arm: &'a JointTracker, start: &[f64]) -> Self {
-        Self { arm, values: start.to_vec(), placed: arm.blank.clone(), stepper: Stepper::default() }
+        Self {
+            arm,
+            values: start.to_vec(),
+            placed: arm.blank.clone(),
+            stepper: IkStepper::default(),
+        }
     }
 
     /// Makes damped steps until the connectors are there or it gets no better.
@@ -207,7 +212,8 @@ impl<'a> TrackingDescent<'a> {
             if is_new {
                 self.update_jacobian(&aims);
             }
-            let input = StepInput { values: &self.values, wanted: &wanted, damping, bounds: room };
+            let input =
+                IkStepInput { values: &self.values, wanted: &wanted, damping, bounds: room };
             self.stepper.step(input, &mut next);
             let next_wanted = self.residuals(&next.clone(), &aims, Some(&mut next_placed));
             is_new = merit(&next_wanted) < merit(&wanted);
@@ -341,7 +347,7 @@ mod tests {
     fn places_are_those_of_forward_kinematics() {
         for (chain, follower) in ARMS.into_iter().filter_map(arm) {
             let values = chain.rest_values();
-            let expected = chain.connectors(&chain.skeleton(), &chain.forward(&values));
+            let expected = chain.connectors(&chain.skeleton(), &chain.forward_kinematics(&values));
             for (a, b) in follower.connector_positions(&values).into_iter().zip(expected) {
                 assert!(norm(sub(a, b)) < 1e-12, "{}", chain.tip);
             }

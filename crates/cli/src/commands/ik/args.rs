@@ -2,9 +2,9 @@
 
 use super::super::arm::{Arm, parse_numbers};
 use clap::{Args, ValueEnum};
-use sidestep::arms::ik::Engine;
+use sidestep::arms::ik::IkEngine;
 use sidestep::arms::kinematics::{
-    ArmBody, ArmGoal, MAX_SOLUTIONS, PoseMask, Sphere, Transform, Vector,
+    ArmBody, ArmGoal, MAX_SOLUTIONS, ObstacleSphere, PoseMask, Transform, Vector,
 };
 use sidestep::import::urdf::Origin;
 use sidestep::kernel::InputError;
@@ -167,9 +167,9 @@ impl GoalArgs {
             tolerance_m: self.tolerance_m,
             tolerance_rad: self.tolerance_rad,
             engine: match self.engine {
-                EngineArg::Auto => Engine::Auto,
-                EngineArg::Chain => Engine::Chain,
-                EngineArg::Dls => Engine::Dls,
+                EngineArg::Auto => IkEngine::Auto,
+                EngineArg::Chain => IkEngine::Chain,
+                EngineArg::Dls => IkEngine::Dls,
             },
             restarts: self.restarts,
             seed: self.seed,
@@ -201,13 +201,13 @@ fn check_positive(option: &str, value: f64, unit: &str, quantity: &str) -> Resul
     Err(InputError::new(option, format!("is {value} {unit}"), format!("give {quantity} above 0")))
 }
 
-fn parse_sphere(text: &String) -> Result<Sphere, InputError> {
+fn parse_sphere(text: &String) -> Result<ObstacleSphere, InputError> {
     let [x, y, z, radius_m] = parse_lengths("--obstacle", "x,y,z,radius", text)?;
     if radius_m < 0.0 {
         let cause = format!("`{text}` has a negative radius");
         return Err(InputError::new("--obstacle", cause, "give a radius of 0 or more"));
     }
-    Ok(Sphere { center_m: [x, y, z], radius_m })
+    Ok(ObstacleSphere { center_m: [x, y, z], radius_m })
 }
 
 /// Parses the `N` lengths of an option, each of a size that a position in m can have.

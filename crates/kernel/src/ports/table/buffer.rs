@@ -118,12 +118,12 @@ impl<R> Buffer for RowBuffer<R> {
 
 /// Whole columns, for tables that have too many rows to keep them one by one.
 #[derive(Debug, Default)]
-pub struct BlockBuffer {
+pub struct ColumnBlockBuffer {
     schema: Option<TableSchema>,
     block: Option<Vec<Values>>,
 }
 
-impl BlockBuffer {
+impl ColumnBlockBuffer {
     /// Keeps a block of `schema` from now on; none without a schema.
     pub fn start(&mut self, schema: Option<TableSchema>) {
         self.schema = schema;
@@ -140,7 +140,7 @@ impl BlockBuffer {
     }
 }
 
-impl Buffer for BlockBuffer {
+impl Buffer for ColumnBlockBuffer {
     fn schema(&self) -> Option<TableSchema> {
         self.schema.clone()
     }
@@ -165,7 +165,7 @@ mod tests {
     struct Two {
         kept: RowBuffer<u32>,
         unwanted: RowBuffer<u32>,
-        blocks: BlockBuffer,
+        blocks: ColumnBlockBuffer,
     }
 
     impl Buffers for Two {

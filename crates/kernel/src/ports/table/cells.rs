@@ -5,9 +5,9 @@ use std::ops::Deref;
 /// A mask of the cells that have a value; without a mask all have one, which is the common case and then costs no
 /// memory.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Mask(Option<Vec<bool>>);
+struct ValidityMask(Option<Vec<bool>>);
 
-impl Mask {
+impl ValidityMask {
     /// Drops the mask where nothing is missing, so that equal cells have equal masks.
     fn from_valid(valid: Vec<bool>) -> Self {
         Self((!valid.iter().all(|valid| *valid)).then_some(valid))
@@ -70,7 +70,7 @@ fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells<T> {
     values: Vec<T>,
-    mask: Mask,
+    mask: ValidityMask,
 }
 
 impl<T> Cells<T> {
@@ -153,7 +153,7 @@ impl<'a, T> IntoIterator for &'a Cells<T> {
 
 impl<T> From<Vec<T>> for Cells<T> {
     fn from(values: Vec<T>) -> Self {
-        Self { values, mask: Mask::default() }
+        Self { values, mask: ValidityMask::default() }
     }
 }
 
@@ -174,13 +174,13 @@ impl<T: Clone + Default> FromIterator<Option<T>> for Cells<T> {
 /// The cells of a column of text, some of which may be missing: one string, and the end of each
 /// cell in it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Texts {
+pub struct TextCells {
     text: String,
     ends: Vec<usize>,
-    mask: Mask,
+    mask: ValidityMask,
 }
 
-impl Texts {
+impl TextCells {
     /// Returns the text in `row`; `None` where it is missing or there is no such row.
     pub fn get(&self, row: usize) -> Option<&str> {
         let end = *self.ends.get(row).filter(|_| self.mask.is_valid(row))?;
@@ -196,14 +196,14 @@ impl Texts {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
-    /// Returns all texts without separators; [`ends`](Self::ends) divides them.
+    /// Returns all texts without separators; [`end_offsets`](Self::ends) divides them.
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// Returns the end of each text, in bytes of [`text`](Self::text); a text starts where the
     /// previous one ends.
-    pub fn ends(&self) -> &[usize] {
+    pub fn end_offsets(&self) -> &[usize] {
         &self.ends
     }
 
@@ -253,7 +253,7 @@ impl Texts {
     }
 }
 
-impl<S: AsRef<str>> FromIterator<Option<S>> for Texts {
+impl<S: AsRef<str>> FromIterator<Option<S>> for TextCells {
     fn from_iter<I: IntoIterator<Item = Option<S>>>(texts: I) -> Self {
         let mut cells = Self::default();
         texts.into_iter().for_each(|text| cells.push(text.as_ref().map(AsRef::as_ref)));
@@ -261,7 +261,7 @@ impl<S: AsRef<str>> FromIterator<Option<S>> for Texts {
     }
 }
 
-impl FromIterator<String> for Texts {
+impl FromIterator<String> for TextCells {
     fn from_iter<I: IntoIterator<Item = String>>(texts: I) -> Self {
         texts.into_iter().map(Some).collect()
     }
@@ -280,7 +280,7 @@ mod tests {
             keep in proptest::collection::vec(any::<bool>(), 18),
         ) {
             let mut list: Vec<Option<i64>> = [&a[..], &b[..], &[None; 2]].concat();
-            let words = |list: &[Option<i64>]| -> Texts {
+            let words = |list: &[Option<i64>]| -> TextCells {
                 list.iter().map(|v| v.map(|v| v.to_string())).collect()
             };
             let mut cells: Cells<i64> = a.iter().copied().collect();

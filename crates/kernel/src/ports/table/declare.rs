@@ -1,6 +1,6 @@
 //! Columns with their getters: rows -> a block of values.
 
-use super::cells::{Cells, Texts};
+use super::cells::{Cells, TextCells};
 use super::column_type::ColumnType;
 use super::schema::{ColumnSpec, TableSchema};
 use super::values::Values;
@@ -28,11 +28,11 @@ pub struct Table<R> {
 
 /// A function that reads all values of a column from a block of rows: one call per block, so that
 /// the getter is inlined into its loop.
-type ReadColumn<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
+type ColumnGetter<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
 
 struct TableColumn<R> {
     spec: ColumnSpec,
-    values: ReadColumn<R>,
+    values: ColumnGetter<R>,
 }
 
 /// The result of a getter of a column with the cells `C`: the value, or an `Option` of it where it
@@ -50,11 +50,11 @@ impl<T> CellValue<Cells<T>> for Option<T> {
     const IS_NULLABLE: bool = true;
 }
 
-impl CellValue<Texts> for String {
+impl CellValue<TextCells> for String {
     const IS_NULLABLE: bool = false;
 }
 
-impl CellValue<Texts> for Option<String> {
+impl CellValue<TextCells> for Option<String> {
     const IS_NULLABLE: bool = true;
 }
 
@@ -92,7 +92,7 @@ impl<R> Table<R> {
         i64, I64, Cells<i64>, "signed 64-bit integers";
         f64, F64, Cells<f64>, "floats";
         bool, Bool, Cells<bool>, "truth values";
-        text, Text, Texts, "text";
+        text, Text, TextCells, "text";
     }
 
     /// Adds a column of labels; `get` reads the label's index from a row.

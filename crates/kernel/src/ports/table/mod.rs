@@ -20,8 +20,8 @@ mod schema;
 mod unit;
 mod values;
 
-pub use buffer::{BlockBuffer, Buffer, Buffers, RowBuffer};
-pub use cells::{Cells, Texts};
+pub use buffer::{Buffer, Buffers, ColumnBlockBuffer, RowBuffer};
+pub use cells::{Cells, TextCells};
 pub use column_type::ColumnType;
 pub use declare::{Table, label_index};
 pub use schema::{ColumnSpec, TableSchema};

@@ -1,6 +1,6 @@
 //! The cells of one column, of any type.
 
-use super::cells::{Cells, Texts};
+use super::cells::{Cells, TextCells};
 use super::column_type::ColumnType;
 use serde_json::Value;
 use std::fmt::{self, Write};
@@ -23,7 +23,7 @@ pub enum Values {
     /// See [`ColumnType::Label`]; indices into the column's labels.
     Label(Cells<u32>),
     /// See [`ColumnType::Text`].
-    Text(Texts),
+    Text(TextCells),
 }
 
 /// Runs the same code for the cells of any type.
@@ -52,12 +52,12 @@ impl Values {
             ColumnType::F64 => Self::F64(Cells::default()),
             ColumnType::Bool => Self::Bool(Cells::default()),
             ColumnType::Label => Self::Label(Cells::default()),
-            ColumnType::Text => Self::Text(Texts::default()),
+            ColumnType::Text => Self::Text(TextCells::default()),
         }
     }
 
     /// Returns the type of these values.
-    pub fn ty(&self) -> ColumnType {
+    pub fn column_type(&self) -> ColumnType {
         match self {
             Self::U32(_) => ColumnType::U32,
             Self::U64(_) => ColumnType::U64,
@@ -104,7 +104,7 @@ impl Values {
             (Self::F64(a), Self::F64(b)) => a.append(b),
             (Self::Bool(a), Self::Bool(b)) => a.append(b),
             (Self::Text(a), Self::Text(b)) => a.append(b),
-            (a, b) => panic!("{:?} values appended to {:?} ones", b.ty(), a.ty()),
+            (a, b) => panic!("{:?} values appended to {:?} ones", b.column_type(), a.column_type()),
         }
     }
 
@@ -225,7 +225,7 @@ mod tests {
     fn every_type_grows_and_is_picked_from() {
         for ty in ColumnType::ALL {
             let mut values = Values::empty(ty);
-            assert_eq!((values.ty(), values.is_empty(), values.valid()), (ty, true, None));
+            assert_eq!((values.column_type(), values.is_empty(), values.valid()), (ty, true, None));
             values.resize(2);
             values.append(&values.clone());
             assert_eq!((values.len(), values.is_missing(3)), (4, true));

@@ -1,7 +1,7 @@
 //! Probes of the other end of a link. Its Zenoh session replies in a thread of its own, however busy its node is: a link
 //! without replies is half-open.
 
-use super::put;
+use super::put_frame;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -95,5 +95,5 @@ impl EchoProbes {
 fn send(session: &Session, me: EntityId, to: EntityId, mark: &'static [u8]) {
     let key = KeyExpr::try_from(super::peer_key(super::Peer::Node(to)));
     let key = key.expect("a path of letters and digits is a key");
-    put(session, &key, &me.to_le_bytes(), Some(mark));
+    put_frame(session, &key, &me.to_le_bytes(), Some(mark));
 }

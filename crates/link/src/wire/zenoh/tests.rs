@@ -69,21 +69,22 @@ fn a_peer_does_not_relay_and_a_router_does() {
 /// Three nodes, in a mesh or a star.
 fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
     let at = [free()];
-    let hub = ZenohWire::server(&at, None).expect("a server");
+    let hub = ZenohWire::server_wire(&at, None).expect("a server");
     let held: Vec<PortReservation> =
         (0..3).map(|_| reserve_port("tcp/127.0.0.1:0").expect("a free port")).collect();
     let listens =
         |held: &PortReservation| if is_mesh { vec![held.endpoint.clone()] } else { Vec::new() };
-    let members: Vec<Member> = (0..)
+    let members: Vec<FleetMember> = (0..)
         .zip(&held)
-        .map(|(agent, held)| Member {
+        .map(|(agent, held)| FleetMember {
             agent,
             incarnation: crate::protocol::Incarnation(0),
             listens: listens(held),
         })
         .collect();
     let node = |(agent, held): (EntityId, PortReservation)| {
-        let wire = ZenohWire::node(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+        let wire =
+            ZenohWire::node_wire(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
         let mut wire = if is_mesh { wire.with_listeners(vec![held]) } else { wire };
         wire.connect_mesh(agent, &members).expect("a mesh");
         wire
@@ -175,9 +176,9 @@ fn carry(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> Option<
 fn best_effort_messages_are_lost_in_a_partition_and_reliable_ones_are_not() {
     let server = free();
     let cable = Cable::to(&server, false);
-    let wire = ZenohWire::server(&[server], None).expect("a server");
+    let wire = ZenohWire::server_wire(&[server], None).expect("a server");
     let mut hub = Messenger::new(Peer::Server, Box::new(wire));
-    let wire = ZenohWire::node(A, std::slice::from_ref(&cable.endpoint), None, TEST_TIMEOUT)
+    let wire = ZenohWire::node_wire(A, std::slice::from_ref(&cable.endpoint), None, TEST_TIMEOUT)
         .expect("it answers");
     let mut node = Messenger::new(A, Box::new(wire));
     node.connect(Peer::Server, hub.incarnation());
@@ -258,19 +259,20 @@ fn half_open_at_first(server: &str) -> String {
 
 /// Returns a server's endpoint with two nodes in a mesh, and each as a member for the other; the second sees the
 /// first at an endpoint made from its own.
-fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>) {
+fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<FleetMember>) {
     let at = [free()];
-    let hub = ZenohWire::server(&at, None).expect("a server");
+    let hub = ZenohWire::server_wire(&at, None).expect("a server");
     let held = [0, 1].map(|_| reserve_port("tcp/127.0.0.1:0").expect("a free port"));
     let lives = [5, 6].map(crate::protocol::Incarnation);
     let seen_at = [seen(&held[0].endpoint), held[1].endpoint.clone()];
-    let members: Vec<Member> = (0..)
+    let members: Vec<FleetMember> = (0..)
         .zip(lives)
         .zip(seen_at)
-        .map(|((agent, incarnation), seen)| Member { agent, incarnation, listens: vec![seen] })
+        .map(|((agent, incarnation), seen)| FleetMember { agent, incarnation, listens: vec![seen] })
         .collect();
     let node = |(agent, held)| {
-        let wire = ZenohWire::node(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+        let wire =
+            ZenohWire::node_wire(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
         let mut wire = wire.with_listeners(vec![held]);
         wire.connect_mesh(agent, &members).expect("a mesh");
         wire
@@ -281,7 +283,7 @@ fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<Member>)
     ([hub, first, second], members)
 }
 
-fn is_open(wire: &ZenohWire, member: &Member) -> bool {
+fn is_open(wire: &ZenohWire, member: &FleetMember) -> bool {
     wire.mesh.as_ref().is_some_and(|mesh| mesh.is_open_to(member))
 }
 
@@ -317,7 +319,7 @@ fn a_half_open_link_is_detected_and_opened_again() {
     second.reopen_links().expect("its endpoint is free again");
     assert!(comes(&mut second, 40), "it is heard");
     let other =
-        Member { agent: 0, incarnation: crate::protocol::Incarnation(7), listens: Vec::new() };
+        FleetMember { agent: 0, incarnation: crate::protocol::Incarnation(7), listens: Vec::new() };
     assert!(!is_open(&second, &other), "another incarnation of it is not there");
 }
 
@@ -357,7 +359,7 @@ fn links_that_could_not_be_opened_are_opened_at_another_time() {
 #[test]
 fn a_link_that_is_not_answered_is_tried_again_soon() {
     let server = free();
-    let _hub = ZenohWire::server(std::slice::from_ref(&server), None).expect("a server");
+    let _hub = ZenohWire::server_wire(std::slice::from_ref(&server), None).expect("a server");
     let cable = Cable::to(&server, true);
     let mended = {
         let is_cut = cable.is_cut.clone();
@@ -369,7 +371,7 @@ fn a_link_that_is_not_answered_is_tried_again_soon() {
     };
     let began = Instant::now();
     let at = std::slice::from_ref(&cable.endpoint);
-    ZenohWire::node(A, at, None, TEST_TIMEOUT).expect("it answers in the end");
+    ZenohWire::node_wire(A, at, None, TEST_TIMEOUT).expect("it answers in the end");
     assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
     mended.join().expect("no panic");
 }
@@ -382,7 +384,7 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
         matches!(again, WireError::Taken { ref endpoint, .. } if *endpoint == held.endpoint),
         "{again}"
     );
-    let server = ZenohWire::server(std::slice::from_ref(&held.endpoint), None);
+    let server = ZenohWire::server_wire(std::slice::from_ref(&held.endpoint), None);
     assert!(matches!(server, Err(WireError::Taken { .. })));
     for wrong in ["127.0.0.1:7600", "udp/127.0.0.1:1", "tcp/127.0.0.1", "tcp/:1", "tcp/a:99999", ""]
     {
@@ -398,7 +400,7 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
 fn nobody_who_answers_is_an_error_in_time() {
     let at = [free()];
     let began = Instant::now();
-    let found = ZenohWire::node(A, &at, None, SHORT_WAIT);
+    let found = ZenohWire::node_wire(A, &at, None, SHORT_WAIT);
     assert!(matches!(found, Err(WireError::NoAnswer { .. })));
     assert!(began.elapsed() < Duration::from_secs(8));
 }

@@ -28,15 +28,15 @@ fn led_both_ways<const D: usize>(
     let rod = Rod { min_m: 1.0 - slack, max_m: 1.0, radius_m: 0.5 * radius_m };
     let mut apart = crooked::<D>(seed, n_rods, rod, radius_m);
     let mut looked = apart.clone();
-    propagator.rules = Rules { self_collision: true, ..Rules::default() };
-    let mut looking = Propagator { proofs: ProofSchedule::never(), ..propagator.clone() };
+    propagator.rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
+    let mut looking = Propagator { proofs: SeparationProofSchedule::never(), ..propagator.clone() };
     let k = if numbers.unit() < 0.5 { 0 } else { (n_rods as f64 * numbers.unit()) as usize };
     let (mut walk, mut vetoes) = (Wanderer::new(seed), 0);
     for _ in 0..60 {
         let to = walk.next(apart.points()[k], numbers.uniform(0.0, 0.6));
         let mode =
             if numbers.unit() < 0.5 { VetoEffect::Exact } else { VetoEffect::AsFarAsPossible };
-        let request = Request { mode, ..Request::exact(k, to) };
+        let request = MotionRequest { mode, ..MotionRequest::operator_request(k, to) };
         let outcome = propagator.propagate(&mut apart, here, &request).unwrap();
         assert_eq!(outcome, looking.propagate(&mut looked, there, &request).unwrap(), "{seed}");
         assert_eq!(bits(&apart), bits(&looked), "{seed}");

@@ -7,8 +7,13 @@ fn wrong_requests_are_errors_and_a_target_reached_is_no_motion() {
     let rod = Rod::fixed(1.0, 0.0);
     let mut chain = Chain::straight([0.0; 2], [1.0, 0.0], 1, rod, Connector::free(0.0)).unwrap();
     let mut propagator = Propagator::default();
-    let mut ask =
-        |k, to| propagator.propagate(&mut chain, &Obstacles::default(), &Request::exact(k, to));
+    let mut ask = |k, to| {
+        propagator.propagate(
+            &mut chain,
+            &Obstacles::default(),
+            &MotionRequest::operator_request(k, to),
+        )
+    };
     assert!(ask(0, [f64::NAN, 0.0]).is_err());
     assert!(ask(2, [0.0, 0.0]).is_err());
     let still = ask(0, [0.0, 0.0]).unwrap();
@@ -80,7 +85,7 @@ fn requests_that_are_absurd_are_errors_and_change_nothing() {
     let obstacles = Obstacles::new(vec![Obstacle::ball(2, [0.0, 3.0], 0.4)], 1.0).unwrap();
     let before = bits(&chain);
     for to in [[f64::INFINITY, 0.0], [0.0, f64::NAN], [1e300, 0.0], [-1e9, 0.0]] {
-        let request = Request::exact(0, to);
+        let request = MotionRequest::operator_request(0, to);
         assert!(
             Propagator::default().propagate(&mut chain, &obstacles, &request).is_err(),
             "{to:?}"
@@ -104,7 +109,7 @@ fn rods_keep_their_lengths_as_far_out_as_a_chain_may_be() {
     let error = Propagator::default().propagate(
         &mut chain,
         &Obstacles::default(),
-        &Request::exact(0, [1.1e6, 0.0, 0.0]),
+        &MotionRequest::operator_request(0, [1.1e6, 0.0, 0.0]),
     );
     assert_eq!(error.unwrap_err().place(), "target");
 }

@@ -15,8 +15,10 @@ fn keeps_the_laws<const D: usize>(seed: u64) {
         let AnyWorld { chain, obstacles, .. } = &mut world;
         let outcome = propagator.propagate(chain, obstacles, &request).unwrap();
         match &outcome {
-            Outcome::Vetoed(_) => assert_eq!(bits(chain), bits(&before), "a veto leaves every bit"),
-            Outcome::Moved(moved) => touches_what_it_says(&before, chain, moved),
+            MotionOutcome::Vetoed(_) => {
+                assert_eq!(bits(chain), bits(&before), "a veto leaves every bit")
+            }
+            MotionOutcome::Moved(moved) => touches_what_it_says(&before, chain, moved),
         }
         is_whole(chain, &before);
         is_clear(&world, seed);
@@ -104,7 +106,7 @@ fn without<const D: usize>(world: &AnyWorld<D>, veto: &Veto<D>) -> AnyWorld<D> {
 fn blames_what_matters<const D: usize>(seed: u64, blamed: &mut Vec<VetoReason>) {
     let mut world = AnyWorld::<D>::new(seed);
     for _ in 0..6 {
-        let request = Request { mode: VetoEffect::Exact, ..world.any_request(0.3) };
+        let request = MotionRequest { mode: VetoEffect::Exact, ..world.any_request(0.3) };
         let ask = |world: &AnyWorld<D>| {
             let mut chain = world.chain.clone();
             let mut propagator = Propagator::new(world.rules);
@@ -164,7 +166,7 @@ fn goes_no_deeper<const D: usize>(seed: u64) -> usize {
         };
         let before = depths(&world.chain);
         let to = add(world.chain.points()[0], numbers.point(0.1));
-        let request = Request::exact(0, to);
+        let request = MotionRequest::operator_request(0, to);
         let mut chain = world.chain.clone();
         let outcome = propagator.propagate(&mut chain, &world.obstacles, &request).unwrap();
         moves += usize::from(outcome.motion().is_some());
@@ -193,7 +195,7 @@ fn ends_where_nobody_need_move<const D: usize>(seed: u64, among_balls: bool) -> 
     let before = bits(&chain);
     let k = (numbers.unit() * 21.0) as usize;
     let to = add(chain.points()[k], numbers.point(0.005));
-    let Outcome::Moved(moved) = go(&mut chain, &obstacles, k, to) else { return false };
+    let MotionOutcome::Moved(moved) = go(&mut chain, &obstacles, k, to) else { return false };
     let after = bits(&chain);
     let changed: Vec<_> = (0..21).filter(|&i| after[i] != before[i]).collect();
     assert_eq!(changed, moved.touched.clone().collect::<Vec<_>>(), "seed {seed}");
@@ -256,7 +258,7 @@ fn a_chain_that_is_pushed_never_runs_into_itself() {
         let (mut propagator, mut numbers) = (Propagator::new(own()), TestRng::new(seed));
         for _ in 0..200 {
             let by = [-0.05, numbers.uniform(-0.02, 0.02)];
-            let request = Request::exact(0, add(chain.points()[0], by));
+            let request = MotionRequest::operator_request(0, add(chain.points()[0], by));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             blocked += usize::from(outcome.veto().is_some());
             assert!(own_clearance_m(&chain) >= -TOLERANCE);

@@ -25,7 +25,7 @@ impl Reaction for Always {
     }
 }
 
-fn own<const D: usize>(rules: Rules, reaction: impl Reaction + 'static) -> Propagator<D> {
+fn own<const D: usize>(rules: ReactionRules, reaction: impl Reaction + 'static) -> Propagator<D> {
     Propagator::new(rules).with_reaction(Some(Arc::new(reaction)))
 }
 
@@ -38,7 +38,7 @@ fn compare<const D: usize>(seed: u64) -> [usize; 2] {
     if world.chain.connectors().iter().any(is_boxed) {
         return [0; 2];
     }
-    let rules = Rules { rotation: Rotation::Never, ..world.rules };
+    let rules = ReactionRules { rotation: RotationRule::Never, ..world.rules };
     let mut built_in = Propagator::new(rules);
     let mut own = own(rules, Guided);
     let mut counts = [0; 2];
@@ -70,7 +70,7 @@ fn a_veto_or_a_place_that_breaks_a_law_leaves_every_bit() {
     let rod = Rod { min_m: 0.8, max_m: 1.0, radius_m: 0.02 };
     let start = Chain::straight([0.0, 0.0], [-1.0, 0.0], 4, rod, Connector::free(0.1)).unwrap();
     let wall = Obstacles::new(vec![Obstacle::ball(3, [-0.8, 0.5], 0.2)], 1.0).unwrap();
-    let request = Request::exact(0, [0.1, 0.0]);
+    let request = MotionRequest::operator_request(0, [0.1, 0.0]);
     for (answer, reason, obstacle) in [
         (Err(VetoReason::Limit), VetoReason::Limit, None),
         (Ok([-5.0, 0.0, 0.0]), VetoReason::Mobility, None),
@@ -78,7 +78,7 @@ fn a_veto_or_a_place_that_breaks_a_law_leaves_every_bit() {
         (Ok([-0.7, 0.45, 0.0]), VetoReason::BothSidesBlocked, Some(3)),
     ] {
         let mut chain = start.clone();
-        let mut propagator = own(Rules::default(), Always(answer));
+        let mut propagator = own(ReactionRules::default(), Always(answer));
         let outcome = propagator.propagate(&mut chain, &wall, &request).unwrap();
         let veto = outcome.veto().expect("a veto");
         assert_eq!((veto.by, veto.reason, veto.obstacle), (1, reason, obstacle), "{answer:?}");
@@ -108,8 +108,9 @@ fn a_reaction_perceives_its_master_and_what_is_in_the_way() {
     for (obstacles, y_m) in [(Obstacles::default(), 0.5), (wall, 0.0)] {
         let mut chain =
             Chain::straight([0.0, 0.0], [-1.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
-        let mut propagator = own(Rules { step_m: Some(1.0), ..Rules::default() }, Aside);
-        let request = Request::exact(0, [0.1, 0.0]);
+        let mut propagator =
+            own(ReactionRules { step_m: Some(1.0), ..ReactionRules::default() }, Aside);
+        let request = MotionRequest::operator_request(0, [0.1, 0.0]);
         propagator.propagate(&mut chain, &obstacles, &request).unwrap();
         let at: Point<3> = with_dimensions(chain.points()[1]);
         assert!((at[1] - y_m).abs() < 1e-12, "{at:?}");

@@ -70,7 +70,8 @@ fn halves_move_on_their_own<const D: usize>(seed: u64, open: bool) -> Result<(),
     let halves = [go(&mut low, &balls, 4, to), go(&mut high, &balls, 0, to)];
     prop_assert_eq!(came, halves.iter().all(|h| h.motion().is_some()));
     if came {
-        let changed = |outcome: &Outcome<D>| outcome.motion().map_or(0, |moved| moved.changed);
+        let changed =
+            |outcome: &MotionOutcome<D>| outcome.motion().map_or(0, |moved| moved.changed);
         // The head counts once in the whole, and once in either half, if it was cut up.
         prop_assert!(
             !open || changed(&whole_came) + 1 == changed(&halves[0]) + changed(&halves[1])
@@ -113,7 +114,7 @@ proptest! {
         let mut chain = crooked::<2>(seed, 8, Rod { min_m: 0.9, max_m: 1.1, radius_m: 0.02 }, 0.1);
         let field = ball_field::<2>(seed, 8.0, 0.05, 0.3, 0.4);
         let turned_field = field.iter().map(|o| {
-            let crate::geometry::Core::Point(c) = o.core else { unreachable!() };
+            let crate::geometry::ConvexCore::Point(c) = o.core else { unreachable!() };
             Obstacle::ball(o.id, turn(c), o.radius_m)
         }).collect();
         let (walls, turned_walls) = (Obstacles::new(field, 1.3).unwrap(), Obstacles::new(turned_field, 1.3).unwrap());

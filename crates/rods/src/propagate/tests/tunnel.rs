@@ -1,7 +1,7 @@
 //! No part passes through anything, however thin.
 
 use super::*;
-use crate::geometry::{Core, Cuboid, segments_cross};
+use crate::geometry::{ConvexCore, Cuboid, segments_cross};
 
 #[test]
 fn nobody_passes_a_thin_wall() {
@@ -21,18 +21,20 @@ fn nobody_passes_a_thin_wall() {
         let rod = Rod { min_m: 0.5, max_m: 0.6, radius_m: 0.002 };
         let mut chain =
             Chain::straight([0.0, 0.0], [-1.0, 0.0], 8, rod, Connector::free(0.01)).unwrap();
-        let mut propagator = Propagator::new(Rules { step_m: Some(0.12), ..Rules::default() });
+        let mut propagator =
+            Propagator::new(ReactionRules { step_m: Some(0.12), ..ReactionRules::default() });
         let mut walk = Wanderer::new(seed);
         for _ in 0..200 {
             let before = chain.points().to_vec();
             let to = walk.next(before[0], 0.119);
-            let outcome =
-                propagator.propagate(&mut chain, &obstacles, &Request::exact(0, to)).unwrap();
+            let outcome = propagator
+                .propagate(&mut chain, &obstacles, &MotionRequest::operator_request(0, to))
+                .unwrap();
             if outcome.veto().is_some() {
                 walk.turn_anywhere();
             }
             for wall in &walls {
-                let Core::Segment(core) = wall.core else {
+                let ConvexCore::Segment(core) = wall.core else {
                     continue;
                 };
                 for (old, new) in before.iter().zip(chain.points()) {
@@ -63,20 +65,22 @@ fn nobody_passes_a_thin_plate() {
             // Nothing near where the chain starts.
             .filter(|p| {
                 let start = [[0.0; 3], [-2.5, 0.0, 0.0]];
-                Core::Cuboid(*p).nearest_to_segment(start).distance_m > 0.1
+                ConvexCore::Cuboid(*p).nearest_to_segment(start).distance_m > 0.1
             })
             .collect();
-        let all = (0..).zip(&plates).map(|(id, p)| Obstacle::still(id, Core::Cuboid(*p), 0.0));
+        let all =
+            (0..).zip(&plates).map(|(id, p)| Obstacle::still(id, ConvexCore::Cuboid(*p), 0.0));
         let obstacles = Obstacles::new(all.collect(), 0.8).unwrap();
         let rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.002 };
         let mut chain =
             Chain::straight([0.0; 3], [-1.0, 0.0, 0.0], 5, rod, Connector::free(0.01)).unwrap();
-        let mut propagator = Propagator::new(Rules { step_m: Some(0.12), ..Rules::default() });
+        let mut propagator =
+            Propagator::new(ReactionRules { step_m: Some(0.12), ..ReactionRules::default() });
         let mut walk = Wanderer::new(seed);
         for _ in 0..150 {
             let before = chain.points().to_vec();
             let to = walk.next(before[0], 0.119);
-            let request = Request::exact(0, to);
+            let request = MotionRequest::operator_request(0, to);
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             if outcome.veto().is_some() {
                 jams += 1;

@@ -41,10 +41,10 @@ impl Player {
         self.state = SessionState::Seeking;
         self.seek = Some(Seek { id, target, then });
         let present = self.cycle();
-        let Some((at, checkpoint)) = self.history.keyframes.before(target) else { return };
+        let Some((at, checkpoint)) = self.history.keyframes.latest_until(target) else { return };
         if target < present || at > present {
             let run = self.open_run.run.as_mut();
-            self.page_view.drain(run, &mut self.history.log, Instant::now());
+            self.page_view.take_events(run, &mut self.history.log, Instant::now());
             // A keyframe that cannot be restored is a bug: the panic ends the session, with its message.
             run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
             self.digest = None;

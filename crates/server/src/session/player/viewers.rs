@@ -18,7 +18,7 @@ impl Player {
 
     /// Sends the run to viewers, and carries out their requests.
     pub(super) fn update_viewers(&mut self, now: Instant) {
-        let playback = self.playback();
+        let playback = self.playback_status();
         let run = self.open_run.run.as_mut();
         let request = self.foxglove.update(run, &mut self.history.log, playback, now);
         let Some(PlaybackRequest { play, speed, seek_s }) = request else { return };
@@ -36,7 +36,7 @@ impl Player {
     }
 
     /// Returns the state of playback in the words of viewers: a seek after which the run plays on counts as playing.
-    fn playback(&self) -> Playback {
+    fn playback_status(&self) -> Playback {
         let plays_after_seek = self.seek.is_some_and(|seek| seek.then.is_some());
         let playing = match self.state {
             SessionState::Over => PlaybackPhase::Ended,

@@ -43,7 +43,7 @@ impl RemoteFlight {
         let (nodes, noun) = ((0..6).map(node).collect(), "connector".into());
         let fleet =
             FleetStatus { cycle: frame.cycle, cycles: 40, noun, nodes, ..FleetStatus::default() };
-        self.screen.publish(FleetFrame { number: self.number, frame, fleet, is_over });
+        self.screen.replace_view(FleetFrame { number: self.number, frame, fleet, is_over });
     }
 
     fn page(&self) -> Page {

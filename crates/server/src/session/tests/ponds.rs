@@ -42,7 +42,8 @@ fn its_scene_and_its_frames_come() {
 
 #[test]
 fn its_tools_edit_its_text() {
-    let Ok(ReplyBody::Schema { editing, .. }) = crate::socket::schema(&worlds(), "pond") else {
+    let Ok(ReplyBody::Schema { editing, .. }) = crate::socket::schema_reply(&worlds(), "pond")
+    else {
         panic!("a schema");
     };
     let tool = json!(editing.tools[1]);
@@ -84,7 +85,7 @@ fn its_fleet_is_watched() {
         nodes: (0..12).map(node).collect(),
         ..FleetStatus::default()
     };
-    feed.publish(FleetFrame { number: 1, frame, fleet, is_over: false });
+    feed.replace_view(FleetFrame { number: 1, frame, fleet, is_over: false });
     let folder = tempfile::tempdir().expect("a folder");
     let deps = SessionDeps { fleets: vec![feed], ..deps(folder.path(), 1) };
     let (mut page, opened) = Page::open_target(deps, OpenTarget::Fleet { path: AT.into() }, folder);

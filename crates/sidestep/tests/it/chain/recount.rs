@@ -60,12 +60,12 @@ fn clearance<const D: usize>(run: &TestRun<D>, slot: usize, balls: &[([f64; D], 
 
 /// All balls of a world at a cycle.
 pub(super) fn balls<const D: usize>(run: &TestRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
-    use sidestep::rods::geometry::Core;
+    use sidestep::rods::geometry::ConvexCore;
     let world = run.world();
     let moving: Vec<_> = world.movers.at(world.start_time_s(cycle)).collect();
     let all = world.obstacles.still().iter().chain(&moving);
-    let ball = |core: &Core<D>, radius_m: f64| match core {
-        Core::Point(at) => (*at, radius_m),
+    let ball = |core: &ConvexCore<D>, radius_m: f64| match core {
+        ConvexCore::Point(at) => (*at, radius_m),
         other => panic!("{other:?} is no ball"),
     };
     all.map(|o| ball(&o.core, o.radius_m)).collect()

@@ -2,7 +2,7 @@
 
 use super::flight::{AircraftMotion, SubStep};
 use crate::events::{Event, EventKind};
-use crate::flight::{Approach, Zone, distance_m, is_separation_lost};
+use crate::flight::{PairApproach, SeparationMinima, distance_m, is_separation_lost};
 use crate::scratch::Scratch;
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
@@ -72,12 +72,13 @@ fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftMotion<'_>]) -> f64 
 fn is_recorded(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> bool {
     let dtau_s = world.timing.dtau_s;
     let step_m = (world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize]) * dtau_s;
-    distance_m(a.pose.at, b.pose.at) <= MAX_RECORDED_SEPARATIONS * gap_m(world, a, b) + step_m
+    distance_m(a.pose.at, b.pose.at)
+        <= MAX_RECORDED_SEPARATIONS * pair_separation_m(world, a, b) + step_m
         && a.levels(dtau_s).overlaps(&b.levels(dtau_s), world.vertical_m)
 }
 
 /// Returns the separation of a pair in meters.
-fn gap_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> f64 {
+fn pair_separation_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> f64 {
     let separation_a_m = world.airplanes[a.slot as usize].model.separation_m;
     let separation_b_m = world.airplanes[b.slot as usize].model.separation_m;
     separation_a_m.max(separation_b_m)
@@ -90,14 +91,15 @@ fn closest_approach(
     b: &AircraftMotion<'_>,
     moment: SubStep,
 ) -> PairRecord {
-    let zone = Zone { gap_m: gap_m(world, a, b), vertical_m: world.vertical_m };
+    let zone =
+        SeparationMinima { gap_m: pair_separation_m(world, a, b), vertical_m: world.vertical_m };
     // A loss continues from the end of the step before; there is no step before when one of the two
     // has just come into the air.
     let is_first_step = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
     let first_legs = a.legs.first().zip(b.legs.first());
     let continues_loss =
         !is_first_step && first_legs.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, zone));
-    let mut approach = Approach::new(continues_loss.then_some(0.0));
+    let mut approach = PairApproach::new(continues_loss.then_some(0.0));
     for leg_a in &a.legs {
         for leg_b in &b.legs {
             if leg_a.from_s < leg_b.until_s && leg_b.from_s < leg_a.until_s {

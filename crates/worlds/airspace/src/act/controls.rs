@@ -2,9 +2,9 @@
 
 use super::protect::{exempt_non_cooperative, store_maneuver};
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::decide::Optimization;
+use crate::decide::OptimizationRecord;
 use crate::events::{Event, EventKind};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{Control, Maneuver, OptimizerStats, OwnshipState};
 use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
@@ -15,7 +15,7 @@ use sidestep_kernel::EntityId;
 pub(super) fn apply_controls(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
     mut controls: Vec<Option<Control>>,
 ) -> Vec<TurnProfile> {
     let PhaseContext { world, state, .. } = *context;
@@ -81,7 +81,7 @@ fn record_outcomes(
         return;
     }
     let ids = own.iter().map(|own| own.id);
-    scratch.optimizations.push(Optimization {
+    scratch.optimizations.push(OptimizationRecord {
         cycle: now,
         airplane: ids.min().unwrap_or(EntityId::MAX),
         airplanes: own.len() as u32,

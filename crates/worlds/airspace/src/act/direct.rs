@@ -7,10 +7,10 @@ use crate::decide::{
 };
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
-use crate::non_cooperative::NonCooperative;
-use crate::pilot::{Control, Maneuver, Memory, OptimizerStats, OwnshipState};
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::pilot::{Control, Maneuver, OptimizerStats, OwnshipState, PilotMemory};
 use crate::scratch::PhaseContext;
-use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter};
+use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter_maneuvers};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, Slot};
 
@@ -18,7 +18,7 @@ use sidestep_kernel::{Cycle, Slot};
 pub(super) fn decide(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
 ) -> Vec<(Control, ManeuverCandidates)> {
     let PhaseContext { world, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
@@ -39,7 +39,7 @@ pub(super) fn decide(
 fn find_candidates(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
 ) -> Vec<(Control, ManeuverCandidates)> {
     let PhaseContext { world, state, now, .. } = *context;
     let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
@@ -83,8 +83,8 @@ fn find_candidates(
 fn decide_reactively(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperative],
-    memories: &mut [Memory],
+    non_cooperative: &[NonCooperativeAircraft],
+    memories: &mut [PilotMemory],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
     let mut resolving: Vec<_> =
@@ -106,7 +106,7 @@ fn unshielded_maneuver(own: &OwnshipState, considered: &ManeuverCandidates) -> M
 fn shielded_maneuvers(
     world: &AirspaceWorld,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
     all: &[(Control, ManeuverCandidates)],
 ) -> Vec<Maneuver> {
     let group: Vec<ShieldedAircraft> = own.iter().map(|own| own.shielded_aircraft(world)).collect();
@@ -121,7 +121,7 @@ fn shielded_maneuvers(
     }
     let steps = world.timing.points_per_dt();
     // In one process no message gets lost, so all fly the plans that they are given.
-    let decisions = filter(&group, &profiles, steps, dtau_s, PlanCertainty::Sure);
+    let decisions = filter_maneuvers(&group, &profiles, steps, dtau_s, PlanCertainty::Sure);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
     decided
         .map(|((decision, allowed), (_, candidates))| {

@@ -1,9 +1,9 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::flight::{FlightSegment, Leg, Levels, Point, Pose2, Track};
+use crate::flight::{FlightLevelRange, FlightSegment, Leg, Point, Pose2, Track};
 use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
-use crate::state::End;
+use crate::state::FlightEnd;
 use sidestep_kernel::{Cycle, Slot};
 
 /// One step of `dtau`.
@@ -32,7 +32,7 @@ pub(super) struct AircraftMotion<'a> {
     /// Legs flown in this `dt`, with times after the start of the run.
     pub(super) flown: Vec<Leg>,
     /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
-    pub(super) end: Option<End>,
+    pub(super) end: Option<FlightEnd>,
 }
 
 /// The path of an airplane, decided for this `dt` or recorded.
@@ -93,7 +93,7 @@ impl<'a> AircraftMotion<'a> {
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
             FlownPath::Track(track) => {
-                track.legs(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
+                track.add_legs(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
             }
         }
         self.record_legs(moment.step_s);
@@ -111,13 +111,13 @@ impl<'a> AircraftMotion<'a> {
     }
 
     /// Returns all levels that it is on during one step.
-    pub(super) fn levels(&self, dtau_s: f64) -> Levels {
+    pub(super) fn levels(&self, dtau_s: f64) -> FlightLevelRange {
         match &self.path {
             FlownPath::Profile(_, segment) => {
-                Levels::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
+                FlightLevelRange::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
             }
             // Within a step a track may leave the levels of its ends.
-            FlownPath::Track(_) => Levels::ALL,
+            FlownPath::Track(_) => FlightLevelRange::ALL,
         }
     }
 }

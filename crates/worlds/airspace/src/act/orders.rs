@@ -5,9 +5,9 @@
 //! changes its level, an airplane occupies the old one, the new one and all between.
 
 use super::protect::shielded_aircraft;
-use crate::flight::{FlightOrder, FlightTask, Levels};
+use crate::flight::{FlightLevelRange, FlightOrder, FlightTask};
 use crate::scratch::PhaseContext;
-use crate::shield::{ShieldedAircraft, Side, safe_side};
+use crate::shield::{OrbitSide, ShieldedAircraft, safe_side};
 use sidestep_kernel::Slot;
 
 /// Executes the orders of a group that are due and, with the shield, safe; the others wait. `flown` are the group's
@@ -38,7 +38,7 @@ fn fallback_after(
     flown: &[Slot],
     slot: Slot,
     order: &FlightOrder,
-) -> Option<Side> {
+) -> Option<OrbitSide> {
     let PhaseContext { world, state, now, .. } = context;
     let current = &state.airplanes[slot as usize];
     let changes_safety = matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. });
@@ -48,7 +48,7 @@ fn fallback_after(
     let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
     let changed = ShieldedAircraft {
         v_m_s: segment.model.v_m_s,
-        levels: Levels::between(current.altitude_m.get(), segment.altitude_m),
+        levels: FlightLevelRange::between(current.altitude_m.get(), segment.altitude_m),
         ..shielded_aircraft(context, slot)
     };
     let others = flown

@@ -3,7 +3,7 @@
 use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
 use crate::flight::{Pose2, distance_m};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::perceive::ownship_state;
 use crate::pilot::{Maneuver, OwnshipState};
 use crate::scratch::PhaseContext;
@@ -21,7 +21,7 @@ pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: Slot) -> Shiel
 pub(super) fn exempt_non_cooperative(
     context: &mut PhaseContext<'_>,
     own: &OwnshipState,
-    all: &[NonCooperative],
+    all: &[NonCooperativeAircraft],
     profile: &TurnProfile,
 ) {
     let slot = own.id;
@@ -32,7 +32,7 @@ pub(super) fn exempt_non_cooperative(
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let aircraft = own.shielded_aircraft(world);
     let avoidance = NonCooperativeAvoidance::new(&aircraft, all, world.timing.dtau_s);
-    let threats: Vec<&NonCooperative> = avoidance.threats(profile).collect();
+    let threats: Vec<&NonCooperativeAircraft> = avoidance.threats(profile).collect();
     let is_threat = |other: Slot| threats.iter().any(|one| one.slot == other);
     state.retain_exempt(slot, |other| !world.is_non_cooperative(other, now) || is_threat(other));
     for one in all.iter().filter(|one| !is_threat(one.slot)) {

@@ -8,7 +8,7 @@ use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
 use crate::scratch::PhaseContext;
-use crate::state::End;
+use crate::state::FlightEnd;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
@@ -25,7 +25,7 @@ pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<Aircraft
         let moment = SubStep { now, k, step, step_s: step as f64 * world.timing.dtau_s };
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             let leaves_s = world.airplanes[flight.slot as usize].leaves_s;
-            flight.end = (leaves_s <= moment.step_s).then_some(End::Left(step));
+            flight.end = (leaves_s <= moment.step_s).then_some(FlightEnd::Left(step));
         }
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             flight.start_step(world.wind_m_s, moment, world.timing.dtau_s);
@@ -36,7 +36,7 @@ pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<Aircraft
             fly(world, flight, moment);
         }
     }
-    flights.into_iter().for_each(|flight| store(context, flight));
+    flights.into_iter().for_each(|flight| store_flight(context, flight));
 }
 
 fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step, .. }: SubStep) {
@@ -60,15 +60,15 @@ fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step
             track.end_s() <= after_s
         }
     };
-    flight.end = is_at_end.then_some(End::Arrived(step + 1));
+    flight.end = is_at_end.then_some(FlightEnd::Arrived(step + 1));
 }
 
 /// Returns the rows of an airplane: its legs, and the position where its flight ended.
-fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec<FlownLeg> {
+fn leg_rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec<FlownLeg> {
     let airplane = flight.slot;
     let mut rows: Vec<FlownLeg> =
         flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
-    if let Some(End::Arrived(step) | End::Left(step)) = flight.end {
+    if let Some(FlightEnd::Arrived(step) | FlightEnd::Left(step)) = flight.end {
         let at_s = step as f64 * world.timing.dtau_s;
         let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).with_climb(flight.altitude_m, 0.0);
         rows.push(FlownLeg { cycle, airplane, leg: end });
@@ -76,11 +76,11 @@ fn rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec
     rows
 }
 
-fn store(context: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
+fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
-    scratch.flown.extend(rows(world, now, &flight));
+    scratch.flown.extend(leg_rows(world, now, &flight));
     let is_disturbed = matches!(flight.path, FlownPath::Profile(..));
     let turn_rate_rad_s = match &flight.path {
         FlownPath::Profile(profile, _) => profile.omegas_rad_s.last().copied().unwrap_or_default(),

@@ -2,7 +2,9 @@
 
 use super::network_traffic::NetworkTraffic;
 use super::packet::{ConversationId, PacketHeader};
-use super::participant::{ConversationEnd, OutgoingMessage, Participant, Progress, WithOutcome};
+use super::participant::{
+    ConversationEnd, ConversationProgress, OutgoingMessage, Participant, WithOutcome,
+};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{DropReason, OutgoingPacket};
 use std::sync::Arc;
@@ -49,7 +51,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Returns how far the participant has come.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> ConversationProgress {
         self.participant.progress()
     }
 
@@ -129,7 +131,7 @@ impl<P: WithOutcome + ?Sized> Conversation<P> {
 
 impl<O> Conversation<dyn WithOutcome<Outcome = O>> {
     /// Returns the conversation as it remains for others once it has ended here: it answers their questions.
-    pub fn into_past(self) -> Conversation<dyn Participant> {
+    pub fn into_ended(self) -> Conversation<dyn Participant> {
         let Self { info, others, sent, traffic, participant } = self;
         Conversation { info, others, sent, traffic, participant }
     }

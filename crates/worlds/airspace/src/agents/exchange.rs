@@ -8,7 +8,7 @@
 //! safe whichever of them are flown, and no airplane flies one that others may not know:
 //!
 //! 1. Each airplane sends its *proposal* as above.
-//! 2. From the proposals it has heard each computes plans by [`filter`] that are *mixable*: each
+//! 2. From the proposals it has heard each computes plans by [`filter_maneuvers`] that are *mixable*: each
 //!    plan keeps apart from every other one's plan and from its fallback too. An airplane that
 //!    was not heard counts as being on any orbit it may be on. Each sends its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
@@ -53,8 +53,8 @@ use super::traffic_state::{
 };
 use crate::flight::Pose2;
 use crate::shield::{
-    ExemptIds, PlanCertainty, SafeManeuver, ShieldDecision, ShieldedAircraft, Side, TurnProfile,
-    filter,
+    ExemptIds, OrbitSide, PlanCertainty, SafeManeuver, ShieldDecision, ShieldedAircraft,
+    TurnProfile, filter_maneuvers,
 };
 use serde::{Deserialize, Serialize};
 pub use setup::{ExchangeSetup, ObservedAircraft};
@@ -68,7 +68,7 @@ pub enum ExchangeMessage {
     Proposal(Proposal),
     /// The profile that it will fly if all agree, and the side to which it turns then; `None` for its
     /// fallback.
-    Plan(Option<(TurnProfile, Side)>),
+    Plan(Option<(TurnProfile, OrbitSide)>),
     /// Ids of the airplanes whose plans it accepts, rising.
     Accepts(Vec<EntityId>),
 }
@@ -79,7 +79,7 @@ pub struct Proposal {
     beacon: StateBeacon,
     /// Its pose on the stored orbit, as all see it.
     orbit_pose: Pose2,
-    fallback: Side,
+    fallback: OrbitSide,
     exempt: Vec<EntityId>,
     rank: u64,
     profiles: Vec<TurnProfile>,
@@ -104,7 +104,7 @@ impl Proposal {
 struct ExchangeMember {
     proposal: Option<Proposal>,
     /// Its plan, when it is known; `Some(None)` stands for its fallback.
-    plan: Option<Option<(TurnProfile, Side)>>,
+    plan: Option<Option<(TurnProfile, OrbitSide)>>,
     accepts: Option<Vec<EntityId>>,
     gone: bool,
 }
@@ -177,11 +177,11 @@ impl ExchangeAgent {
         self.setup.air.timing.dtau_s
     }
 
-    fn steps(&self) -> usize {
+    fn steps_per_dt(&self) -> usize {
         self.setup.air.timing.points_per_dt()
     }
 
-    fn size(&self) -> usize {
+    fn group_size(&self) -> usize {
         self.setup.aircraft.len()
     }
 
@@ -190,7 +190,7 @@ impl ExchangeAgent {
     }
 
     fn fallback(&self, aircraft: ShieldedAircraft) -> SafeManeuver {
-        SafeManeuver::fallback(aircraft, self.steps(), self.dtau_s())
+        SafeManeuver::fallback(aircraft, self.steps_per_dt(), self.dtau_s())
     }
 
     fn aircraft_from_proposal(&self, place: usize, proposal: &Proposal) -> ShieldedAircraft {
@@ -221,7 +221,7 @@ impl ExchangeAgent {
         let heard_plan = self.contacts.get(&aircraft.id).and_then(|contact| contact.planned);
         let sides = match heard_plan.filter(|planned| planned.as_of == self.setup.now) {
             Some(PlanEnd { side, .. }) => vec![side],
-            None => Side::BOTH.to_vec(),
+            None => OrbitSide::BOTH.to_vec(),
         };
         sides
             .into_iter()
@@ -241,13 +241,13 @@ impl ExchangeAgent {
     /// Continues as far as the messages heard allow.
     fn advance(&mut self) -> Vec<ExchangeMessage> {
         let mut outgoing = Vec::new();
-        while link::Agent::awaited_members(self).is_empty() {
+        while link::ProtocolAgent::awaited_members(self).is_empty() {
             match self.phase() {
                 ExchangePhase::Proposals if self.setup.certainty == PlanCertainty::Sure => {
                     self.commit_plan()
                 }
                 ExchangePhase::Proposals => outgoing.push(self.send_plan()),
-                ExchangePhase::Plans => outgoing.push(self.accept()),
+                ExchangePhase::Plans => outgoing.push(self.accept_plans()),
                 ExchangePhase::Consent => self.conclude(),
                 ExchangePhase::Over => break,
             }
@@ -268,7 +268,7 @@ impl ExchangeAgent {
         let mut group = Vec::new();
         let mut candidates = Vec::new();
         let mut mine = 0;
-        for place in 0..self.size() {
+        for place in 0..self.group_size() {
             if place == self.me {
                 mine = group.len();
                 group.push(self.aircraft.clone());
@@ -287,13 +287,19 @@ impl ExchangeAgent {
                 group.extend(possible);
             }
         }
-        filter(&group, &candidates, self.steps(), self.dtau_s(), self.setup.certainty)[mine]
+        filter_maneuvers(
+            &group,
+            &candidates,
+            self.steps_per_dt(),
+            self.dtau_s(),
+            self.setup.certainty,
+        )[mine]
     }
 
     /// Returns the members with which an unheard airplane is an exempt pair, as far as they say so themselves.
     fn exempt_with(&self, place: usize) -> ExemptIds {
         let id = self.id(place);
-        (0..self.size())
+        (0..self.group_size())
             .filter(|&other| {
                 if other == self.me {
                     return self.aircraft.exempt.contains(&id);
@@ -324,7 +330,7 @@ impl ExchangeAgent {
     fn plan_of(
         &self,
         aircraft: ShieldedAircraft,
-        plan: &Option<(TurnProfile, Side)>,
+        plan: &Option<(TurnProfile, OrbitSide)>,
     ) -> SafeManeuver {
         match plan {
             Some((profile, side)) => SafeManeuver::new(aircraft, profile, self.dtau_s(), *side),
@@ -333,12 +339,12 @@ impl ExchangeAgent {
     }
 
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
-    fn accept(&mut self) -> ExchangeMessage {
+    fn accept_plans(&mut self) -> ExchangeMessage {
         let own = self.members[self.me].plan.clone().flatten();
         let mine =
             [self.plan_of(self.aircraft.clone(), &own), self.fallback(self.aircraft.clone())];
         let mut accepts = Vec::new();
-        for place in (0..self.size()).filter(|&place| place != self.me) {
+        for place in (0..self.group_size()).filter(|&place| place != self.me) {
             let ExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
                 &self.members[place]
             else {
@@ -358,7 +364,7 @@ impl ExchangeAgent {
 
     /// Returns the members whose consent a plan of this airplane needs.
     fn consent_members(&self, plan: &SafeManeuver) -> Vec<usize> {
-        (0..self.size())
+        (0..self.group_size())
             .filter(|&place| {
                 let other = &self.setup.aircraft[place].aircraft;
                 place != self.me
@@ -431,7 +437,7 @@ impl ExchangeAgent {
     }
 }
 
-impl link::Agent for ExchangeAgent {
+impl link::ProtocolAgent for ExchangeAgent {
     type Message = ExchangeMessage;
     type Outcome = ExchangeResult;
 
@@ -451,7 +457,7 @@ impl link::Agent for ExchangeAgent {
         }
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         // A proposal, a plan, and a list of those accepted.
         MessageLimits { bytes: self.setup.max_message_bytes(), messages: 3 }
     }
@@ -476,7 +482,7 @@ impl link::Agent for ExchangeAgent {
 
     fn awaited_members(&self) -> Vec<usize> {
         let phase = self.phase();
-        (0..self.size())
+        (0..self.group_size())
             .filter(|&place| place != self.me && !self.members[place].gone)
             .filter(|&place| {
                 let member = &self.members[place];

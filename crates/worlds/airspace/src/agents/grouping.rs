@@ -48,10 +48,10 @@ mod tests;
 use super::link::{self, MessageLimits};
 use super::participant::InvalidMessage;
 use crate::flight::distance_m;
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::PlanCertainty;
-pub use beacon::{Beacon, Item, SurveillanceReport};
-use roster::Roster;
+pub use beacon::{Beacon, SurveillanceItem, SurveillanceReport};
+use roster::BeaconStore;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
 
@@ -67,7 +67,7 @@ pub struct GroupingInput {
     /// Those near it, itself among them, by rising id.
     pub near: Vec<SurveillanceReport>,
     /// Non-cooperative airplanes near it, by rising id.
-    pub non_cooperative: Vec<NonCooperative>,
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
     /// Whether each of those near was heard lately or is met for the first time.
     pub expected: Vec<bool>,
     /// Number of all airplanes.
@@ -84,14 +84,14 @@ pub struct GroupingResult {
     /// The airplanes that decide together, its own among them, by rising id.
     pub members: Vec<SurveillanceReport>,
     /// The non-cooperative airplanes near any of them, by rising id.
-    pub non_cooperative: Vec<NonCooperative>,
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
 }
 
 /// The agent of one airplane that looks for its group.
 #[derive(Debug)]
 pub struct GroupingAgent {
     input: GroupingInput,
-    roster: Roster,
+    roster: BeaconStore,
     /// The airplanes near it that have sent their beacons themselves.
     heard: BTreeSet<EntityId>,
     /// Whether nothing more will come from each of those near.
@@ -121,7 +121,7 @@ impl GroupingAgent {
             .collect();
         Self {
             is_gone,
-            roster: Roster::new(beacon, is_sure),
+            roster: BeaconStore::new(beacon, is_sure),
             input,
             heard: BTreeSet::new(),
             unsent: BTreeSet::new(),
@@ -136,19 +136,19 @@ impl GroupingAgent {
     }
 
     /// Returns the others near it, with their places.
-    fn others(&self) -> impl Iterator<Item = (usize, EntityId)> {
+    fn nearby_others(&self) -> impl Iterator<Item = (usize, EntityId)> {
         let me = self.input.me;
         self.input.near.iter().map(|one| one.id).enumerate().filter(move |(place, _)| *place != me)
     }
 
     /// Takes an item. Returns whether others may lack it now that did not before.
-    fn receive_item(&mut self, from: EntityId, item: Item) -> bool {
-        let id = item.about();
+    fn receive_item(&mut self, from: EntityId, item: SurveillanceItem) -> bool {
+        let id = item.subject_id();
         if id == self.id() {
             return false;
         }
         match item {
-            Item::Beacon(beacon) => {
+            SurveillanceItem::Beacon(beacon) => {
                 let is_own = id == from;
                 let is_new = self.roster.add_beacon(beacon, is_own);
                 if is_new {
@@ -160,24 +160,24 @@ impl GroupingAgent {
                 self.has_news |= is_new | is_own;
                 false
             }
-            Item::Report { heard, .. } => {
+            SurveillanceItem::Report { heard, .. } => {
                 let is_new = self.roster.add_report(id, heard);
                 if is_new {
                     self.unsent.insert((id, true));
                 }
                 self.has_news |= is_new;
-                is_new && self.others().any(|(_, other)| other == id)
+                is_new && self.nearby_others().any(|(_, other)| other == id)
             }
         }
     }
 
     /// Returns whether another one near lacks the known items about an airplane.
     fn is_missing_nearby(&self, about: EntityId) -> bool {
-        self.others().any(|(_, id)| id != about && self.roster.is_missing(id, about))
+        self.nearby_others().any(|(_, id)| id != about && self.roster.is_missing(id, about))
     }
 
     /// Takes out the items that have to be relayed, of those `about` these airplanes.
-    fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<Item>> {
+    fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<SurveillanceItem>> {
         let mut items = Vec::new();
         for &id in about {
             let keys =
@@ -192,27 +192,28 @@ impl GroupingAgent {
                 items.extend(self.roster.item(key.0, key.1));
             }
         }
-        items.chunks(MAX_ITEMS).map(<[Item]>::to_vec).collect()
+        items.chunks(MAX_ITEMS).map(<[SurveillanceItem]>::to_vec).collect()
     }
 
     /// Returns whether all near have been heard, or never will be.
     fn has_heard_all(&self) -> bool {
-        self.others().all(|(place, id)| self.is_gone[place] || self.heard.contains(&id))
+        self.nearby_others().all(|(place, id)| self.is_gone[place] || self.heard.contains(&id))
     }
 
     /// Returns whether it has all on which its group depends, or as much as it ever will.
     fn has_all(&mut self) -> bool {
-        let present = self.present();
-        self.missing(&present).is_empty() && (present.is_empty() || self.roster.update_chain())
+        let present = self.present_others();
+        self.places_with_missing_items(&present).is_empty()
+            && (present.is_empty() || self.roster.update_chain())
     }
 
     /// Returns the others near it from which something may come, with their places.
-    fn present(&self) -> Vec<(usize, EntityId)> {
-        self.others().filter(|&(place, _)| !self.is_gone[place]).collect()
+    fn present_others(&self) -> Vec<(usize, EntityId)> {
+        self.nearby_others().filter(|&(place, _)| !self.is_gone[place]).collect()
     }
 
     /// Returns the places of those from which an item is missing.
-    fn missing(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
+    fn places_with_missing_items(&self, present: &[(usize, EntityId)]) -> Vec<usize> {
         // Where nothing is lost, an item may have come by way of any airplane.
         let is_sure = self.input.certainty == PlanCertainty::Sure;
         present
@@ -226,7 +227,7 @@ impl GroupingAgent {
     }
 
     /// Continues as far as the messages heard allow.
-    fn advance(&mut self) -> Vec<Vec<Item>> {
+    fn advance(&mut self) -> Vec<Vec<SurveillanceItem>> {
         let mut outgoing = Vec::new();
         // To look at all items anew for each message that says nothing new would take most of the time.
         if !std::mem::take(&mut self.has_news) {
@@ -238,7 +239,7 @@ impl GroupingAgent {
             let heard: Vec<EntityId> = self.heard.iter().copied().collect();
             self.roster.add_report(about, heard.clone());
             // An agent that has heard no other one reports too, because those that hear it wait for the report.
-            outgoing.push(vec![Item::Report { about, heard }]);
+            outgoing.push(vec![SurveillanceItem::Report { about, heard }]);
         }
         if self.result.is_none() && self.has_reported && self.has_all() {
             self.find_group();
@@ -264,40 +265,46 @@ impl GroupingAgent {
     }
 }
 
-impl link::Agent for GroupingAgent {
-    type Message = Vec<Item>;
+impl link::ProtocolAgent for GroupingAgent {
+    type Message = Vec<SurveillanceItem>;
     type Outcome = GroupingResult;
 
-    fn start(&mut self) -> Vec<Vec<Item>> {
+    fn start(&mut self) -> Vec<Vec<SurveillanceItem>> {
         let own = self.roster.item(self.id(), false);
-        let mut outgoing: Vec<Vec<Item>> = own.map(|item| vec![item]).into_iter().collect();
+        let mut outgoing: Vec<Vec<SurveillanceItem>> =
+            own.map(|item| vec![item]).into_iter().collect();
         outgoing.extend(self.advance());
         outgoing
     }
 
-    fn check(&self, _: usize, items: &Vec<Item>) -> Result<(), InvalidMessage> {
-        InvalidMessage::Length.unless((1..=MAX_ITEMS).contains(&items.len()))?;
+    fn check(&self, _: usize, items: &Vec<SurveillanceItem>) -> Result<(), InvalidMessage> {
+        InvalidMessage::Length.ensure((1..=MAX_ITEMS).contains(&items.len()))?;
         items.iter().try_for_each(|item| {
             item.check(self.input.airplanes)?;
             let near = &self.input.near;
-            let place = near.binary_search_by_key(&item.about(), |one| one.id);
-            if let (Item::Beacon(beacon), Ok(k)) = (item, place) {
+            let place = near.binary_search_by_key(&item.subject_id(), |one| one.id);
+            if let (SurveillanceItem::Beacon(beacon), Ok(k)) = (item, place) {
                 // A beacon must say where all see its airplane; only of those farther away is it believed.
-                InvalidMessage::Plan.unless(beacon.own == near[k])?;
+                InvalidMessage::Plan.ensure(beacon.own == near[k])?;
             }
             Ok(())
         })
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         let n = self.input.airplanes;
         // Two items of each airplane, and each comes only once from one sender.
         MessageLimits { bytes: MAX_ITEMS * beacon::max_item_bytes(n), messages: 2 * n as u32 + 2 }
     }
 
-    fn on_message(&mut self, from: usize, items: Vec<Item>) -> Vec<Vec<Item>> {
+    fn on_message(
+        &mut self,
+        from: usize,
+        items: Vec<SurveillanceItem>,
+    ) -> Vec<Vec<SurveillanceItem>> {
         let from = self.input.near[from].id;
-        let mut about: BTreeSet<EntityId> = items.iter().map(Item::about).collect();
+        let mut about: BTreeSet<EntityId> =
+            items.iter().map(SurveillanceItem::subject_id).collect();
         let mut may_lack_more = false;
         for item in items {
             may_lack_more |= self.receive_item(from, item);
@@ -314,8 +321,8 @@ impl link::Agent for GroupingAgent {
         if self.result.is_some() {
             return Vec::new();
         }
-        let present = self.present();
-        let missing = self.missing(&present);
+        let present = self.present_others();
+        let missing = self.places_with_missing_items(&present);
         if !missing.is_empty() || self.roster.is_complete(self.id()) {
             return missing;
         }
@@ -332,7 +339,7 @@ impl link::Agent for GroupingAgent {
         if self.has_reported { 0.95 } else { 0.5 }
     }
 
-    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<Item>> {
+    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<SurveillanceItem>> {
         self.is_gone[other] = true;
         self.has_news = true;
         self.advance()

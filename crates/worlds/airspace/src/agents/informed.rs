@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 /// Messages between agents.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum InformedMessage {
+pub enum PredictionSharingMessage {
     /// The predictions of all the sender's actions.
     Predictions {
         /// Beacon of the sender.
@@ -61,7 +61,7 @@ pub enum InformedMessage {
 
 /// A member of the group, as an agent knows it.
 #[derive(Debug, Default)]
-struct InformedMember {
+struct PredictionSharingMember {
     beacon: Option<StateBeacon>,
     options: Option<ActionPredictions>,
     /// Distributions after each round; round 0 is the start.
@@ -72,7 +72,7 @@ struct InformedMember {
     gone: bool,
 }
 
-impl InformedMember {
+impl PredictionSharingMember {
     /// Returns its message that holds in a round, if that is known.
     fn message_in_round<'a, T>(
         &self,
@@ -85,7 +85,7 @@ impl InformedMember {
         }
     }
 
-    fn q(&self, round: u32) -> Option<&Vec<f64>> {
+    fn distribution(&self, round: u32) -> Option<&Vec<f64>> {
         self.message_in_round(&self.q, round)
     }
 
@@ -99,7 +99,7 @@ impl InformedMember {
     }
 
     /// Returns how far it has moved in a round.
-    fn change(&self, round: u32) -> f64 {
+    fn distribution_change(&self, round: u32) -> f64 {
         self.changes.get(&round).copied().unwrap_or(0.0)
     }
 
@@ -114,10 +114,10 @@ impl InformedMember {
 
 /// An agent that keeps the options of all members, and so knows what any joint choice costs.
 #[derive(Debug)]
-pub struct InformedAgent {
+pub struct PredictionSharingAgent {
     own: Ownship,
     by_model: bool,
-    members: Vec<InformedMember>,
+    members: Vec<PredictionSharingMember>,
     game: Option<PairwiseGame>,
     player: Player,
     /// Number of rounds made.
@@ -125,27 +125,27 @@ pub struct InformedAgent {
     calm: u32,
 }
 
-impl InformedAgent {
+impl PredictionSharingAgent {
     /// Returns one that has not sent anything yet.
     pub(crate) fn new(own: Ownship, by_model: bool) -> Self {
-        let mut members: Vec<InformedMember> =
-            (0..own.common.ids.len()).map(|_| InformedMember::default()).collect();
+        let mut members: Vec<PredictionSharingMember> =
+            (0..own.common.ids.len()).map(|_| PredictionSharingMember::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
         Self { own, by_model, members, game: None, player, round: 0, calm: 0 }
     }
 
-    fn model_message(&self) -> InformedMessage {
+    fn model_message(&self) -> PredictionSharingMessage {
         let beacon = self.own.beacon.clone();
         if !self.by_model {
-            return InformedMessage::Predictions {
+            return PredictionSharingMessage::Predictions {
                 beacon,
                 predictions: self.own.options.predictions.clone(),
             };
         }
         let KnownAircraft { slot, next, orders, altitude_m, .. } = self.own.known;
         let mission = self.own.mission.clone();
-        InformedMessage::Model {
+        PredictionSharingMessage::Model {
             beacon,
             next: next as u32,
             mission,
@@ -155,7 +155,7 @@ impl InformedAgent {
         }
     }
 
-    fn is_exact(&self) -> bool {
+    fn has_exact_expectations(&self) -> bool {
         self.own.settings().estimator == Estimator::Exact
     }
 
@@ -168,7 +168,7 @@ impl InformedAgent {
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 // An exact player needs only the pairs that it is part of.
-                if !self.is_exact() || i == self.own.me || j == self.own.me {
+                if !self.has_exact_expectations() || i == self.own.me || j == self.own.me {
                     add_pair_costs(&mut game, objective, [i, j], [all[i], all[j]]);
                 }
             }
@@ -189,13 +189,13 @@ impl InformedAgent {
     fn awaited_in_round(&self) -> Vec<usize> {
         let mut awaited = Vec::new();
         for (j, member) in self.members.iter().enumerate() {
-            let is_missing = if !self.is_exact() {
+            let is_missing = if !self.has_exact_expectations() {
                 let has_drawn = self.members[self.own.me].samples.contains_key(&self.round);
                 has_drawn && member.samples(self.round).is_none()
             } else if self.has_moved() {
-                member.q(self.round + 1).is_none()
+                member.distribution(self.round + 1).is_none()
             } else {
-                member.q(self.round_of_update(j)).is_none()
+                member.distribution(self.round_of_update(j)).is_none()
             };
             if is_missing {
                 awaited.push(j);
@@ -216,7 +216,7 @@ impl InformedAgent {
         self.members[self.own.me].q.contains_key(&(self.round + 1))
     }
 
-    fn exact_step(&mut self) -> OptimizerStep<InformedMessage> {
+    fn exact_step(&mut self) -> OptimizerStep<PredictionSharingMessage> {
         let round = self.round + 1;
         if !self.has_moved() {
             return OptimizerStep::Send(self.exact_update(round));
@@ -231,12 +231,12 @@ impl InformedAgent {
         if is_over { OptimizerStep::Conclude } else { OptimizerStep::Done }
     }
 
-    fn exact_update(&mut self, round: u32) -> InformedMessage {
+    fn exact_update(&mut self, round: u32) -> PredictionSharingMessage {
         let me = self.own.me;
         let settings = *self.own.settings();
         let mut q: Vec<Vec<f64>> = Vec::with_capacity(self.members.len());
         for (j, member) in self.members.iter().enumerate() {
-            q.extend(member.q(self.round_of_update(j)).cloned());
+            q.extend(member.distribution(self.round_of_update(j)).cloned());
         }
         if let Some(game) = &self.game {
             self.player.set_expected(|expected| game.expected_costs(me, &q, expected));
@@ -245,21 +245,26 @@ impl InformedAgent {
         let q = self.player.q.clone();
         self.members[me].q.insert(round, q.clone());
         self.members[me].changes.insert(round, change);
-        InformedMessage::Distribution { round, change, q }
+        PredictionSharingMessage::Distribution { round, change, q }
     }
 
     /// Counts the rounds up to this one in which no distribution moved.
     fn count_calm_rounds(&mut self, round: u32) {
-        let max_change = self.members.iter().map(|m| m.change(round)).fold(0.0, f64::max);
+        let max_change =
+            self.members.iter().map(|m| m.distribution_change(round)).fold(0.0, f64::max);
         self.calm = self.own.settings().stop.count_calm_rounds(self.calm, max_change);
     }
 
     /// Draws samples, unless it has; else learns from the samples of all.
-    fn sampled_step(&mut self, block: usize, ageing: f64) -> OptimizerStep<InformedMessage> {
+    fn sampled_step(
+        &mut self,
+        block: usize,
+        ageing: f64,
+    ) -> OptimizerStep<PredictionSharingMessage> {
         let me = self.own.me;
         let round = self.round;
         if !self.members[me].samples.contains_key(&round) {
-            return OptimizerStep::Send(self.draw(block));
+            return OptimizerStep::Send(self.draw_samples(block));
         }
         if round > 0 {
             self.count_calm_rounds(round);
@@ -274,17 +279,17 @@ impl InformedAgent {
         for member in &mut self.members {
             member.forget_before(round);
         }
-        OptimizerStep::Send(self.draw(block))
+        OptimizerStep::Send(self.draw_samples(block))
     }
 
-    fn draw(&mut self, block: usize) -> InformedMessage {
+    fn draw_samples(&mut self, block: usize) -> PredictionSharingMessage {
         let me = self.own.me;
         let round = self.round;
         let samples = self.own.samples(&self.player, u64::from(round) * block as u64, block);
         // Before the first round nothing can have settled.
         let change = *self.members[me].changes.entry(round).or_insert(f64::INFINITY);
         self.members[me].samples.insert(round, samples.clone());
-        InformedMessage::Samples {
+        PredictionSharingMessage::Samples {
             round,
             change,
             samples: samples.iter().map(|&x| x as u16).collect(),
@@ -307,8 +312,8 @@ impl InformedAgent {
     }
 }
 
-impl Optimizer for InformedAgent {
-    type Message = InformedMessage;
+impl Optimizer for PredictionSharingAgent {
+    type Message = PredictionSharingMessage;
 
     fn ownship(&self) -> &Ownship {
         &self.own
@@ -318,11 +323,15 @@ impl Optimizer for InformedAgent {
         self.round
     }
 
-    fn first_message(&mut self) -> InformedMessage {
+    fn first_message(&mut self) -> PredictionSharingMessage {
         self.model_message()
     }
 
-    fn check_message(&self, from: usize, message: &InformedMessage) -> Result<(), InvalidMessage> {
+    fn check_message(
+        &self,
+        from: usize,
+        message: &PredictionSharingMessage,
+    ) -> Result<(), InvalidMessage> {
         self.validate(from, message)
     }
 
@@ -341,16 +350,16 @@ impl Optimizer for InformedAgent {
         MessageLimits { bytes, messages: rounds.saturating_add(2) }
     }
 
-    fn receive(&mut self, from: usize, message: InformedMessage) {
+    fn receive(&mut self, from: usize, message: PredictionSharingMessage) {
         let member = &mut self.members[from];
         match message {
-            InformedMessage::Predictions { beacon, predictions } => {
+            PredictionSharingMessage::Predictions { beacon, predictions } => {
                 let options =
                     ActionPredictions::new(predictions, beacon.separation_m, beacon.levels);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            InformedMessage::Model { beacon, next, mission, .. } => {
+            PredictionSharingMessage::Model { beacon, next, mission, .. } => {
                 let options =
                     self.own.common.action_predictions(from, &beacon, &mission, next as usize);
                 member.options.get_or_insert(options);
@@ -358,12 +367,12 @@ impl Optimizer for InformedAgent {
             }
             // Messages of one that was given up no longer matter.
             _ if member.gone => {}
-            InformedMessage::Samples { round, change, samples } => {
+            PredictionSharingMessage::Samples { round, change, samples } => {
                 let samples = samples.iter().map(|&x| usize::from(x)).collect();
                 member.samples.insert(round, samples);
                 member.changes.insert(round, change);
             }
-            InformedMessage::Distribution { round, change, q } => {
+            PredictionSharingMessage::Distribution { round, change, q } => {
                 member.q.insert(round, q);
                 member.changes.insert(round, change);
             }
@@ -377,7 +386,7 @@ impl Optimizer for InformedAgent {
         (0..self.members.len()).filter(|&j| self.members[j].options.is_none()).collect()
     }
 
-    fn step(&mut self) -> OptimizerStep<InformedMessage> {
+    fn step(&mut self) -> OptimizerStep<PredictionSharingMessage> {
         if self.game.is_none() {
             self.start_game();
             return OptimizerStep::Done;
@@ -393,10 +402,10 @@ impl Optimizer for InformedAgent {
         member.gone = true;
         if member.options.is_none() {
             // Samples are numbers of options, which are unknown here, so they mean nothing.
-            *member = InformedMember {
+            *member = PredictionSharingMember {
                 gone: true,
                 beacon: member.beacon.take(),
-                ..InformedMember::default()
+                ..PredictionSharingMember::default()
             };
             member.options = Some(self.own.presumed_predictions(other));
         }

@@ -55,7 +55,7 @@ impl IntentAgent {
     }
 }
 
-impl link::Agent for IntentAgent {
+impl link::ProtocolAgent for IntentAgent {
     type Message = Intent;
     /// Messages of the members, by place.
     type Outcome = Vec<Option<Intent>>;
@@ -67,12 +67,12 @@ impl link::Agent for IntentAgent {
     fn check(&self, from: usize, intent: &Intent) -> Result<(), InvalidMessage> {
         let FiledFlight { max_way_points, orders, .. } = self.start.filed[from];
         let is_filed = intent.next as usize <= max_way_points && intent.orders as usize <= orders;
-        InvalidMessage::Plan.unless(is_filed)?;
-        InvalidMessage::Number.unless(are_valid_coordinates([intent.altitude_m]))?;
+        InvalidMessage::Plan.ensure(is_filed)?;
+        InvalidMessage::Number.ensure(are_valid_coordinates([intent.altitude_m]))?;
         intent.resolving.check(self.start.airplanes)
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         // An id takes at most 5 bytes.
         MessageLimits { bytes: 64 + 5 * self.start.airplanes, messages: 1 }
     }
@@ -116,10 +116,10 @@ impl ActiveResolutions {
     /// # Errors
     /// When there are no such airplanes, or no such heading.
     pub(crate) fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
-        let with: &[EntityId] = self.slots();
+        let with: &[EntityId] = self.conflict_slots();
         let is_ascending = with.windows(2).all(|pair| pair[0] < pair[1]);
         let are_known = with.iter().all(|&id| (id as usize) < airplanes);
-        InvalidMessage::Airplane.unless(is_ascending && are_known)?;
-        InvalidMessage::Number.unless(self.heading_rad().is_finite())
+        InvalidMessage::Airplane.ensure(is_ascending && are_known)?;
+        InvalidMessage::Number.ensure(self.heading_rad().is_finite())
     }
 }

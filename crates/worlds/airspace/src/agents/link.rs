@@ -1,6 +1,6 @@
 //! Conversations over a network that loses, delays, duplicates and reorders messages.
 //!
-//! Every agent sends all its messages to all the others of its group. An [`Endpoint`] numbers its
+//! Every agent sends all its messages to all the others of its group. An [`ReliableEndpoint`] numbers its
 //! agent's messages and keeps them; an endpoint that misses one asks for it again. One that does
 //! not answer, although asked so often that it can hardly be alive and reachable, or until the time
 //! for this step is up, is given up for this conversation: the agent goes on with its knowledge of it. One that
@@ -11,7 +11,9 @@
 //! messages are handed in, and messages are taken out.
 
 pub(crate) use super::participant::ConversationEnd;
-use super::participant::{InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome};
+use super::participant::{
+    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, WithOutcome,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
@@ -21,7 +23,7 @@ use std::sync::Arc;
 
 /// An agent as a state machine: messages in, messages to all others out. Others are known by their
 /// place in the group.
-pub trait Agent {
+pub trait ProtocolAgent {
     /// What agents say to each other.
     type Message: Serialize + DeserializeOwned;
     /// What it comes to, e.g. the group that it has found.
@@ -37,7 +39,7 @@ pub trait Agent {
     fn check(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
     /// Returns the largest number of bytes of a message, and of messages of one agent in a conversation.
-    fn limits(&self) -> MessageLimits;
+    fn message_limits(&self) -> MessageLimits;
 
     /// Takes a message of agent `from`, and returns its own messages in response. Messages come in
     /// any order, each once.
@@ -118,7 +120,7 @@ pub struct EndpointConfig {
 
 /// An agent with all that makes its messages arrive.
 #[derive(Debug)]
-pub struct Endpoint<A> {
+pub struct ReliableEndpoint<A> {
     agent: A,
     config: EndpointConfig,
     limits: MessageLimits,
@@ -166,13 +168,13 @@ pub(crate) fn to_bytes<M: Serialize>(message: &M) -> Vec<u8> {
     postcard::to_stdvec(message).expect("messages are plain data")
 }
 
-impl<A: Agent> Endpoint<A> {
+impl<A: ProtocolAgent> ReliableEndpoint<A> {
     /// Returns an endpoint with an agent that has not sent anything yet.
     pub fn new(agent: A, config: EndpointConfig) -> Self {
         let others = vec![PeerState::default(); config.group.len()];
         let retry = RetryTimer::new(config.patience);
         Self {
-            limits: agent.limits(),
+            limits: agent.message_limits(),
             agent,
             config,
             count: 0,
@@ -210,9 +212,9 @@ impl<A: Agent> Endpoint<A> {
     fn read(&self, from: usize, bytes: &[u8]) -> Result<WireMessage<A::Message>, InvalidMessage> {
         let (message, rest) = postcard::take_from_bytes::<WireMessage<A::Message>>(bytes)
             .map_err(|_| InvalidMessage::Form)?;
-        InvalidMessage::Form.unless(rest.is_empty())?;
+        InvalidMessage::Form.ensure(rest.is_empty())?;
         if let WireMessage::Said(number, content) = &message {
-            InvalidMessage::Round.unless(*number < self.limits.messages)?;
+            InvalidMessage::Round.ensure(*number < self.limits.messages)?;
             self.agent.check(from, content)?;
         }
         Ok(message)
@@ -251,9 +253,9 @@ impl<A: Agent> Endpoint<A> {
     }
 }
 
-impl<A: Agent + Send> Participant for Endpoint<A> {
-    fn progress(&self) -> Progress {
-        Progress { round: self.agent.round(), ..Progress::default() }
+impl<A: ProtocolAgent + Send> Participant for ReliableEndpoint<A> {
+    fn progress(&self) -> ConversationProgress {
+        ConversationProgress { round: self.agent.round(), ..ConversationProgress::default() }
     }
 
     fn start(&mut self, tick: u64) {
@@ -274,7 +276,7 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
         tick: u64,
     ) -> Result<(), InvalidMessage> {
         let place = self.config.group.binary_search(&from).map_err(|_| InvalidMessage::Airplane)?;
-        InvalidMessage::Airplane.unless(place != self.config.me)?;
+        InvalidMessage::Airplane.ensure(place != self.config.me)?;
         let message = self.read(place, bytes)?;
         self.others[place].unanswered = 0;
         self.others[place].is_there = true;
@@ -336,7 +338,7 @@ impl<A: Agent + Send> Participant for Endpoint<A> {
     }
 }
 
-impl<A: Agent + Send> WithOutcome for Endpoint<A> {
+impl<A: ProtocolAgent + Send> WithOutcome for ReliableEndpoint<A> {
     type Outcome = A::Outcome;
 
     fn finish(&mut self) -> ConversationEnd<A::Outcome> {

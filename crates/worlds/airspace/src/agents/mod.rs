@@ -2,7 +2,7 @@
 //!
 //! An agent owns its knowledge of its airplane and of others ([`Ownship`]), the knowledge that all share
 //! ([`CommonKnowledge`]), and its part of the optimization. It is a state machine: messages in, messages out. An
-//! [`Endpoint`] is an agent together with the code that makes its messages arrive, a [`Participant`] of a conversation;
+//! [`ReliableEndpoint`] is an agent together with the code that makes its messages arrive, a [`Participant`] of a conversation;
 //! a [`Conversation`] wraps its messages in packets, and lets only sound messages through to it. None of them knows
 //! which network carries the packets, in memory or between processes.
 //!
@@ -34,11 +34,12 @@ pub mod sampling;
 pub mod traffic_state;
 
 pub use conversation::{Conversation, ConversationInfo};
-pub use link::{Agent, Endpoint, EndpointConfig, MessageLimits};
+pub use link::{EndpointConfig, MessageLimits, ProtocolAgent, ReliableEndpoint};
 pub(crate) use optimizer::OptimizingAgent;
 pub use ownship::{CommonKnowledge, FiledFlight, Ownship};
 pub use participant::{
-    ConversationEnd, InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome,
+    ConversationEnd, ConversationProgress, InvalidMessage, OutgoingMessage, Participant,
+    WithOutcome,
 };
 use serde::{Deserialize, Serialize};
 use traffic_state::StateBeacon;

@@ -30,7 +30,7 @@ pub(crate) trait Optimizer {
     /// Returns the message with which it starts, before it has heard anything.
     fn first_message(&mut self) -> Self::Message;
 
-    /// Checks a message of the airplane at a place, see [`link::Agent::check`].
+    /// Checks a message of the airplane at a place, see [`link::ProtocolAgent::check`].
     ///
     /// # Errors
     /// When its content is impossible.
@@ -48,7 +48,7 @@ pub(crate) trait Optimizer {
     /// Takes a step, for which no message is missing.
     fn step(&mut self) -> OptimizerStep<Self::Message>;
 
-    /// Continues without another one, see [`link::Agent::on_peer_gone`].
+    /// Continues without another one, see [`link::ProtocolAgent::on_peer_gone`].
     fn on_peer_gone(&mut self, other: usize, is_settled: bool);
 
     /// Returns its decision; none if it has learned nothing.
@@ -92,7 +92,7 @@ impl<O: Optimizer> OptimizingAgent<O> {
     }
 }
 
-impl<O: Optimizer> link::Agent for OptimizingAgent<O> {
+impl<O: Optimizer> link::ProtocolAgent for OptimizingAgent<O> {
     type Message = O::Message;
     type Outcome = OptimizationResult;
 
@@ -106,7 +106,7 @@ impl<O: Optimizer> link::Agent for OptimizingAgent<O> {
         self.optimizer.check_message(from, message)
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         self.optimizer.limits()
     }
 

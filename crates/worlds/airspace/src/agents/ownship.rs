@@ -3,8 +3,10 @@
 use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{StateBeacon, TrafficPicture, TrafficState};
-use crate::flight::{Action, Air, KnownAircraft, Model, Point, Pose2, Prediction, RoutePosition};
-use crate::non_cooperative::NonCooperative;
+use crate::flight::{
+    Action, Air, AircraftModel, KnownAircraft, Point, Pose2, Prediction, RoutePosition,
+};
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::objective::{ActionPredictions, Objective};
 use crate::purpose;
 use sidestep_collectives::{Estimator, OptimizerConfig, Player};
@@ -32,7 +34,7 @@ pub struct CommonKnowledge {
     /// The random streams from which samples are drawn.
     pub streams: Streams,
     /// Non-cooperative airplanes near the group, as all see them.
-    pub non_cooperative: Vec<NonCooperative>,
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
 }
@@ -41,7 +43,7 @@ pub struct CommonKnowledge {
 #[derive(Debug, Clone)]
 pub struct FiledFlight {
     /// Abilities of the airplane.
-    pub model: Model,
+    pub model: AircraftModel,
     /// Actions from which it may choose.
     pub actions: Vec<Action>,
     /// The knowledge that all others have of it before they have heard it.
@@ -64,7 +66,7 @@ impl CommonKnowledge {
         next: usize,
     ) -> ActionPredictions {
         let FiledFlight { model, actions, .. } = &self.filed[place];
-        let model = Model {
+        let model = AircraftModel {
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             separation_m: beacon.separation_m,
@@ -118,7 +120,7 @@ impl CommonKnowledge {
         let is_filed = beacon.omega_max_rad_s == filed.omega_max_rad_s
             && beacon.orbit_rad_s == filed.orbit_rad_s
             && beacon.separation_m == filed.separation_m;
-        InvalidMessage::Plan.unless(is_filed && beacon.pose == self.poses[place])?;
+        InvalidMessage::Plan.ensure(is_filed && beacon.pose == self.poses[place])?;
         beacon.check(*max_speed_m_s)
     }
 
@@ -131,13 +133,13 @@ impl CommonKnowledge {
         predictions: &[Prediction],
         expected: usize,
     ) -> Result<(), InvalidMessage> {
-        InvalidMessage::Length.unless(predictions.len() == expected)?;
+        InvalidMessage::Length.ensure(predictions.len() == expected)?;
         predictions.iter().try_for_each(|prediction| {
             let is_whole = prediction.points.len() == self.air.timing.horizon;
             InvalidMessage::Length
-                .unless(is_whole && prediction.counted <= prediction.points.len())?;
+                .ensure(is_whole && prediction.counted <= prediction.points.len())?;
             InvalidMessage::Number
-                .unless(are_valid_coordinates(prediction.points.as_flattened().iter().copied()))
+                .ensure(are_valid_coordinates(prediction.points.as_flattened().iter().copied()))
         })
     }
 
@@ -146,8 +148,8 @@ impl CommonKnowledge {
     /// # Errors
     /// When there is no such round, or a distance is no number.
     pub(super) fn check_round(&self, round: u32, change: f64) -> Result<(), InvalidMessage> {
-        InvalidMessage::Round.unless(round <= self.settings.stop.max_rounds)?;
-        InvalidMessage::Number.unless(change >= 0.0)
+        InvalidMessage::Round.ensure(round <= self.settings.stop.max_rounds)?;
+        InvalidMessage::Number.ensure(change >= 0.0)
     }
 
     /// Returns the largest number of bytes of a message with this number of predictions.

@@ -40,14 +40,14 @@ pub trait Participant: Send {
     fn max_message_bytes(&self) -> usize;
 
     /// Returns its progress, for display.
-    fn progress(&self) -> Progress {
-        Progress::default()
+    fn progress(&self) -> ConversationProgress {
+        ConversationProgress::default()
     }
 }
 
 /// How far a participant has come; nothing depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Progress {
+pub struct ConversationProgress {
     /// Number of rounds made; 0 in a conversation without rounds.
     pub round: u32,
     /// Number of the newest epoch that it has accepted; 0 where no coordinator migrates, or none was lost.
@@ -113,7 +113,7 @@ pub(super) fn are_valid_coordinates(values_m: impl IntoIterator<Item = f64>) -> 
 
 impl InvalidMessage {
     /// Returns `Ok` if something holds, or else this reason.
-    pub(crate) fn unless(self, holds: bool) -> Result<(), Self> {
+    pub(crate) fn ensure(self, holds: bool) -> Result<(), Self> {
         if holds { Ok(()) } else { Err(self) }
     }
 }

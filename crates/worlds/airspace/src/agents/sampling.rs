@@ -5,7 +5,7 @@ use super::ownship::Ownship;
 use super::participant::InvalidMessage;
 use super::traffic_state::StateBeacon;
 use super::{ActionChoice, MessageLimits};
-use crate::flight::{Levels, Prediction};
+use crate::flight::{FlightLevelRange, Prediction};
 use crate::objective::{ActionPredictions, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
@@ -59,7 +59,7 @@ impl SamplingMember {
         heard.or_else(|| self.presumed.as_ref()?.predictions.first())
     }
 
-    fn levels(&self) -> Option<Levels> {
+    fn levels(&self) -> Option<FlightLevelRange> {
         let heard = self.beacon.as_ref().map(|beacon| beacon.levels);
         heard.or_else(|| Some(self.presumed.as_ref()?.levels))
     }
@@ -142,14 +142,14 @@ impl SamplingAgent {
     }
 
     /// Computes its part of the costs (lines 10 to 15).
-    fn cost(&mut self) -> SamplingMessage {
-        let costs: Vec<f64> = (0..self.block).map(|k| self.cost_of(k)).collect();
+    fn send_costs(&mut self) -> SamplingMessage {
+        let costs: Vec<f64> = (0..self.block).map(|k| self.sample_cost(k)).collect();
         self.members[self.own.me].costs.insert(self.round, costs.clone());
         SamplingMessage::Costs { round: self.round, costs }
     }
 
     /// Returns its part of the cost of joint sample `k`.
-    fn cost_of(&self, k: usize) -> f64 {
+    fn sample_cost(&self, k: usize) -> f64 {
         let objective = &self.own.common.objective;
         let options = &self.own.options;
         let x = self.samples[k];
@@ -163,7 +163,7 @@ impl SamplingAgent {
                 let presumed = member.presumed.as_ref();
                 let other_separation_m = presumed.map_or(0.0, |options| options.separation_m);
                 let r = options.separation_m.max(other_separation_m);
-                cost += objective.collision(prediction, other, [r, r])[0];
+                cost += objective.collision_costs(prediction, other, [r, r])[0];
             }
         }
         cost
@@ -209,9 +209,9 @@ impl Optimizer for SamplingAgent {
             }
             SamplingMessage::Costs { round, costs } => {
                 common.check_round(*round, 0.0)?;
-                InvalidMessage::Length.unless(costs.len() == self.block)?;
+                InvalidMessage::Length.ensure(costs.len() == self.block)?;
                 // Large ones are accepted, unless their sum would not be a number.
-                InvalidMessage::Number.unless(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
+                InvalidMessage::Number.ensure(costs.iter().all(|cost| (0.0..1e60).contains(cost)))
             }
         }
     }
@@ -259,7 +259,7 @@ impl Optimizer for SamplingAgent {
         } else if self.has_converged() {
             OptimizerStep::Conclude
         } else {
-            OptimizerStep::Send(self.cost())
+            OptimizerStep::Send(self.send_costs())
         }
     }
 

@@ -1,9 +1,9 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
 use super::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{Air, Levels, Point, Pose2, Prediction, distance_m};
+use crate::flight::{Air, FlightLevelRange, Point, Pose2, Prediction, distance_m};
 use crate::objective::ActionPredictions;
-use crate::shield::{ShieldedAircraft, Side};
+use crate::shield::{OrbitSide, ShieldedAircraft};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, math};
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ pub struct StateBeacon {
     /// The separation that it asks for, in meters.
     pub separation_m: f64,
     /// The levels that it is on and changes to.
-    pub levels: Levels,
+    pub levels: FlightLevelRange,
 }
 
 /// An orbit that an airplane may be on: pose, cycle and side.
@@ -38,7 +38,7 @@ pub struct OrbitState {
     /// Cycle of the pose.
     pub as_of: Cycle,
     /// The side to which it turns.
-    pub side: Side,
+    pub side: OrbitSide,
 }
 
 /// One airplane's knowledge of another one.
@@ -62,7 +62,7 @@ pub struct PlanEnd {
     /// The plan ends at the start of this cycle.
     pub as_of: Cycle,
     /// The side to which it turns then.
-    pub side: Side,
+    pub side: OrbitSide,
 }
 
 /// One airplane's knowledge of others, by id.
@@ -105,10 +105,10 @@ impl StateBeacon {
         let Self { pose: Pose2 { at: [x, y], heading_rad }, goal, v_m_s, levels, .. } = self;
         let numbers = [*x, *y, *heading_rad].into_iter().chain(goal.iter().flatten().copied());
         let is_valid_speed = 0.0 < *v_m_s && *v_m_s <= top_m_s;
-        let Levels { low_m, high_m } = levels;
+        let FlightLevelRange { low_m, high_m } = levels;
         let is_valid_level = low_m <= high_m && are_valid_coordinates([*low_m, *high_m]);
         let is_valid = are_valid_coordinates(numbers) && is_valid_speed && is_valid_level;
-        InvalidMessage::Number.unless(is_valid)
+        InvalidMessage::Number.ensure(is_valid)
     }
 }
 

@@ -4,7 +4,7 @@
 pub(super) mod mvp;
 pub(super) mod orca;
 
-use super::flight::{Levels, Point};
+use super::flight::{FlightLevelRange, Point};
 use super::settings::ReactiveSettings;
 use sidestep_kernel::{Slot, math};
 
@@ -25,7 +25,7 @@ pub struct AircraftState {
     /// they may fly within `dt`.
     pub separation_m: f64,
     /// The levels that it is on or passes.
-    pub levels: Levels,
+    pub levels: FlightLevelRange,
     /// Whether it gives way to others, too.
     pub yields: bool,
 }
@@ -37,7 +37,7 @@ impl AircraftState {
     }
 }
 
-fn length(a: Point) -> f64 {
+fn vector_length(a: Point) -> f64 {
     math::hypot(a[0], a[1])
 }
 
@@ -51,7 +51,7 @@ fn moving(slot: Slot, at: Point, heading_rad: f64) -> AircraftState {
         velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
         preferred_rad: heading_rad,
         separation_m: 500.0,
-        levels: Levels::at(0.0),
+        levels: FlightLevelRange::from_level(0.0),
         yields: true,
     }
 }

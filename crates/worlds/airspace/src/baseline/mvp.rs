@@ -6,7 +6,7 @@
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
 
-use super::{AircraftState, length};
+use super::{AircraftState, vector_length};
 use crate::flight::Point;
 use crate::settings::ReactiveSettings;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ pub struct ActiveResolutions {
 
 impl ActiveResolutions {
     /// The others, by rising slot.
-    pub(crate) fn slots(&self) -> &[Slot] {
+    pub(crate) fn conflict_slots(&self) -> &[Slot] {
         &self.with
     }
 
@@ -157,9 +157,9 @@ fn velocity_change(
     let zone_m = own.zone_m(other, settings) * RESOLUTION_FACTOR;
     let apart = sub(other.at, own.at);
     // Two in one place have no line of sight, but its direction must be a number.
-    let distance_m = length(apart).max(1e-9);
+    let distance_m = vector_length(apart).max(1e-9);
     let mut at = closest.at;
-    let mut miss_m = length(at);
+    let mut miss_m = vector_length(at);
     if miss_m <= MAX_HEAD_ON_M {
         miss_m = MAX_HEAD_ON_M;
         at = [apart[1] / distance_m * miss_m, -apart[0] / distance_m * miss_m];
@@ -179,7 +179,7 @@ fn velocity_change(
 fn is_active(own: &AircraftState, other: &AircraftState, settings: ReactiveSettings) -> bool {
     let apart = sub(other.at, own.at);
     let closing = sub(other.velocity, own.velocity);
-    let distance_m = length(apart);
+    let distance_m = vector_length(apart);
     let zone_m = own.zone_m(other, settings);
     let is_past = dot(apart, closing) > 0.0;
     let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();

@@ -8,7 +8,7 @@
 //! one that violates the half-planes least. The margin on separations allows for the time that
 //! turning takes.
 
-use super::{AircraftState, length};
+use super::{AircraftState, vector_length};
 use crate::flight::Point;
 use crate::settings::ReactiveSettings;
 use sidestep_kernel::geometry::{dot, sub};
@@ -37,7 +37,7 @@ pub(crate) fn heading_rad<'a>(
 ) -> Option<f64> {
     let planes: Vec<HalfPlane> =
         others.map(|other| half_plane(own, other, settings, step_s)).collect();
-    let v_m_s = length(own.velocity);
+    let v_m_s = vector_length(own.velocity);
     if min_excess_m_s(&planes, own.preferred_rad, v_m_s) >= 0.0 {
         return None;
     }
@@ -75,7 +75,7 @@ fn half_plane(
     // A pair that is already too near has to be out of the zone by the next step.
     let within_s = if is_too_near { step_s } else { settings.look_ahead_s };
     let from_center = [relative[0] - apart[0] / within_s, relative[1] - apart[1] / within_s];
-    let size = length(from_center).max(1e-9);
+    let size = vector_length(from_center).max(1e-9);
     let along = dot(from_center, apart);
     // The velocity obstacle is a cone whose tip is cut off by a disc: the nearest point of its border is on the disc.
     let is_nearest_on_disc = along < 0.0 && along * along > radius_m * radius_m * size * size;
@@ -140,7 +140,7 @@ mod tests {
             let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
             let theirs = by_library(&own, &other);
             let off = sub(nearest, theirs);
-            prop_assert!(length(off) < 0.02 + 1e-3 * lacks, "{nearest:?} {theirs:?}");
+            prop_assert!(vector_length(off) < 0.02 + 1e-3 * lacks, "{nearest:?} {theirs:?}");
         }
 
         /// Alone with one neighbor, both headings together keep the zone.

@@ -8,7 +8,7 @@ use super::preferences::{rank_by_turn_rate, turn_profiles};
 use crate::baseline::{AircraftState, mvp, orca};
 use crate::flight::{FlightSegment, KnownAircraft, Point, Pose2};
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
@@ -42,7 +42,7 @@ struct StepTraffic<'a> {
 pub(super) fn profiles_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
     resolving: &mut [mvp::ActiveResolutions],
     now: Cycle,
 ) -> Vec<Vec<TurnProfile>> {
@@ -204,7 +204,7 @@ fn point_ahead(pose: Pose2, heading_rad: f64) -> Point {
 /// Returns a non-cooperative airplane after some seconds, with as much more separation as it flies in one `dt`.
 fn non_cooperative_state(
     world: &AirspaceWorld,
-    one: &NonCooperative,
+    one: &NonCooperativeAircraft,
     seconds: f64,
 ) -> AircraftState {
     let [x, y] = one.position_after(seconds);

@@ -1,10 +1,10 @@
 //! Conversations of simple agents, over networks with faults.
 
 use crate::agents::{
-    Agent, Conversation, ConversationEnd, ConversationInfo, Endpoint, EndpointConfig,
-    InvalidMessage, MessageLimits, WithOutcome,
+    Conversation, ConversationEnd, ConversationInfo, EndpointConfig, InvalidMessage, MessageLimits,
+    ProtocolAgent, ReliableEndpoint, WithOutcome,
 };
-use crate::pilot::{ConversationId, Protocol, Schedule, retry_policy};
+use crate::pilot::{ConversationId, ConversationSchedule, Protocol, retry_policy};
 use crate::purpose;
 use proptest::prelude::*;
 use sidestep_kernel::network::{
@@ -50,7 +50,7 @@ impl Adder {
     }
 }
 
-impl Agent for Adder {
+impl ProtocolAgent for Adder {
     type Message = (u32, u64);
     type Outcome = u64;
 
@@ -59,10 +59,10 @@ impl Agent for Adder {
     }
 
     fn check(&self, _: usize, (round, _): &Self::Message) -> Result<(), InvalidMessage> {
-        InvalidMessage::Round.unless(*round < self.rounds)
+        InvalidMessage::Round.ensure(*round < self.rounds)
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         MessageLimits { bytes: 16, messages: self.rounds }
     }
 
@@ -175,7 +175,8 @@ fn sums(
     rounds: u32,
 ) -> Vec<ConversationEnd<u64>> {
     let members: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
-    let (schedule, streams) = (Schedule::for_cycle(3, network), Streams::new(Seed(seed)));
+    let (schedule, streams) =
+        (ConversationSchedule::for_cycle(3, network), Streams::new(Seed(seed)));
     let (begins, ends) = schedule.conversation_ticks(Protocol::Decision, schedule.begins);
     let station = |me: usize| {
         let id = members[me];
@@ -191,7 +192,7 @@ fn sums(
             end_tick: ends,
             is_silent,
         };
-        let participant = Box::new(Endpoint::new(Adder::new(me, group, rounds), config));
+        let participant = Box::new(ReliableEndpoint::new(Adder::new(me, group, rounds), config));
         let mut conversation: Conversation<dyn WithOutcome<Outcome = u64>> =
             Conversation::new(info, participant);
         let mut out = Vec::new();

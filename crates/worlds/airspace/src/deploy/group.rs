@@ -2,14 +2,14 @@
 
 use crate::decide::ManeuverCandidates;
 use crate::join::ControlledGroup;
-use crate::non_cooperative::NonCooperative;
-use crate::pilot::{Control, Memory, Pilot, Schedule};
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::pilot::{Control, ConversationSchedule, Pilot, PilotMemory};
 use crate::purpose;
 use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::{
-    AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, ReplyTiming,
+    AgentDistances, AgentLoop, FaultInjector, FaultStreams, FaultyTransport, ReplyTiming,
 };
 use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, Slot};
@@ -19,14 +19,14 @@ use std::sync::Arc;
 pub(crate) fn decide_group(
     context: &mut PhaseContext<'_>,
     flown: &ControlledGroup,
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
 ) -> Vec<(Control, ManeuverCandidates)> {
     let PhaseContext { world, state, now, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
-    let schedule = Schedule::for_cycle(now, world.network.as_ref());
+    let schedule = ConversationSchedule::for_cycle(now, world.network.as_ref());
     let percepts = flown.percepts(context, non_cooperative);
     let conversations = world.conversation_times_on(now, schedule);
-    let mut network = network(world, state, &conversations);
+    let mut network = conversation_network(world, state, &conversations);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, percept) in pilots.iter_mut().zip(percepts) {
         pilot.start_with_schedule(percept, schedule);
@@ -34,12 +34,12 @@ pub(crate) fn decide_group(
     network.run(&mut pilots, schedule.begins, Pilot::has_decided);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     network.run(&mut pilots, schedule.begins, Pilot::is_done);
-    outcomes(pilots)
+    conversation_outcomes(pilots)
 }
 
 /// Returns the outcome of the conversations of a group. Where one waits for a message that never comes, all stay on
 /// their orbits, because plans that are sure are safe only if all fly them.
-fn outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
+fn conversation_outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
     if pilots.iter().all(Pilot::is_done) {
         let outcomes = pilots.into_iter().map(Pilot::into_outcome);
         outcomes.map(|outcome| outcome.expect("it has come to an end")).collect()
@@ -53,15 +53,15 @@ fn outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
 pub(crate) fn run_pilots(
     world: &AirspaceWorld,
     state: &AirspaceState,
-    (now, schedule): (Cycle, Schedule),
+    (now, schedule): (Cycle, ConversationSchedule),
     pilots: &mut [Pilot],
 ) {
     let conversations = world.conversation_times_on(now, schedule);
-    network(world, state, &conversations).run(pilots, schedule.begins, Pilot::is_done);
+    conversation_network(world, state, &conversations).run(pilots, schedule.begins, Pilot::is_done);
 }
 
 /// Returns the network of the conversations of a cycle.
-fn network<'a>(
+fn conversation_network<'a>(
     world: &'a AirspaceWorld,
     state: &'a AirspaceState,
     conversations: &'a [(u64, f64)],
@@ -75,7 +75,7 @@ fn network<'a>(
     AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None }
 }
 
-impl Distances for AirspaceState {
+impl AgentDistances for AirspaceState {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         AirspaceState::distance_m(self, link)
     }
@@ -84,7 +84,7 @@ impl Distances for AirspaceState {
 impl AirspaceWorld {
     /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run: the
     /// first conversation starts with the cycle, and the shield's exchange when that has to be over.
-    fn conversation_times_on(&self, now: Cycle, schedule: Schedule) -> [(u64, f64); 2] {
+    fn conversation_times_on(&self, now: Cycle, schedule: ConversationSchedule) -> [(u64, f64); 2] {
         let starts_s = self.cycle_start_s(now);
         let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
         [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
@@ -98,7 +98,7 @@ impl AirspaceWorld {
 
     /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run.
     pub fn conversation_times(&self, now: Cycle) -> [(u64, f64); 2] {
-        self.conversation_times_on(now, Schedule::for_cycle(now, self.network.as_ref()))
+        self.conversation_times_on(now, ConversationSchedule::for_cycle(now, self.network.as_ref()))
     }
 
     /// Returns the streams and purposes from which faults are drawn.
@@ -107,7 +107,7 @@ impl AirspaceWorld {
     }
 }
 
-fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<Memory>) -> Vec<Pilot> {
+fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<PilotMemory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
     flown
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use crate::events::EventKind;
     use crate::pilot::{Maneuver, Percept};
-    use crate::{AirspaceRun, Fleet, airspace_run};
+    use crate::{AirspaceRun, RemotePilotRun, airspace_run};
     use sidestep_scenario::Source;
 
     /// Returns the pilots of a group that looks for itself; the first one is of another build, and no other takes it
@@ -133,7 +133,7 @@ mod tests {
             let build = if percept.own.id == 0 { "another" } else { "this" };
             let pilot = Pilot::new(world.clone(), percept.own.id, Default::default());
             let mut pilot = pilot.with_build(build);
-            pilot.start_with_schedule(percept, Schedule::for_cycle(0, None));
+            pilot.start_with_schedule(percept, ConversationSchedule::for_cycle(0, None));
             pilot
         };
         run.percepts().into_iter().map(pilot).collect()
@@ -145,9 +145,14 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n";
         let run = airspace_run(&Source::new("g", text, ""), 1).expect("a scenario");
         let mut pilots = begun(&run);
-        run_pilots(run.world(), run.state(), (0, Schedule::for_cycle(0, None)), &mut pilots);
+        run_pilots(
+            run.world(),
+            run.state(),
+            (0, ConversationSchedule::for_cycle(0, None)),
+            &mut pilots,
+        );
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
-        for (control, _) in outcomes(pilots) {
+        for (control, _) in conversation_outcomes(pilots) {
             assert_eq!(control.maneuver, Maneuver::Orbit);
             let kinds: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
             assert_eq!(kinds, [EventKind::Deadline]);

@@ -1,7 +1,7 @@
 //! Observations: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
 use crate::flight::{FlightSegment, KnownAircraft, Point, distance_m};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{BufferMut, Space, SpaceKind};
@@ -61,7 +61,7 @@ impl VisibleAircraft {
     pub(super) fn from_group(
         context: &PhaseContext<'_>,
         members: &[KnownAircraft],
-        non_cooperative: &[NonCooperative],
+        non_cooperative: &[NonCooperativeAircraft],
     ) -> Vec<Self> {
         let PhaseContext { world, state, .. } = context;
         let cooperative = members.iter().map(|known| {
@@ -116,9 +116,9 @@ impl Observation {
         }
     }
 
-    /// Writes it into a row of each buffer, in the order of [`spaces`].
+    /// Writes it into a row of each buffer, in the order of [`observation_spaces`].
     pub(super) fn write(&self, world: &AirspaceWorld, row: usize, buffers: &mut [BufferMut<'_>]) {
-        let mut row = Row { buffers: buffers.iter_mut(), row };
+        let mut row = ObservationRow { buffers: buffers.iter_mut(), row };
         row.write_integers(&[i64::from(self.is_due)]);
         row.write_reals(&self.at);
         row.write_reals(&[self.altitude_m]);
@@ -149,12 +149,12 @@ impl Observation {
 }
 
 /// One airplane's row in buffers that are written one after the other.
-struct Row<'a, 'b> {
+struct ObservationRow<'a, 'b> {
     buffers: std::slice::IterMut<'a, BufferMut<'b>>,
     row: usize,
 }
 
-impl Row<'_, '_> {
+impl ObservationRow<'_, '_> {
     fn write_integers(&mut self, values: &[i64]) {
         let Some(buffer) = self.buffers.next() else { return };
         let first = self.row * values.len();
@@ -227,14 +227,14 @@ fn wrap_heading(heading_rad: f64) -> f64 {
 }
 
 /// Returns the spaces of the observations of a team's airplanes.
-pub(super) fn spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
+pub(super) fn observation_spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
     let max_turn_rate_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
     let max_way_points =
         agents.iter().map(|&id| max_way_points(world, id)).max().unwrap_or(0) as i64;
     let mut spaces = vec![
         Space::new(
             "due",
-            yes_or_no(),
+            yes_no_space(),
             "whether it decides in the next cycle; all else is padding if not",
         ),
         Space::new("place_m", UNBOUNDED, "its place, east and north, as all see it")
@@ -275,7 +275,7 @@ fn max_way_points(world: &AirspaceWorld, id: EntityId) -> usize {
     (0..=orders).map(|done| world.segment(id, done).mission.len()).max().unwrap_or(0)
 }
 
-fn yes_or_no() -> SpaceKind {
+fn yes_no_space() -> SpaceKind {
     SpaceKind::Discrete(["no", "yes"].map(String::from).into())
 }
 
@@ -307,8 +307,12 @@ fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
         each("neighbor_heading_rad", ANGLE, "their headings, counterclockwise from east"),
         each("neighbor_speed_m_s", POSITIVE, "their speeds through the air"),
         each("neighbor_separation_m", POSITIVE, "the distances that it and they are to keep"),
-        each("neighbor_minds", yes_or_no(), "whether they mind others"),
-        each("neighbor_named", yes_or_no(), "whether the shield promises nothing for it and them"),
+        each("neighbor_minds", yes_no_space(), "whether they mind others"),
+        each(
+            "neighbor_named",
+            yes_no_space(),
+            "whether the shield promises nothing for it and them",
+        ),
     ];
     if world.network.is_some() {
         let bounds = SpaceKind::Real { low: -1.0, high: f64::INFINITY };

@@ -2,7 +2,7 @@ mod maneuvers;
 
 use crate::external_action::ExternalAction;
 use crate::flight::{KnownAircraft, Pose2, distance_m};
-use crate::non_cooperative::NonCooperative;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::trace::InspectionTrace;
 use crate::{AirspaceRun, Scratch, airspace_run};
 use sidestep_kernel::control::{BufferMut, OrderLog, Orders, Team};
@@ -71,7 +71,7 @@ fn run(workers: usize) -> AirspaceRun {
 /// Returns the observations of a team: one vector per space, as real numbers.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
     let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
-    let width = |k: usize| observed[k].width() * agents.len();
+    let width = |k: usize| observed[k].value_count() * agents.len();
     // Filled with something, because all of it must be written.
     let mut whole: Vec<_> = (0..observed.len()).map(|k| vec![77; width(k)]).collect();
     let mut real: Vec<_> = (0..observed.len()).map(|k| vec![f64::NAN; width(k)]).collect();
@@ -106,7 +106,7 @@ fn order_all(run: &mut AirspaceRun) {
                 continue;
             }
             let [x, y] = [0, 1].map(|part| one("neighbor_place_m", part));
-            let actions = team.action_spaces[0].width();
+            let actions = team.action_spaces[0].value_count();
             let first = (one("delay_s", 0).abs() + x.abs()) as usize % actions;
             let ranking: Vec<f64> = (0..actions).map(|k| ((first + k) % actions) as f64).collect();
             let turn = -0.5 * one("turn_rate_rad_s", 0) + 0.01 * cos(one("heading_rad", 0));
@@ -202,7 +202,7 @@ fn going_back_gives_the_same_orders_again() {
 
 /// Returns the knowledge of an airplane's group when it decides in the present cycle; nothing if
 /// the airplane does not.
-fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<KnownAircraft>, Vec<NonCooperative>) {
+fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<KnownAircraft>, Vec<NonCooperativeAircraft>) {
     let (world, now) = (run.world(), run.cycle());
     let copy = crate::state::AirspaceState::restore(world, &run.state().snapshot(now));
     let notes = Some(Box::new(InspectionTrace { slot: id, ..InspectionTrace::default() }));
@@ -233,7 +233,7 @@ fn compare_others(
     of: Row<'_>,
     me: &KnownAircraft,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperative],
+    non_cooperative: &[NonCooperativeAircraft],
 ) -> [usize; 2] {
     let [x, y] = me.pose.at;
     let flying = group.iter().map(|known| (known.slot, known.pose.at, true));

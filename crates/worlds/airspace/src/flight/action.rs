@@ -1,6 +1,6 @@
 //! Actions: the possible motions of an airplane in the near future, as the optimizer knows them.
 
-use super::motion::Model;
+use super::motion::AircraftModel;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -82,14 +82,14 @@ fn turn_text(omega_rad_s: f64) -> String {
 /// Detours around others: a turn, a straight leg, and then proceeding.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Legs {
+pub struct DetourLegs {
     /// Times in seconds that the turns may last.
     pub turns_s: Vec<f64>,
     /// Ends of the legs, in seconds from the start of the turn.
     pub until_s: Vec<f64>,
 }
 
-impl Legs {
+impl DetourLegs {
     /// Returns the legs of the default preset: heading changes of 10 to 60 degrees at the paper's
     /// turn rates, held for as long as most conflicts take to pass.
     pub fn default_preset() -> Self {
@@ -122,7 +122,12 @@ impl Legs {
 /// it is the paper's: `2 m + 1` actions, every rate held forever and for `dt_s`. With legs, which
 /// never start a turn only to undo it, these take the place of the held turns; straight on forever
 /// remains. `holds_s` are further times in seconds for which turns are held.
-pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Action> {
+pub fn actions(
+    model: &AircraftModel,
+    dt_s: f64,
+    holds_s: &[f64],
+    legs: &DetourLegs,
+) -> Vec<Action> {
     let mut all = Vec::new();
     for k in 0..model.turns {
         let omega_rad_s = turn_rate_rad_s(model, k);
@@ -140,7 +145,7 @@ pub fn actions(model: &Model, dt_s: f64, holds_s: &[f64], legs: &Legs) -> Vec<Ac
 }
 
 /// Returns the `k`-th of a model's turn rates, from the fastest right turn to the fastest left turn.
-fn turn_rate_rad_s(model: &Model, k: usize) -> f64 {
+fn turn_rate_rad_s(model: &AircraftModel, k: usize) -> f64 {
     let m = model.turns;
     // The middle rate is exactly 0, free of rounding: straight flight is recognized by that.
     if 2 * k + 1 == m {
@@ -154,13 +159,18 @@ fn turn_rate_rad_s(model: &Model, k: usize) -> f64 {
 mod tests {
     use super::*;
 
-    fn model() -> Model {
-        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
+    fn model() -> AircraftModel {
+        AircraftModel {
+            v_m_s: 35.0,
+            omega_max_rad_s: 4f64.to_radians(),
+            separation_m: 500.0,
+            turns: 5,
+        }
     }
 
     #[test]
     fn the_action_set_is_ordered_and_contains_straight_flight() {
-        let all = actions(&model(), 5.0, &[30.0], &Legs::default());
+        let all = actions(&model(), 5.0, &[30.0], &DetourLegs::default());
         assert_eq!(all.len(), 5 * 3 + 1);
         assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
         assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
@@ -169,7 +179,7 @@ mod tests {
 
     #[test]
     fn legs_take_the_place_of_turns_that_are_undone() {
-        let legs = Legs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
+        let legs = DetourLegs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
         let all = actions(&model(), 5.0, &[], &legs);
         let omega_rad_s = -4f64.to_radians();
         assert_eq!(all.len(), 4 * 2 + 2 + 1);

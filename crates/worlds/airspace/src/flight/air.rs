@@ -5,7 +5,7 @@
 
 use super::action::Action;
 use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
-use super::motion::{Model, Point, Pose2, Timing, distance_m};
+use super::motion::{AircraftModel, Point, Pose2, StepTiming, distance_m};
 use sidestep_kernel::{interrupt, math};
 
 /// Difference of heading and bearing in radians below which an airplane no longer turns: in an hour at 250 m/s it
@@ -16,7 +16,7 @@ const ALIGNED_RAD: f64 = 1e-10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
     /// Lengths of a cycle, of the steps in it, and of the horizon.
-    pub timing: Timing,
+    pub timing: StepTiming,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
@@ -36,7 +36,7 @@ pub struct RoutePosition<'a> {
 
 impl Air {
     /// Returns how an airplane flies through still air.
-    pub fn autopilot<'a>(&self, model: &'a Model, mission: &'a [Point]) -> Autopilot<'a> {
+    pub fn autopilot<'a>(&self, model: &'a AircraftModel, mission: &'a [Point]) -> Autopilot<'a> {
         Autopilot {
             model,
             mission,
@@ -46,21 +46,21 @@ impl Air {
         }
     }
 
-    fn is_still(&self) -> bool {
+    fn is_windless(&self) -> bool {
         self.wind_m_s == [0.0, 0.0]
     }
 
     /// Returns the turn rate that leads to way-point `next` on the ground, corrected for the wind.
     pub fn steer(&self, autopilot: &Autopilot<'_>, pose: Pose2, next: usize) -> f64 {
         let Some(&goal) = autopilot.mission.get(next) else { return 0.0 };
-        let Model { v_m_s, omega_max_rad_s, .. } = *autopilot.model;
+        let AircraftModel { v_m_s, omega_max_rad_s, .. } = *autopilot.model;
         pose.steer(self.aim_point(pose.at, goal, v_m_s), omega_max_rad_s, autopilot.dtau_s)
     }
 
     /// Returns the point to head for from `at` in order to reach `goal` on the ground: turned into
     /// the wind by the angle at which the airspeed cancels the crosswind.
     pub fn aim_point(&self, at: Point, goal: Point, v_m_s: f64) -> Point {
-        if self.is_still() {
+        if self.is_windless() {
             return goal;
         }
         let [wx, wy] = self.wind_m_s;
@@ -121,7 +121,7 @@ impl Air {
     /// be when the airplane, flying straight, reaches it.
     pub fn predictions(
         &self,
-        model: &Model,
+        model: &AircraftModel,
         actions: &[Action],
         route: RoutePosition<'_>,
     ) -> Vec<Prediction> {
@@ -134,7 +134,7 @@ impl Air {
 
     /// Returns the seconds of a straight flight over the ground to `goal`.
     pub fn straight_s(&self, at: Point, goal: Point, v_m_s: f64) -> f64 {
-        if self.is_still() {
+        if self.is_windless() {
             return distance_m(at, goal) / v_m_s;
         }
         let [wx, wy] = self.wind_m_s;
@@ -155,7 +155,7 @@ impl Air {
         v_m_s: f64,
     ) -> Vec<Point> {
         let mut drifted = mission.to_vec();
-        if self.is_still() {
+        if self.is_windless() {
             return drifted;
         }
         let [wx, wy] = self.wind_m_s;

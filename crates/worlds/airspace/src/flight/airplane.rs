@@ -1,6 +1,6 @@
 //! Airplanes as a scenario gives them, and as their group knows them.
 
-use super::motion::{Model, Point, Pose2};
+use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
 use super::track::Track;
 use sidestep_kernel::Slot;
@@ -11,7 +11,7 @@ pub struct Airplane {
     /// Its call sign; `None` where only its id identifies it.
     pub callsign: Option<String>,
     /// Its abilities, with the speed that it has until an order changes it.
-    pub model: Model,
+    pub model: AircraftModel,
     /// The pose in which it appears.
     pub start: Pose2,
     /// Way-points in the order in which it has to reach them.

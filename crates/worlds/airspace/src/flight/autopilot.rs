@@ -1,7 +1,7 @@
 //! Predictions: an autopilot flies actions and missions step by step, and returns the path.
 
 use super::action::Action;
-use super::motion::{Model, Point, Pose2, Timing, distance_m, sinc};
+use super::motion::{AircraftModel, Point, Pose2, StepTiming, distance_m, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -165,7 +165,7 @@ impl PredictionState {
 #[derive(Debug, Clone, Copy)]
 pub struct Autopilot<'a> {
     /// Gives the airspeed and the largest turn rate.
-    pub model: &'a Model,
+    pub model: &'a AircraftModel,
     /// All way-points; methods are given the index of the next one.
     pub mission: &'a [Point],
     /// Rule by which way-points count as reached.
@@ -209,7 +209,13 @@ impl Autopilot<'_> {
     }
 
     /// Predicts `timing.horizon` points of an action from `pose` toward way-point `next`.
-    pub fn predict(&self, action: Action, pose: Pose2, next: usize, timing: &Timing) -> Prediction {
+    pub fn predict(
+        &self,
+        action: Action,
+        pose: Pose2,
+        next: usize,
+        timing: &StepTiming,
+    ) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
         let mut flight = PredictionState::new(pose);
         let mut next = next;
@@ -245,12 +251,17 @@ impl Autopilot<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::action::{Legs, actions};
+    use super::super::action::{DetourLegs, actions};
     use super::*;
     use proptest::prelude::*;
 
-    fn model() -> Model {
-        Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 }
+    fn model() -> AircraftModel {
+        AircraftModel {
+            v_m_s: 35.0,
+            omega_max_rad_s: 4f64.to_radians(),
+            separation_m: 500.0,
+            turns: 5,
+        }
     }
 
     proptest! {
@@ -279,9 +290,9 @@ mod tests {
                 after: AfterLastWaypoint::Straight,
                 dtau_s: 1.0,
             };
-            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
-            let some = Legs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
-            let held = actions(&model, 5.0, &[30.0], &Legs::default());
+            let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
+            let some = DetourLegs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
+            let held = actions(&model, 5.0, &[30.0], &DetourLegs::default());
             let all = [held, actions(&model, 5.0, &[], &some)].concat();
             let action = all[which % all.len()];
             let (mut pose, mut next) = (Pose2 { at: [0.0, 0.0], heading_rad }, 0);
@@ -311,7 +322,7 @@ mod tests {
                 dtau_s: 1.0,
             };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
-            let timing = Timing { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
+            let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");
             // It ends within the tolerance, or where it was about as near as it ever was.
@@ -329,12 +340,12 @@ mod tests {
             dtau_s in prop::sample::select(vec![0.1, 0.25, 0.5, 1.0, 2.0, 5.0]),
         ) {
             let omega_max_rad_s = omega_deg_s.to_radians();
-            let model = Model { v_m_s, omega_max_rad_s, ..model() };
+            let model = AircraftModel { v_m_s, omega_max_rad_s, ..model() };
             let mission = [[x, y]];
             let passing = WaypointRule { tolerance_m, passes: true };
             let pilot = Autopilot { model: &model, mission: &mission, passing, after: AfterLastWaypoint::Straight, dtau_s };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
-            let timing = Timing { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
+            let timing = StepTiming { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < timing.horizon, "still flying to {mission:?}");
             let end = flown.points[flown.counted - 1];

@@ -57,14 +57,14 @@ pub struct Leg {
 
 /// A stretch of time.
 #[derive(Debug, Clone, Copy)]
-struct Span {
+struct TimeSpan {
     from_s: f64,
     until_s: f64,
 }
 
 /// Place, velocity and acceleration at one moment.
 #[derive(Debug, Clone, Copy)]
-struct Motion {
+struct KinematicState {
     at: Point,
     velocity: Point,
     acceleration: Point,
@@ -133,7 +133,7 @@ impl Leg {
             .in_wind(self.drift_m_s)
     }
 
-    fn motion(&self, t_s: f64) -> Motion {
+    fn motion(&self, t_s: f64) -> KinematicState {
         let flown_s = t_s - self.from_s;
         let half_turn_rad = 0.5 * self.omega_rad_s * flown_s;
         // Most legs are straight, and the approach of a pair takes dozens of motions.
@@ -149,7 +149,7 @@ impl Leg {
         let centripetal_m_s2 = self.v_m_s * self.omega_rad_s;
         let [wx, wy] = self.drift_m_s;
         let [x, y] = self.pose.at;
-        Motion {
+        KinematicState {
             at: [x + wx * flown_s + chord_m * middle[0], y + wy * flown_s + chord_m * middle[1]],
             velocity: [wx + self.v_m_s * ahead[0], wy + self.v_m_s * ahead[1]],
             acceleration: [-centripetal_m_s2 * ahead[1], centripetal_m_s2 * ahead[0]],
@@ -164,7 +164,7 @@ fn rotate([x, y]: Point, [cos, sin]: [f64; 2]) -> Point {
 
 /// The approach of two airplanes on their legs, up to some moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Approach {
+pub struct PairApproach {
     /// Closest approach in meters; infinite if they were never on one level.
     pub nearest_m: f64,
     /// Seconds that they were nearer than their separation.
@@ -177,14 +177,14 @@ pub struct Approach {
 
 /// The limits within which two airplanes are too near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zone {
+pub struct SeparationMinima {
     /// Separation in meters.
     pub gap_m: f64,
     /// Difference of altitude in meters from which on they need not avoid each other.
     pub vertical_m: f64,
 }
 
-impl Approach {
+impl PairApproach {
     /// Returns an approach without any leg. `since_s` is a time up to which two airplanes are known to have been too
     /// near each other, so that a loss from then on is no new one.
     pub fn new(since_s: Option<f64>) -> Self {
@@ -193,8 +193,8 @@ impl Approach {
     }
 
     /// Adds the time that two legs have in common; it must not lie before times that were added already.
-    pub fn add(&mut self, a: &Leg, b: &Leg, zone: Zone) {
-        let common = Span { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
+    pub fn add(&mut self, a: &Leg, b: &Leg, zone: SeparationMinima) {
+        let common = TimeSpan { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
         let Some(level) = common_level_span(a, b, common, zone.vertical_m) else { return };
         let pair = LegPair { a, b };
         // Between two of these moments the distance only grows or only shrinks.
@@ -202,13 +202,13 @@ impl Approach {
         pair.find_extrema(level, &mut moments);
         moments.push(level.until_s);
         for ends in moments.windows(2) {
-            self.add_monotonic(pair, Span { from_s: ends[0], until_s: ends[1] }, zone);
+            self.add_monotonic(pair, TimeSpan { from_s: ends[0], until_s: ends[1] }, zone);
         }
     }
 
     /// Adds an interval in which the distance only grows or only shrinks.
-    fn add_monotonic(&mut self, pair: LegPair<'_>, span: Span, zone: Zone) {
-        let Span { from_s, until_s } = span;
+    fn add_monotonic(&mut self, pair: LegPair<'_>, span: TimeSpan, zone: SeparationMinima) {
+        let TimeSpan { from_s, until_s } = span;
         let gap_m = zone.gap_m - ROUNDING_M;
         let start_m = pair.distance_m(from_s);
         let end_m = pair.distance_m(until_s);
@@ -232,14 +232,14 @@ impl Approach {
 }
 
 /// Returns whether two airplanes are too near each other at a time.
-pub fn is_separation_lost(a: &Leg, b: &Leg, t_s: f64, zone: Zone) -> bool {
+pub fn is_separation_lost(a: &Leg, b: &Leg, t_s: f64, zone: SeparationMinima) -> bool {
     (a.altitude_at_m(t_s) - b.altitude_at_m(t_s)).abs() < zone.vertical_m
         && (LegPair { a, b }).distance_m(t_s) < zone.gap_m - ROUNDING_M
 }
 
 /// Returns the part of an interval in which two legs are on one level.
-fn common_level_span(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<Span> {
-    let Span { from_s, until_s } = within;
+fn common_level_span(a: &Leg, b: &Leg, within: TimeSpan, vertical_m: f64) -> Option<TimeSpan> {
+    let TimeSpan { from_s, until_s } = within;
     let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
     let climb_m_s = a.climb_m_s - b.climb_m_s;
     let mut first_s = from_s;
@@ -252,7 +252,7 @@ fn common_level_span(a: &Leg, b: &Leg, within: Span, vertical_m: f64) -> Option<
     } else if above_m.abs() >= vertical_m {
         return None;
     }
-    let part = Span { from_s: first_s, until_s: last_s };
+    let part = TimeSpan { from_s: first_s, until_s: last_s };
     (first_s <= last_s && from_s <= until_s).then_some(part)
 }
 
@@ -264,10 +264,10 @@ struct LegPair<'a> {
 }
 
 impl LegPair<'_> {
-    fn motion(&self, t_s: f64) -> Motion {
+    fn motion(&self, t_s: f64) -> KinematicState {
         let a = self.a.motion(t_s);
         let b = self.b.motion(t_s);
-        Motion {
+        KinematicState {
             at: sub(b.at, a.at),
             velocity: sub(b.velocity, a.velocity),
             acceleration: sub(b.acceleration, a.acceleration),
@@ -282,13 +282,13 @@ impl LegPair<'_> {
     /// Returns half of the first and half of the second derivative of the squared distance. The square has no root,
     /// whose derivative jumps where two airplanes meet in a point.
     fn slope(&self, t_s: f64) -> (f64, f64) {
-        let Motion { at, velocity, acceleration } = self.motion(t_s);
+        let KinematicState { at, velocity, acceleration } = self.motion(t_s);
         (dot(at, velocity), dot(velocity, velocity) + dot(at, acceleration))
     }
 
     /// Adds the moments within an interval at which the distance turns from shrinking to growing or
     /// back, in order. Returns the number of intervals that it took.
-    fn find_extrema(&self, within: Span, found: &mut Vec<f64>) -> u64 {
+    fn find_extrema(&self, within: TimeSpan, found: &mut Vec<f64>) -> u64 {
         if self.is_corotating() {
             self.find_alignments(within, found);
             return 1;
@@ -309,16 +309,19 @@ impl LegPair<'_> {
     /// The relative velocity `w` turns as both do, so that half of the first derivative of the squared distance
     /// from `d` is `d·w cos(ωs) + (d×w + w²/ω) sin(ωs)` (`d×w` with the normal that `w` turns to). Its zeros are
     /// computed without the center, which is far away where both fly almost straight.
-    fn find_alignments(&self, Span { from_s, until_s }: Span, found: &mut Vec<f64>) {
+    fn find_alignments(&self, TimeSpan { from_s, until_s }: TimeSpan, found: &mut Vec<f64>) {
         let omega_rad_s = self.a.omega_rad_s;
         let duration_s = until_s - from_s;
-        let Motion { at, velocity: [vx, vy], .. } = self.motion(from_s);
+        let KinematicState { at, velocity: [vx, vy], .. } = self.motion(from_s);
         let cos_part = -omega_rad_s * dot(at, [vx, vy]);
         let sin_part = omega_rad_s * dot(at, [-vy, vx]) + dot([vx, vy], [vx, vy]);
         let half_turn_s = std::f64::consts::PI / omega_rad_s.abs();
         // Half the squared distance varies by no more than this: in a formation only by rounding.
         let steepest_m2_s = math::hypot(cos_part, sin_part) / omega_rad_s.abs();
-        if is_flat(steepest_m2_s * duration_s.min(half_turn_s), math::hypot(at[0], at[1])) {
+        if is_nearly_constant(
+            steepest_m2_s * duration_s.min(half_turn_s),
+            math::hypot(at[0], at[1]),
+        ) {
             return;
         }
         let first_s = math::atan2(cos_part * sin_part.signum(), sin_part.abs()) / omega_rad_s;
@@ -330,8 +333,8 @@ impl LegPair<'_> {
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
-    fn max_bend(&self, within: Span) -> f64 {
-        let Span { from_s, until_s } = within;
+    fn max_bend(&self, within: TimeSpan) -> f64 {
+        let TimeSpan { from_s, until_s } = within;
         let duration_s = until_s - from_s;
         let [speed_m_s, acceleration_m_s2, jerk_m_s3] = self.max_relative_motion(within);
         let start = self.motion(from_s);
@@ -345,7 +348,7 @@ impl LegPair<'_> {
     /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
     /// two turning vectors, which are small where the vectors have almost one length and direction, as those of
     /// airplanes that fly almost in formation.
-    fn max_relative_motion(&self, Span { from_s, until_s }: Span) -> [f64; 3] {
+    fn max_relative_motion(&self, TimeSpan { from_s, until_s }: TimeSpan) -> [f64; 3] {
         let LegPair { a, b } = self;
         let heading_a_rad = a.pose.heading_rad + a.omega_rad_s * (from_s - a.from_s);
         let heading_b_rad = b.pose.heading_rad + b.omega_rad_s * (from_s - b.from_s);
@@ -365,8 +368,8 @@ impl LegPair<'_> {
     }
 
     /// Adds the zeros of the slope. Returns the number of intervals that it took.
-    fn find_zeros(&self, within: Span, ends: [f64; 2], bend: f64, found: &mut Vec<f64>) -> u64 {
-        let Span { from_s, until_s } = within;
+    fn find_zeros(&self, within: TimeSpan, ends: [f64; 2], bend: f64, found: &mut Vec<f64>) -> u64 {
+        let TimeSpan { from_s, until_s } = within;
         let half_s = 0.5 * (until_s - from_s);
         if half_s < MIN_INTERVAL_S {
             return 1;
@@ -384,19 +387,22 @@ impl LegPair<'_> {
         // before the interval is as short as can be.
         let variation_m2 =
             2.0 * half_s * (at_middle.abs() + half_s * (change.abs() + bend * half_s));
-        if half_s < MAX_FLAT_INTERVAL_S && is_flat(variation_m2, self.distance_m(middle_s)) {
+        if half_s < MAX_FLAT_INTERVAL_S
+            && is_nearly_constant(variation_m2, self.distance_m(middle_s))
+        {
             return 1;
         }
-        let halves = [Span { from_s, until_s: middle_s }, Span { from_s: middle_s, until_s }];
+        let halves =
+            [TimeSpan { from_s, until_s: middle_s }, TimeSpan { from_s: middle_s, until_s }];
         let before = self.find_zeros(halves[0], [ends[0], at_middle], bend, found);
         before + self.find_zeros(halves[1], [at_middle, ends[1]], bend, found)
     }
 
     /// Returns when the distance passes `gap_m` in an interval in which it only grows or only
     /// shrinks.
-    fn crossing_s(&self, within: Span, grows: bool, gap_m: f64) -> f64 {
+    fn crossing_s(&self, within: TimeSpan, grows: bool, gap_m: f64) -> f64 {
         zero_s(within, grows, |t_s| {
-            let Motion { at, velocity, .. } = self.motion(t_s);
+            let KinematicState { at, velocity, .. } = self.motion(t_s);
             (0.5 * (dot(at, at) - gap_m * gap_m), dot(at, velocity))
         })
     }
@@ -410,15 +416,15 @@ fn max_difference([a, b]: [f64; 2], angle_rad: f64) -> f64 {
 }
 
 /// Returns whether a distance is next to constant, by how much half its square varies.
-fn is_flat(variation_m2: f64, distance_m: f64) -> bool {
+fn is_nearly_constant(variation_m2: f64, distance_m: f64) -> bool {
     // d²/2 varies by d times the variation of d.
     variation_m2 < FLAT_TOLERANCE_M * distance_m.max(0.5 * FLAT_TOLERANCE_M)
 }
 
 /// Returns the zero of a function that only rises, or only falls, from its values and slopes: by
 /// Newton's steps, and by halving where these lead out of the interval.
-fn zero_s(within: Span, rises: bool, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let Span { mut from_s, mut until_s } = within;
+fn zero_s(within: TimeSpan, rises: bool, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let TimeSpan { mut from_s, mut until_s } = within;
     let mut t_s = 0.5 * (from_s + until_s);
     // 53 halvings of a day reach the tolerance.
     for _ in 0..100 {
@@ -444,14 +450,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ZONE: Zone = Zone { gap_m: 500.0, vertical_m: 300.0 };
+    const ZONE: SeparationMinima = SeparationMinima { gap_m: 500.0, vertical_m: 300.0 };
 
     fn leg(at: Point, heading_rad: f64, v_m_s: f64, omega_rad_s: f64) -> Leg {
         Leg::new(0.0, 60.0, Pose2 { at, heading_rad }, v_m_s, omega_rad_s)
     }
 
-    fn approach(a: &Leg, b: &Leg, zone: Zone) -> Approach {
-        let mut approach = Approach::new(None);
+    fn approach(a: &Leg, b: &Leg, zone: SeparationMinima) -> PairApproach {
+        let mut approach = PairApproach::new(None);
         approach.add(a, b, zone);
         approach
     }
@@ -460,7 +466,7 @@ mod tests {
     fn a_head_on_pass_through_one_point_is_found_with_its_time() {
         let (a, b) =
             (leg([0.0, 0.0], 0.0, 35.0, 0.0), leg([1007.0, 0.0], std::f64::consts::PI, 35.0, 0.0));
-        let zone = Zone { gap_m: 5.0, ..ZONE };
+        let zone = SeparationMinima { gap_m: 5.0, ..ZONE };
         let found = approach(&a, &b, zone);
         assert!(found.nearest_m < 1e-9 && found.losses == 1, "{found:?}");
         assert!((found.lost_s - 10.0 / 70.0).abs() < 1e-6, "{found:?}");
@@ -470,7 +476,7 @@ mod tests {
     fn a_loss_lasts_from_leg_to_leg_and_ends_with_the_level() {
         let still = leg([0.0, 0.0], 0.0, 35.0, 0.0);
         let beside = leg([0.0, 100.0], 0.0, 35.0, 0.0);
-        let mut found = Approach::new(None);
+        let mut found = PairApproach::new(None);
         let climbs = beside.with_climb(0.0, 10.0);
         for (from_s, until_s) in [(0.0, 10.0), (10.0, 60.0)] {
             let part = |leg: &Leg| Leg { until_s, ..leg.remainder(from_s) };
@@ -478,7 +484,7 @@ mod tests {
         }
         assert_eq!((found.losses, found.nearest_m), (1, 100.0));
         assert!((found.lost_s - 30.0).abs() < 1e-9, "{found:?}");
-        let mut goes_on = Approach::new(Some(0.0));
+        let mut goes_on = PairApproach::new(Some(0.0));
         goes_on.add(&still, &beside, ZONE);
         assert_eq!((goes_on.losses, goes_on.lost_s), (0, 60.0));
         assert_eq!(approach(&still, &beside.with_climb(300.0, 0.0), ZONE).nearest_m, f64::INFINITY);
@@ -506,7 +512,7 @@ mod tests {
                     let b = leg([apart_m, 0.0], 0.3 + off, 250.0, omega_rad_s * (1.0 + off));
                     let pair = LegPair { a: &a, b: &b };
                     let looks =
-                        pair.find_extrema(Span { from_s: 0.0, until_s: 60.0 }, &mut Vec::new());
+                        pair.find_extrema(TimeSpan { from_s: 0.0, until_s: 60.0 }, &mut Vec::new());
                     assert!(looks < 20_000, "{omega_rad_s} {off} {apart_m}: {looks} intervals");
                 }
             }
@@ -545,7 +551,7 @@ mod tests {
             let (omega, wind) = if as_one { ([omega[0]; 2], [0.0; 2]) } else { (omega, wind) };
             let a = leg([0.0, 0.0], 0.0, v[0], omega[0]);
             let b = leg([x, y], heading_rad, v[1], omega[1]).in_wind(wind);
-            let found = approach(&a, &b, Zone { gap_m, ..ZONE });
+            let found = approach(&a, &b, SeparationMinima { gap_m, ..ZONE });
             let looks = 6_000;
             let apart_m = |k: u32| {
                 let t_s = f64::from(k) * 60.0 / f64::from(looks);

@@ -4,19 +4,19 @@ use serde::{Deserialize, Serialize};
 
 /// The levels that an airplane is on or passes while it changes its level.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Levels {
+pub struct FlightLevelRange {
     /// Altitude of the lowest, in meters.
     pub low_m: f64,
     /// Altitude of the highest, in meters.
     pub high_m: f64,
 }
 
-impl Levels {
+impl FlightLevelRange {
     /// Every level: for an airplane whose altitude is not bounded, as on a recorded track.
     pub const ALL: Self = Self { low_m: f64::NEG_INFINITY, high_m: f64::INFINITY };
 
     /// Returns the range of an airplane that keeps its level.
-    pub fn at(altitude_m: f64) -> Self {
+    pub fn from_level(altitude_m: f64) -> Self {
         Self { low_m: altitude_m, high_m: altitude_m }
     }
 
@@ -27,7 +27,7 @@ impl Levels {
 
     /// Returns these levels, another, and all between.
     #[must_use]
-    pub fn including(self, altitude_m: f64) -> Self {
+    pub fn extended_by_level(self, altitude_m: f64) -> Self {
         Self { low_m: self.low_m.min(altitude_m), high_m: self.high_m.max(altitude_m) }
     }
 
@@ -48,8 +48,8 @@ mod tests {
         fn levels_meet_when_two_of_them_do(
             a in prop::array::uniform2(0.0f64..1000.0), b in prop::array::uniform2(0.0f64..1000.0),
         ) {
-            let (one, other) = (Levels::between(a[0], a[1]), Levels::between(b[0], b[1]));
-            let at = |levels: Levels, k: i32| levels.low_m + f64::from(k) / 50.0 * (levels.high_m - levels.low_m);
+            let (one, other) = (FlightLevelRange::between(a[0], a[1]), FlightLevelRange::between(b[0], b[1]));
+            let at = |levels: FlightLevelRange, k: i32| levels.low_m + f64::from(k) / 50.0 * (levels.high_m - levels.low_m);
             let nearest = (0..=50).flat_map(|i| (0..=50).map(move |j| (i, j)))
                 .map(|(i, j)| (at(one, i) - at(other, j)).abs()).fold(f64::INFINITY, f64::min);
             // The grid is at most 20 m too coarse.

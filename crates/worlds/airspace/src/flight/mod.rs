@@ -19,13 +19,13 @@ mod order;
 mod segment;
 mod track;
 
-pub use action::{Action, Legs, actions};
+pub use action::{Action, DetourLegs, actions};
 pub use air::{Air, RoutePosition};
 pub use airplane::{Airplane, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
-pub use leg::{Approach, Leg, Zone, is_separation_lost};
-pub use levels::Levels;
-pub use motion::{Model, Point, Pose2, Timing, distance_m};
+pub use leg::{Leg, PairApproach, SeparationMinima, is_separation_lost};
+pub use levels::FlightLevelRange;
+pub use motion::{AircraftModel, Point, Pose2, StepTiming, distance_m};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
 pub(crate) use segment::{FlightSegment, SegmentAfterOrder, segments_after_orders};
 pub use track::{Track, TrackPoint};

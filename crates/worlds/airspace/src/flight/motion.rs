@@ -17,7 +17,7 @@ pub fn distance_m(a: Point, b: Point) -> f64 {
 
 /// Abilities and separation of an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Model {
+pub struct AircraftModel {
     /// Airspeed in meters per second, constant.
     pub v_m_s: f64,
     /// Largest rate of turn in radians per second.
@@ -28,7 +28,7 @@ pub struct Model {
     pub turns: usize,
 }
 
-impl Model {
+impl AircraftModel {
     /// Returns the radius of the tightest turn in meters.
     pub fn turn_radius_m(&self) -> f64 {
         self.v_m_s / self.omega_max_rad_s
@@ -79,7 +79,7 @@ pub(super) fn sinc(a: f64) -> f64 {
 
 /// The times in which airplanes decide, fly a step, and look ahead.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Timing {
+pub struct StepTiming {
     /// Seconds between two optimizations.
     pub dt_s: f64,
     /// Seconds between two points of a prediction; divides `dt_s`.
@@ -88,7 +88,7 @@ pub struct Timing {
     pub horizon: usize,
 }
 
-impl Timing {
+impl StepTiming {
     /// Returns the time that a prediction covers, in seconds.
     pub fn horizon_s(&self) -> f64 {
         self.horizon as f64 * self.dtau_s

@@ -1,7 +1,7 @@
 //! Segments of a flight: the flight between two orders.
 
 use super::airplane::Airplane;
-use super::motion::{Model, Point};
+use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
 use sidestep_kernel::math;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ const FAR_AHEAD_M: f64 = 1e12;
 /// The part of a flight between two orders.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlightSegment<'a> {
-    pub(crate) model: &'a Model,
+    pub(crate) model: &'a AircraftModel,
     pub(crate) mission: &'a [Point],
     /// Altitude in meters of the level that it keeps or changes to.
     pub(crate) altitude_m: f64,
@@ -25,7 +25,7 @@ pub(crate) struct FlightSegment<'a> {
 /// The part of a flight from an order on, in which this order and all before it hold.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentAfterOrder {
-    model: Model,
+    model: AircraftModel,
     mission: Arc<[Point]>,
     altitude_m: f64,
     climb_m_s: f64,

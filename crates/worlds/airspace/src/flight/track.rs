@@ -48,7 +48,7 @@ impl Track {
     }
 
     /// Returns whether the airplane was there at a time.
-    pub fn covers(&self, t_s: f64) -> bool {
+    pub fn has_position_at(&self, t_s: f64) -> bool {
         (self.start_s()..=self.end_s()).contains(&t_s)
     }
 
@@ -70,7 +70,7 @@ impl Track {
     }
 
     /// Adds the legs flown in an interval, with times after its start.
-    pub(crate) fn legs(&self, from_s: f64, until_s: f64, legs: &mut Vec<Leg>) {
+    pub(crate) fn add_legs(&self, from_s: f64, until_s: f64, legs: &mut Vec<Leg>) {
         let first = self.points.partition_point(|p| p.t_s <= from_s).max(1) - 1;
         for (k, pair) in self.points.windows(2).enumerate().skip(first) {
             if pair[0].t_s >= until_s {
@@ -201,7 +201,11 @@ mod tests {
         assert_eq!(track.altitude_at_m(15.0), 1000.0);
         assert_eq!(track.pose_at(13.0).heading_rad, std::f64::consts::FRAC_PI_2);
         assert_eq!((track.pose_at(0.0).at, track.pose_at(99.0).at), ([0.0, 0.0], [0.0, 1000.0]));
-        assert!(track.covers(10.0) && track.covers(20.0) && !track.covers(20.1));
+        assert!(
+            track.has_position_at(10.0)
+                && track.has_position_at(20.0)
+                && !track.has_position_at(20.1)
+        );
         assert_eq!((track.max_speed_m_s(), track.mean_speed_m_s(15.0)), (100.0, 100.0));
     }
 

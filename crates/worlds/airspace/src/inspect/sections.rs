@@ -6,7 +6,7 @@ use crate::decide::decide_centrally;
 use crate::events::EventKind;
 use crate::flight::{Point, Pose2};
 use crate::method::MethodKind;
-use crate::shield::{Side, TurnProfile};
+use crate::shield::{OrbitSide, TurnProfile};
 use crate::trace::InspectionTrace;
 use sidestep_kernel::view::{
     FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape, Vec3,
@@ -86,7 +86,7 @@ impl Inspector<'_> {
         let mut points_m = Vec::new();
         for (k, at) in points.iter().enumerate() {
             if k <= next_dt || k % stride == 0 || k + 1 == points.len() {
-                points_m.push(self.place(*at));
+                points_m.push(self.point_on_level(*at));
             }
         }
         MarkShape::Line { points_m }
@@ -123,7 +123,7 @@ impl Inspector<'_> {
                 .fact_if("can be reached by", threat.map(|event| airplane(event.other)))
                 .table(table),
         );
-        let at_m = self.place(orbit.center());
+        let at_m = self.point_on_level(orbit.center());
         let radius_m = orbit.radius_m;
         inspection.add_mark(
             MarkRole::Orbit,
@@ -180,8 +180,9 @@ impl Inspector<'_> {
         let heading = current.is_flying().then(|| FactValue::degrees(current.pose().heading_rad));
         let mut table = FactTable::new(["event", "with", "value"]);
         for event in &self.trace.events {
-            let with = event.partner().map(airplane);
-            let value = event.kind.measure().map(|m| FactValue::number(event.value, m.unit()));
+            let with = event.other_airplane().map(airplane);
+            let value =
+                event.kind.value_quantity().map(|m| FactValue::number(event.value, m.unit()));
             table.push_row([event.kind.name().into(), with.into(), value.into()]);
         }
         inspection.add_section(
@@ -211,9 +212,9 @@ fn traffic_row(about: &str, traffic: NetworkTraffic) -> [FactValue; 5] {
     ]
 }
 
-fn side(side: Side) -> &'static str {
+fn side(side: OrbitSide) -> &'static str {
     match side {
-        Side::Left => "to the left",
-        Side::Right => "to the right",
+        OrbitSide::Left => "to the left",
+        OrbitSide::Right => "to the right",
     }
 }

@@ -4,9 +4,9 @@ use super::percept::{OwnshipState, Percept, SurveillanceReport};
 use crate::agents::exchange::{ExchangeSetup, ObservedAircraft};
 use crate::agents::traffic_state::{OrbitState, StateBeacon, TrafficPicture, TrafficState};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
-use crate::flight::{KnownAircraft, Levels, Pose2};
-use crate::non_cooperative::NonCooperative;
-use crate::shield::{PlanCertainty, ShieldedAircraft, Side};
+use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::shield::{OrbitSide, PlanCertainty, ShieldedAircraft};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, math};
 use std::sync::Arc;
@@ -161,10 +161,10 @@ fn other_aircraft(
         orbit_rad_s: world.orbit_rad_s[one.id as usize],
         separation_m: segment.model.separation_m,
         error_m: world.error_m(one.id as usize),
-        levels: Levels::between(one.altitude_m, segment.altitude_m),
+        levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
         // The side of one that flies a profile is not visible; the exchange tries both.
-        fallback: one.orbit.unwrap_or(Side::Left),
+        fallback: one.orbit.unwrap_or(OrbitSide::Left),
         exempt: exempt.into(),
         // Ranks are known from proposals only.
         rank: 0,
@@ -172,18 +172,21 @@ fn other_aircraft(
 }
 
 /// Returns an airplane that was not heard as one that flies straight on, for methods that need no more than that.
-pub(super) fn unheard_aircraft(world: &AirspaceWorld, one: &SurveillanceReport) -> NonCooperative {
+pub(super) fn unheard_aircraft(
+    world: &AirspaceWorld,
+    one: &SurveillanceReport,
+) -> NonCooperativeAircraft {
     let segment = world.segment(one.id, 0);
     let v_m_s = segment.model.v_m_s;
     let Pose2 { at, heading_rad } = one.pose;
-    NonCooperative {
+    NonCooperativeAircraft {
         slot: one.id,
         at,
         velocity_m_s: [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)],
         top_m_s: world.top_m_s[one.id as usize],
         separation_m: segment.model.separation_m,
         error_m: world.bounds.position_m,
-        levels: Levels::between(one.altitude_m, segment.altitude_m),
+        levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
         dt_s: world.timing.dt_s,
     }
 }

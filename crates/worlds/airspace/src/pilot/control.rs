@@ -6,7 +6,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
-use crate::shield::{ShieldDecision, Side, TurnProfile};
+use crate::shield::{OrbitSide, ShieldDecision, TurnProfile};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -30,7 +30,7 @@ pub struct Control {
     /// Others that it no longer hears, deadlines missed, and the like.
     pub events: Vec<Event>,
     /// What it remembers in the next cycle.
-    pub memory: Memory,
+    pub memory: PilotMemory,
 }
 
 /// What an airplane flies for one `dt`.
@@ -43,7 +43,7 @@ pub enum Maneuver {
         /// Turn rate in each step.
         profile: TurnProfile,
         /// Side of the fallback that it stores for the end of the profile.
-        side: Side,
+        side: OrbitSide,
     },
     /// Its stored orbit.
     Orbit,
@@ -62,7 +62,7 @@ pub struct OptimizerStats {
 
 /// The memory of an airplane from one cycle to the next.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Memory {
+pub struct PilotMemory {
     /// Its knowledge of others; empty where the network is reliable.
     pub contacts: TrafficPicture,
     /// The conflicts that it resolves; empty unless the method is MVP.
@@ -87,7 +87,7 @@ impl Maneuver {
     }
 
     /// Returns the maneuver as a decision of the shield; `fallback` is the side of the stored orbit.
-    pub(crate) fn shield_decision(&self, fallback: Side) -> ShieldDecision {
+    pub(crate) fn shield_decision(&self, fallback: OrbitSide) -> ShieldDecision {
         match *self {
             Self::Profile { candidate, side, .. } => {
                 ShieldDecision { candidate: Some(candidate as usize), fallback: side }
@@ -111,7 +111,7 @@ impl OptimizerStats {
 
 impl Control {
     /// Returns a control by which an airplane stays on its orbit: what it flies unless something else is decided.
-    pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: Memory) -> Self {
+    pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: PilotMemory) -> Self {
         Self {
             id,
             cycle,

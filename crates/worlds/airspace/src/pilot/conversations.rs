@@ -2,14 +2,15 @@
 
 use super::common_knowledge::{exchange_setup, filed_flight, ownship, plan_certainty};
 use super::percept::Percept;
-use crate::agents::coordinator::HostParticipant;
+use crate::agents::coordinator::CoordinatorHostParticipant;
 use crate::agents::exchange::{self, ExchangeResult};
 use crate::agents::grouping::{self, GroupingResult, SurveillanceReport};
 use crate::agents::intent::{self, Intent};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{
-    Agent, ConversationEnd, Endpoint, EndpointConfig, InvalidMessage, OptimizationResult,
-    OptimizingAgent, OutgoingMessage, Participant, Progress, WithOutcome, informed, sampling,
+    ConversationEnd, ConversationProgress, EndpointConfig, InvalidMessage, OptimizationResult,
+    OptimizingAgent, OutgoingMessage, Participant, ProtocolAgent, ReliableEndpoint, WithOutcome,
+    informed, sampling,
 };
 use crate::baseline::mvp::ActiveResolutions;
 use crate::settings::Deployment;
@@ -62,7 +63,7 @@ pub(super) type DynParticipant = dyn WithOutcome<Outcome = ConversationOutcome>;
 struct ErasedParticipant<P>(P);
 
 impl<P: Participant> Participant for ErasedParticipant<P> {
-    fn progress(&self) -> Progress {
+    fn progress(&self) -> ConversationProgress {
         self.0.progress()
     }
 
@@ -111,7 +112,7 @@ impl<P: WithOutcome<Outcome: Into<ConversationOutcome>>> WithOutcome for ErasedP
 
 /// What an airplane knows at the start of a conversation.
 #[derive(Clone, Copy)]
-pub(super) struct Knowledge<'a> {
+pub(super) struct PilotKnowledge<'a> {
     pub(super) world: &'a AirspaceWorld,
     pub(super) percept: &'a Percept,
     /// Airplanes nearby that are not in its group.
@@ -122,9 +123,9 @@ pub(super) struct Knowledge<'a> {
 
 fn endpoint<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
 where
-    A: Agent<Outcome: Into<ConversationOutcome>> + Send + 'static,
+    A: ProtocolAgent<Outcome: Into<ConversationOutcome>> + Send + 'static,
 {
-    Box::new(ErasedParticipant(Endpoint::new(agent, config)))
+    Box::new(ErasedParticipant(ReliableEndpoint::new(agent, config)))
 }
 
 /// Returns the participant that finds an airplane's group among those near it.
@@ -160,22 +161,25 @@ fn expected_members(percept: &Percept, contacts: &TrafficPicture) -> Vec<bool> {
 
 /// Returns the deployment's participant of an optimization.
 pub(super) fn optimization_participant(
-    knowledge: Knowledge<'_>,
+    knowledge: PilotKnowledge<'_>,
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let Knowledge { world, percept, unheard, contacts } = knowledge;
+    let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
     let own = ownship(world, percept, unheard, contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
-            Box::new(ErasedParticipant(HostParticipant::new(own, is_hierarchy, config)))
+            Box::new(ErasedParticipant(CoordinatorHostParticipant::new(own, is_hierarchy, config)))
         }
         (Deployment::Team, Estimator::Sampled { block, ageing }) => {
             endpoint(OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)), config)
         }
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint(OptimizingAgent::new(informed::InformedAgent::new(own, by_model)), config)
+            endpoint(
+                OptimizingAgent::new(informed::PredictionSharingAgent::new(own, by_model)),
+                config,
+            )
         }
     }
 }
@@ -206,11 +210,11 @@ pub(super) fn intent_participant(
 
 /// Returns the participant of the shield's exchange for an airplane that may fly some profiles.
 pub(super) fn exchange_participant(
-    knowledge: Knowledge<'_>,
+    knowledge: PilotKnowledge<'_>,
     profiles: &[TurnProfile],
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let Knowledge { world, percept, unheard, contacts } = knowledge;
+    let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
     let scene = Arc::new(exchange_setup(world, percept, unheard));
     endpoint(exchange::ExchangeAgent::new(scene, config.me, profiles, contacts.clone()), config)
 }

@@ -34,10 +34,10 @@ mod schedule;
 mod tests;
 
 pub use crate::agents::packet::{ConversationId, Protocol};
-pub use control::{Control, Maneuver, Memory, OptimizerStats};
+pub use control::{Control, Maneuver, OptimizerStats, PilotMemory};
 pub use percept::{OwnshipState, Percept, SurveillanceReport};
 pub use program::Pilot;
-pub(crate) use schedule::Schedule;
+pub(crate) use schedule::ConversationSchedule;
 #[cfg(test)]
 pub(crate) use schedule::retry_policy;
 pub use sidestep_kernel::network::{DropCounts, DropReason};

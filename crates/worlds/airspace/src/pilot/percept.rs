@@ -3,9 +3,9 @@
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
-use crate::flight::{FlightSegment, KnownAircraft, Levels, Pose2, distance_m};
-use crate::non_cooperative::NonCooperative;
-use crate::shield::{OrbitTracker, ShieldedAircraft, Side, TurnProfile};
+use crate::flight::{FlightLevelRange, FlightSegment, KnownAircraft, Pose2, distance_m};
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::shield::{OrbitSide, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -30,7 +30,7 @@ pub struct Percept {
     /// groups are heard rather than announced, those near it.
     pub group: Vec<SurveillanceReport>,
     /// Non-cooperative airplanes near these, as all see them.
-    pub non_cooperative: Vec<NonCooperative>,
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
 }
 
 /// An airplane as those aboard know it.
@@ -53,7 +53,7 @@ pub struct OwnshipState {
     /// Number of orders executed.
     pub orders: u32,
     /// Side of its stored fallback, the orbit that it may fly at any time.
-    pub fallback: Side,
+    pub fallback: OrbitSide,
     /// Number of times that the shield has refused its preferred action.
     pub refusals: u32,
     /// The others with which it is an exempt pair, by rising id: the shield guarantees nothing for these pairs.
@@ -81,18 +81,18 @@ impl OwnshipState {
             orbit_rad_s: world.orbit_rad_s[self.id as usize],
             separation_m: segment.model.separation_m,
             error_m: world.error_m(self.id as usize),
-            levels: Levels::between(self.altitude_m, segment.altitude_m),
+            levels: FlightLevelRange::between(self.altitude_m, segment.altitude_m),
             vertical_m: world.vertical_m,
             fallback: self.fallback,
             exempt: self.exempt.as_slice().into(),
-            rank: self.rank(world.timing.dt_s, &segment),
+            rank: self.priority_rank(world.timing.dt_s, &segment),
         }
     }
 
     /// Returns its rank. It is higher the nearer its goal is, so that it is soon gone, and the more
     /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
     /// lower half makes it unique.
-    fn rank(&self, dt_s: f64, segment: &FlightSegment<'_>) -> u64 {
+    fn priority_rank(&self, dt_s: f64, segment: &FlightSegment<'_>) -> u64 {
         // A percept that came off a network may count more way-points than there are.
         let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
         // Along the whole route, from where its own instruments see it: others are sent its rank, and do not compute
@@ -134,14 +134,14 @@ impl Percept {
         let are_known = self.members().into_iter().chain(others).all(|id| (id as usize) < n);
         let is_ascending = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
         let is_member = self.group.iter().any(|one| one.id == id);
-        InvalidMessage::Airplane.unless(are_known && is_ascending && is_member)?;
+        InvalidMessage::Airplane.ensure(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
-            .unless(orders as usize <= world.airplanes[id as usize].orders.len())?;
+            .ensure(orders as usize <= world.airplanes[id as usize].orders.len())?;
         // From where the group is seen all its members compute together. The airplane's other numbers enter only what
         // it sends, and the others check that.
         let seen =
             self.group.iter().flat_map(|one| [one.pose.at[0], one.pose.at[1], one.altitude_m]);
-        InvalidMessage::Number.unless(seen.into_iter().all(f64::is_finite))
+        InvalidMessage::Number.ensure(seen.into_iter().all(f64::is_finite))
     }
 
     /// Returns the ids of the airplanes that decide together, rising.

@@ -3,24 +3,26 @@
 mod conclude;
 mod cycle_state;
 
-use super::control::{Control, Maneuver, Memory};
+use super::control::{Control, Maneuver, PilotMemory};
 use super::conversations::{
-    DynParticipant, Knowledge, exchange_participant, grouping_participant, intent_participant,
+    DynParticipant, PilotKnowledge, exchange_participant, grouping_participant, intent_participant,
     optimization_participant,
 };
 use super::early_packets::EarlyPackets;
 use super::percept::Percept;
-use super::schedule::{Schedule, retry_policy};
+use super::schedule::{ConversationSchedule, retry_policy};
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::packet::{ConversationId, Protocol};
 use crate::agents::traffic_state::TrafficPicture;
-use crate::agents::{Conversation, ConversationInfo, EndpointConfig, Participant, Progress};
+use crate::agents::{
+    Conversation, ConversationInfo, ConversationProgress, EndpointConfig, Participant,
+};
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
 use crate::settings::Grouping;
 use crate::world::AirspaceWorld;
-use cycle_state::{ConversationTiming, CyclePhase, CycleState};
+use cycle_state::{ConversationTiming, PilotCyclePhase, PilotCycleState};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
     DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest, parse_packet,
@@ -37,9 +39,9 @@ pub struct Pilot {
     world: Arc<AirspaceWorld>,
     id: EntityId,
     fingerprint: u64,
-    memory: Memory,
+    memory: PilotMemory,
     /// The cycle that it is in, or was in last.
-    state: Option<CycleState>,
+    state: Option<PilotCycleState>,
     /// Talks that have ended for it.
     past: VecDeque<Conversation<dyn Participant>>,
     early: EarlyPackets,
@@ -53,14 +55,14 @@ impl Pilot {
     /// # Panics
     /// When there is no such airplane in the world.
     pub fn new(world: Arc<AirspaceWorld>, id: EntityId, contacts: TrafficPicture) -> Self {
-        Self::with_memory(world, id, Memory { contacts, ..Memory::default() })
+        Self::with_memory(world, id, PilotMemory { contacts, ..PilotMemory::default() })
     }
 
     /// Returns the pilot of an airplane with all that it remembers.
     ///
     /// # Panics
     /// When there is no such airplane in the world.
-    pub fn with_memory(world: Arc<AirspaceWorld>, id: EntityId, memory: Memory) -> Self {
+    pub fn with_memory(world: Arc<AirspaceWorld>, id: EntityId, memory: PilotMemory) -> Self {
         assert!((id as usize) < world.airplanes.len(), "there is no airplane {id}");
         Self {
             fingerprint: world.fingerprint,
@@ -87,12 +89,12 @@ impl Pilot {
     /// # Panics
     /// When the percept is that of another airplane, or one that [`Percept::check`] refuses.
     pub fn start(&mut self, percept: Percept, tick: u64) {
-        let schedule = Schedule::from_tick(tick, self.world.network.as_ref());
+        let schedule = ConversationSchedule::from_tick(tick, self.world.network.as_ref());
         self.start_with_schedule(percept, schedule);
     }
 
     /// Starts the conversations of a cycle at ticks that all agree on.
-    pub(crate) fn start_with_schedule(&mut self, percept: Percept, schedule: Schedule) {
+    pub(crate) fn start_with_schedule(&mut self, percept: Percept, schedule: ConversationSchedule) {
         self.start_cycle(percept, schedule);
         match self.world.groups {
             Grouping::Announced => self.decide(schedule.begins),
@@ -101,21 +103,21 @@ impl Pilot {
         self.advance(schedule.begins);
     }
 
-    fn start_cycle(&mut self, percept: Percept, schedule: Schedule) {
+    fn start_cycle(&mut self, percept: Percept, schedule: ConversationSchedule) {
         assert_eq!(percept.own.id, self.id, "the percept is that of another airplane");
         if let Some(state) = self.state.take()
-            && let CyclePhase::Grouping(conversation)
-            | CyclePhase::Deciding(conversation)
-            | CyclePhase::Shielding(conversation, _) = state.phase
+            && let PilotCyclePhase::Grouping(conversation)
+            | PilotCyclePhase::Deciding(conversation)
+            | PilotCyclePhase::Shielding(conversation, _) = state.phase
         {
-            self.push_past(conversation);
+            self.keep_ended(conversation);
         }
-        let control = Control::stay_on_orbit(self.id, percept.cycle, Memory::default());
-        self.state = Some(CycleState {
+        let control = Control::stay_on_orbit(self.id, percept.cycle, PilotMemory::default());
+        self.state = Some(PilotCycleState {
             members: percept.members().into(),
             unheard: Vec::new(),
             schedule,
-            phase: CyclePhase::Decided,
+            phase: PilotCyclePhase::Decided,
             candidates: ManeuverCandidates::default(),
             control,
             percept,
@@ -134,7 +136,8 @@ impl Pilot {
 
     /// Returns its control in the present cycle, once that is decided.
     pub fn control(&self) -> Option<Control> {
-        let state = self.state.as_ref().filter(|state| matches!(state.phase, CyclePhase::Over))?;
+        let state =
+            self.state.as_ref().filter(|state| matches!(state.phase, PilotCyclePhase::Over))?;
         let mut control = state.control.clone();
         // Questions have been answered since.
         for conversation in
@@ -152,19 +155,21 @@ impl Pilot {
 
     /// Returns whether it knows its group in the present cycle.
     pub fn has_group(&self) -> bool {
-        self.state.as_ref().is_some_and(|state| !matches!(state.phase, CyclePhase::Grouping(_)))
+        self.state
+            .as_ref()
+            .is_some_and(|state| !matches!(state.phase, PilotCyclePhase::Grouping(_)))
     }
 
     /// Returns whether it has chosen its candidates in the present cycle.
     pub fn has_decided(&self) -> bool {
         self.state.as_ref().is_some_and(|state| {
-            !matches!(state.phase, CyclePhase::Grouping(_) | CyclePhase::Deciding(_))
+            !matches!(state.phase, PilotCyclePhase::Grouping(_) | PilotCyclePhase::Deciding(_))
         })
     }
 
     /// Returns whether it has come to an end in the present cycle.
     pub fn is_done(&self) -> bool {
-        self.state.as_ref().is_some_and(|state| matches!(state.phase, CyclePhase::Over))
+        self.state.as_ref().is_some_and(|state| matches!(state.phase, PilotCyclePhase::Over))
     }
 
     /// Returns its control in the present cycle, and what it has considered; `None` before that is decided.
@@ -179,7 +184,7 @@ impl Pilot {
     /// When it has not begun a cycle.
     pub(crate) fn into_fallback(mut self) -> (Control, ManeuverCandidates) {
         let mut state = self.state.take().expect("it has begun a cycle");
-        let is_over = matches!(state.phase, CyclePhase::Over);
+        let is_over = matches!(state.phase, PilotCyclePhase::Over);
         let now = state.percept.cycle;
         state.record_traffic(0);
         let mut control =
@@ -191,12 +196,12 @@ impl Pilot {
     }
 
     /// Returns how far it has come in the conversation that it is in, if it is in one.
-    pub fn progress(&self) -> Option<Progress> {
+    pub fn progress(&self) -> Option<ConversationProgress> {
         match &self.state.as_ref()?.phase {
-            CyclePhase::Grouping(conversation)
-            | CyclePhase::Deciding(conversation)
-            | CyclePhase::Shielding(conversation, _) => Some(conversation.progress()),
-            CyclePhase::Decided | CyclePhase::Over => None,
+            PilotCyclePhase::Grouping(conversation)
+            | PilotCyclePhase::Deciding(conversation)
+            | PilotCyclePhase::Shielding(conversation, _) => Some(conversation.progress()),
+            PilotCyclePhase::Decided | PilotCyclePhase::Over => None,
         }
     }
 
@@ -219,7 +224,7 @@ impl Pilot {
         }
         let Self { state, past, early, out, .. } = self;
         if let Some(state) = state {
-            if self.world.is_silent(self.id, state.percept.cycle) {
+            if self.world.is_radio_off(self.id, state.percept.cycle) {
                 return Ok(());
             }
             if let Some(conversation) = state.conversation()
@@ -247,9 +252,9 @@ impl Pilot {
     fn advance(&mut self, tick: u64) {
         while let Some(state) = &mut self.state {
             match &mut state.phase {
-                CyclePhase::Grouping(conversation)
-                | CyclePhase::Deciding(conversation)
-                | CyclePhase::Shielding(conversation, _)
+                PilotCyclePhase::Grouping(conversation)
+                | PilotCyclePhase::Deciding(conversation)
+                | PilotCyclePhase::Shielding(conversation, _)
                     if conversation.is_done() || tick >= conversation.info().end_tick =>
                 {
                     let ended = conversation.finish();
@@ -263,7 +268,7 @@ impl Pilot {
                     state.record_traffic(ticks);
                     self.on_conversation_end(ended, tick);
                 }
-                CyclePhase::Decided if tick >= state.schedule.shield_from => {
+                PilotCyclePhase::Decided if tick >= state.schedule.shield_from => {
                     self.start_conversation(Protocol::Shield, tick);
                 }
                 _ => return,
@@ -276,7 +281,7 @@ impl Pilot {
         let Some(state) = &mut self.state else { return };
         let world = &*self.world;
         let known = state.members_of(topic);
-        let CycleState { percept, schedule, members, unheard, candidates, .. } = state;
+        let PilotCycleState { percept, schedule, members, unheard, candidates, .. } = state;
         let (start_tick, end_tick) = schedule.conversation_ticks(topic, tick);
         let id = match topic {
             // Its members are not known yet.
@@ -285,7 +290,7 @@ impl Pilot {
                 ConversationId::new(percept.cycle, topic, members)
             }
         };
-        let is_silent = world.is_silent(self.id, percept.cycle);
+        let is_silent = world.is_radio_off(self.id, percept.cycle);
         let config = EndpointConfig {
             me: known.binary_search(&self.id).expect("an airplane knows itself"),
             group: known,
@@ -303,28 +308,28 @@ impl Pilot {
             end_tick,
             is_silent,
         };
-        let Memory { contacts, resolving } = &self.memory;
+        let PilotMemory { contacts, resolving } = &self.memory;
         state.phase = match topic {
             Protocol::Shield => {
                 let allowed = allowed_profiles(world, percept, candidates);
                 let profiles: Vec<_> =
                     allowed.iter().map(|&k| candidates.profiles[k].clone()).collect();
-                let knowledge = Knowledge { world, percept, unheard, contacts };
+                let knowledge = PilotKnowledge { world, percept, unheard, contacts };
                 let participant = exchange_participant(knowledge, &profiles, config);
-                CyclePhase::Shielding(Conversation::new(info, participant), allowed)
+                PilotCyclePhase::Shielding(Conversation::new(info, participant), allowed)
             }
-            Protocol::Group => CyclePhase::Grouping(Conversation::new(
+            Protocol::Group => PilotCyclePhase::Grouping(Conversation::new(
                 info,
                 grouping_participant(world, percept, contacts, config),
             )),
             Protocol::Decision if DecisionStrategy::is_reactive(world) => {
                 let participant = intent_participant(world, percept, contacts, resolving, config);
-                CyclePhase::Deciding(Conversation::new(info, participant))
+                PilotCyclePhase::Deciding(Conversation::new(info, participant))
             }
             Protocol::Decision => {
-                let knowledge = Knowledge { world, percept, unheard, contacts };
+                let knowledge = PilotKnowledge { world, percept, unheard, contacts };
                 let participant = optimization_participant(knowledge, config);
-                CyclePhase::Deciding(Conversation::new(info, participant))
+                PilotCyclePhase::Deciding(Conversation::new(info, participant))
             }
         };
         self.deliver_early_packets(id, tick);
@@ -332,7 +337,7 @@ impl Pilot {
 
     /// Starts the conversation that it is in, and hands over earlier messages of others in it.
     fn deliver_early_packets(&mut self, id: ConversationId, tick: u64) {
-        let Some(conversation) = self.state.as_mut().and_then(CycleState::conversation) else {
+        let Some(conversation) = self.state.as_mut().and_then(PilotCycleState::conversation) else {
             return;
         };
         conversation.start(tick, &mut self.out);
@@ -351,11 +356,11 @@ impl Pilot {
     }
 
     /// Keeps a conversation that has ended here, to answer questions about it.
-    fn push_past(&mut self, conversation: Conversation<DynParticipant>) {
+    fn keep_ended(&mut self, conversation: Conversation<DynParticipant>) {
         if self.past.len() == MAX_PAST_CONVERSATIONS {
             self.past.pop_front();
         }
-        self.past.push_back(conversation.into_past());
+        self.past.push_back(conversation.into_ended());
     }
 }
 
@@ -375,7 +380,7 @@ impl NetworkAgent for Pilot {
 
     fn on_timer(&mut self, tick: u64) {
         self.advance(tick);
-        if let Some(conversation) = self.state.as_mut().and_then(CycleState::conversation) {
+        if let Some(conversation) = self.state.as_mut().and_then(PilotCycleState::conversation) {
             conversation.on_timer(tick, &mut self.out);
         }
         // Others may still depend on it in a conversation that has ended for it.
@@ -390,14 +395,14 @@ impl NetworkAgent for Pilot {
     fn next_timer(&self) -> Option<u64> {
         let state = self.state.as_ref()?;
         let present = match &state.phase {
-            CyclePhase::Grouping(conversation)
-            | CyclePhase::Deciding(conversation)
-            | CyclePhase::Shielding(conversation, _) => {
+            PilotCyclePhase::Grouping(conversation)
+            | PilotCyclePhase::Deciding(conversation)
+            | PilotCyclePhase::Shielding(conversation, _) => {
                 let end_tick = conversation.info().end_tick;
                 Some(conversation.next_timer().map_or(end_tick, |due| due.min(end_tick)))
             }
-            CyclePhase::Decided => Some(state.schedule.shield_from),
-            CyclePhase::Over => None,
+            PilotCyclePhase::Decided => Some(state.schedule.shield_from),
+            PilotCyclePhase::Over => None,
         };
         let of_cycle = self
             .past

@@ -10,7 +10,7 @@ const NO_TIMEOUT: RetryPolicy =
 
 /// The ticks of a cycle's conversations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Schedule {
+pub(crate) struct ConversationSchedule {
     /// Start of the first one.
     pub(crate) begins: u64,
     /// Latest end of the conversation that finds the group, where there is one.
@@ -23,7 +23,7 @@ pub(crate) struct Schedule {
     pub(crate) ends: u64,
 }
 
-impl Schedule {
+impl ConversationSchedule {
     /// Returns the ticks of conversations that start in a tick: over a network that loses messages each has its time;
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
     pub(crate) fn from_tick(tick: u64, network: Option<&Network>) -> Self {

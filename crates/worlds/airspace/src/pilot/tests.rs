@@ -7,7 +7,7 @@ mod order;
 use super::*;
 use crate::deploy::run_pilots;
 use crate::world::AirspaceWorld;
-use crate::{AirspaceRun, Fleet, airspace_run};
+use crate::{AirspaceRun, RemotePilotRun, airspace_run};
 use sidestep_kernel::network::{Network, NetworkAgent, OutgoingPacket};
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
@@ -47,7 +47,7 @@ impl TestPilots {
     /// Lets the pilots that perceive something decide, over the network of the scenario.
     fn decide(&mut self, run: &AirspaceRun) -> Vec<Control> {
         let network: Option<&Network> = self.world.network.as_ref();
-        let (now, schedule) = (run.cycle(), Schedule::for_cycle(run.cycle(), network));
+        let (now, schedule) = (run.cycle(), ConversationSchedule::for_cycle(run.cycle(), network));
         // As they come off a network.
         let percepts: Vec<Percept> = run.percepts().iter().map(over_the_wire).collect();
         let is_due = |pilot: &Pilot| percepts.iter().any(|percept| percept.own.id == pilot.id());
@@ -96,7 +96,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
             (*next, *overrides, *orbits) = (1 - (*next).min(1), *overrides + 7, *orbits + 3);
             airplane.turn_rate_rad_s += 0.01;
             if *orbiting == 0 {
-                airplane.fallback = crate::shield::Side::BOTH[1 - airplane.fallback as usize];
+                airplane.fallback = crate::shield::OrbitSide::BOTH[1 - airplane.fallback as usize];
                 hidden += 1;
             }
             snapshot.resolving[id] = crate::baseline::mvp::ActiveResolutions::default();

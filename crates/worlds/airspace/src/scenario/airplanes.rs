@@ -1,10 +1,10 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use crate::flight::{Airplane, Model, Pose2, Timing, Track};
+use crate::flight::{AircraftModel, Airplane, Pose2, StepTiming, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::{GeneratorKind, GeneratorParams, generate};
-use crate::settings::{SeparationM, Speed, TurnRate, Turns};
+use crate::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::traffic::MAX_SPEED_M_S;
@@ -13,8 +13,12 @@ use sidestep_kernel::stream::Streams;
 use sidestep_scenario::{Integer, Number, Open, RightOpen, Spanned};
 
 /// The paper's airplane, for keys that a scenario leaves out.
-const PAPER_MODEL: Model =
-    Model { v_m_s: 35.0, omega_max_rad_s: 4f64.to_radians(), separation_m: 500.0, turns: 5 };
+const PAPER_MODEL: AircraftModel = AircraftModel {
+    v_m_s: 35.0,
+    omega_max_rad_s: 4f64.to_radians(),
+    separation_m: 500.0,
+    turns: 5,
+};
 /// Radius in meters of the paper's circle.
 const PAPER_RADIUS_M: f64 = 6_500.0;
 /// Default of the random displacement of generated starts: as much as breaks all symmetries, and far less than the
@@ -40,7 +44,7 @@ pub(super) struct ModelSection {
     omega_max_deg_s: Option<Number<TurnRate>>,
     /// Distance that all keep from each other.
     separation_m: Option<SeparationM>,
-    turns: Option<Turns>,
+    turns: Option<TurnCount>,
 }
 
 impl ModelSection {
@@ -54,8 +58,8 @@ impl ModelSection {
         }
     }
 
-    fn model(&self) -> Model {
-        Model {
+    fn model(&self) -> AircraftModel {
+        AircraftModel {
             v_m_s: self.v_m_s.map_or(PAPER_MODEL.v_m_s, f64::from),
             omega_max_rad_s: self
                 .omega_max_deg_s
@@ -68,7 +72,7 @@ impl ModelSection {
 
 /// The time for which recorded airplanes follow their tracks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Replay {
+pub(super) struct ReplayPeriod {
     pub(super) cycles: u64,
     /// End of these cycles, in seconds after the start of the run.
     until_s: f64,
@@ -79,7 +83,7 @@ impl Compiler<'_> {
     pub(super) fn airplanes(
         &self,
         streams: &Streams,
-        replay: Replay,
+        replay: ReplayPeriod,
     ) -> Result<Vec<Airplane>, InputError> {
         let common = self.file.airplane.clone().unwrap_or_default();
         let mut all = match &self.file.airspace.generator {
@@ -108,7 +112,7 @@ impl Compiler<'_> {
     fn generate_airplanes(
         &self,
         section: &Spanned<GeneratorSection>,
-        model: &Model,
+        model: &AircraftModel,
         streams: &Streams,
     ) -> Result<Vec<Airplane>, InputError> {
         let s = section.get_ref();
@@ -134,8 +138,8 @@ impl Compiler<'_> {
 
     /// Returns how much farther from each other two airplanes of a model have to start, because of errors: they are
     /// perceived at other places, and their orbits are wider.
-    fn error_margin_m(&self, model: &Model) -> f64 {
-        let bounds = self.bounds();
+    fn error_margin_m(&self, model: &AircraftModel) -> f64 {
+        let bounds = self.error_bounds();
         let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let Some(rate_rad_s) = bounds.max_orbit_rate_rad_s(model, dt_s) else { return 0.0 };
         let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();
@@ -147,7 +151,7 @@ impl Compiler<'_> {
     fn planned_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
-        model: Model,
+        model: AircraftModel,
     ) -> Result<Airplane, InputError> {
         let s = section.get_ref();
         let error =
@@ -182,9 +186,9 @@ impl Compiler<'_> {
     fn recorded_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
-        mut model: Model,
+        mut model: AircraftModel,
         track: Track,
-        replay: Replay,
+        replay: ReplayPeriod,
     ) -> Result<Airplane, InputError> {
         let top_m_s = track.max_speed_m_s();
         if top_m_s >= MAX_SPEED_M_S {
@@ -205,18 +209,18 @@ impl Compiler<'_> {
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
-    pub(super) fn replay(&self, timing: &Timing) -> Replay {
+    pub(super) fn replay(&self, timing: &StepTiming) -> ReplayPeriod {
         let until_s = self.file.airspace.replay_until_s.map_or(f64::INFINITY, f64::from);
         // The conversion saturates at the largest number of cycles.
         let cycles = (until_s / timing.dt_s).ceil() as u64;
-        Replay { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s }
+        ReplayPeriod { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s }
     }
 }
 
 fn replayed_airplane(
     track: Track,
-    model: Model,
-    replay: Replay,
+    model: AircraftModel,
+    replay: ReplayPeriod,
     is_non_cooperative: bool,
 ) -> Airplane {
     let begins_s = track.start_s();

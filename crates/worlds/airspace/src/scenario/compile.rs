@@ -2,13 +2,13 @@
 
 use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
-use crate::flight::Levels;
+use crate::flight::FlightLevelRange;
 use crate::flight::{Airplane, FlightTask};
-use crate::flight::{Timing, WaypointRule};
+use crate::flight::{StepTiming, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
 use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings};
-use crate::shield::{ErrorBounds, ExemptIds, ShieldedAircraft, Side, first_fallbacks};
+use crate::shield::{ErrorBounds, ExemptIds, OrbitSide, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::fingerprint;
@@ -76,7 +76,7 @@ impl<'a> Compiler<'a> {
         let (fallbacks, too_close) = if world.shield {
             first_fallbacks_of(&world)
         } else {
-            (vec![Side::default(); world.airplanes.len()], Vec::new())
+            (vec![OrbitSide::default(); world.airplanes.len()], Vec::new())
         };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
@@ -147,7 +147,7 @@ impl<'a> Compiler<'a> {
             start_utc_s: section.start_utc_s.map(f64::from),
             replay_cycles: replay.cycles,
             disturbance: self.disturbance(),
-            bounds: self.bounds(),
+            bounds: self.error_bounds(),
             fingerprint: fingerprint(&self.recipe.source.text, self.seed),
             streams,
             actions: Arc::default(),
@@ -196,7 +196,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the bounds on errors for which the shield allows.
-    pub(super) fn bounds(&self) -> ErrorBounds {
+    pub(super) fn error_bounds(&self) -> ErrorBounds {
         let sigmas = self.file.airspace.error_sigmas.map_or(DEFAULT_SIGMAS, f64::from);
         let Disturbance { position_m, heading_rad } = self.disturbance();
         ErrorBounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
@@ -294,11 +294,11 @@ impl<'a> Compiler<'a> {
         Err(self.source.error(None, cause, remedy))
     }
 
-    pub(super) fn is_paper(&self) -> bool {
+    pub(super) fn is_paper_preset(&self) -> bool {
         self.file.airspace.preset == Preset::Paper
     }
 
-    fn timing(&self) -> Result<Timing, InputError> {
+    fn timing(&self) -> Result<StepTiming, InputError> {
         let section = &self.file.airspace;
         let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
@@ -316,7 +316,7 @@ impl<'a> Compiler<'a> {
                 format!("give up to {MAX_STEPS_PER_DT}: each is flown and watched by itself");
             return Err(self.source.error(span, cause, remedy));
         }
-        Ok(Timing { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
+        Ok(StepTiming { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
     }
 
     /// Returns the number of points of a prediction, which reach as far as the scenario says.
@@ -331,7 +331,7 @@ impl<'a> Compiler<'a> {
             return Err(self.source.error(former.span(), cause, remedy));
         }
         // The paper predicts 125 points of one second each.
-        let preset_s: f64 = if self.is_paper() { 125.0 } else { 90.0 };
+        let preset_s: f64 = if self.is_paper_preset() { 125.0 } else { 90.0 };
         let given = section.horizon_s.as_ref();
         let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
         // A time that rounding puts behind a point ends at that point.
@@ -384,8 +384,8 @@ fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
 }
 
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
-fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
-    let mut sides = vec![Side::default(); world.airplanes.len()];
+fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>) {
+    let mut sides = vec![OrbitSide::default(); world.airplanes.len()];
     // Airplanes that enter at other times do not meet at the start.
     let starts: Vec<usize> = (0..sides.len())
         .filter(|&i| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0))
@@ -401,9 +401,9 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Side>, Vec<(u32, u32)>) {
             orbit_rad_s: world.orbit_rad_s[i],
             separation_m: airplane.model.separation_m,
             error_m: world.error_m(i),
-            levels: Levels::at(airplane.altitude_m),
+            levels: FlightLevelRange::from_level(airplane.altitude_m),
             vertical_m: world.vertical_m,
-            fallback: Side::Left,
+            fallback: OrbitSide::Left,
             exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,

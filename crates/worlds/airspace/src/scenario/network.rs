@@ -1,7 +1,7 @@
 //! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
-use crate::flight::{Airplane, FlightTask, Timing};
+use crate::flight::{Airplane, FlightTask, StepTiming};
 use crate::settings::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -95,11 +95,11 @@ impl AgentNaming for AirplaneNaming {
         Ok(network::RadioOutage { agent: one.airplane, window })
     }
 
-    fn partition(&self, one: &PartitionSection) -> Result<network::Partition, SectionError> {
+    fn partition(&self, one: &PartitionSection) -> Result<network::NetworkPartition, SectionError> {
         self.check(&one.sides.concat())?;
         check_sides(&one.sides, "airplane")?;
         let window = time_window(one.from_s, one.until_s)?;
-        Ok(network::Partition { sides: one.sides.clone(), window })
+        Ok(network::NetworkPartition { sides: one.sides.clone(), window })
     }
 
     fn unidirectional_link(
@@ -117,7 +117,7 @@ impl Compiler<'_> {
     /// Returns the network, if the scenario has one.
     pub(super) fn network(
         &self,
-        timing: &Timing,
+        timing: &StepTiming,
         airplanes: &[Airplane],
     ) -> Result<Option<Network>, InputError> {
         let Some(section) = &self.file.airspace.network else { return Ok(None) };

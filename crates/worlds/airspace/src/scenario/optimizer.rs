@@ -1,7 +1,7 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
-use crate::flight::Legs;
+use crate::flight::DetourLegs;
 use crate::objective::Objective;
 use crate::settings::{Held, ReactiveSettings};
 use schemars::JsonSchema;
@@ -21,9 +21,9 @@ const MAX_TIMES: usize = 20;
 
 /// A list of times.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Times(pub(super) Vec<f64>);
+pub(super) struct TimeList(pub(super) Vec<f64>);
 
-impl<'de> Deserialize<'de> for Times {
+impl<'de> Deserialize<'de> for TimeList {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let times_s = Vec::<f64>::deserialize(deserializer)?;
         if times_s.iter().all(|t| Held::allows(*t)) && times_s.len() <= MAX_TIMES {
@@ -34,7 +34,7 @@ impl<'de> Deserialize<'de> for Times {
     }
 }
 
-schema_by_hand!(Times, {
+schema_by_hand!(TimeList, {
     let mut time = Held::limits();
     time["type"] = "number".into();
     json!({ "type": "array", "items": time, "maxItems": MAX_TIMES })
@@ -44,9 +44,9 @@ schema_by_hand!(Times, {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct LegsSection {
     /// Times for which an airplane turns.
-    turns_s: Times,
+    turns_s: TimeList,
     /// Times until which it then flies straight on.
-    until_s: Times,
+    until_s: TimeList,
 }
 
 /// The settings of a method that looks ahead anew in every step.
@@ -56,13 +56,13 @@ pub(super) struct ReactiveSection {
     /// Time within which conflicts are seen.
     look_ahead_s: Option<Number<LookAhead>>,
     /// Factor on the separation that is kept.
-    margin: Option<Number<Margin>>,
+    margin: Option<Number<SeparationFactor>>,
 }
 
 /// A time in which an airplane looks ahead.
 type LookAhead = LeftOpen<0, 100_000>;
 /// A factor on separations.
-type Margin = Closed<1, 10>;
+type SeparationFactor = Closed<1, 10>;
 
 impl ReactiveSection {
     /// Returns the settings, with those of `default` where none are given.
@@ -76,15 +76,15 @@ impl ReactiveSection {
 
 /// A yes or no; yes unless given.
 #[derive(Debug)]
-pub(super) struct Switch(pub(super) bool);
+pub(super) struct OnOffSwitch(pub(super) bool);
 
-impl Default for Switch {
+impl Default for OnOffSwitch {
     fn default() -> Self {
         Self(true)
     }
 }
 
-impl<'de> Deserialize<'de> for Switch {
+impl<'de> Deserialize<'de> for OnOffSwitch {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let given = toml::Value::deserialize(deserializer)?;
         match given.as_str() {
@@ -95,14 +95,14 @@ impl<'de> Deserialize<'de> for Switch {
     }
 }
 
-schema_by_hand!(Switch, json!({ "enum": ["on", "off"], "default": "on" }));
+schema_by_hand!(OnOffSwitch, json!({ "enum": ["on", "off"], "default": "on" }));
 
 impl Compiler<'_> {
     /// Returns the objective. Its sums are over points, and the scenario's weights are per second:
     /// however fine the points are, the same paths have the same order.
     pub(super) fn objective(&self, vertical_m: f64, dtau_s: f64) -> Objective {
         let section = &self.file.airspace;
-        let is_paper = self.is_paper();
+        let is_paper = self.is_paper_preset();
         let beta_per_s = section.beta.map_or(0.995, f64::from);
         Objective {
             // With the paper's weight, and without a margin, the optimum itself gives up some meters of separation for
@@ -118,7 +118,7 @@ impl Compiler<'_> {
 
     pub(super) fn settings(&self) -> Result<OptimizerConfig, InputError> {
         let section = &self.file.airspace;
-        let is_paper = self.is_paper();
+        let is_paper = self.is_paper_preset();
         let estimator =
             if is_paper { Estimator::Sampled { block: 20, ageing: 0.7 } } else { Estimator::Exact };
         let estimator = self.estimator()?.unwrap_or(estimator);
@@ -174,11 +174,16 @@ impl Compiler<'_> {
         Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
     }
 
-    pub(super) fn legs(&self) -> Result<Legs, InputError> {
+    pub(super) fn legs(&self) -> Result<DetourLegs, InputError> {
         let Some(given) = &self.file.airspace.legs else {
-            return Ok(if self.is_paper() { Legs::default() } else { Legs::default_preset() });
+            return Ok(if self.is_paper_preset() {
+                DetourLegs::default()
+            } else {
+                DetourLegs::default_preset()
+            });
         };
-        let LegsSection { turns_s: Times(turns_s), until_s: Times(until_s) } = given.get_ref();
+        let LegsSection { turns_s: TimeList(turns_s), until_s: TimeList(until_s) } =
+            given.get_ref();
         if turns_s.is_empty() != until_s.is_empty() {
             let cause = "legs with one of turns_s and until_s";
             let remedy = "give both, or neither for no legs";
@@ -194,6 +199,6 @@ impl Compiler<'_> {
                           are holds_s";
             return Err(self.source.error(given.span(), cause, remedy));
         }
-        Ok(Legs { turns_s: turns_s.clone(), until_s: until_s.clone() })
+        Ok(DetourLegs { turns_s: turns_s.clone(), until_s: until_s.clone() })
     }
 }

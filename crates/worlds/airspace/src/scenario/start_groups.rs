@@ -2,7 +2,7 @@
 
 use crate::decide::max_group_bytes;
 use crate::flight::KnownAircraft;
-use crate::join::groups;
+use crate::join::form_groups;
 use crate::perceive::known_aircraft;
 use crate::scratch::{PhaseContext, Scratch};
 use crate::state::AirspaceState;
@@ -16,7 +16,7 @@ pub(super) fn largest_start_group(world: &AirspaceWorld, state: &AirspaceState) 
     let mut scratch = Scratch::default();
     let clock = &ManualClock::default();
     let context = &mut PhaseContext { world, state, now: 0, clock, scratch: &mut scratch };
-    let groups = groups(context);
+    let groups = form_groups(context);
     let mut members = Vec::new();
     let leaders =
         (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_singleton(slot));

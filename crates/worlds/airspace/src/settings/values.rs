@@ -50,9 +50,9 @@ bounds! {
 
 /// A number of rounds of an optimization.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rounds(pub(crate) u32);
+pub(crate) struct RoundCount(pub(crate) u32);
 
-impl<'de> Deserialize<'de> for Rounds {
+impl<'de> Deserialize<'de> for RoundCount {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let rounds = i64::deserialize(deserializer)?;
         if (1..=10_000).contains(&rounds) {
@@ -63,13 +63,13 @@ impl<'de> Deserialize<'de> for Rounds {
     }
 }
 
-schema_by_hand!(Rounds, json!({ "type": "integer", "minimum": 1, "maximum": 10_000 }));
+schema_by_hand!(RoundCount, json!({ "type": "integer", "minimum": 1, "maximum": 10_000 }));
 
 /// A number of turns to choose from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Turns(pub(crate) usize);
+pub(crate) struct TurnCount(pub(crate) usize);
 
-impl<'de> Deserialize<'de> for Turns {
+impl<'de> Deserialize<'de> for TurnCount {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let turns = i64::deserialize(deserializer)?;
         if !(3..=99).contains(&turns) || turns % 2 == 0 {
@@ -80,7 +80,7 @@ impl<'de> Deserialize<'de> for Turns {
     }
 }
 
-schema_by_hand!(Turns, {
+schema_by_hand!(TurnCount, {
     let odd: Vec<u32> = (3..=99).step_by(2).collect();
     json!({ "type": "integer", "enum": odd })
 });

@@ -25,8 +25,8 @@
 //! changes by at most `2 v sin(D) dt <= 2 v dt D`. So it is within `W = 6 v dt D` of its orbit, and
 //! gaps wider by `W` on either side keep `R`.
 
-use super::orbit::Side;
-use crate::flight::{Model, Pose2};
+use super::orbit::OrbitSide;
+use crate::flight::{AircraftModel, Pose2};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -63,7 +63,7 @@ impl ErrorBounds {
     }
 
     /// Returns the largest turn rate at which an airplane can hold an orbit, if there is one.
-    pub(crate) fn max_orbit_rate_rad_s(&self, model: &Model, dt_s: f64) -> Option<f64> {
+    pub(crate) fn max_orbit_rate_rad_s(&self, model: &AircraftModel, dt_s: f64) -> Option<f64> {
         // The rest of the turn rate has to correct two gusts within a `dt`: `a dt >= 2 D`.
         let fraction = 1.0 - 2.0 * self.heading_rad / (model.omega_max_rad_s * dt_s);
         (fraction >= MIN_RATE_FRACTION).then_some(fraction * model.omega_max_rad_s)
@@ -106,11 +106,11 @@ impl OrbitTracker {
     pub(crate) fn new(
         pose: Pose2,
         orbit_pose: Pose2,
-        model: &Model,
+        model: &AircraftModel,
         rate_rad_s: f64,
-        side: Side,
+        side: OrbitSide,
     ) -> Self {
-        let Model { v_m_s, omega_max_rad_s, .. } = *model;
+        let AircraftModel { v_m_s, omega_max_rad_s, .. } = *model;
         Self { pose, orbit_pose, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
     }
 
@@ -162,12 +162,12 @@ mod tests {
             gusts in prop::collection::vec(-1.0f64..1.0, 300), worst in 0u8..4,
         ) {
             let (dt_s, v_m_s, omega_max_rad_s) = (5.0, 35.0, 4f64.to_radians());
-            let model = Model { v_m_s, omega_max_rad_s, separation_m: 500.0, turns: 5 };
+            let model = AircraftModel { v_m_s, omega_max_rad_s, separation_m: 500.0, turns: 5 };
             let gust_rad = part * omega_max_rad_s * dt_s;
             let bounds = ErrorBounds { position_m: 0.0, heading_rad: gust_rad };
             let rate = bounds.max_orbit_rate_rad_s(&model, dt_s).expect("within what can be held");
             let start = Pose2 { at: [0.0, 0.0], heading_rad: 1.0 };
-            let mut now = OrbitTracker::new(start, start, &model, rate, Side::BOTH[usize::from(left)]);
+            let mut now = OrbitTracker::new(start, start, &model, rate, OrbitSide::BOTH[usize::from(left)]);
             let steps = (dt_s / dtau) as usize;
             for (k, gust) in gusts.iter().enumerate() {
                 // Outward, by turns, always to one side, or by chance.

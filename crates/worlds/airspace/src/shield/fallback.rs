@@ -1,13 +1,13 @@
 //! Fallbacks of airplanes that enter, or that are about to change speed or level.
 
-use super::orbit::Side;
+use super::orbit::OrbitSide;
 use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
 use crate::flight::distance_m;
 use sidestep_kernel::interrupt;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
 /// pairs that are not: they start too close.
-pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<Side>, Vec<(usize, usize)>) {
+pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<OrbitSide>, Vec<(usize, usize)>) {
     entry_fallbacks(group, |_| true)
 }
 
@@ -16,10 +16,10 @@ pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<Side>, Vec<(us
 pub(crate) fn entry_fallbacks(
     group: &[ShieldedAircraft],
     enters: impl Fn(usize) -> bool,
-) -> (Vec<Side>, Vec<(usize, usize)>) {
+) -> (Vec<OrbitSide>, Vec<(usize, usize)>) {
     let near = neighbors(group);
-    let mut sides: Vec<Side> = group.iter().map(|aircraft| aircraft.fallback).collect();
-    let count_conflicts = |sides: &[Side], i: usize, side: Side| {
+    let mut sides: Vec<OrbitSide> = group.iter().map(|aircraft| aircraft.fallback).collect();
+    let count_conflicts = |sides: &[OrbitSide], i: usize, side: OrbitSide| {
         near[i].iter().filter(|&&j| !are_apart(group, (i, side), (j, sides[j]))).count()
     };
     // An airplane with fewer conflicts on the other side changes over. Conflicts only decrease, so this
@@ -28,7 +28,8 @@ pub(crate) fn entry_fallbacks(
     while has_changed {
         has_changed = false;
         for i in (0..sides.len()).filter(|&i| enters(i)) {
-            let best = Side::BOTH.into_iter().min_by_key(|&side| count_conflicts(&sides, i, side));
+            let best =
+                OrbitSide::BOTH.into_iter().min_by_key(|&side| count_conflicts(&sides, i, side));
             if let Some(best) = best
                 && count_conflicts(&sides, i, best) < count_conflicts(&sides, i, sides[i])
             {
@@ -51,8 +52,8 @@ pub(crate) fn entry_fallbacks(
 /// Returns whether the orbits of two airplanes of a group, each to a side, stay apart.
 fn are_apart(
     group: &[ShieldedAircraft],
-    (i, side_i): (usize, Side),
-    (j, side_j): (usize, Side),
+    (i, side_i): (usize, OrbitSide),
+    (j, side_j): (usize, OrbitSide),
 ) -> bool {
     group[i].orbit(side_i).stays_apart(&group[j].orbit(side_j), group[i].gap_m(&group[j]))
 }
@@ -62,10 +63,10 @@ fn are_apart(
 pub(crate) fn safe_side(
     changed: &ShieldedAircraft,
     others: impl Iterator<Item = ShieldedAircraft>,
-) -> Option<Side> {
+) -> Option<OrbitSide> {
     let others: Vec<ShieldedAircraft> =
         others.filter(|other| changed.is_protected_from(other)).collect();
-    let other_sides = Side::BOTH.into_iter().filter(|&side| side != changed.fallback);
+    let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changed.fallback);
     [changed.fallback].into_iter().chain(other_sides).find(|&side| {
         let orbit = changed.orbit(side);
         others.iter().all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.gap_m(other)))

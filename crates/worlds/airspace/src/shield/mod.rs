@@ -9,7 +9,7 @@
 //! Each `dt` every airplane is given a *plan*: some turn rates for `dt`, and then an orbit from where those
 //! end. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits forever
 //! after it, or when the pair need not be kept apart: it is exempt, or the levels that the two keep
-//! or pass do not meet. [`filter`] assigns plans that are pairwise compatible:
+//! or pass do not meet. [`filter_maneuvers`] assigns plans that are pairwise compatible:
 //!
 //! 1. *Start.* If the fallbacks are apart, staying on them for `dt` and forever after is a plan for
 //!    each, and these plans are pairwise compatible: they are the motions of which the invariant
@@ -61,10 +61,10 @@ mod tests;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_rates};
 pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_side};
-pub use orbit::Side;
+pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;
 pub use safe_maneuver::TurnProfile;
-pub use search::{PlanCertainty, ShieldDecision, filter};
+pub use search::{PlanCertainty, ShieldDecision, filter_maneuvers};
 pub(crate) use shielded_aircraft::ExemptIds;
 pub use shielded_aircraft::ShieldedAircraft;

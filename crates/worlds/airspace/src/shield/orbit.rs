@@ -20,7 +20,7 @@ const MIN_INTERVAL_FRACTION: f64 = 1e-6;
 /// The direction of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Side {
+pub enum OrbitSide {
     /// Counter-clockwise.
     #[default]
     Left,
@@ -28,7 +28,7 @@ pub enum Side {
     Right,
 }
 
-impl Side {
+impl OrbitSide {
     /// Both sides, in the order in which plans are tried.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
@@ -41,7 +41,7 @@ impl Side {
     }
 }
 
-impl Packed for Side {
+impl Packed for OrbitSide {
     type Bits = u8;
 
     #[inline(always)]
@@ -217,7 +217,7 @@ mod tests {
             x in -1e3f64..1e3, psi in -3.1f64..3.1, left in any::<bool>(), t_s in 0.0f64..300.0,
         ) {
             let pose = Pose2 { at: [x, 0.0], heading_rad: psi };
-            let omega = Side::BOTH[usize::from(left)].sign() * 4f64.to_radians();
+            let omega = OrbitSide::BOTH[usize::from(left)].sign() * 4f64.to_radians();
             let flown = pose.step(35.0, omega, t_s).at;
             prop_assert!(distance_m(flown, Orbit::from_pose(pose, 35.0, omega).at(t_s)) < 1e-6);
         }

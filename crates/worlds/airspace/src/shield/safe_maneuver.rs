@@ -1,6 +1,6 @@
 //! Plans: turn rates for one `dt`, and then an orbit forever.
 
-use super::orbit::{Orbit, Side, stays_apart_for};
+use super::orbit::{Orbit, OrbitSide, stays_apart_for};
 use super::shielded_aircraft::ShieldedAircraft;
 use crate::flight::{Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub(crate) struct SafeManeuver {
     orbit: Orbit,
     /// Number of the candidate, `None` for the fallback.
     pub(super) candidate: Option<usize>,
-    pub(super) side: Side,
+    pub(super) side: OrbitSide,
 }
 
 impl SafeManeuver {
@@ -33,7 +33,7 @@ impl SafeManeuver {
         aircraft: ShieldedAircraft,
         profile: &TurnProfile,
         dtau_s: f64,
-        side: Side,
+        side: OrbitSide,
     ) -> Self {
         Self::from_candidate(aircraft, profile, dtau_s, None, side)
     }
@@ -44,7 +44,7 @@ impl SafeManeuver {
         profile: &TurnProfile,
         dtau_s: f64,
         candidate: Option<usize>,
-        side: Side,
+        side: OrbitSide,
     ) -> Self {
         let flown = Self::from_turn_rates(
             aircraft.pose,
@@ -57,7 +57,7 @@ impl SafeManeuver {
     }
 
     /// Returns the same plan with an orbit to a side.
-    pub(super) fn with_side(&self, side: Side) -> Self {
+    pub(super) fn with_side(&self, side: OrbitSide) -> Self {
         let omega_rad_s = side.sign() * self.aircraft.orbit_rad_s;
         let orbit = Orbit::from_pose(self.end(), self.aircraft.v_m_s, omega_rad_s);
         Self { orbit, side, ..self.clone() }
@@ -68,7 +68,7 @@ impl SafeManeuver {
         aircraft: ShieldedAircraft,
         omegas_rad_s: Vec<f64>,
         dtau_s: f64,
-        side: Side,
+        side: OrbitSide,
     ) -> Self {
         let mut poses = vec![start];
         for &omega in &omegas_rad_s {
@@ -92,7 +92,7 @@ impl SafeManeuver {
         self.poses[self.poses.len() - 1]
     }
 
-    pub(crate) fn side(&self) -> Side {
+    pub(crate) fn side(&self) -> OrbitSide {
         self.side
     }
 
@@ -128,7 +128,7 @@ impl SafeManeuver {
     /// and on orbits forever after it.
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
-        let (centers, radius_m) = other.reach(dt_s);
+        let (centers, radius_m) = other.reach_discs(dt_s);
         let gap_m = radius_m + self.aircraft.gap_m(other);
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;

@@ -1,6 +1,6 @@
 //! The search for plans that are pairwise compatible.
 
-use super::orbit::Side;
+use super::orbit::OrbitSide;
 use super::safe_maneuver::{SafeManeuver, TurnProfile};
 use super::shielded_aircraft::ShieldedAircraft;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +11,7 @@ pub struct ShieldDecision {
     /// Number of the candidate to fly, `None` for the stored fallback.
     pub candidate: Option<usize>,
     /// The fallback to store after that.
-    pub fallback: Side,
+    pub fallback: OrbitSide,
 }
 
 /// The certainty that all airplanes fly the plans they are given.
@@ -27,14 +27,14 @@ pub enum PlanCertainty {
 /// Decides for airplanes with stored fallbacks that are pairwise apart. `candidates[i]` are the
 /// turn profiles that airplane `i` may fly, the preferred one first, each of `steps` steps of `dtau_s` seconds;
 /// without any it stays on its fallback.
-pub fn filter(
+pub fn filter_maneuvers(
     group: &[ShieldedAircraft],
     candidates: &[Vec<TurnProfile>],
     steps: usize,
     dtau_s: f64,
     certainty: PlanCertainty,
 ) -> Vec<ShieldDecision> {
-    let mut search = Search::new(group, candidates, steps, dtau_s, certainty);
+    let mut search = ShieldSearch::new(group, candidates, steps, dtau_s, certainty);
     search.resolve_conflicts();
     search.retry_fallbacks();
     search
@@ -44,7 +44,7 @@ pub fn filter(
         .collect()
 }
 
-struct Search<'a> {
+struct ShieldSearch<'a> {
     group: &'a [ShieldedAircraft],
     candidates: &'a [Vec<TurnProfile>],
     dtau_s: f64,
@@ -55,7 +55,7 @@ struct Search<'a> {
     by_rank: Vec<usize>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> ShieldSearch<'a> {
     fn new(
         group: &'a [ShieldedAircraft],
         candidates: &'a [Vec<TurnProfile>],
@@ -151,7 +151,7 @@ impl<'a> Search<'a> {
         if all.iter().any(|&k| self.plans[k].is_fallback()) {
             return None;
         }
-        for side in Side::BOTH {
+        for side in OrbitSide::BOTH {
             let turned: BTreeMap<usize, SafeManeuver> =
                 all.iter().map(|&k| (k, self.plans[k].with_side(side))).collect();
             if turned.keys().all(|&k| self.is_compatible_when_turned(k, &turned)) {
@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
     fn alternative_plan(&self, i: usize) -> Option<SafeManeuver> {
         let aircraft = &self.group[i];
         for (k, profile) in self.candidates[i].iter().enumerate() {
-            for side in Side::BOTH {
+            for side in OrbitSide::BOTH {
                 let plan = SafeManeuver::from_candidate(
                     aircraft.clone(),
                     profile,

@@ -1,7 +1,7 @@
 //! An airplane as the shield knows it.
 
-use super::orbit::{Orbit, Side};
-use crate::flight::{Levels, Point, Pose2, distance_m};
+use super::orbit::{Orbit, OrbitSide};
+use crate::flight::{FlightLevelRange, Point, Pose2, distance_m};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
@@ -32,11 +32,11 @@ pub struct ShieldedAircraft {
     /// Bound in meters on how far it may be from where all see it, and from its orbit.
     pub error_m: f64,
     /// The levels it keeps or passes in the next `dt`.
-    pub levels: Levels,
+    pub levels: FlightLevelRange,
     /// Difference of altitude in meters from which on airplanes need not avoid each other.
     pub vertical_m: f64,
     /// Its stored fallback.
-    pub fallback: Side,
+    pub fallback: OrbitSide,
     /// The others with which it entered too close: with each of them it is left to the method until their fallbacks
     /// are apart.
     pub exempt: Arc<[EntityId]>,
@@ -64,7 +64,7 @@ impl ShieldedAircraft {
     }
 
     /// Returns the orbit to a side that it holds, or that it enters where it is.
-    pub(crate) fn orbit(&self, side: Side) -> Orbit {
+    pub(crate) fn orbit(&self, side: OrbitSide) -> Orbit {
         Orbit::from_pose(self.orbit_pose, self.v_m_s, side.sign() * self.orbit_rad_s)
     }
 
@@ -94,13 +94,13 @@ impl ShieldedAircraft {
     /// center of the disc. A turn shifts the airplane by at most `v omega dt^2 / 2`, and the center
     /// about it by at most `r omega dt`. Earlier it is nearer, because `r omega` is not less than
     /// `v`. The same holds to the right.
-    pub(super) fn reach(&self, dt_s: f64) -> ([Point; 2], f64) {
+    pub(super) fn reach_discs(&self, dt_s: f64) -> ([Point; 2], f64) {
         let ahead = self.pose.step(self.v_m_s, 0.0, dt_s);
         let orbit =
-            |side: Side| Orbit::from_pose(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
-        let centers = Side::BOTH.map(|side| orbit(side).center());
+            |side: OrbitSide| Orbit::from_pose(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
+        let centers = OrbitSide::BOTH.map(|side| orbit(side).center());
         let turn_rad = self.omega_max_rad_s * dt_s;
-        let radius_m = orbit(Side::Left).radius_m;
+        let radius_m = orbit(OrbitSide::Left).radius_m;
         let shift_m = 0.5 * self.v_m_s * dt_s * turn_rad;
         (centers, radius_m * (1.0 + turn_rad) + shift_m)
     }

@@ -2,7 +2,7 @@
 
 use super::orbit::Orbit;
 use super::*;
-use crate::flight::{Levels, Point, Pose2, distance_m};
+use crate::flight::{FlightLevelRange, Point, Pose2, distance_m};
 use proptest::prelude::*;
 
 const DTAU_S: f64 = 1.0;
@@ -19,9 +19,9 @@ fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
         orbit_rad_s: 4f64.to_radians(),
         separation_m: 500.0,
         error_m: 0.0,
-        levels: Levels::at(0.0),
+        levels: FlightLevelRange::from_level(0.0),
         vertical_m: 300.0,
-        fallback: Side::Left,
+        fallback: OrbitSide::Left,
         exempt: ExemptIds::default(),
         rank,
     }
@@ -98,7 +98,7 @@ proptest! {
             wishes.iter().map(profile).collect()
         }).collect();
         let certainty = if mixable { PlanCertainty::Mixable } else { PlanCertainty::Sure };
-        let mut decisions = filter(&group, &candidates, STEPS, DTAU_S, certainty);
+        let mut decisions = filter_maneuvers(&group, &candidates, STEPS, DTAU_S, certainty);
         if mixable {
             for ((decision, follows), aircraft) in decisions.iter_mut().zip(follow).zip(&group) {
                 if !follows {
@@ -144,7 +144,7 @@ proptest! {
         let other = ShieldedAircraft { orbit_rad_s: slow * own.omega_max_rad_s, ..aircraft(at[0], at[1], psi, 1) };
         let plan = |of: &ShieldedAircraft, parts: &[f64], left: bool| {
             let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
-            SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, Side::BOTH[usize::from(left)])
+            SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, OrbitSide::BOTH[usize::from(left)])
         };
         let clear = plan(&own, &[part; STEPS], own_left);
         if clear.is_clear_of(&other) {
@@ -158,7 +158,7 @@ proptest! {
         let group = [aircraft(0.0, 0.0, 0.0, 0), aircraft(x, 0.0, 3.0, 1)];
         let profile = || TurnProfile { omegas_rad_s: vec![part * group[0].orbit_rad_s; STEPS] };
         let wishes = [vec![profile()], vec![profile()]];
-        let decisions = filter(&group, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+        let decisions = filter_maneuvers(&group, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }
 }
@@ -169,10 +169,10 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
     let stored = aircraft(0.0, 2002.0, std::f64::consts::PI, 0);
     let group = [stored.clone(), aircraft(0.0, 0.0, 0.0, 1)];
     let (sides, too_close) = entry_fallbacks(&group, |i| i == 1);
-    assert_eq!((sides, too_close), (vec![Side::Left, Side::Right], vec![]));
+    assert_eq!((sides, too_close), (vec![OrbitSide::Left, OrbitSide::Right], vec![]));
     let near = [stored.clone(), aircraft(100.0, 2002.0, 0.0, 1), aircraft(50.0, 2030.0, 0.0, 2)];
     let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
-    assert_eq!(sides[..2], [Side::Left; 2]);
+    assert_eq!(sides[..2], [OrbitSide::Left; 2]);
     assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
 }
 
@@ -185,16 +185,16 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     let straight = || vec![TurnProfile { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
     let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
-    let wanted = filter(&of_each_other, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+    let wanted = filter_maneuvers(&of_each_other, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
     // In each other's way, and both are named with others.
     let mut of_others = [close(0.0, 0, 7), close(0.0, 1, 8)];
     let pose = Pose2 { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
     (of_others[1].pose, of_others[1].orbit_pose) = (pose, pose);
-    of_others.iter_mut().for_each(|f| f.fallback = Side::Right);
+    of_others.iter_mut().for_each(|f| f.fallback = OrbitSide::Right);
     assert!(nearest_on_orbits(&of_others, 400) > 500.0);
     assert!(of_others[0].is_safe_with(&of_others[1]));
-    let kept = filter(&of_others, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+    let kept = filter_maneuvers(&of_others, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
     assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
 }
 
@@ -205,13 +205,13 @@ fn a_change_is_refused_when_neither_orbit_is_apart() {
     let slow = aircraft(0.0, 0.0, 0.0, 1);
     let beside = |changed: &ShieldedAircraft| safe_side(changed, [other.clone()].into_iter());
     let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
-    assert_eq!((beside(&slow), beside(&fast)), (Some(Side::Left), None));
-    let above = ShieldedAircraft { levels: Levels::at(1000.0), ..fast.clone() };
-    assert_eq!(beside(&above), Some(Side::Left));
+    assert_eq!((beside(&slow), beside(&fast)), (Some(OrbitSide::Left), None));
+    let above = ShieldedAircraft { levels: FlightLevelRange::from_level(1000.0), ..fast.clone() };
+    assert_eq!(beside(&above), Some(OrbitSide::Left));
     // Named with another one, and then with this one.
     assert_eq!(beside(&ShieldedAircraft { exempt: [7].into(), ..fast.clone() }), None);
-    assert_eq!(beside(&ShieldedAircraft { exempt: [0, 7].into(), ..fast }), Some(Side::Left));
-    let climbing = ShieldedAircraft { levels: Levels::between(0.0, 1000.0), ..above };
+    assert_eq!(beside(&ShieldedAircraft { exempt: [0, 7].into(), ..fast }), Some(OrbitSide::Left));
+    let climbing = ShieldedAircraft { levels: FlightLevelRange::between(0.0, 1000.0), ..above };
     assert_eq!(beside(&climbing), None);
 }
 

@@ -5,7 +5,7 @@ use sidestep_kernel::column::Packed;
 
 /// The end of a flight, with its step of `dtau` since the run's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
+pub enum FlightEnd {
     /// The airplane is at its last way-point, or at the end of its recorded way.
     Arrived(u64),
     /// Removed before it arrived.
@@ -16,40 +16,42 @@ pub enum End {
 /// highest bit set where the airplane was removed before it arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct PackedEnd(u64);
+pub struct PackedFlightEnd(u64);
 
-impl PackedEnd {
+impl PackedFlightEnd {
     /// No end yet.
     pub(crate) const NONE: Self = Self(u64::MAX);
     /// Flag set beside the step in which an airplane was removed.
     const LEFT_FLAG: u64 = 1 << 63;
 
     /// Returns the end, if there was one.
-    pub fn get(self) -> Option<End> {
+    pub fn unpack(self) -> Option<FlightEnd> {
         match self {
             Self::NONE => None,
-            Self(step) if step & Self::LEFT_FLAG != 0 => Some(End::Left(step & !Self::LEFT_FLAG)),
-            Self(step) => Some(End::Arrived(step)),
+            Self(step) if step & Self::LEFT_FLAG != 0 => {
+                Some(FlightEnd::Left(step & !Self::LEFT_FLAG))
+            }
+            Self(step) => Some(FlightEnd::Arrived(step)),
         }
     }
 }
 
-impl From<End> for PackedEnd {
-    fn from(end: End) -> Self {
+impl From<FlightEnd> for PackedFlightEnd {
+    fn from(end: FlightEnd) -> Self {
         match end {
-            End::Arrived(step) => Self(step),
-            End::Left(step) => Self(step | Self::LEFT_FLAG),
+            FlightEnd::Arrived(step) => Self(step),
+            FlightEnd::Left(step) => Self(step | Self::LEFT_FLAG),
         }
     }
 }
 
-impl Default for PackedEnd {
+impl Default for PackedFlightEnd {
     fn default() -> Self {
         Self::NONE
     }
 }
 
-impl Packed for PackedEnd {
+impl Packed for PackedFlightEnd {
     type Bits = u64;
 
     #[inline(always)]

@@ -1,22 +1,22 @@
 //! Airplanes near each other.
 
 use crate::flight::Point;
-use sidestep_kernel::{Column, Cycle, Slot};
+use sidestep_kernel::{AtomicColumn, Cycle, Slot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 const NO_SLOT: u32 = u32::MAX;
 
 /// The airplanes near each other: lists of airplanes by square of the plane, built anew each cycle.
 #[derive(Debug)]
-pub(crate) struct Neighborhood {
+pub(crate) struct SpatialIndex {
     side_m: f64,
     /// Cycle (upper half) and last airplane listed (lower half) of each bucket.
     first: Box<[AtomicU64]>,
     /// The airplane listed before each one.
-    next: Column<u32>,
+    next: AtomicColumn<u32>,
 }
 
-impl Neighborhood {
+impl SpatialIndex {
     /// Returns lists for `n` airplanes that consider each other up to `side_m` meters away.
     pub(super) fn new(n: usize, side_m: f64) -> Self {
         // Twice as many as airplanes, so that few squares share one.
@@ -24,7 +24,7 @@ impl Neighborhood {
         Self {
             side_m,
             first: (0..buckets).map(|_| AtomicU64::new(u64::MAX)).collect(),
-            next: Column::filled(n, NO_SLOT),
+            next: AtomicColumn::filled(n, NO_SLOT),
         }
     }
 

@@ -1,12 +1,12 @@
 //! Snapshots of a state by id, and their digests.
 
-use super::end::PackedEnd;
+use super::end::PackedFlightEnd;
 use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::external_action::ExternalAction;
 use crate::flight::Pose2;
 use crate::pilot::Control;
-use crate::shield::Side;
+use crate::shield::OrbitSide;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::digest::Hasher;
@@ -18,11 +18,11 @@ pub struct AirplaneRecord {
     /// Pose at the start of the cycle.
     pub pose: Pose2,
     /// See [`super::AirplaneState::end`].
-    pub ended: PackedEnd,
+    pub ended: PackedFlightEnd,
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
     /// Side of the stored fallback.
-    pub fallback: Side,
+    pub fallback: OrbitSide,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// Number of orders carried out, and of times that one had to wait.

@@ -48,7 +48,7 @@ pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportS
         refuse("DTLOOK", cause, &format!("give {dt_s} to {MAX_LOOK_AHEAD_S} s"));
         look_ahead_s = None;
     }
-    let (method, is_bare) = resolution(traffic);
+    let (method, is_bare) = resolution_method(traffic);
     if look_ahead_s.is_none() && method == Some("mvp") {
         look_ahead_s = Some(Traffic::default().lookahead_s);
     }
@@ -60,7 +60,7 @@ const MAX_LOOK_AHEAD_S: f64 = 36_000.0;
 
 /// Returns the method that the file asks for, and whether nothing is to keep aircraft apart.
 /// Without detection nothing is resolved.
-fn resolution(traffic: &Traffic) -> (Option<&'static str>, bool) {
+fn resolution_method(traffic: &Traffic) -> (Option<&'static str>, bool) {
     match (traffic.detection, traffic.resolution) {
         (Some(false), _) | (_, Some(ResolutionMethod::Off)) => (Some("none"), true),
         (_, Some(ResolutionMethod::Mvp)) => (Some("mvp"), false),

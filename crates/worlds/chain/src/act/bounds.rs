@@ -3,10 +3,10 @@
 use super::joints::ArmFollower;
 use super::{ActState, ChainContext};
 use crate::events::{Event, EventKind};
-use crate::motion::escape::{EscapeTick, Escaper};
+use crate::motion::escape::{ObstacleEscapeInput, ObstacleEscaper};
 use crate::scratch::PositionBuffer;
-use crate::state::Body;
-use sidestep_rods::geometry::{Bounds, distance, with_dimensions};
+use crate::state::ChainBodyState;
+use sidestep_rods::geometry::{Aabb, distance, with_dimensions};
 use sidestep_rods::{Veto, VetoReason};
 
 /// Relative tolerance for motions at exactly the maximum speed.
@@ -14,11 +14,11 @@ const ROUNDING: f64 = 1e-9;
 
 /// How a chain escapes, and where it may be.
 pub(super) struct EscapeContext<'a, const D: usize> {
-    pub(super) escaper: Option<&'a mut Escaper<D>>,
+    pub(super) escaper: Option<&'a mut ObstacleEscaper<D>>,
     /// Its positions after parts of it escaped.
     pub(super) escaped: &'a mut PositionBuffer<D>,
     /// The box that it stays in.
-    pub(super) claim: Bounds<D>,
+    pub(super) claim: Aabb<D>,
 }
 
 impl<const D: usize> EscapeContext<'_, D> {
@@ -31,7 +31,7 @@ impl<const D: usize> EscapeContext<'_, D> {
     ) -> bool {
         let Some(escaper) = &mut self.escaper else { return false };
         let ActState { body, before, propagator, sink, .. } = acting;
-        let tick = EscapeTick {
+        let tick = ObstacleEscapeInput {
             chain: &mut body.chain,
             obstacles: context.obstacles,
             propagator,
@@ -44,14 +44,14 @@ impl<const D: usize> EscapeContext<'_, D> {
             arm.escape();
         }
         body.tally.escapes.add(&escaped);
-        sink.trace(|trace| trace.escapes = escaped.moves);
+        sink.record_trace(|trace| trace.escapes = escaped.moves);
         self.escaped.record(body);
         move_leader_robot(context, body);
         // Only the first of several cycles of escape in a row is an event.
         let first = escaped.first.filter(|_| !body.tally.is_escaping);
         if let Some((connector, obstacle)) = first {
             let moves = escaped.moves as f64;
-            let event = sink.event(&body.chain, EventKind::Escape, connector, moves);
+            let event = sink.new_event(&body.chain, EventKind::Escape, connector, moves);
             sink.events.push(Event { obstacle: Some(obstacle), ..event });
         }
         body.tally.is_escaping = escaped.moves > 0;
@@ -69,7 +69,7 @@ impl<const D: usize> EscapeContext<'_, D> {
     pub(super) fn enforce_claim(
         &self,
         context: ChainContext<'_, D>,
-        body: &mut Body<D>,
+        body: &mut ChainBodyState<D>,
         before: &PositionBuffer<D>,
     ) -> Option<Veto<D>> {
         let world = context.world;
@@ -81,7 +81,7 @@ impl<const D: usize> EscapeContext<'_, D> {
         };
         let mut moves = body.chain.points().iter().zip(&before.points);
         let by = moves.position(|(p, was)| {
-            distance(*p, *was) > most_m || !self.claim.meets(&Bounds::from_points(&[*p]))
+            distance(*p, *was) > most_m || !self.claim.meets(&Aabb::from_points(&[*p]))
         })?;
         self.escaped.restore(body);
         // After the last task connector 0 stands for the chain.
@@ -94,7 +94,7 @@ impl<const D: usize> EscapeContext<'_, D> {
 
 /// Keeps a leader on wheels at its connector after the connector was moved; if it is a robot, it follows on its
 /// wheels, from where it is.
-fn move_leader_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut Body<D>) {
+fn move_leader_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut ChainBodyState<D>) {
     let agent = context.task(body).map(|task| task.agent);
     let Some(leader) = &mut body.driving.leader else { return };
     let Some(agent) = agent else { return };

@@ -4,12 +4,12 @@
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::state::{Body, ScatterState, flatten};
-use crate::world::{Change, ChangeKind, MAX_THROW_SIGMAS, purpose};
+use crate::state::{ChainBodyState, ScatterState, flatten};
+use crate::world::{ChainChange, ChainChangeKind, MAX_THROW_SIGMAS, purpose};
 use sidestep_kernel::distr::normal;
 use sidestep_rods::Chain;
 use sidestep_rods::geometry::{Point, add, distance};
-use sidestep_rods::rebuild::{MovableEnd, ReformResult, reform};
+use sidestep_rods::rebuild::{MovableEnd, ReformResult, reform_chain};
 use std::ops::RangeInclusive;
 
 /// Attempts to find a free position where a part may fall; without one it stays: among obstacles that leave a twentieth of
@@ -19,32 +19,32 @@ const MAX_PLACEMENT_TRIES: usize = 100;
 /// Applies the changes at the start of a cycle.
 pub(super) fn apply_changes<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
 ) {
     let ChainContext { spec, now, .. } = context;
     for change in spec.changes.iter().filter(|change| change.cycle == now) {
-        apply(change, context, body, sink);
+        apply_change(change, context, body, sink);
     }
 }
 
-fn apply<const D: usize>(
-    change: &Change<D>,
+fn apply_change<const D: usize>(
+    change: &ChainChange<D>,
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
 ) {
     body.catch_up();
     // Its path was planned for the chain as it was.
     body.plan = None;
-    change.constrain(&mut body.chain);
+    change.apply_constraints(&mut body.chain);
     match &change.what {
-        ChangeKind::Failed { connector, .. }
-        | ChangeKind::Mobility { connector, .. }
-        | ChangeKind::MaxBend { connector, .. } => {
+        ChainChangeKind::Failed { connector, .. }
+        | ChainChangeKind::Mobility { connector, .. }
+        | ChainChangeKind::MaxBend { connector, .. } => {
             sink.record(&body.chain, EventKind::Changed, *connector, 0.0);
         }
-        ChangeKind::Scatter { connectors, by_m, apart_m } => {
+        ChainChangeKind::Scatter { connectors, by_m, apart_m } => {
             scatter(context, body, connectors, *by_m);
             for point in &mut body.chain.points_mut()[connectors.end() + 1..] {
                 *point = add(*point, *apart_m);
@@ -52,7 +52,7 @@ fn apply<const D: usize>(
             let n = connectors.clone().count() as f64;
             sink.record(&body.chain, EventKind::Broken, *connectors.start(), n);
         }
-        ChangeKind::Reform { may_come, speed_m_s } => {
+        ChainChangeKind::Reform { may_come, speed_m_s } => {
             start_reform(body, sink, *may_come, *speed_m_s)
         }
     }
@@ -62,7 +62,7 @@ fn apply<const D: usize>(
 /// or have failed stay.
 fn scatter<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     connectors: &RangeInclusive<usize>,
     by_m: f64,
 ) {
@@ -96,7 +96,7 @@ fn scatter<const D: usize>(
 
 /// Finds the places where the scattered parts have to be. A chain that an earlier change has joined stays as it is.
 fn start_reform<const D: usize>(
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     may_come: MovableEnd,
     speed_m_s: f64,
@@ -123,7 +123,7 @@ fn start_reform<const D: usize>(
 
 /// Reports the length and the number of parts that are missing.
 fn report_gap<const D: usize>(
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     first: usize,
     wanting_m: f64,
@@ -132,7 +132,7 @@ fn report_gap<const D: usize>(
     let tally = &mut body.tally;
     tally.not_reformed += 1;
     tally.missing_parts = tally.missing_parts.max(missing as u64);
-    let event = sink.event(&body.chain, EventKind::GapTooLong, first, wanting_m);
+    let event = sink.new_event(&body.chain, EventKind::GapTooLong, first, wanting_m);
     sink.events.push(Event { missing: missing as u32, ..event });
 }
 
@@ -145,7 +145,7 @@ fn reform_goals<const D: usize>(
 ) -> (Vec<Point<D>>, ReformResult) {
     let mut whole = chain.clone();
     // Beyond the range of coordinates nothing is joined.
-    let result = reform(&mut whole, scattered, may_come)
+    let result = reform_chain(&mut whole, scattered, may_come)
         .unwrap_or(ReformResult::NotReached { off_m: chain.max_rod_violation_m() });
     let goals = whole.points().to_vec();
     for (k, connector) in chain.connectors().iter().enumerate() {

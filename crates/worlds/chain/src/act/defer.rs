@@ -4,18 +4,21 @@ use super::situation::goal_distance_m;
 use super::{ChainContext, Initiator};
 use crate::driver::{Task, TaskKind};
 use crate::motion::recovery::RecoveryOutcome;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, CompletedMotion, MAX_COORDINATE_M};
 
 /// Returns whether the chain may follow the initiator's motion of this cycle later. The first cycle
 /// measures all rods, so that later only those count that move.
-pub(super) fn may_defer<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> bool {
+pub(super) fn may_defer<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &ChainBodyState<D>,
+) -> bool {
     let world = context.world;
     let Some(task) = context.task(body) else { return false };
     // Nothing can veto, a motion is a single sub-step of connector 0, and nothing else needs the
     // others' places.
-    world.is_open()
+    world.is_unobstructed()
         && world.reaction.is_none()
         && world.rules.step_m.is_none()
         && context.spec.robots.is_none()
@@ -36,10 +39,10 @@ fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -
         && chain.points()[0].iter().all(|x| x.abs() < most_m)
 }
 
-/// Moves connector 0; the others follow when [`Body::catch_up`] is called.
+/// Moves connector 0; the others follow when [`ChainBodyState::catch_up`] is called.
 pub(super) fn move_initiator_only<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     to: Point<D>,
 ) -> RecoveryOutcome<D> {
     let world = initiator.context.world;

@@ -3,7 +3,7 @@
 use super::bounds::EscapeContext;
 use super::joints::arrival_tolerance_m;
 use super::orders::step_from_orders;
-use super::own_driver::propose;
+use super::own_driver::ask_own_driver;
 use super::plan::plan_if_stuck;
 use super::wheels::{NavigatorContext, WheelStep};
 use super::{ActState, FollowMode, Initiator};
@@ -13,8 +13,8 @@ use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::events::EventKind;
 use crate::script::ScriptMotion;
-use crate::state::Body;
-use crate::swarm::leader::Decision;
+use crate::state::ChainBodyState;
+use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
 use sidestep_rods::geometry::{Point, add_scaled, distance, move_toward, with_dimensions};
 
@@ -43,7 +43,7 @@ pub(super) enum DesiredMove<const D: usize> {
 #[derive(Clone, Copy)]
 pub(super) struct CycleInputs {
     /// Decision of its navigator.
-    pub(super) decision: Option<Decision>,
+    pub(super) decision: Option<LeaderDecision>,
     /// Orders of an external caller.
     pub(super) orders: Orders,
 }
@@ -75,7 +75,7 @@ pub(super) fn desired_move<const D: usize>(
             navigator_move(wheeled, decision, has_fled)
         }
         TaskKind::Wander(rule) => wander_move(initiator, acting.body, rule),
-        TaskKind::Own(driver) => match propose(initiator, acting.body, driver) {
+        TaskKind::Own(driver) => match ask_own_driver(initiator, acting.body, driver) {
             Proposal::Rest => DesiredMove::Rest,
             Proposal::Done => DesiredMove::Done,
             Proposal::GoTo(to) => {
@@ -92,7 +92,7 @@ pub(super) fn desired_move<const D: usize>(
 /// last.
 fn navigator_move<const D: usize>(
     mut wheeled: NavigatorContext<'_, D>,
-    decision: Option<Decision>,
+    decision: Option<LeaderDecision>,
     has_fled: bool,
 ) -> DesiredMove<D> {
     if wheeled.has_arrived() {
@@ -109,7 +109,7 @@ fn navigator_move<const D: usize>(
 
 fn wander_move<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     rule: &Wander<D>,
 ) -> DesiredMove<D> {
     let at = initiator.position(body);
@@ -153,7 +153,10 @@ fn step_to_target<const D: usize>(
 }
 
 /// Returns the next move of a script. Turning takes no time.
-fn script_move<const D: usize>(initiator: Initiator<'_, D>, body: &mut Body<D>) -> DesiredMove<D> {
+fn script_move<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &mut ChainBodyState<D>,
+) -> DesiredMove<D> {
     let at = initiator.position(body);
     let there_m = arrival_tolerance_m(initiator.context, &body.chain);
     let driving = &mut body.driving;

@@ -9,7 +9,7 @@ use super::tasks::{end_event, start_next_task};
 use super::wheels::{drive_on_wheels, turn_robot};
 use super::{ActState, ChainContext, Initiator};
 use crate::driver::step_motion::StepMotion;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use crate::trace::IntendedMove;
 use sidestep_rods::geometry::with_dimensions;
 
@@ -40,7 +40,7 @@ pub(super) fn run_task<const D: usize>(
     let escaper = lead_context.escaping.escaper.as_deref();
     outcome.gives_way |= lookahead::should_yield(initiator, acting.body, escaper, desired);
     let wanted = intended_move(initiator, acting.body, desired, outcome.gives_way);
-    acting.sink.trace(|trace| trace.intended = Some(wanted));
+    acting.sink.record_trace(|trace| trace.intended = Some(wanted));
     let options =
         StepOptions { gives_way: outcome.gives_way, goes_far: lead_context.inputs.orders.goes_far };
     execute(initiator, acting, desired, options);
@@ -89,7 +89,7 @@ fn execute<const D: usize>(
 /// Describes a move for an inspection.
 fn intended_move<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &Body<D>,
+    body: &ChainBodyState<D>,
     desired: DesiredMove<D>,
     gives_way: bool,
 ) -> IntendedMove<D> {

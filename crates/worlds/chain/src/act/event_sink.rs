@@ -17,14 +17,14 @@ pub(super) struct EventSink<'a, const D: usize> {
 
 impl<const D: usize> EventSink<'_, D> {
     /// Records something if this chain is inspected.
-    pub(super) fn trace(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
+    pub(super) fn record_trace(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
         if let Some(trace) = self.trace.as_deref_mut() {
             record(trace);
         }
     }
 
     /// Returns an event where a connector is, for callers that add a reason or an obstacle to it.
-    pub(super) fn event(
+    pub(super) fn new_event(
         &self,
         chain: &Chain<D>,
         kind: EventKind,
@@ -51,6 +51,6 @@ impl<const D: usize> EventSink<'_, D> {
         connector: usize,
         value: f64,
     ) {
-        self.events.push(self.event(chain, kind, connector, value));
+        self.events.push(self.new_event(chain, kind, connector, value));
     }
 }

@@ -5,7 +5,7 @@ use super::wheels::HEADING_TOLERANCE_RAD;
 use super::{ActState, ChainContext};
 use crate::events::EventKind;
 use crate::formation::{Robot, Robots};
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use crate::swarm::drive::Pose2;
 use crate::swarm::follower::{Follower, TrackingTarget};
 use crate::swarm::laser::{NearbyBodies, RobotBody};
@@ -51,14 +51,17 @@ pub(super) fn follow<const D: usize>(
 
 /// Returns the connector of a navigator that its own wheels have moved, or that stands. Where anything else moves
 /// the connector, its robot follows like the others.
-fn wheeled_leader<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> Option<usize> {
+fn wheeled_leader<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &ChainBodyState<D>,
+) -> Option<usize> {
     let agent = context.task(body)?.agent;
     let leader = body.driving.leader.as_ref()?;
     (with_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
 }
 
 /// Lets a navigator whose robot follows its connector go on from where the robot is.
-fn lead_from_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut Body<D>) {
+fn lead_from_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut ChainBodyState<D>) {
     let Some(agent) = context.task(body).map(|task| task.agent) else { return };
     let at = body.chain.points()[agent];
     let robot = &body.robots[agent];
@@ -70,7 +73,7 @@ fn lead_from_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut Body
 }
 
 /// Moves the robot of a navigator to where its wheels have taken it.
-fn place_robot<const D: usize>(body: &mut Body<D>, k: usize) {
+fn place_robot<const D: usize>(body: &mut ChainBodyState<D>, k: usize) {
     let Some(leader) = body.driving.leader else { return };
     let [x, y, _] = body.driving.ahead;
     let at = with_dimensions(body.chain.points()[k]);

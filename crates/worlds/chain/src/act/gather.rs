@@ -3,9 +3,9 @@
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::state::{Body, unflatten};
+use crate::state::{ChainBodyState, unflatten};
 use sidestep_rods::geometry::{Point, move_toward};
-use sidestep_rods::{Chain, Obstacles, Sweep, TOLERANCE_M, blocking_obstacle};
+use sidestep_rods::{Chain, Obstacles, RodSweep, TOLERANCE_M, blocking_obstacle};
 use std::ops::Range;
 
 /// Fractions of a step that are tried one after the other where something is in the way.
@@ -34,7 +34,7 @@ struct ScatteredParts<'a, const D: usize> {
 /// chain is whole when all are there and nothing is where their rods will be.
 pub(super) fn gather_parts<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
 ) {
     let Some(scattered) = &body.scattered else { return };
@@ -59,7 +59,11 @@ pub(super) fn gather_parts<const D: usize>(
     }
 }
 
-fn mark_whole<const D: usize>(body: &mut Body<D>, sink: &mut EventSink<'_, D>, first: usize) {
+fn mark_whole<const D: usize>(
+    body: &mut ChainBodyState<D>,
+    sink: &mut EventSink<'_, D>,
+    first: usize,
+) {
     body.scattered = None;
     body.tally.reformed += 1;
     sink.record(&body.chain, EventKind::Reformed, first, 0.0);
@@ -68,7 +72,7 @@ fn mark_whole<const D: usize>(body: &mut Body<D>, sink: &mut EventSink<'_, D>, f
 /// Counts the time in which no part moved, and gives up after [`GATHER_TIMEOUT_S`].
 fn wait_or_give_up<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     attempt: &GatherAttempt,
 ) {
@@ -83,7 +87,7 @@ fn wait_or_give_up<const D: usize>(
     let first = scattered.first as usize;
     body.tally.not_reformed += 1;
     let off_m = body.chain.max_rod_violation_m();
-    let event = sink.event(&body.chain, EventKind::NotReformed, first, off_m);
+    let event = sink.new_event(&body.chain, EventKind::NotReformed, first, off_m);
     sink.events.push(Event { obstacle: attempt.blocked_by, ..event });
 }
 
@@ -131,14 +135,14 @@ impl<const D: usize> ScatteredParts<'_, D> {
     /// Returns the obstacle in the way of connectors, the first of which is `k`, and of the rods between them.
     fn blocking_obstacle(&self, k: usize, from: &[Point<D>], to: &[Point<D>]) -> Option<u32> {
         for i in 0..from.len() {
-            let sweep = Sweep { from: [from[i]; 2], to: [to[i]; 2] };
+            let sweep = RodSweep { from: [from[i]; 2], to: [to[i]; 2] };
             let radius_m = self.chain.connectors()[k + i].radius_m;
             if let Some(id) = blocking_obstacle(sweep, radius_m, self.obstacles) {
                 return Some(id);
             }
         }
         for i in 0..from.len().saturating_sub(1) {
-            let sweep = Sweep { from: [from[i], from[i + 1]], to: [to[i], to[i + 1]] };
+            let sweep = RodSweep { from: [from[i], from[i + 1]], to: [to[i], to[i + 1]] };
             let radius_m = self.chain.rods()[k + i].radius_m;
             if let Some(id) = blocking_obstacle(sweep, radius_m, self.obstacles) {
                 return Some(id);

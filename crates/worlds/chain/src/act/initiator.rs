@@ -5,7 +5,7 @@ use super::situation::{out_of_range_veto, situation};
 use super::{ActState, FollowMode, Initiator, defer, joints, negotiation};
 use crate::motion::recovery::{DirectMover, RecoveryLadder, RecoveryOutcome};
 use sidestep_rods::geometry::{Point, distance, norm, sub};
-use sidestep_rods::{Motion, Request, VetoEffect};
+use sidestep_rods::{MotionRequest, RequestedMotion, VetoEffect};
 
 /// Moves the initiator where it wants to go, or as the recovery ladder allows.
 pub(super) fn move_initiator<const D: usize>(
@@ -20,7 +20,7 @@ pub(super) fn move_initiator<const D: usize>(
         FollowMode::AtOnce => Some(request_motion(initiator, acting, to)),
     };
     let climbed = climbed.map(|climbed| joints::follow_initiator(initiator, acting, to, climbed));
-    acting.sink.trace(|trace| trace.climbed.clone_from(&climbed));
+    acting.sink.record_trace(|trace| trace.climbed.clone_from(&climbed));
     let displacement = sub(initiator.position(acting.body), at);
     acting.body.driving.way_m.wanted += distance(at, to);
     acting.body.driving.way_m.gone += norm(displacement);
@@ -38,8 +38,8 @@ fn request_motion<const D: usize>(
 ) -> RecoveryOutcome<D> {
     let context = initiator.context;
     let k = initiator.task.agent;
-    let request = Request {
-        motion: Motion::Connector { k, to },
+    let request = MotionRequest {
+        motion: RequestedMotion::Connector { k, to },
         source: initiator.task.source(),
         mode: VetoEffect::Exact,
     };
@@ -51,7 +51,7 @@ fn request_motion<const D: usize>(
         obstacles: context.obstacles,
         propagator: acting.propagator,
     };
-    let climbed = ladder.climb_with(&mut mover, &request, &situation);
+    let climbed = ladder.move_or_recover_with(&mut mover, &request, &situation);
     acting.body.driving.ladder = ladder.memory;
     let beyond = out_of_range_veto(&acting.body.chain, k);
     let (climbed, objection) = climbed.unwrap_or((RecoveryOutcome::Vetoed(beyond), Some(beyond)));

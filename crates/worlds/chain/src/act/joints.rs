@@ -11,13 +11,14 @@ use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::TOLERANCE_M;
 use crate::scratch::PositionBuffer;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::ConnectorTarget;
 use sidestep_arms::plan::{JointPosture, JointSpace};
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
-    Chain, CompletedMotion, Motion, Outcome, RequestSource, Veto, VetoReason, find_tunneling,
+    Chain, CompletedMotion, MotionOutcome, RequestSource, RequestedMotion, Veto, VetoReason,
+    find_tunneling,
 };
 
 /// Fractions of a motion that are tried, each half of the one before: down to 1/32; less is not worth
@@ -123,7 +124,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     pub(super) fn from_body(
         context: ChainContext<'a, D>,
         before: &'a PositionBuffer<D>,
-        body: &'a mut Body<D>,
+        body: &'a mut ChainBodyState<D>,
     ) -> Option<Self> {
         let arm = context.spec.arm.as_deref()?;
         let joints = body.joints.as_mut()?;
@@ -135,20 +136,22 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         &mut self,
         step: &StepMotion<D>,
         part: f64,
-        outcome: Outcome<D>,
-    ) -> Outcome<D> {
+        outcome: MotionOutcome<D>,
+    ) -> MotionOutcome<D> {
         let followed = match step.motion(part) {
-            Motion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
-            Motion::Rod { i, to: [to, next] } => {
+            RequestedMotion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
+            RequestedMotion::Rod { i, to: [to, next] } => {
                 self.follow(&[LeadTarget { k: i, to }, LeadTarget { k: i + 1, to: next }], 1)
             }
         };
         match (followed, outcome) {
-            (Ok(()), Outcome::Vetoed(_)) => Outcome::Moved(initiator_only_motion(step.first)),
+            (Ok(()), MotionOutcome::Vetoed(_)) => {
+                MotionOutcome::Moved(initiator_only_motion(step.first))
+            }
             (Ok(()), moved) => moved,
             // The veto of the chain itself says more than that of its joints.
-            (Err(_), vetoed @ Outcome::Vetoed(_)) => vetoed,
-            (Err(veto), Outcome::Moved(_)) => Outcome::Vetoed(veto),
+            (Err(_), vetoed @ MotionOutcome::Vetoed(_)) => vetoed,
+            (Err(veto), MotionOutcome::Moved(_)) => MotionOutcome::Vetoed(veto),
         }
     }
 

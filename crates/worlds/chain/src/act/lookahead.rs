@@ -4,8 +4,8 @@ use super::Initiator;
 use super::desired_move::DesiredMove;
 use super::situation::is_held;
 use crate::driver::Task;
-use crate::motion::escape::{Escaper, LeadMotion};
-use crate::state::Body;
+use crate::motion::escape::{LeadMotion, ObstacleEscaper};
+use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{sub, with_dimensions};
 use sidestep_rods::{Chain, RequestSource};
 
@@ -13,8 +13,8 @@ use sidestep_rods::{Chain, RequestSource};
 /// for less time.
 pub(super) fn should_yield<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
-    escaper: Option<&Escaper<D>>,
+    body: &mut ChainBodyState<D>,
+    escaper: Option<&ObstacleEscaper<D>>,
     desired: DesiredMove<D>,
 ) -> bool {
     let Some(escaper) = escaper else { return false };

@@ -14,7 +14,7 @@ const MAX_MEASURED_RODS: usize = 32;
 const MEASURE_INTERVAL_CYCLES: u64 = 16;
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
-pub(super) fn measure<const D: usize>(
+pub(super) fn measure_chain<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
     own: &mut RodBvh<D>,

@@ -46,7 +46,7 @@ use super::deploy::Deployment;
 use super::driver::{Task, VetoRecord};
 use super::events::{Event, EventKind};
 use super::scratch::PositionBuffer;
-use super::state::Body;
+use super::state::ChainBodyState;
 use super::world::{ChainSpec, ChainWorld};
 use bounds::EscapeContext;
 use desired_move::{CycleInputs, InitiatorContext};
@@ -54,7 +54,7 @@ use event_sink::EventSink;
 use negotiation::Negotiation;
 use sidestep_kernel::stream::{Draws, Purpose};
 use sidestep_kernel::{Cycle, PhaseContext, Slot};
-use sidestep_rods::geometry::{Bounds, Point, distance};
+use sidestep_rods::geometry::{Aabb, Point, distance};
 use sidestep_rods::{Obstacles, Propagator, Veto};
 
 /// The circumstances in which a chain acts, constant during the cycle.
@@ -88,7 +88,7 @@ enum FollowMode {
 
 /// A chain as it acts: what its cycle changes.
 struct ActState<'a, const D: usize> {
-    body: &'a mut Body<D>,
+    body: &'a mut ChainBodyState<D>,
     /// Its positions before the cycle.
     before: &'a PositionBuffer<D>,
     propagator: &'a mut Propagator<D>,
@@ -124,7 +124,7 @@ pub(crate) fn act_one<const D: usize>(
 fn run_cycle<const D: usize>(
     phase: &mut PhaseContext<'_, ChainWorld<D>>,
     slot: Slot,
-    claim: Bounds<D>,
+    claim: Aabb<D>,
 ) {
     let &mut PhaseContext { world, state, now, .. } = phase;
     let scratch = &mut *phase.scratch;
@@ -137,7 +137,7 @@ fn run_cycle<const D: usize>(
     broken::apply_changes(context, body, &mut sink);
     let inputs =
         CycleInputs { decision: state.decision(slot as usize), orders: orders::take_orders(body) };
-    let follows = FollowMode::choose(context, body);
+    let follows = FollowMode::choose_follow_mode(context, body);
     if follows != FollowMode::Deferred {
         body.catch_up();
         scratch.before.record(body);
@@ -164,7 +164,7 @@ fn run_cycle<const D: usize>(
     }
     let solid = scratch.nearby.solid();
     let robots_gap_m = follow::follow(context, &mut acting, solid, &mut scratch.robot_bodies);
-    measure::measure(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
+    measure::measure_chain(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
 }
 
 /// Lets a whole chain escape from obstacles, carry out its task, and stay in its claim. Escapes come first, because they
@@ -195,7 +195,7 @@ fn act_whole_chain<const D: usize>(
 
 impl<'a, const D: usize> ChainContext<'a, D> {
     /// Returns the present task; none after the last.
-    fn task(self, body: &Body<D>) -> Option<&'a Task<D>> {
+    fn task(self, body: &ChainBodyState<D>) -> Option<&'a Task<D>> {
         self.spec.tasks.get(body.driving.task as usize)
     }
 
@@ -206,7 +206,7 @@ impl<'a, const D: usize> ChainContext<'a, D> {
 }
 
 impl<const D: usize> Initiator<'_, D> {
-    fn position(self, body: &Body<D>) -> Point<D> {
+    fn position(self, body: &ChainBodyState<D>) -> Point<D> {
         body.chain.points()[self.task.agent]
     }
 
@@ -218,7 +218,10 @@ impl<const D: usize> Initiator<'_, D> {
 
 impl FollowMode {
     /// Returns how a chain follows its initiator in this cycle.
-    fn choose<const D: usize>(context: ChainContext<'_, D>, body: &Body<D>) -> Self {
+    fn choose_follow_mode<const D: usize>(
+        context: ChainContext<'_, D>,
+        body: &ChainBodyState<D>,
+    ) -> Self {
         match context.world.deployment {
             Deployment::Team => Self::AsTeam,
             Deployment::Direct if defer::may_defer(context, body) => Self::Deferred,
@@ -233,12 +236,12 @@ impl<const D: usize> ActState<'_, D> {
     fn record_veto(&mut self, veto: &Veto<D>) {
         let Self { body, before, sink, .. } = self;
         body.tally.add_veto(veto.reason);
-        sink.trace(|trace| trace.vetoes.push(*veto));
+        sink.record_trace(|trace| trace.vetoes.push(*veto));
         let objection = Some(VetoRecord { by: veto.by as u32, reason: veto.reason });
         let driving = &mut body.driving;
         if driving.last_event.is_none() || driving.objection != objection {
             let traveled_m = distance(veto.reached, before.points[veto.from]);
-            let event = sink.event(&body.chain, EventKind::Veto, veto.by, traveled_m);
+            let event = sink.new_event(&body.chain, EventKind::Veto, veto.by, traveled_m);
             sink.events.push(Event { reason: Some(veto.reason), obstacle: veto.obstacle, ..event });
             driving.last_event = driving.last_event.or(Some(EventKind::Veto));
         }

@@ -5,12 +5,12 @@ use super::event_sink::EventSink;
 use super::situation::situation;
 use super::{ActState, ChainContext, Initiator};
 use crate::agents::percept::ChainPercepts;
-use crate::agents::side::Side;
-use crate::agents::{ChainControls, Intention, LeaderOutcome, Role};
+use crate::agents::side::ChainSide;
+use crate::agents::{ChainControls, ConnectorRole, Intention, LeaderOutcome};
 use crate::deploy::{SensingContext, final_positions};
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
-use crate::state::{Body, MissingNeighbors};
+use crate::state::{ChainBodyState, MissingNeighbors};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::serde_point::WirePoint;
 use std::collections::BTreeMap;
@@ -46,7 +46,7 @@ pub(super) fn negotiate_move<const D: usize>(
         is_open: is_empty && acting.body.chain.is_plain(),
     };
     let memory = intention.memory.clone();
-    let ended = negotiate(initiator.context, acting, &Role::Leads(intention));
+    let ended = negotiate(initiator.context, acting, &ConnectorRole::Leads(intention));
     let Some(LeaderOutcome::Climbed { climbed, objection, memory }) = ended else {
         acting.body.driving.ladder = memory;
         acting.body.tally.stood += 1;
@@ -65,7 +65,7 @@ pub(super) fn negotiate_rest<const D: usize>(
     acting: &mut ActState<'_, D>,
 ) {
     if !acting.negotiation.is_done {
-        negotiate(context, acting, &Role::Rests);
+        negotiate(context, acting, &ConnectorRole::Rests);
     }
 }
 
@@ -73,7 +73,7 @@ pub(super) fn negotiate_rest<const D: usize>(
 fn negotiate<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ActState<'_, D>,
-    role: &Role<D>,
+    role: &ConnectorRole<D>,
 ) -> Option<LeaderOutcome<D>> {
     let ActState { body, negotiation, sink, .. } = acting;
     negotiation.is_done = true;
@@ -114,7 +114,7 @@ fn negotiate<const D: usize>(
 
 /// Records lost connectors, with an event for each that a neighbor has lost, or has heard again.
 fn record_missing<const D: usize>(
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     missing: Vec<MissingNeighbors>,
 ) {
@@ -135,7 +135,7 @@ fn record_missing<const D: usize>(
 fn mark_missing(missing: &mut [MissingNeighbors], gone: &[u32]) {
     let n = missing.len() as u32;
     for &k in gone {
-        for side in Side::ALL {
+        for side in ChainSide::ALL {
             if let Some(neighbor) = side.neighbor(k, n) {
                 missing[neighbor as usize][side.other() as usize] = Some(k);
             }
@@ -148,7 +148,7 @@ fn lost_connectors(missing: &[MissingNeighbors]) -> BTreeMap<u32, u32> {
     let n = missing.len() as u32;
     let mut lost = BTreeMap::new();
     for (k, sides) in (0..).zip(missing) {
-        for (side, missing) in Side::ALL.into_iter().zip(sides) {
+        for (side, missing) in ChainSide::ALL.into_iter().zip(sides) {
             // Connectors farther away only know of it from messages.
             if let Some(connector) = missing.filter(|_| side.neighbor(k, n) == *missing) {
                 lost.entry(connector).or_insert(k);

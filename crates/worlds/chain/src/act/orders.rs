@@ -7,15 +7,17 @@ use crate::driver::external::{OrderOutcome, Orders, Target};
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::execute_request;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
-use sidestep_rods::{Chain, Motion, Outcome, Request, RequestSource, Veto, VetoEffect};
+use sidestep_rods::{
+    Chain, MotionOutcome, MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect,
+};
 
 /// Number of bisections to find how far a motion can go: to 1/256 of it, 0.04 mm of the usual cycle's.
 const BISECTIONS: usize = 8;
 
 /// Takes the orders for this cycle. They end with it, whether the task follows them or not.
-pub(super) fn take_orders<const D: usize>(body: &mut Body<D>) -> Orders {
+pub(super) fn take_orders<const D: usize>(body: &mut ChainBodyState<D>) -> Orders {
     let orders = std::mem::take(&mut body.external).orders;
     if orders.target.is_some() {
         body.external.answer.outcome = OrderOutcome::Unheard;
@@ -41,12 +43,15 @@ pub(super) fn step_from_orders<const D: usize>(
             // A place that the mobility forbids is vetoed, unless the caller takes the nearest one
             // allowed.
             let is_there = !goes_far || connector.is_still() || mobility.allows(to, at);
-            Motion::Connector { k, to: if is_there { to } else { mobility.project(to, at) } }
+            RequestedMotion::Connector {
+                k,
+                to: if is_there { to } else { mobility.project(to, at) },
+            }
         }
         Target::Rod(to) => {
             let last = chain.rods().len().checked_sub(1)?;
             let i = rod.map_or(agent.min(last), |i| i as usize);
-            Motion::Rod { i, to: to.map(with_dimensions) }
+            RequestedMotion::Rod { i, to: to.map(with_dimensions) }
         }
     };
     Some(StepMotion::new(chain, &motion, initiator.step_m()))
@@ -76,7 +81,7 @@ pub(super) fn execute_step<const D: usize>(
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
-    acting.sink.trace(|trace| trace.climbed = Some(climbed));
+    acting.sink.record_trace(|trace| trace.climbed = Some(climbed));
     let displacement = sub(body.chain.points()[step.first], at);
     let driving = &mut body.driving;
     driving.way_m.gone += norm(displacement);
@@ -96,14 +101,14 @@ fn request_or_bisect<const D: usize>(
     goes_far: bool,
 ) -> RecoveryOutcome<D> {
     let mut veto = match request_fraction(context, acting, step, 1.0) {
-        Outcome::Moved(moved) => {
+        MotionOutcome::Moved(moved) => {
             match &moved.cut_short {
                 Some(veto) => record_veto(acting, veto),
                 None => acting.body.driving.last_event = None,
             }
             return RecoveryOutcome::Straight(moved);
         }
-        Outcome::Vetoed(veto) => veto,
+        MotionOutcome::Vetoed(veto) => veto,
     };
     let mut done = 0.0;
     let mut half = 0.5;
@@ -111,11 +116,11 @@ fn request_or_bisect<const D: usize>(
     let bisections = if goes_far { BISECTIONS } else { 0 };
     for _ in 0..bisections {
         match request_fraction(context, acting, step, done + half) {
-            Outcome::Moved(moved) => {
+            MotionOutcome::Moved(moved) => {
                 done += half;
                 last = Some(moved);
             }
-            Outcome::Vetoed(nearer) => veto = nearer,
+            MotionOutcome::Vetoed(nearer) => veto = nearer,
         }
         half *= 0.5;
     }
@@ -132,19 +137,19 @@ fn request_fraction<const D: usize>(
     acting: &mut ActState<'_, D>,
     step: &StepMotion<D>,
     part: f64,
-) -> Outcome<D> {
+) -> MotionOutcome<D> {
     let motion = step.motion(part);
     // The caller gets a report of a veto, as a planner does.
-    let request = Request { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
+    let request = MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let ActState { body, before, propagator, .. } = acting;
     let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
-    let outcome =
-        outcome.unwrap_or_else(|_| Outcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
+    let outcome = outcome
+        .unwrap_or_else(|_| MotionOutcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
     let outcome = match ArmFollower::from_body(context, before, body) {
         Some(mut arm) => arm.execute_order(step, part, outcome),
         None => outcome,
     };
-    if let Outcome::Moved(moved) = &outcome {
+    if let MotionOutcome::Moved(moved) = &outcome {
         body.tally.add_motion(moved);
     }
     outcome
@@ -157,7 +162,7 @@ fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
 }
 
 /// Puts a veto into the result, after [`ActState::record_veto`] has made it the present objection.
-pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto<D>) {
+pub(super) fn record_result_veto<const D: usize>(body: &mut ChainBodyState<D>, veto: &Veto<D>) {
     let answer = &mut body.external.answer;
     answer.veto = body.driving.objection;
     answer.obstacle = veto.obstacle;
@@ -166,7 +171,7 @@ pub(super) fn record_result_veto<const D: usize>(body: &mut Body<D>, veto: &Veto
 
 /// Completes the result at the end of the chain's motions.
 pub(super) fn complete_result<const D: usize>(
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     step: &StepMotion<D>,
     gives_way: bool,
 ) {

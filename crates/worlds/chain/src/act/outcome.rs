@@ -5,7 +5,7 @@ use super::{ActState, Initiator};
 use crate::driver::TaskKind;
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use crate::world::purpose;
 use sidestep_kernel::distr::normal;
 use sidestep_rods::CompletedMotion;
@@ -79,7 +79,7 @@ fn report_once<const D: usize>(
 }
 
 /// Turns a wandering initiator that is stuck to a random direction.
-fn turn_away<const D: usize>(initiator: Initiator<'_, D>, body: &mut Body<D>) {
+fn turn_away<const D: usize>(initiator: Initiator<'_, D>, body: &mut ChainBodyState<D>) {
     if matches!(initiator.task.driver, TaskKind::Wander(_)) {
         let draws = &mut initiator.context.draws(purpose::TURN_AWAY);
         let any: Point<D> = std::array::from_fn(|_| normal(draws));
@@ -89,7 +89,7 @@ fn turn_away<const D: usize>(initiator: Initiator<'_, D>, body: &mut Body<D>) {
 }
 
 fn record_motion<const D: usize>(
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     moved: &CompletedMotion<D>,
     displacement: Point<D>,
 ) {

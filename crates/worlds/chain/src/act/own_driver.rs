@@ -2,16 +2,16 @@
 
 use super::Initiator;
 use crate::driver::own_driver::{DriverPercept, NearbyObstacle, OwnDriver, Proposal};
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use crate::world::{OTHER_CHAIN, purpose};
-use sidestep_rods::geometry::{Bounds, Point, norm, scaled, sub, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, norm, scaled, sub, with_dimensions};
 use sidestep_rods::{Chain, Obstacles};
 use std::cmp::Ordering;
 
 /// Returns what a driver of the program's own proposes.
-pub(super) fn propose<const D: usize>(
+pub(super) fn ask_own_driver<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     driver: &OwnDriver,
 ) -> Proposal {
     let Initiator { context, task, .. } = initiator;
@@ -44,7 +44,7 @@ fn nearby_obstacles<const D: usize>(
 ) -> Vec<NearbyObstacle> {
     let at = chain.points()[k];
     let radius_m = chain.connectors()[k].radius_m;
-    let room = Bounds::from_points(&[at]).grown(radius_m + look_m);
+    let room = Aabb::from_points(&[at]).grown(radius_m + look_m);
     let mut nearby = Vec::new();
     obstacles.visit(&room, |obstacle| {
         let nearest = obstacle.core.nearest_to_point(at);

@@ -4,7 +4,7 @@ use super::{ActState, ChainContext, Initiator};
 use crate::driver::Targets;
 use crate::events::EventKind;
 use crate::scratch::PositionBuffer;
-use crate::state::{Body, MotionPlan};
+use crate::state::{ChainBodyState, MotionPlan};
 use crate::world::purpose;
 use sidestep_arms::plan::{
     ChainPosture, ConfigurationSpace, JointPosture, JointSpace, PlanningQuery, RodSpace, plan,
@@ -61,7 +61,7 @@ pub(super) fn plan_if_stuck<const D: usize>(
 /// Searches for a path: of an arm's joints, otherwise of rods.
 fn find_path<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &Body<D>,
+    body: &ChainBodyState<D>,
     query: &PlanningQuery<D>,
 ) -> Result<Option<MotionPlan<D>>, InputError> {
     let draws = &mut context.draws(purpose::PLAN);
@@ -84,7 +84,7 @@ fn find_path<const D: usize>(
 /// Returns the next position of the initiator on its planned path.
 pub(super) fn next_waypoint<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &Body<D>,
+    body: &ChainBodyState<D>,
 ) -> Option<Point<D>> {
     match body.plan.as_ref()? {
         MotionPlan::Rods(path) => Some(path.front()?[initiator.task.agent]),
@@ -99,7 +99,7 @@ pub(super) fn next_waypoint<const D: usize>(
 /// become blocked is dropped.
 pub(super) fn follow_plan<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     before: &PositionBuffer<D>,
 ) {
     body.plan = match body.plan.take() {
@@ -114,13 +114,13 @@ pub(super) fn follow_plan<const D: usize>(
 /// Follows a path of rods; returns the rest of it.
 fn follow_rods<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     mut path: VecDeque<ChainPosture<D>>,
 ) -> Option<VecDeque<ChainPosture<D>>> {
     let ChainContext { world, obstacles, .. } = initiator.context;
     let self_collision = world.rules.self_collision;
     let space = RodSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent).ok()?;
-    let from = space.present();
+    let from = space.present_posture();
     let to = path.front()?;
     let limits = StepLimits::from_initiator(initiator);
     let segment = Segment { space: &space, from: &from, to };
@@ -138,7 +138,7 @@ fn follow_rods<const D: usize>(
 /// joints have no speed left for the plan.
 fn follow_joints<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     joints_before: &[f64],
     mut path: VecDeque<Vec<f64>>,
 ) -> Option<VecDeque<Vec<f64>>> {
@@ -182,7 +182,7 @@ fn follow_joints<const D: usize>(
 /// Moves the chain to the next posture of a planned path, unless it would tunnel through something.
 fn move_along<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     from: &[Point<D>],
     next: &[Point<D>],
 ) -> bool {

@@ -2,8 +2,8 @@
 
 use super::Initiator;
 use crate::driver::{Task, TaskKind};
-use crate::motion::recovery::Situation;
-use crate::state::Body;
+use crate::motion::recovery::InitiatorSituation;
+use crate::state::ChainBodyState;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{Chain, Mobility, Veto, VetoReason};
 
@@ -12,7 +12,10 @@ use sidestep_rods::{Chain, Mobility, Veto, VetoReason};
 const MOVER_NEAR_M: f64 = 1.0;
 
 /// Returns an initiator's knowledge beside its neighborhood.
-pub(super) fn situation<const D: usize>(initiator: Initiator<'_, D>, body: &Body<D>) -> Situation {
+pub(super) fn situation<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &ChainBodyState<D>,
+) -> InitiatorSituation {
     let at = initiator.position(body);
     let near_m = initiator.context.world.look_m + MOVER_NEAR_M;
     let goal_distance_m = goal_distance_m(initiator.task, body);
@@ -22,11 +25,14 @@ pub(super) fn situation<const D: usize>(initiator: Initiator<'_, D>, body: &Body
     };
     let mut movers = initiator.context.obstacles.moving().iter();
     let movers_near = movers.any(|o| o.core.nearest_to_point(at).distance_m - o.radius_m < near_m);
-    Situation { goal_distance_m, movers_near, can_turn, keeps_heading }
+    InitiatorSituation { goal_distance_m, movers_near, can_turn, keeps_heading }
 }
 
 /// Returns the distance of an initiator from its target, if it has one.
-pub(super) fn goal_distance_m<const D: usize>(task: &Task<D>, body: &Body<D>) -> Option<f64> {
+pub(super) fn goal_distance_m<const D: usize>(
+    task: &Task<D>,
+    body: &ChainBodyState<D>,
+) -> Option<f64> {
     let TaskKind::Targets(targets) = &task.driver else { return None };
     let place = targets.places.get(body.driving.next as usize);
     place.map(|place| distance(body.chain.points()[task.agent], *place))

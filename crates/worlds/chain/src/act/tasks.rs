@@ -2,14 +2,14 @@
 
 use super::event_sink::EventSink;
 use super::{ChainContext, Initiator};
-use crate::driver::own_driver::Memory;
+use crate::driver::own_driver::DriverMemory;
 use crate::driver::{Task, TaskKind};
 use crate::events::{Event, EventKind};
-use crate::metrics::AbandonedPart;
-use crate::state::{Body, Standstill};
+use crate::metrics::AbandonedTaskPart;
+use crate::state::{ChainBodyState, Standstill};
 
 /// Returns how a task ends: a list of targets none of which was reached is not done.
-pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &Body<D>) -> EventKind {
+pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &ChainBodyState<D>) -> EventKind {
     if !matches!(task.driver, TaskKind::Targets(_)) {
         return EventKind::Done;
     }
@@ -22,7 +22,7 @@ pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &Body<D>) -> Event
 /// Ends the present task, done or given up, and starts the next.
 pub(super) fn start_next_task<const D: usize>(
     context: ChainContext<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     how: EventKind,
 ) {
@@ -30,7 +30,7 @@ pub(super) fn start_next_task<const D: usize>(
     body.catch_up();
     body.plan = None;
     body.standstill = Standstill::default();
-    body.driver_memory = Memory::default();
+    body.driver_memory = DriverMemory::default();
     let driving = &mut body.driving;
     let next = context.spec.tasks.get(driving.task as usize + 1).unwrap_or(task);
     let ended = f64::from(driving.task);
@@ -45,7 +45,7 @@ pub(super) fn start_next_task<const D: usize>(
 /// there the time without coming nearer counts, too.
 pub(super) fn give_up_if_stuck<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut Body<D>,
+    body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
 ) {
     let Initiator { context, task, .. } = initiator;
@@ -59,7 +59,7 @@ pub(super) fn give_up_if_stuck<const D: usize>(
         TaskKind::Targets(targets) => 1.0 / targets.places.len() as f64,
         _ => 1.0 - context.world.fraction_done(body, task),
     };
-    body.tally.given_up.push(AbandonedPart {
+    body.tally.given_up.push(AbandonedTaskPart {
         task: body.driving.task,
         part: body.driving.next,
         nearest_m: body.driving.nearest_m,
@@ -72,7 +72,7 @@ pub(super) fn give_up_if_stuck<const D: usize>(
         TaskKind::Targets(_) => {
             let by = objection.map_or(task.agent, |objection| objection.by as usize);
             let target = f64::from(body.driving.next);
-            let event = sink.event(&body.chain, EventKind::TargetGivenUp, by, target);
+            let event = sink.new_event(&body.chain, EventKind::TargetGivenUp, by, target);
             sink.events.push(Event { reason, ..event });
             body.plan = None;
             body.driving.advance_part();

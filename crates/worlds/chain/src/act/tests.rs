@@ -10,8 +10,8 @@ use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{
-    Chain, Connector, Motion, Obstacle, Obstacles, Propagator, Request, RequestSource, Rod,
-    VetoEffect,
+    Chain, Connector, MotionRequest, Obstacle, Obstacles, Propagator, RequestSource,
+    RequestedMotion, Rod, VetoEffect,
 };
 use sidestep_scenario::Source as Text;
 use sidestep_testing::root;
@@ -356,8 +356,9 @@ fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
     let mut chain =
         Chain::straight([0.0; 2], [-1.0, 0.0], 3, rod, Connector::free(0.05)).expect("a chain");
     let ball = Obstacles::new(vec![Obstacle::ball(0, [0.0, 99.0], 0.1)], 1.0).expect("a ball");
-    let motion = Motion::Connector { k: 0, to: [2.0, 0.0] };
-    let request = Request { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
+    let motion = RequestedMotion::Connector { k: 0, to: [2.0, 0.0] };
+    let request =
+        MotionRequest { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
     let interrupt = Interrupt::default();
     interrupt.raise();
     let moved = || {
@@ -365,7 +366,7 @@ fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
         Propagator::default().propagate(&mut chain, &ball, &request)
     };
     let payload = catch_unwind(AssertUnwindSafe(moved)).expect_err("it unwinds");
-    assert!(interrupt.caused(payload.as_ref()));
+    assert!(interrupt.has_caused_unwind(payload.as_ref()));
 }
 
 /// Chains side by side, so many that they are sorted, which wander into each other.

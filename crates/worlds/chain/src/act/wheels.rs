@@ -5,10 +5,10 @@ use super::outcome::MoveResult;
 use super::{ActState, Initiator};
 use crate::driver::TaskKind;
 use crate::navigate::{NavigationGoal, Navigator};
-use crate::state::Body;
-use crate::swarm::drive::{Pose2, Wheels};
+use crate::state::ChainBodyState;
+use crate::swarm::drive::{Pose2, WheelSpeeds};
 use crate::swarm::follower::speed_fraction;
-use crate::swarm::leader::Decision;
+use crate::swarm::leader::LeaderDecision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
 
@@ -30,14 +30,14 @@ pub(super) struct WheelStep {
     /// The pose to which it leads.
     pub(super) pose: Pose2,
     /// The navigator's decision, at full speed.
-    wheels: Wheels,
+    wheels: WheelSpeeds,
 }
 
 /// A navigator and the chain that it leads.
 pub(super) struct NavigatorContext<'a, const D: usize> {
     pub(super) initiator: Initiator<'a, D>,
     pub(super) navigator: &'a Navigator,
-    pub(super) body: &'a mut Body<D>,
+    pub(super) body: &'a mut ChainBodyState<D>,
 }
 
 /// Moves an initiator on wheels; one that is blocked may turn on the spot.
@@ -65,7 +65,7 @@ pub(super) fn drive_on_wheels<const D: usize>(
 }
 
 /// Sets the heading alone, which nothing can veto: a round body that turns touches nothing.
-pub(super) fn turn_robot<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
+pub(super) fn turn_robot<const D: usize>(body: &mut ChainBodyState<D>, heading_rad: f64) {
     if let Some(leader) = &mut body.driving.leader {
         leader.pose.heading_rad = heading_rad;
     }
@@ -73,7 +73,7 @@ pub(super) fn turn_robot<const D: usize>(body: &mut Body<D>, heading_rad: f64) {
 
 /// Returns whether a leader's robot would come nearer to another one of its chain than that one, which keeps a
 /// part of the gap for itself, allows for.
-fn comes_too_near<const D: usize>(body: &Body<D>, agent: usize, to: Point<2>) -> bool {
+fn comes_too_near<const D: usize>(body: &ChainBodyState<D>, agent: usize, to: Point<2>) -> bool {
     let robots = &body.robots;
     let Some(robot) = robots.get(agent) else { return false };
     let apart_m = 2.0 * body.robot_radius_m;
@@ -99,14 +99,14 @@ impl<const D: usize> NavigatorContext<'_, D> {
     }
 
     /// Returns the step of a decision, slower if robots lag; counts the cycles in which it stands.
-    pub(super) fn steer(&mut self, decision: Decision) -> WheelStep {
+    pub(super) fn steer(&mut self, decision: LeaderDecision) -> WheelStep {
         let world = self.initiator.context.world;
         self.locate();
         let pace = self.speed_fraction();
         let body = &mut *self.body;
         let driving = &mut body.driving;
         driving.rested = if pace == 0.0 { driving.rested.saturating_add(1) } else { 0 };
-        if decision.wheels == Wheels::default() {
+        if decision.wheels == WheelSpeeds::default() {
             body.standstill.cycles = body.standstill.cycles.saturating_add(1);
         } else if !decision.is_mover_ahead {
             // While a mover is ahead the count stays: otherwise a navigator that has stopped waiting for it
@@ -158,7 +158,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
         let drive = &self.navigator.drive;
         let dt_s = self.initiator.context.world.dt_s;
         let most = drive.max_wheel_m_s();
-        let most_rad = drive.turn_rad_s(Wheels::new(-most, most)) * dt_s;
+        let most_rad = drive.turn_rad_s(WheelSpeeds::new(-most, most)) * dt_s;
         let turn_rad = off_rad.clamp(-most_rad, most_rad);
         (off_rad.abs() > HEADING_TOLERANCE_RAD)
             .then(|| wrap_angle(leader.pose.heading_rad + turn_rad))
@@ -180,7 +180,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
     }
 
     /// Turns a navigator that is blocked on the spot, if it can.
-    fn turn_if_blocked(&mut self, wheels: Wheels) {
+    fn turn_if_blocked(&mut self, wheels: WheelSpeeds) {
         let Some(leader) = self.body.driving.leader else { return };
         let wheels = self.navigator.leader.blocked_wheels(wheels);
         let turned =

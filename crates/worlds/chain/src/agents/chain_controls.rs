@@ -1,6 +1,6 @@
 //! Decisions of a chain's agents in a cycle, wherever they run.
 
-use super::control::{Control, LeaderOutcome};
+use super::control::{ConnectorControl, LeaderOutcome};
 use crate::motion::recovery::RecoveryOutcome;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
@@ -12,7 +12,7 @@ pub struct ChainControls<const D: usize> {
     /// The cycle that they decide; in any other one they are ignored.
     pub cycle: Cycle,
     /// The decisions, by connector; none of one that has not come to a decision in time.
-    pub controls: Vec<Option<Control<D>>>,
+    pub controls: Vec<Option<ConnectorControl<D>>>,
     /// Connectors whose agents are gone: the chain stands until they are back.
     pub gone: Vec<u32>,
 }
@@ -39,7 +39,7 @@ impl<const D: usize> ChainControls<D> {
         for (k, control) in self.controls.iter().enumerate() {
             let Some(control) = control else { continue };
             if control.connector as usize != k || control.cycle != self.cycle {
-                let Control { connector, cycle, .. } = control;
+                let ConnectorControl { connector, cycle, .. } = control;
                 let cause = format!("number {k} is of connector {connector}, cycle {cycle}");
                 return Err((cause, "give them by connector, of the cycle to come"));
             }
@@ -53,7 +53,7 @@ impl<const D: usize> ChainControls<D> {
 }
 
 /// Returns whether a decision is about connectors of a chain of `n`.
-fn is_valid<const D: usize>(control: &Control<D>, n: usize) -> bool {
+fn is_valid<const D: usize>(control: &ConnectorControl<D>, n: usize) -> bool {
     let is_end_valid = control.ended.as_ref().is_none_or(|ended| is_valid_outcome(ended, n));
     let is_led_valid =
         control.led.is_none_or(|led| led.first <= led.last && (led.last as usize) < n);

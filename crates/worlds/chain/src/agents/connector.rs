@@ -6,23 +6,23 @@ mod follow;
 mod lead;
 
 use super::control::{ExecutedMotion, LeaderOutcome};
-use super::link::Link;
-use super::message::{Message, MotionProtocol, Packet};
-use super::percept::{ConnectorPercept, Role};
-use super::side::{PerSide, Side};
-use super::traffic::Traffic;
+use super::link::NeighborLink;
+use super::message::{MotionProtocol, NeighborMessage, Packet};
+use super::percept::{ConnectorPercept, ConnectorRole};
+use super::side::{ChainSide, PerSide};
+use super::traffic::NetworkTraffic;
 use crate::motion::recovery::RecoveryLimits;
 use crate::world::ChainWorld;
 use climb::RecoveryProgress;
 use follow::SlaveMotion;
-use lead::LeadState;
+use lead::LeadMotionState;
 use sidestep_kernel::network::{
     ConversationId, DropCounts, DropReason, PacketHeader, RetryPolicy, digest, parse_packet,
 };
 use sidestep_kernel::{Cycle, EntityId, InputError};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::local_solver::LocalSolver;
-use sidestep_rods::{Chain, Obstacles, Rod, Rules};
+use sidestep_rods::{Chain, Obstacles, ReactionRules, Rod};
 
 /// Most packets that wait for the beginning of their cycle: a neighbor is at most one cycle ahead.
 const MAX_HELD_PACKETS: usize = 64;
@@ -57,12 +57,12 @@ pub struct ConnectorAgent<const D: usize> {
     now: u64,
     position: TentativePosition<D>,
     beside: PerSide<Option<TentativePosition<D>>>,
-    links: PerSide<Option<Link<Message<D>>>>,
+    links: PerSide<Option<NeighborLink<NeighborMessage<D>>>>,
     missing: PerSide<Option<u32>>,
     /// Packets of a cycle that has not begun here yet.
-    early_packets: Vec<(Side, Cycle, Packet<D>)>,
+    early_packets: Vec<(ChainSide, Cycle, Packet<D>)>,
     following: Option<SlaveMotion>,
-    leading: Option<LeadState<D>>,
+    leading: Option<LeadMotionState<D>>,
     climbing: Option<RecoveryProgress<D>>,
     /// Number of the motion that it makes in this cycle.
     goes_in: Option<u32>,
@@ -74,7 +74,7 @@ pub struct ConnectorAgent<const D: usize> {
     /// Whether the deadline has passed.
     is_closed: bool,
     is_late: bool,
-    traffic: Traffic,
+    traffic: NetworkTraffic,
     /// Packets that it has dropped since it was started.
     dropped: DropCounts,
 }
@@ -152,7 +152,7 @@ impl<const D: usize> ConnectorAgent<D> {
     pub(crate) fn from_chain(
         chain: &Chain<D>,
         k: u32,
-        rules: &Rules,
+        rules: &ReactionRules,
         rungs: RecoveryLimits,
     ) -> Self {
         let n = chain.points().len() as u32;
@@ -189,7 +189,7 @@ impl<const D: usize> ConnectorAgent<D> {
             is_over: false,
             is_closed: false,
             is_late: false,
-            traffic: Traffic::default(),
+            traffic: NetworkTraffic::default(),
             dropped: DropCounts::default(),
         }
     }
@@ -245,7 +245,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.is_over = false;
         self.is_closed = percept.is_silent;
         self.is_late = false;
-        self.traffic = Traffic::default();
+        self.traffic = NetworkTraffic::default();
         self.start_links();
         self.start_role(percept.role);
         self.receive_held(percept.cycle);
@@ -259,23 +259,25 @@ impl<const D: usize> ConnectorAgent<D> {
         let retry = self.radio.map(|radio| radio.retry);
         self.links = PerSide::from_fn(|side| {
             let neighbor = side.neighbor(me, n)?;
-            let mut link = Link::new(retry, missing[side] == Some(neighbor));
+            let mut link = NeighborLink::new(retry, missing[side] == Some(neighbor));
             // Where messages get lost, neighbors find out in every cycle whether they are in touch.
             if retry.is_some() {
-                link.push(Message::Here);
+                link.push(NeighborMessage::Here);
             }
             Some(link)
         });
     }
 
     /// A leader that knows of a lost connector, or whose own radio is dead, does not begin.
-    fn start_role(&mut self, role: Role<D>) {
+    fn start_role(&mut self, role: ConnectorRole<D>) {
         let missing = self.nearest_missing().or(self.is_silent.then_some(self.me));
         match (role, missing) {
-            (Role::Follows, _) => return,
-            (Role::Rests, _) => self.ended = Some(LeaderOutcome::Rested),
-            (Role::Leads(_), Some(missing)) => self.ended = Some(LeaderOutcome::Stands { missing }),
-            (Role::Leads(intention), None) => {
+            (ConnectorRole::Follows, _) => return,
+            (ConnectorRole::Rests, _) => self.ended = Some(LeaderOutcome::Rested),
+            (ConnectorRole::Leads(_), Some(missing)) => {
+                self.ended = Some(LeaderOutcome::Stands { missing })
+            }
+            (ConnectorRole::Leads(intention), None) => {
                 self.climbing = Some(RecoveryProgress::new(intention, self.position.base));
                 return self.process();
             }
@@ -299,7 +301,7 @@ impl<const D: usize> ConnectorAgent<D> {
         let (header, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
         let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } =
             header;
-        let mut sides = Side::ALL.into_iter();
+        let mut sides = ChainSide::ALL.into_iter();
         let side = sides.find(|side| self.neighbor_id(*side) == Some(from));
         let side = side.filter(|_| sender == from).ok_or(DropReason::Sender)?;
         if members != self.members {
@@ -319,7 +321,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Returns the id on the network of the neighbor on a side, if there is one.
-    fn neighbor_id(&self, side: Side) -> Option<EntityId> {
+    fn neighbor_id(&self, side: ChainSide) -> Option<EntityId> {
         let neighbor = side.neighbor(self.me, self.n)?;
         Some(self.first_id + neighbor)
     }
@@ -329,13 +331,13 @@ impl<const D: usize> ConnectorAgent<D> {
         self.dropped
     }
 
-    fn accept_packet(&mut self, side: Side, packet: Packet<D>) {
+    fn accept_packet(&mut self, side: ChainSide, packet: Packet<D>) {
         if self.is_silent {
             return;
         }
         let Some(link) = &mut self.links[side] else { return };
         let messages = link.receive(packet.parcel);
-        let beyond = packet.missing.filter(|k| side.has(*k, self.me));
+        let beyond = packet.missing.filter(|k| side.is_side_of(*k, self.me));
         self.mark_missing(side, beyond);
         for message in messages {
             self.on_message(side, message);
@@ -343,29 +345,29 @@ impl<const D: usize> ConnectorAgent<D> {
         self.process();
     }
 
-    fn on_message(&mut self, from: Side, message: Message<D>) {
+    fn on_message(&mut self, from: ChainSide, message: NeighborMessage<D>) {
         if self.is_over || self.is_closed {
             return;
         }
         match message {
-            Message::Here => {}
-            Message::Prepare(prepare) => self.on_prepare(from, &prepare),
-            Message::Consent(consent) => self.on_consent(from, &consent),
-            Message::Object(objection) => self.on_veto(from, objection),
-            Message::Settle { request, goes } => self.on_settle(from, request, goes),
-            Message::Over => self.finish(Some(from)),
-            Message::AskEnd | Message::Order(_) => self.on_order(from, message),
-            Message::End(..) | Message::Done(_) => self.on_answer(from, message),
+            NeighborMessage::Here => {}
+            NeighborMessage::Prepare(prepare) => self.on_prepare(from, &prepare),
+            NeighborMessage::Consent(consent) => self.on_consent(from, &consent),
+            NeighborMessage::Object(objection) => self.on_veto(from, objection),
+            NeighborMessage::Settle { request, goes } => self.on_settle(from, request, goes),
+            NeighborMessage::Over => self.finish(Some(from)),
+            NeighborMessage::AskEnd | NeighborMessage::Order(_) => self.on_order(from, message),
+            NeighborMessage::End(..) | NeighborMessage::Done(_) => self.on_answer(from, message),
         }
     }
 
     /// Records the lost connector on one side, and sends it to the other side if it has changed. A leader stops.
-    fn mark_missing(&mut self, side: Side, missing: Option<u32>) {
+    fn mark_missing(&mut self, side: ChainSide, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
         }
         self.missing[side] = missing;
-        self.send(side.other(), Message::Here);
+        self.send(side.other(), NeighborMessage::Here);
         if let Some(missing) = missing {
             self.give_up_leading();
             if self.climbing.take().is_some() {
@@ -376,29 +378,29 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     fn nearest_missing(&self) -> Option<u32> {
-        let both = Side::ALL.into_iter().filter_map(|side| self.missing[side]);
+        let both = ChainSide::ALL.into_iter().filter_map(|side| self.missing[side]);
         both.min_by_key(|k| k.abs_diff(self.me))
     }
 
     /// Sends a message to a neighbor, if there is one.
-    fn send(&mut self, to: Side, message: Message<D>) {
+    fn send(&mut self, to: ChainSide, message: NeighborMessage<D>) {
         if let Some(link) = &mut self.links[to] {
             link.push(message);
         }
     }
 
     /// Ends the cycle, as the leader decides or as a message from the leader says.
-    fn finish(&mut self, from: Option<Side>) {
+    fn finish(&mut self, from: Option<ChainSide>) {
         self.give_up_leading();
         self.is_over = true;
-        for side in Side::ALL.into_iter().filter(|side| Some(*side) != from) {
-            self.send(side, Message::Over);
+        for side in ChainSide::ALL.into_iter().filter(|side| Some(*side) != from) {
+            self.send(side, NeighborMessage::Over);
         }
     }
 
     /// Advances as far as possible before the next message.
     fn process(&mut self) {
-        while self.advance_leading() || self.continue_climb() {}
+        while self.advance_leading() || self.continue_recovery() {}
     }
 }
 

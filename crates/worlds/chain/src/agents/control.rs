@@ -1,6 +1,6 @@
 //! Decision of an agent at the end of a cycle.
 
-use super::traffic::Traffic;
+use super::traffic::NetworkTraffic;
 use crate::motion::recovery::{RecoveryMemory, RecoveryOutcome};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::Cycle;
@@ -9,7 +9,7 @@ use sidestep_rods::geometry::Point;
 
 /// A connector's motion in a cycle, and the outcome of its talk.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Control<const D: usize> {
+pub struct ConnectorControl<const D: usize> {
     /// The connector's number in its chain.
     pub connector: u32,
     /// The cycle that it decides; it is refused in any other.
@@ -25,7 +25,7 @@ pub struct Control<const D: usize> {
     /// Whether time was up before its leader had finished.
     pub is_late: bool,
     /// The count of its packets.
-    pub traffic: Traffic,
+    pub traffic: NetworkTraffic,
 }
 
 /// What a connector does in a cycle.

@@ -18,7 +18,7 @@ const MAX_UNCONFIRMED_MESSAGES: usize = 4096;
 
 /// One end of a link, for the time of a cycle.
 #[derive(Debug, Clone)]
-pub(super) struct Link<M> {
+pub(super) struct NeighborLink<M> {
     /// None where nothing is ever lost: then nothing is confirmed or sent again either.
     retry: Option<RetryTimer>,
     /// Repetitions until the neighbor counts as lost.
@@ -43,7 +43,7 @@ pub(super) struct Link<M> {
 
 /// Messages on their way, with a confirmation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Parcel<M> {
+pub(super) struct MessageBatch<M> {
     /// Number of its first message.
     pub(super) first: u32,
     /// Number of the first message of the other that has not come yet.
@@ -52,7 +52,7 @@ pub(super) struct Parcel<M> {
     pub(super) messages: Vec<M>,
 }
 
-impl<M: Clone> Link<M> {
+impl<M: Clone> NeighborLink<M> {
     /// Returns a link over which nothing has gone yet. A neighbor that was lost in the cycle before is
     /// given up sooner.
     pub(super) fn new(patience: Option<RetryPolicy>, was_lost: bool) -> Self {
@@ -81,7 +81,7 @@ impl<M: Clone> Link<M> {
     }
 
     /// Takes a parcel; returns the messages that are new, in order.
-    pub(super) fn receive(&mut self, parcel: Parcel<M>) -> Vec<M> {
+    pub(super) fn receive(&mut self, parcel: MessageBatch<M>) -> Vec<M> {
         self.is_heard = true;
         self.is_lost = false;
         self.unanswered = 0;
@@ -130,7 +130,7 @@ impl<M: Clone> Link<M> {
     }
 
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
-    pub(super) fn next_parcel(&mut self, tick: u64) -> Option<Parcel<M>> {
+    pub(super) fn next_parcel(&mut self, tick: u64) -> Option<MessageBatch<M>> {
         // All that are unconfirmed, because the neighbor may lack any of them.
         let from = if self.again { 0 } else { self.sent };
         let confirms = self.owes && self.retry.is_some();
@@ -138,7 +138,7 @@ impl<M: Clone> Link<M> {
             return None;
         }
         let messages: Vec<M> = self.said.range(from..).cloned().collect();
-        let parcel = Parcel { first: self.first + from as u32, next: self.next, messages };
+        let parcel = MessageBatch { first: self.first + from as u32, next: self.next, messages };
         if let Some(retry) = &mut self.retry
             && (self.again || self.sent == 0)
         {

@@ -1,12 +1,12 @@
 //! The messages of neighbors, and their form on the network. All packets from there are checked here,
 //! once, before an agent sees them.
 
-use super::link::Parcel;
+use super::link::MessageBatch;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::network::{self, DropReason, PacketBuffer};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::serde_point::WirePoint;
-use sidestep_rods::{Outcome, RequestSource, Veto, VetoReason, is_in_range};
+use sidestep_rods::{MotionOutcome, RequestSource, Veto, VetoReason, is_in_range};
 use std::f64::consts::PI;
 
 /// Largest packet that is read, bytes; the largest that is ever sent is a fraction of it.
@@ -36,17 +36,17 @@ impl network::Protocol for MotionProtocol {
 pub(super) struct Packet<const D: usize> {
     /// The nearest lost connector beyond the sender, as the receiver sees it.
     pub(super) missing: Option<u32>,
-    pub(super) parcel: Parcel<Message<D>>,
+    pub(super) parcel: MessageBatch<NeighborMessage<D>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Message<const D: usize> {
+pub(super) enum NeighborMessage<const D: usize> {
     /// "I am here." The packet around it names the lost connectors.
     Here,
     /// A master's "I am to go there. Can you follow?"
-    Prepare(Prepare<D>),
+    Prepare(PrepareMessage<D>),
     /// A slave's "I can, and so can all beyond me that have to."
-    Consent(Consent<D>),
+    Consent(ConsentMessage<D>),
     /// A slave's "I cannot, or one beyond me cannot."
     Object(VetoMessage),
     /// A master's "All of that motion is carried out", or none of it.
@@ -63,14 +63,14 @@ pub(super) enum Message<const D: usize> {
     /// A leader's order to the far end: "Lead a motion."
     Order(LeadOrder<D>),
     /// The answer: its outcome; none if the target is beyond all coordinates.
-    Done(Option<Outcome<D>>),
+    Done(Option<MotionOutcome<D>>),
     /// A leader's word to all: "I have finished this cycle."
     Over,
 }
 
 /// A master's motion in a sub-step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Prepare<const D: usize> {
+pub(super) struct PrepareMessage<const D: usize> {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     /// Number of the sub-step; the one before is accepted.
@@ -93,7 +93,7 @@ pub(super) struct Prepare<const D: usize> {
 
 /// A slave's consent to a sub-step, with sums over all connectors that react from it outward.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Consent<const D: usize> {
+pub(super) struct ConsentMessage<const D: usize> {
     /// The slave's place after the sub-step.
     #[serde(with = "sidestep_rods::serde_point")]
     pub(super) at: Point<D>,
@@ -164,7 +164,7 @@ fn is_valid_length(length_m: f64) -> bool {
     length_m.is_finite() && length_m >= 0.0
 }
 
-impl<const D: usize> Message<D> {
+impl<const D: usize> NeighborMessage<D> {
     /// Returns whether its numbers make sense in a chain of `n` connectors.
     fn is_valid(&self, n: u32) -> bool {
         match self {
@@ -180,8 +180,8 @@ impl<const D: usize> Message<D> {
             Self::Object(objection) => objection.by < n,
             Self::End(at, ahead) => is_in_range(&at.0) && is_valid_point(*ahead),
             Self::Order(order) => is_in_range(&order.to),
-            Self::Done(Some(Outcome::Vetoed(veto))) => is_valid_veto(veto, n),
-            Self::Done(Some(Outcome::Moved(moved))) => {
+            Self::Done(Some(MotionOutcome::Vetoed(veto))) => is_valid_veto(veto, n),
+            Self::Done(Some(MotionOutcome::Moved(moved))) => {
                 let touched = &moved.touched;
                 touched.start <= touched.end
                     && touched.end <= n as usize

@@ -2,7 +2,7 @@
 //!
 //! An agent knows its own connector, its two neighbors' messages, and the perception of its own sensors
 //! ([`ConnectorPercept`]). It is a state machine without a clock, a socket or a thread: packets and ticks in,
-//! packets out, and at the end of a cycle the motion of its connector ([`Control`]).
+//! packets out, and at the end of a cycle the motion of its connector ([`ConnectorControl`]).
 //!
 //! ```text
 //! percept.rs, control.rs   in and out of a cycle; chain_controls.rs: all decisions of a chain
@@ -34,7 +34,7 @@ pub(crate) mod traffic;
 
 pub use chain_controls::ChainControls;
 pub use connector::ConnectorAgent;
-pub use control::{ConnectorMove, Control, ExecutedMotion, LeaderOutcome};
+pub use control::{ConnectorControl, ConnectorMove, ExecutedMotion, LeaderOutcome};
 pub use message::MotionProtocol;
-pub use percept::{ChainPercepts, ConnectorPercept, Intention, Role, SensedObstacle};
-pub use traffic::Traffic;
+pub use percept::{ChainPercepts, ConnectorPercept, ConnectorRole, Intention, SensedObstacle};
+pub use traffic::NetworkTraffic;

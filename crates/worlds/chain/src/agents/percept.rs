@@ -1,9 +1,9 @@
 //! The percept of a connector at the start of a cycle: the only input of its agent besides messages.
 
-use crate::motion::recovery::{RecoveryMemory, Situation};
+use crate::motion::recovery::{InitiatorSituation, RecoveryMemory};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId, InputError};
-use sidestep_rods::geometry::{Core, Cuboid, Point, distance};
+use sidestep_rods::geometry::{ConvexCore, Cuboid, Point, distance};
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{Obstacle, RequestSource, is_in_range};
 use std::f64::consts::PI;
@@ -26,7 +26,7 @@ pub struct ConnectorPercept<const D: usize> {
     /// The nearest lost connectors below and above, as it knew at the end of the cycle before.
     pub missing: [Option<u32>; 2],
     /// Its role in this cycle.
-    pub role: Role<D>,
+    pub role: ConnectorRole<D>,
 }
 
 /// Id of a chain, and what each of its connectors perceives, from connector 0 on.
@@ -34,7 +34,7 @@ pub type ChainPercepts<const D: usize> = (EntityId, Vec<ConnectorPercept<D>>);
 
 /// Whether a connector leads its chain in a cycle, which only one does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Role<const D: usize> {
+pub enum ConnectorRole<const D: usize> {
     /// Another one leads: it answers its neighbors.
     Follows,
     /// It leads the chain, which rests.
@@ -51,7 +51,7 @@ pub struct Intention<const D: usize> {
     /// Who wants it, which decides what the leader tries after a veto.
     pub source: RequestSource,
     /// Its knowledge beside its neighborhood.
-    pub situation: Situation,
+    pub situation: InitiatorSituation,
     /// Its memory of vetoes in earlier cycles.
     pub memory: RecoveryMemory,
     /// Whether it is known that there is no obstacle anywhere.
@@ -76,9 +76,9 @@ impl SensedObstacle {
     /// Returns an obstacle in numbers of any dimension.
     pub fn from_obstacle<const D: usize>(obstacle: &Obstacle<D>) -> Self {
         let core = match &obstacle.core {
-            Core::Point(at) => at.to_vec(),
-            Core::Segment(ends) => ends.as_flattened().to_vec(),
-            Core::Cuboid(Cuboid { center, axes, half_m }) => {
+            ConvexCore::Point(at) => at.to_vec(),
+            ConvexCore::Segment(ends) => ends.as_flattened().to_vec(),
+            ConvexCore::Cuboid(Cuboid { center, axes, half_m }) => {
                 [center, axes.as_flattened(), half_m].concat()
             }
         };
@@ -88,9 +88,9 @@ impl SensedObstacle {
     /// Returns the obstacle; none if its core is of no shape.
     pub fn to_obstacle<const D: usize>(&self) -> Option<Obstacle<D>> {
         let core = match self.core.len() {
-            n if n == D => Core::Point(self.point(0)),
-            n if n == 2 * D => Core::Segment([self.point(0), self.point(1)]),
-            n if n == D * (D + 2) => Core::Cuboid(Cuboid {
+            n if n == D => ConvexCore::Point(self.point(0)),
+            n if n == 2 * D => ConvexCore::Segment([self.point(0), self.point(1)]),
+            n if n == D * (D + 2) => ConvexCore::Cuboid(Cuboid {
                 center: self.point(0),
                 axes: std::array::from_fn(|axis| self.point(1 + axis)),
                 half_m: self.point(1 + D),

@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 
 /// One of the two directions along a chain, and the neighbor there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Side {
+pub(crate) enum ChainSide {
     /// Toward connector 0.
     Below,
     /// Toward the last connector.
     Above,
 }
 
-impl Side {
+impl ChainSide {
     /// In the order of arrays with a value for each side.
     pub(crate) const ALL: [Self; 2] = [Self::Below, Self::Above];
 
@@ -31,7 +31,7 @@ impl Side {
     }
 
     /// Returns whether connector `other` is on this side of connector `k`.
-    pub(crate) fn has(self, other: u32, k: u32) -> bool {
+    pub(crate) fn is_side_of(self, other: u32, k: u32) -> bool {
         match self {
             Self::Below => other < k,
             Self::Above => other > k,
@@ -52,33 +52,33 @@ impl<T> PerSide<T> {
     }
 
     /// Makes the value below first.
-    pub(crate) fn from_fn(mut make: impl FnMut(Side) -> T) -> Self {
-        Self { below: make(Side::Below), above: make(Side::Above) }
+    pub(crate) fn from_fn(mut make: impl FnMut(ChainSide) -> T) -> Self {
+        Self { below: make(ChainSide::Below), above: make(ChainSide::Above) }
     }
 
     /// Visits the value below first.
-    pub(crate) fn for_each(&mut self, mut visit: impl FnMut(Side, &mut T)) {
-        visit(Side::Below, &mut self.below);
-        visit(Side::Above, &mut self.above);
+    pub(crate) fn for_each(&mut self, mut visit: impl FnMut(ChainSide, &mut T)) {
+        visit(ChainSide::Below, &mut self.below);
+        visit(ChainSide::Above, &mut self.above);
     }
 }
 
-impl<T> std::ops::Index<Side> for PerSide<T> {
+impl<T> std::ops::Index<ChainSide> for PerSide<T> {
     type Output = T;
 
-    fn index(&self, side: Side) -> &T {
+    fn index(&self, side: ChainSide) -> &T {
         match side {
-            Side::Below => &self.below,
-            Side::Above => &self.above,
+            ChainSide::Below => &self.below,
+            ChainSide::Above => &self.above,
         }
     }
 }
 
-impl<T> std::ops::IndexMut<Side> for PerSide<T> {
-    fn index_mut(&mut self, side: Side) -> &mut T {
+impl<T> std::ops::IndexMut<ChainSide> for PerSide<T> {
+    fn index_mut(&mut self, side: ChainSide) -> &mut T {
         match side {
-            Side::Below => &mut self.below,
-            Side::Above => &mut self.above,
+            ChainSide::Below => &mut self.below,
+            ChainSide::Above => &mut self.above,
         }
     }
 }

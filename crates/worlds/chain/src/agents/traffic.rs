@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Messages and bytes that went over the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Traffic {
+pub struct NetworkTraffic {
     /// Number of packets.
     pub messages: u64,
     /// Number of their bytes, in their serialized form.
@@ -13,7 +13,7 @@ pub struct Traffic {
     pub dropped: u64,
 }
 
-impl Traffic {
+impl NetworkTraffic {
     pub(super) fn count(&mut self, bytes: usize) {
         self.messages += 1;
         self.bytes += bytes as u64;

@@ -3,10 +3,10 @@
 //!
 //! Its faults are those of any network ([`sidestep_kernel::network`]).
 
-use crate::agents::{ConnectorAgent, ConnectorPercept, Control};
+use crate::agents::{ConnectorAgent, ConnectorControl, ConnectorPercept};
 use crate::world::{ChainWorld, purpose};
 use sidestep_kernel::network::{
-    AgentLoop, Distances, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyTiming,
+    AgentDistances, AgentLoop, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyTiming,
 };
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
@@ -70,7 +70,7 @@ fn draws(streams: Streams) -> FaultStreams {
 /// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
 struct StartPositions<'a, const D: usize>(EntityId, &'a [ConnectorPercept<D>]);
 
-impl<const D: usize> Distances for StartPositions<'_, D> {
+impl<const D: usize> AgentDistances for StartPositions<'_, D> {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         let [a, b] = link.map(|id| self.1[(id - self.0) as usize].at.0);
         distance(a, b)
@@ -86,7 +86,7 @@ pub(super) fn run_agents<const D: usize>(
     talk: NegotiationContext<'_>,
     agents: &mut [ConnectorAgent<D>],
     sights: Vec<ConnectorPercept<D>>,
-) -> Vec<Option<Control<D>>> {
+) -> Vec<Option<ConnectorControl<D>>> {
     let places = StartPositions(talk.first_id, &sights);
     let begins = [talk.begins];
     let draws = draws(talk.streams);

@@ -1,6 +1,6 @@
 //! The outcome of the decisions of a chain's connectors.
 
-use crate::agents::{ConnectorMove, Control, ExecutedMotion};
+use crate::agents::{ConnectorControl, ConnectorMove, ExecutedMotion};
 use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, is_in_range, is_length_allowed};
 
@@ -8,7 +8,7 @@ use sidestep_rods::{Chain, is_in_range, is_length_allowed};
 /// a participant's decision is missing, is another one, or would tear a rod, no connector moves.
 pub(crate) fn final_positions<const D: usize>(
     chain: &Chain<D>,
-    controls: &[Option<Control<D>>],
+    controls: &[Option<ConnectorControl<D>>],
 ) -> Option<Vec<Point<D>>> {
     let mut led = controls.iter().flatten().filter_map(|control| control.led);
     let (ExecutedMotion { request, first, last }, None) = (led.next()?, led.next()) else {

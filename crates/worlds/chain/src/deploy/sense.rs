@@ -1,8 +1,8 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
-use crate::agents::side::Side;
-use crate::agents::{ConnectorPercept, Role, SensedObstacle};
-use crate::state::Body;
+use crate::agents::side::ChainSide;
+use crate::agents::{ConnectorPercept, ConnectorRole, SensedObstacle};
+use crate::state::ChainBodyState;
 use crate::world::{ChainSpec, ChainWorld};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::serde_point::WirePoint;
@@ -16,13 +16,13 @@ const MARGIN_M: f64 = 1e-3;
 pub(crate) struct SensingContext<'a, const D: usize> {
     pub(crate) chain: EntityId,
     pub(crate) now: Cycle,
-    pub(crate) body: &'a Body<D>,
+    pub(crate) body: &'a ChainBodyState<D>,
     pub(crate) obstacles: &'a Obstacles<D>,
 }
 
 impl<const D: usize> SensingContext<'_, D> {
     /// Returns the position of the neighbor of connector `k` on a side, if there is one.
-    fn neighbor_position(&self, k: u32, side: Side) -> Option<WirePoint<D>> {
+    fn neighbor_position(&self, k: u32, side: ChainSide) -> Option<WirePoint<D>> {
         let points = self.body.chain.points();
         let neighbor = side.neighbor(k, points.len() as u32)?;
         Some(WirePoint(points[neighbor as usize]))
@@ -52,7 +52,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         sensed: SensingContext<'_, D>,
         leader: usize,
-        role: &Role<D>,
+        role: &ConnectorRole<D>,
     ) -> Vec<ConnectorPercept<D>> {
         let SensingContext { chain, now, body, .. } = sensed;
         let first_id = self.first_id(chain);
@@ -67,12 +67,12 @@ impl<const D: usize> ChainWorld<D> {
             percepts.push(ConnectorPercept {
                 cycle: now,
                 at: WirePoint(body.chain.points()[k as usize]),
-                neighbors: Side::ALL.map(|side| sensed.neighbor_position(k, side)),
+                neighbors: ChainSide::ALL.map(|side| sensed.neighbor_position(k, side)),
                 max_bend_rad: body.chain.connectors()[k as usize].max_bend_rad,
                 seen: sensed.obstacles_near(k, sees_m),
                 is_silent,
                 missing: body.missing.get(k as usize).copied().unwrap_or_default(),
-                role: if is_leader { role.clone() } else { Role::Follows },
+                role: if is_leader { role.clone() } else { ConnectorRole::Follows },
             });
         }
         percepts

@@ -6,12 +6,15 @@ mod silence;
 
 use super::final_positions;
 use super::negotiation::{NegotiationContext, first_tick, run_agents};
-use crate::agents::side::Side;
+use crate::agents::side::ChainSide;
 use crate::agents::{
-    ConnectorAgent, ConnectorPercept, Control, Intention, LeaderOutcome, Role, SensedObstacle,
+    ConnectorAgent, ConnectorControl, ConnectorPercept, ConnectorRole, Intention, LeaderOutcome,
+    SensedObstacle,
 };
 use crate::fixtures::chains::AnyWorld;
-use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, RecoveryOutcome, Situation};
+use crate::motion::recovery::{
+    InitiatorSituation, RecoveryLimits, RecoveryMemory, RecoveryOutcome,
+};
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::network::Network;
@@ -19,7 +22,8 @@ use sidestep_kernel::stream::Streams;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::serde_point::WirePoint;
 use sidestep_rods::{
-    Chain, Motion, Obstacles, Outcome, Propagator, Request, RequestSource, Rules, VetoEffect,
+    Chain, MotionOutcome, MotionRequest, Obstacles, Propagator, ReactionRules, RequestSource,
+    RequestedMotion, VetoEffect,
 };
 
 /// A network with some faults and all the time that talks need.
@@ -53,28 +57,33 @@ fn sights<const D: usize>(
     let sight = |k: u32| ConnectorPercept {
         cycle: 5,
         at: WirePoint(points[k as usize]),
-        neighbors: Side::ALL.map(|side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]))),
+        neighbors: ChainSide::ALL
+            .map(|side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]))),
         max_bend_rad: chain.connectors()[k as usize].max_bend_rad,
         seen: seen.clone(),
         is_silent: false,
         missing: [None; 2],
-        role: if k as usize == leader { Role::Leads(wish.clone()) } else { Role::Follows },
+        role: if k as usize == leader {
+            ConnectorRole::Leads(wish.clone())
+        } else {
+            ConnectorRole::Follows
+        },
     };
     (0..n).map(sight).collect()
 }
 
 /// A team that makes a motion; returns its decisions.
 fn talked<const D: usize>(
-    (chain, obstacles, rules): (&Chain<D>, &Obstacles<D>, &Rules),
+    (chain, obstacles, rules): (&Chain<D>, &Obstacles<D>, &ReactionRules),
     (leader, to, source): (usize, Point<D>, RequestSource),
     network: Option<&Network>,
     seed: u64,
-) -> Vec<Option<Control<D>>> {
+) -> Vec<Option<ConnectorControl<D>>> {
     let is_empty = obstacles.is_empty();
     let wish = Intention {
         to: WirePoint(to),
         source,
-        situation: Situation::default(),
+        situation: InitiatorSituation::default(),
         memory: RecoveryMemory::default(),
         is_empty,
         is_open: is_empty && chain.is_plain(),
@@ -93,11 +102,13 @@ fn talked<const D: usize>(
 /// Makes random motions in both ways; returns the number of those that moved something, and of the vetoes.
 fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) -> (usize, usize) {
     let mut world = AnyWorld::<D>::new(seed);
-    let rules = Rules { self_collision: false, backtracks: 0, ..world.rules };
+    let rules = ReactionRules { self_collision: false, backtracks: 0, ..world.rules };
     let mut propagator = Propagator::new(rules);
     let (mut moved, mut vetoed) = (0, 0);
     for t in 0..tries {
-        let Request { motion: Motion::Connector { k, to }, .. } = world.any_request(0.15) else {
+        let MotionRequest { motion: RequestedMotion::Connector { k, to }, .. } =
+            world.any_request(0.15)
+        else {
             continue;
         };
         let source = RequestSource::Operator;
@@ -105,15 +116,18 @@ fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) 
         let obstacles = &world.obstacles;
         let controls =
             talked((&before, obstacles, &rules), (k, to, source), network, seed + t as u64);
-        let request =
-            Request { motion: Motion::Connector { k, to }, source, mode: VetoEffect::Exact };
+        let request = MotionRequest {
+            motion: RequestedMotion::Connector { k, to },
+            source,
+            mode: VetoEffect::Exact,
+        };
         let outcome = propagator.propagate(&mut world.chain, &world.obstacles, &request).unwrap();
         let points = final_positions(&before, &controls).unwrap_or(before.points().to_vec());
         assert_eq!(points, world.chain.points(), "seed {seed}, motion {t}: {outcome:?}");
         let ended = controls[k].as_ref().and_then(|control| control.ended.clone());
         let climbed = match outcome.clone() {
-            Outcome::Moved(moved) => RecoveryOutcome::Straight(moved),
-            Outcome::Vetoed(veto) => RecoveryOutcome::Vetoed(veto),
+            MotionOutcome::Moved(moved) => RecoveryOutcome::Straight(moved),
+            MotionOutcome::Vetoed(veto) => RecoveryOutcome::Vetoed(veto),
         };
         match ended {
             Some(LeaderOutcome::Climbed { climbed: told, .. }) => {
@@ -130,11 +144,12 @@ fn compared<const D: usize>(seed: u64, network: Option<&Network>, tries: usize) 
 /// The chain of a world after one process has moved it.
 fn compared_on<const D: usize>(
     world: &mut AnyWorld<D>,
-    rules: &Rules,
+    rules: &ReactionRules,
     (k, to): (usize, Point<D>),
 ) -> Chain<D> {
-    let motion = Motion::Connector { k, to };
-    let request = Request { motion, source: RequestSource::Operator, mode: VetoEffect::Exact };
+    let motion = RequestedMotion::Connector { k, to };
+    let request =
+        MotionRequest { motion, source: RequestSource::Operator, mode: VetoEffect::Exact };
     let moved = Propagator::new(*rules).propagate(&mut world.chain, &world.obstacles, &request);
     assert!(moved.is_ok_and(|outcome| outcome.motion().is_some()));
     world.chain.clone()

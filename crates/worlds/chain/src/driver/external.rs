@@ -4,7 +4,7 @@ use super::VetoRecord;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct External {
+pub(crate) struct ExternalControlState {
     /// Orders for the next cycle.
     pub(crate) orders: Orders,
     /// The result of those of the last one.
@@ -72,7 +72,7 @@ impl OrderOutcome {
         ["no-order", "moved", "cut-short", "vetoed", "waited", "unheard"];
 }
 
-impl External {
+impl ExternalControlState {
     /// Returns whether there is nothing to keep.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::default()

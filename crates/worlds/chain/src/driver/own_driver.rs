@@ -23,14 +23,14 @@ pub trait Driver: Debug + Send + Sync {
     fn decide(
         &self,
         percept: &DriverPercept<'_>,
-        memory: &mut Memory,
+        memory: &mut DriverMemory,
         draws: &mut Draws,
     ) -> Proposal;
 }
 
 /// A driver's memory between two cycles of its task: four words; their meaning is up to the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Memory {
+pub struct DriverMemory {
     /// The words; all 0 at the start of a task.
     pub words: [u32; 4],
 }
@@ -104,7 +104,7 @@ impl OwnDriver {
     pub(crate) fn decide(
         &self,
         percept: &DriverPercept<'_>,
-        memory: &mut Memory,
+        memory: &mut DriverMemory,
         draws: &mut Draws,
     ) -> Proposal {
         let proposal = self.driver.decide(percept, memory, draws);
@@ -137,7 +137,7 @@ mod tests {
         fn decide(
             &self,
             percept: &DriverPercept<'_>,
-            memory: &mut Memory,
+            memory: &mut DriverMemory,
             _: &mut Draws,
         ) -> Proposal {
             let [count, ..] = &mut memory.words;

@@ -5,7 +5,7 @@ use sidestep_rods::geometry::{
     Point, add, add_scaled, angle_rad, distance, first_axis, lerp, move_toward, norm, normalized,
     perpendicular, rejection, scaled, sub,
 };
-use sidestep_rods::{Chain, Motion};
+use sidestep_rods::{Chain, RequestedMotion};
 
 /// One request of a cycle: the moving part, its start and its destination.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,14 +21,14 @@ pub(crate) struct StepMotion<const D: usize> {
 
 impl<const D: usize> StepMotion<D> {
     /// Returns the part of a motion that takes one cycle: nothing goes farther than `step_m`.
-    pub(crate) fn new(chain: &Chain<D>, motion: &Motion<D>, step_m: f64) -> Self {
+    pub(crate) fn new(chain: &Chain<D>, motion: &RequestedMotion<D>, step_m: f64) -> Self {
         let points = chain.points();
         match *motion {
-            Motion::Connector { k, to } => {
+            RequestedMotion::Connector { k, to } => {
                 let to = move_toward(points[k], to, step_m);
                 Self { first: k, is_rod: false, from: [points[k]; 2], to: [to; 2] }
             }
-            Motion::Rod { i, to } => {
+            RequestedMotion::Rod { i, to } => {
                 let from = [points[i], points[i + 1]];
                 let travel_m = max_travel_m(from, to);
                 let part = if travel_m <= step_m { 1.0 } else { step_m / travel_m };
@@ -38,13 +38,13 @@ impl<const D: usize> StepMotion<D> {
     }
 
     /// Returns a fraction of the motion; all of it ends at the target bit for bit.
-    pub(crate) fn motion(&self, part: f64) -> Motion<D> {
+    pub(crate) fn motion(&self, part: f64) -> RequestedMotion<D> {
         let Self { first, from, to, .. } = *self;
         if self.is_rod {
-            return Motion::Rod { i: first, to: interpolate(from, to, part) };
+            return RequestedMotion::Rod { i: first, to: interpolate(from, to, part) };
         }
         let to = if part >= 1.0 { to[0] } else { lerp(from[0], to[0], part) };
-        Motion::Connector { k: first, to }
+        RequestedMotion::Connector { k: first, to }
     }
 
     /// Returns the distance that both ends together travel, meters.
@@ -106,7 +106,7 @@ mod tests {
         let mut chain =
             Chain::new(start.to_vec(), vec![Connector::free(0.02); 2], vec![rod]).expect("a chain");
         for n in 0..1000 {
-            let errand = StepMotion::new(&chain, &Motion::Rod { i: 0, to }, step_m);
+            let errand = StepMotion::new(&chain, &RequestedMotion::Rod { i: 0, to }, step_m);
             if errand.length_m() == 0.0 {
                 return n;
             }
@@ -137,7 +137,7 @@ mod tests {
         let points = vec![[0.0, 0.0], [1.0, 0.0]];
         let mut chain = Chain::new(points, vec![Connector::free(0.02); 2], vec![rod]).unwrap();
         let to = [[0.0, 0.1], [1.0, 0.1]];
-        let errand = StepMotion::new(&chain, &Motion::Rod { i: 0, to }, 1.0);
+        let errand = StepMotion::new(&chain, &RequestedMotion::Rod { i: 0, to }, 1.0);
         assert_eq!(errand.done_fraction(&chain), 0.0);
         chain.points_mut()[0] = to[0];
         assert!((errand.done_fraction(&chain) - 0.5).abs() < 1e-12);

@@ -67,7 +67,8 @@ fn plane(text: &str, workers: usize) -> ChainRun<2> {
 /// Observations of a team: one vector per space.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
     let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
-    let sizes: Vec<usize> = observed.iter().map(|space| space.width() * agents.len()).collect();
+    let sizes: Vec<usize> =
+        observed.iter().map(|space| space.value_count() * agents.len()).collect();
     let mut whole: Vec<Vec<i64>> = sizes.iter().map(|&n| vec![0; n]).collect();
     let mut real: Vec<Vec<f64>> = sizes.iter().map(|&n| vec![0.0; n]).collect();
     let rooms = observed.iter().zip(whole.iter_mut().zip(&mut real));

@@ -15,7 +15,7 @@ const MAX_TURN_DEG: f64 = 3600.0;
 
 /// A part of a corridor's center line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Leg {
+pub enum CorridorLeg {
     /// Along the heading at its start.
     Straight {
         /// Its length, meters, above 0.
@@ -30,7 +30,7 @@ pub enum Leg {
     },
 }
 
-impl Leg {
+impl CorridorLeg {
     /// Returns the length of the center line, and its turn to the left.
     fn length_and_turn(self) -> (f64, f64) {
         match self {
@@ -75,7 +75,7 @@ fn corridor_error(place: String, cause: String) -> InputError {
 /// Both ends are open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Corridor {
-    legs: Vec<Leg>,
+    legs: Vec<CorridorLeg>,
     width_m: f64,
 }
 
@@ -86,7 +86,7 @@ impl Corridor {
     /// # Errors
     /// When there is no leg, or a length, radius, turn or width is not positive (a turn: 0) or
     /// absurd.
-    pub fn new(legs: Vec<Leg>, width_m: f64) -> Result<Self, InputError> {
+    pub fn new(legs: Vec<CorridorLeg>, width_m: f64) -> Result<Self, InputError> {
         if !is_good_length(width_m) {
             return Err(corridor_error("corridor".into(), format!("has a width of {width_m} m")));
         }
@@ -112,23 +112,23 @@ impl Corridor {
     ///
     /// # Errors
     /// When the width is not positive.
-    pub fn pinned(width_m: f64) -> Result<Self, InputError> {
+    pub fn reference_corridor(width_m: f64) -> Result<Self, InputError> {
         let legs = vec![
-            Leg::Straight { length_m: 14.0 },
-            Leg::Bend { radius_m: 2.0, turn_deg: 90.0 },
-            Leg::Bend { radius_m: 1.5, turn_deg: -90.0 },
-            Leg::Bend { radius_m: 1.6, turn_deg: 180.0 },
-            Leg::Bend { radius_m: 1.3, turn_deg: 60.0 },
-            Leg::Bend { radius_m: 1.3, turn_deg: -120.0 },
-            Leg::Bend { radius_m: 1.3, turn_deg: 60.0 },
-            Leg::Bend { radius_m: 2.0, turn_deg: -180.0 },
-            Leg::Straight { length_m: 8.0 },
+            CorridorLeg::Straight { length_m: 14.0 },
+            CorridorLeg::Bend { radius_m: 2.0, turn_deg: 90.0 },
+            CorridorLeg::Bend { radius_m: 1.5, turn_deg: -90.0 },
+            CorridorLeg::Bend { radius_m: 1.6, turn_deg: 180.0 },
+            CorridorLeg::Bend { radius_m: 1.3, turn_deg: 60.0 },
+            CorridorLeg::Bend { radius_m: 1.3, turn_deg: -120.0 },
+            CorridorLeg::Bend { radius_m: 1.3, turn_deg: 60.0 },
+            CorridorLeg::Bend { radius_m: 2.0, turn_deg: -180.0 },
+            CorridorLeg::Straight { length_m: 8.0 },
         ];
         Self::new(legs, width_m)
     }
 
     /// Returns the legs, in order from the origin.
-    pub fn legs(&self) -> &[Leg] {
+    pub fn legs(&self) -> &[CorridorLeg] {
         &self.legs
     }
 
@@ -200,13 +200,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use sidestep_rods::Obstacles;
-    use sidestep_rods::geometry::{Core, distance};
+    use sidestep_rods::geometry::{ConvexCore, distance};
 
-    fn leg() -> impl Strategy<Value = Leg> {
+    fn leg() -> impl Strategy<Value = CorridorLeg> {
         prop_oneof![
-            (0.1..5.0f64).prop_map(|length_m| Leg::Straight { length_m }),
+            (0.1..5.0f64).prop_map(|length_m| CorridorLeg::Straight { length_m }),
             (1.0..3.0f64, prop_oneof![-180.0..-10.0f64, 10.0..180.0f64])
-                .prop_map(|(radius_m, turn_deg)| Leg::Bend { radius_m, turn_deg }),
+                .prop_map(|(radius_m, turn_deg)| CorridorLeg::Bend { radius_m, turn_deg }),
         ]
     }
 
@@ -221,15 +221,15 @@ mod tests {
             prop_assert!((way_m - corridor.length_m()).abs() < 1e-9);
             prop_assert!(line.windows(2).all(|w| distance(w[0].at, w[1].at) <= step_m + 1e-12));
             let turns = legs.iter().map(|leg| match leg {
-                Leg::Straight { .. } => 0.0,
-                Leg::Bend { turn_deg, .. } => turn_deg.to_radians(),
+                CorridorLeg::Straight { .. } => 0.0,
+                CorridorLeg::Bend { turn_deg, .. } => turn_deg.to_radians(),
             });
             prop_assert!((line[line.len() - 1].heading_rad - turns.sum::<f64>()).abs() < 1e-9);
         }
 
         #[test]
         fn a_bend_ends_where_its_circle_says(radius_m in 0.5..5.0f64, turn_deg in 5.0..180.0f64) {
-            let corridor = Corridor::new(vec![Leg::Bend { radius_m, turn_deg }], 1.0).unwrap();
+            let corridor = Corridor::new(vec![CorridorLeg::Bend { radius_m, turn_deg }], 1.0).unwrap();
             let line = corridor.center_line(0.01 * radius_m);
             let turn_rad = turn_deg.to_radians();
             let end = [radius_m * sin(turn_rad), radius_m * (1.0 - cos(turn_rad))];
@@ -239,14 +239,14 @@ mod tests {
 
     #[test]
     fn walls_are_half_a_width_beside_the_line_and_closed() {
-        let corridor = Corridor::pinned(2.0).unwrap();
+        let corridor = Corridor::reference_corridor(2.0).unwrap();
         let walls = corridor.walls(7);
         assert_eq!(walls.len(), 2 * (corridor.center_line(WALL_PIECE_M).len() - 1));
         assert!((7..).zip(&walls).all(|(id, wall)| wall.id == id));
         let ends: Vec<_> = walls
             .iter()
             .map(|wall| match wall.core {
-                Core::Segment(ends) => ends,
+                ConvexCore::Segment(ends) => ends,
                 other => panic!("{other:?} is no wall"),
             })
             .collect();
@@ -261,8 +261,8 @@ mod tests {
 
     #[test]
     fn impossible_corridors_are_refused() {
-        let straight = |length_m| vec![Leg::Straight { length_m }];
-        let bend = |radius_m, turn_deg| vec![Leg::Bend { radius_m, turn_deg }];
+        let straight = |length_m| vec![CorridorLeg::Straight { length_m }];
+        let bend = |radius_m, turn_deg| vec![CorridorLeg::Bend { radius_m, turn_deg }];
         assert!(Corridor::new(Vec::new(), 1.0).is_err());
         for width_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(Corridor::new(straight(1.0), width_m).is_err());

@@ -6,12 +6,12 @@
 use sidestep_kernel::InputError;
 use sidestep_rods::Obstacle;
 use sidestep_rods::geometry::{
-    Bounds, Point, distance, is_finite, lerp, norm, normalized, scaled, sub,
+    Aabb, Point, distance, is_finite, lerp, norm, normalized, scaled, sub,
 };
 
 /// The course of a moving body.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Course<const D: usize> {
+pub enum ObstaclePath<const D: usize> {
     /// Straight on without end.
     Straight {
         /// Its velocity at all times, not zero.
@@ -22,7 +22,7 @@ pub enum Course<const D: usize> {
         /// Its velocity at time 0.
         velocity_m_s: Point<D>,
         /// The room that its whole body never leaves.
-        room: Bounds<D>,
+        room: Aabb<D>,
     },
     /// A tour from way point to way point. The middle of the body is at the first one at time 0.
     Patrol {
@@ -37,20 +37,20 @@ pub enum Course<const D: usize> {
 
 /// A body and its course, which give its place at any time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mover<const D: usize> {
+pub struct MovingObstacle<const D: usize> {
     /// The body, with its place at time 0 (on a patrol: anywhere).
     body: Obstacle<D>,
-    course: Course<D>,
-    bounds: Bounds<D>,
+    course: ObstaclePath<D>,
+    bounds: Aabb<D>,
 }
 
-impl<const D: usize> Mover<D> {
+impl<const D: usize> MovingObstacle<D> {
     /// Returns a body on a course.
     ///
     /// # Errors
     /// When numbers are not finite, a course does not move, the body does not fit into its room or
     /// is not in it, or a patrol has fewer than two way points or two equal neighbors.
-    pub fn new(body: Obstacle<D>, course: Course<D>) -> Result<Self, InputError> {
+    pub fn new(body: Obstacle<D>, course: ObstaclePath<D>) -> Result<Self, InputError> {
         let mover = Self { bounds: body.bounds(), body, course };
         match mover.fault() {
             None => Ok(mover),
@@ -63,17 +63,19 @@ impl<const D: usize> Mover<D> {
     fn fault(&self) -> Option<(&'static str, &'static str)> {
         let still = ("does not move", "give it a speed, or make it a static obstacle");
         match &self.course {
-            Course::Straight { velocity_m_s } if !is_motion(velocity_m_s) => Some(still),
-            Course::Straight { .. } => None,
-            Course::Bouncing { velocity_m_s, .. } if !is_motion(velocity_m_s) => Some(still),
-            Course::Bouncing { room, .. } if !contains_box(room, &self.bounds) => {
+            ObstaclePath::Straight { velocity_m_s } if !is_motion(velocity_m_s) => Some(still),
+            ObstaclePath::Straight { .. } => None,
+            ObstaclePath::Bouncing { velocity_m_s, .. } if !is_motion(velocity_m_s) => Some(still),
+            ObstaclePath::Bouncing { room, .. } if !contains_box(room, &self.bounds) => {
                 Some(("is not in its room", "put it inside, or make the room larger"))
             }
-            Course::Bouncing { .. } => None,
-            Course::Patrol { speed_m_s, .. } if !(*speed_m_s > 0.0 && speed_m_s.is_finite()) => {
+            ObstaclePath::Bouncing { .. } => None,
+            ObstaclePath::Patrol { speed_m_s, .. }
+                if !(*speed_m_s > 0.0 && speed_m_s.is_finite()) =>
+            {
                 Some(still)
             }
-            Course::Patrol { way_points, .. } => patrol_fault(way_points),
+            ObstaclePath::Patrol { way_points, .. } => patrol_fault(way_points),
         }
     }
 
@@ -86,8 +88,8 @@ impl<const D: usize> Mover<D> {
     /// Returns the shift of the body from its given place, and its velocity.
     fn shift_and_velocity(&self, t_s: f64) -> (Point<D>, Point<D>) {
         match &self.course {
-            Course::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
-            Course::Bouncing { velocity_m_s, room } => {
+            ObstaclePath::Straight { velocity_m_s } => (scaled(*velocity_m_s, t_s), *velocity_m_s),
+            ObstaclePath::Bouncing { velocity_m_s, room } => {
                 let mut shift_m = [0.0; D];
                 let mut velocity_now_m_s = [0.0; D];
                 for i in 0..D {
@@ -95,12 +97,14 @@ impl<const D: usize> Mover<D> {
                     let hi_m = room.hi[i] - self.bounds.hi[i];
                     // A body may stick out by a rounding: then its room ends where it begins.
                     let limits_m = [lo_m.min(0.0), hi_m.max(0.0)];
-                    (shift_m[i], velocity_now_m_s[i]) = bounce(limits_m, velocity_m_s[i], t_s);
+                    (shift_m[i], velocity_now_m_s[i]) =
+                        bounce_position_and_velocity(limits_m, velocity_m_s[i], t_s);
                 }
                 (shift_m, velocity_now_m_s)
             }
-            Course::Patrol { way_points, closed, speed_m_s } => {
-                let (at, velocity_m_s) = patrol(way_points, *closed, *speed_m_s, t_s);
+            ObstaclePath::Patrol { way_points, closed, speed_m_s } => {
+                let (at, velocity_m_s) =
+                    patrol_position_and_velocity(way_points, *closed, *speed_m_s, t_s);
                 (sub(at, lerp(self.bounds.lo, self.bounds.hi, 0.5)), velocity_m_s)
             }
         }
@@ -113,7 +117,7 @@ fn is_motion<const D: usize>(velocity_m_s: &Point<D>) -> bool {
 }
 
 /// Returns whether a box holds another, apart from rounding.
-fn contains_box<const D: usize>(room: &Bounds<D>, body: &Bounds<D>) -> bool {
+fn contains_box<const D: usize>(room: &Aabb<D>, body: &Aabb<D>) -> bool {
     let slack_m = 1e-9;
     is_finite(&room.lo)
         && is_finite(&room.hi)
@@ -136,10 +140,10 @@ fn patrol_fault<const D: usize>(way_points: &[Point<D>]) -> Option<(&'static str
 
 /// Returns the position and the velocity of a point that starts at 0 and is thrown back at `lo_m` (at most 0) and `hi_m`
 /// (at least 0).
-fn bounce([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
+fn bounce_position_and_velocity([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) -> (f64, f64) {
     if v_m_s < 0.0 {
         // Its mirror image goes forward.
-        let (x_m, v_m_s) = bounce([-hi_m, -lo_m], -v_m_s, t_s);
+        let (x_m, v_m_s) = bounce_position_and_velocity([-hi_m, -lo_m], -v_m_s, t_s);
         return (-x_m, -v_m_s);
     }
     let span_m = hi_m - lo_m;
@@ -159,7 +163,7 @@ fn shuttle(traveled_m: f64, length_m: f64) -> (f64, bool) {
 }
 
 /// Returns the place on a patrol, and the velocity.
-fn patrol<const D: usize>(
+fn patrol_position_and_velocity<const D: usize>(
     way_points: &[Point<D>],
     closed: bool,
     speed_m_s: f64,
@@ -191,14 +195,14 @@ fn patrol<const D: usize>(
 
 /// All moving obstacles of a world, by id.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Movers<const D: usize>(Vec<Mover<D>>);
+pub struct MovingObstacles<const D: usize>(Vec<MovingObstacle<D>>);
 
-impl<const D: usize> Movers<D> {
+impl<const D: usize> MovingObstacles<D> {
     /// Returns moving obstacles, sorted by their ids.
     ///
     /// # Errors
     /// When two have the same id.
-    pub fn new(mut movers: Vec<Mover<D>>) -> Result<Self, InputError> {
+    pub fn new(mut movers: Vec<MovingObstacle<D>>) -> Result<Self, InputError> {
         movers.sort_by_key(|m| m.body.id);
         match movers.windows(2).find(|w| w[0].body.id == w[1].body.id) {
             None => Ok(Self(movers)),
@@ -230,13 +234,13 @@ impl<const D: usize> Movers<D> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use sidestep_rods::geometry::{Core, add};
+    use sidestep_rods::geometry::{ConvexCore, add};
 
-    const ROOM: Bounds<2> = Bounds { lo: [-5.0, -3.0], hi: [6.0, 4.0] };
+    const ROOM: Aabb<2> = Aabb { lo: [-5.0, -3.0], hi: [6.0, 4.0] };
 
     fn center<const D: usize>(obstacle: &Obstacle<D>) -> Point<D> {
         match obstacle.core {
-            Core::Point(c) => c,
+            ConvexCore::Point(c) => c,
             other => panic!("{other:?} is no ball"),
         }
     }
@@ -245,24 +249,23 @@ mod tests {
         Obstacle::ball(3, at, 0.5)
     }
 
-    fn course() -> impl Strategy<Value = Course<2>> {
+    fn course() -> impl Strategy<Value = ObstaclePath<2>> {
         let velocity = || prop::array::uniform2(prop_oneof![-2.0..-0.1f64, 0.1..2.0f64]);
         let points = prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..6);
         prop_oneof![
-            velocity().prop_map(|velocity_m_s| Course::Straight { velocity_m_s }),
-            velocity().prop_map(|velocity_m_s| Course::Bouncing { velocity_m_s, room: ROOM }),
+            velocity().prop_map(|velocity_m_s| ObstaclePath::Straight { velocity_m_s }),
+            velocity().prop_map(|velocity_m_s| ObstaclePath::Bouncing { velocity_m_s, room: ROOM }),
             (points, any::<bool>(), 0.1..2.0f64).prop_map(|(way_points, closed, speed_m_s)| {
-                Course::Patrol { way_points, closed, speed_m_s }
+                ObstaclePath::Patrol { way_points, closed, speed_m_s }
             }),
         ]
     }
 
-    fn speed_m_s(course: &Course<2>) -> f64 {
+    fn speed_m_s(course: &ObstaclePath<2>) -> f64 {
         match course {
-            Course::Straight { velocity_m_s } | Course::Bouncing { velocity_m_s, .. } => {
-                norm(*velocity_m_s)
-            }
-            Course::Patrol { speed_m_s, .. } => *speed_m_s,
+            ObstaclePath::Straight { velocity_m_s }
+            | ObstaclePath::Bouncing { velocity_m_s, .. } => norm(*velocity_m_s),
+            ObstaclePath::Patrol { speed_m_s, .. } => *speed_m_s,
         }
     }
 
@@ -272,7 +275,7 @@ mod tests {
             course in course(), t_s in 0.0..1e3f64, dt_s in 1e-6..5.0f64,
         ) {
             let limit_m_s = speed_m_s(&course);
-            let mover = Mover::new(ball([0.0; 2]), course).unwrap();
+            let mover = MovingObstacle::new(ball([0.0; 2]), course).unwrap();
             let (before, after) = (mover.at(t_s), mover.at(t_s + dt_s));
             let way_m = distance(center(&before), center(&after));
             prop_assert!(way_m <= limit_m_s * dt_s + 1e-9);
@@ -282,7 +285,7 @@ mod tests {
 
         #[test]
         fn the_velocity_is_the_way_that_follows(course in course(), t_s in 0.0..1e3f64) {
-            let mover = Mover::new(ball([0.0; 2]), course).unwrap();
+            let mover = MovingObstacle::new(ball([0.0; 2]), course).unwrap();
             let (now, dt_s) = (mover.at(t_s), 1e-6);
             let soon = center(&mover.at(t_s + dt_s));
             let off_m = distance(soon, add(center(&now), scaled(now.velocity_m_s, dt_s)));
@@ -297,7 +300,7 @@ mod tests {
         ) {
             prop_assume!(norm(velocity_m_s) > 0.1);
             let mover =
-                Mover::new(ball(start), Course::Bouncing { velocity_m_s, room: ROOM }).unwrap();
+                MovingObstacle::new(ball(start), ObstaclePath::Bouncing { velocity_m_s, room: ROOM }).unwrap();
             let (mut at, mut v, dt_s) = (start, velocity_m_s, 0.01);
             for k in 1..=4000 {
                 for i in 0..2 {
@@ -321,8 +324,8 @@ mod tests {
             way_points in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..6),
             closed in any::<bool>(),
         ) {
-            let course = Course::Patrol { way_points: way_points.clone(), closed, speed_m_s: 0.5 };
-            let mover = Mover::new(ball([9.0; 2]), course).unwrap();
+            let course = ObstaclePath::Patrol { way_points: way_points.clone(), closed, speed_m_s: 0.5 };
+            let mover = MovingObstacle::new(ball([9.0; 2]), course).unwrap();
             let there = way_points.windows(2).map(|w| distance(w[0], w[1])).sum::<f64>();
             let last = way_points[way_points.len() - 1];
             let round_m = there + if closed { distance(last, way_points[0]) } else { there };
@@ -341,8 +344,9 @@ mod tests {
     fn a_corner_has_the_velocity_of_what_comes() {
         let way_points = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]];
         let velocity_at = |closed, t_s| {
-            let course = Course::Patrol { way_points: way_points.clone(), closed, speed_m_s: 1.0 };
-            Mover::new(ball([0.0; 2]), course).unwrap().at(t_s).velocity_m_s
+            let course =
+                ObstaclePath::Patrol { way_points: way_points.clone(), closed, speed_m_s: 1.0 };
+            MovingObstacle::new(ball([0.0; 2]), course).unwrap().at(t_s).velocity_m_s
         };
         assert_eq!(velocity_at(false, 2.0), [0.0, 1.0]);
         assert_eq!(velocity_at(false, 4.0), [0.0, -1.0]);
@@ -354,35 +358,35 @@ mod tests {
     #[test]
     fn movers_are_told_by_id_at_any_time() {
         let mover = |id, at| {
-            let course = Course::Straight { velocity_m_s: [1.0, 0.0] };
-            Mover::new(Obstacle::ball(id, at, 0.1), course).unwrap()
+            let course = ObstaclePath::Straight { velocity_m_s: [1.0, 0.0] };
+            MovingObstacle::new(Obstacle::ball(id, at, 0.1), course).unwrap()
         };
-        let movers = Movers::new(vec![mover(8, [1.0, 1.0]), mover(2, [0.0; 2])]).unwrap();
+        let movers = MovingObstacles::new(vec![mover(8, [1.0, 1.0]), mover(2, [0.0; 2])]).unwrap();
         let places: Vec<_> = movers.at(2.5).map(|o| (o.id, center(&o))).collect();
         assert_eq!(places, [(2, [2.5, 0.0]), (8, [3.5, 1.0])]);
-        assert!(Movers::new(vec![mover(1, [0.0; 2]), mover(1, [1.0; 2])]).is_err());
+        assert!(MovingObstacles::new(vec![mover(1, [0.0; 2]), mover(1, [1.0; 2])]).is_err());
     }
 
     #[test]
     fn impossible_courses_are_refused() {
-        let patrol = |way_points: &[Point<2>], speed_m_s| Course::Patrol {
+        let patrol = |way_points: &[Point<2>], speed_m_s| ObstaclePath::Patrol {
             way_points: way_points.to_vec(),
             closed: true,
             speed_m_s,
         };
-        let inside_out = Bounds { lo: [1.0; 2], hi: [-1.0; 2] };
+        let inside_out = Aabb { lo: [1.0; 2], hi: [-1.0; 2] };
         for course in [
-            Course::Straight { velocity_m_s: [0.0; 2] },
-            Course::Straight { velocity_m_s: [f64::NAN, 1.0] },
-            Course::Bouncing { velocity_m_s: [0.0; 2], room: ROOM },
-            Course::Bouncing { velocity_m_s: [1.0; 2], room: inside_out },
-            Course::Bouncing { velocity_m_s: [1.0; 2], room: ROOM.grown(-3.2) },
+            ObstaclePath::Straight { velocity_m_s: [0.0; 2] },
+            ObstaclePath::Straight { velocity_m_s: [f64::NAN, 1.0] },
+            ObstaclePath::Bouncing { velocity_m_s: [0.0; 2], room: ROOM },
+            ObstaclePath::Bouncing { velocity_m_s: [1.0; 2], room: inside_out },
+            ObstaclePath::Bouncing { velocity_m_s: [1.0; 2], room: ROOM.grown(-3.2) },
             patrol(&[[0.0; 2]], 1.0),
             patrol(&[[0.0; 2], [0.0; 2]], 1.0),
             patrol(&[[0.0; 2], [f64::INFINITY; 2]], 1.0),
             patrol(&[[0.0; 2], [1.0; 2]], 0.0),
         ] {
-            assert!(Mover::new(ball([0.0; 2]), course.clone()).is_err(), "{course:?}");
+            assert!(MovingObstacle::new(ball([0.0; 2]), course.clone()).is_err(), "{course:?}");
         }
     }
 }

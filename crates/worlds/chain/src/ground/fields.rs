@@ -1,10 +1,10 @@
 //! Obstacles at random places, from the seed alone.
 
-use super::courses::{Course, Mover};
+use super::courses::{MovingObstacle, ObstaclePath};
 use super::purposes;
 use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{InputError, Seed};
-use sidestep_rods::geometry::{Bounds, Core, Point, add_scaled, is_finite, normalized};
+use sidestep_rods::geometry::{Aabb, ConvexCore, Point, add_scaled, is_finite, normalized};
 use sidestep_rods::{Obstacle, Obstacles};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
@@ -16,9 +16,9 @@ const MAX_ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Field<const D: usize> {
+pub(crate) struct ObstacleField<const D: usize> {
     /// Region of their middles.
-    pub(crate) room: Bounds<D>,
+    pub(crate) room: Aabb<D>,
     /// Their total size, as a part of the room's. They may overlap, and those that would come too
     /// near to `keep_clear` are left out, so they cover less.
     pub(crate) part: f64,
@@ -27,12 +27,12 @@ pub(crate) struct Field<const D: usize> {
     /// Length of a capsule's core, meters; 0 for balls.
     pub(crate) length_m: f64,
     /// Bodies that they keep away from: the places where chains start.
-    pub(crate) keep_clear: Vec<Core<D>>,
+    pub(crate) keep_clear: Vec<ConvexCore<D>>,
     /// Distance that their surfaces keep from these, meters.
     pub(crate) keep_m: f64,
 }
 
-impl<const D: usize> Field<D> {
+impl<const D: usize> ObstacleField<D> {
     /// Returns the obstacles, numbered from `first_id`; gaps in the numbers are those left out.
     ///
     /// # Errors
@@ -46,8 +46,11 @@ impl<const D: usize> Field<D> {
         for k in 0..n {
             let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
             if clear.is_clear(ends, self.radius_m) {
-                let core =
-                    if ends[0] == ends[1] { Core::Point(ends[0]) } else { Core::Segment(ends) };
+                let core = if ends[0] == ends[1] {
+                    ConvexCore::Point(ends[0])
+                } else {
+                    ConvexCore::Segment(ends)
+                };
                 obstacles.push(Obstacle::still(first_id + k, core, self.radius_m));
             }
         }
@@ -91,27 +94,31 @@ impl<const D: usize> Field<D> {
 
 /// Balls that go straight on, and are thrown back at the sides of a room.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Crowd<const D: usize> {
+pub(crate) struct WanderingObstacles<const D: usize> {
     /// The room that they never leave.
-    pub(crate) room: Bounds<D>,
+    pub(crate) room: Aabb<D>,
     pub(crate) n: u32,
     /// Their radii, evenly spread.
     pub(crate) radius_m: RangeInclusive<f64>,
     /// Their speeds, evenly spread.
     pub(crate) speed_m_s: RangeInclusive<f64>,
     /// Bodies that they keep away from at time 0.
-    pub(crate) keep_clear: Vec<Core<D>>,
+    pub(crate) keep_clear: Vec<ConvexCore<D>>,
     /// Distance that their surfaces keep from these at time 0, meters.
     pub(crate) keep_m: f64,
 }
 
-impl<const D: usize> Crowd<D> {
+impl<const D: usize> WanderingObstacles<D> {
     /// Returns the obstacles, numbered from `first_id`.
     ///
     /// # Errors
     /// When a room is too small for them, or has no place away from `keep_clear`; when sizes or
     /// speeds are not finite and positive.
-    pub(crate) fn generate(&self, seed: Seed, first_id: u32) -> Result<Vec<Mover<D>>, InputError> {
+    pub(crate) fn generate(
+        &self,
+        seed: Seed,
+        first_id: u32,
+    ) -> Result<Vec<MovingObstacle<D>>, InputError> {
         if f64::from(self.n) > MAX_OBSTACLES {
             let cause = format!("{} moving obstacles", self.n);
             return Err(InputError::new("crowd", cause, "give at most 1e7"));
@@ -127,7 +134,7 @@ impl<const D: usize> Crowd<D> {
         clear: &KeepClearIndex<D>,
         k: u32,
         id: u32,
-    ) -> Result<Mover<D>, InputError> {
+    ) -> Result<MovingObstacle<D>, InputError> {
         for attempt in 0..MAX_ATTEMPTS {
             let mut draws = streams.draws(k, attempt, purposes::MOVING);
             let radius_m = uniform(&mut draws, &self.radius_m);
@@ -141,7 +148,10 @@ impl<const D: usize> Crowd<D> {
             let at = random_point(&mut draws, &places);
             if clear.is_clear([at; 2], radius_m) {
                 let ball = Obstacle::ball(id, at, radius_m);
-                return Mover::new(ball, Course::Bouncing { velocity_m_s, room: self.room });
+                return MovingObstacle::new(
+                    ball,
+                    ObstaclePath::Bouncing { velocity_m_s, room: self.room },
+                );
             }
         }
         Err(InputError::new(
@@ -163,7 +173,7 @@ const ROUNDING_M: f64 = 1e-6;
 
 impl<const D: usize> KeepClearIndex<D> {
     /// Returns bodies from which obstacles of about `size_m` keep a distance.
-    fn new(bodies: &[Core<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
+    fn new(bodies: &[ConvexCore<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
         let bodies = (0..).zip(bodies).map(|(k, core)| Obstacle::still(k, *core, 0.0)).collect();
         // Determines the cells of a grid, never the result, so that any length will do where none is given. No cell is
         // smaller than 1 mm, or points would make cells of no size.
@@ -176,7 +186,7 @@ impl<const D: usize> KeepClearIndex<D> {
     fn is_clear(&self, ends: [Point<D>; 2], radius_m: f64) -> bool {
         let reach_m = radius_m + self.keep_m;
         let mut is_away = reach_m.is_finite();
-        self.bodies.visit(&Bounds::from_points(&ends).grown(reach_m + ROUNDING_M), |body| {
+        self.bodies.visit(&Aabb::from_points(&ends).grown(reach_m + ROUNDING_M), |body| {
             is_away &= body.core.nearest_to_segment(ends).distance_m > reach_m;
         });
         is_away
@@ -187,7 +197,7 @@ fn uniform(draws: &mut Draws, range: &RangeInclusive<f64>) -> f64 {
     range.start() + (range.end() - range.start()) * draws.uniform()
 }
 
-fn random_point<const D: usize>(draws: &mut Draws, room: &Bounds<D>) -> Point<D> {
+fn random_point<const D: usize>(draws: &mut Draws, room: &Aabb<D>) -> Point<D> {
     std::array::from_fn(|i| uniform(draws, &(room.lo[i]..=room.hi[i])))
 }
 
@@ -208,15 +218,15 @@ mod tests {
     use super::*;
     use sidestep_rods::geometry::norm;
 
-    fn field<const D: usize>(part: f64, length_m: f64) -> Field<D> {
+    fn field<const D: usize>(part: f64, length_m: f64) -> ObstacleField<D> {
         let mut tail = [0.0; D];
         tail[0] = -3.0;
-        Field {
-            room: Bounds { lo: [-4.0; D], hi: [4.0; D] },
+        ObstacleField {
+            room: Aabb { lo: [-4.0; D], hi: [4.0; D] },
             part,
             radius_m: 0.3,
             length_m,
-            keep_clear: vec![Core::Segment([[0.0; D], tail])],
+            keep_clear: vec![ConvexCore::Segment([[0.0; D], tail])],
             keep_m: 0.2,
         }
     }
@@ -227,8 +237,8 @@ mod tests {
         assert!(found.len() > 10 && found.len() < field.obstacle_count().unwrap() as usize);
         for o in &found {
             let ends = match o.core {
-                Core::Point(c) => [c; 2],
-                Core::Segment(ends) => ends,
+                ConvexCore::Point(c) => [c; 2],
+                ConvexCore::Segment(ends) => ends,
                 other => panic!("{other:?}"),
             };
             assert!(
@@ -252,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_field_has_the_size_it_is_asked_for() {
-        let field = Field { keep_clear: Vec::new(), ..field::<3>(0.3, 0.5) };
+        let field = ObstacleField { keep_clear: Vec::new(), ..field::<3>(0.3, 0.5) };
         let one = 4.0 / 3.0 * PI * 0.027 + PI * 0.09 * 0.5;
         let size = field.fill(Seed(1), 0).unwrap().len() as f64 * one;
         assert!((size / 512.0 - 0.3).abs() < 0.001, "{size}");
@@ -260,12 +270,12 @@ mod tests {
 
     #[test]
     fn a_crowd_stays_in_its_room_with_the_sizes_and_speeds_it_is_given() {
-        let crowd = Crowd {
-            room: Bounds { lo: [-3.0, -2.0], hi: [3.0, 2.0] },
+        let crowd = WanderingObstacles {
+            room: Aabb { lo: [-3.0, -2.0], hi: [3.0, 2.0] },
             n: 40,
             radius_m: 0.2..=0.5,
             speed_m_s: 0.25..=2.0,
-            keep_clear: vec![Core::Point([0.0; 2])],
+            keep_clear: vec![ConvexCore::Point([0.0; 2])],
             keep_m: 0.5,
         };
         for mover in crowd.generate(Seed(9), 100).unwrap() {
@@ -280,21 +290,21 @@ mod tests {
                 assert!((0..2).all(|i| at.hi[i] < crowd.room.hi[i] + 1e-9));
             }
         }
-        let cramped = Crowd { keep_m: 9.0, ..crowd.clone() };
+        let cramped = WanderingObstacles { keep_m: 9.0, ..crowd.clone() };
         assert!(cramped.generate(Seed(9), 0).is_err());
-        let too_large = Crowd { radius_m: 2.5..=3.0, ..crowd };
+        let too_large = WanderingObstacles { radius_m: 2.5..=3.0, ..crowd };
         assert!(too_large.generate(Seed(9), 0).is_err());
     }
 
     #[test]
     fn impossible_fields_are_refused() {
         for wrong in [
-            Field { part: f64::NAN, ..field::<2>(0.1, 0.0) },
-            Field { part: -1.0, ..field(0.1, 0.0) },
-            Field { radius_m: 0.0, ..field(0.1, 0.0) },
-            Field { radius_m: 1e-9, ..field(0.1, 0.0) },
-            Field { length_m: -1.0, ..field(0.1, 0.0) },
-            Field { room: Bounds { lo: [1.0; 2], hi: [0.0; 2] }, ..field(0.1, 0.0) },
+            ObstacleField { part: f64::NAN, ..field::<2>(0.1, 0.0) },
+            ObstacleField { part: -1.0, ..field(0.1, 0.0) },
+            ObstacleField { radius_m: 0.0, ..field(0.1, 0.0) },
+            ObstacleField { radius_m: 1e-9, ..field(0.1, 0.0) },
+            ObstacleField { length_m: -1.0, ..field(0.1, 0.0) },
+            ObstacleField { room: Aabb { lo: [1.0; 2], hi: [0.0; 2] }, ..field(0.1, 0.0) },
         ] {
             assert!(wrong.fill(Seed(1), 0).is_err(), "{wrong:?}");
         }

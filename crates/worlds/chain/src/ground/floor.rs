@@ -6,17 +6,17 @@
 //! sides, and the inside of solid areas needs nothing. No chain gets there, because walls that meet
 //! share their corners bit for bit, and no motion passes through a wall, however thin (see
 //! [`Sweep`](sidestep_rods::Sweep)). The walls do not detect a chain that starts inside a solid area;
-//! [`Floor::is_free`] does.
+//! [`FloorMap::is_free`] does.
 
 use sidestep_import::PixelMap;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::{Cell, UnknownPolicy};
 use sidestep_rods::Obstacle;
-use sidestep_rods::geometry::{Bounds, Point, add, add_scaled, dot, scaled, sub};
+use sidestep_rods::geometry::{Aabb, Point, add, add_scaled, dot, scaled, sub};
 
 /// A plane of pixels, free or solid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Floor {
+pub struct FloorMap {
     width: u32,
     height: u32,
     /// Row by row from the bottom; length `width * height`.
@@ -31,7 +31,7 @@ pub struct Floor {
     is_walled: bool,
 }
 
-impl Floor {
+impl FloorMap {
     /// Returns a floor of `width` x `height` pixels of size `pixel_m`; `solid` holds them row by
     /// row from the bottom. Its lower-left corner lies at the origin, and everything around it is
     /// solid.
@@ -122,10 +122,10 @@ impl Floor {
     }
 
     /// Returns the box around the floor.
-    pub fn bounds(&self) -> Bounds<2> {
+    pub fn bounds(&self) -> Aabb<2> {
         let w = f64::from(self.width);
         let h = f64::from(self.height);
-        Bounds::from_points(
+        Aabb::from_points(
             &[(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| self.pixel_position(x, y)),
         )
     }
@@ -192,11 +192,11 @@ mod tests {
     use proptest::prelude::*;
     use sidestep_import::rosmap;
     use sidestep_kernel::view::Isometry2;
-    use sidestep_rods::geometry::{Core, Cuboid, distance};
+    use sidestep_rods::geometry::{ConvexCore, Cuboid, distance};
     use sidestep_testing::shared_data as shared;
 
     /// A floor drawn at random, turned and stretched.
-    fn floor() -> impl Strategy<Value = Floor> {
+    fn floor() -> impl Strategy<Value = FloorMap> {
         let pixels = (1u32..9, 1u32..9).prop_flat_map(|(width, height)| {
             let solid = prop::collection::vec(prop::bool::weighted(0.4), (width * height) as usize);
             (Just(width), Just(height), solid)
@@ -205,19 +205,19 @@ mod tests {
         let middle = prop::array::uniform2(-5.0..5.0f64);
         (pixels, size, middle, -3.0..3.0f64, any::<bool>()).prop_map(
             |((width, height, solid), pixel_m, middle, yaw_rad, is_walled)| {
-                let floor = Floor::new(width, height, pixel_m, solid).centered(middle, yaw_rad);
+                let floor = FloorMap::new(width, height, pixel_m, solid).centered(middle, yaw_rad);
                 if is_walled { floor } else { floor.with_open_surroundings() }
             },
         )
     }
 
     /// All pixels of the floor and around it that are solid, or free, as boxes.
-    fn boxes(floor: &Floor, solid: bool) -> Vec<Core<2>> {
+    fn boxes(floor: &FloorMap, solid: bool) -> Vec<ConvexCore<2>> {
         let (width, height) = (i64::from(floor.width), i64::from(floor.height));
         let all = (-1..=height).flat_map(|row| (-1..=width).map(move |col| (col, row)));
         all.filter(|&(col, row)| floor.is_solid(col, row) == solid)
             .map(|(col, row)| {
-                Core::Cuboid(Cuboid {
+                ConvexCore::Cuboid(Cuboid {
                     center: floor.pixel_position(col as f64 + 0.5, row as f64 + 0.5),
                     axes: floor.axes,
                     half_m: floor.pixel_m.map(|m| 0.5 * m),
@@ -236,7 +236,7 @@ mod tests {
                 part[1] * f64::from(floor.height),
             );
             let other_sort = boxes(&floor, floor.is_free(at));
-            let nearest_m = |cores: Vec<Core<2>>| {
+            let nearest_m = |cores: Vec<ConvexCore<2>>| {
                 let all = cores.iter().map(|core| core.nearest_to_point(at).distance_m);
                 all.fold(f64::INFINITY, f64::min)
             };
@@ -258,7 +258,7 @@ mod tests {
             );
             let way = [point(0), point(2)];
             let crosses = |wall: &Obstacle<2>| match wall.core {
-                Core::Segment(ends) => sidestep_rods::geometry::segments_cross(way, ends),
+                ConvexCore::Segment(ends) => sidestep_rods::geometry::segments_cross(way, ends),
                 _ => false,
             };
             let crossed = floor.walls(0).iter().filter(|wall| crosses(wall)).count();
@@ -272,7 +272,7 @@ mod tests {
     fn straight_edges_are_one_wall() {
         let room = ["#####", "#...#", "#.#.#", "#...#", "#####"];
         let solid = room.iter().rev().flat_map(|row| row.chars().map(|c| c == '#')).collect();
-        let floor = Floor::new(5, 5, [0.5, 0.25], solid);
+        let floor = FloorMap::new(5, 5, [0.5, 0.25], solid);
         let walls = floor.walls(10);
         assert_eq!(walls.len(), 8, "four of the room, four of the pillar");
         assert_eq!(walls[0], Obstacle::capsule(10, [[0.5, 0.25], [2.0, 0.25]], 0.0));
@@ -289,10 +289,10 @@ mod tests {
         let pixels = vec![Cell::Free, Cell::Wall, Cell::Unknown];
         let plane = Isometry2 { origin_m: [1.0, 2.0], yaw_rad: 0.0 };
         let map = PixelMap::new(3, 1, 0.5, plane, pixels);
-        let solid = |policy| Floor::from_map(&map, policy).count_solid();
+        let solid = |policy| FloorMap::from_map(&map, policy).count_solid();
         let policies = [UnknownPolicy::Wall, UnknownPolicy::Keep, UnknownPolicy::Free];
         assert_eq!(policies.map(solid), [2, 2, 1]);
-        assert!(Floor::from_map(&map, UnknownPolicy::Wall).is_free([1.25, 2.25]));
+        assert!(FloorMap::from_map(&map, UnknownPolicy::Wall).is_free([1.25, 2.25]));
     }
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
         for yaw_rad in [0.0, 0.5, 3.0] {
             let plane = Isometry2 { origin_m: [1.0, 2.0], yaw_rad };
             let map = PixelMap::new(3, 2, 0.5, plane, pixels.to_vec());
-            let floor = Floor::from_map(&map, UnknownPolicy::Wall);
+            let floor = FloorMap::from_map(&map, UnknownPolicy::Wall);
             for (k, cell) in pixels.iter().enumerate() {
                 let middle = [0.5 * (k % 3) as f64 + 0.25, 0.5 * (k / 3) as f64 + 0.25];
                 let at = plane.transform_point(middle);
@@ -315,12 +315,12 @@ mod tests {
         for (name, most_walls) in [("porto/porto", 1500), ("berlin/berlin", 2500)] {
             let Some(path) = shared(&format!("maps/{name}.yaml")) else { return };
             let map = rosmap::load(&path).expect(name);
-            let floor = Floor::from_map(&map, UnknownPolicy::Wall);
+            let floor = FloorMap::from_map(&map, UnknownPolicy::Wall);
             let counts = map.counts();
             assert_eq!(floor.count_solid(), counts.wall + counts.unknown);
             let walls = floor.walls(0);
             let length_m = |wall: &Obstacle<2>| match wall.core {
-                Core::Segment([a, b]) => distance(a, b),
+                ConvexCore::Segment([a, b]) => distance(a, b),
                 _ => f64::NAN,
             };
             let edges = walls.iter().map(length_m).sum::<f64>() / map.resolution_m();
@@ -330,7 +330,7 @@ mod tests {
         }
     }
 
-    fn count_edges(floor: &Floor) -> usize {
+    fn count_edges(floor: &FloorMap) -> usize {
         let (width, height) = (i64::from(floor.width), i64::from(floor.height));
         let all = (-1..=height).flat_map(|row| (-1..=width).map(move |col| (col, row)));
         let edges = all.map(|(col, row)| {

@@ -13,9 +13,9 @@ pub(crate) mod floor;
 pub(crate) mod route;
 pub(crate) mod site;
 
-pub use corridor::{Corridor, Leg};
-pub use courses::{Course, Mover, Movers};
-pub use floor::Floor;
+pub use corridor::{Corridor, CorridorLeg};
+pub use courses::{MovingObstacle, MovingObstacles, ObstaclePath};
+pub use floor::FloorMap;
 pub use site::Site;
 
 use sidestep_kernel::stream::Purpose;

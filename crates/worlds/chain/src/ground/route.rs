@@ -6,7 +6,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_map::planning::{Distances, FreeSpace, STEPS};
 use sidestep_rods::Obstacles;
-use sidestep_rods::geometry::{Bounds, Point, add_scaled, distance, dot, lerp, normalized, sub};
+use sidestep_rods::geometry::{Aabb, Point, add_scaled, distance, dot, lerp, normalized, sub};
 
 /// Random positions that are tried: many, because the test of one is cheap and little of a map may be free.
 const MAX_PLACES: u64 = 20_000;
@@ -30,7 +30,7 @@ pub(crate) struct SpaceRequirement {
     pub(crate) ahead_m: f64,
     /// Region where the leader starts; by default anywhere on the site. Many sites have blocks
     /// whose insides are free and lead nowhere.
-    pub(crate) within: Option<Bounds<2>>,
+    pub(crate) within: Option<Aabb<2>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -338,7 +338,7 @@ mod tests {
                 (required.connectors, start.leader.at)
             );
             let within = required.within.unwrap_or_else(|| site.bounds());
-            assert!(within.meets(&Bounds::from_points(&[start.leader.at])));
+            assert!(within.meets(&Aabb::from_points(&[start.leader.at])));
             for rod in start.points.windows(2) {
                 assert!((distance(rod[0], rod[1]) - required.spacing_m).abs() < 1e-9);
                 let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
@@ -406,7 +406,7 @@ mod tests {
         }
         let path = shared("worlds/stage/SFU.world").expect("there");
         let world = stage::load(&path).expect("SFU");
-        let within = Some(Bounds { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
+        let within = Some(Aabb { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
         check("SFU", &Site::from_stage(&world), &SpaceRequirement { within, ..WANTED }, 3);
     }
 }

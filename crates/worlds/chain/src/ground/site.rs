@@ -1,17 +1,17 @@
 //! Ground read from files: floors of pixels and boxes.
 
 use super::GroundPose;
-use super::floor::Floor;
+use super::floor::FloorMap;
 use sidestep_import::{PixelMap, stage};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_map::UnknownPolicy;
-use sidestep_rods::geometry::{Bounds, Core, Cuboid, Point};
-use sidestep_rods::{Obstacle, outline};
+use sidestep_rods::geometry::{Aabb, ConvexCore, Cuboid, Point};
+use sidestep_rods::{Obstacle, outline_walls};
 
 /// Floors, and solid things that stand on them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Site {
-    floors: Vec<Floor>,
+    floors: Vec<FloorMap>,
     /// Boxes, and walls around floors; their ids are given later.
     solids: Vec<Obstacle<2>>,
 }
@@ -19,7 +19,7 @@ pub struct Site {
 impl Site {
     /// Returns the site of a map, solid all around.
     pub fn from_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
-        Self { floors: vec![Floor::from_map(map, unknown)], solids: Vec::new() }
+        Self { floors: vec![FloorMap::from_map(map, unknown)], solids: Vec::new() }
     }
 
     /// Returns the site of a Stage world, without its robots (see [`stage::Robot`] for their
@@ -30,24 +30,24 @@ impl Site {
         for plan in &world.floor_plans {
             let pixel_m =
                 [plan.size_m[0] / f64::from(plan.width), plan.size_m[1] / f64::from(plan.height)];
-            let floor = Floor::new(plan.width, plan.height, pixel_m, plan.solid.clone());
+            let floor = FloorMap::new(plan.width, plan.height, pixel_m, plan.solid.clone());
             // Stage places models by their middles.
             let pose = GroundPose::from(plan.pose);
             site.floors.push(floor.centered(pose.at, pose.heading_rad).with_open_surroundings());
             if plan.has_boundary {
                 let edges = cuboid(pose, plan.size_m).edges_2d();
-                site.solids.extend(outline(0, &edges.map(|edge| edge[0]), 0.0));
+                site.solids.extend(outline_walls(0, &edges.map(|edge| edge[0]), 0.0));
             }
         }
         for body in &world.boxes {
-            let solid = Core::Cuboid(cuboid(body.pose.into(), body.size_m));
+            let solid = ConvexCore::Cuboid(cuboid(body.pose.into(), body.size_m));
             site.solids.push(Obstacle::still(0, solid, 0.0));
         }
         site
     }
 
     /// Returns the floors of pixels; a map has one, a Stage world one for each floor plan.
-    pub fn floors(&self) -> &[Floor] {
+    pub fn floors(&self) -> &[FloorMap] {
         &self.floors
     }
 
@@ -65,8 +65,8 @@ impl Site {
     }
 
     /// Returns the box around all floors.
-    pub fn bounds(&self) -> Bounds<2> {
-        self.floors.iter().fold(Bounds::empty(), |all, floor| all.joined(&floor.bounds()))
+    pub fn bounds(&self) -> Aabb<2> {
+        self.floors.iter().fold(Aabb::empty(), |all, floor| all.joined(&floor.bounds()))
     }
 }
 

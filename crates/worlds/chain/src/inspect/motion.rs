@@ -2,7 +2,7 @@
 
 use super::{ConnectorInspection, line};
 use crate::motion::recovery::RecoveryOutcome;
-use crate::state::Body;
+use crate::state::ChainBodyState;
 use crate::view::obstacle_body_id;
 use sidestep_kernel::geometry::angle_rad;
 use sidestep_kernel::view::{
@@ -147,7 +147,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
 }
 
 /// Returns the distance of a robot from its connector.
-fn lag_m<const D: usize>(body: &Body<D>, k: usize) -> f64 {
+fn lag_m<const D: usize>(body: &ChainBodyState<D>, k: usize) -> f64 {
     distance(body.robots[k].pose.at, with_dimensions(body.chain.points()[k]))
 }
 

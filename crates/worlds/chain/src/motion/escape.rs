@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, norm};
-use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, Rules, Veto};
+use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, ReactionRules, Veto};
 pub use simultaneous::EscapePlan;
 pub(crate) use simultaneous::LeadMotion;
 use simultaneous::SimultaneousEscape;
@@ -41,7 +41,7 @@ pub enum EscapeMethod {
 
 /// Rules of escapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EscapeRules {
+pub struct ObstacleEscapeRules {
     /// Length of a tick, s.
     pub dt_s: f64,
     /// Maximum speed: no connector is farther from its position at the start of the tick than this
@@ -57,7 +57,7 @@ pub struct EscapeRules {
     pub method: EscapeMethod,
 }
 
-impl EscapeRules {
+impl ObstacleEscapeRules {
     /// Returns rules of the usual method with a look-ahead of 20 ticks and, where it counts them, up
     /// to 40 violations a tick.
     pub fn new(dt_s: f64, speed_max_m_s: f64) -> Self {
@@ -90,11 +90,11 @@ impl EscapeRules {
         self.speed_max_m_s * self.dt_s
     }
 
-    fn look_ahead_margin(&self) -> Margin {
+    fn look_ahead_margin(&self) -> EscapeMargin {
         if self.ticks_ahead > 0.0 {
-            Margin { ahead_s: self.ticks_ahead * self.dt_s, spare_m: MARGIN_M }
+            EscapeMargin { ahead_s: self.ticks_ahead * self.dt_s, spare_m: MARGIN_M }
         } else {
-            Margin::NONE
+            EscapeMargin::NONE
         }
     }
 }
@@ -134,15 +134,15 @@ pub struct TrappedPart<const D: usize> {
 /// Escapes of chains. It owns its buffers and keeps nothing from tick to tick; a chain's memory is its
 /// [`EscapePlan`].
 #[derive(Debug, Clone)]
-pub struct Escaper<const D: usize> {
-    rules: EscapeRules,
+pub struct ObstacleEscaper<const D: usize> {
+    rules: ObstacleEscapeRules,
     literal: LiteralEscape<D>,
     simultaneous: SimultaneousEscape<D>,
 }
 
 /// A chain that may have to escape in a tick, and its surroundings.
 #[derive(Debug)]
-pub struct EscapeTick<'a, const D: usize> {
+pub struct ObstacleEscapeInput<'a, const D: usize> {
     /// The chain, which the escape moves.
     pub chain: &'a mut Chain<D>,
     /// Obstacles around it, with those that move.
@@ -155,12 +155,12 @@ pub struct EscapeTick<'a, const D: usize> {
 
 /// The free space required around moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Margin {
+struct EscapeMargin {
     ahead_s: f64,
     spare_m: f64,
 }
 
-impl Margin {
+impl EscapeMargin {
     const NONE: Self = Self { ahead_s: 0.0, spare_m: 0.0 };
 
     fn required_gap_m<const D: usize>(self, mover: &Obstacle<D>) -> f64 {
@@ -181,9 +181,9 @@ const TICKS_AHEAD: f64 = 20.0;
 /// chains of 16 robots.
 const MAX_VIOLATIONS: usize = 40;
 
-impl<const D: usize> Escaper<D> {
+impl<const D: usize> ObstacleEscaper<D> {
     /// Returns an escaper; it is [`Self::escape`] that checks the rules.
-    pub fn new(rules: EscapeRules) -> Self {
+    pub fn new(rules: ObstacleEscapeRules) -> Self {
         Self {
             rules,
             literal: LiteralEscape::new(rules),
@@ -192,14 +192,14 @@ impl<const D: usize> Escaper<D> {
     }
 
     /// Returns the rules that it was made with.
-    pub fn rules(&self) -> &EscapeRules {
+    pub fn rules(&self) -> &ObstacleEscapeRules {
         &self.rules
     }
 
     /// Returns the ticks from one choice of a leader to the next; none if leaders choose nothing, because the chain
     /// escapes on contact only, or by the literal method.
     pub(crate) fn choice_interval_ticks(&self) -> Option<u64> {
-        let EscapeRules { dt_s, ticks_ahead, method, .. } = self.rules;
+        let ObstacleEscapeRules { dt_s, ticks_ahead, method, .. } = self.rules;
         if method == EscapeMethod::Literal || ticks_ahead == 0.0 {
             return None;
         }
@@ -212,7 +212,7 @@ impl<const D: usize> Escaper<D> {
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        rules: &Rules,
+        rules: &ReactionRules,
         lead: &LeadMotion<D>,
     ) -> bool {
         self.simultaneous.should_rest(chain, obstacles, rules, lead)
@@ -225,7 +225,7 @@ impl<const D: usize> Escaper<D> {
     /// When a tick is not positive, a speed limit is below 0, or the start of the tick belongs to another chain.
     pub fn escape(
         &mut self,
-        mut tick: EscapeTick<'_, D>,
+        mut tick: ObstacleEscapeInput<'_, D>,
         escape_plan: &mut EscapePlan,
     ) -> Result<EscapeReport<D>, InputError> {
         self.rules.check()?;

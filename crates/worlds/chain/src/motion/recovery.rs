@@ -19,8 +19,8 @@ use sidestep_rods::geometry::{
     Point, add, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
 };
 use sidestep_rods::{
-    Chain, CompletedMotion, Motion, Obstacles, Outcome, Propagator, Request, RequestSource, Veto,
-    VetoEffect,
+    Chain, CompletedMotion, MotionOutcome, MotionRequest, Obstacles, Propagator, RequestSource,
+    RequestedMotion, Veto, VetoEffect,
 };
 
 /// Fractions of a step that are tried when the whole step is vetoed. An eighth is the least worth a cycle; where less
@@ -59,7 +59,7 @@ impl Default for RecoveryLimits {
 
 /// An initiator's knowledge beside its neighborhood.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Situation {
+pub struct InitiatorSituation {
     /// Distance of its goal, if it has one, meters. Without a goal there is no progress to miss,
     /// and detours through the same place are not counted.
     pub goal_distance_m: Option<f64>,
@@ -138,10 +138,10 @@ pub(crate) trait ChainMover<const D: usize> {
     fn place(&self, k: usize) -> Point<D>;
 
     /// Carries out a motion: all of it, or nothing moves.
-    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, Self::Failure>;
+    fn request(&mut self, request: &MotionRequest<D>) -> Result<MotionOutcome<D>, Self::Failure>;
 
     /// Returns the veto of a motion, if there is one; nothing moves.
-    fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, Self::Failure>;
+    fn find_veto(&mut self, request: &MotionRequest<D>) -> Result<Option<Veto<D>>, Self::Failure>;
 
     /// Returns the end farther from an initiator; `None` if there is none that could lead.
     fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, Self::Failure>;
@@ -175,11 +175,11 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
         self.chain.points()[k]
     }
 
-    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, InputError> {
+    fn request(&mut self, request: &MotionRequest<D>) -> Result<MotionOutcome<D>, InputError> {
         execute_request(self.propagator, self.chain, self.obstacles, request)
     }
 
-    fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, InputError> {
+    fn find_veto(&mut self, request: &MotionRequest<D>) -> Result<Option<Veto<D>>, InputError> {
         let mut copy = self.chain.clone();
         let attempted = execute_request(self.propagator, &mut copy, self.obstacles, request)?;
         Ok(attempted.veto().copied())
@@ -196,17 +196,20 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
 
 struct RecoveryAttempt<'a, M, const D: usize> {
     by: &'a mut M,
-    wanted: Request<D>,
+    wanted: MotionRequest<D>,
     vetoes: Vec<Veto<D>>,
 }
 
 impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
     /// Tries all of a motion, or none.
-    fn attempt(&mut self, motion: Motion<D>) -> Result<Option<CompletedMotion<D>>, M::Failure> {
-        let request = Request { motion, mode: VetoEffect::Exact, ..self.wanted };
+    fn attempt(
+        &mut self,
+        motion: RequestedMotion<D>,
+    ) -> Result<Option<CompletedMotion<D>>, M::Failure> {
+        let request = MotionRequest { motion, mode: VetoEffect::Exact, ..self.wanted };
         Ok(match self.by.request(&request)? {
-            Outcome::Moved(moved) => Some(moved),
-            Outcome::Vetoed(veto) => {
+            MotionOutcome::Moved(moved) => Some(moved),
+            MotionOutcome::Vetoed(veto) => {
                 self.record_veto(veto);
                 None
             }
@@ -227,12 +230,12 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
     }
 
     /// Returns the wanted motion with another displacement of the initiator.
-    fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> Motion<D> {
+    fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> RequestedMotion<D> {
         match self.wanted.motion {
-            Motion::Connector { k, to } => {
-                Motion::Connector { k, to: self.with_change(k, to, change) }
+            RequestedMotion::Connector { k, to } => {
+                RequestedMotion::Connector { k, to: self.with_change(k, to, change) }
             }
-            Motion::Rod { i, to: [first, second] } => Motion::Rod {
+            RequestedMotion::Rod { i, to: [first, second] } => RequestedMotion::Rod {
                 i,
                 to: [self.with_change(i, first, &change), self.with_change(i + 1, second, &change)],
             },
@@ -268,27 +271,27 @@ impl RecoveryLadder {
     ///
     /// # Errors
     /// As [`Propagator::propagate`].
-    pub fn climb<const D: usize>(
+    pub fn move_or_recover<const D: usize>(
         &mut self,
         by: &mut DirectMover<'_, D>,
-        wanted: &Request<D>,
-        situation: &Situation,
+        wanted: &MotionRequest<D>,
+        situation: &InitiatorSituation,
     ) -> Result<RecoveryOutcome<D>, InputError> {
-        let (climbed, _) = self.climb_with(by, wanted, situation)?;
+        let (climbed, _) = self.move_or_recover_with(by, wanted, situation)?;
         Ok(climbed)
     }
 
     /// Climbs with any kind of mover, and also returns the veto of the wanted motion itself, if there was one.
-    pub(crate) fn climb_with<M: ChainMover<D>, const D: usize>(
+    pub(crate) fn move_or_recover_with<M: ChainMover<D>, const D: usize>(
         &mut self,
         by: &mut M,
-        wanted: &Request<D>,
-        situation: &Situation,
+        wanted: &MotionRequest<D>,
+        situation: &InitiatorSituation,
     ) -> Result<(RecoveryOutcome<D>, Option<Veto<D>>), M::Failure> {
         if wanted.source != RequestSource::Autonomous {
             return Ok(match by.request(wanted)? {
-                Outcome::Moved(moved) => (RecoveryOutcome::Straight(moved), None),
-                Outcome::Vetoed(veto) => (RecoveryOutcome::Vetoed(veto), Some(veto)),
+                MotionOutcome::Moved(moved) => (RecoveryOutcome::Straight(moved), None),
+                MotionOutcome::Vetoed(veto) => (RecoveryOutcome::Vetoed(veto), Some(veto)),
             });
         }
         let mut climb = RecoveryAttempt { by, wanted: *wanted, vetoes: Vec::new() };
@@ -307,7 +310,7 @@ impl RecoveryLadder {
     fn try_rungs<M: ChainMover<D>, const D: usize>(
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
-        situation: &Situation,
+        situation: &InitiatorSituation,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         if let Some(recovery) = try_shorter(climb)? {
             self.memory.reset_failures();
@@ -323,14 +326,14 @@ impl RecoveryLadder {
     fn try_sideways<M: ChainMover<D>, const D: usize>(
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
-        situation: &Situation,
+        situation: &InitiatorSituation,
     ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
         let (k, displacement) = climb.wanted_displacement();
         let Some(u) = normalized(displacement).filter(|_| !situation.keeps_heading) else {
             return Ok(None);
         };
         let axes = axes_across(u);
-        for (plane, turn_rad) in fan(&self.memory, D - 1) {
+        for (plane, turn_rad) in turn_sequence(&self.memory, D - 1) {
             let turn = |v| turn_toward(v, u, axes[plane], turn_rad);
             let Some(moved) = climb.attempt(climb.with_displacement(turn))? else { continue };
             self.memory.record_sideways(plane, turn_rad);
@@ -347,7 +350,7 @@ impl RecoveryLadder {
     fn try_stationary_rungs<M: ChainMover<D>, const D: usize>(
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
-        situation: &Situation,
+        situation: &InitiatorSituation,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         let memory = &mut self.memory;
         if situation.can_turn && memory.turns < self.rungs.turns {
@@ -379,10 +382,10 @@ impl RecoveryLadder {
         let axes = axes_across(u);
         let step = scaled(u, norm(displacement));
         // The good side is the initiator's, and means nothing at the other end.
-        let turns = fan(&RecoveryMemory::default(), D - 1);
+        let turns = turn_sequence(&RecoveryMemory::default(), D - 1);
         for (plane, turn_rad) in std::iter::once((0, 0.0)).chain(turns) {
             let to = add(at, turn_toward(step, u, axes[plane], turn_rad));
-            if let Some(moved) = climb.attempt(Motion::Connector { k: by, to })? {
+            if let Some(moved) = climb.attempt(RequestedMotion::Connector { k: by, to })? {
                 self.memory.record_pull_back();
                 return Ok(RecoveryOutcome::PulledBack { by, moved });
             }
@@ -394,10 +397,10 @@ impl RecoveryLadder {
         &mut self,
         climb: &mut RecoveryAttempt<'_, M, D>,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
-        self.memory.reset();
+        self.memory.forget_failures();
         if climb.vetoes.is_empty() {
             // It is stuck in detours without a veto in this tick, so the wanted motion is tried for its veto.
-            let request = Request { mode: VetoEffect::Exact, ..climb.wanted };
+            let request = MotionRequest { mode: VetoEffect::Exact, ..climb.wanted };
             if let Some(veto) = climb.by.find_veto(&request)? {
                 climb.record_veto(veto);
             }
@@ -419,10 +422,10 @@ fn try_shorter<M: ChainMover<D>, const D: usize>(
     Ok(None)
 }
 
-fn moving_head<const D: usize>(motion: &Motion<D>) -> (usize, Point<D>) {
+fn moving_head<const D: usize>(motion: &RequestedMotion<D>) -> (usize, Point<D>) {
     match *motion {
-        Motion::Connector { k, to } => (k, to),
-        Motion::Rod { i, to } => (i, to[0]),
+        RequestedMotion::Connector { k, to } => (k, to),
+        RequestedMotion::Rod { i, to } => (i, to[0]),
     }
 }
 
@@ -434,7 +437,10 @@ pub(crate) fn farther_end(k: usize, n: usize) -> usize {
 /// Returns planes and turns in the order in which they are tried. If no side is known to be good,
 /// the least turn comes first; otherwise all of that side before the other, so that the chain does
 /// not alternate between two detours.
-fn fan(memory: &RecoveryMemory, planes: usize) -> impl Iterator<Item = (usize, f64)> + use<> {
+fn turn_sequence(
+    memory: &RecoveryMemory,
+    planes: usize,
+) -> impl Iterator<Item = (usize, f64)> + use<> {
     let side = f64::from(memory.side_or_left());
     let keeps_side = memory.side != 0;
     let first = memory.plane.min(planes - 1);

@@ -1,21 +1,22 @@
 //! One motion of a chain: by propagation, or by a reach if a held connector vetoes it.
 
-use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver};
+use sidestep_arms::ik::{ChainIkGoal, IkEngine, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
-    Chain, CompletedMotion, Connector, Mobility, Motion, Obstacles, Outcome, Propagator,
-    ReachOutcome, ReachRequest, Request, Veto, VetoReason, find_tunneling, reach,
+    Chain, CompletedMotion, Connector, Mobility, MotionOutcome, MotionRequest, Obstacles,
+    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, find_tunneling,
+    reach_target,
 };
 
 /// What moves a chain, and what it may meet.
-struct Scene<'a, const D: usize> {
+struct MotionEnvironment<'a, const D: usize> {
     propagator: &'a mut Propagator<D>,
     obstacles: &'a Obstacles<D>,
 }
 
 /// Moves a chain as requested; if a connector vetoes that must stay at its position, on its line or plane,
-/// or in its box, by [`reach`].
+/// or in its box, by [`reach_target`].
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
@@ -23,17 +24,19 @@ pub(crate) fn execute_request<const D: usize>(
     propagator: &mut Propagator<D>,
     chain: &mut Chain<D>,
     obstacles: &Obstacles<D>,
-    request: &Request<D>,
-) -> Result<Outcome<D>, InputError> {
-    if let Motion::Connector { k, to } = request.motion
+    request: &MotionRequest<D>,
+) -> Result<MotionOutcome<D>, InputError> {
+    if let RequestedMotion::Connector { k, to } = request.motion
         && let Some(base) = sliding_connector(chain, k)
     {
         let order = ReachRequest { k, target: to, base, tolerance_m: TOLERANCE_M };
-        let scene = &mut Scene { propagator, obstacles };
+        let scene = &mut MotionEnvironment { propagator, obstacles };
         return move_sliding(scene, chain, &order, request);
     }
     let outcome = propagator.propagate(chain, obstacles, request)?;
-    let (Outcome::Vetoed(veto), Motion::Connector { k, to }) = (&outcome, request.motion) else {
+    let (MotionOutcome::Vetoed(veto), RequestedMotion::Connector { k, to }) =
+        (&outcome, request.motion)
+    else {
         return Ok(outcome);
     };
     // A reach leads others back; it is of no use to an initiator that is held itself.
@@ -41,7 +44,7 @@ pub(crate) fn execute_request<const D: usize>(
         return Ok(outcome);
     }
     let order = ReachRequest { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
-    move_with_base(&mut Scene { propagator, obstacles }, chain, &order, veto)
+    move_with_base(&mut MotionEnvironment { propagator, obstacles }, chain, &order, veto)
 }
 
 /// Returns whether a return pass may answer a veto.
@@ -66,18 +69,18 @@ fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize
 /// initiator, as the foot of a rod that stands across its line, or from one side of its master to the other, return
 /// passes find a position nearby.
 fn move_sliding<const D: usize>(
-    scene: &mut Scene<'_, D>,
+    scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     order: &ReachRequest<D>,
-    request: &Request<D>,
-) -> Result<Outcome<D>, InputError> {
+    request: &MotionRequest<D>,
+) -> Result<MotionOutcome<D>, InputError> {
     let k = order.k;
     let joints_m = scene.propagator.rules.joint_step_max_m;
     try_slowed(chain, k, order.target, joints_m, |chain, before, to| {
-        let request = Request { motion: Motion::Connector { k, to }, ..*request };
+        let request = MotionRequest { motion: RequestedMotion::Connector { k, to }, ..*request };
         let veto = match scene.propagator.propagate(chain, scene.obstacles, &request)? {
-            Outcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
-            Outcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
+            MotionOutcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
+            MotionOutcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
                 // It would jump, as if it had objected.
                 chain.points_mut().copy_from_slice(before);
                 let reason = VetoReason::Mobility;
@@ -92,11 +95,11 @@ fn move_sliding<const D: usize>(
 
 /// Moves a chain whose base has vetoed, as far as the speed limit of its joints allows.
 fn move_with_base<const D: usize>(
-    scene: &mut Scene<'_, D>,
+    scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     order: &ReachRequest<D>,
     objection: &Veto<D>,
-) -> Result<Outcome<D>, InputError> {
+) -> Result<MotionOutcome<D>, InputError> {
     // Only a fixed connector is the base of an arm, whose joints have a speed limit; the parts that hang on a failed
     // connector swing freely.
     let joints_m = if objection.reason == VetoReason::Fixed {
@@ -122,8 +125,8 @@ fn try_slowed<const D: usize>(
         &mut Chain<D>,
         &[Point<D>],
         Point<D>,
-    ) -> Result<(Outcome<D>, f64), InputError>,
-) -> Result<Outcome<D>, InputError> {
+    ) -> Result<(MotionOutcome<D>, f64), InputError>,
+) -> Result<MotionOutcome<D>, InputError> {
     let before = chain.points().to_vec();
     let from = before[k];
     let mut fraction = 1.0;
@@ -133,8 +136,8 @@ fn try_slowed<const D: usize>(
         let target = if fraction < 1.0 { lerp(from, to, fraction) } else { to };
         let (outcome, jump_m) = attempt(chain, &before, target)?;
         let moved = match outcome {
-            Outcome::Moved(moved) => moved,
-            vetoed @ Outcome::Vetoed(_) => return Ok(vetoed),
+            MotionOutcome::Moved(moved) => moved,
+            vetoed @ MotionOutcome::Vetoed(_) => return Ok(vetoed),
         };
         let most_m = joints_m.min(jump_m);
         let (by, longest_m) = max_displacement(&before, chain.points());
@@ -144,13 +147,13 @@ fn try_slowed<const D: usize>(
             } else {
                 moved.cut_short
             };
-            return Ok(Outcome::Moved(CompletedMotion { cut_short, ..moved }));
+            return Ok(MotionOutcome::Moved(CompletedMotion { cut_short, ..moved }));
         }
         chain.points_mut().copy_from_slice(&before);
         fraction = fraction * SLOWED_FRACTION * most_m / longest_m;
         fastest = by;
     }
-    Ok(Outcome::Vetoed(speed_veto(k, fastest, from)))
+    Ok(MotionOutcome::Vetoed(speed_veto(k, fastest, from)))
 }
 
 /// Returns the veto of connector `by`, which would be too fast, against a motion of connector `k`.
@@ -173,17 +176,19 @@ fn max_displacement<const D: usize>(before: &[Point<D>], points: &[Point<D>]) ->
 /// Moves a chain whose base has vetoed by forward and backward passes, or straight to a posture; also returns the
 /// longest displacement of a connector with which the outcome still counts as a motion, meters.
 fn move_to_target<const D: usize>(
-    scene: &mut Scene<'_, D>,
+    scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
     order: &ReachRequest<D>,
     objection: &Veto<D>,
-) -> Result<(Outcome<D>, f64), InputError> {
-    Ok(match reach(scene.propagator, chain, scene.obstacles, order)? {
+) -> Result<(MotionOutcome<D>, f64), InputError> {
+    Ok(match reach_target(scene.propagator, chain, scene.obstacles, order)? {
         ReachOutcome::There { .. } => {
-            (Outcome::Moved(motion_since(before, chain, order.k)), f64::INFINITY)
+            (MotionOutcome::Moved(motion_since(before, chain, order.k)), f64::INFINITY)
         }
-        ReachOutcome::Short { veto: Some(veto), .. } => (Outcome::Vetoed(veto), f64::INFINITY),
+        ReachOutcome::Short { veto: Some(veto), .. } => {
+            (MotionOutcome::Vetoed(veto), f64::INFINITY)
+        }
         ReachOutcome::Short { nearest, veto: None } => {
             let objection = Veto { reached: nearest, ..*objection };
             let rules = scene.propagator.rules;
@@ -206,18 +211,18 @@ const SLOWED_FRACTION: f64 = 0.9;
 /// posture that reaches the target, and the chain moves straight to it if neither the posture nor the motion is
 /// blocked.
 fn move_to_posture<const D: usize>(
-    scene: &Scene<'_, D>,
+    scene: &MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
     order: &ReachRequest<D>,
     objection: Veto<D>,
-) -> Result<Outcome<D>, InputError> {
+) -> Result<MotionOutcome<D>, InputError> {
     let ReachRequest { k, target, base, tolerance_m } = *order;
     if let Some(by) = out_of_reach(chain, order) {
-        return Ok(Outcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
+        return Ok(MotionOutcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
     }
     let goal = ChainIkGoal {
-        engine: Engine::Dls,
+        engine: IkEngine::Dls,
         restarts: 0,
         tolerance_m,
         ..ChainIkGoal::new(k, base, target)
@@ -227,19 +232,19 @@ fn move_to_posture<const D: usize>(
     let mut motions = chain.connectors().iter().zip(chain.points().iter().zip(&answer.points));
     let is_allowed = motions.all(|(connector, (at, to))| may_move(connector, *at, *to));
     if !answer.reached || !is_allowed {
-        return Ok(Outcome::Vetoed(objection));
+        return Ok(MotionOutcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
     if let Some(passed) = find_tunneling(chain, before, scene.obstacles, 0.0) {
         chain.points_mut().copy_from_slice(before);
-        return Ok(Outcome::Vetoed(Veto {
+        return Ok(MotionOutcome::Vetoed(Veto {
             by: passed.rod,
             obstacle: Some(passed.obstacle),
             reason: VetoReason::WouldTunnel,
             ..objection
         }));
     }
-    Ok(Outcome::Moved(motion_since(before, chain, k)))
+    Ok(MotionOutcome::Moved(motion_since(before, chain, k)))
 }
 
 /// Returns whether a connector may move from one position to another.
@@ -293,7 +298,7 @@ fn motion_since<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_rods::{RequestSource, Rod, Rules, VetoEffect};
+    use sidestep_rods::{ReactionRules, RequestSource, Rod, VetoEffect};
 
     /// An arm of two rods, bent a little; the base is fixed.
     fn arm() -> Chain<2> {
@@ -309,14 +314,18 @@ mod tests {
     /// request, and the greatest distance of the tool from the base.
     fn dragged_out(joint_step_max_m: f64) -> (f64, f64) {
         let (mut chain, step_m) = (arm(), 0.01);
-        let mut propagator = Propagator::new(Rules { joint_step_max_m, ..Rules::default() });
+        let mut propagator =
+            Propagator::new(ReactionRules { joint_step_max_m, ..ReactionRules::default() });
         let mut most_m = 0.0;
         for _ in 0..400 {
             let (before, at) = (chain.points().to_vec(), chain.points()[2]);
             let to = sidestep_rods::geometry::move_toward(at, [1.199_94, 1.599_92], step_m);
-            let motion = Motion::Connector { k: 2, to };
-            let request =
-                Request { motion, source: RequestSource::Autonomous, mode: VetoEffect::Exact };
+            let motion = RequestedMotion::Connector { k: 2, to };
+            let request = MotionRequest {
+                motion,
+                source: RequestSource::Autonomous,
+                mode: VetoEffect::Exact,
+            };
             execute_request(&mut propagator, &mut chain, &Obstacles::default(), &request).unwrap();
             most_m = f64::max(most_m, max_displacement(&before, chain.points()).1);
         }
@@ -326,7 +335,7 @@ mod tests {
     #[test]
     fn a_straight_arm_is_drawn_inward_and_no_joint_is_faster_than_it_may_be() {
         let joint_step_max_m = 0.08;
-        let rules = Rules { joint_step_max_m, ..Rules::default() };
+        let rules = ReactionRules { joint_step_max_m, ..ReactionRules::default() };
         for n_rods in [3, 7, 11, 25] {
             let rod = Rod::fixed(1.0, 0.03);
             let mut arm =
@@ -336,7 +345,7 @@ mod tests {
             for _ in 0..4000 {
                 let before = arm.points().to_vec();
                 let to = sidestep_rods::geometry::move_toward(before[n_rods], target, 0.04);
-                let request = Request::exact(n_rods, to);
+                let request = MotionRequest::operator_request(n_rods, to);
                 execute_request(
                     &mut Propagator::new(rules),
                     &mut arm,
@@ -368,13 +377,13 @@ mod tests {
         for (i, mobility) in held {
             chain.set_mobility(*i, *mobility).unwrap();
         }
-        let rules = Rules { joint_step_max_m: 0.02, ..Rules::default() };
+        let rules = ReactionRules { joint_step_max_m: 0.02, ..ReactionRules::default() };
         let (mut left_m, mut most_m) = (0.0, 0.0);
         for place in places {
             for _ in 0..2000 {
                 let before = chain.points().to_vec();
                 let to = sidestep_rods::geometry::move_toward(before[k], *place, 0.01);
-                let request = Request::exact(k, to);
+                let request = MotionRequest::operator_request(k, to);
                 let came = execute_request(
                     &mut Propagator::new(rules),
                     &mut chain,
@@ -421,7 +430,7 @@ mod tests {
     fn a_target_that_no_position_on_the_rail_reaches_is_out_of_reach() {
         let mut chain = arm();
         chain.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
-        let request = Request::exact(2, [1.5, 4.0]);
+        let request = MotionRequest::operator_request(2, [1.5, 4.0]);
         let came = execute_request(
             &mut Propagator::default(),
             &mut chain,

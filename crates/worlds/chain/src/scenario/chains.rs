@@ -4,15 +4,15 @@ use super::super::driver::{Task, TaskKind};
 use super::super::formation::Robots;
 use super::super::ground::Site;
 use super::super::ground::route::{SpaceRequirement, find_placement};
-use super::super::motion::escape::{EscapeMethod, EscapeRules};
-use super::super::world::{ChainSpec, Change, ChangeKind};
+use super::super::motion::escape::{EscapeMethod, ObstacleEscapeRules};
+use super::super::world::{ChainChange, ChainChangeKind, ChainSpec};
 use super::arms::ArmSection;
 use super::changes::ChangeSection;
 use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
 use super::obstacles::to_dimensions;
 use super::tasks::TaskSection;
-use super::{BoxSection, Compiler, MIN_REACH_M, Measure, PointValue};
+use super::{BoxSection, Compiler, MIN_REACH_M, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
@@ -82,7 +82,7 @@ pub(super) struct ChainSection<const D: usize> {
     along: Option<Spanned<PointValue<D>>>,
     heading_deg: Option<f64>,
     /// Length of the legs in which it lies, and the distance from one to the next.
-    folded_m: Option<[Measure; 2]>,
+    folded_m: Option<[PositiveNumber; 2]>,
     points_m: Option<Vec<PointValue<D>>>,
     #[serde(default)]
     pub(super) anywhere: bool,
@@ -248,17 +248,17 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<ChainSection<D>>,
         start: &Chain<D>,
         dt_s: f64,
-    ) -> Result<Vec<Change<D>>, InputError> {
+    ) -> Result<Vec<ChainChange<D>>, InputError> {
         let s = section.get_ref();
         let changes = s.changes.0.iter().map(|change| self.change(change, start, dt_s));
         let mut changes = changes.collect::<Result<Vec<_>, _>>()?;
         // A chain may break and be joined in the same cycle, in either order in the file.
         changes.sort_by_key(|change| {
-            let joins = matches!(change.what, ChangeKind::Reform { .. });
+            let joins = matches!(change.what, ChainChangeKind::Reform { .. });
             (change.cycle, joins)
         });
         let breaks =
-            changes.iter().filter(|change| matches!(change.what, ChangeKind::Scatter { .. }));
+            changes.iter().filter(|change| matches!(change.what, ChainChangeKind::Scatter { .. }));
         if breaks.count() > 1 {
             let cause = "a chain that breaks more than once";
             return Err(self.source.error(section.span(), cause, "break it once"));
@@ -308,7 +308,7 @@ impl<const D: usize> Compiler<'_, D> {
     pub(super) fn check_escapes(
         &self,
         chains: &[ChainSpec<D>],
-        escape: Option<&EscapeRules>,
+        escape: Option<&ObstacleEscapeRules>,
     ) -> Result<(), InputError> {
         let Some(escape) = escape.filter(|escape| escape.method == EscapeMethod::Literal) else {
             return Ok(());

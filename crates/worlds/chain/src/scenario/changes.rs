@@ -1,9 +1,9 @@
 //! Changes to a chain during a run.
 
-use super::super::world::{Change, ChangeKind};
+use super::super::world::{ChainChange, ChainChangeKind};
 use super::mobility::MobilitySection;
 use super::tasks::DEFAULT_SPEED_M_S;
-use super::{Compiler, Measure, PointValue};
+use super::{Compiler, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
@@ -45,7 +45,7 @@ pub(super) struct ChangeSection<const D: usize> {
     reform: Option<bool>,
     may_come: Option<MovableEndWord>,
     /// Speed at which they come back.
-    speed_m_s: Option<Measure>,
+    speed_m_s: Option<PositiveNumber>,
 }
 
 impl<const D: usize> ChangeSection<D> {
@@ -81,10 +81,10 @@ impl<const D: usize> Compiler<'_, D> {
         section: &Spanned<ChangeSection<D>>,
         chain: &Chain<D>,
         dt_s: f64,
-    ) -> Result<Change<D>, InputError> {
+    ) -> Result<ChainChange<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
-        Ok(Change { cycle: s.cycle(dt_s), what: self.change_kind(s, chain, at)? })
+        Ok(ChainChange { cycle: s.cycle(dt_s), what: self.change_kind(s, chain, at)? })
     }
 
     fn change_kind(
@@ -92,7 +92,7 @@ impl<const D: usize> Compiler<'_, D> {
         s: &ChangeSection<D>,
         chain: &Chain<D>,
         at: Range<usize>,
-    ) -> Result<ChangeKind<D>, InputError> {
+    ) -> Result<ChainChangeKind<D>, InputError> {
         self.check_one_change(s, at.clone())?;
         let n = chain.points().len();
         if let Some([first, last]) = s.scatter {
@@ -104,7 +104,7 @@ impl<const D: usize> Compiler<'_, D> {
                 MovableEndWord::First => MovableEnd::First,
                 MovableEndWord::Last => MovableEnd::Last,
             };
-            return Ok(ChangeKind::Reform {
+            return Ok(ChainChangeKind::Reform {
                 may_come,
                 speed_m_s: s.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from),
             });
@@ -119,9 +119,13 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, cause, remedy));
         };
         let what = match (s.failed, s.max_bend_deg, &s.mobility) {
-            (Some(failed), ..) => ChangeKind::Failed { connector, failed },
-            (_, Some(deg), _) => ChangeKind::MaxBend { connector, max_bend_rad: deg.to_radians() },
-            (_, _, Some(given)) => ChangeKind::Mobility { connector, mobility: given.mobility() },
+            (Some(failed), ..) => ChainChangeKind::Failed { connector, failed },
+            (_, Some(deg), _) => {
+                ChainChangeKind::MaxBend { connector, max_bend_rad: deg.to_radians() }
+            }
+            (_, _, Some(given)) => {
+                ChainChangeKind::Mobility { connector, mobility: given.mobility() }
+            }
             _ => unreachable!("one of them is given"),
         };
         self.check_constraint(&what, chain, at)?;
@@ -153,16 +157,16 @@ impl<const D: usize> Compiler<'_, D> {
     /// Tries a constraint on a copy, so that it cannot fail during a run.
     fn check_constraint(
         &self,
-        what: &ChangeKind<D>,
+        what: &ChainChangeKind<D>,
         chain: &Chain<D>,
         at: Range<usize>,
     ) -> Result<(), InputError> {
         let mut chain = chain.clone();
         let tried = match what {
-            ChangeKind::Mobility { connector, mobility } => {
+            ChainChangeKind::Mobility { connector, mobility } => {
                 chain.set_mobility(*connector, *mobility)
             }
-            ChangeKind::MaxBend { connector, max_bend_rad } => {
+            ChainChangeKind::MaxBend { connector, max_bend_rad } => {
                 chain.set_max_bend_rad(*connector, *max_bend_rad)
             }
             _ => Ok(()),
@@ -179,7 +183,7 @@ impl<const D: usize> Compiler<'_, D> {
         [first, last]: [usize; 2],
         n: usize,
         at: Range<usize>,
-    ) -> Result<ChangeKind<D>, InputError> {
+    ) -> Result<ChainChangeKind<D>, InputError> {
         if first == 0 || first > last || last + 1 >= n {
             let cause = format!("scatter = [{first}, {last}] of a chain of {n}");
             let remedy = "leave a whole end on both sides: at least connectors 0 and the last";
@@ -188,6 +192,6 @@ impl<const D: usize> Compiler<'_, D> {
         }
         let by_m = s.by_m.map_or(DEFAULT_THROW_M, f64::from);
         let apart_m = s.apart_m.map_or([0.0; D], PointValue::get);
-        Ok(ChangeKind::Scatter { connectors: first..=last, by_m, apart_m })
+        Ok(ChainChangeKind::Scatter { connectors: first..=last, by_m, apart_m })
     }
 }

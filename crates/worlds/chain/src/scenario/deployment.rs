@@ -3,9 +3,9 @@
 use super::{ChainSpec, Compiler};
 use crate::deploy::deployment::Deployment;
 use crate::driver::TaskKind;
-use crate::world::ChangeKind;
+use crate::world::ChainChangeKind;
 use sidestep_kernel::InputError;
-use sidestep_rods::{Mobility, Rules};
+use sidestep_rods::{Mobility, ReactionRules};
 
 /// A key whose value needs a view of the whole chain.
 struct NonLocalKey {
@@ -27,7 +27,7 @@ impl<const D: usize> Compiler<'_, D> {
     pub(super) fn check_local(
         &self,
         chains: &[ChainSpec<D>],
-        rules: &Rules,
+        rules: &ReactionRules,
         escapes: bool,
     ) -> Result<(), InputError> {
         if self.file.chain.deployment == Deployment::Direct {
@@ -46,7 +46,7 @@ impl<const D: usize> Compiler<'_, D> {
 }
 
 /// Returns the first rule by which chains cannot be moved by their neighbors alone.
-fn non_local_rule(rules: &Rules, escapes: bool) -> Option<NonLocalKey> {
+fn non_local_rule(rules: &ReactionRules, escapes: bool) -> Option<NonLocalKey> {
     if rules.self_collision {
         let reason =
             "self_collision = true: to avoid its own parts, a chain has to know all of them";
@@ -100,11 +100,12 @@ fn non_local_key<const D: usize>(s: usize, spec: &ChainSpec<D>) -> Option<NonLoc
     }
     spec.changes.iter().find_map(|change| {
         let reason = match &change.what {
-            ChangeKind::MaxBend { .. } => return None,
-            ChangeKind::Failed { connector, .. } | ChangeKind::Mobility { connector, .. } => {
+            ChainChangeKind::MaxBend { .. } => return None,
+            ChainChangeKind::Failed { connector, .. }
+            | ChainChangeKind::Mobility { connector, .. } => {
                 format!("connector {connector} is held at some time: a target {passes}")
             }
-            ChangeKind::Scatter { .. } | ChangeKind::Reform { .. } => {
+            ChainChangeKind::Scatter { .. } | ChainChangeKind::Reform { .. } => {
                 "a chain that breaks: its parts find together by passes from end to end".into()
             }
         };

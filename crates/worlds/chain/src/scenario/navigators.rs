@@ -5,8 +5,8 @@ use super::super::navigate::{NavigationGoal, Navigator};
 use super::super::swarm::drive::DifferentialDrive;
 use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
-use super::super::swarm::leader::{Leader, LeaveRule, TargetSense, TurnMode, WallLossRule};
-use super::{Compiler, MAX_VALUE, Unbounded};
+use super::super::swarm::leader::{Leader, TargetDetector, TurnMode, WallLeaveRule, WallLossRule};
+use super::{Compiler, MAX_VALUE, PositiveRule};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ const WHEEL_SPEED_FACTOR: f64 = 1.2;
 const DEFAULT_WHEELBASE_M: f64 = 0.4;
 
 /// A measure of a robot, limited because squares and quotients of others would overflow.
-type Size = Number<RobotSizeRule>;
+type RobotSize = Number<RobotSizeRule>;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RobotSizeRule;
@@ -120,19 +120,19 @@ pub(super) struct NavigatorSection {
     /// Number of beams of the laser.
     beams: Option<usize>,
     /// Length of the beams.
-    range_m: Option<Size>,
+    range_m: Option<RobotSize>,
     /// Field of view of the laser.
     field_deg: Option<f64>,
     /// Standard deviation of its distances.
     noise_m: Option<f64>,
     /// Distance between the wheels.
-    wheelbase_m: Option<Size>,
+    wheelbase_m: Option<RobotSize>,
     /// Place to go to; the end of the corridor by default.
     target_m: Option<Point<2>>,
     /// Distance at which the target counts as reached.
-    tolerance_m: Option<Number<Unbounded>>,
+    tolerance_m: Option<Number<PositiveRule>>,
     /// Distance from which the target is seen.
-    detects_from_m: Option<Number<Unbounded>>,
+    detects_from_m: Option<Number<PositiveRule>>,
     /// Whether walls hide the target.
     needs_line_of_sight: bool,
 }
@@ -140,16 +140,16 @@ pub(super) struct NavigatorSection {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RobotsSection {
-    radius_m: Option<Size>,
+    radius_m: Option<RobotSize>,
     pub(super) margin_m: Option<f64>,
     /// Distance between the wheels.
-    wheelbase_m: Option<Size>,
-    wheel_speed_m_s: Option<Size>,
-    sensors_m: Option<Size>,
-    lag_limit_m: Option<Number<Unbounded>>,
-    gain_per_s: Option<Size>,
+    wheelbase_m: Option<RobotSize>,
+    wheel_speed_m_s: Option<RobotSize>,
+    sensors_m: Option<RobotSize>,
+    lag_limit_m: Option<Number<PositiveRule>>,
+    gain_per_s: Option<RobotSize>,
     /// Turn rate per angle to the way.
-    turn_gain_per_s: Option<Size>,
+    turn_gain_per_s: Option<RobotSize>,
 }
 
 impl<const D: usize> Compiler<'_, D> {
@@ -240,8 +240,8 @@ impl NavigatorSection {
                 WallLossWord::Range => WallLossRule::Range,
                 WallLossWord::Level => WallLossRule::Level,
             },
-            leave_rule: self.leave_rule.unwrap_or(true).then(LeaveRule::default),
-            target_sense: TargetSense {
+            leave_rule: self.leave_rule.unwrap_or(true).then(WallLeaveRule::default),
+            target_sense: TargetDetector {
                 range_m: self.detects_from_m.map_or(f64::INFINITY, f64::from),
                 needs_line_of_sight: self.needs_line_of_sight,
             },

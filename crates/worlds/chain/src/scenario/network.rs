@@ -110,11 +110,11 @@ impl AgentNaming for ConnectorCounts {
         Ok(network::RadioOutage { agent, window: time_window(one.from_s, one.until_s)? })
     }
 
-    fn partition(&self, one: &PartitionSection) -> Result<network::Partition, SectionError> {
+    fn partition(&self, one: &PartitionSection) -> Result<network::NetworkPartition, SectionError> {
         let sides =
             one.sides.iter().map(|side| self.ids(one.chain, side)).collect::<Result<_, _>>()?;
         check_sides(&one.sides, "connector")?;
-        Ok(network::Partition { sides, window: time_window(one.from_s, one.until_s)? })
+        Ok(network::NetworkPartition { sides, window: time_window(one.from_s, one.until_s)? })
     }
 
     fn unidirectional_link(

@@ -1,17 +1,19 @@
 //! Obstacles: grounds, single obstacles, and fields of them.
 
-use super::super::ground::fields::{Crowd, Field};
-use super::super::ground::{Corridor, Course, Leg, Mover, Movers, Site};
+use super::super::ground::fields::{ObstacleField, WanderingObstacles};
+use super::super::ground::{
+    Corridor, CorridorLeg, MovingObstacle, MovingObstacles, ObstaclePath, Site,
+};
 use super::super::world::{ChainSpec, push_parts};
 use super::tasks::DEFAULT_SPEED_M_S;
-use super::{Compiler, MAX_VALUE, MIN_REACH_M, Measure, PointValue};
+use super::{Compiler, MAX_VALUE, MIN_REACH_M, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
 use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
-use sidestep_rods::geometry::{Bounds, Core, Cuboid, Point};
-use sidestep_rods::{Chain, Obstacle, Obstacles, outline};
+use sidestep_rods::geometry::{Aabb, ConvexCore, Cuboid, Point};
+use sidestep_rods::{Chain, Obstacle, Obstacles, outline_walls};
 use sidestep_scenario::{NumberRange, Spanned};
 use std::ops::{Range, RangeInclusive};
 
@@ -83,7 +85,7 @@ pub(super) struct ObstacleSection<const D: usize> {
     patrol_m: Option<Vec<PointValue<D>>>,
     closed: Option<bool>,
     /// Speed along them.
-    speed_m_s: Option<Measure>,
+    speed_m_s: Option<PositiveNumber>,
 }
 
 /// Obstacles at random.
@@ -110,15 +112,15 @@ pub(super) struct FieldSection<const D: usize> {
 }
 
 /// All obstacles for a world's chains.
-pub(super) struct Ground<const D: usize> {
+pub(super) struct GroundObstacles<const D: usize> {
     pub(super) obstacles: Obstacles<D>,
-    pub(super) movers: Movers<D>,
+    pub(super) movers: MovingObstacles<D>,
 }
 
 /// The obstacles gathered so far.
 struct ObstacleBuilder<const D: usize> {
     still: Vec<Obstacle<D>>,
-    movers: Vec<Mover<D>>,
+    movers: Vec<MovingObstacle<D>>,
     next_id: u32,
 }
 
@@ -138,15 +140,15 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         site: Option<&Site>,
         chains: &[ChainSpec<D>],
-    ) -> Result<Ground<D>, InputError> {
+    ) -> Result<GroundObstacles<D>, InputError> {
         let mut all = self.given_obstacles(site)?;
         for (k, section) in (0..).zip(&self.file.fields.0) {
             self.add_field(section, k, chains, &mut all)?;
         }
         let reach_m = chains.iter().map(longest_part_m).fold(0.0, f64::max).max(MIN_REACH_M);
         let obstacles = Obstacles::new(all.still, reach_m);
-        let movers = Movers::new(all.movers);
-        Ok(Ground {
+        let movers = MovingObstacles::new(all.movers);
+        Ok(GroundObstacles {
             obstacles: obstacles.map_err(|error| self.ground_error(&error))?,
             movers: movers.map_err(|error| self.ground_error(&error))?,
         })
@@ -244,20 +246,21 @@ impl<const D: usize> Compiler<'_, D> {
         let Some(given) = section else { return Ok(None) };
         let s = given.get_ref();
         let corridor = match &s.legs {
-            None => Corridor::pinned(s.width_m),
+            None => Corridor::reference_corridor(s.width_m),
             Some(legs) => {
-                let legs: Result<Vec<Leg>, _> = legs.iter().map(|leg| self.leg(leg)).collect();
+                let legs: Result<Vec<CorridorLeg>, _> =
+                    legs.iter().map(|leg| self.leg(leg)).collect();
                 Corridor::new(legs?, s.width_m)
             }
         };
         corridor.map(Some).map_err(|error| self.source.error_from(given.span(), &error))
     }
 
-    fn leg(&self, given: &Spanned<LegSection>) -> Result<Leg, InputError> {
+    fn leg(&self, given: &Spanned<LegSection>) -> Result<CorridorLeg, InputError> {
         let LegSection { straight_m, radius_m, turn_deg } = *given.get_ref();
         match (straight_m, radius_m, turn_deg) {
-            (Some(length_m), None, None) => Ok(Leg::Straight { length_m }),
-            (None, Some(radius_m), Some(turn_deg)) => Ok(Leg::Bend { radius_m, turn_deg }),
+            (Some(length_m), None, None) => Ok(CorridorLeg::Straight { length_m }),
+            (None, Some(radius_m), Some(turn_deg)) => Ok(CorridorLeg::Bend { radius_m, turn_deg }),
             _ => {
                 let remedy = "give straight_m, or radius_m and turn_deg";
                 let cause = "a leg that is neither straight nor a bend";
@@ -287,7 +290,7 @@ impl<const D: usize> Compiler<'_, D> {
         match self.course(s, at.clone())? {
             None => all.still.push(body),
             Some(course) => {
-                let mover = Mover::new(body, course);
+                let mover = MovingObstacle::new(body, course);
                 let mover = mover.map_err(|error| self.source.error_from(at, &error))?;
                 all.movers.push(mover);
             }
@@ -323,15 +326,15 @@ impl<const D: usize> Compiler<'_, D> {
         }
         let corners: Vec<Point<2>> =
             corners.iter().map(|corner| to_dimensions(corner.get())).collect();
-        let walls = outline(all.next_id, &corners, s.radius_m);
+        let walls = outline_walls(all.next_id, &corners, s.radius_m);
         all.add_still(walls.iter().map(wall_to_dimensions));
         Ok(())
     }
 
-    fn core(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<Core<D>, InputError> {
+    fn core(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<ConvexCore<D>, InputError> {
         match (s.at_m, s.ends_m, s.size_m) {
-            (Some(center), None, None) => Ok(Core::Point(center.get())),
-            (None, Some(ends), None) => Ok(Core::Segment(ends.map(PointValue::get))),
+            (Some(center), None, None) => Ok(ConvexCore::Point(center.get())),
+            (None, Some(ends), None) => Ok(ConvexCore::Segment(ends.map(PointValue::get))),
             (Some(_), None, Some(size)) if size.get().contains(&0.0) => {
                 let at = self.source.key_span(at, &["size_m"]);
                 let remedy = "give every side a length, or leave size_m out for a ball";
@@ -340,7 +343,7 @@ impl<const D: usize> Compiler<'_, D> {
             (Some(center), None, Some(size)) => {
                 let half_m = size.get().map(|x| 0.5 * x.abs());
                 let axes = turned_axes(s.turn_deg.unwrap_or(0.0));
-                Ok(Core::Cuboid(Cuboid { center: center.get(), axes, half_m }))
+                Ok(ConvexCore::Cuboid(Cuboid { center: center.get(), axes, half_m }))
             }
             _ => {
                 let remedy = "give at_m and radius_m (a ball), ends_m (a capsule or a wall), \
@@ -355,15 +358,15 @@ impl<const D: usize> Compiler<'_, D> {
         &self,
         s: &ObstacleSection<D>,
         at: Range<usize>,
-    ) -> Result<Option<Course<D>>, InputError> {
+    ) -> Result<Option<ObstaclePath<D>>, InputError> {
         let course = match (s.velocity_m_s.map(PointValue::get), s.bounces_m, &s.patrol_m) {
             (None, None, None) => return Ok(None),
-            (Some(velocity_m_s), None, None) => Course::Straight { velocity_m_s },
+            (Some(velocity_m_s), None, None) => ObstaclePath::Straight { velocity_m_s },
             (Some(velocity_m_s), Some(corners), None) => {
                 let [lo, hi] = corners.map(PointValue::get);
-                Course::Bouncing { velocity_m_s, room: Bounds { lo, hi } }
+                ObstaclePath::Bouncing { velocity_m_s, room: Aabb { lo, hi } }
             }
-            (None, None, Some(way_points)) => Course::Patrol {
+            (None, None, Some(way_points)) => ObstaclePath::Patrol {
                 way_points: way_points.iter().map(|place| place.get()).collect(),
                 closed: s.closed.unwrap_or(false),
                 speed_m_s: s.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from),
@@ -385,7 +388,7 @@ impl<const D: usize> Compiler<'_, D> {
         all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
         let s = section.get_ref();
-        let room = Bounds { lo: s.lo_m.get(), hi: s.hi_m.get() };
+        let room = Aabb { lo: s.lo_m.get(), hi: s.hi_m.get() };
         let keep_clear = chains.iter().flat_map(|spec| parts(&spec.start)).collect();
         let connectors = chains.iter().flat_map(|spec| spec.start.connectors());
         let widest_m = connectors.map(|c| c.radius_m).fold(0.0, f64::max);
@@ -401,7 +404,8 @@ impl<const D: usize> Compiler<'_, D> {
         match (s.fill_fraction.or(s.part), s.n, s.speed_m_s) {
             (Some(part), None, None) if least == greatest => {
                 let length_m = s.length_m.unwrap_or(0.0);
-                let field = Field { room, part, radius_m: least, length_m, keep_clear, keep_m };
+                let field =
+                    ObstacleField { room, part, radius_m: least, length_m, keep_clear, keep_m };
                 let obstacles = field.fill(seed, all.next_id);
                 all.add_still(
                     obstacles.map_err(|error| self.source.error_from(section.span(), &error))?,
@@ -410,7 +414,7 @@ impl<const D: usize> Compiler<'_, D> {
             (None, Some(n), Some(speed_m_s)) if s.length_m.is_none() => {
                 let [radius_m, speed_m_s] =
                     self.crowd_sizes([s.radius_m, speed_m_s], section.span())?;
-                let crowd = Crowd { room, n, radius_m, speed_m_s, keep_clear, keep_m };
+                let crowd = WanderingObstacles { room, n, radius_m, speed_m_s, keep_clear, keep_m };
                 let movers = crowd.generate(seed, all.next_id);
                 all.movers.extend(
                     movers.map_err(|error| self.source.error_from(section.span(), &error))?,
@@ -453,10 +457,10 @@ fn longest_part_m<const D: usize>(spec: &ChainSpec<D>) -> f64 {
 }
 
 /// Returns the rods of a chain; of a chain without rods its connector.
-fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = Core<D>> + '_ {
+fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ConvexCore<D>> + '_ {
     let points = chain.points();
-    let one = (points.len() == 1).then(|| Core::Point(points[0]));
-    points.windows(2).map(|ends| Core::Segment([ends[0], ends[1]])).chain(one)
+    let one = (points.len() == 1).then(|| ConvexCore::Point(points[0]));
+    points.windows(2).map(|ends| ConvexCore::Segment([ends[0], ends[1]])).chain(one)
 }
 
 /// Sets coordinates that are missing to 0, and drops those beyond.
@@ -467,12 +471,12 @@ pub(super) fn to_dimensions<const FROM: usize, const TO: usize>(p: Point<FROM>) 
 /// Returns a plane wall in the required number of dimensions.
 fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     let core = match wall.core {
-        Core::Point(c) => Core::Point(to_dimensions(c)),
-        Core::Segment(ends) => Core::Segment(ends.map(to_dimensions)),
-        Core::Cuboid(Cuboid { center, axes, half_m }) => {
+        ConvexCore::Point(c) => ConvexCore::Point(to_dimensions(c)),
+        ConvexCore::Segment(ends) => ConvexCore::Segment(ends.map(to_dimensions)),
+        ConvexCore::Cuboid(Cuboid { center, axes, half_m }) => {
             let axes =
                 std::array::from_fn(|i| axes.get(i).map_or([0.0; D], |axis| to_dimensions(*axis)));
-            Core::Cuboid(Cuboid {
+            ConvexCore::Cuboid(Cuboid {
                 center: to_dimensions(center),
                 axes,
                 half_m: to_dimensions(half_m),

@@ -2,10 +2,10 @@
 
 use super::super::metrics::PENETRATION_THRESHOLD_M;
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
-use super::obstacles::Ground;
+use super::obstacles::GroundObstacles;
 use super::{Compiler, MIN_REACH_M};
 use sidestep_kernel::{InputError, Slot};
-use sidestep_rods::geometry::Bounds;
+use sidestep_rods::geometry::Aabb;
 use sidestep_rods::{Chain, Obstacle, Obstacles};
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ impl<const D: usize> Compiler<'_, D> {
     pub(super) fn check_starts(
         &self,
         chains: &[ChainSpec<D>],
-        ground: &Ground<D>,
+        ground: &GroundObstacles<D>,
     ) -> Result<(), InputError> {
         if self.file.chain.may_start_inside {
             return Ok(());
@@ -88,8 +88,8 @@ fn deepest<const D: usize>(
         let end = (connector + 1).min(points.len() - 1);
         let radius_m = chain.connectors()[connector].radius_m;
         let rod_radius_m = chain.rods().get(connector).map_or(0.0, |rod| rod.radius_m);
-        let near = Bounds::from_points(&[points[connector], points[end]])
-            .grown(radius_m.max(rod_radius_m));
+        let near =
+            Aabb::from_points(&[points[connector], points[end]]).grown(radius_m.max(rod_radius_m));
         obstacles.visit(&near, |o| {
             let ball_m = o.core.nearest_to_point(points[connector]).distance_m - radius_m;
             let rod_m = o.core.nearest_to_segment([points[connector], points[end]]).distance_m;

@@ -4,7 +4,7 @@ use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
 use super::navigators::NavigatorSection;
-use super::{BoxSection, Compiler, MAX_VALUE, Measure, PointValue};
+use super::{BoxSection, Compiler, MAX_VALUE, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
@@ -62,10 +62,10 @@ pub(super) struct TaskSection<const D: usize> {
     kind: ByName<TaskKindWord>,
     #[serde(default)]
     connector: usize,
-    speed_m_s: Option<Measure>,
-    lasts_s: Option<Measure>,
-    patience_s: Option<Measure>,
-    turn_deg: Option<Measure>,
+    speed_m_s: Option<PositiveNumber>,
+    lasts_s: Option<PositiveNumber>,
+    patience_s: Option<PositiveNumber>,
+    turn_deg: Option<PositiveNumber>,
     /// Box to stay in: its lower and its upper corner.
     within_m: Option<BoxSection<D>>,
     /// An operator's orders.
@@ -73,10 +73,10 @@ pub(super) struct TaskSection<const D: usize> {
     script_file: Option<String>,
     /// Places to go to, one after the other.
     targets_m: Option<Vec<PointValue<D>>>,
-    tolerance_m: Option<Measure>,
+    tolerance_m: Option<PositiveNumber>,
     navigator: Option<Spanned<NavigatorSection>>,
     planner: Option<PlannerWord>,
-    plans_after_s: Option<Measure>,
+    plans_after_s: Option<PositiveNumber>,
 }
 
 impl<const D: usize> TaskSection<D> {

@@ -89,11 +89,11 @@ struct Procedure {
 struct Statement {
     /// Bytes of the text before it.
     at: usize,
-    action: Action,
+    action: ScriptAction,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Action {
+enum ScriptAction {
     Forward(Expression),
     Turn(Expression),
     Pitch(Expression),
@@ -113,11 +113,11 @@ enum Action {
 struct Expression {
     /// Bytes of the text before it.
     at: usize,
-    terms: Vec<Term>,
+    terms: Vec<ExpressionTerm>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Term {
+enum ExpressionTerm {
     Number(f64),
     /// A parameter by its name, and the bytes of the text before it.
     Named(String, usize),

@@ -7,11 +7,13 @@ use winnow::prelude::*;
 use winnow::stream::{LocatingSlice, Location, Stream};
 use winnow::token::{one_of, take_while};
 
-use super::{Action, Expression, MAX_BYTES, MAX_NESTING, Procedure, Script, Statement, Term};
+use super::{
+    Expression, ExpressionTerm, MAX_BYTES, MAX_NESTING, Procedure, Script, ScriptAction, Statement,
+};
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
 
-type Input<'a> = LocatingSlice<&'a str>;
+type ParserInput<'a> = LocatingSlice<&'a str>;
 
 /// Words that cannot name a procedure.
 const RESERVED: [&str; 8] = ["forward", "turn", "pitch", "wait", "goto", "repeat", "to", "end"];
@@ -25,16 +27,16 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
         return Err(InputError::new(place, cause, "use procedures and repeat"));
     }
     check_nesting(place, text)?;
-    let items = program.parse(LocatingSlice::new(text)).map_err(|error| {
-        let (cause, remedy) = words(error.inner(), &text[error.offset()..]);
+    let items = parse_program.parse(LocatingSlice::new(text)).map_err(|error| {
+        let (cause, remedy) = describe_error(error.inner(), &text[error.offset()..]);
         InputError::new(place, cause, remedy).with_offset(text, error.offset())
     })?;
     let mut main = Vec::new();
     let mut procedures = Vec::new();
     for item in items {
         match item {
-            Item::Statement(statement) => main.push(statement),
-            Item::Procedure(procedure) => procedures.push(procedure),
+            ScriptItem::Statement(statement) => main.push(statement),
+            ScriptItem::Procedure(procedure) => procedures.push(procedure),
         }
     }
     let script = Script { place: place.into(), text: text.into(), main, procedures };
@@ -63,7 +65,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
 }
 
 /// Returns the expected and the found token, in words.
-fn words(error: &ContextError, rest: &str) -> (String, String) {
+fn describe_error(error: &ContextError, rest: &str) -> (String, String) {
     let expected = error.context().find_map(|context| match context {
         StrContext::Expected(value) => Some(value.to_string()),
         _ => None,
@@ -85,154 +87,161 @@ fn expected(what: &'static str) -> StrContext {
     StrContext::Expected(StrContextValue::Description(what))
 }
 
-enum Item {
+enum ScriptItem {
     Statement(Statement),
     Procedure(Procedure),
 }
 
-fn program(input: &mut Input) -> ModalResult<Vec<Item>> {
-    let item = alt((procedure.map(Item::Procedure), statement.map(Item::Statement)));
-    preceded(blank, repeat(0.., item)).parse_next(input)
+fn parse_program(input: &mut ParserInput) -> ModalResult<Vec<ScriptItem>> {
+    let item = alt((
+        parse_procedure.map(ScriptItem::Procedure),
+        parse_statement.map(ScriptItem::Statement),
+    ));
+    preceded(skip_blank, repeat(0.., item)).parse_next(input)
 }
 
-fn blank(input: &mut Input) -> ModalResult<()> {
+fn skip_blank(input: &mut ParserInput) -> ModalResult<()> {
     let comment = ('#', till_line_ending).void();
     repeat(0.., alt((multispace1.void(), comment))).parse_next(input)
 }
 
-fn name<'a>(input: &mut Input<'a>) -> ModalResult<&'a str> {
+fn name<'a>(input: &mut ParserInput<'a>) -> ModalResult<&'a str> {
     let letters = (one_of(char::is_alphabetic), take_while(0.., is_name)).take();
-    terminated(letters, blank).parse_next(input)
+    terminated(letters, skip_blank).parse_next(input)
 }
 
-fn sign<'a>(expected: char) -> impl ModalParser<Input<'a>, char, ContextError> {
-    terminated(expected, blank)
+fn parse_sign<'a>(expected: char) -> impl ModalParser<ParserInput<'a>, char, ContextError> {
+    terminated(expected, skip_blank)
 }
 
-fn procedure(input: &mut Input) -> ModalResult<Procedure> {
+fn parse_procedure(input: &mut ParserInput) -> ModalResult<Procedure> {
     let at = input.current_token_start();
     name.verify(|word: &str| word == "to").parse_next(input)?;
     let free = name.verify(|word: &str| !RESERVED.contains(&word));
     let called = cut_err(free).context(expected("a name for the procedure")).parse_next(input)?;
     let parameter = preceded(':', cut_err(name).context(expected("a parameter's name")));
     let parameters: Vec<&str> = repeat(0.., parameter).parse_next(input)?;
-    let body = repeat(0.., statement).parse_next(input)?;
+    let body = repeat(0.., parse_statement).parse_next(input)?;
     let end = name.verify(|word: &str| word == "end");
     cut_err(end).context(expected("a statement or `end`")).parse_next(input)?;
     let parameters = parameters.into_iter().map(str::to_owned).collect();
     Ok(Procedure { name: called.into(), parameters, body, at })
 }
 
-fn statement(input: &mut Input) -> ModalResult<Statement> {
+fn parse_statement(input: &mut ParserInput) -> ModalResult<Statement> {
     let start = input.checkpoint();
     let at = input.current_token_start();
     let action = match name.parse_next(input)? {
-        "forward" => Action::Forward(argument(input)?),
-        "turn" => Action::Turn(argument(input)?),
-        "pitch" => Action::Pitch(argument(input)?),
-        "wait" => Action::Wait(argument(input)?),
-        "goto" => Action::Goto(coordinates(input)?),
-        "repeat" => Action::Repeat(argument(input)?, block(input)?),
+        "forward" => ScriptAction::Forward(parse_argument(input)?),
+        "turn" => ScriptAction::Turn(parse_argument(input)?),
+        "pitch" => ScriptAction::Pitch(parse_argument(input)?),
+        "wait" => ScriptAction::Wait(parse_argument(input)?),
+        "goto" => ScriptAction::Goto(parse_coordinates(input)?),
+        "repeat" => ScriptAction::Repeat(parse_argument(input)?, parse_block(input)?),
         // They end the statements before them, and are for the caller to parse.
         "to" | "end" => {
             input.reset(&start);
             return Err(ErrMode::Backtrack(ContextError::from_input(input)));
         }
-        name => Action::Call { name: name.into(), procedure: 0, arguments: arguments(input)? },
+        name => ScriptAction::Call {
+            name: name.into(),
+            procedure: 0,
+            arguments: parse_arguments(input)?,
+        },
     };
     Ok(Statement { at, action })
 }
 
-fn block(input: &mut Input) -> ModalResult<Vec<Statement>> {
-    cut_err(sign('[')).context(expected("`[`")).parse_next(input)?;
-    let statements = repeat(0.., statement).parse_next(input)?;
-    cut_err(sign(']')).context(expected("a statement or `]`")).parse_next(input)?;
+fn parse_block(input: &mut ParserInput) -> ModalResult<Vec<Statement>> {
+    cut_err(parse_sign('[')).context(expected("`[`")).parse_next(input)?;
+    let statements = repeat(0.., parse_statement).parse_next(input)?;
+    cut_err(parse_sign(']')).context(expected("a statement or `]`")).parse_next(input)?;
     Ok(statements)
 }
 
-fn argument(input: &mut Input) -> ModalResult<Expression> {
-    cut_err(expression).context(expected("a value")).parse_next(input)
+fn parse_argument(input: &mut ParserInput) -> ModalResult<Expression> {
+    cut_err(parse_expression).context(expected("a value")).parse_next(input)
 }
 
-fn coordinates(input: &mut Input) -> ModalResult<Vec<Expression>> {
-    let mut found = vec![argument(input)?];
-    cut_err(sign(',')).context(expected("`,`")).parse_next(input)?;
-    found.push(argument(input)?);
-    if opt(sign(',')).parse_next(input)?.is_some() {
-        found.push(argument(input)?);
+fn parse_coordinates(input: &mut ParserInput) -> ModalResult<Vec<Expression>> {
+    let mut found = vec![parse_argument(input)?];
+    cut_err(parse_sign(',')).context(expected("`,`")).parse_next(input)?;
+    found.push(parse_argument(input)?);
+    if opt(parse_sign(',')).parse_next(input)?.is_some() {
+        found.push(parse_argument(input)?);
     }
     Ok(found)
 }
 
 /// Parses the values behind a procedure's name; none if no value starts there.
-fn arguments(input: &mut Input) -> ModalResult<Vec<Expression>> {
+fn parse_arguments(input: &mut ParserInput) -> ModalResult<Vec<Expression>> {
     let begins = one_of(|c: char| c.is_ascii_digit() || ".:(-".contains(c));
     if opt(peek(begins)).parse_next(input)?.is_none() {
         return Ok(Vec::new());
     }
-    separated(1.., argument, sign(',')).parse_next(input)
+    separated(1.., parse_argument, parse_sign(',')).parse_next(input)
 }
 
-fn expression(input: &mut Input) -> ModalResult<Expression> {
+fn parse_expression(input: &mut ParserInput) -> ModalResult<Expression> {
     let at = input.current_token_start();
     let mut terms = Vec::new();
     sum(input, &mut terms)?;
     Ok(Expression { at, terms })
 }
 
-fn sum(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
-    product(input, terms)?;
-    while let Some(operator) = opt(alt((sign('+'), sign('-')))).parse_next(input)? {
-        operand(input, terms, product)?;
-        terms.push(if operator == '+' { Term::Add } else { Term::Subtract });
+fn sum(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
+    parse_product(input, terms)?;
+    while let Some(operator) = opt(alt((parse_sign('+'), parse_sign('-')))).parse_next(input)? {
+        parse_operand(input, terms, parse_product)?;
+        terms.push(if operator == '+' { ExpressionTerm::Add } else { ExpressionTerm::Subtract });
     }
     Ok(())
 }
 
-fn product(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
-    factor(input, terms)?;
-    while let Some(operator) = opt(alt((sign('*'), sign('/')))).parse_next(input)? {
-        operand(input, terms, factor)?;
-        terms.push(if operator == '*' { Term::Multiply } else { Term::Divide });
+fn parse_product(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
+    parse_factor(input, terms)?;
+    while let Some(operator) = opt(alt((parse_sign('*'), parse_sign('/')))).parse_next(input)? {
+        parse_operand(input, terms, parse_factor)?;
+        terms.push(if operator == '*' { ExpressionTerm::Multiply } else { ExpressionTerm::Divide });
     }
     Ok(())
 }
 
 /// Parses the operand that has to follow an operator.
-fn operand(
-    input: &mut Input,
-    terms: &mut Vec<Term>,
-    parse: fn(&mut Input, &mut Vec<Term>) -> ModalResult<()>,
+fn parse_operand(
+    input: &mut ParserInput,
+    terms: &mut Vec<ExpressionTerm>,
+    parse: fn(&mut ParserInput, &mut Vec<ExpressionTerm>) -> ModalResult<()>,
 ) -> ModalResult<()> {
-    let operand = |input: &mut Input| parse(input, terms);
+    let operand = |input: &mut ParserInput| parse(input, terms);
     cut_err(operand).context(expected("a value")).parse_next(input)
 }
 
-fn factor(input: &mut Input, terms: &mut Vec<Term>) -> ModalResult<()> {
-    let is_negative = opt(sign('-')).parse_next(input)?.is_some();
-    if opt(sign('(')).parse_next(input)?.is_some() {
-        operand(input, terms, sum)?;
-        cut_err(sign(')')).context(expected("`)`")).parse_next(input)?;
+fn parse_factor(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
+    let is_negative = opt(parse_sign('-')).parse_next(input)?.is_some();
+    if opt(parse_sign('(')).parse_next(input)?.is_some() {
+        parse_operand(input, terms, sum)?;
+        cut_err(parse_sign(')')).context(expected("`)`")).parse_next(input)?;
     } else {
-        terms.push(alt((number, parameter)).parse_next(input)?);
+        terms.push(alt((parse_number, parse_parameter)).parse_next(input)?);
     }
     if is_negative {
-        terms.push(Term::Negate);
+        terms.push(ExpressionTerm::Negate);
     }
     Ok(())
 }
 
-fn number(input: &mut Input) -> ModalResult<Term> {
+fn parse_number(input: &mut ParserInput) -> ModalResult<ExpressionTerm> {
     let digits = alt(((digit1, opt(('.', digit0))).void(), ('.', digit1).void()));
     let exponent = (one_of(['e', 'E']), opt(one_of(['+', '-'])), digit1);
-    let number = (digits, opt(exponent)).take().parse_to().map(Term::Number);
-    terminated(number, blank).parse_next(input)
+    let number = (digits, opt(exponent)).take().parse_to().map(ExpressionTerm::Number);
+    terminated(number, skip_blank).parse_next(input)
 }
 
-fn parameter(input: &mut Input) -> ModalResult<Term> {
+fn parse_parameter(input: &mut ParserInput) -> ModalResult<ExpressionTerm> {
     let at = input.current_token_start();
     let named = cut_err(name).context(expected("a parameter's name"));
-    preceded(':', named).map(|name| Term::Named(name.into(), at)).parse_next(input)
+    preceded(':', named).map(|name| ExpressionTerm::Named(name.into(), at)).parse_next(input)
 }
 
 /// Replaces names of procedures and parameters by indices.
@@ -264,15 +273,18 @@ fn resolve(
 ) -> Result<(), InputError> {
     for Statement { at, action } in statements {
         match action {
-            Action::Forward(e) | Action::Turn(e) | Action::Pitch(e) | Action::Wait(e) => {
+            ScriptAction::Forward(e)
+            | ScriptAction::Turn(e)
+            | ScriptAction::Pitch(e)
+            | ScriptAction::Wait(e) => {
                 resolve_values(script, std::slice::from_mut(e), parameters)?;
             }
-            Action::Goto(coordinates) => resolve_values(script, coordinates, parameters)?,
-            Action::Repeat(count, body) => {
+            ScriptAction::Goto(coordinates) => resolve_values(script, coordinates, parameters)?,
+            ScriptAction::Repeat(count, body) => {
                 resolve_values(script, std::slice::from_mut(count), parameters)?;
                 resolve(script, body, parameters)?;
             }
-            Action::Call { name, procedure, arguments } => {
+            ScriptAction::Call { name, procedure, arguments } => {
                 *procedure = find_procedure(script, *at, name, arguments.len())?;
                 resolve_values(script, arguments, parameters)?;
             }
@@ -311,13 +323,13 @@ fn resolve_values(
     parameters: &[String],
 ) -> Result<(), InputError> {
     for term in values.iter_mut().flat_map(|value| &mut value.terms) {
-        let Term::Named(name, at) = term else { continue };
+        let ExpressionTerm::Named(name, at) = term else { continue };
         let Some(index) = parameters.iter().position(|parameter| parameter == name) else {
             let known: Vec<&str> = parameters.iter().map(String::as_str).collect();
             let cause = format!("there is no parameter `:{name}` here");
             return Err(script.error(*at, cause, suggestion(name, &known)));
         };
-        *term = Term::Parameter(index);
+        *term = ExpressionTerm::Parameter(index);
     }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! A script, carried out statement by statement.
 
-use super::{Action, Expression, MAX_DEPTH, MAX_STATEMENTS, Script, Statement, Term};
+use super::{
+    Expression, ExpressionTerm, MAX_DEPTH, MAX_STATEMENTS, Script, ScriptAction, Statement,
+};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
@@ -96,14 +98,14 @@ pub enum ScriptMotion {
 pub struct ScriptMotions<'a> {
     script: &'a Script,
     turtle: Turtle,
-    frames: Vec<Frame<'a>>,
+    frames: Vec<CallFrame<'a>>,
     /// Statements that may still be carried out.
     left: u64,
 }
 
 /// A body that is being carried out.
 #[derive(Debug, Clone)]
-struct Frame<'a> {
+struct CallFrame<'a> {
     body: &'a [Statement],
     next: usize,
     /// Number of repetitions left.
@@ -114,7 +116,7 @@ struct Frame<'a> {
 
 impl<'a> ScriptMotions<'a> {
     pub(super) fn new(script: &'a Script, turtle: Turtle) -> Self {
-        let main = Frame { body: &script.main, next: 0, again: 0, parameters: Vec::new() };
+        let main = CallFrame { body: &script.main, next: 0, again: 0, parameters: Vec::new() };
         Self { script, turtle, frames: vec![main], left: MAX_STATEMENTS }
     }
 
@@ -155,33 +157,36 @@ impl<'a> ScriptMotions<'a> {
     }
 
     /// Carries out a statement; returns its motion, or none if it only opens a body.
-    fn carry_out(&mut self, statement: &'a Statement) -> Result<Option<ScriptMotion>, InputError> {
+    fn execute_statement(
+        &mut self,
+        statement: &'a Statement,
+    ) -> Result<Option<ScriptMotion>, InputError> {
         match &statement.action {
-            Action::Forward(distance) => {
+            ScriptAction::Forward(distance) => {
                 self.turtle.advance(self.value(distance)?);
                 self.motion(statement)
             }
-            Action::Goto(coordinates) => {
+            ScriptAction::Goto(coordinates) => {
                 for (i, coordinate) in coordinates.iter().enumerate() {
                     self.turtle.position_m[i] = self.value(coordinate)?;
                 }
                 self.motion(statement)
             }
-            Action::Turn(angle) => {
+            ScriptAction::Turn(angle) => {
                 self.turtle.turn(self.value(angle)?.to_radians());
                 Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
-            Action::Pitch(angle) => {
+            ScriptAction::Pitch(angle) => {
                 self.turtle.pitch(self.value(angle)?.to_radians());
                 Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
-            Action::Wait(duration) => self.wait(duration).map(Some),
-            Action::Repeat(count, body) => self.repeat(count, body).map(|()| None),
-            Action::Call { procedure, arguments, .. } => {
+            ScriptAction::Wait(duration) => self.execute_wait(duration).map(Some),
+            ScriptAction::Repeat(count, body) => self.execute_repeat(count, body).map(|()| None),
+            ScriptAction::Call { procedure, arguments, .. } => {
                 let parameters = arguments.iter().map(|argument| self.value(argument));
                 let parameters = parameters.collect::<Result<_, _>>()?;
                 let body = &self.script.procedures[*procedure].body;
-                self.open(statement.at, Frame { body, next: 0, again: 0, parameters })?;
+                self.push_frame(statement.at, CallFrame { body, next: 0, again: 0, parameters })?;
                 Ok(None)
             }
         }
@@ -195,7 +200,7 @@ impl<'a> ScriptMotions<'a> {
         Err(self.script.error(statement.at, "this goes beyond all numbers", "go less far"))
     }
 
-    fn wait(&self, duration: &Expression) -> Result<ScriptMotion, InputError> {
+    fn execute_wait(&self, duration: &Expression) -> Result<ScriptMotion, InputError> {
         let duration_s = self.value(duration)?;
         if duration_s < 0.0 {
             let cause = format!("a wait of {duration_s} s");
@@ -204,7 +209,11 @@ impl<'a> ScriptMotions<'a> {
         Ok(ScriptMotion::Wait { duration_s })
     }
 
-    fn repeat(&mut self, count: &Expression, body: &'a [Statement]) -> Result<(), InputError> {
+    fn execute_repeat(
+        &mut self,
+        count: &Expression,
+        body: &'a [Statement],
+    ) -> Result<(), InputError> {
         let times = self.value(count)?;
         if times < 0.0 || times.fract() != 0.0 || times > MAX_STATEMENTS as f64 {
             let cause = format!("nothing can be repeated {times} times");
@@ -215,10 +224,10 @@ impl<'a> ScriptMotions<'a> {
             return Ok(());
         }
         let parameters = self.parameters().to_vec();
-        self.open(count.at, Frame { body, next: 0, again: times as u64 - 1, parameters })
+        self.push_frame(count.at, CallFrame { body, next: 0, again: times as u64 - 1, parameters })
     }
 
-    fn open(&mut self, at: usize, frame: Frame<'a>) -> Result<(), InputError> {
+    fn push_frame(&mut self, at: usize, frame: CallFrame<'a>) -> Result<(), InputError> {
         // A finished body is removed, so the last call of a procedure takes no depth.
         while self.frames.last().is_some_and(|f| f.next == f.body.len() && f.again == 0) {
             self.frames.pop();
@@ -246,22 +255,22 @@ impl<'a> ScriptMotions<'a> {
 }
 
 /// Evaluates a postfix expression from the parser, which has two operands wherever it takes two.
-fn evaluate(terms: &[Term], parameters: &[f64]) -> f64 {
+fn evaluate(terms: &[ExpressionTerm], parameters: &[f64]) -> f64 {
     let mut stack = Vec::with_capacity(terms.len());
     for term in terms {
         let value = match term {
-            Term::Number(number) => *number,
-            Term::Parameter(index) => parameters[*index],
-            Term::Named(..) => unreachable!("names are resolved when a script is read"),
-            Term::Negate => -pop(&mut stack),
+            ExpressionTerm::Number(number) => *number,
+            ExpressionTerm::Parameter(index) => parameters[*index],
+            ExpressionTerm::Named(..) => unreachable!("names are resolved when a script is read"),
+            ExpressionTerm::Negate => -pop(&mut stack),
             operator => {
                 // The second operand was pushed last.
                 let b = pop(&mut stack);
                 let a = pop(&mut stack);
                 match operator {
-                    Term::Add => a + b,
-                    Term::Subtract => a - b,
-                    Term::Multiply => a * b,
+                    ExpressionTerm::Add => a + b,
+                    ExpressionTerm::Subtract => a - b,
+                    ExpressionTerm::Multiply => a * b,
                     _ => a / b,
                 }
             }
@@ -280,7 +289,7 @@ impl Iterator for ScriptMotions<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let motion = self.statement()?.and_then(|statement| self.carry_out(statement));
+            let motion = self.statement()?.and_then(|statement| self.execute_statement(statement));
             match motion {
                 Ok(None) => {}
                 Ok(Some(motion)) => return Some(Ok(motion)),

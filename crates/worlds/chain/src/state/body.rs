@@ -2,8 +2,8 @@
 
 use crate::agents::chain_controls::ChainControls;
 use crate::deferred::DeferredMotions;
-use crate::driver::external::External;
-use crate::driver::own_driver::Memory;
+use crate::driver::external::ExternalControlState;
+use crate::driver::own_driver::DriverMemory;
 use crate::driver::{Task, TaskProgress};
 use crate::formation::{Robot, Solid};
 use crate::metrics::ChainTally;
@@ -16,12 +16,12 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_rods::Chain;
-use sidestep_rods::geometry::{Bounds, Point, normalized, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, normalized, with_dimensions};
 use std::collections::VecDeque;
 
 /// One chain as it is now.
 #[derive(Debug, Clone)]
-pub struct Body<const D: usize> {
+pub struct ChainBodyState<const D: usize> {
     /// Its connectors and rods; with deferred motions only connector 0 is where it should be.
     pub chain: Chain<D>,
     /// Progress of its initiator through its tasks.
@@ -38,14 +38,14 @@ pub struct Body<const D: usize> {
     /// Cycles for which its navigator stands because something moves ahead.
     pub(crate) standstill: Standstill,
     /// Memory of a driver of the program's own.
-    pub(crate) driver_memory: Memory,
+    pub(crate) driver_memory: DriverMemory,
     /// Its plan to leave the obstacle that caught a part of it.
     pub(crate) escape_plan: EscapePlan,
     /// The motions of the present script, derived from the position at which it started; so a snapshot does not
     /// hold them.
     pub(crate) motions: Vec<ScriptMotion>,
     /// Orders from an external caller, and the result of the last ones.
-    pub(crate) external: External,
+    pub(crate) external: ExternalControlState,
     /// Joint values of an arm, in rad or m: its connectors are where forward kinematics puts them.
     pub joints: Option<Vec<f64>>,
     /// The planned path that it follows after local rules came no nearer to the target.
@@ -95,7 +95,7 @@ pub(crate) struct Standstill {
     pub(crate) cycles: u32,
 }
 
-impl<const D: usize> Body<D> {
+impl<const D: usize> ChainBodyState<D> {
     pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
         let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
@@ -107,10 +107,10 @@ impl<const D: usize> Body<D> {
             scattered: None,
             tally: ChainTally::default(),
             standstill: Standstill::default(),
-            driver_memory: Memory::default(),
+            driver_memory: DriverMemory::default(),
             escape_plan: EscapePlan::default(),
             motions: Vec::new(),
-            external: External::default(),
+            external: ExternalControlState::default(),
             joints: spec.arm.as_ref().map(|arm| arm.values.clone()),
             plan: None,
             missing: Vec::new(),
@@ -140,10 +140,10 @@ impl<const D: usize> Body<D> {
     }
 
     /// Returns the box around its solid parts in the plane.
-    pub(super) fn solid_bounds(&self) -> Bounds<2> {
+    pub(super) fn solid_bounds(&self) -> Aabb<2> {
         let boxes =
-            self.solids().map(|(_, solid)| Bounds::from_points(&[solid.at]).grown(solid.radius_m));
-        boxes.fold(Bounds::empty(), |all, one| all.joined(&one))
+            self.solids().map(|(_, solid)| Aabb::from_points(&[solid.at]).grown(solid.radius_m));
+        boxes.fold(Aabb::empty(), |all, one| all.joined(&one))
     }
 
     /// Returns a navigator's memory; at the start of its task it stands at its connector and faces the direction

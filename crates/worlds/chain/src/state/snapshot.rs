@@ -1,15 +1,15 @@
 //! Snapshots: the content of checkpoints, covered by the digest.
 //!
-//! Each chain has a [`ChainRecord`]. What only some chains have is a [`Component`]: it saves itself to a list of its
+//! Each chain has a [`ChainRecord`]. What only some chains have is a [`SnapshotComponent`]: it saves itself to a list of its
 //! own, by id, of the chains where there is something to save.
 
 use super::body::{
-    Body, MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten,
+    ChainBodyState, MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten,
 };
 use crate::agents::chain_controls::ChainControls;
 use crate::driver::TaskProgress;
-use crate::driver::external::External;
-use crate::driver::own_driver::Memory;
+use crate::driver::external::ExternalControlState;
+use crate::driver::own_driver::DriverMemory;
 use crate::formation::Robot;
 use crate::metrics::ChainTally;
 use crate::motion::escape::EscapePlan;
@@ -20,10 +20,10 @@ use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Cycle, Digest, EntityId};
 
 /// Records of one component, by chain.
-pub(crate) type ComponentList<T> = Vec<(EntityId, T)>;
+pub(crate) type SnapshotComponentRecords<T> = Vec<(EntityId, T)>;
 
 /// A part of a body that a snapshot lists only for chains where it is not in its initial state.
-pub(super) trait Component {
+pub(super) trait SnapshotComponent {
     /// Its serialized form.
     type Record;
 
@@ -34,11 +34,15 @@ pub(super) trait Component {
     ///
     /// # Errors
     /// When the record belongs to another chain.
-    fn restore(&mut self, record: &Self::Record, owner: &Owner) -> Result<(), CheckpointError>;
+    fn restore(
+        &mut self,
+        record: &Self::Record,
+        owner: &ComponentOwner,
+    ) -> Result<(), CheckpointError>;
 }
 
 /// The chain to which a component belongs.
-pub(super) struct Owner {
+pub(super) struct ComponentOwner {
     /// Cycles done.
     cycle: Cycle,
     /// Number of its connectors; records with higher numbers are damaged.
@@ -54,11 +58,11 @@ pub(super) struct Owner {
 pub struct ChainRecord {
     /// Positions of the connectors, coordinate after coordinate.
     pub points_m: Vec<f64>,
-    /// See [`Body::driving`].
+    /// See [`ChainBodyState::driving`].
     pub driving: TaskProgress,
-    /// See [`Body::scattered`].
+    /// See [`ChainBodyState::scattered`].
     pub scattered: Option<ScatterState>,
-    /// See [`Body::robots`].
+    /// See [`ChainBodyState::robots`].
     pub robots: Vec<Robot>,
 }
 
@@ -70,41 +74,41 @@ pub struct Snapshot {
     /// The chains by id.
     pub chains: Vec<ChainRecord>,
     /// Joint values of arms.
-    pub(crate) joints: ComponentList<Vec<f64>>,
+    pub(crate) joints: SnapshotComponentRecords<Vec<f64>>,
     /// Plans: the postures still to be reached, each coordinate after coordinate, or of an arm joint after joint.
-    pub(crate) plans: ComponentList<Vec<Vec<f64>>>,
+    pub(crate) plans: SnapshotComponentRecords<Vec<Vec<f64>>>,
     /// Plans to leave obstacles that caught a part of a chain.
-    pub(crate) escape_plans: ComponentList<EscapePlan>,
+    pub(crate) escape_plans: SnapshotComponentRecords<EscapePlan>,
     /// Cycles for which navigators stand because something moves ahead.
-    pub(crate) standstills: ComponentList<u32>,
+    pub(crate) standstills: SnapshotComponentRecords<u32>,
     /// Cycles for which scattered parts have waited for an obstacle in their way.
-    pub(crate) waited: ComponentList<Cycle>,
+    pub(crate) waited: SnapshotComponentRecords<Cycle>,
     /// Orders from external callers, and their results.
-    pub(crate) externals: ComponentList<External>,
+    pub(crate) externals: SnapshotComponentRecords<ExternalControlState>,
     /// Lost connectors, as known to the agents of their chain.
-    pub(crate) missing: ComponentList<Vec<MissingNeighbors>>,
+    pub(crate) missing: SnapshotComponentRecords<Vec<MissingNeighbors>>,
     /// Decisions that agents in other processes have submitted for the next cycle; serialized, because their type
     /// depends on the number of dimensions.
-    pub(crate) submitted: ComponentList<Vec<u8>>,
+    pub(crate) submitted: SnapshotComponentRecords<Vec<u8>>,
     /// Memories of drivers of the program's own.
-    pub(crate) driver_memories: ComponentList<Memory>,
+    pub(crate) driver_memories: SnapshotComponentRecords<DriverMemory>,
 }
 
-impl Component for Option<Vec<f64>> {
+impl SnapshotComponent for Option<Vec<f64>> {
     type Record = Vec<f64>;
 
     fn save(&self, _: Cycle) -> Option<Vec<f64>> {
         self.clone()
     }
 
-    fn restore(&mut self, values: &Vec<f64>, _: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, values: &Vec<f64>, _: &ComponentOwner) -> Result<(), CheckpointError> {
         let joints = self.as_mut().filter(|joints| joints.len() == values.len());
         joints.ok_or(CheckpointError::Damaged)?.clone_from(values);
         Ok(())
     }
 }
 
-impl<const D: usize> Component for Option<MotionPlan<D>> {
+impl<const D: usize> SnapshotComponent for Option<MotionPlan<D>> {
     type Record = Vec<Vec<f64>>;
 
     fn save(&self, _: Cycle) -> Option<Vec<Vec<f64>>> {
@@ -115,7 +119,11 @@ impl<const D: usize> Component for Option<MotionPlan<D>> {
         Some(path)
     }
 
-    fn restore(&mut self, path: &Vec<Vec<f64>>, owner: &Owner) -> Result<(), CheckpointError> {
+    fn restore(
+        &mut self,
+        path: &Vec<Vec<f64>>,
+        owner: &ComponentOwner,
+    ) -> Result<(), CheckpointError> {
         let values = owner.joints.unwrap_or(owner.coordinates);
         if path.is_empty() || path.iter().any(|posture| posture.len() != values) {
             return Err(CheckpointError::Damaged);
@@ -130,67 +138,67 @@ impl<const D: usize> Component for Option<MotionPlan<D>> {
     }
 }
 
-impl Component for EscapePlan {
+impl SnapshotComponent for EscapePlan {
     type Record = Self;
 
     fn save(&self, _: Cycle) -> Option<Self> {
         (!self.is_none()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, _: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, _: &ComponentOwner) -> Result<(), CheckpointError> {
         *self = *record;
         Ok(())
     }
 }
 
-impl Component for Standstill {
+impl SnapshotComponent for Standstill {
     type Record = u32;
 
     fn save(&self, _: Cycle) -> Option<u32> {
         (self.cycles > 0).then_some(self.cycles)
     }
 
-    fn restore(&mut self, cycles: &u32, _: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, cycles: &u32, _: &ComponentOwner) -> Result<(), CheckpointError> {
         self.cycles = *cycles;
         Ok(())
     }
 }
 
-impl Component for Memory {
+impl SnapshotComponent for DriverMemory {
     type Record = Self;
 
     fn save(&self, _: Cycle) -> Option<Self> {
         (*self != Self::default()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, _: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, _: &ComponentOwner) -> Result<(), CheckpointError> {
         *self = *record;
         Ok(())
     }
 }
 
 /// The rest of the scattered parts is in the record of their chain.
-impl Component for Option<ScatterState> {
+impl SnapshotComponent for Option<ScatterState> {
     type Record = Cycle;
 
     fn save(&self, _: Cycle) -> Option<Cycle> {
         Some(self.as_ref()?.waited).filter(|waited| *waited > 0)
     }
 
-    fn restore(&mut self, waited: &Cycle, _: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, waited: &Cycle, _: &ComponentOwner) -> Result<(), CheckpointError> {
         self.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
         Ok(())
     }
 }
 
-impl Component for External {
+impl SnapshotComponent for ExternalControlState {
     type Record = Self;
 
     fn save(&self, _: Cycle) -> Option<Self> {
         (!self.is_none()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, owner: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, owner: &ComponentOwner) -> Result<(), CheckpointError> {
         if !record.is_within(owner.connectors) {
             return Err(CheckpointError::Damaged);
         }
@@ -199,14 +207,14 @@ impl Component for External {
     }
 }
 
-impl Component for Vec<MissingNeighbors> {
+impl SnapshotComponent for Vec<MissingNeighbors> {
     type Record = Self;
 
     fn save(&self, _: Cycle) -> Option<Self> {
         (!self.is_empty()).then(|| self.clone())
     }
 
-    fn restore(&mut self, record: &Self, owner: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, owner: &ComponentOwner) -> Result<(), CheckpointError> {
         let n = owner.connectors;
         let exist = record.iter().flatten().flatten().all(|k| (*k as usize) < n);
         if record.len() != n || !exist {
@@ -217,7 +225,7 @@ impl Component for Vec<MissingNeighbors> {
     }
 }
 
-impl<const D: usize> Component for Option<ChainControls<D>> {
+impl<const D: usize> SnapshotComponent for Option<ChainControls<D>> {
     type Record = Vec<u8>;
 
     fn save(&self, cycle: Cycle) -> Option<Vec<u8>> {
@@ -226,7 +234,7 @@ impl<const D: usize> Component for Option<ChainControls<D>> {
         Some(postcard::to_stdvec(submitted).expect("decisions are plain data"))
     }
 
-    fn restore(&mut self, bytes: &Vec<u8>, owner: &Owner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, bytes: &Vec<u8>, owner: &ComponentOwner) -> Result<(), CheckpointError> {
         let controls: ChainControls<D> =
             postcard::from_bytes(bytes).map_err(|_| CheckpointError::Damaged)?;
         if controls.cycle != owner.cycle || controls.check(owner.connectors).is_err() {
@@ -241,16 +249,16 @@ impl<const D: usize> Component for Option<ChainControls<D>> {
 ///
 /// # Errors
 /// When a record belongs to another chain.
-fn restore_component<const D: usize, C: Component>(
-    bodies: &mut [Body<D>],
+fn restore_component<const D: usize, C: SnapshotComponent>(
+    bodies: &mut [ChainBodyState<D>],
     cycle: Cycle,
     list: &[(EntityId, C::Record)],
-    component: fn(&mut Body<D>) -> &mut C,
+    component: fn(&mut ChainBodyState<D>) -> &mut C,
 ) -> Result<(), CheckpointError> {
     for (slot, record) in list {
         let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
         let connectors = body.chain.points().len();
-        let owner = Owner {
+        let owner = ComponentOwner {
             cycle,
             connectors,
             coordinates: connectors * D,
@@ -261,7 +269,7 @@ fn restore_component<const D: usize, C: Component>(
     Ok(())
 }
 
-impl<const D: usize> Body<D> {
+impl<const D: usize> ChainBodyState<D> {
     pub(super) fn record(&self) -> ChainRecord {
         ChainRecord {
             points_m: flatten(self.chain.points()),
@@ -289,7 +297,7 @@ impl<const D: usize> Body<D> {
         }
         // Failures and joint limits of past changes are in no record: they follow from the scenario.
         for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
-            change.constrain(&mut chain);
+            change.apply_constraints(&mut chain);
         }
         for (point, at) in chain.points_mut().iter_mut().zip(record.points_m.chunks_exact(D)) {
             point.copy_from_slice(at);
@@ -310,7 +318,7 @@ impl Snapshot {
     /// When a record belongs to another chain.
     pub(super) fn restore_components<const D: usize>(
         &self,
-        bodies: &mut [Body<D>],
+        bodies: &mut [ChainBodyState<D>],
     ) -> Result<(), CheckpointError> {
         let cycle = self.cycle;
         restore_component(bodies, cycle, &self.joints, |body| &mut body.joints)?;

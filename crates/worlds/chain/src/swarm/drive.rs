@@ -25,14 +25,14 @@ impl Pose2 {
 
 /// Speeds of the two wheels; negative is backward.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Wheels {
+pub struct WheelSpeeds {
     /// Speed over ground of the wheel to the left of the heading, m/s.
     pub left_m_s: f64,
     /// Speed over ground of the wheel to the right of the heading, m/s.
     pub right_m_s: f64,
 }
 
-impl Wheels {
+impl WheelSpeeds {
     /// Returns the two wheels' speeds, left first.
     pub fn new(left_m_s: f64, right_m_s: f64) -> Self {
         Self { left_m_s, right_m_s }
@@ -85,26 +85,26 @@ impl DifferentialDrive {
     }
 
     /// Returns the rate at which wheels turn the robot, rad/s; to the left is positive.
-    pub fn turn_rad_s(&self, wheels: Wheels) -> f64 {
+    pub fn turn_rad_s(&self, wheels: WheelSpeeds) -> f64 {
         (wheels.right_m_s - wheels.left_m_s) / self.wheelbase_m
     }
 
     /// Returns wheel speeds for a speed and a turn. If both together are too fast, the turn comes
     /// first, because a robot that faces the right way gets there, if late.
-    pub fn wheels(&self, speed_m_s: f64, turn_rad_s: f64) -> Wheels {
+    pub fn wheels(&self, speed_m_s: f64, turn_rad_s: f64) -> WheelSpeeds {
         let max = self.max_wheel_m_s;
         let half = (0.5 * turn_rad_s * self.wheelbase_m).clamp(-max, max);
         let room = max - half.abs();
         let speed_m_s = speed_m_s.clamp(-room, room);
-        Wheels::new(speed_m_s - half, speed_m_s + half)
+        WheelSpeeds::new(speed_m_s - half, speed_m_s + half)
     }
 
     /// Returns the pose to which wheels take a robot within `dt_s`: along an arc, exactly.
-    pub fn step(&self, pose: Pose2, wheels: Wheels, dt_s: f64) -> Pose2 {
+    pub fn step(&self, pose: Pose2, wheels: WheelSpeeds, dt_s: f64) -> Pose2 {
         let max = self.max_wheel_m_s;
         let [left_m_s, right_m_s] =
             [wheels.left_m_s, wheels.right_m_s].map(|speed| speed.clamp(-max, max));
-        let wheels = Wheels { left_m_s, right_m_s };
+        let wheels = WheelSpeeds { left_m_s, right_m_s };
         let half_rad = 0.5 * self.turn_rad_s(wheels) * dt_s;
         let chord_m = wheels.speed_m_s() * dt_s * sine_ratio(half_rad);
         let toward = pose.heading_rad + half_rad;
@@ -117,12 +117,12 @@ impl DifferentialDrive {
 
 /// Returns wheel speeds toward a bearing, the faster wheel at `speed_m_s`: straight on when the
 /// bearing is 0, about the resting inner wheel from an eighth of a turn on.
-pub fn steer(bearing_rad: f64, speed_m_s: f64) -> Wheels {
+pub fn steer(bearing_rad: f64, speed_m_s: f64) -> WheelSpeeds {
     let inner_m_s = speed_m_s * (1.0 - bearing_rad.abs() / FRAC_PI_4).max(0.0);
     if bearing_rad > 0.0 {
-        Wheels::new(inner_m_s, speed_m_s)
+        WheelSpeeds::new(inner_m_s, speed_m_s)
     } else {
-        Wheels::new(speed_m_s, inner_m_s)
+        WheelSpeeds::new(speed_m_s, inner_m_s)
     }
 }
 
@@ -148,7 +148,7 @@ mod tests {
             x in -5.0..5.0f64, heading_rad in -3.1..3.1f64,
             left in -1.0..1.0f64, right in -1.0..1.0f64, dt_s in 1e-6..2.0f64,
         ) {
-            let (start, wheels) = (Pose2 { at: [x, 1.0], heading_rad }, Wheels::new(left, right));
+            let (start, wheels) = (Pose2 { at: [x, 1.0], heading_rad }, WheelSpeeds::new(left, right));
             let once = drive().step(start, wheels, dt_s);
             let half = drive().step(start, wheels, 0.5 * dt_s);
             let twice = drive().step(half, wheels, 0.5 * dt_s);
@@ -165,8 +165,8 @@ mod tests {
         #[test]
         fn backward_undoes_forward(left in -1.0..1.0f64, right in -1.0..1.0f64) {
             let start = Pose2 { at: [0.3, -0.2], heading_rad: 0.5 };
-            let there = drive().step(start, Wheels::new(left, right), 0.7);
-            let back = drive().step(there, Wheels::new(-left, -right), 0.7);
+            let there = drive().step(start, WheelSpeeds::new(left, right), 0.7);
+            let back = drive().step(there, WheelSpeeds::new(-left, -right), 0.7);
             prop_assert!(distance(start.at, back.at) < 1e-12);
         }
     }
@@ -176,15 +176,15 @@ mod tests {
         let start = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         // The right wheel goes a quarter circle of 0.4 m about the left one at (0, 0.2).
         let quarter_s = 0.4 * std::f64::consts::FRAC_PI_2;
-        let end = drive().step(start, Wheels::new(0.0, 1.0), quarter_s);
+        let end = drive().step(start, WheelSpeeds::new(0.0, 1.0), quarter_s);
         assert!(distance(end.at, [0.2, 0.2]) < 1e-12, "{end:?}");
     }
 
     #[test]
     fn steering_turns_to_where_the_bearing_is() {
-        assert_eq!(steer(0.0, 0.5), Wheels::new(0.5, 0.5));
-        assert_eq!(steer(2.0, 0.5), Wheels::new(0.0, 0.5));
-        assert_eq!(steer(-2.0, 0.5), Wheels::new(0.5, 0.0));
+        assert_eq!(steer(0.0, 0.5), WheelSpeeds::new(0.5, 0.5));
+        assert_eq!(steer(2.0, 0.5), WheelSpeeds::new(0.0, 0.5));
+        assert_eq!(steer(-2.0, 0.5), WheelSpeeds::new(0.5, 0.0));
     }
 
     #[test]

@@ -5,9 +5,9 @@
 //! that only stop get stuck at walls when they have to graze them, so their connectors' radius has
 //! to exceed their own by a margin.
 
-use super::drive::{DifferentialDrive, Pose2, Wheels};
+use super::drive::{DifferentialDrive, Pose2, WheelSpeeds};
 use super::laser::{NearbyBodies, RobotBody};
-use super::proximity::{Gaps, SECTOR_RAD, SensorRing, safe_speed_m_s};
+use super::proximity::{SECTOR_RAD, SectorGaps, SensorRing, safe_speed_m_s};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
 use sidestep_rods::geometry::{Point, add_scaled, dot, norm, sub};
@@ -41,9 +41,9 @@ pub struct TrackingTarget {
 
 /// What a follower does in a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct FollowerCommand {
     /// Speeds of its wheels.
-    pub wheels: Wheels,
+    pub wheels: WheelSpeeds,
     /// Whether its sensors slowed it down.
     pub is_held: bool,
 }
@@ -115,12 +115,21 @@ impl Follower {
 
     /// Returns wheel speeds that keep to a connector, limited by the sensors' readings. The wheels
     /// will turn for `dt_s`.
-    pub fn decide(&self, pose: &Pose2, goal: &TrackingTarget, gaps: &Gaps, dt_s: f64) -> Command {
+    pub fn decide(
+        &self,
+        pose: &Pose2,
+        goal: &TrackingTarget,
+        gaps: &SectorGaps,
+        dt_s: f64,
+    ) -> FollowerCommand {
         let wished = add_scaled(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
         let wanted = self.avoid_obstacles(wished, pose.heading_rad, gaps);
         let speed_m_s = norm(wanted);
         if speed_m_s <= STANDING_M_S {
-            return Command { wheels: Wheels::default(), is_held: norm(wished) > STANDING_M_S };
+            return FollowerCommand {
+                wheels: WheelSpeeds::default(),
+                is_held: norm(wished) > STANDING_M_S,
+            };
         }
         let off_rad = wrap_angle(atan2(wanted[1], wanted[0]) - pose.heading_rad);
         let is_backward = off_rad.abs() > BACKWARD_RAD;
@@ -155,7 +164,12 @@ impl Follower {
 
     /// Returns a wish without its part toward nearby obstacles, which is reduced more the nearer
     /// they are: the robot slides along.
-    fn avoid_obstacles(&self, mut wished: Point<2>, heading_rad: f64, gaps: &Gaps) -> Point<2> {
+    fn avoid_obstacles(
+        &self,
+        mut wished: Point<2>,
+        heading_rad: f64,
+        gaps: &SectorGaps,
+    ) -> Point<2> {
         for (k, gap_m) in gaps.iter().enumerate().filter(|&(_, &gap_m)| gap_m < self.slide_m) {
             let toward = heading_rad + k as f64 * SECTOR_RAD;
             let u = [cos(toward), sin(toward)];
@@ -167,7 +181,13 @@ impl Follower {
 
     /// Slows the middle, never the turn, because a round body that turns on the spot touches
     /// nothing.
-    fn limit_speed(&self, wheels: Wheels, is_backward: bool, gaps: &Gaps, dt_s: f64) -> Command {
+    fn limit_speed(
+        &self,
+        wheels: WheelSpeeds,
+        is_backward: bool,
+        gaps: &SectorGaps,
+        dt_s: f64,
+    ) -> FollowerCommand {
         let turn_rad_s = self.drive.turn_rad_s(wheels);
         let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };
         // The chord of an arc leads half of its turn aside.
@@ -176,7 +196,7 @@ impl Follower {
         let horizon_s = self.horizon_s.max(2.0 * dt_s);
         let safe_m_s = safe_speed_m_s(gaps, toward_rad, slack_rad, horizon_s);
         let speed_m_s = wheels.speed_m_s();
-        Command {
+        FollowerCommand {
             wheels: self.drive.wheels(sign * speed_m_s.min(safe_m_s), turn_rad_s),
             is_held: speed_m_s > safe_m_s,
         }

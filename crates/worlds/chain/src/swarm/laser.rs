@@ -6,7 +6,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::{cos, sin, wrap_angle};
 use sidestep_kernel::stream::{Draws, Purpose};
-use sidestep_rods::geometry::{Bounds, Core, Point};
+use sidestep_rods::geometry::{Aabb, ConvexCore, Point};
 use sidestep_rods::{Obstacle, Obstacles, bounds_around};
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
@@ -18,7 +18,7 @@ pub const LASER_NOISE: Purpose = Purpose(1);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotBody {
     /// Its inner part.
-    pub core: Core<2>,
+    pub core: ConvexCore<2>,
     /// Its reach beyond its core, meters.
     pub radius_m: f64,
 }
@@ -26,10 +26,10 @@ pub struct RobotBody {
 impl RobotBody {
     /// Returns a round robot.
     pub fn disc(at: Point<2>, radius_m: f64) -> Self {
-        Self { core: Core::Point(at), radius_m }
+        Self { core: ConvexCore::Point(at), radius_m }
     }
 
-    pub(super) fn bounds(&self) -> Bounds<2> {
+    pub(super) fn bounds(&self) -> Aabb<2> {
         self.core.bounds().grown(self.radius_m)
     }
 }
@@ -58,7 +58,7 @@ pub struct Laser {
 
 /// Ranges of one scan, and which beams met something that moves.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Scan {
+pub struct LaserScan {
     /// Range of every beam of the full circle, as in [`Laser`]; beams that are not read hold 0.
     ranges_m: Vec<f64>,
     /// The same without errors, where wanted.
@@ -129,7 +129,7 @@ impl Laser {
         pose: &Pose2,
         around: NearbyBodies<'_, impl IntoIterator<Item = RobotBody>>,
         noise: &mut Draws,
-        scan: &mut Scan,
+        scan: &mut LaserScan,
     ) {
         scan.ranges_m.clear();
         scan.ranges_m.resize(self.directions.len(), 0.0);
@@ -167,7 +167,7 @@ impl Laser {
     }
 
     /// Shortens the beams that meet a moving obstacle, and records which they are.
-    fn scan_movers(&self, view: &Viewpoint<'_>, obstacles: &Obstacles<2>, scan: &mut Scan) {
+    fn scan_movers(&self, view: &Viewpoint<'_>, obstacles: &Obstacles<2>, scan: &mut LaserScan) {
         scan.still_m.clone_from(&scan.ranges_m);
         obstacles.visit(&bounds_around(view.pose.at, self.range_m), |o| {
             if is_moving(o) {
@@ -186,18 +186,18 @@ impl Laser {
     }
 
     /// Shortens the beams that meet a body.
-    fn scan_body(&self, view: &Viewpoint<'_>, body: &RobotBody, scan: &mut Scan) {
+    fn scan_body(&self, view: &Viewpoint<'_>, body: &RobotBody, scan: &mut LaserScan) {
         let RobotBody { core, radius_m } = body;
         match core {
-            Core::Point(c) => self.scan_segment(view, [*c; 2], body, scan),
-            Core::Segment(ends) => self.scan_segment(view, *ends, body, scan),
-            Core::Cuboid(cuboid) => {
+            ConvexCore::Point(c) => self.scan_segment(view, [*c; 2], body, scan),
+            ConvexCore::Segment(ends) => self.scan_segment(view, *ends, body, scan),
+            ConvexCore::Cuboid(cuboid) => {
                 // From inside, the edges are not visible in every direction.
                 if core.nearest_to_point(view.pose.at).distance_m <= *radius_m {
                     return scan.ranges_m.fill(0.0);
                 }
                 for edge in cuboid.edges_2d() {
-                    let side = RobotBody { core: Core::Segment(edge), radius_m: *radius_m };
+                    let side = RobotBody { core: ConvexCore::Segment(edge), radius_m: *radius_m };
                     self.scan_segment(view, edge, &side, scan);
                 }
             }
@@ -210,7 +210,7 @@ impl Laser {
         view: &Viewpoint<'_>,
         ends: [Point<2>; 2],
         body: &RobotBody,
-        scan: &mut Scan,
+        scan: &mut LaserScan,
     ) {
         let Viewpoint { pose, turn } = *view;
         let n = self.directions.len();
@@ -240,7 +240,7 @@ impl Laser {
 
     /// Returns the bearing, left positive, and the range of every beam that it reads, from the
     /// rightmost on.
-    pub fn readings<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = (f64, f64)> + 'a {
+    pub fn readings<'a>(&'a self, scan: &'a LaserScan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
         let step_rad = self.step_rad();
         let ranges_m = self.read_values(&scan.ranges_m).enumerate();
@@ -249,7 +249,7 @@ impl Laser {
 
     /// Returns the ranges without errors in the order of [`Self::readings`]; none unless they were
     /// kept.
-    pub fn true_ranges<'a>(&'a self, scan: &'a Scan) -> impl Iterator<Item = f64> + 'a {
+    pub fn true_ranges<'a>(&'a self, scan: &'a LaserScan) -> impl Iterator<Item = f64> + 'a {
         self.read_values(&scan.true_m)
     }
 
@@ -259,10 +259,10 @@ impl Laser {
     }
 
     /// Returns the least range within a sector of beams, given by its ends relative to the heading,
-    /// left positive; `None` if [`Self::sees`] returns false.
-    pub fn min_range_m(&self, scan: &Scan, sector_rad: [f64; 2]) -> Option<f64> {
+    /// left positive; `None` if [`Self::can_see_sector`] returns false.
+    pub fn min_range_m(&self, scan: &LaserScan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
-        let beams = self.sector(sector_rad)?;
+        let beams = self.sector_beams(sector_rad)?;
         let ranges_m = beams.map(|k| scan.ranges_m[k.rem_euclid(n) as usize]);
         Some(ranges_m.fold(self.range_m, f64::min))
     }
@@ -271,13 +271,13 @@ impl Laser {
     /// [`Self::min_range_m`].
     pub fn min_range_by_motion_m(
         &self,
-        scan: &Scan,
+        scan: &LaserScan,
         sector_rad: [f64; 2],
         moves: bool,
     ) -> Option<f64> {
         let n = self.directions.len() as isize;
         let mut least_m = self.range_m;
-        for k in self.sector(sector_rad)? {
+        for k in self.sector_beams(sector_rad)? {
             let beam = k.rem_euclid(n) as usize;
             let meets_mover = scan.meets_mover.get(beam).copied().unwrap_or(false);
             if meets_mover == moves {
@@ -288,12 +288,12 @@ impl Laser {
     }
 
     /// Returns whether a sector lies completely in the field and has a beam.
-    pub fn sees(&self, sector_rad: [f64; 2]) -> bool {
-        self.sector(sector_rad).is_some()
+    pub fn can_see_sector(&self, sector_rad: [f64; 2]) -> bool {
+        self.sector_beams(sector_rad).is_some()
     }
 
     /// Returns the beams of a sector; negative ones are to the right.
-    fn sector(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
+    fn sector_beams(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
         // Ends that are multiples of the step count as inside, whatever their rounding.
         let first = (from_rad / self.step_rad() - 1e-9).ceil() as isize;
         let last = (to_rad / self.step_rad() + 1e-9).floor() as isize;
@@ -349,8 +349,8 @@ mod tests {
         pose: &Pose2,
         obstacles: &Obstacles<2>,
         bodies: &[RobotBody],
-    ) -> Scan {
-        let mut scan = Scan::default();
+    ) -> LaserScan {
+        let mut scan = LaserScan::default();
         let around = NearbyBodies { obstacles, robots: bodies.iter().copied() };
         laser.scan(pose, around, &mut draws(), &mut scan);
         scan
@@ -406,7 +406,7 @@ mod tests {
         let pose = Pose2 { at: [1.0, 0.0], heading_rad: PI };
         let mut ahead_m = Vec::new();
         for cycle in 0..500 {
-            let mut scan = Scan::default();
+            let mut scan = LaserScan::default();
             let mut noise = Streams::new(Seed(5)).draws(0, cycle, LASER_NOISE);
             let around = NearbyBodies { obstacles: &obstacles, robots: [] };
             laser.scan(&pose, around, &mut noise, &mut scan);

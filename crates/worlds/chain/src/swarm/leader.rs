@@ -12,8 +12,8 @@
 //! A lower number replaces a higher one. The exclusions let the right side win every tie, which
 //! turns a robot around in a dead end. Distances are from the robot's middle.
 
-use super::drive::{Pose2, Wheels, steer};
-use super::laser::{Laser, NearbyBodies, RobotBody, Scan};
+use super::drive::{Pose2, WheelSpeeds, steer};
+use super::laser::{Laser, LaserScan, NearbyBodies, RobotBody};
 use super::ray;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
@@ -23,7 +23,7 @@ use sidestep_rods::geometry::{Point, distance};
 
 /// One of the six layers, with the number that the slides give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Layer {
+pub enum BehaviorLayer {
     /// 1: away from the left wall.
     CloseLeft = 1,
     /// 2: away from the right wall.
@@ -38,7 +38,7 @@ pub enum Layer {
     KeepMoving = 6,
 }
 
-impl Layer {
+impl BehaviorLayer {
     /// All layers, layer 1 first.
     pub const ALL: [Self; 6] = [
         Self::CloseLeft,
@@ -77,14 +77,14 @@ pub enum WallLossRule {
 
 /// The rule for when a target ends the following of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeaveRule {
+pub struct WallLeaveRule {
     /// Distance toward the target that must be free, meters.
     pub free_m: f64,
     /// Angle to each side of the target's bearing that must be free.
     pub half_angle_rad: f64,
 }
 
-impl Default for LeaveRule {
+impl Default for WallLeaveRule {
     /// Returns the rule with which a leader reached its target in 29, 28 and 20 of 30 open fields with 10, 25 and 40 discs;
     /// without one, in 11 and 1 of 30 with 10 and 25.
     fn default() -> Self {
@@ -94,14 +94,14 @@ impl Default for LeaveRule {
 
 /// The detection of targets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TargetSense {
+pub struct TargetDetector {
     /// Range, meters; infinite for a beacon.
     pub range_m: f64,
     /// Whether obstacles hide it.
     pub needs_line_of_sight: bool,
 }
 
-impl Default for TargetSense {
+impl Default for TargetDetector {
     fn default() -> Self {
         Self { range_m: f64::INFINITY, needs_line_of_sight: false }
     }
@@ -136,9 +136,9 @@ pub struct Leader {
     /// Rule for when a wall counts as being left.
     pub leaving: WallLossRule,
     /// Rule for when a target ends the following of a wall; `None` for never, as in the slides.
-    pub leave_rule: Option<LeaveRule>,
+    pub leave_rule: Option<WallLeaveRule>,
     /// Detection of targets.
-    pub target_sense: TargetSense,
+    pub target_sense: TargetDetector,
     /// Whether it turns on the spot where it cannot turn about a wheel.
     pub turning: TurnMode,
     /// Whether it treats no moving body as a wall, and stands while one is ahead and close. Otherwise a wall
@@ -168,8 +168,8 @@ impl Leader {
             far_m: 0.9,
             lost_m: 1.3,
             leaving: WallLossRule::default(),
-            leave_rule: Some(LeaveRule::default()),
-            target_sense: TargetSense::default(),
+            leave_rule: Some(WallLeaveRule::default()),
+            target_sense: TargetDetector::default(),
             turning: TurnMode::default(),
             gives_way: true,
         };
@@ -205,7 +205,7 @@ impl Leader {
             let cause = format!("detects targets from {detects_m} m");
             return Err(leader_error(cause, "give more than 0, or inf"));
         }
-        if !self.laser.sees([from, to]) || !self.laser.sees([-to, -from]) {
+        if !self.laser.can_see_sector([from, to]) || !self.laser.can_see_sector([-to, -from]) {
             let cause = format!("looks for walls from {from} to {to} rad, where it has no beams");
             return Err(leader_error(cause, "widen the laser's field, or the sector"));
         }
@@ -223,19 +223,19 @@ pub struct LeaderState {
     /// Its place and heading.
     pub pose: Pose2,
     /// The walls that it follows.
-    pub followed: Sides<bool>,
+    pub followed: LeftRight<bool>,
 }
 
 impl LeaderState {
     /// Returns a leader that follows no wall yet.
     pub fn new(pose: Pose2) -> Self {
-        Self { pose, followed: Sides::default() }
+        Self { pose, followed: LeftRight::default() }
     }
 }
 
 /// One value for the left of a robot, and one for the right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Sides<T> {
+pub struct LeftRight<T> {
     /// That of what is counterclockwise of the heading.
     pub left: T,
     /// That of what is clockwise of the heading.
@@ -244,7 +244,7 @@ pub struct Sides<T> {
 
 /// All that a leader's sensors may detect.
 #[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a> {
+pub struct LeaderSurroundings<'a> {
     /// Obstacles of the world, the moving ones where they are now.
     pub obstacles: &'a Obstacles<2>,
     /// Bodies of robots, without its own.
@@ -255,11 +255,11 @@ pub struct Surroundings<'a> {
 
 /// What a leader makes of a scan, and of its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Percept {
+pub struct LeaderPercept {
     /// Distances of the nearest walls, meters.
-    pub walls_m: Sides<f64>,
+    pub walls_m: LeftRight<f64>,
     /// The target, if it is detected.
-    pub target: Option<Sighting>,
+    pub target: Option<TargetSighting>,
     /// Whether a moving body is close ahead.
     pub is_mover_ahead: bool,
     /// Whether the leader still has the patience to stand for it.
@@ -268,7 +268,7 @@ pub struct Percept {
 
 /// A target that is detected, as seen from the heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sighting {
+pub struct TargetSighting {
     /// Direction relative to the heading, left positive.
     pub bearing_rad: f64,
     /// Whether the leave rule finds the way to it free.
@@ -277,13 +277,13 @@ pub struct Sighting {
 
 /// What a leader does in a cycle, and what it remembers for the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Decision {
+pub struct LeaderDecision {
     /// Speeds of its wheels.
-    pub wheels: Wheels,
+    pub wheels: WheelSpeeds,
     /// The layer that acts.
-    pub layer: Layer,
+    pub layer: BehaviorLayer,
     /// The walls that it follows from now on.
-    pub followed: Sides<bool>,
+    pub followed: LeftRight<bool>,
     /// Whether it stands or goes on while a moving body is close ahead.
     pub is_mover_ahead: bool,
 }
@@ -293,9 +293,9 @@ impl Leader {
     pub fn scan(
         &self,
         pose: &Pose2,
-        around: &Surroundings<'_>,
+        around: &LeaderSurroundings<'_>,
         noise: &mut Draws,
-        scan: &mut Scan,
+        scan: &mut LaserScan,
     ) {
         let robots = around.bodies.iter().copied();
         let around = NearbyBodies { obstacles: around.obstacles, robots };
@@ -307,13 +307,13 @@ impl Leader {
     pub fn perceive(
         &self,
         pose: &Pose2,
-        around: &Surroundings<'_>,
-        scan: &Scan,
+        around: &LeaderSurroundings<'_>,
+        scan: &LaserScan,
         is_patient: bool,
-    ) -> Percept {
+    ) -> LeaderPercept {
         let [from, to] = self.sector_rad;
         let stands_for_it = self.gives_way && is_patient;
-        let walls_m = Sides {
+        let walls_m = LeftRight {
             left: self.wall_distance_m(scan, [from, to], stands_for_it),
             right: self.wall_distance_m(scan, [-to, -from], stands_for_it),
         };
@@ -321,12 +321,17 @@ impl Leader {
         let mover_m = self.laser.min_range_by_motion_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
         let is_mover_ahead = self.gives_way && mover_m.is_some_and(|mover_m| mover_m < self.near_m);
         let target = target.map(|target| self.sighting(pose, target, scan));
-        Percept { walls_m, target, is_mover_ahead, stands_for_it }
+        LeaderPercept { walls_m, target, is_mover_ahead, stands_for_it }
     }
 
     /// Returns the distance of the nearest wall in a sector. A mover for which the leader stands is no wall, or it would
     /// turn around in front of it.
-    fn wall_distance_m(&self, scan: &Scan, sector_rad: [f64; 2], stands_for_movers: bool) -> f64 {
+    fn wall_distance_m(
+        &self,
+        scan: &LaserScan,
+        sector_rad: [f64; 2],
+        stands_for_movers: bool,
+    ) -> f64 {
         let range_m = if stands_for_movers {
             self.laser.min_range_by_motion_m(scan, sector_rad, false)
         } else {
@@ -335,7 +340,7 @@ impl Leader {
         range_m.unwrap_or(self.laser.range_m())
     }
 
-    fn detects(&self, pose: &Pose2, around: &Surroundings<'_>, target: Point<2>) -> bool {
+    fn detects(&self, pose: &Pose2, around: &LeaderSurroundings<'_>, target: Point<2>) -> bool {
         if distance(pose.at, target) > self.target_sense.range_m {
             return false;
         }
@@ -347,7 +352,7 @@ impl Leader {
         ray::is_clear(around.obstacles, line) && around.bodies.iter().all(is_body_clear)
     }
 
-    fn sighting(&self, pose: &Pose2, target: Point<2>, scan: &Scan) -> Sighting {
+    fn sighting(&self, pose: &Pose2, target: Point<2>, scan: &LaserScan) -> TargetSighting {
         let bearing_rad = pose.bearing_rad(target);
         let mut way_is_free = false;
         if let Some(rule) = self.leave_rule {
@@ -357,38 +362,43 @@ impl Leader {
             let free_m = self.laser.min_range_m(scan, cone);
             way_is_free = free_m.is_some_and(|free_m| free_m >= needed_m);
         }
-        Sighting { bearing_rad, way_is_free }
+        TargetSighting { bearing_rad, way_is_free }
     }
 
     /// Returns the layer that acts, and its wheel speeds.
-    pub fn decide(&self, followed: Sides<bool>, percept: &Percept) -> Decision {
+    pub fn decide(&self, followed: LeftRight<bool>, percept: &LeaderPercept) -> LeaderDecision {
         let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
         let left = self.wall_view(followed.left, percept.walls_m.left, leaves_walls);
         let right = self.wall_view(followed.right, percept.walls_m.right, leaves_walls);
         let s = self.speed_m_s;
-        let to_left = Wheels::new(0.0, s);
-        let to_right = Wheels::new(s, 0.0);
+        let to_left = WheelSpeeds::new(0.0, s);
+        let to_right = WheelSpeeds::new(s, 0.0);
         let (layer, wheels) = if left.is_close && !right.is_close {
-            (Layer::CloseLeft, to_right)
+            (BehaviorLayer::CloseLeft, to_right)
         } else if right.is_close {
-            (Layer::CloseRight, to_left)
+            (BehaviorLayer::CloseRight, to_left)
         } else if left.is_left_behind && !right.is_left_behind {
-            (Layer::FarLeft, to_left)
+            (BehaviorLayer::FarLeft, to_left)
         } else if right.is_left_behind {
-            (Layer::FarRight, to_right)
+            (BehaviorLayer::FarRight, to_right)
         } else if let Some(target) = percept.target {
-            (Layer::TargetCheck, steer(target.bearing_rad, s))
+            (BehaviorLayer::TargetCheck, steer(target.bearing_rad, s))
         } else {
-            (Layer::KeepMoving, Wheels::new(s, s))
+            (BehaviorLayer::KeepMoving, WheelSpeeds::new(s, s))
         };
-        let followed = Sides { left: left.is_followed, right: right.is_followed };
+        let followed = LeftRight { left: left.is_followed, right: right.is_followed };
         let is_mover_ahead = percept.is_mover_ahead;
         if is_mover_ahead && percept.stands_for_it {
             // It goes straight on as soon as the mover is gone.
-            let layer = Layer::KeepMoving;
-            return Decision { wheels: Wheels::default(), layer, followed, is_mover_ahead };
+            let layer = BehaviorLayer::KeepMoving;
+            return LeaderDecision {
+                wheels: WheelSpeeds::default(),
+                layer,
+                followed,
+                is_mover_ahead,
+            };
         }
-        Decision { wheels, layer, followed, is_mover_ahead }
+        LeaderDecision { wheels, layer, followed, is_mover_ahead }
     }
 
     fn wall_view(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> WallView {
@@ -405,9 +415,9 @@ impl Leader {
     }
 
     /// Returns the wheel speeds to use if the way of its wheels is blocked.
-    pub fn blocked_wheels(&self, wheels: Wheels) -> Wheels {
+    pub fn blocked_wheels(&self, wheels: WheelSpeeds) -> WheelSpeeds {
         match self.turning {
-            TurnMode::AboutAWheel => Wheels::default(),
+            TurnMode::AboutAWheel => WheelSpeeds::default(),
             TurnMode::OnTheSpotWhereBlocked => wheels.turn_in_place(),
         }
     }
@@ -429,34 +439,34 @@ mod tests {
         Leader { leaving, ..Leader::new(0.5).unwrap() }
     }
 
-    fn percept(left: f64, right: f64) -> Percept {
-        let walls_m = Sides { left, right };
-        Percept { walls_m, target: None, is_mover_ahead: false, stands_for_it: true }
+    fn percept(left: f64, right: f64) -> LeaderPercept {
+        let walls_m = LeftRight { left, right };
+        LeaderPercept { walls_m, target: None, is_mover_ahead: false, stands_for_it: true }
     }
 
-    fn layer(leader: &Leader, followed: (bool, bool), percept: &Percept) -> Layer {
+    fn layer(leader: &Leader, followed: (bool, bool), percept: &LeaderPercept) -> BehaviorLayer {
         let (left, right) = followed;
-        leader.decide(Sides { left, right }, percept).layer
+        leader.decide(LeftRight { left, right }, percept).layer
     }
 
     #[test]
     fn the_table_of_the_slides_holds_line_by_line() {
         let leader = leader(WallLossRule::Latched);
-        let (l, r) = (Wheels::new(0.0, 0.5), Wheels::new(0.5, 0.0));
+        let (l, r) = (WheelSpeeds::new(0.0, 0.5), WheelSpeeds::new(0.5, 0.0));
         for (walls, followed, layer, wheels) in [
-            ((0.6, 0.8), (false, false), Layer::CloseLeft, r),
-            ((0.8, 0.6), (false, false), Layer::CloseRight, l),
-            ((0.6, 0.6), (false, false), Layer::CloseRight, l),
-            ((1.0, 0.8), (true, true), Layer::FarLeft, l),
-            ((0.8, 1.0), (true, true), Layer::FarRight, r),
-            ((1.0, 1.0), (true, true), Layer::FarRight, r),
-            ((0.8, 0.8), (true, true), Layer::KeepMoving, Wheels::new(0.5, 0.5)),
+            ((0.6, 0.8), (false, false), BehaviorLayer::CloseLeft, r),
+            ((0.8, 0.6), (false, false), BehaviorLayer::CloseRight, l),
+            ((0.6, 0.6), (false, false), BehaviorLayer::CloseRight, l),
+            ((1.0, 0.8), (true, true), BehaviorLayer::FarLeft, l),
+            ((0.8, 1.0), (true, true), BehaviorLayer::FarRight, r),
+            ((1.0, 1.0), (true, true), BehaviorLayer::FarRight, r),
+            ((0.8, 0.8), (true, true), BehaviorLayer::KeepMoving, WheelSpeeds::new(0.5, 0.5)),
             // Close comes before far, whatever the sides.
-            ((0.6, 1.0), (true, true), Layer::CloseLeft, r),
-            ((1.0, 0.6), (true, true), Layer::CloseRight, l),
+            ((0.6, 1.0), (true, true), BehaviorLayer::CloseLeft, r),
+            ((1.0, 0.6), (true, true), BehaviorLayer::CloseRight, l),
         ] {
             let (left, right) = followed;
-            let decision = leader.decide(Sides { left, right }, &percept(walls.0, walls.1));
+            let decision = leader.decide(LeftRight { left, right }, &percept(walls.0, walls.1));
             assert_eq!((decision.layer, decision.wheels), (layer, wheels), "{walls:?}");
         }
     }
@@ -466,7 +476,7 @@ mod tests {
         let reading = |leaving, followed, left| {
             layer(&leader(leaving), (followed, false), &percept(left, 0.8))
         };
-        let (far, keep) = (Layer::FarLeft, Layer::KeepMoving);
+        let (far, keep) = (BehaviorLayer::FarLeft, BehaviorLayer::KeepMoving);
         assert_eq!(reading(WallLossRule::Latched, true, 1.0), far);
         assert_eq!(reading(WallLossRule::Latched, false, 1.0), keep, "never near");
         assert_eq!(reading(WallLossRule::Latched, true, 1.4), keep, "lost");
@@ -489,22 +499,22 @@ mod tests {
     #[test]
     fn a_lost_wall_is_forgotten() {
         let leader = leader(WallLossRule::Latched);
-        let near = leader.decide(Sides::default(), &percept(0.8, 3.2)).followed;
-        assert_eq!(near, Sides { left: true, right: false });
+        let near = leader.decide(LeftRight::default(), &percept(0.8, 3.2)).followed;
+        assert_eq!(near, LeftRight { left: true, right: false });
         let leaving = leader.decide(near, &percept(1.2, 3.2)).followed;
         assert_eq!(leaving, near);
         let lost = leader.decide(leaving, &percept(1.4, 3.2)).followed;
-        assert_eq!(leader.decide(lost, &percept(1.2, 3.2)).layer, Layer::KeepMoving);
+        assert_eq!(leader.decide(lost, &percept(1.2, 3.2)).layer, BehaviorLayer::KeepMoving);
     }
 
     #[test]
     fn a_free_way_to_the_target_ends_the_following() {
-        let target = |way_is_free| Some(Sighting { bearing_rad: 0.1, way_is_free });
+        let target = |way_is_free| Some(TargetSighting { bearing_rad: 0.1, way_is_free });
         for leaving in [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level] {
             let leader = leader(leaving);
-            let seen = |free| Percept { target: target(free), ..percept(1.0, 3.2) };
-            assert_eq!(layer(&leader, (true, false), &seen(true)), Layer::TargetCheck);
-            assert_ne!(layer(&leader, (true, false), &seen(false)), Layer::TargetCheck);
+            let seen = |free| LeaderPercept { target: target(free), ..percept(1.0, 3.2) };
+            assert_eq!(layer(&leader, (true, false), &seen(true)), BehaviorLayer::TargetCheck);
+            assert_ne!(layer(&leader, (true, false), &seen(false)), BehaviorLayer::TargetCheck);
         }
     }
 
@@ -514,13 +524,14 @@ mod tests {
         use sidestep_rods::Obstacle;
         let wall = Obstacle::capsule(0, [[2.0, -1.0], [2.0, 1.0]], 0.0);
         let obstacles = Obstacles::new(vec![wall], 1.0).unwrap();
-        let around = Surroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
+        let around =
+            LeaderSurroundings { obstacles: &obstacles, bodies: &[], target: Some([4.0, 0.0]) };
         let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
         let mut sees = |needs_line_of_sight, range_m| {
-            let target_sense = TargetSense { range_m, needs_line_of_sight };
+            let target_sense = TargetDetector { range_m, needs_line_of_sight };
             let leader = Leader { target_sense, ..leader(WallLossRule::Latched) };
-            let scan = &mut Scan::default();
+            let scan = &mut LaserScan::default();
             leader.scan(&pose, &around, &mut noise, scan);
             leader.perceive(&pose, &around, scan, true).target.is_some()
         };
@@ -537,20 +548,20 @@ mod tests {
         let sees = |at, velocity_m_s, is_patient| {
             let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };
             let obstacles = Obstacles::new(vec![disc], 1.0).unwrap();
-            let around = Surroundings { obstacles: &obstacles, bodies: &[], target: None };
+            let around = LeaderSurroundings { obstacles: &obstacles, bodies: &[], target: None };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
             let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
-            let scan = &mut Scan::default();
+            let scan = &mut LaserScan::default();
             leader.scan(&pose, &around, &mut noise, scan);
             let percept = leader.perceive(&pose, &around, scan, is_patient);
-            leader.decide(Sides::default(), &percept)
+            leader.decide(LeftRight::default(), &percept)
         };
         let (ahead, aside, moves, stands) = ([0.8, 0.1], [0.0, 0.8], [0.0, -0.4], [0.0, 0.0]);
-        assert_eq!(sees(ahead, moves, true).wheels, Wheels::default(), "it waits");
-        assert_ne!(sees(ahead, moves, false).wheels, Wheels::default(), "not forever");
+        assert_eq!(sees(ahead, moves, true).wheels, WheelSpeeds::default(), "it waits");
+        assert_ne!(sees(ahead, moves, false).wheels, WheelSpeeds::default(), "not forever");
         assert_eq!(sees(ahead, moves, false).layer, sees(ahead, stands, true).layer);
-        assert_eq!(sees(aside, moves, true).layer, Layer::KeepMoving, "it is no wall");
-        assert_eq!(sees(aside, stands, true).layer, Layer::CloseLeft);
+        assert_eq!(sees(aside, moves, true).layer, BehaviorLayer::KeepMoving, "it is no wall");
+        assert_eq!(sees(aside, stands, true).layer, BehaviorLayer::CloseLeft);
     }
 
     proptest! {
@@ -560,8 +571,8 @@ mod tests {
             left in 0.3..2.0f64, right in 0.3..2.0f64, fl: bool, fr: bool,
         ) {
             let leader = leader(WallLossRule::Latched);
-            let this = leader.decide(Sides { left: fl, right: fr }, &percept(left, right));
-            let other = leader.decide(Sides { left: fr, right: fl }, &percept(right, left));
+            let this = leader.decide(LeftRight { left: fl, right: fr }, &percept(left, right));
+            let other = leader.decide(LeftRight { left: fr, right: fl }, &percept(right, left));
             let both_close = left < 0.7 && right < 0.7;
             let both_far = (fl && left > 0.9 && left <= 1.3) && (fr && right > 0.9 && right <= 1.3);
             if !both_close && !both_far {

@@ -21,7 +21,7 @@ pub(crate) mod ray;
 #[cfg(test)]
 mod tests;
 
-pub use drive::{DifferentialDrive, Pose2, Wheels};
+pub use drive::{DifferentialDrive, Pose2, WheelSpeeds};
 pub use follower::Follower;
-pub use laser::{Laser, NearbyBodies, RobotBody, Scan};
-pub use leader::{Leader, Percept, WallLossRule};
+pub use laser::{Laser, LaserScan, NearbyBodies, RobotBody};
+pub use leader::{Leader, LeaderPercept, WallLossRule};

@@ -16,7 +16,7 @@ pub(crate) const SECTORS: usize = 8;
 pub(crate) const SECTOR_RAD: f64 = TAU / SECTORS as f64;
 
 /// The gap between the body and the nearest obstacle, sector by sector, up to the sensors' range.
-pub(crate) type Gaps = [f64; SECTORS];
+pub(crate) type SectorGaps = [f64; SECTORS];
 
 /// A ring of sensors around a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ impl SensorRing {
         pose: &Pose2,
         obstacles: &Obstacles<2>,
         bodies: impl IntoIterator<Item = RobotBody>,
-    ) -> Gaps {
+    ) -> SectorGaps {
         let mut gaps = [self.range_m; SECTORS];
         let near = bounds_around(pose.at, self.radius_m + self.range_m);
         let borders: [[f64; 2]; SECTORS] = std::array::from_fn(|k| {
@@ -58,7 +58,7 @@ impl SensorRing {
         pose: &Pose2,
         borders: &[[f64; 2]; SECTORS],
         body: &RobotBody,
-        gaps: &mut Gaps,
+        gaps: &mut SectorGaps,
     ) {
         let RobotBody { core, radius_m } = *body;
         let nearest = core.nearest_to_point(pose.at);
@@ -91,7 +91,12 @@ fn sector_of(bearing_rad: f64) -> usize {
 
 /// Returns the speed at which a body may go into a direction relative to its heading without
 /// reaching a static obstacle within `horizon_s`. It may turn by up to `slack_rad` meanwhile.
-pub(crate) fn safe_speed_m_s(gaps: &Gaps, bearing_rad: f64, slack_rad: f64, horizon_s: f64) -> f64 {
+pub(crate) fn safe_speed_m_s(
+    gaps: &SectorGaps,
+    bearing_rad: f64,
+    slack_rad: f64,
+    horizon_s: f64,
+) -> f64 {
     let mut safe_m_s = f64::INFINITY;
     for (k, gap_m) in gaps.iter().enumerate() {
         let off_rad = wrap_angle(k as f64 * SECTOR_RAD - bearing_rad).abs();

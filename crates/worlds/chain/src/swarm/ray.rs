@@ -2,7 +2,7 @@
 
 use sidestep_rods::Obstacles;
 use sidestep_rods::geometry::{
-    Bounds, Core, Point, add, cross_2d, distance, dot, normalized, perpendicular, scaled, sub,
+    Aabb, ConvexCore, Point, add, cross_2d, distance, dot, normalized, perpendicular, scaled, sub,
 };
 
 /// Returns the distance at which a ray from `from` along the unit vector `u` enters the region
@@ -10,24 +10,24 @@ use sidestep_rods::geometry::{
 pub(crate) fn distance_m(
     from: Point<2>,
     u: Point<2>,
-    core: &Core<2>,
+    core: &ConvexCore<2>,
     radius_m: f64,
 ) -> Option<f64> {
     match core {
-        Core::Point(c) => to_disc(from, u, *c, radius_m),
-        Core::Segment(ends) => to_capsule(from, u, *ends, radius_m),
+        ConvexCore::Point(c) => distance_to_disc(from, u, *c, radius_m),
+        ConvexCore::Segment(ends) => distance_to_capsule(from, u, *ends, radius_m),
         // The outline of a box with round corners is the outer one of its edges' capsules.
-        Core::Cuboid(cuboid) => {
+        ConvexCore::Cuboid(cuboid) => {
             if core.nearest_to_point(from).distance_m <= radius_m {
                 return Some(0.0);
             }
-            let edges = cuboid.edges_2d().map(|edge| to_capsule(from, u, edge, radius_m));
+            let edges = cuboid.edges_2d().map(|edge| distance_to_capsule(from, u, edge, radius_m));
             edges.into_iter().flatten().reduce(f64::min)
         }
     }
 }
 
-fn to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Option<f64> {
+fn distance_to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Option<f64> {
     let to = sub(center, from);
     let ahead_m = dot(u, to);
     let aside_m = cross_2d(u, to);
@@ -38,26 +38,36 @@ fn to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Opti
     (half2 >= 0.0 && ahead_m > 0.0).then(|| (ahead_m - half2.sqrt()).max(0.0))
 }
 
-fn to_capsule(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
-    if radius_m > 0.0 && Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m {
+fn distance_to_capsule(
+    from: Point<2>,
+    u: Point<2>,
+    ends: [Point<2>; 2],
+    radius_m: f64,
+) -> Option<f64> {
+    if radius_m > 0.0 && ConvexCore::Segment(ends).nearest_to_point(from).distance_m <= radius_m {
         return Some(0.0);
     }
-    let caps = ends.map(|end| to_disc(from, u, end, radius_m)).into_iter().flatten();
-    caps.chain(to_sides(from, u, ends, radius_m)).reduce(f64::min)
+    let caps = ends.map(|end| distance_to_disc(from, u, end, radius_m)).into_iter().flatten();
+    caps.chain(distance_to_sides(from, u, ends, radius_m)).reduce(f64::min)
 }
 
 /// Returns the distance to the long sides of a capsule; without a radius, they are the segment.
-fn to_sides(from: Point<2>, u: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<f64> {
+fn distance_to_sides(
+    from: Point<2>,
+    u: Point<2>,
+    ends: [Point<2>; 2],
+    radius_m: f64,
+) -> Option<f64> {
     let aside = scaled(perpendicular(normalized(sub(ends[1], ends[0]))?), radius_m);
-    let left = to_segment(from, u, ends.map(|end| add(end, aside)));
+    let left = distance_to_segment(from, u, ends.map(|end| add(end, aside)));
     if radius_m == 0.0 {
         return left;
     }
-    let right = to_segment(from, u, ends.map(|end| sub(end, aside)));
+    let right = distance_to_segment(from, u, ends.map(|end| sub(end, aside)));
     [left, right].into_iter().flatten().reduce(f64::min)
 }
 
-fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
+fn distance_to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
     let d = sub(b, a);
     let to_a = sub(a, from);
     // The ends lie on both sides of the ray's line, or on it.
@@ -74,7 +84,7 @@ fn to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64>
 /// Returns whether no obstacle lies on a line.
 pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
     let mut is_clear = true;
-    obstacles.visit(&Bounds::from_points(&line), |o| {
+    obstacles.visit(&Aabb::from_points(&line), |o| {
         is_clear &= o.core.nearest_to_segment(line).distance_m > o.radius_m;
     });
     is_clear
@@ -85,7 +95,7 @@ pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
 pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<(f64, f64)> {
     use sidestep_kernel::math::{asin, atan2, wrap_angle};
     // At the surface rounding decides what is seen in which direction.
-    if Core::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
+    if ConvexCore::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
         return None;
     }
     let [a, b] = ends.map(|end| {
@@ -109,7 +119,7 @@ pub(super) mod tests {
     pub(crate) fn marched_m(
         from: Point<2>,
         u: Point<2>,
-        core: &Core<2>,
+        core: &ConvexCore<2>,
         radius_m: f64,
     ) -> Option<f64> {
         let mut gone_m = 0.0;
@@ -126,17 +136,17 @@ pub(super) mod tests {
         None
     }
 
-    pub(crate) fn any_core() -> impl Strategy<Value = Core<2>> {
+    pub(crate) fn any_core() -> impl Strategy<Value = ConvexCore<2>> {
         let point = || prop::array::uniform2(-3.0..3.0f64);
         let cuboid = (point(), -3.0..3.0f64, prop::array::uniform2(0.05..1.0f64)).prop_map(
             |(center, turn, half_m)| {
                 let axis = [cos(turn), sin(turn)];
-                Core::Cuboid(Cuboid { center, axes: [axis, perpendicular(axis)], half_m })
+                ConvexCore::Cuboid(Cuboid { center, axes: [axis, perpendicular(axis)], half_m })
             },
         );
         prop_oneof![
-            point().prop_map(Core::Point),
-            (point(), point()).prop_map(|(a, b)| Core::Segment([a, b])),
+            point().prop_map(ConvexCore::Point),
+            (point(), point()).prop_map(|(a, b)| ConvexCore::Segment([a, b])),
             cuboid,
         ]
     }
@@ -170,14 +180,14 @@ pub(super) mod tests {
             let at = sidestep_rods::geometry::lerp(a, b, part);
             let Some(u) = normalized(sub(at, from)) else { return Ok(()) };
             prop_assume!(cross_2d(u, sub(b, a)).abs() > 1e-3);
-            let hit_m = distance_m(from, u, &Core::Segment([a, b]), 0.0).unwrap();
+            let hit_m = distance_m(from, u, &ConvexCore::Segment([a, b]), 0.0).unwrap();
             prop_assert!((hit_m - distance(at, from)).abs() < 1e-9);
         }
     }
 
     #[test]
     fn a_wall_seen_end_on_is_seen() {
-        let wall = Core::Segment([[1.0, 0.0], [2.0, 0.0]]);
+        let wall = ConvexCore::Segment([[1.0, 0.0], [2.0, 0.0]]);
         assert_eq!(distance_m([0.0, 0.0], [1.0, 0.0], &wall, 0.0), Some(1.0));
         assert_eq!(distance_m([0.0, 0.0], [-1.0, 0.0], &wall, 0.0), None);
     }

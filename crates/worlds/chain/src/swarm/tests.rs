@@ -239,7 +239,7 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
 fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
     // A box that leaves no room to swing around.
     let corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]];
-    let walls = sidestep_rods::outline(0, &corners, 0.0);
+    let walls = sidestep_rods::outline_walls(0, &corners, 0.0);
     let course = Course {
         obstacles: Obstacles::new(walls, 1.0).unwrap(),
         target: None,

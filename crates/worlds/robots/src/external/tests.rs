@@ -53,7 +53,8 @@ fn run(workers: usize) -> RobotsRun {
 /// Observations of a team: one vector per space.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<i64>> {
     let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
-    let mut rooms: Vec<_> = observed.iter().map(|s| vec![0; s.width() * agents.len()]).collect();
+    let mut rooms: Vec<_> =
+        observed.iter().map(|s| vec![0; s.value_count() * agents.len()]).collect();
     let mut room: Vec<_> = rooms.iter_mut().map(|room| BufferMut::Integer(room)).collect();
     run.observe(team, &mut room).expect("the room fits");
     observed.iter().map(|space| space.name.clone()).zip(rooms).collect()

@@ -7,7 +7,7 @@ use crate::action::{Action, StepPath};
 use crate::effector::ObstacleRule;
 use crate::world::Role;
 use sidestep_kernel::Slot;
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{self, FactSection, FactTable, FactValue, MarkShape};
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ impl TransitionResult {
     }
 }
 
-impl<T: BoxWord> Inspector<'_, T> {
+impl<T: OccupantWord> Inspector<'_, T> {
     /// Lets the body act with its draw, and reports the outcome.
     pub(super) fn add_outcome(&mut self, word: u32, scratch: &mut Scratch) {
         let mut section = FactSection::new("Outcome");

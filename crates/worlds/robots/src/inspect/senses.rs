@@ -7,7 +7,7 @@ use crate::sensor::{NOTHING, Reading};
 use crate::view::{center_to_boundary_m, class_middle_m};
 use crate::world::{MountedSensor, RobotModel, Role};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::space::BoxWord;
+use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{self, BodyId, BodyKind, FactSection, FactTable, FactValue, MarkShape};
 
 /// One row of the table of readings: what a beam truly meets, and what its sensor makes of that.
@@ -21,7 +21,7 @@ struct BeamReading<'a, T> {
     reported: Reading,
 }
 
-impl<T: BoxWord> Inspector<'_, T> {
+impl<T: OccupantWord> Inspector<'_, T> {
     /// Adds the percept and the decision of a robot; nothing of other bodies, which have neither.
     pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
         let body = self.cycle.body(self.slot);

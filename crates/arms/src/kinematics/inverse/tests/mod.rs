@@ -3,7 +3,7 @@ mod poses;
 use super::criteria::IkCriteria;
 use super::step::JointRanges;
 use super::*;
-use crate::ik::Engine;
+use crate::ik::IkEngine;
 use crate::kinematics::RecoverError;
 use crate::kinematics::{Transform, Vector};
 use proptest::prelude::*;
@@ -59,12 +59,12 @@ proptest! {
     ) {
         let arm = arm();
         prop_assert_eq!(arm.variables.len(), 4);
-        let target = arm.forward(&inside(&arm, &there)).tip.origin_m;
-        for engine in [Engine::Dls, Engine::Chain] {
+        let target = arm.forward_kinematics(&inside(&arm, &there)).tip.origin_m;
+        for engine in [IkEngine::Dls, IkEngine::Chain] {
             let goal = ArmGoal { engine, ..ArmGoal::new(target) };
             let answer = arm.solve(&goal, &inside(&arm, &start)).expect("right");
             prop_assert!(answer.reached, "{:?}", answer.reason);
-            prop_assert!(apart_m(arm.forward(&answer.values).tip.origin_m, target) <= 1e-6);
+            prop_assert!(apart_m(arm.forward_kinematics(&answer.values).tip.origin_m, target) <= 1e-6);
             prop_assert!(arm.outside_limits(&answer.values).is_empty());
             prop_assert_eq!(&answer, &arm.solve(&goal, &inside(&arm, &start)).expect("right"));
         }
@@ -82,9 +82,9 @@ proptest! {
         let arm = arm();
         let skeleton = arm.skeleton();
         let [values, target] = [there, target].map(|shares| inside(&arm, &shares));
-        let spheres = vec![Sphere { center_m: [0.4, 0.3, 0.6], radius_m: 3.0 }];
+        let spheres = vec![ObstacleSphere { center_m: [0.4, 0.3, 0.6], radius_m: 3.0 }];
         let asked = PoseMask { along: [true, false, true], turn };
-        let goal = ArmGoal { spheres, asked, ..ArmGoal::from_pose(arm.forward(&target).tip) };
+        let goal = ArmGoal { spheres, asked, ..ArmGoal::from_pose(arm.forward_kinematics(&target).tip) };
         let scene = IkCriteria::new(&arm, &skeleton, &goal);
         let look_at = |by: f64| {
             let mut values = values.clone();
@@ -113,7 +113,7 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     let far = solve(&ArmGoal::new([9.0, 0.0, 0.5]));
     assert!(matches!(far.reason, Some(IkFailure::TooFar { .. })), "{far:?}");
     // Nearer to the shoulder than the elbow may fold.
-    let near = arm.forward(&[0.0, 0.2, 2.9, 0.0]).tip.origin_m;
+    let near = arm.forward_kinematics(&[0.0, 0.2, 2.9, 0.0]).tip.origin_m;
     let limited = solve(&ArmGoal { restarts: 10, ..ArmGoal::new(near) });
     let Some(IkFailure::OutsideLimits { joint, .. }) = &limited.reason else {
         panic!("{limited:?}")
@@ -121,8 +121,8 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
     assert!(["pitch", "elbow", "slide"].contains(&joint.as_str()));
     let ignored = solve(&ArmGoal { ignore_limits: true, ..ArmGoal::new(near) });
     assert!(ignored.reached);
-    let target = arm.forward(&[0.3, 0.2, 0.4, 0.2]).tip.origin_m;
-    let spheres = vec![Sphere { center_m: target, radius_m: 0.2 }];
+    let target = arm.forward_kinematics(&[0.3, 0.2, 0.4, 0.2]).tip.origin_m;
+    let spheres = vec![ObstacleSphere { center_m: target, radius_m: 0.2 }];
     let blocked = solve(&ArmGoal { spheres, restarts: 10, ..ArmGoal::new(target) });
     let Some(IkFailure::Blocked(hit)) = &blocked.reason else { panic!("{blocked:?}") };
     assert_eq!(hit.against, CollidesWith::Sphere(0));
@@ -132,7 +132,7 @@ fn reasons_name_the_joint_the_obstacle_or_the_reach() {
 fn wrong_goals_are_named() {
     let arm = arm();
     let right = ArmGoal::new([0.5, 0.0, 0.5]);
-    let bad_sphere = Sphere { center_m: [0.0; 3], radius_m: -1.0 };
+    let bad_sphere = ObstacleSphere { center_m: [0.0; 3], radius_m: -1.0 };
     for (goal, place) in [
         (ArmGoal::new([f64::NAN, 0.0, 0.0]), "target"),
         (
@@ -184,10 +184,13 @@ fn shared_arms_reach_what_they_have_reached() {
         for seed in 0..20u32 {
             let share = |k: usize| (f64::from(seed) * 0.37 + k as f64 * 0.618_034).fract();
             let shares: Vec<f64> = (0..arm.variables.len()).map(share).collect();
-            let target = arm.forward(&inside(&arm, &shares)).tip.origin_m;
+            let target = arm.forward_kinematics(&inside(&arm, &shares)).tip.origin_m;
             let answer = arm.solve(&ArmGoal::new(target), &arm.rest_values()).expect("right");
             assert!(answer.reached, "{name}: {:?}", answer.reason);
-            assert!(apart_m(arm.forward(&answer.values).tip.origin_m, target) <= 1e-6, "{name}");
+            assert!(
+                apart_m(arm.forward_kinematics(&answer.values).tip.origin_m, target) <= 1e-6,
+                "{name}"
+            );
             assert!(arm.outside_limits(&answer.values).is_empty(), "{name}");
         }
     }
@@ -199,18 +202,18 @@ fn the_connectors_of_an_iiwa_lead_to_its_joints_and_those_of_a_panda_do_not() {
     let engine_of = |path: &std::path::Path| {
         let model = Model::load(path).expect("a model");
         let arm = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
-        let goal = ArmGoal { engine: Engine::Chain, ..ArmGoal::new([0.35, 0.2, 0.5]) };
+        let goal = ArmGoal { engine: IkEngine::Chain, ..ArmGoal::new([0.35, 0.2, 0.5]) };
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         assert!(answer.reached, "{:?}", answer.reason);
         let skeleton = arm.skeleton();
-        let connectors = arm.connectors(&skeleton, &arm.forward(&answer.values));
-        (answer.engine, arm.recover(&skeleton, &connectors, &answer.values))
+        let connectors = arm.connectors(&skeleton, &arm.forward_kinematics(&answer.values));
+        (answer.engine, arm.recover_joint_values(&skeleton, &connectors, &answer.values))
     };
     let (engine, recovered) = engine_of(&path);
-    assert_eq!(engine, Engine::Chain);
+    assert_eq!(engine, IkEngine::Chain);
     assert!(recovered.is_ok());
     let panda = shared("chain/panda.urdf").expect("there");
     let (engine, recovered) = engine_of(&panda);
-    assert_eq!(engine, Engine::Dls);
+    assert_eq!(engine, IkEngine::Dls);
     assert!(matches!(recovered, Err(RecoverError::Coupled { .. })), "{recovered:?}");
 }

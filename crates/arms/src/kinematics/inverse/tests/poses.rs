@@ -69,7 +69,7 @@ fn angle_rad(a: &Transform, b: &Transform) -> f64 {
 }
 
 fn assert_met(arm: &SerialChain, goal: &ArmGoal, values: &[f64]) {
-    let tip = arm.forward(values).tip;
+    let tip = arm.forward_kinematics(values).tip;
     assert!(apart_m(tip.origin_m, goal.target.origin_m) <= goal.tolerance_m);
     // The arc cosine of nearly 1 knows half of the digits.
     assert!(angle_rad(&tip, &goal.target) <= goal.tolerance_rad.max(1e-7));
@@ -80,7 +80,7 @@ fn assert_met(arm: &SerialChain, goal: &ArmGoal, values: &[f64]) {
 fn poses_of_an_independent_library_are_those_of_rpy_quaternion_and_forward_kinematics() {
     let arm = six();
     for (values, xyz_m, rpy_rad, quaternion) in KNOWN {
-        let tip = arm.forward(&values).tip;
+        let tip = arm.forward_kinematics(&values).tip;
         let by_rpy = Transform::from_origin(&Origin { xyz_m, rpy_rad });
         let by_quaternion = Transform::from_quaternion("q", xyz_m, quaternion).expect("right");
         for pose in [by_rpy, by_quaternion] {
@@ -124,7 +124,7 @@ proptest! {
         start in prop::array::uniform6(0.0..1.0f64),
     ) {
         let arm = six();
-        let goal = ArmGoal::from_pose(arm.forward(&inside(&arm, &there)).tip);
+        let goal = ArmGoal::from_pose(arm.forward_kinematics(&inside(&arm, &there)).tip);
         let answer = arm.solve(&goal, &inside(&arm, &start)).expect("right");
         prop_assert!(answer.reached, "{:?}", answer.reason);
         assert_met(&arm, &goal, &answer.values);
@@ -138,7 +138,7 @@ proptest! {
         axis in 0usize..3,
     ) {
         let arm = six();
-        let tip = arm.forward(&inside(&arm, &there)).tip;
+        let tip = arm.forward_kinematics(&inside(&arm, &there)).tip;
         // Turned about the free axis, and shifted along it, which the arm may undo.
         let mut rpy_rad = [0.0; 3];
         rpy_rad[axis] = off[axis];
@@ -147,7 +147,7 @@ proptest! {
         let goal = ArmGoal { asked, ..ArmGoal::from_pose(target) };
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached, "{:?}", answer.reason);
-        let found = arm.forward(&answer.values).tip;
+        let found = arm.forward_kinematics(&answer.values).tip;
         prop_assert!(apart_m(found.origin_m, target.origin_m) <= 1e-6);
         prop_assert!(apart_m(found.axis(axis), target.axis(axis)) <= 1e-6);
         // Nowhere along x, but turned as the tip was.
@@ -155,13 +155,13 @@ proptest! {
         let asked = PoseMask { along: [false, true, true], turn: OrientationMask::Whole };
         let answer = arm.solve(&ArmGoal { asked, ..ArmGoal::from_pose(away) }, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached && answer.error_m <= 1e-6, "{:?}", answer.reason);
-        prop_assert!(angle_rad(&arm.forward(&answer.values).tip, &tip) <= 1e-6);
+        prop_assert!(angle_rad(&arm.forward_kinematics(&answer.values).tip, &tip) <= 1e-6);
     }
 
     #[test]
     fn several_postures_all_reach_the_target_and_differ(there in prop::array::uniform6(0.1..0.9f64)) {
         let arm = six();
-        let tip = arm.forward(&inside(&arm, &there)).tip;
+        let tip = arm.forward_kinematics(&inside(&arm, &there)).tip;
         let goal = ArmGoal { solutions: 4, apart: 0.2, ..ArmGoal::from_pose(tip) };
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached);
@@ -188,7 +188,7 @@ proptest! {
         let values = inside(&arm, &there);
         let start: Vec<f64> = values.iter().zip(off).map(|(v, off)| v + off).collect();
         let asked = if whole { PoseMask::POSE } else { PoseMask::POSITION };
-        let tip = arm.forward(&values).tip;
+        let tip = arm.forward_kinematics(&values).tip;
         let goal = ArmGoal { nearest: true, restarts: 20, asked, ..ArmGoal::from_pose(tip) };
         let answer = arm.solve(&goal, &start).expect("right");
         prop_assert!(answer.reached && answer.others.is_empty());
@@ -219,7 +219,7 @@ fn full_turns_are_no_posture_of_their_own_and_the_nearest_counts() {
 fn orientations_out_of_reach_are_told_as_such() {
     let arm = six();
     // As far as the arm gets, it points outward.
-    let far = arm.forward(&[0.0; 6]).tip.origin_m;
+    let far = arm.forward_kinematics(&[0.0; 6]).tip.origin_m;
     let back = Transform::from_origin(&Origin { xyz_m: far, rpy_rad: [3.0, 0.0, 0.0] });
     let goal = ArmGoal { ignore_limits: true, restarts: 20, ..ArmGoal::from_pose(back) };
     let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
@@ -238,7 +238,7 @@ fn shared_arms_take_poses_that_they_have_taken() {
         for seed in 0..20u32 {
             let share = |k: usize| (f64::from(seed) * 0.37 + k as f64 * 0.618_034).fract();
             let shares: Vec<f64> = (0..arm.variables.len()).map(share).collect();
-            let goal = ArmGoal::from_pose(arm.forward(&inside(&arm, &shares)).tip);
+            let goal = ArmGoal::from_pose(arm.forward_kinematics(&inside(&arm, &shares)).tip);
             let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
             assert!(answer.reached, "{name}: {:?}", answer.reason);
             assert_met(&arm, &goal, &answer.values);

@@ -1,8 +1,10 @@
 //! Checks of states that come in over the network: whichever bytes arrive, every state that a host accepts can be
 //! computed with.
 
-use super::hosted_aircraft::HostedAircraft;
-use super::state::{Coordinator, CoordinatorTask, HierarchyData, MemberData, samples_per_round};
+use super::hosted_aircraft::HostAircraft;
+use super::state::{
+    Coordinator, CoordinatorMemberData, CoordinatorTask, HierarchyData, samples_per_round,
+};
 use crate::agents::participant::InvalidMessage;
 use crate::agents::{ActionChoice, CommonKnowledge};
 
@@ -12,7 +14,7 @@ use crate::agents::{ActionChoice, CommonKnowledge};
 /// When it cannot be such a state.
 pub(super) fn check_state(
     state: &Coordinator,
-    services: &HostedAircraft,
+    services: &HostAircraft,
     number: usize,
 ) -> Result<(), InvalidMessage> {
     let airplanes = &state.data.airplanes;
@@ -21,9 +23,9 @@ pub(super) fn check_state(
     match &state.hierarchy {
         Some(hierarchy) if is_above => {
             check_hierarchy(hierarchy, services)?;
-            InvalidMessage::Airplane.unless(are_members(&places, services))?;
+            InvalidMessage::Airplane.ensure(are_members(&places, services))?;
         }
-        None if !is_above => InvalidMessage::Airplane.unless(places == services.parts[number])?,
+        None if !is_above => InvalidMessage::Airplane.ensure(places == services.parts[number])?,
         _ => return Err(InvalidMessage::Kind),
     }
     // The next step computes with the predictions of those that it has visited in this round.
@@ -34,28 +36,28 @@ pub(super) fn check_state(
         CoordinatorTask::Collect(k) => (is_above && k <= services.parts.len(), places.len()),
         CoordinatorTask::HandBack(k) => (is_above && k <= services.parts.len(), 0),
     };
-    InvalidMessage::Kind.unless(is_of_level)?;
-    InvalidMessage::Round.unless(known <= places.len())?;
+    InvalidMessage::Kind.ensure(is_of_level)?;
+    InvalidMessage::Round.ensure(known <= places.len())?;
     let common = &*services.own.common;
     let rounds = common.settings.stop.max_rounds;
-    InvalidMessage::Round.unless(state.data.round <= rounds && state.data.calm <= rounds)?;
+    InvalidMessage::Round.ensure(state.data.round <= rounds && state.data.calm <= rounds)?;
     airplanes.iter().enumerate().try_for_each(|(k, one)| check_member(one, k < known, common))
 }
 
 fn check_hierarchy(
     hierarchy: &HierarchyData,
-    services: &HostedAircraft,
+    services: &HostAircraft,
 ) -> Result<(), InvalidMessage> {
     let HierarchyData { epochs, missing, unreachable } = hierarchy;
     let group = services.own.common.ids.len();
     let parts = services.parts.len();
-    InvalidMessage::Length.unless([epochs.len(), missing.len()] == [parts; 2])?;
-    InvalidMessage::Length.unless(unreachable.len() <= group)?;
-    InvalidMessage::Round.unless(epochs.iter().all(|epoch| epoch.is_valid_for(group)))
+    InvalidMessage::Length.ensure([epochs.len(), missing.len()] == [parts; 2])?;
+    InvalidMessage::Length.ensure(unreachable.len() <= group)?;
+    InvalidMessage::Round.ensure(epochs.iter().all(|epoch| epoch.is_valid_for(group)))
 }
 
 /// Returns whether all are members of the group, and none is there twice.
-fn are_members(places: &[usize], services: &HostedAircraft) -> bool {
+fn are_members(places: &[usize], services: &HostAircraft) -> bool {
     let mut sorted = places.to_vec();
     sorted.sort_unstable();
     let are_unique = sorted.windows(2).all(|pair| pair[0] != pair[1]);
@@ -64,7 +66,7 @@ fn are_members(places: &[usize], services: &HostedAircraft) -> bool {
 
 /// Checks the data of an airplane of the group, which must have predictions if they are `known`.
 fn check_member(
-    airplane: &MemberData,
+    airplane: &CoordinatorMemberData,
     known: bool,
     common: &CommonKnowledge,
 ) -> Result<(), InvalidMessage> {
@@ -75,24 +77,32 @@ fn check_member(
         None if airplane.is_presumed => 1,
         None => actions,
     };
-    let MemberData { place, beacon, samples, predictions, own_costs, separation_m, levels, .. } =
-        airplane;
+    let CoordinatorMemberData {
+        place,
+        beacon,
+        samples,
+        predictions,
+        own_costs,
+        separation_m,
+        levels,
+        ..
+    } = airplane;
     if known || !predictions.is_empty() {
         common.check_predictions(predictions, expected)?;
     }
-    InvalidMessage::Length.unless(own_costs.len() == predictions.len())?;
-    InvalidMessage::Length.unless(samples.is_empty() || Some(samples.len()) == block)?;
+    InvalidMessage::Length.ensure(own_costs.len() == predictions.len())?;
+    InvalidMessage::Length.ensure(samples.is_empty() || Some(samples.len()) == block)?;
     let is_player = airplane.player.as_ref().is_none_or(|player| player.has_strategies(actions));
     let is_wide = (0.0..f64::INFINITY).contains(separation_m);
     let are_numbers = own_costs.iter().all(|cost| cost.is_finite());
     let is_level = levels.low_m <= levels.high_m && samples.iter().all(|&x| x < actions);
-    InvalidMessage::Number.unless(is_player && is_wide && are_numbers && is_level)?;
+    InvalidMessage::Number.ensure(is_player && is_wide && are_numbers && is_level)?;
     beacon.as_ref().map_or(Ok(()), |beacon| common.check_beacon(*place, beacon))?;
     airplane.decided.as_ref().map_or(Ok(()), |one| check_choice(one, actions))
 }
 
 fn check_choice(decided: &ActionChoice, actions: usize) -> Result<(), InvalidMessage> {
-    InvalidMessage::Length.unless(decided.expected.len() == actions)?;
+    InvalidMessage::Length.ensure(decided.expected.len() == actions)?;
     let are_finite = decided.expected.iter().all(|cost| cost.is_finite());
-    InvalidMessage::Number.unless(decided.chosen < actions && are_finite)
+    InvalidMessage::Number.ensure(decided.chosen < actions && are_finite)
 }

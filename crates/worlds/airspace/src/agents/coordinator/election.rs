@@ -1,8 +1,10 @@
 //! Elections: how a missing coordinator is brought back.
 
-use super::epoch::{Epoch, is_majority};
+use super::epoch::{CoordinatorEpoch, is_majority};
 use super::messages::{CoordinatorMessage, VoteRequest};
-use super::replica::{Candidate, CoordinatorReplica, ElectionCause, ReplicaRole, StateCopy};
+use super::replica::{
+    CoordinatorReplica, CoordinatorStateCopy, ElectionCandidate, ElectionCause, ReplicaRole,
+};
 use super::{HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 
@@ -16,7 +18,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         // On a network that loses nothing, no coordinator gets lost.
         let Some(policy) = self.rules.retry_policy else { return };
         self.candidate_number = 1 + self.promised.number.max(self.candidate_number);
-        let epoch = Epoch { number: self.candidate_number, owner: self.rules.me as u16 };
+        let epoch = CoordinatorEpoch { number: self.candidate_number, owner: self.rules.me as u16 };
         let has = self.copy.as_ref().map(|copy| copy.at);
         let was_lost = missed != ElectionCause::Unheard;
         let request = VoteRequest { epoch, seen: self.newest, has, was_lost };
@@ -31,8 +33,14 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ElectionCause::OnHop(to) => Some(to),
             ElectionCause::Unheard | ElectionCause::Outdated => None,
         };
-        self.role =
-            ReplicaRole::Candidate(Candidate { request, lost, votes, heard, tries_left, due });
+        self.role = ReplicaRole::Candidate(ElectionCandidate {
+            request,
+            lost,
+            votes,
+            heard,
+            tries_left,
+            due,
+        });
         if is_elected {
             return self.restore_coordinator(moment);
         }
@@ -75,7 +83,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.defer_election(tick);
         let newer = self.copy.clone().filter(|copy| request.has.is_none_or(|has| copy.at > has));
         match newer {
-            Some(StateCopy { at, state }) => {
+            Some(CoordinatorStateCopy { at, state }) => {
                 self.send(from, &CoordinatorMessage::Vote(request.epoch, Some(at)), &state);
             }
             None => self.send(from, &CoordinatorMessage::Vote(request.epoch, None), &[]),
@@ -89,8 +97,8 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     pub(super) fn on_vote(
         &mut self,
         from: usize,
-        epoch: Epoch,
-        copy: Option<StateCopy>,
+        epoch: CoordinatorEpoch,
+        copy: Option<CoordinatorStateCopy>,
         moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
         let ReplicaRole::Candidate(candidate) = &mut self.role else { return Ok(()) };
@@ -115,7 +123,9 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Brings the coordinator back from the newest copy that a majority has, or else from nothing.
     pub(super) fn restore_coordinator(&mut self, moment: &HostMoment<'_, P::Services>) {
         let &HostMoment { services, tick } = moment;
-        let ReplicaRole::Candidate(Candidate { request, lost, .. }) = &self.role else { return };
+        let ReplicaRole::Candidate(ElectionCandidate { request, lost, .. }) = &self.role else {
+            return;
+        };
         let at = request.epoch.first_version();
         let lost = *lost;
         let number = self.number.into();

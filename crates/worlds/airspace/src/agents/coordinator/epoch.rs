@@ -11,34 +11,34 @@ const MAX_NUMBER: u32 = 1 << 24;
 /// it had to be brought back from a copy. It names the host that began it, so no two hosts begin the
 /// same one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub(super) struct Epoch {
+pub(super) struct CoordinatorEpoch {
     /// The higher one is newer.
     pub number: u32,
     /// Place of the host that began it; among equal numbers the lower one is newer.
     pub owner: u16,
 }
 
-impl Ord for Epoch {
+impl Ord for CoordinatorEpoch {
     fn cmp(&self, other: &Self) -> Ordering {
         self.number.cmp(&other.number).then(other.owner.cmp(&self.owner))
     }
 }
 
-impl PartialOrd for Epoch {
+impl PartialOrd for CoordinatorEpoch {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Epoch {
+impl CoordinatorEpoch {
     /// Returns the epoch in which all begin, without an election.
     pub(super) fn initial(owner: usize) -> Self {
         Self { number: 0, owner: owner as u16 }
     }
 
     /// Returns the start of the epoch, before the first hop.
-    pub(super) fn first_version(self) -> Version {
-        Version { epoch: self, hop: 0 }
+    pub(super) fn first_version(self) -> CoordinatorVersion {
+        CoordinatorVersion { epoch: self, hop: 0 }
     }
 
     /// Returns whether its owner is in a group of this size, and its number within reach.
@@ -49,15 +49,15 @@ impl Epoch {
 
 /// A point on a coordinator's itinerary: the epoch, and the number of hops in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub(super) struct Version {
-    pub epoch: Epoch,
+pub(super) struct CoordinatorVersion {
+    pub epoch: CoordinatorEpoch,
     /// Number of hops since the epoch began.
     pub hop: u32,
 }
 
-impl Version {
+impl CoordinatorVersion {
     /// Returns the position after the next hop.
-    pub(super) fn next(self) -> Self {
+    pub(super) fn after_hop(self) -> Self {
         Self { hop: self.hop + 1, ..self }
     }
 
@@ -79,11 +79,11 @@ mod tests {
 
     #[test]
     fn the_newest_epoch_has_the_highest_number_and_then_the_lowest_id() {
-        let epoch = |number, owner| Epoch { number, owner };
+        let epoch = |number, owner| CoordinatorEpoch { number, owner };
         let mut all = [epoch(1, 2), epoch(0, 0), epoch(2, 3), epoch(1, 0), epoch(2, 1)];
         all.sort_unstable();
         assert_eq!(all, [epoch(0, 0), epoch(1, 2), epoch(1, 0), epoch(2, 3), epoch(2, 1)]);
-        assert!(epoch(1, 0).first_version() > epoch(1, 2).first_version().next());
+        assert!(epoch(1, 0).first_version() > epoch(1, 2).first_version().after_hop());
     }
 
     #[test]

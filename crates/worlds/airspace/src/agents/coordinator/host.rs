@@ -1,10 +1,11 @@
 //! A host: the airplane's part in all coordinators of its group.
 
-use super::epoch::Epoch;
+use super::epoch::CoordinatorEpoch;
 use super::messages::{self, MessageReader};
 use super::replica::{CoordinatorReplica, HostedCoordinator, QueuedMessage};
 use super::{
-    CoordinatorStep, HostConfig, HostContext, HostMoment, HostServices, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
+    HostMoment, MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
 use std::sync::Arc;
@@ -15,13 +16,17 @@ use std::sync::Arc;
 pub(super) struct CoordinatorHost<P: MigratingCoordinator> {
     pub services: P::Services,
     pub replicas: Vec<CoordinatorReplica<P>>,
-    pub rules: Arc<HostConfig>,
+    pub rules: Arc<CoordinatorHostConfig>,
 }
 
 impl<P: MigratingCoordinator> CoordinatorHost<P> {
     /// Returns a host of coordinators, each of which visits the hosts at some places and begins on
     /// the first of them.
-    pub(super) fn new(services: P::Services, stops: &[Vec<usize>], rules: HostConfig) -> Self {
+    pub(super) fn new(
+        services: P::Services,
+        stops: &[Vec<usize>],
+        rules: CoordinatorHostConfig,
+    ) -> Self {
         let rules = Arc::new(rules);
         let replicas = stops
             .iter()
@@ -37,7 +42,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         for replica in &mut self.replicas {
             replica.start(&moment);
         }
-        self.run_all(tick);
+        self.run_coordinators(tick);
     }
 
     /// Takes a message of another host.
@@ -50,13 +55,13 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         bytes: &[u8],
         tick: u64,
     ) -> Result<(), InvalidMessage> {
-        let HostConfig { me, group, .. } = *self.rules;
+        let CoordinatorHostConfig { me, group, .. } = *self.rules;
         let reader = MessageReader { me, group, replicas: self.replicas.len() };
         let (replica, message, state) = messages::decode(bytes, from, reader)?;
         let replica = &mut self.replicas[usize::from(replica)];
         let moment = HostMoment { services: &self.services, tick };
         replica.on_message(from, message, state, &moment)?;
-        self.run_all(tick);
+        self.run_coordinators(tick);
         Ok(())
     }
 
@@ -67,7 +72,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
             let watches = self.services.is_watching(replica.number.into());
             replica.on_timer(watches, &moment);
         }
-        self.run_all(tick);
+        self.run_coordinators(tick);
     }
 
     /// Returns the tick in which something is due, whether the host itself is done or not: others
@@ -82,7 +87,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
     }
 
     /// Runs the coordinators that are here until each has left, is over, or waits.
-    fn run_all(&mut self, tick: u64) {
+    fn run_coordinators(&mut self, tick: u64) {
         for replica in &self.replicas {
             if let Some(unanswering) = &replica.unanswering {
                 self.services.on_no_majority(replica.number.into(), unanswering);
@@ -98,7 +103,8 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
 
     /// Runs a coordinator if it is here. Returns whether anything has changed for the others here.
     fn run(&mut self, k: usize, tick: u64) -> bool {
-        let epochs: Vec<Epoch> = self.replicas.iter().map(|replica| replica.promised).collect();
+        let epochs: Vec<CoordinatorEpoch> =
+            self.replicas.iter().map(|replica| replica.promised).collect();
         let is_here: Vec<bool> = self.replicas.iter().map(CoordinatorReplica::is_hosting).collect();
         let replica = &mut self.replicas[k];
         let Some(HostedCoordinator { mut coordinator, heartbeat_at, timeout_at }) =
@@ -107,7 +113,8 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
             return false;
         };
         let has_timed_out = timeout_at <= tick;
-        let context = HostContext { epochs: &epochs, is_here: &is_here, has_timed_out, tick };
+        let context =
+            CoordinatorHostContext { epochs: &epochs, is_here: &is_here, has_timed_out, tick };
         match coordinator.advance(&mut self.services, &context) {
             CoordinatorStep::Hop(to) => replica.migrate(&coordinator, to, tick),
             CoordinatorStep::Done => {}

@@ -1,6 +1,6 @@
 //! What an airplane exposes to the coordinators that it hosts, and the news that they leave there for each other.
 
-use super::HostServices;
+use super::CoordinatorHostServices;
 use super::state::RoundData;
 use crate::agents::link::ConversationEnd;
 use crate::agents::{OptimizationResult, Ownship};
@@ -8,7 +8,7 @@ use crate::flight::{Point, distance_m};
 
 /// An airplane as the coordinators on it see it.
 #[derive(Debug, Clone)]
-pub(super) struct HostedAircraft {
+pub(super) struct HostAircraft {
     pub own: Ownship,
     /// The parts of the group, each of which has a coordinator; with several there is one above them,
     /// which has the number after theirs.
@@ -36,7 +36,7 @@ pub(super) struct HierarchyReply {
     pub is_known: bool,
 }
 
-impl HostedAircraft {
+impl HostAircraft {
     pub(super) fn new(own: Ownship, parts: Vec<Vec<usize>>) -> Self {
         let part = parts.iter().position(|part| part.contains(&own.me)).unwrap_or(0);
         Self {
@@ -82,7 +82,7 @@ impl HostedAircraft {
     }
 }
 
-impl HostServices for HostedAircraft {
+impl CoordinatorHostServices for HostAircraft {
     fn is_watching(&self, number: usize) -> bool {
         // Only the part's coordinator waits for the one above it.
         let is_above = self.root_number() == Some(number) && self.report.is_some();

@@ -1,15 +1,15 @@
 //! The tours of coordinators: the airplane that they visit next, and the reason.
 
-use super::hosted_aircraft::{HierarchyReply, HostedAircraft};
-use super::state::{Coordinator, CoordinatorTask, HierarchyData, MemberData, RoundData};
-use super::{CoordinatorStep, HostContext, MigratingCoordinator, check};
+use super::hosted_aircraft::{HierarchyReply, HostAircraft};
+use super::state::{Coordinator, CoordinatorMemberData, CoordinatorTask, HierarchyData, RoundData};
+use super::{CoordinatorHostContext, CoordinatorStep, MigratingCoordinator, check};
 use crate::agents::OptimizationResult;
 use crate::agents::link::to_bytes;
 use crate::agents::participant::InvalidMessage;
 
 impl Coordinator {
     /// Gathers the data of the airplanes of its part, from number `k` on.
-    fn gather(&mut self, k: usize, services: &HostedAircraft) -> Option<CoordinatorStep> {
+    fn gather_members(&mut self, k: usize, services: &HostAircraft) -> Option<CoordinatorStep> {
         let RoundData { round, airplanes, .. } = &mut self.data;
         for (k, airplane) in airplanes.iter_mut().enumerate().skip(k) {
             if airplane.place == services.own.me {
@@ -28,8 +28,8 @@ impl Coordinator {
     /// Returns to the host that began the epoch, where the step of the algorithm is taken.
     fn return_home(
         &mut self,
-        services: &mut HostedAircraft,
-        context: &HostContext<'_>,
+        services: &mut HostAircraft,
+        context: &CoordinatorHostContext<'_>,
     ) -> Option<CoordinatorStep> {
         let home = context.epochs[services.part].owner.into();
         if services.own.me != home {
@@ -51,8 +51,8 @@ impl Coordinator {
     /// decisions are made.
     fn advance_task(
         &mut self,
-        services: &HostedAircraft,
-        context: &HostContext<'_>,
+        services: &HostAircraft,
+        context: &CoordinatorHostContext<'_>,
         next: CoordinatorTask,
         last: CoordinatorTask,
     ) -> CoordinatorTask {
@@ -61,7 +61,7 @@ impl Coordinator {
     }
 
     /// Waits for the coordinator above, which takes the data and brings the results.
-    fn wait_for_root(&mut self, services: &mut HostedAircraft) -> Option<CoordinatorStep> {
+    fn wait_for_root(&mut self, services: &mut HostAircraft) -> Option<CoordinatorStep> {
         if let Some(HierarchyReply { data, is_known }) = services.answer.take() {
             if is_known {
                 self.data = data;
@@ -85,7 +85,11 @@ impl Coordinator {
     }
 
     /// Delivers the controls to the airplanes of its part, from number `k` on.
-    fn deliver(&mut self, k: usize, services: &mut HostedAircraft) -> Option<CoordinatorStep> {
+    fn deliver_controls(
+        &mut self,
+        k: usize,
+        services: &mut HostAircraft,
+    ) -> Option<CoordinatorStep> {
         let me = services.own.me;
         // This includes an airplane that was passed over because it could not be reached then.
         self.conclude(services);
@@ -97,7 +101,7 @@ impl Coordinator {
         Some(CoordinatorStep::Hop(host))
     }
 
-    fn conclude(&self, services: &mut HostedAircraft) {
+    fn conclude(&self, services: &mut HostAircraft) {
         let airplanes = &self.data.airplanes;
         let mut beacons = vec![None; services.own.common.ids.len()];
         for airplane in airplanes {
@@ -116,8 +120,8 @@ impl Coordinator {
     /// Returns the data about the parts, with the newest epochs that a host knows.
     fn update_hierarchy(
         &mut self,
-        services: &HostedAircraft,
-        context: &HostContext<'_>,
+        services: &HostAircraft,
+        context: &CoordinatorHostContext<'_>,
     ) -> &mut HierarchyData {
         let parts = &context.epochs[..services.parts.len()];
         let hierarchy = self.hierarchy.get_or_insert_default();
@@ -132,11 +136,11 @@ impl Coordinator {
     }
 
     /// Collects the data of the parts from number `k` on.
-    fn collect(
+    fn collect_parts(
         &mut self,
         first: usize,
-        services: &mut HostedAircraft,
-        context: &HostContext<'_>,
+        services: &mut HostAircraft,
+        context: &CoordinatorHostContext<'_>,
     ) -> Option<CoordinatorStep> {
         let mut has_timed_out = context.has_timed_out;
         for k in first..services.parts.len() {
@@ -172,9 +176,9 @@ impl Coordinator {
     }
 
     /// Presumes the airplanes of a part whose coordinator cannot be found.
-    fn presume(&mut self, part: usize, services: &HostedAircraft) {
+    fn presume(&mut self, part: usize, services: &HostAircraft) {
         let presumed = services.parts[part].iter().map(|&place| {
-            let mut airplane = MemberData::new(place);
+            let mut airplane = CoordinatorMemberData::new(place);
             airplane.presume(&services.own);
             airplane
         });
@@ -185,8 +189,8 @@ impl Coordinator {
     fn return_results(
         &mut self,
         k: usize,
-        services: &mut HostedAircraft,
-        context: &HostContext<'_>,
+        services: &mut HostAircraft,
+        context: &CoordinatorHostContext<'_>,
     ) -> Option<CoordinatorStep> {
         for k in (0..k).rev() {
             self.task = CoordinatorTask::HandBack(k + 1);
@@ -219,7 +223,7 @@ impl Coordinator {
     }
 
     /// Releases a part that was left out while its coordinator waited here.
-    fn release_waiting(&self, services: &mut HostedAircraft, context: &HostContext<'_>) {
+    fn release_waiting(&self, services: &mut HostAircraft, context: &CoordinatorHostContext<'_>) {
         if context.is_here[services.part] && services.report.is_some() {
             services.set_reply(HierarchyReply { data: RoundData::default(), is_known: false });
         }
@@ -227,12 +231,13 @@ impl Coordinator {
 }
 
 impl MigratingCoordinator for Coordinator {
-    type Services = HostedAircraft;
+    type Services = HostAircraft;
 
-    fn new(services: &HostedAircraft, number: usize) -> Self {
+    fn new(services: &HostAircraft, number: usize) -> Self {
         let is_above = services.root_number() == Some(number);
         let part = services.parts.get(number).filter(|_| !is_above);
-        let airplanes = part.into_iter().flatten().map(|&place| MemberData::new(place)).collect();
+        let airplanes =
+            part.into_iter().flatten().map(|&place| CoordinatorMemberData::new(place)).collect();
         Self {
             task: if is_above { CoordinatorTask::Collect(0) } else { CoordinatorTask::Gather(0) },
             data: RoundData { airplanes, ..RoundData::default() },
@@ -246,28 +251,28 @@ impl MigratingCoordinator for Coordinator {
 
     fn decode(
         bytes: &[u8],
-        services: &HostedAircraft,
+        services: &HostAircraft,
         number: usize,
     ) -> Result<Self, InvalidMessage> {
         let read = postcard::take_from_bytes::<Self>(bytes);
         let (state, rest) = read.map_err(|_| InvalidMessage::Form)?;
-        InvalidMessage::Form.unless(rest.is_empty())?;
+        InvalidMessage::Form.ensure(rest.is_empty())?;
         check::check_state(&state, services, number)?;
         Ok(state)
     }
 
     fn advance(
         &mut self,
-        services: &mut HostedAircraft,
-        context: &HostContext<'_>,
+        services: &mut HostAircraft,
+        context: &CoordinatorHostContext<'_>,
     ) -> CoordinatorStep {
         loop {
             let step = match self.task {
-                CoordinatorTask::Gather(k) => self.gather(k, services),
+                CoordinatorTask::Gather(k) => self.gather_members(k, services),
                 CoordinatorTask::Return => self.return_home(services, context),
                 CoordinatorTask::Await => self.wait_for_root(services),
-                CoordinatorTask::Deliver(k) => self.deliver(k, services),
-                CoordinatorTask::Collect(k) => self.collect(k, services, context),
+                CoordinatorTask::Deliver(k) => self.deliver_controls(k, services),
+                CoordinatorTask::Collect(k) => self.collect_parts(k, services, context),
                 CoordinatorTask::HandBack(k) => self.return_results(k, services, context),
             };
             if let Some(step) = step {

@@ -1,6 +1,6 @@
 //! Messages between hosts, and how they are read: every message is checked before a host sees it.
 
-use super::epoch::{Epoch, Version};
+use super::epoch::{CoordinatorEpoch, CoordinatorVersion};
 use crate::agents::participant::InvalidMessage;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::network::PacketBuffer;
@@ -9,19 +9,19 @@ use sidestep_kernel::network::PacketBuffer;
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) enum CoordinatorMessage {
     /// "The coordinator is on its way to you": with its state.
-    Hop(Version),
+    Hop(CoordinatorVersion),
     /// "It has arrived here."
-    Ack(Version),
+    Ack(CoordinatorVersion),
     /// "It was alive so many ticks ago, and I know it to have come as far as this": none ago, if it is in
     /// the sender's care. Hearsay ages, or else two hosts could keep telling each other forever.
-    Alive(Version, u64),
+    Alive(CoordinatorVersion, u64),
     /// "I have accepted a newer one."
-    Stale(Epoch),
+    Stale(CoordinatorEpoch),
     /// "The coordinator is missed. Shall I bring it back?"
     Elect(VoteRequest),
     /// "You shall, as far as I am concerned": with the state of the copy that I have, if the
     /// candidate has no newer one.
-    Vote(Epoch, Option<Version>),
+    Vote(CoordinatorEpoch, Option<CoordinatorVersion>),
 }
 
 impl CoordinatorMessage {
@@ -35,18 +35,18 @@ impl CoordinatorMessage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) struct VoteRequest {
     /// The epoch that it wants to begin.
-    pub epoch: Epoch,
+    pub epoch: CoordinatorEpoch,
     /// The farthest that it knows the coordinator to have come.
-    pub seen: Version,
+    pub seen: CoordinatorVersion,
     /// The copy that it has.
-    pub has: Option<Version>,
+    pub has: Option<CoordinatorVersion>,
     /// Whether it was lost on a hop from this very host, rather than not heard of for long.
     pub was_lost: bool,
 }
 
 /// A message as it was read: the number of the coordinator that it is about, and the bytes of a
 /// state where it carries one.
-pub(super) type ParsedMessage<'a> = (u16, CoordinatorMessage, &'a [u8]);
+pub(super) type ParsedCoordinatorMessage<'a> = (u16, CoordinatorMessage, &'a [u8]);
 
 /// Returns a message in the form in which it travels: a state goes behind it.
 pub(super) fn encode(number: u16, message: &CoordinatorMessage, state: &[u8]) -> PacketBuffer {
@@ -72,13 +72,13 @@ pub(super) fn decode(
     bytes: &[u8],
     from: usize,
     reader: MessageReader,
-) -> Result<ParsedMessage<'_>, InvalidMessage> {
+) -> Result<ParsedCoordinatorMessage<'_>, InvalidMessage> {
     let MessageReader { me, group, replicas } = reader;
     let read = postcard::take_from_bytes::<(u16, CoordinatorMessage)>(bytes);
     let ((number, message), state) = read.map_err(|_| InvalidMessage::Form)?;
-    InvalidMessage::Airplane.unless(from < group && from != me)?;
-    InvalidMessage::Kind.unless(usize::from(number) < replicas)?;
-    InvalidMessage::Form.unless(message.has_state() || state.is_empty())?;
+    InvalidMessage::Airplane.ensure(from < group && from != me)?;
+    InvalidMessage::Kind.ensure(usize::from(number) < replicas)?;
+    InvalidMessage::Form.ensure(message.has_state() || state.is_empty())?;
     let is_valid = match &message {
         CoordinatorMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
         CoordinatorMessage::Ack(at) | CoordinatorMessage::Alive(at, _) => at.is_valid_for(group),
@@ -92,6 +92,6 @@ pub(super) fn decode(
             is_mine && copy.is_none_or(|copy| copy.is_valid_for(group))
         }
     };
-    InvalidMessage::Round.unless(is_valid)?;
+    InvalidMessage::Round.ensure(is_valid)?;
     Ok((number, message, state))
 }

@@ -1,6 +1,6 @@
 //! Coordinators and hosts, as they see each other.
 
-use super::epoch::Epoch;
+use super::epoch::CoordinatorEpoch;
 use crate::agents::participant::InvalidMessage;
 use sidestep_kernel::network::RetryPolicy;
 
@@ -17,12 +17,12 @@ pub(super) enum CoordinatorStep {
 
 /// The circumstances in which a coordinator is run on a host.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HostContext<'a> {
+pub(super) struct CoordinatorHostContext<'a> {
     /// The newest epoch of each coordinator of the group that the host has accepted.
-    pub epochs: &'a [Epoch],
+    pub epochs: &'a [CoordinatorEpoch],
     /// Whether each coordinator is on the host.
     pub is_here: &'a [bool],
-    /// Whether it has waited here for [`HostConfig::wait_timeout_ticks`].
+    /// Whether it has waited here for [`CoordinatorHostConfig::wait_timeout_ticks`].
     pub has_timed_out: bool,
     /// The tick on the host's own clock.
     pub tick: u64,
@@ -30,7 +30,7 @@ pub(super) struct HostContext<'a> {
 
 /// A coordinator, all of whose state migrates from host to host.
 pub(super) trait MigratingCoordinator: Sized {
-    type Services: HostServices;
+    type Services: CoordinatorHostServices;
 
     /// Returns the coordinator with this number before it has visited any host.
     fn new(services: &Self::Services, number: usize) -> Self;
@@ -52,7 +52,7 @@ pub(super) trait MigratingCoordinator: Sized {
     fn advance(
         &mut self,
         services: &mut Self::Services,
-        context: &HostContext<'_>,
+        context: &CoordinatorHostContext<'_>,
     ) -> CoordinatorStep;
 
     /// Records that a host cannot be reached.
@@ -63,7 +63,7 @@ pub(super) trait MigratingCoordinator: Sized {
 }
 
 /// What a host exposes to the coordinators that it hosts.
-pub(super) trait HostServices {
+pub(super) trait CoordinatorHostServices {
     /// Returns whether the host misses a coordinator that is not heard of.
     fn is_watching(&self, number: usize) -> bool;
 
@@ -85,7 +85,7 @@ pub(super) struct HostMoment<'a, S> {
 
 /// The rules by which a host waits for others.
 #[derive(Debug, Clone)]
-pub(super) struct HostConfig {
+pub(super) struct CoordinatorHostConfig {
     /// Size of the group.
     pub group: usize,
     /// Place of the host in the group.
@@ -98,7 +98,7 @@ pub(super) struct HostConfig {
     pub election_timeout_ticks: u64,
 }
 
-impl HostConfig {
+impl CoordinatorHostConfig {
     /// Returns the ticks after which a host that has a coordinator in its care says so: a few messages
     /// may be lost before it is missed.
     pub(super) fn heartbeat_ticks(&self) -> u64 {

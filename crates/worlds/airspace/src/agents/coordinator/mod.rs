@@ -76,9 +76,10 @@ mod replica;
 mod state;
 
 use migrating::{
-    CoordinatorStep, HostConfig, HostContext, HostMoment, HostServices, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
+    HostMoment, MigratingCoordinator,
 };
-pub use participant::HostParticipant;
+pub use participant::CoordinatorHostParticipant;
 
 #[cfg(test)]
 mod tests;

@@ -1,13 +1,13 @@
 //! A host as a participant of the conversation of its group.
 
-use super::HostConfig;
+use super::CoordinatorHostConfig;
 use super::host::CoordinatorHost;
-use super::hosted_aircraft::{HostedAircraft, partition_group};
+use super::hosted_aircraft::{HostAircraft, partition_group};
 use super::replica::QueuedMessage;
 use super::state::{Coordinator, samples_per_round};
 use crate::agents::link::{ConversationEnd, EndpointConfig};
 use crate::agents::participant::{
-    InvalidMessage, OutgoingMessage, Participant, Progress, WithOutcome,
+    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, WithOutcome,
 };
 use crate::agents::{CommonKnowledge, OptimizationResult, Ownship};
 use sidestep_kernel::EntityId;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// The program aboard one airplane that takes coordinators in, runs them, and sends them on.
 #[derive(Debug)]
-pub struct HostParticipant {
+pub struct CoordinatorHostParticipant {
     host: CoordinatorHost<Coordinator>,
     group: Arc<[EntityId]>,
     /// Number of ticks after which the conversation ends.
@@ -24,7 +24,7 @@ pub struct HostParticipant {
     is_silent: bool,
 }
 
-impl HostParticipant {
+impl CoordinatorHostParticipant {
     /// Returns the host aboard an airplane. There is one coordinator for the group, or in a hierarchy one for each
     /// part of it and one above these.
     pub fn new(own: Ownship, is_hierarchy: bool, config: EndpointConfig) -> Self {
@@ -42,7 +42,7 @@ impl HostParticipant {
             hops.saturating_mul(patience.timeout_ticks(bytes)).min(ticks / 4).max(1)
         });
         let expected = (0..group.len()).map(|place| own.is_expected(place)).collect();
-        let rules = HostConfig {
+        let rules = CoordinatorHostConfig {
             group: group.len(),
             me,
             retry_policy: patience,
@@ -53,7 +53,7 @@ impl HostParticipant {
         if parts.len() > 1 {
             stops.push((0..group.len()).collect());
         }
-        let host = CoordinatorHost::new(HostedAircraft::new(own, parts), &stops, rules);
+        let host = CoordinatorHost::new(HostAircraft::new(own, parts), &stops, rules);
         Self { host, group, ticks, is_silent }
     }
 }
@@ -67,10 +67,10 @@ fn max_state_bytes(common: &CommonKnowledge) -> usize {
     common.ids.len() * (common.max_message_bytes(block.max(actions)) + numbers) + 512
 }
 
-impl Participant for HostParticipant {
-    fn progress(&self) -> Progress {
+impl Participant for CoordinatorHostParticipant {
+    fn progress(&self) -> ConversationProgress {
         let epochs = self.host.replicas.iter().map(|replica| replica.promised.number);
-        Progress { epoch: epochs.max().unwrap_or(0), ..Progress::default() }
+        ConversationProgress { epoch: epochs.max().unwrap_or(0), ..ConversationProgress::default() }
     }
 
     fn start(&mut self, tick: u64) {
@@ -127,7 +127,7 @@ impl Participant for HostParticipant {
     }
 }
 
-impl WithOutcome for HostParticipant {
+impl WithOutcome for CoordinatorHostParticipant {
     type Outcome = OptimizationResult;
 
     fn finish(&mut self) -> ConversationEnd<OptimizationResult> {

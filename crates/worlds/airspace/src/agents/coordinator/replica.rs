@@ -2,9 +2,9 @@
 //!
 //! The protocol and the argument for it are at the head of the module above.
 
-use super::epoch::{Epoch, Version};
+use super::epoch::{CoordinatorEpoch, CoordinatorVersion};
 use super::messages::{CoordinatorMessage, VoteRequest, encode};
-use super::{HostConfig, HostMoment, MigratingCoordinator};
+use super::{CoordinatorHostConfig, HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 use sidestep_kernel::network::PacketBuffer;
 use std::sync::Arc;
@@ -18,8 +18,8 @@ pub(super) struct QueuedMessage {
 
 /// The state with which a coordinator has left a host.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct StateCopy {
-    pub at: Version,
+pub(super) struct CoordinatorStateCopy {
+    pub at: CoordinatorVersion,
     pub state: Arc<[u8]>,
 }
 
@@ -33,7 +33,7 @@ pub(super) enum ReplicaRole<P> {
     /// It has left with the state of the copy, and is not known to have arrived.
     Sending { to: usize, tries_left: u32, due: u64, heartbeat_at: u64 },
     /// It is missed, and this host wants to bring it back.
-    Candidate(Candidate),
+    Candidate(ElectionCandidate),
 }
 
 /// A coordinator on this host, with what is due if it stays here.
@@ -48,7 +48,7 @@ pub(super) struct HostedCoordinator<P> {
 
 /// A host that stands for election.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct ElectionCandidate {
     pub request: VoteRequest,
     /// The host that the coordinator could not reach from here.
     pub lost: Option<usize>,
@@ -75,22 +75,22 @@ pub(super) enum ElectionCause {
 pub(super) struct CoordinatorReplica<P> {
     /// Its number among the coordinators of the group.
     pub number: u16,
-    pub rules: Arc<HostConfig>,
+    pub rules: Arc<CoordinatorHostConfig>,
     /// Place among the hosts that miss it, which stand for election one after the other.
     rank: u64,
     /// The newest epoch that this host has accepted; it refuses older ones.
-    pub promised: Epoch,
+    pub promised: CoordinatorEpoch,
     /// The farthest that it knows the coordinator to have come.
-    pub newest: Version,
+    pub newest: CoordinatorVersion,
     /// The hop that brought the coordinator here last; earlier ones are copies on the network.
-    pub accepted: Version,
+    pub accepted: CoordinatorVersion,
     /// The highest number of an epoch that it has wanted to begin.
     pub candidate_number: u32,
     /// Tick of the last sign of life.
     pub heard_at: u64,
     /// Tick before which it does not stand for election, because another one does.
     pub quiet_until: u64,
-    pub copy: Option<StateCopy>,
+    pub copy: Option<CoordinatorStateCopy>,
     pub role: ReplicaRole<P>,
     /// The hosts that did not answer when no majority could be found, if that has happened.
     pub unanswering: Option<Vec<usize>>,
@@ -99,8 +99,8 @@ pub(super) struct CoordinatorReplica<P> {
 
 impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Returns the replica of the coordinator with this number, which starts on the first of `stops`.
-    pub(super) fn new(number: usize, stops: &[usize], rules: &Arc<HostConfig>) -> Self {
-        let first = Epoch::initial(stops[0]);
+    pub(super) fn new(number: usize, stops: &[usize], rules: &Arc<CoordinatorHostConfig>) -> Self {
+        let first = CoordinatorEpoch::initial(stops[0]);
         let rank = stops.iter().position(|&stop| stop == rules.me).unwrap_or(stops.len());
         Self {
             number: number as u16,
@@ -164,7 +164,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
 
     /// Sends the coordinator to another host.
     pub(super) fn migrate(&mut self, coordinator: &P, to: usize, tick: u64) {
-        let at = self.accepted.next();
+        let at = self.accepted.after_hop();
         let state: Arc<[u8]> = coordinator.encode().into();
         self.record_alive(at, tick);
         self.send(to, &CoordinatorMessage::Hop(at), &state);
@@ -173,7 +173,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let tries = if self.rules.expected[to] { policy.tries } else { policy.first_tries };
         let due = tick + policy.timeout_ticks(state.len());
         let heartbeat_at = tick + self.rules.heartbeat_ticks();
-        self.copy = Some(StateCopy { at, state });
+        self.copy = Some(CoordinatorStateCopy { at, state });
         self.role =
             ReplicaRole::Sending { to, tries_left: tries.saturating_sub(1), due, heartbeat_at };
     }
@@ -193,7 +193,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         match message {
             CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
             CoordinatorMessage::Vote(epoch, copy) => {
-                let copy = copy.map(|at| StateCopy { at, state: state.into() });
+                let copy = copy.map(|at| CoordinatorStateCopy { at, state: state.into() });
                 self.on_vote(from, epoch, copy, moment)?;
             }
             CoordinatorMessage::Ack(at) => self.on_ack(from, at, tick),
@@ -210,7 +210,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     fn on_hop(
         &mut self,
         from: usize,
-        at: Version,
+        at: CoordinatorVersion,
         state: &[u8],
         moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
@@ -230,13 +230,13 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         Ok(())
     }
 
-    fn acknowledge(&mut self, to: usize, at: Version) {
+    fn acknowledge(&mut self, to: usize, at: CoordinatorVersion) {
         if self.rules.retry_policy.is_some() {
             self.send(to, &CoordinatorMessage::Ack(at), &[]);
         }
     }
 
-    fn on_ack(&mut self, from: usize, at: Version, tick: u64) {
+    fn on_ack(&mut self, from: usize, at: CoordinatorVersion, tick: u64) {
         let is_awaited = matches!(self.role, ReplicaRole::Sending { to, .. } if to == from);
         if is_awaited && self.copy.as_ref().is_some_and(|copy| copy.at == at) {
             self.role = ReplicaRole::Idle;
@@ -245,7 +245,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Receives the news that it was alive some ticks ago.
-    fn on_alive(&mut self, from: usize, at: Version, ago: u64, tick: u64) {
+    fn on_alive(&mut self, from: usize, at: CoordinatorVersion, ago: u64, tick: u64) {
         if at.epoch < self.promised {
             return self.send(from, &CoordinatorMessage::Stale(self.promised), &[]);
         }
@@ -255,7 +255,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ReplicaRole::Hosting(_) => at.epoch > self.accepted.epoch,
             // It has arrived, if the host that it went to knows of it, or if it has come farther.
             ReplicaRole::Sending { to, .. } => self.has_arrived(*to, from, at),
-            ReplicaRole::Candidate(Candidate { request, lost, .. }) => match lost {
+            ReplicaRole::Candidate(ElectionCandidate { request, lost, .. }) => match lost {
                 Some(lost) => self.has_arrived(*lost, from, at),
                 // The hearsay of others is of use unless it is so old that the coordinator is
                 // missed all the same.
@@ -268,7 +268,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.record_alive(at, tick.saturating_sub(ago));
     }
 
-    fn has_arrived(&self, to: usize, from: usize, at: Version) -> bool {
+    fn has_arrived(&self, to: usize, from: usize, at: CoordinatorVersion) -> bool {
         let left = self.copy.as_ref().map(|copy| copy.at);
         left.is_none_or(|left| at > left || (at == left && from == to))
     }
@@ -276,7 +276,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Receives the news that a newer epoch was accepted by another host. A host that has the
     /// coordinator in its care wants to bring it back in a still newer one, unless one is alive in
     /// that one.
-    fn on_stale(&mut self, epoch: Epoch, moment: &HostMoment<'_, P::Services>) {
+    fn on_stale(&mut self, epoch: CoordinatorEpoch, moment: &HostMoment<'_, P::Services>) {
         if epoch <= self.promised {
             return;
         }
@@ -285,8 +285,10 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ReplicaRole::Idle => {}
             ReplicaRole::Sending { .. } => self.start_election(ElectionCause::Outdated, moment),
             ReplicaRole::Hosting(HostedCoordinator { coordinator, .. }) => {
-                self.copy =
-                    Some(StateCopy { at: self.accepted, state: coordinator.encode().into() });
+                self.copy = Some(CoordinatorStateCopy {
+                    at: self.accepted,
+                    state: coordinator.encode().into(),
+                });
                 self.start_election(ElectionCause::Outdated, moment);
             }
             ReplicaRole::Candidate(candidate) if candidate.request.epoch > epoch => {
@@ -297,7 +299,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Records that the coordinator was alive at a tick, and has come as far as this.
-    pub(super) fn record_alive(&mut self, at: Version, heard_at: u64) {
+    pub(super) fn record_alive(&mut self, at: CoordinatorVersion, heard_at: u64) {
         self.promised = self.promised.max(at.epoch);
         self.newest = self.newest.max(at);
         self.heard_at = self.heard_at.max(heard_at);

@@ -1,10 +1,10 @@
 //! The state of a coordinator: its data about the airplanes that it serves, and the steps of the
 //! algorithm on them.
 
-use super::epoch::Epoch;
+use super::epoch::CoordinatorEpoch;
 use crate::agents::traffic_state::StateBeacon;
 use crate::agents::{ActionChoice, CommonKnowledge, Ownship};
-use crate::flight::{Levels, Prediction};
+use crate::flight::{FlightLevelRange, Prediction};
 use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
@@ -12,7 +12,7 @@ use sidestep_kernel::interrupt;
 
 /// A coordinator's data about one airplane.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct MemberData {
+pub(super) struct CoordinatorMemberData {
     /// Place of the airplane in the group.
     pub place: usize,
     pub beacon: Option<StateBeacon>,
@@ -24,7 +24,7 @@ pub(super) struct MemberData {
     /// Cost of the predictions to the airplane itself.
     pub own_costs: Vec<f64>,
     pub separation_m: f64,
-    pub levels: Levels,
+    pub levels: FlightLevelRange,
     /// Whether it could not be reached, so that its only prediction is presumed.
     pub is_presumed: bool,
     pub decided: Option<ActionChoice>,
@@ -36,7 +36,7 @@ pub(super) struct RoundData {
     /// Number of rounds made, and of calm ones at the end of them.
     pub round: u32,
     pub calm: u32,
-    pub airplanes: Vec<MemberData>,
+    pub airplanes: Vec<CoordinatorMemberData>,
     /// Whether the decisions are made.
     pub is_final: bool,
 }
@@ -62,7 +62,7 @@ pub(super) enum CoordinatorTask {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct HierarchyData {
     /// The newest known epoch of each part's coordinator, which says where that one is at home.
-    pub epochs: Vec<Epoch>,
+    pub epochs: Vec<CoordinatorEpoch>,
     /// Whether each part is left out, because its coordinator cannot be found.
     pub missing: Vec<bool>,
     /// Places of hosts that could not be reached.
@@ -86,7 +86,7 @@ pub(super) fn samples_per_round(common: &CommonKnowledge) -> Option<usize> {
     }
 }
 
-impl MemberData {
+impl CoordinatorMemberData {
     /// Returns an airplane that is not visited yet.
     pub(super) fn new(place: usize) -> Self {
         Self { place, ..Self::default() }
@@ -191,7 +191,7 @@ impl RoundData {
     ) {
         interrupt::check();
         let stop = common.settings.stop;
-        let change = self.learn(common, block, ageing);
+        let change = self.learn_from_samples(common, block, ageing);
         self.calm = stop.count_calm_rounds(self.calm, change);
         self.round += 1;
         let is_over = self.calm >= stop.calm_rounds || self.round >= stop.max_rounds;
@@ -207,7 +207,7 @@ impl RoundData {
 
     /// Computes the costs once all predictions of a round are known, summed in the same order as everywhere
     /// else, and updates every player. Returns the largest change of a probability.
-    fn learn(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
+    fn learn_from_samples(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
         let mut total = Vec::with_capacity(block);
         for k in 0..block {
             let parts = (0..self.airplanes.len()).map(|i| self.collision_cost(common, i, k));
@@ -216,7 +216,9 @@ impl RoundData {
         let settings = common.settings;
         let mut max_change: f64 = 0.0;
         for airplane in &mut self.airplanes {
-            let MemberData { player: Some(player), samples, .. } = airplane else { continue };
+            let CoordinatorMemberData { player: Some(player), samples, .. } = airplane else {
+                continue;
+            };
             if samples.is_empty() {
                 continue;
             }
@@ -239,7 +241,8 @@ impl RoundData {
             // Others are to keep farther away from one that is presumed.
             let other_separation_m = if other.is_presumed { other.separation_m } else { 0.0 };
             let r = own.separation_m.max(other_separation_m);
-            cost += objective.collision(&own.predictions[k], &other.predictions[k], [r, r])[0];
+            cost +=
+                objective.collision_costs(&own.predictions[k], &other.predictions[k], [r, r])[0];
         }
         cost
     }

@@ -36,7 +36,7 @@ impl ObservedAircraft {
             self.aircraft;
         let claimed = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
         let is_filed = claimed == [omega_max_rad_s, orbit_rad_s, separation_m];
-        InvalidMessage::Plan.unless(is_filed && beacon.pose == pose)?;
+        InvalidMessage::Plan.ensure(is_filed && beacon.pose == pose)?;
         beacon.check(self.max_speed_m_s)
     }
 }
@@ -85,10 +85,10 @@ impl ExchangeSetup {
         self.aircraft[place].check_beacon(beacon)?;
         let is_valid_pose =
             orbit_pose.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(orbit_pose.at);
-        InvalidMessage::Number.unless(is_valid_pose)?;
+        InvalidMessage::Number.ensure(is_valid_pose)?;
         let are_known = exempt.iter().all(|&id| (id as usize) < self.airplanes);
-        InvalidMessage::Airplane.unless(are_known && is_ascending(exempt))?;
-        InvalidMessage::Length.unless(profiles.len() <= self.aircraft[place].max_profiles)?;
+        InvalidMessage::Airplane.ensure(are_known && is_ascending(exempt))?;
+        InvalidMessage::Length.ensure(profiles.len() <= self.aircraft[place].max_profiles)?;
         profiles.iter().try_for_each(|profile| self.check_profile(place, profile))
     }
 
@@ -100,10 +100,10 @@ impl ExchangeSetup {
     ) -> Result<(), InvalidMessage> {
         let max_rad_s = self.aircraft[place].aircraft.omega_max_rad_s;
         InvalidMessage::Length
-            .unless(profile.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
+            .ensure(profile.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
         // Comparisons with NaN are false.
         InvalidMessage::Number
-            .unless(profile.omegas_rad_s.iter().all(|omega| omega.abs() <= max_rad_s))
+            .ensure(profile.omegas_rad_s.iter().all(|omega| omega.abs() <= max_rad_s))
     }
 
     /// Checks a list of members of the group.
@@ -111,7 +111,7 @@ impl ExchangeSetup {
         let are_members = ids
             .iter()
             .all(|id| self.aircraft.binary_search_by_key(id, |one| one.aircraft.id).is_ok());
-        InvalidMessage::Airplane.unless(is_ascending(ids) && are_members)
+        InvalidMessage::Airplane.ensure(is_ascending(ids) && are_members)
     }
 
     /// Returns the largest number of bytes of a message: a proposal with as many profiles as any airplane can have.

@@ -2,8 +2,8 @@
 
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::flight::{KnownAircraft, Pose2};
-use crate::non_cooperative::NonCooperative;
-use crate::shield::Side;
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::shield::OrbitSide;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
@@ -20,7 +20,7 @@ pub struct SurveillanceReport {
     /// Altitude in meters.
     pub altitude_m: f64,
     /// The side to which it turns, if it is seen to be on its stored orbit.
-    pub orbit: Option<Side>,
+    pub orbit: Option<OrbitSide>,
 }
 
 impl SurveillanceReport {
@@ -39,12 +39,12 @@ pub struct Beacon {
     /// Ids of those that it sees near it, rising.
     pub near: Vec<EntityId>,
     /// Non-cooperative airplanes near it, by rising id.
-    pub non_cooperative: Vec<NonCooperative>,
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
 }
 
 /// A piece of knowledge about an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Item {
+pub enum SurveillanceItem {
     /// What it says of itself; others relay it.
     Beacon(Beacon),
     /// What it has heard: sent once, when it expects no further beacon.
@@ -56,9 +56,9 @@ pub enum Item {
     },
 }
 
-impl Item {
+impl SurveillanceItem {
     /// Returns the airplane that it is about.
-    pub(super) fn about(&self) -> EntityId {
+    pub(super) fn subject_id(&self) -> EntityId {
         match self {
             Self::Beacon(beacon) => beacon.own.id,
             Self::Report { about, .. } => *about,
@@ -73,8 +73,9 @@ impl Item {
         };
         let is_known = |id: EntityId| (id as usize) < airplanes;
         let is_ascending = list.windows(2).all(|pair| pair[0] < pair[1]);
-        let are_others = list.iter().all(|&id| is_known(id) && id != self.about());
-        InvalidMessage::Airplane.unless(is_known(self.about()) && is_ascending && are_others)?;
+        let are_others = list.iter().all(|&id| is_known(id) && id != self.subject_id());
+        InvalidMessage::Airplane
+            .ensure(is_known(self.subject_id()) && is_ascending && are_others)?;
         match self {
             Self::Beacon(beacon) => beacon.check(airplanes),
             Self::Report { .. } => Ok(()),
@@ -86,12 +87,13 @@ impl Beacon {
     fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
         let SurveillanceReport { pose: Pose2 { at: [x, y], heading_rad }, altitude_m, .. } =
             self.own;
-        InvalidMessage::Number.unless(heading_rad.abs() < MAX_HEADING_RAD)?;
-        InvalidMessage::Number.unless(are_valid_coordinates([x, y, altitude_m]))?;
+        InvalidMessage::Number.ensure(heading_rad.abs() < MAX_HEADING_RAD)?;
+        InvalidMessage::Number.ensure(are_valid_coordinates([x, y, altitude_m]))?;
         let is_ascending = self.non_cooperative.windows(2).all(|pair| pair[0].slot < pair[1].slot);
         let are_known = self.non_cooperative.iter().all(|one| (one.slot as usize) < airplanes);
-        InvalidMessage::Airplane.unless(is_ascending && are_known)?;
-        InvalidMessage::Number.unless(self.non_cooperative.iter().all(NonCooperative::is_valid))
+        InvalidMessage::Airplane.ensure(is_ascending && are_known)?;
+        InvalidMessage::Number
+            .ensure(self.non_cooperative.iter().all(NonCooperativeAircraft::is_valid))
     }
 }
 

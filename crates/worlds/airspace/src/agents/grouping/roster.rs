@@ -1,12 +1,12 @@
 //! The knowledge of which airplanes see and hear each other, and the groups that follow from it.
 
-use super::beacon::{Beacon, Item};
+use super::beacon::{Beacon, SurveillanceItem};
 use sidestep_kernel::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The items that one airplane knows, its own among them.
 #[derive(Debug)]
-pub(super) struct Roster {
+pub(super) struct BeaconStore {
     beacons: BTreeMap<EntityId, Beacon>,
     reports: BTreeMap<EntityId, Vec<EntityId>>,
     /// Whether all hear all that are near them, without a report.
@@ -30,7 +30,7 @@ impl ChainSearch {
     }
 }
 
-impl Roster {
+impl BeaconStore {
     /// Returns the roster of an airplane that has heard nothing yet.
     pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
         let chain_search = ChainSearch::new(own.own.id);
@@ -73,12 +73,12 @@ impl Roster {
     }
 
     /// Returns the report of an airplane or its beacon, if that is known.
-    pub(super) fn item(&self, about: EntityId, is_report: bool) -> Option<Item> {
+    pub(super) fn item(&self, about: EntityId, is_report: bool) -> Option<SurveillanceItem> {
         if is_report {
             let heard = self.reports.get(&about)?.clone();
-            return Some(Item::Report { about, heard });
+            return Some(SurveillanceItem::Report { about, heard });
         }
-        self.beacons.get(&about).cloned().map(Item::Beacon)
+        self.beacons.get(&about).cloned().map(SurveillanceItem::Beacon)
     }
 
     /// Returns whether one airplane does not hear another one's items from itself, as far as is known.

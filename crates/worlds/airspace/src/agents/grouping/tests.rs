@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::flight::Pose2;
-use crate::shield::Side;
-use link::Agent as _;
+use crate::shield::OrbitSide;
+use link::ProtocolAgent as _;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
@@ -67,7 +67,7 @@ fn sighted(place: usize) -> SurveillanceReport {
         id: id(place),
         pose,
         altitude_m: 0.0,
-        orbit: (place == 1).then_some(Side::Left),
+        orbit: (place == 1).then_some(OrbitSide::Left),
     }
 }
 
@@ -81,9 +81,9 @@ fn found(
     let n = links.near.len();
     let mut agents: Vec<GroupingAgent> = (0..n).map(|i| links.agent(i, certainty)).collect();
     let (mut due, mut sent) = (Vec::new(), 0);
-    let mut say = |due: &mut Vec<(usize, usize, Vec<Item>)>,
+    let mut say = |due: &mut Vec<(usize, usize, Vec<SurveillanceItem>)>,
                    from: usize,
-                   outgoing: Vec<Vec<Item>>| {
+                   outgoing: Vec<Vec<SurveillanceItem>>| {
         for items in outgoing {
             let to = (0..n).filter(|&to| links.near[from][to]);
             sent += to.clone().count();
@@ -166,7 +166,7 @@ proptest! {
         let links = Links::drawn(n, near, heard, &mut draws);
         let ids = |of: &[bool]| (0..n).filter(|&j| of[j]).map(id).collect::<Vec<_>>();
         let beacon = |i: usize| Beacon { own: sighted(i), near: ids(&links.near[i]), non_cooperative: Vec::new() };
-        let mut roster = Roster::new(beacon(0), is_sure);
+        let mut roster = BeaconStore::new(beacon(0), is_sure);
         for _ in 0..12 * n {
             let i = draws.uniform_below(n as u32) as usize;
             let lie = Beacon { near: Vec::new(), ..beacon(i) };
@@ -194,7 +194,9 @@ fn a_crowd_of_hundreds_is_found_at_once() {
     for i in (1..n).rev() {
         let beacon = Beacon { own: sighted(i), near: near(i), non_cooperative: Vec::new() };
         for from in [i, 1 + i % (n - 1), i] {
-            assert!(agent.on_message(from, vec![Item::Beacon(beacon.clone())]).is_empty());
+            assert!(
+                agent.on_message(from, vec![SurveillanceItem::Beacon(beacon.clone())]).is_empty()
+            );
         }
     }
     assert_eq!(agent.outcome().expect("all is known").members.len(), n);
@@ -213,7 +215,7 @@ fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(907));
     let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, PlanCertainty::Mixable);
     let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], non_cooperative: Vec::new() };
-    let check = |beacon: &Beacon| agent.check(1, &vec![Item::Beacon(beacon.clone())]);
+    let check = |beacon: &Beacon| agent.check(1, &vec![SurveillanceItem::Beacon(beacon.clone())]);
     assert_eq!(check(&right), Ok(()));
     let altered = |alter: fn(&mut Beacon)| {
         let mut beacon = right.clone();

@@ -26,7 +26,7 @@ fn heading_rad(run: &AirspaceRun, id: usize) -> f64 {
 #[test]
 fn a_turn_is_flown_for_one_decision_and_the_last_order_counts() {
     let mut run = lone("");
-    let actions = run.teams()[0].action_spaces[0].width();
+    let actions = run.teams()[0].action_spaces[0].value_count();
     let ranking: Vec<f64> = (0..actions).map(|k| k as f64).collect();
     let orders: [(&str, &[f64]); 3] = [
         (ExternalAction::RANKING, &ranking),
@@ -60,7 +60,7 @@ fn a_velocity_is_turned_to_as_fast_as_may_be() {
 #[test]
 fn the_first_of_a_ranking_is_flown() {
     let mut run = lone("");
-    let actions = run.teams()[0].action_spaces[0].width();
+    let actions = run.teams()[0].action_spaces[0].value_count();
     // The first action turns right as fast as it can, the last proceeds.
     let first: Vec<f64> = (0..actions).map(|k| k as f64).collect();
     let last: Vec<f64> = first.iter().rev().copied().collect();
@@ -178,7 +178,7 @@ fn others_that_decide_themselves_are_observed_and_take_no_orders() {
 fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = run(1);
     let before = run.digest();
-    let actions = run.teams()[0].action_spaces[0].width();
+    let actions = run.teams()[0].action_spaces[0].value_count();
     let double = [vec![1.0], (1..actions).map(|k| k as f64).collect()].concat();
     let (turn, velocity) = (ExternalAction::TURN_RATE, ExternalAction::VELOCITY);
     let refused: [(Orders<'_>, &str); 10] = [

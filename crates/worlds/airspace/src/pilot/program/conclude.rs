@@ -1,7 +1,7 @@
 //! The conclusions that a pilot draws: from its perception, and from the conversations that it has ended.
 
 use super::Pilot;
-use super::cycle_state::CyclePhase;
+use super::cycle_state::PilotCyclePhase;
 use crate::agents::exchange::ExchangeResult;
 use crate::agents::intent::Intent;
 use crate::agents::packet::Protocol;
@@ -72,7 +72,7 @@ impl Pilot {
     fn set_candidates(&mut self, candidates: ManeuverCandidates) {
         let Some(state) = &mut self.state else { return };
         state.candidates = candidates;
-        state.phase = CyclePhase::Decided;
+        state.phase = PilotCyclePhase::Decided;
         if !self.world.shield {
             let profile = state.candidates.profiles.first().cloned().unwrap_or_default();
             let side = state.percept.own.fallback;
@@ -83,7 +83,7 @@ impl Pilot {
 
     fn finish_cycle(&mut self) {
         if let Some(state) = &mut self.state {
-            state.phase = CyclePhase::Over;
+            state.phase = PilotCyclePhase::Over;
             state.control.memory = self.memory.clone();
         }
     }
@@ -98,13 +98,13 @@ impl Pilot {
         if self.world.network.is_some() {
             state.record_end(&self.world, &ended, &self.memory.contacts);
         }
-        match std::mem::replace(&mut state.phase, CyclePhase::Decided) {
-            CyclePhase::Grouping(conversation) => {
-                self.push_past(conversation);
+        match std::mem::replace(&mut state.phase, PilotCyclePhase::Decided) {
+            PilotCyclePhase::Grouping(conversation) => {
+                self.keep_ended(conversation);
                 self.on_group(ended.outcome, tick);
             }
-            CyclePhase::Deciding(conversation) => {
-                self.push_past(conversation);
+            PilotCyclePhase::Deciding(conversation) => {
+                self.keep_ended(conversation);
                 match ended.outcome {
                     Some(ConversationOutcome::Intents(intents)) => self.on_intents(&intents),
                     Some(ConversationOutcome::Optimization(conclusion)) => {
@@ -113,11 +113,11 @@ impl Pilot {
                     _ => self.on_optimization(None),
                 }
             }
-            CyclePhase::Shielding(conversation, allowed) => {
-                self.push_past(conversation);
+            PilotCyclePhase::Shielding(conversation, allowed) => {
+                self.keep_ended(conversation);
                 self.on_exchange(ended.outcome, &allowed);
             }
-            CyclePhase::Decided | CyclePhase::Over => {}
+            PilotCyclePhase::Decided | PilotCyclePhase::Over => {}
         }
     }
 

@@ -9,27 +9,27 @@ use crate::events::{Event, EventKind};
 use crate::pilot::control::Control;
 use crate::pilot::conversations::{ConversationOutcome, DynParticipant};
 use crate::pilot::percept::{Percept, SurveillanceReport};
-use crate::pilot::schedule::Schedule;
+use crate::pilot::schedule::ConversationSchedule;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// A cycle of one airplane.
-pub(super) struct CycleState {
+pub(super) struct PilotCycleState {
     pub(super) percept: Percept,
-    pub(super) schedule: Schedule,
+    pub(super) schedule: ConversationSchedule,
     /// Ids of the airplanes that decide together as far as it knows, rising.
     pub(super) members: Arc<[EntityId]>,
     /// Airplanes near it that are not among them, by rising id.
     pub(super) unheard: Vec<SurveillanceReport>,
-    pub(super) phase: CyclePhase,
+    pub(super) phase: PilotCyclePhase,
     pub(super) candidates: ManeuverCandidates,
     /// Its control, as far as that is decided.
     pub(super) control: Control,
 }
 
 /// The part of a cycle that an airplane is in.
-pub(super) enum CyclePhase {
+pub(super) enum PilotCyclePhase {
     /// A conversation that finds the group.
     Grouping(Conversation<DynParticipant>),
     /// A conversation in which candidates are chosen.
@@ -54,23 +54,23 @@ pub(super) enum ConversationTiming {
     Past,
 }
 
-impl CycleState {
+impl PilotCycleState {
     /// Returns the conversation that it is in; `None` between two of them and after the last.
     pub(super) fn conversation(&mut self) -> Option<&mut Conversation<DynParticipant>> {
         match &mut self.phase {
-            CyclePhase::Grouping(conversation)
-            | CyclePhase::Deciding(conversation)
-            | CyclePhase::Shielding(conversation, _) => Some(conversation),
-            CyclePhase::Decided | CyclePhase::Over => None,
+            PilotCyclePhase::Grouping(conversation)
+            | PilotCyclePhase::Deciding(conversation)
+            | PilotCyclePhase::Shielding(conversation, _) => Some(conversation),
+            PilotCyclePhase::Decided | PilotCyclePhase::Over => None,
         }
     }
 
     /// Returns where a conversation stands that is none of those that it has been in.
     pub(super) fn timing_of(&self, conversation: &ConversationId) -> ConversationTiming {
         let topic = match self.phase {
-            CyclePhase::Grouping(_) => Protocol::Group,
-            CyclePhase::Deciding(_) | CyclePhase::Decided => Protocol::Decision,
-            CyclePhase::Shielding(..) | CyclePhase::Over => Protocol::Shield,
+            PilotCyclePhase::Grouping(_) => Protocol::Group,
+            PilotCyclePhase::Deciding(_) | PilotCyclePhase::Decided => Protocol::Decision,
+            PilotCyclePhase::Shielding(..) | PilotCyclePhase::Over => Protocol::Shield,
         };
         let here = ConversationId {
             topic,
@@ -92,16 +92,16 @@ impl CycleState {
     /// Records the packets of the conversation that it is in, and the time that it took.
     pub(super) fn record_traffic(&mut self, ticks: u64) {
         let (traffic, recorded) = match &self.phase {
-            CyclePhase::Grouping(conversation) => {
+            PilotCyclePhase::Grouping(conversation) => {
                 (conversation.traffic(), &mut self.control.grouping)
             }
-            CyclePhase::Deciding(conversation) => {
+            PilotCyclePhase::Deciding(conversation) => {
                 (conversation.traffic(), &mut self.control.deciding)
             }
-            CyclePhase::Shielding(conversation, _) => {
+            PilotCyclePhase::Shielding(conversation, _) => {
                 (conversation.traffic(), &mut self.control.shielding)
             }
-            CyclePhase::Decided | CyclePhase::Over => return,
+            PilotCyclePhase::Decided | PilotCyclePhase::Over => return,
         };
         *recorded = NetworkTraffic { ticks, ..traffic };
     }
@@ -114,7 +114,7 @@ impl CycleState {
         contacts: &TrafficPicture,
     ) {
         // Where groups are found, missing airplanes are noted once the members are known.
-        let is_group = matches!(self.phase, CyclePhase::Grouping(_));
+        let is_group = matches!(self.phase, PilotCyclePhase::Grouping(_));
         let missing = end.unheard.iter().filter(|_| !is_group);
         self.record_unheard(
             world,
@@ -138,7 +138,7 @@ impl CycleState {
     /// Returns the ids of the airplanes that the participant to the present conversation knows, by their places.
     fn conversation_members(&self) -> Vec<EntityId> {
         match self.phase {
-            CyclePhase::Shielding(..) => self.exchange_members(),
+            PilotCyclePhase::Shielding(..) => self.exchange_members(),
             _ => self.members.to_vec(),
         }
     }

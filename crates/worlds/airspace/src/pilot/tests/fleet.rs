@@ -190,7 +190,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
     let profile = |omegas_rad_s: Vec<f64>| Maneuver::Profile {
         candidate: 0,
         profile: crate::shield::TurnProfile { omegas_rad_s },
-        side: crate::shield::Side::Left,
+        side: crate::shield::OrbitSide::Left,
     };
     let wrong: [(Vec<Control>, &str); 7] = [
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),

@@ -79,7 +79,7 @@ fn reachable(path: &Path, draws: &mut Draws) -> (usize, Vec<[f64; 3]>) {
         };
         let limits = arm.variables.iter().map(|v| v.limits.map(|l| [l.lower, l.upper]));
         let values: Vec<f64> = limits.map(&mut value).collect();
-        arm.forward(&values).tip.origin_m
+        arm.forward_kinematics(&values).tip.origin_m
     };
     let targets = (0..4).map(|_| target()).collect();
     (arm.skeleton().rods.len(), targets)

@@ -7,20 +7,20 @@
 
 use super::ConnectorAgent;
 use crate::agents::control::LeaderOutcome;
-use crate::agents::message::{LeadOrder, Message};
+use crate::agents::message::{LeadOrder, NeighborMessage};
 use crate::agents::percept::Intention;
-use crate::agents::side::Side;
+use crate::agents::side::ChainSide;
 use crate::motion::recovery::{ChainEnd, ChainMover, RecoveryLadder, RecoveryOutcome, farther_end};
 use sidestep_rods::geometry::{Point, normalized, sub};
 use sidestep_rods::serde_point::WirePoint;
-use sidestep_rods::{Motion, Outcome, Request, Veto, VetoEffect, VetoReason};
+use sidestep_rods::{MotionOutcome, MotionRequest, RequestedMotion, Veto, VetoEffect, VetoReason};
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RecoveryProgress<const D: usize> {
     intention: Intention<D>,
     start: Point<D>,
     /// Answers so far.
-    answers: Vec<LadderAnswer<D>>,
+    answers: Vec<RecoveryAnswer<D>>,
     /// Whether it waits for the next one.
     waits: bool,
     /// Number of motions so far.
@@ -29,9 +29,9 @@ pub(super) struct RecoveryProgress<const D: usize> {
 
 /// The answer to one question of the ladder; answers are in the order of the questions.
 #[derive(Debug, Clone, PartialEq)]
-enum LadderAnswer<const D: usize> {
+enum RecoveryAnswer<const D: usize> {
     /// The outcome of a motion, after which the leader is at a place.
-    Outcome(Outcome<D>, Point<D>),
+    Outcome(MotionOutcome<D>, Point<D>),
     /// Place and direction of the far end; none in a chain of a single connector.
     End(Option<ChainEnd<D>>),
     /// The target is beyond all coordinates.
@@ -40,17 +40,17 @@ enum LadderAnswer<const D: usize> {
 
 /// A question of the ladder that has no answer yet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum LadderQuestion<const D: usize> {
+enum RecoveryQuestion<const D: usize> {
     /// A motion, or only whether it would be possible.
-    Motion { request: Request<D>, only_asks: bool },
+    Motion { request: MotionRequest<D>, only_asks: bool },
     /// Where the far end of the chain is, and in which direction its rod points.
     End,
 }
 
 /// Reason for which a climb does not go on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum HaltReason<const D: usize> {
-    Asks(LadderQuestion<D>),
+enum RecoveryHaltReason<const D: usize> {
+    Asks(RecoveryQuestion<D>),
     Beyond,
 }
 
@@ -63,70 +63,79 @@ impl<const D: usize> RecoveryProgress<D> {
 /// A chain that answers as it did before.
 struct AnswerReplay<'a, const D: usize> {
     at: Point<D>,
-    answers: std::slice::Iter<'a, LadderAnswer<D>>,
+    answers: std::slice::Iter<'a, RecoveryAnswer<D>>,
 }
 
 impl<const D: usize> AnswerReplay<'_, D> {
     fn outcome(
         &mut self,
-        request: &Request<D>,
+        request: &MotionRequest<D>,
         only_asks: bool,
-    ) -> Result<Outcome<D>, HaltReason<D>> {
+    ) -> Result<MotionOutcome<D>, RecoveryHaltReason<D>> {
         match self.answers.next() {
-            Some(LadderAnswer::Outcome(outcome, at)) => {
+            Some(RecoveryAnswer::Outcome(outcome, at)) => {
                 self.at = *at;
                 Ok(outcome.clone())
             }
-            Some(_) => Err(HaltReason::Beyond),
-            None => Err(HaltReason::Asks(LadderQuestion::Motion { request: *request, only_asks })),
+            Some(_) => Err(RecoveryHaltReason::Beyond),
+            None => Err(RecoveryHaltReason::Asks(RecoveryQuestion::Motion {
+                request: *request,
+                only_asks,
+            })),
         }
     }
 }
 
 impl<const D: usize> ChainMover<D> for AnswerReplay<'_, D> {
-    type Failure = HaltReason<D>;
+    type Failure = RecoveryHaltReason<D>;
 
     fn place(&self, _: usize) -> Point<D> {
         self.at
     }
 
-    fn request(&mut self, request: &Request<D>) -> Result<Outcome<D>, HaltReason<D>> {
+    fn request(
+        &mut self,
+        request: &MotionRequest<D>,
+    ) -> Result<MotionOutcome<D>, RecoveryHaltReason<D>> {
         self.outcome(request, false)
     }
 
-    fn find_veto(&mut self, request: &Request<D>) -> Result<Option<Veto<D>>, HaltReason<D>> {
+    fn find_veto(
+        &mut self,
+        request: &MotionRequest<D>,
+    ) -> Result<Option<Veto<D>>, RecoveryHaltReason<D>> {
         Ok(self.outcome(request, true)?.veto().copied())
     }
 
-    fn other_end(&mut self, _: usize) -> Result<Option<ChainEnd<D>>, HaltReason<D>> {
+    fn other_end(&mut self, _: usize) -> Result<Option<ChainEnd<D>>, RecoveryHaltReason<D>> {
         match self.answers.next() {
-            Some(LadderAnswer::End(end)) => Ok(*end),
-            Some(_) => Err(HaltReason::Beyond),
-            None => Err(HaltReason::Asks(LadderQuestion::End)),
+            Some(RecoveryAnswer::End(end)) => Ok(*end),
+            Some(_) => Err(RecoveryHaltReason::Beyond),
+            None => Err(RecoveryHaltReason::Asks(RecoveryQuestion::End)),
         }
     }
 }
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Climbs as far as its answers reach; returns whether there was anything to do.
-    pub(super) fn continue_climb(&mut self) -> bool {
+    pub(super) fn continue_recovery(&mut self) -> bool {
         let Some(climbing) = self.climbing.as_mut().filter(|climbing| !climbing.waits) else {
             return false;
         };
         climbing.waits = true;
         let RecoveryProgress { intention, start, answers, .. } = &*climbing;
         let mut ladder = RecoveryLadder { rungs: self.rungs, memory: intention.memory.clone() };
-        let motion = Motion::Connector { k: self.me as usize, to: intention.to.0 };
-        let request = Request { motion, source: intention.source, mode: VetoEffect::Exact };
+        let motion = RequestedMotion::Connector { k: self.me as usize, to: intention.to.0 };
+        let request = MotionRequest { motion, source: intention.source, mode: VetoEffect::Exact };
         let mut replay = AnswerReplay { at: *start, answers: answers.iter() };
-        let climbed = ladder.climb_with(&mut replay, &request, &intention.situation);
+        let climbed = ladder.move_or_recover_with(&mut replay, &request, &intention.situation);
         let (climbed, objection) = match climbed {
             Ok(climbed) => climbed,
-            Err(HaltReason::Asks(question)) => {
+            Err(RecoveryHaltReason::Asks(question)) => {
                 self.ask_chain(question);
                 return true;
             }
-            Err(HaltReason::Beyond) => {
+            Err(RecoveryHaltReason::Beyond) => {
                 let by = self.me as usize;
                 let reason = VetoReason::Limit;
                 let veto = Veto { by, from: by, reason, obstacle: None, reached: replay.at };
@@ -139,17 +148,17 @@ impl<const D: usize> ConnectorAgent<D> {
         true
     }
 
-    fn ask_chain(&mut self, question: LadderQuestion<D>) {
+    fn ask_chain(&mut self, question: RecoveryQuestion<D>) {
         match question {
-            LadderQuestion::End if self.n == 1 => self.add_answer(LadderAnswer::End(None)),
-            LadderQuestion::End => self.send(self.far_side(), Message::AskEnd),
-            LadderQuestion::Motion { request, only_asks } => {
+            RecoveryQuestion::End if self.n == 1 => self.add_answer(RecoveryAnswer::End(None)),
+            RecoveryQuestion::End => self.send(self.far_side(), NeighborMessage::AskEnd),
+            RecoveryQuestion::Motion { request, only_asks } => {
                 let Some(climbing) = &mut self.climbing else { return };
                 climbing.requests += 1;
                 let (k, to) = match request.motion {
-                    Motion::Connector { k, to } => (k as u32, to),
+                    RequestedMotion::Connector { k, to } => (k as u32, to),
                     // The ladder moves single connectors only.
-                    Motion::Rod { i, to } => (i as u32, to[0]),
+                    RequestedMotion::Rod { i, to } => (i as u32, to[0]),
                 };
                 let Intention { is_empty, is_open, .. } = climbing.intention;
                 let source = request.source;
@@ -158,21 +167,21 @@ impl<const D: usize> ConnectorAgent<D> {
                 if k == self.me {
                     self.start_leading(order, None);
                 } else {
-                    self.send(self.far_side(), Message::Order(order));
+                    self.send(self.far_side(), NeighborMessage::Order(order));
                 }
             }
         }
     }
 
     /// Returns the side of the end that leads where this connector is stuck.
-    fn far_side(&self) -> Side {
+    fn far_side(&self) -> ChainSide {
         match farther_end(self.me as usize, self.n as usize) {
-            0 => Side::Below,
-            _ => Side::Above,
+            0 => ChainSide::Below,
+            _ => ChainSide::Above,
         }
     }
 
-    fn add_answer(&mut self, answer: LadderAnswer<D>) {
+    fn add_answer(&mut self, answer: RecoveryAnswer<D>) {
         if let Some(climbing) = &mut self.climbing {
             climbing.answers.push(answer);
             climbing.waits = false;
@@ -180,35 +189,35 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Takes the outcome of a motion that the ladder wanted.
-    pub(super) fn receive_outcome(&mut self, outcome: Option<Outcome<D>>) {
+    pub(super) fn receive_outcome(&mut self, outcome: Option<MotionOutcome<D>>) {
         let at = self.position.base;
         self.add_answer(
-            outcome.map_or(LadderAnswer::Beyond, |outcome| LadderAnswer::Outcome(outcome, at)),
+            outcome.map_or(RecoveryAnswer::Beyond, |outcome| RecoveryAnswer::Outcome(outcome, at)),
         );
     }
 
     /// Passes a leader's question on to the end, or answers it there.
-    pub(super) fn on_order(&mut self, from: Side, message: Message<D>) {
+    pub(super) fn on_order(&mut self, from: ChainSide, message: NeighborMessage<D>) {
         let onward = from.other();
         if self.rods[onward].is_some() {
             return self.send(onward, message);
         }
         match message {
-            Message::Order(order) if self.leading.is_none() => {
+            NeighborMessage::Order(order) if self.leading.is_none() => {
                 self.start_leading(order, Some(from))
             }
-            Message::AskEnd => {
+            NeighborMessage::AskEnd => {
                 let at = self.position.base;
                 let inward = self.beside[from].map(|track| track.base);
                 let ahead = inward.and_then(|inward| normalized(sub(at, inward)));
-                self.send(from, Message::End(WirePoint(at), ahead.map(WirePoint)));
+                self.send(from, NeighborMessage::End(WirePoint(at), ahead.map(WirePoint)));
             }
             _ => {}
         }
     }
 
     /// Passes an answer on to the leader, or takes it there.
-    pub(super) fn on_answer(&mut self, from: Side, message: Message<D>) {
+    pub(super) fn on_answer(&mut self, from: ChainSide, message: NeighborMessage<D>) {
         let is_mine = self.climbing.as_ref().is_some_and(|climbing| climbing.waits);
         if !is_mine {
             return self.send(from.other(), message);
@@ -217,11 +226,11 @@ impl<const D: usize> ConnectorAgent<D> {
             return;
         }
         match message {
-            Message::Done(outcome) => self.receive_outcome(outcome),
-            Message::End(at, ahead) => {
+            NeighborMessage::Done(outcome) => self.receive_outcome(outcome),
+            NeighborMessage::End(at, ahead) => {
                 let by = farther_end(self.me as usize, self.n as usize);
                 let end = ahead.map(|ahead| ChainEnd { by, at: at.0, ahead: ahead.0 });
-                self.add_answer(LadderAnswer::End(end));
+                self.add_answer(RecoveryAnswer::End(end));
             }
             _ => {}
         }

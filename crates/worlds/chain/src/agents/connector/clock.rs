@@ -1,10 +1,10 @@
 //! The timers of an agent, its outgoing packets, and the end of its cycle.
 
 use super::ConnectorAgent;
-use crate::agents::control::{ConnectorMove, Control};
-use crate::agents::link::Link;
+use crate::agents::control::{ConnectorControl, ConnectorMove};
+use crate::agents::link::NeighborLink;
 use crate::agents::message::{MotionProtocol, Packet};
-use crate::agents::side::Side;
+use crate::agents::side::ChainSide;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
     ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketHeader,
@@ -29,7 +29,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
     /// Sends unconfirmed messages again, and gives up a neighbor that never confirms.
     fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
-        for side in Side::ALL {
+        for side in ChainSide::ALL {
             let link = self.links[side].as_mut().filter(|_| !self.is_silent);
             if link.is_some_and(|link| link.on_timer(tick)) {
                 self.mark_missing(side, side.neighbor(self.me, self.n));
@@ -45,8 +45,8 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
         if self.is_done() {
             return None;
         }
-        let links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        links.filter_map(Link::next_retry).chain(self.deadline()).min()
+        let links = ChainSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        links.filter_map(NeighborLink::next_retry).chain(self.deadline()).min()
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
@@ -55,7 +55,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
             return Vec::new();
         }
         let mut out = Vec::new();
-        for side in Side::ALL {
+        for side in ChainSide::ALL {
             let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
             let missing = self.missing[side.other()];
             let Some(parcel) =
@@ -90,7 +90,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
 impl<const D: usize> ConnectorAgent<D> {
     /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
     fn end_cycle(&mut self) {
-        for side in Side::ALL {
+        for side in ChainSide::ALL {
             if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
                 self.mark_missing(side, side.neighbor(self.me, self.n));
             }
@@ -108,12 +108,12 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Returns whether its cycle is over. It still answers questions of its neighbors.
     pub fn is_done(&self) -> bool {
-        let mut links = Side::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
-        self.is_closed || self.is_over && links.all(Link::is_quiet)
+        let mut links = ChainSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        self.is_closed || self.is_over && links.all(NeighborLink::is_quiet)
     }
 
     /// Returns its connector's motion in this cycle; none before the cycle is over.
-    pub fn control(&self) -> Option<Control<D>> {
+    pub fn control(&self) -> Option<ConnectorControl<D>> {
         let cycle = self.cycle.filter(|_| self.is_done())?;
         let doubt = self.following.as_ref().filter(|following| following.has_consented);
         let goes = match (self.goes_in, doubt) {
@@ -123,13 +123,13 @@ impl<const D: usize> ConnectorAgent<D> {
             }
             (None, None) => ConnectorMove::Stays,
         };
-        Some(Control {
+        Some(ConnectorControl {
             connector: self.me,
             cycle,
             goes,
             led: self.led,
             ended: self.ended.clone(),
-            missing: Side::ALL.map(|side| self.missing[side]),
+            missing: ChainSide::ALL.map(|side| self.missing[side]),
             is_late: self.is_late,
             traffic: self.traffic,
         })

@@ -1,8 +1,8 @@
 //! A connector as a slave: it reacts to its master, and is the master of the next one.
 
 use super::ConnectorAgent;
-use crate::agents::message::{Consent, Message, Prepare, VetoMessage};
-use crate::agents::side::Side;
+use crate::agents::message::{ConsentMessage, NeighborMessage, PrepareMessage, VetoMessage};
+use crate::agents::side::ChainSide;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::local_solver::{LocalSolver, MasterMotion, SlavePosition, SlaveReaction};
 use sidestep_rods::serde_point::WirePoint;
@@ -14,7 +14,7 @@ pub(super) struct SlaveMotion {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     sub_step: u32,
-    master: Side,
+    master: ChainSide,
     /// Whether it has asked the connector beyond it.
     has_asked: bool,
     /// Whether it waits for the answer.
@@ -28,7 +28,7 @@ pub(super) struct SlaveMotion {
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Answers a master, or asks the next connector first.
-    pub(super) fn on_prepare(&mut self, from: Side, prepare: &Prepare<D>) {
+    pub(super) fn on_prepare(&mut self, from: ChainSide, prepare: &PrepareMessage<D>) {
         let Some(rod) = self.rods[from].filter(|_| self.leading.is_none()) else { return };
         let before = self.following.take().filter(|f| f.request == prepare.request);
         if before.is_none() {
@@ -57,8 +57,8 @@ impl<const D: usize> ConnectorAgent<D> {
     /// an earlier sub-step.
     fn follow(
         &mut self,
-        from: Side,
-        prepare: &Prepare<D>,
+        from: ChainSide,
+        prepare: &PrepareMessage<D>,
         reaction: &SlaveReaction<D>,
         had_asked: bool,
     ) {
@@ -78,26 +78,27 @@ impl<const D: usize> ConnectorAgent<D> {
             has_turned,
         });
         if asks {
-            let next = Prepare {
+            let next = PrepareMessage {
                 mo: self.position.base,
                 mn: at,
                 prev: Some(WirePoint(prepare.mn)),
                 max_bend_rad: self.solver.max_bend_rad(),
                 ..*prepare
             };
-            self.send(onward, Message::Prepare(next));
+            self.send(onward, NeighborMessage::Prepare(next));
         } else {
-            let no_slaves = Consent { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
+            let no_slaves =
+                ConsentMessage { at, touched: 0, changed: 0, rotated: 0, longest_m: 0.0 };
             let consent = if ends { no_slaves } else { self.merged_consent(&no_slaves, rotated) };
-            self.send(from, Message::Consent(consent));
+            self.send(from, NeighborMessage::Consent(consent));
         }
     }
 
     fn reaction(
         &mut self,
-        from: Side,
+        from: ChainSide,
         rod: Rod,
-        prepare: &Prepare<D>,
+        prepare: &PrepareMessage<D>,
     ) -> Result<SlaveReaction<D>, PendingVeto> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
@@ -113,17 +114,17 @@ impl<const D: usize> ConnectorAgent<D> {
         self.solver.react(&slave, &self.obstacles, &pull)
     }
 
-    fn send_veto(&mut self, to: Side, refusal: PendingVeto, may_go_elsewhere: bool) {
+    fn send_veto(&mut self, to: ChainSide, refusal: PendingVeto, may_go_elsewhere: bool) {
         let PendingVeto { reason, obstacle } = refusal;
         let by = self.me;
         let objection = VetoMessage { by, reason, obstacle, has_turned: false, may_go_elsewhere };
-        self.send(to, Message::Object(objection));
+        self.send(to, NeighborMessage::Object(objection));
     }
 
     /// Adds this connector's part to the sums of a consent.
-    fn merged_consent(&self, beyond: &Consent<D>, rotated: bool) -> Consent<D> {
+    fn merged_consent(&self, beyond: &ConsentMessage<D>, rotated: bool) -> ConsentMessage<D> {
         let displacement_m = distance(self.position.base, self.position.now);
-        Consent {
+        ConsentMessage {
             at: self.position.now,
             touched: beyond.touched + 1,
             changed: beyond.changed + u32::from(self.position.base != self.position.now),
@@ -133,7 +134,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Passes a consent on to its master, or to the motion that it leads.
-    pub(super) fn on_consent(&mut self, from: Side, consent: &Consent<D>) {
+    pub(super) fn on_consent(&mut self, from: ChainSide, consent: &ConsentMessage<D>) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         if let Some(following) = waiting {
             following.waits = false;
@@ -141,13 +142,13 @@ impl<const D: usize> ConnectorAgent<D> {
             let SlaveMotion { master, rotated, .. } = *following;
             self.record_neighbor(from, consent);
             let joined = self.merged_consent(consent, rotated);
-            self.send(master, Message::Consent(joined));
+            self.send(master, NeighborMessage::Consent(joined));
         } else if self.receive_consent(from, consent) {
             self.record_neighbor(from, consent);
         }
     }
 
-    fn record_neighbor(&mut self, side: Side, consent: &Consent<D>) {
+    fn record_neighbor(&mut self, side: ChainSide, consent: &ConsentMessage<D>) {
         if let Some(beside) = &mut self.beside[side] {
             beside.now = consent.at;
         }
@@ -155,7 +156,7 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Passes a veto on to its master, or to the motion that it leads. Where this connector had alternatives, the
     /// reason is that the search for one has reached its limit.
-    pub(super) fn on_veto(&mut self, from: Side, objection: VetoMessage) {
+    pub(super) fn on_veto(&mut self, from: ChainSide, objection: VetoMessage) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         let Some(following) = waiting else { return self.receive_veto(from, &objection) };
         following.waits = false;
@@ -172,11 +173,11 @@ impl<const D: usize> ConnectorAgent<D> {
             may_go_elsewhere: objection.may_go_elsewhere || may_go_elsewhere,
             ..objection
         };
-        self.send(master, Message::Object(objection));
+        self.send(master, NeighborMessage::Object(objection));
     }
 
     /// Carries out the motion, or returns to where it was before it, and passes that on.
-    pub(super) fn on_settle(&mut self, from: Side, request: u32, goes: bool) {
+    pub(super) fn on_settle(&mut self, from: ChainSide, request: u32, goes: bool) {
         // One that has not consented was not part of a motion that is carried out.
         let its = self.following.take_if(|motion| {
             let is_same = motion.request == request && motion.master == from;
@@ -185,7 +186,7 @@ impl<const D: usize> ConnectorAgent<D> {
         let Some(following) = its else { return };
         self.settle_motion(goes.then_some(request));
         if following.has_asked {
-            self.send(from.other(), Message::Settle { request, goes });
+            self.send(from.other(), NeighborMessage::Settle { request, goes });
         }
     }
 

@@ -3,43 +3,45 @@
 
 use super::ConnectorAgent;
 use crate::agents::control::ExecutedMotion;
-use crate::agents::message::{Consent, LeadOrder, Message, Prepare, VetoMessage};
-use crate::agents::side::{PerSide, Side};
+use crate::agents::message::{
+    ConsentMessage, LeadOrder, NeighborMessage, PrepareMessage, VetoMessage,
+};
+use crate::agents::side::{ChainSide, PerSide};
 use sidestep_rods::geometry::{Point, lerp};
 use sidestep_rods::serde_point::WirePoint;
-use sidestep_rods::{CompletedMotion, Outcome, PendingVeto, Veto};
+use sidestep_rods::{CompletedMotion, MotionOutcome, PendingVeto, Veto};
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct LeadState<const D: usize> {
+pub(super) struct LeadMotionState<const D: usize> {
     order: LeadOrder<D>,
     /// The side from which the order came; none if it is its own.
-    orderer: Option<Side>,
+    orderer: Option<ChainSide>,
     from: Point<D>,
     /// Number of sub-steps.
     n: usize,
     /// The present sub-step, from 1.
     k: usize,
-    phase: LeadPhase,
+    phase: LeadNegotiationPhase,
     has_asked: PerSide<bool>,
     moved: CompletedMotion<D>,
 }
 
 /// The next thing to do in a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum LeadPhase {
+enum LeadNegotiationPhase {
     /// The next sub-step, if there is one.
     Step,
     /// Asks one side whether it can follow.
-    Ask(Side, LengthChoice),
+    Ask(ChainSide, RodLengthChoice),
     /// Waits for its answer.
-    Wait(Side, LengthChoice),
+    Wait(ChainSide, RodLengthChoice),
     /// Ends the motion, because of an objection.
     Object(VetoMessage),
 }
 
 /// Lengths that rods which turn try.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum LengthChoice {
+enum RodLengthChoice {
     /// Another one only if the present one is blocked.
     Own,
     /// All that a rod may have: the second try, after a veto.
@@ -47,7 +49,7 @@ enum LengthChoice {
 }
 
 impl<const D: usize> ConnectorAgent<D> {
-    pub(super) fn start_leading(&mut self, order: LeadOrder<D>, orderer: Option<Side>) {
+    pub(super) fn start_leading(&mut self, order: LeadOrder<D>, orderer: Option<ChainSide>) {
         self.start_motion();
         self.following = None;
         let from = self.position.base;
@@ -64,11 +66,12 @@ impl<const D: usize> ConnectorAgent<D> {
             cut_short: None,
         };
         let phase = match self.solver.may_lead(from, order.to) {
-            Ok(()) => LeadPhase::Step,
-            Err(refusal) => LeadPhase::Object(self.own_veto(refusal)),
+            Ok(()) => LeadNegotiationPhase::Step,
+            Err(refusal) => LeadNegotiationPhase::Object(self.own_veto(refusal)),
         };
         let has_asked = PerSide::default();
-        self.leading = Some(LeadState { order, orderer, from, n, k: 0, phase, has_asked, moved });
+        self.leading =
+            Some(LeadMotionState { order, orderer, from, n, k: 0, phase, has_asked, moved });
     }
 
     fn own_veto(&self, PendingVeto { reason, obstacle }: PendingVeto) -> VetoMessage {
@@ -79,18 +82,18 @@ impl<const D: usize> ConnectorAgent<D> {
     pub(super) fn advance_leading(&mut self) -> bool {
         let Some(mut leading) = self.leading.take() else { return false };
         match leading.phase {
-            LeadPhase::Wait(..) => {
+            LeadNegotiationPhase::Wait(..) => {
                 self.leading = Some(leading);
                 return false;
             }
-            LeadPhase::Step if leading.k == leading.n => self.complete_lead(leading),
-            LeadPhase::Object(objection) => self.abort_lead(leading, &objection),
-            LeadPhase::Step => {
+            LeadNegotiationPhase::Step if leading.k == leading.n => self.complete_lead(leading),
+            LeadNegotiationPhase::Object(objection) => self.abort_lead(leading, &objection),
+            LeadNegotiationPhase::Step => {
                 leading.k += 1;
                 leading.phase = self.start_sub_step(&leading);
                 self.leading = Some(leading);
             }
-            LeadPhase::Ask(side, lengths) => {
+            LeadNegotiationPhase::Ask(side, lengths) => {
                 leading.phase = self.ask_side(&mut leading, side, lengths);
                 self.leading = Some(leading);
             }
@@ -99,38 +102,38 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Starts a sub-step, which begins where the one before has ended.
-    fn start_sub_step(&mut self, leading: &LeadState<D>) -> LeadPhase {
-        let LeadState { order, from, n, k, .. } = leading;
+    fn start_sub_step(&mut self, leading: &LeadMotionState<D>) -> LeadNegotiationPhase {
+        let LeadMotionState { order, from, n, k, .. } = leading;
         let to = if k == n { order.to } else { lerp(*from, order.to, *k as f64 / *n as f64) };
         self.accept_sub_step();
         let at = self.position.base;
         if self.solver.is_negligible(at, to) {
-            return LeadPhase::Step;
+            return LeadNegotiationPhase::Step;
         }
         if !order.is_open
             && let Err(refusal) = self.solver.check_initiator(at, to, &self.obstacles)
         {
-            return LeadPhase::Object(self.own_veto(refusal));
+            return LeadNegotiationPhase::Object(self.own_veto(refusal));
         }
         self.position.now = to;
         // Above first, as where one process moves the chain, so that both make the same bits.
-        LeadPhase::Ask(Side::Above, LengthChoice::Own)
+        LeadNegotiationPhase::Ask(ChainSide::Above, RodLengthChoice::Own)
     }
 
     fn ask_side(
         &mut self,
-        leading: &mut LeadState<D>,
-        side: Side,
-        lengths: LengthChoice,
-    ) -> LeadPhase {
+        leading: &mut LeadMotionState<D>,
+        side: ChainSide,
+        lengths: RodLengthChoice,
+    ) -> LeadNegotiationPhase {
         if self.rods[side].is_none() {
             return self.after_consent(leading, side);
         }
         // In the first sweep the connector on the other side has yet to move, and the second sweep
         // will check the bend.
-        let other = self.beside[Side::Above].filter(|_| side == Side::Below);
+        let other = self.beside[ChainSide::Above].filter(|_| side == ChainSide::Below);
         leading.has_asked[side] = true;
-        let prepare = Prepare {
+        let prepare = PrepareMessage {
             request: leading.order.request,
             sub_step: leading.k as u32,
             mo: self.position.base,
@@ -138,38 +141,42 @@ impl<const D: usize> ConnectorAgent<D> {
             prev: other.map(|track| WirePoint(track.now)),
             max_bend_rad: self.solver.max_bend_rad(),
             is_open: leading.order.is_open,
-            all_lengths: lengths == LengthChoice::All,
+            all_lengths: lengths == RodLengthChoice::All,
         };
-        self.send(side, Message::Prepare(prepare));
-        LeadPhase::Wait(side, lengths)
+        self.send(side, NeighborMessage::Prepare(prepare));
+        LeadNegotiationPhase::Wait(side, lengths)
     }
 
     /// Above is followed by below; after both the sub-step is accepted.
-    fn after_consent(&self, leading: &mut LeadState<D>, side: Side) -> LeadPhase {
-        if side == Side::Above {
-            return LeadPhase::Ask(Side::Below, LengthChoice::Own);
+    fn after_consent(
+        &self,
+        leading: &mut LeadMotionState<D>,
+        side: ChainSide,
+    ) -> LeadNegotiationPhase {
+        if side == ChainSide::Above {
+            return LeadNegotiationPhase::Ask(ChainSide::Below, RodLengthChoice::Own);
         }
         leading.moved.changed += 1;
         let me = self.me as usize;
         let touched = &mut leading.moved.touched;
         touched.start = touched.start.min(me);
         touched.end = touched.end.max(me + 1);
-        LeadPhase::Step
+        LeadNegotiationPhase::Step
     }
 
     /// Accepts the consent of one side to the motion that it leads; returns whether it waits for that.
-    pub(super) fn receive_consent(&mut self, side: Side, consent: &Consent<D>) -> bool {
+    pub(super) fn receive_consent(&mut self, side: ChainSide, consent: &ConsentMessage<D>) -> bool {
         let Some(mut leading) = self.leading.take() else { return false };
-        let waits = matches!(leading.phase, LeadPhase::Wait(from, _) if from == side);
+        let waits = matches!(leading.phase, LeadNegotiationPhase::Wait(from, _) if from == side);
         if waits {
             let me = self.me as usize;
             let moved = &mut leading.moved;
             match side {
-                Side::Below => {
+                ChainSide::Below => {
                     let first = me.saturating_sub(consent.touched as usize);
                     moved.touched.start = moved.touched.start.min(first);
                 }
-                Side::Above => {
+                ChainSide::Above => {
                     let end = (me + 1 + consent.touched as usize).min(self.n as usize);
                     moved.touched.end = moved.touched.end.max(end);
                 }
@@ -185,26 +192,26 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Accepts the veto of one side to the motion that it leads. If rods have turned, and could try other
     /// lengths, that side is asked again.
-    pub(super) fn receive_veto(&mut self, side: Side, objection: &VetoMessage) {
+    pub(super) fn receive_veto(&mut self, side: ChainSide, objection: &VetoMessage) {
         let Some(leading) = &mut self.leading else { return };
-        let LeadPhase::Wait(from, lengths) = leading.phase else { return };
+        let LeadNegotiationPhase::Wait(from, lengths) = leading.phase else { return };
         if from != side {
             return;
         }
         let VetoMessage { has_turned, may_go_elsewhere, .. } = *objection;
-        let repeats = lengths == LengthChoice::Own
+        let repeats = lengths == RodLengthChoice::Own
             && has_turned
             && may_go_elsewhere
             && self.solver.should_repeat();
         leading.phase = if repeats {
-            LeadPhase::Ask(side, LengthChoice::All)
+            LeadNegotiationPhase::Ask(side, RodLengthChoice::All)
         } else {
-            LeadPhase::Object(*objection)
+            LeadNegotiationPhase::Object(*objection)
         };
     }
 
     /// Ends a motion to which all have consented.
-    fn complete_lead(&mut self, leading: LeadState<D>) {
+    fn complete_lead(&mut self, leading: LeadMotionState<D>) {
         self.accept_sub_step();
         let goes = !leading.order.only_asks;
         let touched = &leading.moved.touched;
@@ -216,25 +223,25 @@ impl<const D: usize> ConnectorAgent<D> {
             });
         }
         self.send_settle(&leading, goes);
-        self.send_outcome(leading.orderer, Some(Outcome::Moved(leading.moved)));
+        self.send_outcome(leading.orderer, Some(MotionOutcome::Moved(leading.moved)));
     }
 
     /// Ends a motion to which a connector objects.
-    fn abort_lead(&mut self, leading: LeadState<D>, objection: &VetoMessage) {
+    fn abort_lead(&mut self, leading: LeadMotionState<D>, objection: &VetoMessage) {
         let VetoMessage { by, reason, obstacle, .. } = *objection;
         let by = by as usize;
         let from = self.me as usize;
         let reached = self.position.base;
         self.send_settle(&leading, false);
         let veto = Veto { by, from, reason, obstacle, reached };
-        self.send_outcome(leading.orderer, Some(Outcome::Vetoed(veto)));
+        self.send_outcome(leading.orderer, Some(MotionOutcome::Vetoed(veto)));
     }
 
-    fn send_settle(&mut self, leading: &LeadState<D>, goes: bool) {
+    fn send_settle(&mut self, leading: &LeadMotionState<D>, goes: bool) {
         let request = leading.order.request;
         self.settle_motion(goes.then_some(request));
-        for side in Side::ALL.into_iter().filter(|side| leading.has_asked[*side]) {
-            self.send(side, Message::Settle { request, goes });
+        for side in ChainSide::ALL.into_iter().filter(|side| leading.has_asked[*side]) {
+            self.send(side, NeighborMessage::Settle { request, goes });
         }
     }
 
@@ -246,9 +253,9 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Sends the outcome to the agent that ordered the motion, or to this one's own ladder.
-    fn send_outcome(&mut self, orderer: Option<Side>, outcome: Option<Outcome<D>>) {
+    fn send_outcome(&mut self, orderer: Option<ChainSide>, outcome: Option<MotionOutcome<D>>) {
         match orderer {
-            Some(side) => self.send(side, Message::Done(outcome)),
+            Some(side) => self.send(side, NeighborMessage::Done(outcome)),
             None => self.receive_outcome(outcome),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{network, sights};
 use crate::agents::{ConnectorAgent, ConnectorPercept, Intention, MotionProtocol};
-use crate::motion::recovery::{RecoveryLimits, RecoveryMemory, Situation};
+use crate::motion::recovery::{InitiatorSituation, RecoveryLimits, RecoveryMemory};
 use proptest::prelude::*;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::network::{
@@ -11,7 +11,7 @@ use sidestep_kernel::network::{
 };
 use sidestep_rods::geometry::Point;
 use sidestep_rods::serde_point::WirePoint;
-use sidestep_rods::{Chain, Connector, Obstacles, RequestSource, Rod, Rules};
+use sidestep_rods::{Chain, Connector, Obstacles, ReactionRules, RequestSource, Rod};
 
 const N: usize = 5;
 
@@ -24,7 +24,7 @@ fn shown(to: Point<2>) -> Vec<ConnectorPercept<2>> {
     let wish = Intention {
         to: WirePoint(to),
         source: RequestSource::Autonomous,
-        situation: Situation::default(),
+        situation: InitiatorSituation::default(),
         memory: RecoveryMemory::default(),
         is_empty: false,
         is_open: false,
@@ -34,7 +34,7 @@ fn shown(to: Point<2>) -> Vec<ConnectorPercept<2>> {
 
 fn agents() -> Vec<ConnectorAgent<2>> {
     let network = network(0.1, 0.0, 0.0, 500.0);
-    let rules = Rules { backtracks: 0, ..Rules::default() };
+    let rules = ReactionRules { backtracks: 0, ..ReactionRules::default() };
     let agent = |k| {
         ConnectorAgent::from_chain(&chain(), k, &rules, RecoveryLimits::default())
             .with_network(Some(&network))

@@ -10,7 +10,9 @@ use proptest::prelude::*;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::network::{Network, RadioOutage, TimeWindow, UnidirectionalLink};
 use sidestep_kernel::view::{FrameOptions, LogEventKind};
-use sidestep_rods::{LENGTH_TOLERANCE_M, Motion, Request, RequestSource, Rules};
+use sidestep_rods::{
+    LENGTH_TOLERANCE_M, MotionRequest, ReactionRules, RequestSource, RequestedMotion,
+};
 use sidestep_scenario::Source as Text;
 
 /// A chain of slack or fixed rods that is led along, with a network of some keys.
@@ -172,8 +174,10 @@ fn faulty(
 /// all.
 fn all_or_nothing<const D: usize>(seed: u64, network: &Network) -> Result<bool, TestCaseError> {
     let mut world = AnyWorld::<D>::new(seed);
-    let rules = Rules { self_collision: false, backtracks: 0, ..world.rules };
-    let Request { motion: Motion::Connector { k, to }, .. } = world.any_request(0.15) else {
+    let rules = ReactionRules { self_collision: false, backtracks: 0, ..world.rules };
+    let MotionRequest { motion: RequestedMotion::Connector { k, to }, .. } =
+        world.any_request(0.15)
+    else {
         return Ok(false);
     };
     let (chain, obstacles) = (&world.chain, &world.obstacles);

@@ -2,7 +2,9 @@
 
 use crate::fixtures::{clearance_m, corridor_line, corridor_walls, straight_chain};
 use sidestep_rods::geometry::distance;
-use sidestep_rods::{Obstacles, Outcome, Propagator, Request, Rod, Rotation, Rules};
+use sidestep_rods::{
+    MotionOutcome, MotionRequest, Obstacles, Propagator, ReactionRules, Rod, RotationRule,
+};
 
 /// The leader's start: in the first, straight part, which is 14 m long.
 const LEAD_M: f64 = 13.0;
@@ -21,24 +23,24 @@ fn through_the_corridor(
     followers: usize,
     rod: Rod,
     step_m: f64,
-    rotation: Rotation,
+    rotation: RotationRule,
 ) -> Run {
     let mut chain = straight_chain(LEAD_M, followers, rod, 0.25);
     let obstacles = Obstacles::new(corridor_walls(width_m), rod.max_m + 0.5).unwrap();
-    let mut propagator = Propagator::new(Rules { rotation, ..Rules::default() });
+    let mut propagator = Propagator::new(ReactionRules { rotation, ..ReactionRules::default() });
     let mut run =
         Run { vetoes: 0, least_clearance_m: 1.0, worst_rod_m: 0.0, longest_slave_steps: 0.0 };
     let line = corridor_line(step_m);
     let last = line.len() - (1.0 / step_m) as usize;
     for (at, _) in line[..last].iter().filter(|(at, _)| at[0] > LEAD_M || at[1] != 0.0) {
         let way_m = distance(*at, chain.points()[0]);
-        let request = Request::exact(0, *at);
+        let request = MotionRequest::operator_request(0, *at);
         match propagator.propagate(&mut chain, &obstacles, &request).unwrap() {
-            Outcome::Moved(moved) => {
+            MotionOutcome::Moved(moved) => {
                 let steps = moved.max_slave_step_m / way_m;
                 run.longest_slave_steps = run.longest_slave_steps.max(steps);
             }
-            Outcome::Vetoed(_) => run.vetoes += 1,
+            MotionOutcome::Vetoed(_) => run.vetoes += 1,
         }
         run.least_clearance_m = run.least_clearance_m.min(clearance_m(&chain, &obstacles));
         run.worst_rod_m = run.worst_rod_m.max(chain.max_rod_violation_m());
@@ -48,7 +50,7 @@ fn through_the_corridor(
 
 fn assert_clean(width_m: f64, followers: usize, rod: Rod, step_m: f64) -> Run {
     let what = format!("width {width_m}, {followers} followers, {rod:?}, step {step_m}");
-    let run = through_the_corridor(width_m, followers, rod, step_m, Rotation::Union);
+    let run = through_the_corridor(width_m, followers, rod, step_m, RotationRule::Union);
     assert_eq!(run.vetoes, 0, "{what}");
     assert!(run.least_clearance_m >= -1e-9, "{what}: {}", run.least_clearance_m);
     assert!(run.worst_rod_m <= 1e-9, "{what}: {}", run.worst_rod_m);
@@ -96,6 +98,6 @@ fn thin_rods_do_not_make_slaves_jump_in_the_corridor() {
 #[test]
 fn the_literal_rule_runs_into_walls_where_the_union_does_not() {
     let rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
-    let run = through_the_corridor(2.0, 15, rod, 0.05, Rotation::Literal);
+    let run = through_the_corridor(2.0, 15, rod, 0.05, RotationRule::Literal);
     assert!(run.least_clearance_m < -0.005, "{}", run.least_clearance_m);
 }

@@ -6,22 +6,24 @@
 //! part that only this limit keeps from escaping is reported.
 
 use super::threat::{Nearness, Threat, collect, gap_m, nearness};
-use super::{ChainPart, EscapeReport, EscapeRules, EscapeTick, Margin, TrappedPart};
+use super::{
+    ChainPart, EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart,
+};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::{
     Point, add_scaled, distance, dot, normalized, perpendicular, scaled, sub,
 };
 use sidestep_rods::{
-    Chain, Motion, Outcome, ReachOutcome, ReachRequest, Request, RequestSource, RodBvh,
-    TOLERANCE_M, Veto, VetoEffect, VetoReason, reach,
+    Chain, MotionOutcome, MotionRequest, ReachOutcome, ReachRequest, RequestSource,
+    RequestedMotion, RodBvh, TOLERANCE_M, Veto, VetoEffect, VetoReason, reach_target,
 };
 use std::ops::Range;
 
 /// Escapes of one part after the other.
 #[derive(Debug, Clone)]
 pub(super) struct LiteralEscape<const D: usize> {
-    rules: EscapeRules,
+    rules: ObstacleEscapeRules,
     body: RodBvh<D>,
     threats: Vec<Threat>,
     vetoes: Vec<(Threat, Veto<D>)>,
@@ -44,7 +46,7 @@ const PUSH_FRACTIONS: [f64; 3] = [1.0, 0.5, 0.25];
 const PUSH_TURNS_RAD: [f64; 7] = [0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5];
 
 impl<const D: usize> LiteralEscape<D> {
-    pub(super) fn new(rules: EscapeRules) -> Self {
+    pub(super) fn new(rules: ObstacleEscapeRules) -> Self {
         Self {
             rules,
             body: RodBvh::default(),
@@ -57,7 +59,7 @@ impl<const D: usize> LiteralEscape<D> {
     /// Moves the parts that are too near to a moving obstacle.
     pub(super) fn escape(
         &mut self,
-        tick: &mut EscapeTick<'_, D>,
+        tick: &mut ObstacleEscapeInput<'_, D>,
     ) -> Result<EscapeReport<D>, InputError> {
         let ahead = self.rules.look_ahead_margin();
         // No part gets farther from where it is now than from one side of its start to the other.
@@ -77,17 +79,17 @@ impl<const D: usize> LiteralEscape<D> {
         self.before.extend_from_slice(tick.chain.points());
         // The look-ahead gets half of the tries, so that contacts are handled even where many parts are threatened.
         let mut tries = self.rules.most / 2;
-        if ahead != Margin::NONE {
+        if ahead != EscapeMargin::NONE {
             self.relieve_round(tick, ahead, &mut tries, &mut report)?;
         }
         tries += self.rules.most.div_ceil(2);
-        self.relieve_round(tick, Margin::NONE, &mut tries, &mut report)?;
+        self.relieve_round(tick, EscapeMargin::NONE, &mut tries, &mut report)?;
         self.report_trapped(tick, &mut report);
         Ok(report)
     }
 
     /// Returns the greatest distance from its start that a connector may have, or already has, meters.
-    fn max_travel_m(&self, tick: &EscapeTick<'_, D>) -> f64 {
+    fn max_travel_m(&self, tick: &ObstacleEscapeInput<'_, D>) -> f64 {
         let distances_m = tick.start.iter().zip(tick.chain.points()).map(|(s, p)| distance(*s, *p));
         distances_m.fold(self.rules.max_step_m(), f64::max)
     }
@@ -95,8 +97,8 @@ impl<const D: usize> LiteralEscape<D> {
     /// Relieves violations of one margin, the deepest first.
     fn relieve_round(
         &mut self,
-        tick: &mut EscapeTick<'_, D>,
-        margin: Margin,
+        tick: &mut ObstacleEscapeInput<'_, D>,
+        margin: EscapeMargin,
         tries: &mut usize,
         report: &mut EscapeReport<D>,
     ) -> Result<(), InputError> {
@@ -106,7 +108,7 @@ impl<const D: usize> LiteralEscape<D> {
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
             interrupt::check();
-            match self.relieve(tick, deepest)? {
+            match self.reduce_violation(tick, deepest)? {
                 Ok(touched) => {
                     self.measure(tick, &touched);
                     report.moves += 1;
@@ -126,7 +128,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Measures all threats in a margin; none counts as given up after that.
-    fn measure_all(&mut self, tick: &EscapeTick<'_, D>, margin: Margin) {
+    fn measure_all(&mut self, tick: &ObstacleEscapeInput<'_, D>, margin: EscapeMargin) {
         for threat in &mut self.threats {
             threat.given_up = false;
             threat.margin_m = margin.required_gap_m(&tick.obstacles.moving()[threat.mover]);
@@ -135,7 +137,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Measures the threats of some connectors and their rods again; all others are as deep as before.
-    fn measure(&mut self, tick: &EscapeTick<'_, D>, touched: &Range<usize>) {
+    fn measure(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
         for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
             threat.depth_m = threat_depth(tick, threat);
         }
@@ -156,9 +158,9 @@ impl<const D: usize> LiteralEscape<D> {
     /// Tries to reduce one violation; returns the connectors that may have moved, or the objection if no motion
     /// works: then every bit is as before. A base that vetoes is led back to its position by a return pass, so that
     /// the elbows of an arm escape, too.
-    fn relieve(
+    fn reduce_violation(
         &mut self,
-        tick: &mut EscapeTick<'_, D>,
+        tick: &mut ObstacleEscapeInput<'_, D>,
         which: usize,
     ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let threat = self.threats[which];
@@ -184,14 +186,14 @@ impl<const D: usize> LiteralEscape<D> {
 
     /// Returns how far from its start a connector may be, meters: as far as its speed allows, or as
     /// far as it already is.
-    fn max_distance_m(&self, tick: &EscapeTick<'_, D>, k: usize) -> f64 {
+    fn max_distance_m(&self, tick: &ObstacleEscapeInput<'_, D>, k: usize) -> f64 {
         self.rules.max_step_m().max(distance(tick.start[k], self.before[k]))
     }
 
     /// Moves one connector, if that helps; otherwise every bit is as before. Returns the connectors that may have moved.
     fn attempt(
         &mut self,
-        tick: &mut EscapeTick<'_, D>,
+        tick: &mut ObstacleEscapeInput<'_, D>,
         which: usize,
         k: usize,
         to: Point<D>,
@@ -201,26 +203,26 @@ impl<const D: usize> LiteralEscape<D> {
         if distance(to, at) <= TOLERANCE_M {
             return Ok(Err(make_veto(tick.chain, k, VetoReason::StepLimit, None)));
         }
-        let request = Request {
-            motion: Motion::Connector { k, to },
+        let request = MotionRequest {
+            motion: RequestedMotion::Connector { k, to },
             source: RequestSource::Autonomous,
             mode: VetoEffect::AsFarAsPossible,
         };
         let touched = match tick.propagator.propagate(tick.chain, tick.obstacles, &request)? {
-            Outcome::Moved(moved) => moved.touched,
-            Outcome::Vetoed(veto)
+            MotionOutcome::Moved(moved) => moved.touched,
+            MotionOutcome::Vetoed(veto)
                 if veto.by != k && tick.chain.connectors()[veto.by].is_still() =>
             {
                 let order =
                     // A reach may end short of its target, but by less than the push goes beyond
                     // the depth.
                     ReachRequest { k, target: to, base: veto.by, tolerance_m: 0.5 * PUSH_MARGIN_M };
-                match reach(tick.propagator, tick.chain, tick.obstacles, &order)? {
+                match reach_target(tick.propagator, tick.chain, tick.obstacles, &order)? {
                     ReachOutcome::There { .. } => 0..tick.start.len(),
                     ReachOutcome::Short { .. } => return Ok(Err(veto)),
                 }
             }
-            Outcome::Vetoed(veto) => return Ok(Err(veto)),
+            MotionOutcome::Vetoed(veto) => return Ok(Err(veto)),
         };
         let refused = if let Some(by) = self.first_too_far(tick, touched.clone()) {
             Some(Veto { by, ..make_veto(tick.chain, k, VetoReason::StepLimit, None) })
@@ -238,7 +240,11 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Returns the first connector that went farther than its speed allows.
-    fn first_too_far(&self, tick: &EscapeTick<'_, D>, touched: Range<usize>) -> Option<usize> {
+    fn first_too_far(
+        &self,
+        tick: &ObstacleEscapeInput<'_, D>,
+        touched: Range<usize>,
+    ) -> Option<usize> {
         touched.into_iter().find(|&i| {
             distance(tick.start[i], tick.chain.points()[i]) > self.max_distance_m(tick, i) + 1e-12
         })
@@ -248,7 +254,7 @@ impl<const D: usize> LiteralEscape<D> {
     /// another that is as deep now.
     fn find_loss(
         &self,
-        tick: &EscapeTick<'_, D>,
+        tick: &ObstacleEscapeInput<'_, D>,
         touched: &Range<usize>,
         which: usize,
         distance_m: f64,
@@ -265,8 +271,8 @@ impl<const D: usize> LiteralEscape<D> {
         Some(tick.obstacles.moving()[worse.mover].id)
     }
 
-    fn report_trapped(&mut self, tick: &EscapeTick<'_, D>, report: &mut EscapeReport<D>) {
-        self.measure_all(tick, Margin::NONE);
+    fn report_trapped(&mut self, tick: &ObstacleEscapeInput<'_, D>, report: &mut EscapeReport<D>) {
+        self.measure_all(tick, EscapeMargin::NONE);
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
         report.deepest_m = threat.depth_m;
@@ -278,7 +284,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 }
 
-fn threat_depth<const D: usize>(tick: &EscapeTick<'_, D>, threat: &Threat) -> f64 {
+fn threat_depth<const D: usize>(tick: &ObstacleEscapeInput<'_, D>, threat: &Threat) -> f64 {
     threat.margin_m - gap_m(tick.chain, threat.part, &tick.obstacles.moving()[threat.mover])
 }
 

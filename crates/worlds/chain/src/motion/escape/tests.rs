@@ -1,14 +1,17 @@
 use super::*;
 use crate::fixtures::{TestRng, clearance_m};
 use sidestep_rods::geometry::{distance, normalized, scaled};
-use sidestep_rods::{Connector, Mobility, Rod, Rules, TOLERANCE_M, VetoReason};
+use sidestep_rods::{Connector, Mobility, ReactionRules, Rod, TOLERANCE_M, VetoReason};
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
 
 /// The rules of the slides' own escape.
-fn literal(dt_s: f64, speed_max_m_s: f64) -> EscapeRules {
-    EscapeRules { method: EscapeMethod::Literal, ..EscapeRules::new(dt_s, speed_max_m_s) }
+fn literal(dt_s: f64, speed_max_m_s: f64) -> ObstacleEscapeRules {
+    ObstacleEscapeRules {
+        method: EscapeMethod::Literal,
+        ..ObstacleEscapeRules::new(dt_s, speed_max_m_s)
+    }
 }
 
 fn swarm<const D: usize>(n_rods: usize) -> Chain<D> {
@@ -40,14 +43,14 @@ fn movers<const D: usize>(seed: u64, n: u32, speed_m_s: f64) -> Obstacles<D> {
 fn tick<const D: usize>(
     chain: &mut Chain<D>,
     obstacles: &mut Obstacles<D>,
-    escaper: &mut Escaper<D>,
+    escaper: &mut ObstacleEscaper<D>,
     propagator: &mut Propagator<D>,
 ) -> EscapeReport<D> {
     let start = chain.points().to_vec();
     obstacles.advance(escaper.rules().dt_s);
     let told = escaper
         .escape(
-            EscapeTick { chain, obstacles, propagator, start: &start },
+            ObstacleEscapeInput { chain, obstacles, propagator, start: &start },
             &mut EscapePlan::default(),
         )
         .unwrap();
@@ -69,7 +72,8 @@ fn a_chain_gets_out_of_the_way_of_a_ball_that_crosses_it() {
         let (mut center, mut velocity_m_s) = ([0.0; D], [0.0; D]);
         (center[0], center[1], velocity_m_s[1]) = (at_x, 2.0, -0.5);
         let (mut chain, mut obstacles) = (swarm::<D>(8), mover(center, 0.4, velocity_m_s));
-        let mut escaper = Escaper::new(EscapeRules { ticks_ahead, ..literal(DT_S, 1.5) });
+        let mut escaper =
+            ObstacleEscaper::new(ObstacleEscapeRules { ticks_ahead, ..literal(DT_S, 1.5) });
         for _ in 0..600 {
             let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
             assert_eq!(told.deepest_m, 0.0, "{told:?}");
@@ -87,7 +91,7 @@ fn a_chain_gets_out_of_the_way_of_a_ball_that_crosses_it() {
 fn among_many_movers_no_connector_is_faster_than_its_limit_and_runs_are_equal() {
     fn run<const D: usize>(limit_m_s: f64, ticks: usize) -> Vec<Point<D>> {
         let (mut chain, mut obstacles) = (swarm::<D>(10), movers(3, 12, 0.8));
-        let mut escaper = Escaper::new(literal(DT_S, limit_m_s));
+        let mut escaper = ObstacleEscaper::new(literal(DT_S, limit_m_s));
         for _ in 0..ticks {
             tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
         }
@@ -105,10 +109,11 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.5, 0.0], 0.4, [-1.0, 0.0]));
     let mut start = chain.points().to_vec();
     start[0][0] += 0.015;
-    let mut escaper = Escaper::new(EscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
+    let mut escaper =
+        ObstacleEscaper::new(ObstacleEscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 1.0) });
     escaper
         .escape(
-            EscapeTick {
+            ObstacleEscapeInput {
                 chain: &mut chain,
                 obstacles: &obstacles,
                 propagator: &mut Propagator::default(),
@@ -123,7 +128,8 @@ fn the_limit_counts_what_a_connector_has_moved_before_in_the_tick() {
 #[test]
 fn it_is_told_when_only_the_speed_limit_is_in_the_way() {
     let (mut chain, mut obstacles) = (swarm::<2>(4), mover([0.0, 0.8], 0.4, [0.0, -4.0]));
-    let mut escaper = Escaper::new(EscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 0.5) });
+    let mut escaper =
+        ObstacleEscaper::new(ObstacleEscapeRules { ticks_ahead: 0.0, ..literal(DT_S, 0.5) });
     let mut told = Vec::new();
     for _ in 0..6 {
         told.push(tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default()));
@@ -141,7 +147,7 @@ fn who_never_moves_is_told_and_nothing_changes() {
         chain.set_failed(k, true);
     }
     let before = chain.clone();
-    let mut escaper = Escaper::new(literal(DT_S, 1.0));
+    let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.0));
     let mut told = None;
     for _ in 0..20 {
         told = Some(tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default()));
@@ -162,7 +168,7 @@ fn an_arm_bends_away_and_its_base_keeps_every_bit() {
         let mut chain = Chain::new(points, vec![Connector::free(0.08); 5], vec![rod; 4]).unwrap();
         chain.set_mobility(0, Mobility::Fixed).unwrap();
         let mut obstacles = mover([1.0, y], 0.2, [0.0, velocity]);
-        let mut escaper = Escaper::new(literal(DT_S, 1.5));
+        let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.5));
         for _ in 0..300 {
             let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
             assert_eq!(told.deepest_m, 0.0, "{told:?}");
@@ -174,11 +180,11 @@ fn an_arm_bends_away_and_its_base_keeps_every_bit() {
 #[test]
 fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
     let (mut chain, obstacles) = (swarm::<2>(0), mover([0.0, 0.0], 0.4, [0.0, -0.5]));
-    let mut escaper = Escaper::new(literal(DT_S, f64::INFINITY));
+    let mut escaper = ObstacleEscaper::new(literal(DT_S, f64::INFINITY));
     let start = chain.points().to_vec();
     let told = escaper
         .escape(
-            EscapeTick {
+            ObstacleEscapeInput {
                 chain: &mut chain,
                 obstacles: &obstacles,
                 propagator: &mut Propagator::default(),
@@ -195,7 +201,7 @@ fn a_connector_in_the_middle_of_a_mover_leaves_to_the_left_of_its_way() {
 #[test]
 fn who_starts_inside_gets_out_little_by_little() {
     let (mut chain, mut obstacles) = (swarm::<2>(6), mover([0.1, 0.3], 0.4, [0.0, -0.2]));
-    let mut escaper = Escaper::new(literal(DT_S, 1.0));
+    let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.0));
     let mut before_m = f64::INFINITY;
     for _ in 0..60 {
         let told = tick(&mut chain, &mut obstacles, &mut escaper, &mut Propagator::default());
@@ -207,10 +213,11 @@ fn who_starts_inside_gets_out_little_by_little() {
 
 #[test]
 fn with_self_collision_the_chain_does_not_run_into_itself() {
-    let mut propagator = Propagator::new(Rules { self_collision: true, ..Rules::default() });
+    let mut propagator =
+        Propagator::new(ReactionRules { self_collision: true, ..ReactionRules::default() });
     for seed in 1..5 {
         let (mut chain, mut obstacles) = (swarm::<2>(10), movers(seed, 10, 0.5));
-        let mut escaper = Escaper::new(literal(DT_S, 1.5));
+        let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.5));
         for _ in 0..400 {
             tick(&mut chain, &mut obstacles, &mut escaper, &mut propagator);
             for (i, a) in chain.points().iter().enumerate() {
@@ -227,13 +234,13 @@ fn walls_stop_an_escape_and_are_not_passed() {
     let ball = Obstacle { velocity_m_s: [0.0, -0.3], ..Obstacle::ball(2, [0.1, 1.0], 0.3) };
     let mut obstacles = Obstacles::new(vec![wall, ball], 1.0).unwrap();
     let mut chain = swarm::<2>(2);
-    let mut escaper = Escaper::new(literal(DT_S, 1.5));
+    let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.5));
     for _ in 0..300 {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
         escaper
             .escape(
-                EscapeTick {
+                ObstacleEscapeInput {
                     chain: &mut chain,
                     obstacles: &obstacles,
                     propagator: &mut Propagator::default(),
@@ -252,9 +259,9 @@ fn where_nothing_moves_nothing_changes() {
     let before = chain.clone();
     let obstacles = Obstacles::new(vec![Obstacle::ball(1, [0.0, 0.2], 0.3)], 1.0).unwrap();
     let start = chain.points().to_vec();
-    let told = Escaper::new(literal(DT_S, 1.0))
+    let told = ObstacleEscaper::new(literal(DT_S, 1.0))
         .escape(
-            EscapeTick {
+            ObstacleEscapeInput {
                 chain: &mut chain,
                 obstacles: &obstacles,
                 propagator: &mut Propagator::default(),
@@ -270,10 +277,10 @@ fn where_nothing_moves_nothing_changes() {
 fn wrong_numbers_are_named() {
     let mut chain = swarm::<2>(2);
     let start = chain.points().to_vec();
-    let mut place = |rules: EscapeRules, start: &[Point<2>]| {
-        Escaper::new(rules)
+    let mut place = |rules: ObstacleEscapeRules, start: &[Point<2>]| {
+        ObstacleEscaper::new(rules)
             .escape(
-                EscapeTick {
+                ObstacleEscapeInput {
                     chain: &mut chain,
                     obstacles: &Obstacles::default(),
                     propagator: &mut Propagator::default(),
@@ -287,7 +294,7 @@ fn wrong_numbers_are_named() {
     };
     assert_eq!(place(literal(0.0, 1.0), &start), "escape");
     assert_eq!(place(literal(0.1, f64::NAN), &start), "escape");
-    let blind = EscapeRules { ticks_ahead: -1.0, ..literal(0.1, 1.0) };
+    let blind = ObstacleEscapeRules { ticks_ahead: -1.0, ..literal(0.1, 1.0) };
     assert_eq!(place(blind, &start), "escape");
     assert_eq!(place(literal(0.1, 1.0), &start[1..]), "start of the tick");
 }

@@ -1,8 +1,6 @@
 //! The parts of a chain near a moving obstacle, with their distances.
 
-use sidestep_rods::geometry::{
-    Bounds, Point, distance, first_axis, normalized, perpendicular, sub,
-};
+use sidestep_rods::geometry::{Aabb, Point, distance, first_axis, normalized, perpendicular, sub};
 use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
 use std::ops::Range;
 
@@ -114,7 +112,7 @@ pub(super) fn collect<const D: usize>(
     let movers = obstacles.moving().iter().enumerate();
     for (k, mover) in movers.filter(|(_, mover)| mover.is_moving()) {
         let within_m = within_m(mover);
-        let reach = Reach { chain, mover, index: k, within_m };
+        let reach = ThreatZone { chain, mover, index: k, within_m };
         body.visit(&mover.bounds().grown(within_m), |rod| {
             reach.add_if_near(ChainPart::Connector(rod), threats);
             reach.add_if_near(ChainPart::Rod(rod), threats);
@@ -125,7 +123,7 @@ pub(super) fn collect<const D: usize>(
 }
 
 /// The surroundings of an obstacle in which parts are threatened.
-struct Reach<'a, const D: usize> {
+struct ThreatZone<'a, const D: usize> {
     chain: &'a Chain<D>,
     mover: &'a Obstacle<D>,
     /// Index among [`Obstacles::moving`].
@@ -133,7 +131,7 @@ struct Reach<'a, const D: usize> {
     within_m: f64,
 }
 
-impl<const D: usize> Reach<'_, D> {
+impl<const D: usize> ThreatZone<'_, D> {
     #[inline]
     fn add_if_near(&self, part: ChainPart, threats: &mut Vec<Threat>) {
         if gap_m(self.chain, part, self.mover) < self.within_m {
@@ -143,8 +141,8 @@ impl<const D: usize> Reach<'_, D> {
     }
 }
 
-fn rod_box<const D: usize>(chain: &Chain<D>, i: usize) -> Bounds<D> {
+fn rod_box<const D: usize>(chain: &Chain<D>, i: usize) -> Aabb<D> {
     // Rods are no thicker than their connectors.
     let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
-    Bounds::from_points(&[chain.points()[i], chain.points()[i + 1]]).grown(radius_m)
+    Aabb::from_points(&[chain.points()[i], chain.points()[i + 1]]).grown(radius_m)
 }

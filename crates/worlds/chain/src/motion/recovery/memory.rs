@@ -151,7 +151,7 @@ impl RecoveryMemory {
     }
 
     /// Forgets failures after the report that nothing works, so that every rung may be tried again.
-    pub(super) fn reset(&mut self) {
+    pub(super) fn forget_failures(&mut self) {
         self.pulling_back = 0;
         self.hand_overs = 0;
         self.forget_visits();

@@ -1,6 +1,6 @@
 use super::*;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::{Connector, Mobility, Obstacle, Rod, Rules, VetoReason};
+use sidestep_rods::{Connector, Mobility, Obstacle, ReactionRules, Rod, VetoReason};
 
 const STEP_M: f64 = 0.04;
 
@@ -23,11 +23,11 @@ fn dead_end() -> Obstacles<2> {
     Obstacles::new(walls, 1.0).unwrap()
 }
 
-fn ahead(chain: &Chain<2>, heading_rad: f64) -> Request<2> {
+fn ahead(chain: &Chain<2>, heading_rad: f64) -> MotionRequest<2> {
     let u = [cos(heading_rad), sin(heading_rad)];
     let to = add_scaled(chain.points()[0], u, STEP_M);
-    Request {
-        motion: Motion::Connector { k: 0, to },
+    MotionRequest {
+        motion: RequestedMotion::Connector { k: 0, to },
         source: RequestSource::Autonomous,
         mode: VetoEffect::Exact,
     }
@@ -38,13 +38,14 @@ fn climb(
     ladder: &mut RecoveryLadder,
     chain: &mut Chain<2>,
     obstacles: &Obstacles<2>,
-    situation: &Situation,
+    situation: &InitiatorSituation,
 ) -> RecoveryOutcome<2> {
     let before = chain.clone();
     let wanted = ahead(chain, 0.0);
-    let mut propagator = Propagator::new(Rules { self_collision: true, ..Rules::default() });
+    let mut propagator =
+        Propagator::new(ReactionRules { self_collision: true, ..ReactionRules::default() });
     let came = ladder
-        .climb(
+        .move_or_recover(
             &mut DirectMover { chain, obstacles, propagator: &mut propagator },
             &wanted,
             situation,
@@ -66,7 +67,7 @@ fn where_nothing_is_in_the_way_it_goes_as_wanted() {
         &mut RecoveryLadder::default(),
         &mut chain(),
         &Obstacles::default(),
-        &Situation::default(),
+        &InitiatorSituation::default(),
     );
     assert!(matches!(came, RecoveryOutcome::Straight(_)));
 }
@@ -75,8 +76,12 @@ fn where_nothing_is_in_the_way_it_goes_as_wanted() {
 fn before_a_wall_it_takes_the_longest_part_of_a_step_that_fits() {
     let x = 0.25 + 0.3 * STEP_M;
     let obstacles = Obstacles::new(vec![wall(1, [[x, -9.0], [x, 9.0]])], 1.0).unwrap();
-    let came =
-        climb(&mut RecoveryLadder::default(), &mut chain(), &obstacles, &Situation::default());
+    let came = climb(
+        &mut RecoveryLadder::default(),
+        &mut chain(),
+        &obstacles,
+        &InitiatorSituation::default(),
+    );
     assert!(matches!(came, RecoveryOutcome::Shorter { part: 0.25, .. }), "{came:?}");
 }
 
@@ -86,8 +91,12 @@ fn beside_an_obstacle_it_turns_as_little_as_it_can() {
         let touching_m = norm([0.5, y]) - 0.25 - 1e-4;
         let ball = Obstacle::ball(1, [0.5, y], touching_m);
         let obstacles = Obstacles::new(vec![ball], 1.0).unwrap();
-        let came =
-            climb(&mut RecoveryLadder::default(), &mut chain(), &obstacles, &Situation::default());
+        let came = climb(
+            &mut RecoveryLadder::default(),
+            &mut chain(),
+            &obstacles,
+            &InitiatorSituation::default(),
+        );
         let RecoveryOutcome::Sideways { turn_rad, plane: 0, .. } = came else { panic!("{came:?}") };
         assert_eq!(turn_rad, expected_rad);
     }
@@ -96,12 +105,12 @@ fn beside_an_obstacle_it_turns_as_little_as_it_can() {
 #[test]
 fn it_goes_on_round_the_side_that_was_good() {
     let memory = |side| RecoveryMemory { side, ..RecoveryMemory::default() };
-    let turns = |side| fan(&memory(side), 1).map(|(_, a)| a).collect::<Vec<_>>();
+    let turns = |side| turn_sequence(&memory(side), 1).map(|(_, a)| a).collect::<Vec<_>>();
     assert_eq!(turns(0), [0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6, 2.0, -2.0]);
     assert_eq!(turns(-1), [-0.4, -0.8, -1.2, -1.6, -2.0, 0.4, 0.8, 1.2, 1.6, 2.0]);
     let obstacles = Obstacles::new(vec![Obstacle::ball(1, [0.501, 0.0], 0.25)], 1.0).unwrap();
     let mut ladder = RecoveryLadder { memory: memory(-1), ..RecoveryLadder::default() };
-    let came = climb(&mut ladder, &mut chain(), &obstacles, &Situation::default());
+    let came = climb(&mut ladder, &mut chain(), &obstacles, &InitiatorSituation::default());
     assert!(
         matches!(came, RecoveryOutcome::Sideways { turn_rad, .. } if turn_rad < 0.0),
         "{came:?}"
@@ -115,7 +124,7 @@ fn a_side_is_forgotten_after_a_straight_run() {
     let mut chain = chain();
     for _ in 0..ladder.rungs.straight {
         assert_eq!(ladder.memory.side, -1);
-        climb(&mut ladder, &mut chain, &Obstacles::default(), &Situation::default());
+        climb(&mut ladder, &mut chain, &Obstacles::default(), &InitiatorSituation::default());
     }
     assert_eq!(ladder.memory.side, 0);
 }
@@ -129,7 +138,8 @@ fn in_a_dead_end_it_turns_then_waits_then_is_pulled_back() {
         ..RecoveryLimits::default()
     });
     let (mut chain, obstacles) = (chain(), dead_end());
-    let situation = Situation { can_turn: true, movers_near: true, ..Situation::default() };
+    let situation =
+        InitiatorSituation { can_turn: true, movers_near: true, ..InitiatorSituation::default() };
     let came: Vec<_> =
         (0..10).map(|_| climb(&mut ladder, &mut chain, &obstacles, &situation)).collect();
     assert!(came[..2].iter().all(|c| *c == RecoveryOutcome::TurnOnTheSpot { side: 1 }), "{came:?}");
@@ -142,7 +152,7 @@ fn in_a_dead_end_it_turns_then_waits_then_is_pulled_back() {
 #[test]
 fn it_does_not_wait_for_what_stands_still() {
     let mut ladder = RecoveryLadder::default();
-    let came = climb(&mut ladder, &mut chain(), &dead_end(), &Situation::default());
+    let came = climb(&mut ladder, &mut chain(), &dead_end(), &InitiatorSituation::default());
     assert!(matches!(came, RecoveryOutcome::PulledBack { .. }), "{came:?}");
 }
 
@@ -150,8 +160,12 @@ fn it_does_not_wait_for_what_stands_still() {
 fn a_chain_that_cannot_move_says_who_objects_to_what() {
     let mut chain = chain();
     chain.set_mobility(4, Mobility::Fixed).unwrap();
-    let came =
-        climb(&mut RecoveryLadder::default(), &mut chain, &dead_end(), &Situation::default());
+    let came = climb(
+        &mut RecoveryLadder::default(),
+        &mut chain,
+        &dead_end(),
+        &InitiatorSituation::default(),
+    );
     let RecoveryOutcome::Stuck { vetoes } = came else { panic!("{came:?}") };
     assert_eq!((vetoes[0].by, vetoes[0].reason), (0, VetoReason::TargetBlocked));
     let last = vetoes.last().unwrap();
@@ -176,8 +190,10 @@ fn going_to_and_fro_without_progress_hands_over_and_is_told_in_the_end() {
     let (mut pulled, mut stuck) = (0, 0);
     for _ in 0..3000 {
         let at = chain.points()[0];
-        let situation =
-            Situation { goal_distance_m: Some(distance(at, goal)), ..Situation::default() };
+        let situation = InitiatorSituation {
+            goal_distance_m: Some(distance(at, goal)),
+            ..InitiatorSituation::default()
+        };
         match climb(&mut ladder, &mut chain, &obstacles, &situation) {
             RecoveryOutcome::PulledBack { .. } => pulled += 1,
             RecoveryOutcome::Stuck { .. } => stuck += 1,
@@ -192,17 +208,17 @@ fn a_planner_gets_the_veto() {
     let (mut chain, obstacles) = (chain(), dead_end());
     let before = chain.clone();
     for source in [RequestSource::Planner, RequestSource::Operator] {
-        let wanted = Request { source, ..ahead(&chain, 0.0) };
+        let wanted = MotionRequest { source, ..ahead(&chain, 0.0) };
         let mut ladder = RecoveryLadder::default();
         let came = ladder
-            .climb(
+            .move_or_recover(
                 &mut DirectMover {
                     chain: &mut chain,
                     obstacles: &obstacles,
                     propagator: &mut Propagator::default(),
                 },
                 &wanted,
-                &Situation::default(),
+                &InitiatorSituation::default(),
             )
             .unwrap();
         assert!(
@@ -217,7 +233,8 @@ fn a_memory_that_was_stored_goes_on_as_the_original() {
     let mut ladder =
         RecoveryLadder::new(RecoveryLimits { turns: 0, pull_back: 7, ..RecoveryLimits::default() });
     let (mut first, obstacles) = (chain(), dead_end());
-    let situation = Situation { goal_distance_m: Some(2.0), ..Situation::default() };
+    let situation =
+        InitiatorSituation { goal_distance_m: Some(2.0), ..InitiatorSituation::default() };
     for _ in 0..10 {
         climb(&mut ladder, &mut first, &obstacles, &situation);
     }
@@ -243,21 +260,21 @@ fn in_space_it_turns_towards_the_second_axis_then_the_third() {
     for (obstacles, expected) in [(vec![ahead], 0), (vec![ahead, beside[0], beside[1]], 1)] {
         let obstacles = Obstacles::new(obstacles, 1.0).unwrap();
         let mut chain = straight.clone();
-        let wanted = Request {
-            motion: Motion::Connector { k: 0, to: [STEP_M, 0.0, 0.0] },
+        let wanted = MotionRequest {
+            motion: RequestedMotion::Connector { k: 0, to: [STEP_M, 0.0, 0.0] },
             source: RequestSource::Autonomous,
             mode: VetoEffect::Exact,
         };
         let mut propagator = Propagator::default();
         let came = RecoveryLadder::default()
-            .climb(
+            .move_or_recover(
                 &mut DirectMover {
                     chain: &mut chain,
                     obstacles: &obstacles,
                     propagator: &mut propagator,
                 },
                 &wanted,
-                &Situation::default(),
+                &InitiatorSituation::default(),
             )
             .unwrap();
         let RecoveryOutcome::Sideways { plane, .. } = came else { panic!("{came:?}") };

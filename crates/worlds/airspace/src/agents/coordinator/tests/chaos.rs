@@ -1,6 +1,6 @@
 //! Hosts on networks with faults of every kind, from seeds.
 
-use super::super::epoch::{Epoch, is_majority};
+use super::super::epoch::{CoordinatorEpoch, is_majority};
 use super::super::host::CoordinatorHost;
 use super::{TestCoordinator, hosts};
 use proptest::prelude::*;
@@ -128,7 +128,7 @@ impl Group {
     }
 
     /// Returns the epochs of the coordinators that are on hosts which are alive.
-    pub(super) fn is_here(&self) -> Vec<Epoch> {
+    pub(super) fn is_here(&self) -> Vec<CoordinatorEpoch> {
         let alive = (0..self.hosts.len()).filter(|&k| self.is_alive[k]);
         let replicas =
             alive.map(|k| &self.hosts[k].replicas[0]).filter(|replica| replica.is_hosting());
@@ -136,7 +136,7 @@ impl Group {
     }
 
     /// Returns whether a majority has accepted an epoch and no newer one.
-    pub(super) fn is_accepted(&self, epoch: Epoch) -> bool {
+    pub(super) fn is_accepted(&self, epoch: CoordinatorEpoch) -> bool {
         let accepts = |host: &CoordinatorHost<TestCoordinator>| host.replicas[0].promised == epoch;
         is_majority(&self.hosts.iter().map(accepts).collect::<Vec<_>>())
     }

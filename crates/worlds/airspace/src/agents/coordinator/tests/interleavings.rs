@@ -1,7 +1,7 @@
 //! All interleavings of three hosts and some faults: every order in which messages may arrive and
 //! time may run out, by a search over all states that real hosts can come to.
 
-use super::super::epoch::{Epoch, is_majority};
+use super::super::epoch::{CoordinatorEpoch, is_majority};
 use super::super::replica::ReplicaRole;
 use super::{TestCoordinator, TestHost, hosts};
 use crate::agents::coordinator::host::CoordinatorHost;
@@ -28,7 +28,7 @@ struct SystemState {
     flights: Vec<InFlightMessage>,
     faults_left: u8,
     /// The hosts that have ever accepted each epoch.
-    accepted: BTreeMap<Epoch, [bool; GROUP]>,
+    accepted: BTreeMap<CoordinatorEpoch, [bool; GROUP]>,
 }
 
 /// A thing that may happen next.
@@ -134,7 +134,7 @@ impl SystemState {
     }
 
     /// Returns the epochs of the coordinators that are on hosts which are alive.
-    fn is_here(&self) -> Vec<Epoch> {
+    fn is_here(&self) -> Vec<CoordinatorEpoch> {
         let replicas = (0..GROUP).filter(|&k| self.is_alive[k]).map(|k| &self.hosts[k].replicas[0]);
         replicas
             .filter(|replica| replica.is_hosting())
@@ -144,7 +144,7 @@ impl SystemState {
 
     /// Returns whether a majority has accepted an epoch and no newer one; those that have crashed
     /// count as they were.
-    fn is_accepted(&self, epoch: Epoch) -> bool {
+    fn is_accepted(&self, epoch: CoordinatorEpoch) -> bool {
         let have: Vec<bool> =
             self.hosts.iter().map(|host| host.replicas[0].promised == epoch).collect();
         is_majority(&have)

@@ -4,10 +4,11 @@ mod chaos;
 mod interleavings;
 mod recovery;
 
-use super::epoch::Epoch;
+use super::epoch::CoordinatorEpoch;
 use super::host::CoordinatorHost;
 use super::migrating::{
-    CoordinatorStep, HostConfig, HostContext, HostServices, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
+    MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
 use serde::{Deserialize, Serialize};
@@ -40,11 +41,11 @@ struct TestHost {
     /// Whether coordinators do not wait here.
     is_restless: bool,
     /// The epoch of the coordinator that has delivered the result.
-    concluded: Option<Epoch>,
+    concluded: Option<CoordinatorEpoch>,
     is_cut_off: bool,
 }
 
-impl HostServices for TestHost {
+impl CoordinatorHostServices for TestHost {
     fn is_watching(&self, _: usize) -> bool {
         !self.is_done()
     }
@@ -67,7 +68,11 @@ impl TestCoordinator {
         (k..services.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(&mut self, services: &TestHost, context: &HostContext<'_>) -> CoordinatorStep {
+    fn hop(
+        &mut self,
+        services: &TestHost,
+        context: &CoordinatorHostContext<'_>,
+    ) -> CoordinatorStep {
         loop {
             match self.task {
                 TestTask::Visit(k) => match self.next(k, services) {
@@ -115,11 +120,15 @@ impl MigratingCoordinator for TestCoordinator {
 
     fn decode(bytes: &[u8], services: &TestHost, _: usize) -> Result<Self, InvalidMessage> {
         let read: Self = postcard::from_bytes(bytes).map_err(|_| InvalidMessage::Form)?;
-        InvalidMessage::Length.unless(read.unreachable.len() == services.group)?;
+        InvalidMessage::Length.ensure(read.unreachable.len() == services.group)?;
         Ok(read)
     }
 
-    fn advance(&mut self, services: &mut TestHost, context: &HostContext<'_>) -> CoordinatorStep {
+    fn advance(
+        &mut self,
+        services: &mut TestHost,
+        context: &CoordinatorHostContext<'_>,
+    ) -> CoordinatorStep {
         if !services.is_restless && !std::mem::replace(&mut services.is_rested, true) {
             return CoordinatorStep::Stay;
         }
@@ -160,7 +169,7 @@ fn hosts(
             is_cut_off: false,
         };
         let expected = vec![true; group];
-        let rules = HostConfig {
+        let rules = CoordinatorHostConfig {
             group,
             me,
             retry_policy: Some(patience),

@@ -5,7 +5,7 @@ use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::SolveInput;
 use sidestep_kernel::math::cos;
 use sidestep_rods::geometry::{Point, angle_rad, distance, normalized, sub};
-use sidestep_rods::{BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, Sweep, TOLERANCE_M};
+use sidestep_rods::{BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, RodSweep, TOLERANCE_M};
 
 /// A bend limit: that of a connector, or its bend before the tick where that was sharper.
 #[derive(Debug, Clone, Copy)]
@@ -69,7 +69,7 @@ impl<const D: usize> Constraints<'_, '_, D> {
                 let apart_m = wall.core.nearest_to_segment(to).distance_m;
                 let from = ends(self.input.chain.points(), wall.part);
                 apart_m >= wall.keep_m - TOLERANCE_M
-                    && Sweep { from, to }.is_clear(&wall.core, wall.keep_m)
+                    && RodSweep { from, to }.is_clear(&wall.core, wall.keep_m)
             })
     }
 

@@ -1,16 +1,16 @@
 //! All bodies that the parts of a chain may touch in a tick.
 
 use super::super::threat::{Threat, collect};
-use super::super::{ChainPart, Margin};
+use super::super::{ChainPart, EscapeMargin};
 use super::posture::ends;
-use sidestep_rods::geometry::{Bounds, Core, NearestPoints, Point, between_segments, distance};
+use sidestep_rods::geometry::{Aabb, ConvexCore, NearestPoints, Point, between_segments, distance};
 use sidestep_rods::{Chain, Obstacles, RodBvh};
 
 /// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WallContact<const D: usize> {
     pub(super) part: ChainPart,
-    pub(super) core: Core<D>,
+    pub(super) core: ConvexCore<D>,
     /// Distance from the core to be kept, meters: that of touching, or less if it was less.
     pub(super) keep_m: f64,
 }
@@ -38,7 +38,7 @@ impl<const D: usize> Contacts<D> {
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        margin: Margin,
+        margin: EscapeMargin,
         move_m: f64,
     ) {
         let reach_m = CONTACT_RANGE_FACTOR * move_m;
@@ -65,7 +65,7 @@ impl<const D: usize> Contacts<D> {
         for part in parts(chain) {
             let ends = ends(chain.points(), part);
             let radius_m = radius_m(chain, part);
-            obstacles.visit(&Bounds::from_points(&ends).grown(radius_m + reach_m), |o| {
+            obstacles.visit(&Aabb::from_points(&ends).grown(radius_m + reach_m), |o| {
                 let apart_m = o.core.nearest_to_segment(ends).distance_m;
                 let touch_m = radius_m + o.radius_m;
                 if !o.is_moving() && apart_m < touch_m + reach_m {
@@ -107,9 +107,9 @@ const CONTACT_RANGE_FACTOR: f64 = 4.0;
 
 /// Returns the box around a rod and its connectors, grown by `by_m`.
 #[inline]
-fn grown_rod_box<const D: usize>(chain: &Chain<D>, i: usize, by_m: f64) -> Bounds<D> {
+fn grown_rod_box<const D: usize>(chain: &Chain<D>, i: usize, by_m: f64) -> Aabb<D> {
     let [a, b] = [i, i + 1].map(|k| chain.connectors()[k].radius_m);
-    Bounds::from_points(&chain.points()[i..i + 2]).grown(a.max(b) + by_m)
+    Aabb::from_points(&chain.points()[i..i + 2]).grown(a.max(b) + by_m)
 }
 
 fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + use<D> {

@@ -5,7 +5,7 @@
 //! touches the chain, in some directions. Each is rolled out on the connectors around the contact,
 //! with obstacles at constant velocity, and the one with the least time inside is taken.
 
-use super::super::EscapeRules;
+use super::super::ObstacleEscapeRules;
 use super::super::threat::gap_m;
 use super::posture::ends;
 use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
@@ -95,7 +95,7 @@ impl EscapePlan {
     /// Searches for the best exit; returns whether it is another than before.
     pub(super) fn plan<const D: usize>(
         &mut self,
-        rules: &EscapeRules,
+        rules: &ObstacleEscapeRules,
         input: &SolveInput<'_, D>,
         solver: &EscapeSolver<D>,
         gap_m: f64,
@@ -105,7 +105,7 @@ impl EscapePlan {
         }
         self.pause = CHOICE_INTERVAL_TICKS;
         let around = endangered_connectors(input, solver);
-        let Some(rollout) = Rollout::cut(rules, input, around) else { return false };
+        let Some(rollout) = Rollout::rollout_between(rules, input, around) else { return false };
         let now = self.exit_direction();
         let mut left = rollout.ticks_for(MAX_WORK);
         let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);

@@ -6,7 +6,7 @@
 //! headings in its place gain nothing: with seven of them chains are inside for longer (1.1 in place of 0.9 % of the
 //! steps among 8 discs), because leaders that turn to and fro get nowhere.
 
-use super::super::EscapeRules;
+use super::super::ObstacleEscapeRules;
 use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
 use super::solve_input::{LeadMotion, SolveInput};
 
@@ -20,13 +20,13 @@ const MAX_WORK: usize = 40_000;
 /// Resting is rolled out only where moving brings parts inside, because rollouts are all the cost
 /// of a choice.
 pub(super) fn should_rest<const D: usize>(
-    rules: &EscapeRules,
+    rules: &ObstacleEscapeRules,
     input: &SolveInput<'_, D>,
     lead: &LeadMotion<D>,
 ) -> bool {
     let from = lead.k.saturating_sub(SIDE_CONNECTORS);
     let to = (lead.k + SIDE_CONNECTORS).min(input.chain.points().len() - 1);
-    let rollout = Rollout::cut(rules, input, from..=to).filter(Rollout::is_approached);
+    let rollout = Rollout::rollout_between(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
     let mut left = rollout.ticks_for(MAX_WORK);
     let wanted = LeadMotion { k: lead.k - from, displacement_m: lead.displacement_m };

@@ -28,11 +28,11 @@ mod solve_input;
 mod tests;
 
 use super::threat::Threat;
-use super::{EscapeReport, EscapeRules, EscapeTick, Margin, TrappedPart};
+use super::{EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart};
 pub use escape_plan::EscapePlan;
 use leader_choice::should_rest;
 use sidestep_rods::geometry::{Point, distance};
-use sidestep_rods::{Chain, Obstacles, Rules, Veto, VetoReason};
+use sidestep_rods::{Chain, Obstacles, ReactionRules, Veto, VetoReason};
 use solve::EscapeSolver;
 pub(crate) use solve_input::LeadMotion;
 use solve_input::{ExitDirection, SoftConstraints, SolveInput};
@@ -40,7 +40,7 @@ use solve_input::{ExitDirection, SoftConstraints, SolveInput};
 /// Escapes of all parts of a chain at once. It owns its buffers.
 #[derive(Debug, Clone)]
 pub(super) struct SimultaneousEscape<const D: usize> {
-    rules: EscapeRules,
+    rules: ObstacleEscapeRules,
     solver: EscapeSolver<D>,
     best: Vec<Point<D>>,
     start: Vec<Point<D>>,
@@ -58,16 +58,16 @@ const PRESSED_SPEED_FRACTION: f64 = 0.9;
 const TOUCH_M: f64 = 1e-9;
 
 impl<const D: usize> SimultaneousEscape<D> {
-    pub(super) fn new(rules: EscapeRules) -> Self {
+    pub(super) fn new(rules: ObstacleEscapeRules) -> Self {
         Self { rules, solver: EscapeSolver::default(), best: Vec::new(), start: Vec::new() }
     }
 
     pub(super) fn escape(
         &mut self,
-        tick: &mut EscapeTick<'_, D>,
+        tick: &mut ObstacleEscapeInput<'_, D>,
         escape_plan: &mut EscapePlan,
     ) -> EscapeReport<D> {
-        let EscapeTick { chain, obstacles, start, .. } = tick;
+        let ObstacleEscapeInput { chain, obstacles, start, .. } = tick;
         let rules = &tick.propagator.rules;
         // A step of the chain is a quarter of its thinnest part.
         let thinnest_m = 4.0 * chain.step_m();
@@ -105,7 +105,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        rules: &Rules,
+        rules: &ReactionRules,
         lead: &LeadMotion<D>,
     ) -> bool {
         let max_step_m = self.rules.max_step_m();
@@ -150,7 +150,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         self.best.extend_from_slice(input.chain.points());
         // On the way out through an obstacle a part gets deeper first, so depth is no measure.
         let mut best_m = if through.is_some() { f64::NEG_INFINITY } else { before_m };
-        for margin in [self.rules.look_ahead_margin(), Margin::NONE] {
+        for margin in [self.rules.look_ahead_margin(), EscapeMargin::NONE] {
             if !self.solver.solve(input, &SoftConstraints { margin, through, rounds: ROUNDS }) {
                 continue;
             }
@@ -202,7 +202,7 @@ impl<const D: usize> SimultaneousEscape<D> {
 /// Returns the margin around the obstacle of a threat, meters.
 fn margin_around<const D: usize>(
     input: &SolveInput<'_, D>,
-    margin: Margin,
+    margin: EscapeMargin,
     threat: Option<Threat>,
 ) -> f64 {
     let mover = threat.map(|threat| &input.obstacles.moving()[threat.mover]);

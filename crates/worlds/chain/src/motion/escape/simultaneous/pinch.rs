@@ -34,14 +34,14 @@ struct TimedExit {
 }
 
 /// The chain some time before a long time inside, and the length of that.
-struct Episode {
+struct PinchEpisode {
     cycle: u64,
     ticks: usize,
     chain: Chain<2>,
 }
 
 /// Runs a seed and returns its long episodes.
-fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
+fn episodes(discs: usize, seed: u64) -> (World, Vec<PinchEpisode>) {
     let path = root().join("scenarios/chain/movers.toml");
     let settings = [format!("seed={seed}"), format!("fields.0.n={discs}")];
     let source = Source::read(&path, &settings).expect("a scenario");
@@ -60,7 +60,7 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
         let back = past.len().saturating_sub(since + 1 + BEFORE);
         if since > LONG {
             let cycle = run.cycle() - (past.len() - back) as u64;
-            found.push(Episode { cycle, ticks: since, chain: past[back].clone() });
+            found.push(PinchEpisode { cycle, ticks: since, chain: past[back].clone() });
         }
         since = 0;
     }
@@ -68,7 +68,7 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<Episode>) {
 }
 
 /// Returns the longest time in a row that a chain is inside, in ticks, if it goes along some ways; at most `enough`.
-fn inside(world: &World, episode: &Episode, legs: &[TimedExit], enough: usize) -> usize {
+fn inside(world: &World, episode: &PinchEpisode, legs: &[TimedExit], enough: usize) -> usize {
     let (mut chain, mut obstacles) = (episode.chain.clone(), (*world.obstacles).clone());
     let rules = world.escape.expect("something moves");
     let (margin, max_step_m) = (rules.look_ahead_margin(), rules.speed_max_m_s * rules.dt_s);
@@ -101,12 +101,12 @@ fn inside(world: &World, episode: &Episode, legs: &[TimedExit], enough: usize) -
     most
 }
 
-fn movers(world: &World, episode: &Episode, tick: usize) -> Vec<Obstacle<2>> {
+fn movers(world: &World, episode: &PinchEpisode, tick: usize) -> Vec<Obstacle<2>> {
     world.movers.at(world.start_time_s(episode.cycle + tick as u64)).collect()
 }
 
 /// Returns the obstacles nearest to the chain when it began to be inside.
-fn nearest(world: &World, episode: &Episode) -> Vec<u32> {
+fn nearest(world: &World, episode: &PinchEpisode) -> Vec<u32> {
     let apart_m = |mover: &Obstacle<2>| {
         let ends = episode.chain.points().windows(2).map(|w| [w[0], w[1]]);
         let apart_m = ends.map(|ends| mover.core.nearest_to_segment(ends).distance_m);

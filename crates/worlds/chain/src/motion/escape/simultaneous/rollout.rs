@@ -1,19 +1,19 @@
 //! Rollouts: motions tried on a copy of a part of the chain, among the moving obstacles near it.
 
-use super::super::{EscapeRules, Margin};
+use super::super::{EscapeMargin, ObstacleEscapeRules};
 use super::solve::EscapeSolver;
 use super::solve_input::{ExitDirection, LeadMotion, SoftConstraints, SolveInput};
 use super::{PRESSED_SPEED_FRACTION, TOUCH_M};
 use sidestep_rods::geometry::{Point, add, distance, norm};
-use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, Request, Rules};
+use sidestep_rods::{Chain, MotionRequest, Obstacle, Obstacles, Propagator, ReactionRules};
 use std::ops::RangeInclusive;
 
 /// A part of a chain, and the obstacles that may come near it.
 pub(super) struct Rollout<'a, const D: usize> {
-    rules: &'a Rules,
+    rules: &'a ReactionRules,
     chain: Chain<D>,
     obstacles: Obstacles<D>,
-    margin: Margin,
+    margin: EscapeMargin,
     dt_s: f64,
     max_step_m: f64,
     ticks: usize,
@@ -46,14 +46,14 @@ const DEPTH_COST: f64 = 0.2;
 /// Rounds of a solve in a rollout, with margins and without; fewer than in a tick, because rollouts are many.
 const ROUNDS: [usize; 2] = [12, 20];
 
-struct Trial<const D: usize> {
+struct RolloutTrial<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,
     propagator: Propagator<D>,
     solver: EscapeSolver<D>,
 }
 
-impl<const D: usize> Trial<D> {
+impl<const D: usize> RolloutTrial<D> {
     /// Leads the chain on, unless it needs its speed, of `max_step_m` a tick, to escape. `start` holds the positions at the
     /// start of the tick.
     fn move_leader(&mut self, lead: LeadMotion<D>, start: &[Point<D>], max_step_m: f64) {
@@ -62,7 +62,7 @@ impl<const D: usize> Trial<D> {
         }
         let escaped = self.chain.points().to_vec();
         let to = add(escaped[lead.k], lead.displacement_m);
-        let request = Request::exact(lead.k, to);
+        let request = MotionRequest::operator_request(lead.k, to);
         // Beyond the range of coordinates nothing is led.
         let went = self.propagator.propagate(&mut self.chain, &self.obstacles, &request);
         if went.is_err() || self.max_displacement_m(start) > max_step_m {
@@ -92,8 +92,8 @@ impl<const D: usize> RolloutOptions<D> {
 
 impl<'a, const D: usize> Rollout<'a, D> {
     /// Returns a rollout of the connectors between two; none if there are none.
-    pub(super) fn cut(
-        rules: &EscapeRules,
+    pub(super) fn rollout_between(
+        rules: &ObstacleEscapeRules,
         input: &SolveInput<'a, D>,
         between: RangeInclusive<usize>,
     ) -> Option<Self> {
@@ -174,13 +174,13 @@ impl<'a, const D: usize> Rollout<'a, D> {
         cost
     }
 
-    fn start_trial(&self) -> Trial<D> {
+    fn start_trial(&self) -> RolloutTrial<D> {
         // Slaves of the leader are no faster than escapes may be.
         let slave_step_max_m = self.rules.slave_step_max_m.min(self.max_step_m);
-        Trial {
+        RolloutTrial {
             chain: self.chain.clone(),
             obstacles: self.obstacles.clone(),
-            propagator: Propagator::new(Rules { slave_step_max_m, ..*self.rules }),
+            propagator: Propagator::new(ReactionRules { slave_step_max_m, ..*self.rules }),
             solver: EscapeSolver::default(),
         }
     }
@@ -189,11 +189,11 @@ impl<'a, const D: usize> Rollout<'a, D> {
     /// least gap then, meters.
     fn escape(
         &self,
-        trial: &mut Trial<D>,
+        trial: &mut RolloutTrial<D>,
         start: &[Point<D>],
         through: &mut Option<ExitDirection<D>>,
     ) -> f64 {
-        let Trial { chain, obstacles, solver, .. } = trial;
+        let RolloutTrial { chain, obstacles, solver, .. } = trial;
         let input =
             SolveInput { chain, obstacles, rules: self.rules, start, max_step_m: self.max_step_m };
         let gap_m = self.find_positions(&input, solver, through);

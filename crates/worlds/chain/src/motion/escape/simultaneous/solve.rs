@@ -4,7 +4,7 @@
 //! laws: rods, speed, walls, own parts. A solve whose result breaks a law is given up, so that
 //! obstacles may be in conflict with laws, and never the other way round.
 
-use super::super::Margin;
+use super::super::EscapeMargin;
 use super::super::threat::{ChainPart, Threat, gap_m, left_of};
 use super::constraints::{BendConstraint, Constraints};
 use super::contacts::{Contacts, fraction_along, nearest, radius_m};
@@ -55,7 +55,11 @@ const RESERVE_FRACTION: f64 = 1e-4;
 
 impl<const D: usize> EscapeSolver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
-    pub(super) fn find_contacts(&mut self, input: &SolveInput<'_, D>, margin: Margin) -> bool {
+    pub(super) fn find_contacts(
+        &mut self,
+        input: &SolveInput<'_, D>,
+        margin: EscapeMargin,
+    ) -> bool {
         let SolveInput { chain, obstacles, rules, max_step_m, .. } = *input;
         self.contacts.find_movers(chain, obstacles, margin, max_step_m);
         if self.contacts.threats.is_empty() {
@@ -82,8 +86,9 @@ impl<const D: usize> EscapeSolver<D> {
         self.start_exit(input, constraints.through);
         let [with_margin, without_margin] = constraints.rounds;
         for round in 0..with_margin + without_margin {
-            let soft =
-                (round < with_margin).then_some(constraints.margin).filter(|m| *m != Margin::NONE);
+            let soft = (round < with_margin)
+                .then_some(constraints.margin)
+                .filter(|m| *m != EscapeMargin::NONE);
             let mover_correction_m = self.push_from_movers(input, constraints.through, soft);
             let wall_correction_m = self.push_from_walls();
             self.lengths.correct(
@@ -118,7 +123,7 @@ impl<const D: usize> EscapeSolver<D> {
         &mut self,
         input: &SolveInput<'_, D>,
         through: Option<ExitDirection<D>>,
-        soft: Option<Margin>,
+        soft: Option<EscapeMargin>,
     ) -> f64 {
         let Self { contacts, points, inverse_mass, .. } = self;
         let mut posture = trial_posture(points, inverse_mass);

@@ -1,14 +1,14 @@
 //! The input of a solve, and its soft constraints.
 
-use super::super::Margin;
+use super::super::EscapeMargin;
 use sidestep_rods::geometry::{Point, distance};
-use sidestep_rods::{Chain, Obstacles, Rules};
+use sidestep_rods::{Chain, Obstacles, ReactionRules};
 
 #[derive(Clone, Copy)]
 pub(super) struct SolveInput<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
-    pub(super) rules: &'a Rules,
+    pub(super) rules: &'a ReactionRules,
     /// Positions from which displacements count.
     pub(super) start: &'a [Point<D>],
     /// Longest displacement of a connector, meters.
@@ -42,7 +42,7 @@ pub(super) struct ExitDirection<const D: usize> {
 /// The soft constraints of a solve, beside the hard ones.
 #[derive(Clone, Copy)]
 pub(super) struct SoftConstraints<const D: usize> {
-    pub(super) margin: Margin,
+    pub(super) margin: EscapeMargin,
     pub(super) through: Option<ExitDirection<D>>,
     /// Rounds with margins, and rounds without.
     pub(super) rounds: [usize; 2],

@@ -1,14 +1,14 @@
-use super::super::Escaper;
+use super::super::ObstacleEscaper;
 use super::*;
 use crate::fixtures::{TestRng, clearance_m};
 use proptest::prelude::*;
-use sidestep_rods::geometry::{Core, normalized, scaled, segments_cross};
+use sidestep_rods::geometry::{ConvexCore, normalized, scaled, segments_cross};
 use sidestep_rods::{Connector, Mobility, Obstacle, Propagator, Rod};
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
-const SOLID: Rules = Rules {
-    rotation: sidestep_rods::Rotation::Union,
+const SOLID: ReactionRules = ReactionRules {
+    rotation: sidestep_rods::RotationRule::Union,
     self_collision: true,
     slave_step_max_m: f64::INFINITY,
     joint_step_max_m: f64::INFINITY,
@@ -43,14 +43,14 @@ fn balls<const D: usize>(seed: u64, n: u32, speed_m_s: f64) -> Vec<Obstacle<D>> 
 struct Case<const D: usize> {
     chain: Chain<D>,
     obstacles: Obstacles<D>,
-    escaper: Escaper<D>,
+    escaper: ObstacleEscaper<D>,
     escape_plan: EscapePlan,
 }
 
 impl<const D: usize> Case<D> {
     fn new(chain: Chain<D>, obstacles: Vec<Obstacle<D>>, speed_max_m_s: f64) -> Self {
         let obstacles = Obstacles::new(obstacles, 1.0).unwrap();
-        let escaper = Escaper::new(EscapeRules::new(DT_S, speed_max_m_s));
+        let escaper = ObstacleEscaper::new(ObstacleEscapeRules::new(DT_S, speed_max_m_s));
         Self { chain, obstacles, escaper, escape_plan: EscapePlan::default() }
     }
 
@@ -62,7 +62,12 @@ impl<const D: usize> Case<D> {
         let Self { chain, obstacles, escaper, escape_plan } = self;
         let told = escaper
             .escape(
-                EscapeTick { chain, obstacles, propagator: &mut propagator, start: &start },
+                ObstacleEscapeInput {
+                    chain,
+                    obstacles,
+                    propagator: &mut propagator,
+                    start: &start,
+                },
                 escape_plan,
             )
             .unwrap();
@@ -88,7 +93,7 @@ fn assert_own_parts_are_apart<const D: usize>(chain: &Chain<D>) {
             assert!(distance(points[i], points[j]) >= radius_m(i) + radius_m(j) - 2e-9);
         }
         for rod in (0..chain.rods().len()).filter(|&rod| rod > i + 1 || rod + 2 < i) {
-            let core = Core::Segment([points[rod], points[rod + 1]]);
+            let core = ConvexCore::Segment([points[rod], points[rod + 1]]);
             let apart_m = core.nearest_to_point(points[i]).distance_m;
             assert!(apart_m >= radius_m(i) + chain.rods()[rod].radius_m - 2e-9);
         }
@@ -206,7 +211,7 @@ fn inside_by(way: Option<ExitDirection<2>>, from: usize) -> usize {
     let discs = vec![ball(1, [0.2, 2.0], [0.0, -0.5]), ball(2, [0.2, -2.0], [0.0, 0.5])];
     let mut obstacles = Obstacles::new(discs, 1.0).unwrap();
     let (mut chain, mut solver) = (straight::<2>(14, SWARM, 0.25), EscapeSolver::default());
-    let margin = EscapeRules::new(DT_S, 1.0).look_ahead_margin();
+    let margin = ObstacleEscapeRules::new(DT_S, 1.0).look_ahead_margin();
     let mut inside = 0;
     for tick in 0..400 {
         obstacles.advance(DT_S);
