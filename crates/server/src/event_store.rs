@@ -124,7 +124,7 @@ mod tests {
 
     fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
         let entry = |&cycle: &Cycle| {
-            let (kind, who) = (LogEventKind::Contact, BodyId::new(BodyKind::Robot, 3, None));
+            let (kind, who) = (LogEventKind::Contact, BodyId::new(BodyKind::ROBOT, 3, None));
             let (with, at_m, value, words) = (None, None, None, format!("at {cycle}"));
             LogEvent { cycle, level: Severity::Info, kind, who, with, at_m, value, words }
         };

@@ -130,7 +130,7 @@ mod tests {
     fn one_changed_cell_is_found() {
         let rows = PositionColumns {
             table: "trajectories",
-            kind: BodyKind::Connector,
+            kind: BodyKind::CONNECTOR,
             number: "chain",
             part: Some("connector"),
             axes: vec![Axis::meters("x_m")],
@@ -157,8 +157,8 @@ mod tests {
         assert_eq!(was, bodies(2.0));
         let same = |of: &BodyId| was[of] == is[of];
         assert!(
-            same(&BodyId::new(BodyKind::Connector, 0, Some(3)))
-                && !same(&BodyId::new(BodyKind::Connector, 0, Some(4)))
+            same(&BodyId::new(BodyKind::CONNECTOR, 0, Some(3)))
+                && !same(&BodyId::new(BodyKind::CONNECTOR, 0, Some(4)))
         );
     }
 }

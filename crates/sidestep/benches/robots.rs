@@ -268,7 +268,7 @@ fn looking() {
     advance(&mut run, 20);
     let frame_ms =
         best_ms(40, Box::new(|_| drop(black_box(run.frame(FrameOptions::WITHOUT_SCANS)))));
-    let asked = |k: u32| BodyId::new(BodyKind::Robot, 97 * k, None);
+    let asked = |k: u32| BodyId::new(BodyKind::ROBOT, 97 * k, None);
     let inspect_ms = best_ms(20, Box::new(|k| drop(black_box(run.inspect(asked(k))))));
     println!("{}: a frame in {frame_ms:.2} ms, an inspection in {inspect_ms:.1} ms", case.name);
     let traffic = |kind: &str, n: u32, more: &str| {

@@ -81,7 +81,7 @@ impl WorldRecording for PondWorld {
     fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
         vec![PositionColumns {
             table: "trajectories",
-            kind: BodyKind::Robot,
+            kind: BodyKind::ROBOT,
             number: "frog",
             part: None,
             axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
@@ -142,7 +142,7 @@ impl WorldView for PondWorld {
         let frog = |(number, pad)| {
             let [x_m, y_m] = self.place_m(pad);
             let shape = Shape::Cylinder { radius_m: 0.3, height_m: 0.2 };
-            Body::new(BodyKind::Robot, number, Pose::from_position([x_m, y_m, 0.1]), shape)
+            Body::new(BodyKind::ROBOT, number, Pose::from_position([x_m, y_m, 0.1]), shape)
         };
         let bodies = (0..).zip(state.pad.iter()).map(frog).collect();
         Frame { cycle: now, time_s: now as f64, bodies, ..Frame::default() }
@@ -153,7 +153,7 @@ impl PondWorld {
     fn reed(&self, number: u32, pad: u32) -> Body {
         let [x_m, y_m] = self.place_m(pad);
         let shape = Shape::Cuboid { size_m: [1.0, 1.0, 0.5] };
-        Body::new(BodyKind::Obstacle, number, Pose::from_position([x_m, y_m, 0.25]), shape)
+        Body::new(BodyKind::OBSTACLE, number, Pose::from_position([x_m, y_m, 0.25]), shape)
     }
 }
 

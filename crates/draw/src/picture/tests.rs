@@ -14,7 +14,7 @@ fn picture(scenery: &Scenery, frame: &Frame) -> String {
 
 /// Two marks that make the shown area 10 meters square, apart from the margin.
 fn corners() -> Vec<Body> {
-    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(BodyKind::Goal, 0, at, 0.0)).to_vec()
+    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(BodyKind::GOAL, 0, at, 0.0)).to_vec()
 }
 
 fn numbers(text: &str) -> Vec<f64> {
@@ -55,7 +55,7 @@ fn colors<const N: usize>(
 }
 
 fn obstacle(pose: Pose, shape: Shape) -> Body {
-    Body::new(BodyKind::Obstacle, 0, pose, shape)
+    Body::new(BodyKind::OBSTACLE, 0, pose, shape)
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn shapes_are_where_they_are() {
     let pole = Shape::Line { points_m: vec![[0.0, 1.0, 0.0], [3.0, 1.0, 0.0]], thickness_m: 0.8 };
     let still = || {
         vec![
-            ball(BodyKind::Obstacle, 0, [5.0, 5.0, 0.0], 1.0),
+            ball(BodyKind::OBSTACLE, 0, [5.0, 5.0, 0.0], 1.0),
             obstacle(turned, Shape::Cuboid { size_m: [2.0, 1.0, 0.1] }),
             obstacle(Pose::from_position([0.0; 3]), pole.clone()),
         ]
@@ -80,11 +80,11 @@ fn pair() -> Vec<Body> {
     let ends = [[4.0, 5.0, 0.0], [2.0, 5.0, 0.0]];
     let rod = Shape::Line { points_m: ends.to_vec(), thickness_m: 0.4 };
     let connector = |part: u32| {
-        let ball = ball(BodyKind::Connector, 0, ends[part as usize], 0.5);
+        let ball = ball(BodyKind::CONNECTOR, 0, ends[part as usize], 0.5);
         ball.with_part(part).with_state_if(part == 0, Condition::Leading)
     };
     vec![
-        Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rod),
+        Body::new(BodyKind::RODS, 0, Pose::from_position([0.0; 3]), rod),
         connector(0),
         connector(1),
     ]
@@ -111,7 +111,7 @@ fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
         svg.matches(r#"class="arrow""#).count()
     };
     let mover =
-        |x_m_s: f64| ball(BodyKind::Obstacle, 0, [0.0; 3], 0.1).with_velocity([x_m_s, 0.0, 0.0]);
+        |x_m_s: f64| ball(BodyKind::OBSTACLE, 0, [0.0; 3], 0.1).with_velocity([x_m_s, 0.0, 0.0]);
     assert_eq!(arrows(vec![mover(0.0)]), 0);
     assert_eq!(arrows(vec![mover(1.0), mover(0.01)]), 1, "too short an arrow is none");
 }
@@ -122,7 +122,7 @@ fn near_things_are_drawn_over_far_ones() {
     let to_eye = super::canvas::Camera::CORNER.to_eye;
     let at = |k: u32| -> Vec3 { to_eye.map(|x| x * -f64::from(k)) };
     let frame =
-        moment((0..4).map(|k| ball(BodyKind::Connector, k, at(k), 1.0).with_part(1)).collect());
+        moment((0..4).map(|k| ball(BodyKind::CONNECTOR, k, at(k), 1.0).with_part(1)).collect());
     let svg = picture(&open(3), &frame);
     let place =
         |k: usize| svg.find(&format!(r#"fill="{}""#, hex(BODY_COLORS[k]))).expect("a connector");
@@ -136,7 +136,7 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
         let at = [[0.0, 0.0, 0.0], [width_m, 0.0, 0.0], [0.0, height_m, 0.0]];
         let balls = (0..)
             .zip(at)
-            .map(|(k, at)| ball(BodyKind::Connector, k, at, 0.01 * far).with_part(1))
+            .map(|(k, at)| ball(BodyKind::CONNECTOR, k, at, 0.01 * far).with_part(1))
             .collect();
         let svg = picture(&open(2), &moment(balls));
         let [origin, east, north] = [0, 1, 2].map(|k| circle(&svg, &hex(BODY_COLORS[k])));
@@ -149,15 +149,15 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
 #[test]
 fn every_kind_has_the_colors_of_the_table() {
     let kinds = [
-        BodyKind::Robot,
-        BodyKind::Person,
-        BodyKind::Door,
-        BodyKind::Connector,
-        BodyKind::Airplane,
-        BodyKind::Zone,
-        BodyKind::Obstacle,
-        BodyKind::Goal,
-        BodyKind::Start,
+        BodyKind::ROBOT,
+        BodyKind::PERSON,
+        BodyKind::DOOR,
+        BodyKind::CONNECTOR,
+        BodyKind::AIRPLANE,
+        BodyKind::ZONE,
+        BodyKind::OBSTACLE,
+        BodyKind::GOAL,
+        BodyKind::START,
     ];
     for kind in kinds {
         for state in [Condition::Plain, Condition::Touching, Condition::Failed] {
@@ -178,7 +178,7 @@ fn thick_parts_in_space_have_a_seam_and_thin_ones_none() {
     let rods = |thickness_m: f64| {
         let points_m = vec![[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]];
         Body::new(
-            BodyKind::Rods,
+            BodyKind::RODS,
             0,
             Pose::from_position([0.0; 3]),
             Shape::Line { points_m, thickness_m },

@@ -1,6 +1,7 @@
 //! The trails of bodies, and the recorded rows from which they are made.
 
-use super::body::{Body, BodyId, BodyKind, Shape};
+use super::body::{Body, BodyId, Shape};
+use super::kind::{BodyKind, Role};
 use super::pose::{Isometry2, Vec3};
 use super::{Frame, Scenery};
 use crate::ports::Values;
@@ -81,7 +82,7 @@ impl PositionColumns {
             let is_current = |last: &Row| last.cycle + self.interval >= frame.cycle;
             if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
                 // A body that is gone has no shape in the frame, so that of its start is used.
-                let start = || scenery.bodies.iter().find(|body| is_start(body, id.number));
+                let start = || scenery.bodies.iter().find(|body| is_start(body, id));
                 let like = body.or_else(start);
                 let present = body.map(|body| (frame.cycle, body.pose.at_m));
                 trails.push(Trail { of: id, points: self.points(rows, like, present) });
@@ -174,8 +175,8 @@ impl PositionColumns {
     }
 }
 
-fn is_start(body: &Body, number: u32) -> bool {
-    body.kind == BodyKind::Start && body.number == number
+fn is_start(body: &Body, of: BodyId) -> bool {
+    body.kind.role() == Role::StartOf(of.kind) && body.number == of.number
 }
 
 /// Appends a point, and before it the corner of the move from the previous one, whose position and heading are given.
@@ -228,7 +229,7 @@ mod tests {
         let axis = |column| Axis { column, scale_m: 0.5, offset_m: 10.0 };
         PositionColumns {
             table: "trajectories",
-            kind: BodyKind::Robot,
+            kind: BodyKind::ROBOT,
             number: "body",
             part: None,
             axes: vec![axis("col"), axis("row")],
@@ -244,7 +245,7 @@ mod tests {
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
         let robot = Body::new(
-            BodyKind::Robot,
+            BodyKind::ROBOT,
             7,
             Pose::from_position([11.5, 11.0, 0.25]),
             Shape::Cuboid { size_m },
@@ -266,7 +267,7 @@ mod tests {
             bodies: Vec::new(),
             names: Vec::new(),
         };
-        rows().trails(&scenery, &frame, &[BodyId::new(BodyKind::Robot, 7, None)], column)
+        rows().trails(&scenery, &frame, &[BodyId::new(BodyKind::ROBOT, 7, None)], column)
     }
 
     #[test]
@@ -280,7 +281,7 @@ mod tests {
         ];
         assert_eq!(
             (trail.of, &trail.points[..]),
-            (BodyId::new(BodyKind::Robot, 7, None), &way[..])
+            (BodyId::new(BodyKind::ROBOT, 7, None), &way[..])
         );
     }
 

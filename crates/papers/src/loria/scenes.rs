@@ -33,7 +33,7 @@ fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
     let scenery = run.scenery();
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let columns = columns(&tracks, cycles.saturating_sub(TRAIL_CYCLES));
-    let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot);
+    let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::ROBOT);
     let bodies: Vec<BodyId> = robots.map(|body| body.id()).collect();
     let mut trails: Vec<Trail> = Vec::new();
     for positions in run.position_columns() {
@@ -86,7 +86,7 @@ mod tests {
         let scenes = all(&LoriaConfig { cycles: 450, ..LoriaConfig::quick() });
         for scene in &scenes {
             let robots =
-                scene.frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot).count();
+                scene.frame.bodies.iter().filter(|body| body.kind == BodyKind::ROBOT).count();
             assert_eq!(scene.trails.len(), robots);
             let box_m = scene.scenery.floor.as_ref().expect("a floor").box_m;
             let far = |pair: &[(Cycle, Vec3)]| {

@@ -10,7 +10,7 @@ use ::mcap::sans_io::indexed_reader::{
 use foxglove::Decode;
 use foxglove::messages::{Log, SceneEntity, SceneUpdate, log};
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, LogEvent, LogEventKind, Pose, Severity, Shape,
+    Body, BodyId, BodyKind, LogEvent, LogEventKind, Pose, Role, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, InputError};
 
@@ -118,12 +118,12 @@ impl McapSceneReader {
     }
 }
 
-/// Returns the bodies that an entity shows; those of a chain are its connectors, in their order.
+/// Returns the bodies that an entity shows; those of a body of parts are the parts, in their order.
 fn bodies(entity: &SceneEntity) -> Vec<Body> {
     let Some(BodyId { kind, number, .. }) = parse_body_id(&entity.id) else { return Vec::new() };
     let mut bodies = Vec::new();
     for (k, (pose, shape)) in (0u32..).zip(shapes(entity)) {
-        let part = (kind == BodyKind::Connector).then_some(k);
+        let part = (kind.role() == Role::PartOfBody).then_some(k);
         bodies.push(Body { part, ..Body::new(kind, number, pose, shape) });
     }
     bodies
@@ -212,7 +212,7 @@ mod tests {
             Shape::Line { points_m: vec![[0.0; 3], [1.0; 3]], thickness_m: 0.5 },
         ];
         let kinds =
-            [BodyKind::Robot, BodyKind::Person, BodyKind::Obstacle, BodyKind::Rods, BodyKind::Goal];
+            [BodyKind::ROBOT, BodyKind::PERSON, BodyKind::OBSTACLE, BodyKind::RODS, BodyKind::GOAL];
         let mut written: Vec<Body> = shapes
             .into_iter()
             .zip(kinds)
@@ -220,7 +220,7 @@ mod tests {
             .collect();
         let ball = || Shape::Sphere { radius_m: 0.1 };
         written.extend((0..3).map(|k| {
-            Body::new(BodyKind::Connector, 1, Pose::from_position([f64::from(k), 0.0, 0.0]), ball())
+            Body::new(BodyKind::CONNECTOR, 1, Pose::from_position([f64::from(k), 0.0, 0.0]), ball())
                 .with_part(k)
         }));
         let frame = Frame { bodies: written.clone(), ..Frame::default() };
@@ -230,7 +230,7 @@ mod tests {
 
         let dart = Shape::Dart { length_m: 2.0, width_m: 1.0 };
         let frame = Frame {
-            bodies: vec![Body::new(BodyKind::Airplane, 7, turned, dart)],
+            bodies: vec![Body::new(BodyKind::AIRPLANE, 7, turned, dart)],
             ..Frame::default()
         };
         let update = messages::scene(&frame, 2, &mut BTreeSet::new());
@@ -245,9 +245,9 @@ mod tests {
     fn names_that_are_no_bodies_are_left_out() {
         assert_eq!(
             parse_body_id("connector/0/7"),
-            Some(BodyId::new(BodyKind::Connector, 0, Some(7)))
+            Some(BodyId::new(BodyKind::CONNECTOR, 0, Some(7)))
         );
-        assert_eq!(parse_body_id("robot/3"), Some(BodyId::new(BodyKind::Robot, 3, None)));
+        assert_eq!(parse_body_id("robot/3"), Some(BodyId::new(BodyKind::ROBOT, 3, None)));
         for name in ["scenery", "robot", "robot/x", "robot/1/2/3", "cow/1"] {
             assert_eq!(parse_body_id(name), None, "{name}");
         }

@@ -40,7 +40,7 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         names: Vec::new(),
-        bodies: vec![Body::new(BodyKind::Obstacle, 0, Pose::from_position([0.0; 3]), wall)],
+        bodies: vec![Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), wall)],
     }
 }
 
@@ -49,16 +49,16 @@ fn frame(cycle: u64) -> Frame {
     let at_m = [0.1 * cycle as f64, 1.0, 0.0];
     let body = |kind, number, shape| Body::new(kind, number, Pose::from_heading(at_m, 0.3), shape);
     let mut bodies = vec![
-        body(BodyKind::Robot, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
-        body(BodyKind::Connector, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
-        body(BodyKind::Zone, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
+        body(BodyKind::ROBOT, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
+        body(BodyKind::CONNECTOR, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
+        body(BodyKind::ZONE, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
             .with_state_if(true, Condition::Touching),
     ];
     if cycle <= 4 {
-        bodies.push(body(BodyKind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
+        bodies.push(body(BodyKind::AIRPLANE, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
     }
     let scan = Scan {
-        of: BodyId::new(BodyKind::Robot, 0, None),
+        of: BodyId::new(BodyKind::ROBOT, 0, None),
         sensor: "sonar".into(),
         pose: Pose::from_position(at_m),
         bearings_rad: vec![-0.5, 0.0, 0.5],
@@ -70,7 +70,7 @@ fn frame(cycle: u64) -> Frame {
         cycle,
         level: Severity::Warning,
         kind: LogEventKind::Contact,
-        who: BodyId::new(BodyKind::Robot, 0, None),
+        who: BodyId::new(BodyKind::ROBOT, 0, None),
         with: None,
         at_m: None,
         value: None,

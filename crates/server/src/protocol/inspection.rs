@@ -37,7 +37,7 @@ fn declared_shape(shape: &MarkShape) -> &'static str {
 }
 
 fn body() -> BodyId {
-    BodyId::new(BodyKind::Connector, 3, Some(1))
+    BodyId::new(BodyKind::CONNECTOR, 3, Some(1))
 }
 
 #[test]

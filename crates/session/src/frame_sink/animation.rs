@@ -217,7 +217,7 @@ mod tests {
         }
         assert!(
             pictures
-                .trail(BodyId::new(sidestep_kernel::view::BodyKind::Robot, 9, None), last)
+                .trail(BodyId::new(sidestep_kernel::view::BodyKind::ROBOT, 9, None), last)
                 .points
                 .is_empty()
         );

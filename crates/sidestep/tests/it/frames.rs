@@ -101,7 +101,7 @@ fn bodies_keep_their_names_and_are_where_the_world_has_them() {
         let frame = run.frame(LOOK);
         assert_eq!((frame.cycle, frame.time_s), (5, 5.0 * scenery.cycle_s));
     }
-    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == BodyKind::Robot).count();
+    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == BodyKind::ROBOT).count();
     assert_eq!(agents, robots(1).agents());
 }
 
@@ -138,11 +138,11 @@ fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
         run.advance(1);
         let frame = run.frame(LOOK);
         let is_marked = |b: &&sidestep::kernel::view::Body| {
-            b.kind == BodyKind::Zone && b.state == sidestep::kernel::view::Condition::Touching
+            b.kind == BodyKind::ZONE && b.state == sidestep::kernel::view::Condition::Touching
         };
         marked += frame.bodies.iter().filter(is_marked).count();
         losses += frame.log.iter().filter(|e| e.words.contains("loses separation")).count();
-        let zones = frame.bodies.iter().filter(|b| b.kind == BodyKind::Zone);
+        let zones = frame.bodies.iter().filter(|b| b.kind == BodyKind::ZONE);
         assert!(zones.clone().all(|b| matches!(b.shape, Shape::Cylinder { .. })));
         assert_eq!(frame.bodies.len(), 2 * zones.count(), "each airplane has its zone");
     }
@@ -154,9 +154,9 @@ fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_
     let mut run = robots(1);
     run.advance(10);
     let all = run.frame(LOOK).scans;
-    let asked = [30, 3].map(|id| BodyId::new(BodyKind::Robot, id, None));
+    let asked = [30, 3].map(|id| BodyId::new(BodyKind::ROBOT, id, None));
     let unknown =
-        [BodyId::new(BodyKind::Robot, 9_999, None), BodyId::new(BodyKind::Door, 30, None)];
+        [BodyId::new(BodyKind::ROBOT, 9_999, None), BodyId::new(BodyKind::DOOR, 30, None)];
     let some = run.frame(FrameOptions::with_scans_of([&asked[..], &unknown].concat())).scans;
     let of = |who| all.iter().filter(move |scan| scan.of == who).cloned();
     let expected: Vec<_> = asked.into_iter().flat_map(of).collect();

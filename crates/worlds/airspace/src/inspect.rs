@@ -28,7 +28,7 @@ impl AirspaceWorld {
         who: BodyId,
     ) -> Option<Inspection> {
         let BodyId { kind, number: id, part } = who;
-        let is_airplane = kind == BodyKind::Airplane && part.is_none();
+        let is_airplane = kind == BodyKind::AIRPLANE && part.is_none();
         if !is_airplane || id as usize >= self.airplanes.len() || !state.is_active(self, id, now) {
             return None;
         }
@@ -189,5 +189,5 @@ impl Inspector<'_> {
 
 /// Returns the body that stands for an airplane.
 fn airplane(id: EntityId) -> BodyId {
-    BodyId::new(BodyKind::Airplane, id, None)
+    BodyId::new(BodyKind::AIRPLANE, id, None)
 }

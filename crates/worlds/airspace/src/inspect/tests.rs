@@ -13,7 +13,7 @@ fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
 }
 
 fn inspect_airplane(run: &AirspaceRun, id: u32) -> Inspection {
-    run.inspect(BodyId::new(BodyKind::Airplane, id, None)).expect("it is in the air")
+    run.inspect(BodyId::new(BodyKind::AIRPLANE, id, None)).expect("it is in the air")
 }
 
 /// Returns the probabilities of the actions; none of an airplane that is alone.
@@ -91,7 +91,7 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
     let mut kept = 0;
     while !run.is_over() && run.cycle() < 80 {
         for id in 0..6 {
-            let Some(inspection) = run.inspect(BodyId::new(BodyKind::Airplane, id, None)) else {
+            let Some(inspection) = run.inspect(BodyId::new(BodyKind::AIRPLANE, id, None)) else {
                 continue;
             };
             assert_eq!(
@@ -105,7 +105,7 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
             }
             kept += 1;
             let Some(FactValue::Body(BodyId {
-                kind: BodyKind::Airplane,
+                kind: BodyKind::AIRPLANE,
                 number: other,
                 part: None,
             })) = inspection.value("Shield", "because of")

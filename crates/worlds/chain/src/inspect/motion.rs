@@ -107,7 +107,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             let then = FactValue::meters(lag_m(&self.after, k));
             let touches = self.after.robots[k].is_bumped;
             table.push_row([
-                BodyId::new(BodyKind::Robot, self.slot, Some(k as u32)).into(),
+                BodyId::new(BodyKind::ROBOT, self.slot, Some(k as u32)).into(),
                 now,
                 then,
                 touches.into(),

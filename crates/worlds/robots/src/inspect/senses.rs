@@ -139,7 +139,7 @@ impl<T: BoxWord> Inspector<'_, T> {
     fn add_messages(&mut self, scratch: &Scratch) {
         let mut table = FactTable::new(["sender", "word"]);
         for heard in &scratch.heard {
-            let sender = BodyId::new(BodyKind::Robot, heard.sender, None);
+            let sender = BodyId::new(BodyKind::ROBOT, heard.sender, None);
             table.push_row([sender.into(), format!("{:#018x}", heard.word).into()]);
         }
         if self.cycle.world.radio.is_some() {

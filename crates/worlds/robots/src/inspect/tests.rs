@@ -18,7 +18,7 @@ fn head_on() -> RobotsRun {
 }
 
 fn robot(id: u32) -> BodyId {
-    BodyId::new(BodyKind::Robot, id, None)
+    BodyId::new(BodyKind::ROBOT, id, None)
 }
 
 fn told(run: &RobotsRun, id: u32) -> Inspection {
@@ -62,9 +62,9 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
 fn nobody_is_told_of_who_is_not_there() {
     let run = head_on();
     for who in [
-        BodyId::new(BodyKind::Robot, 2, None),
-        BodyId::new(BodyKind::Person, 0, None),
-        BodyId::new(BodyKind::Robot, 0, Some(0)),
+        BodyId::new(BodyKind::ROBOT, 2, None),
+        BodyId::new(BodyKind::PERSON, 0, None),
+        BodyId::new(BodyKind::ROBOT, 0, Some(0)),
     ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }

@@ -223,11 +223,11 @@ fn who_asks_what_was_ordered_does_not_use_it_up() {
     run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.02] })
         .expect("right");
     let inspection =
-        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+        run.inspect(BodyId::new(BodyKind::AIRPLANE, 0, None)).expect("it is in the air");
     assert_eq!(inspection.value("Decides", "action"), Some(&"the turn that was ordered".into()));
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
     let inspection =
-        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+        run.inspect(BodyId::new(BodyKind::AIRPLANE, 0, None)).expect("it is in the air");
     assert_eq!(inspection.value("Decides", "action"), Some(&"to the way-point".into()));
 }
