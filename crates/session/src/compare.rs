@@ -124,13 +124,14 @@ fn bits(values: &Values, row: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::view::{Axis, BodyKind};
+    use sidestep_kernel::view::Axis;
+    use sidestep_robots::kinds::ROBOT;
 
     #[test]
     fn one_changed_cell_is_found() {
         let rows = PositionColumns {
             table: "trajectories",
-            kind: BodyKind::CONNECTOR,
+            kind: ROBOT,
             number: "chain",
             part: Some("connector"),
             axes: vec![Axis::meters("x_m")],
@@ -156,9 +157,6 @@ mod tests {
         let (was, is) = (bodies(2.0), bodies(2.0 + f64::EPSILON * 2.0));
         assert_eq!(was, bodies(2.0));
         let same = |of: &BodyId| was[of] == is[of];
-        assert!(
-            same(&BodyId::new(BodyKind::CONNECTOR, 0, Some(3)))
-                && !same(&BodyId::new(BodyKind::CONNECTOR, 0, Some(4)))
-        );
+        assert!(same(&BodyId::new(ROBOT, 0, Some(3))) && !same(&BodyId::new(ROBOT, 0, Some(4))));
     }
 }

@@ -1,5 +1,6 @@
 //! The hooks of a run of the pond, beside its phases.
 
+use super::kinds;
 use super::rows::{Event, FrogAction, Rows};
 use super::{PondState, PondWorld, Saved, Sums};
 use serde_json::{Value, json};
@@ -81,7 +82,7 @@ impl WorldRecording for PondWorld {
     fn position_columns(&self, _: &Collector) -> Vec<PositionColumns> {
         vec![PositionColumns {
             table: "trajectories",
-            kind: BodyKind::ROBOT,
+            kind: kinds::FROG,
             number: "frog",
             part: None,
             axes: vec![Axis::meters("x_m"), Axis::meters("y_m")],
@@ -142,7 +143,7 @@ impl WorldView for PondWorld {
         let frog = |(number, pad)| {
             let [x_m, y_m] = self.place_m(pad);
             let shape = Shape::Cylinder { radius_m: 0.3, height_m: 0.2 };
-            Body::new(BodyKind::ROBOT, number, Pose::from_position([x_m, y_m, 0.1]), shape)
+            Body::new(kinds::FROG, number, Pose::from_position([x_m, y_m, 0.1]), shape)
         };
         let bodies = (0..).zip(state.pad.iter()).map(frog).collect();
         Frame { cycle: now, time_s: now as f64, bodies, ..Frame::default() }

@@ -3,6 +3,7 @@
 use crate::exit::Failure;
 use sidestep::arms::kinematics::{Sphere, Vector};
 use sidestep::kernel::view::{Body, BodyKind, Frame, Pose, Scenery, Shape};
+use sidestep::worlds::chain::kinds::{CONNECTOR, RODS};
 use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::Path;
@@ -39,7 +40,7 @@ impl ArmPicture<'_> {
             cycle_s: 1.0,
             floor: None,
             bodies: self.static_bodies(length_m),
-            names: vec![(BodyKind::CONNECTOR, 0, self.robot.into())],
+            names: vec![(CONNECTOR, 0, self.robot.into())],
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };
         let caption = "Positions in m in the frame of the base.";
@@ -60,10 +61,10 @@ impl ArmPicture<'_> {
             thickness_m: THICKNESS_FRACTION * length_m,
         };
         let ball = Shape::Sphere { radius_m: RADIUS_FRACTION * length_m };
-        let mut bodies = vec![Body::new(BodyKind::RODS, 0, Pose::from_position([0.0; 3]), line)];
+        let mut bodies = vec![Body::new(RODS, 0, Pose::from_position([0.0; 3]), line)];
         for (part, at_m) in (0..).zip(self.connectors) {
             let pose = Pose::from_position(*at_m);
-            let connector = Body::new(BodyKind::CONNECTOR, 0, pose, ball.clone());
+            let connector = Body::new(CONNECTOR, 0, pose, ball.clone());
             bodies.push(connector.with_part(part));
         }
         bodies

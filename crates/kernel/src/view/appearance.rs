@@ -87,6 +87,7 @@ impl Body {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kind::samples::{AIRPLANE, CONNECTOR, ROBOT};
     use super::super::{BodyKind, Pose, Shape};
     use super::*;
 
@@ -95,7 +96,7 @@ mod tests {
         let body = |kind| {
             Body::new(kind, 3, Pose::from_position([0.0; 3]), Shape::Sphere { radius_m: 1.0 })
         };
-        for kind in [BodyKind::ROBOT, BodyKind::CONNECTOR, BodyKind::AIRPLANE] {
+        for kind in [ROBOT, CONNECTOR, AIRPLANE] {
             let plain = body(kind);
             assert_eq!(plain.appearance(2).color, BODY_COLORS[3]);
             let touching = plain.with_state_if(true, Condition::Touching).appearance(2);

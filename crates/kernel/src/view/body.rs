@@ -185,12 +185,13 @@ pub enum Shape {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kind::samples::CONNECTOR;
     use super::*;
 
     #[test]
     fn names_tell_kind_number_and_part() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        let body = Body::new(BodyKind::CONNECTOR, 2, Pose::from_position([0.0; 3]), ball);
+        let body = Body::new(CONNECTOR, 2, Pose::from_position([0.0; 3]), ball);
         assert_eq!(body.name(), "connector/2");
         assert_eq!(body.with_part(7).name(), "connector/2/7");
     }

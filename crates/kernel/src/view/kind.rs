@@ -1,8 +1,11 @@
 //! Kinds of bodies, which worlds declare: all that other code needs to show a body of a kind.
 
-use super::appearance::{Color, DOOR_COLOR, MOBILE_COLOR};
+use super::appearance::Color;
+use super::body::BodyId;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::cell::RefCell;
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::hash::{Hash, Hasher};
 
@@ -212,110 +215,23 @@ impl Serialize for BodyKind {
     }
 }
 
+thread_local! {
+    /// The kinds that the names in a text stand for while [`Kinds::while_reading`] reads it: Serde hands no context to the
+    /// code that it derives.
+    static READABLE: RefCell<Kinds> = const { RefCell::new(Kinds(Vec::new())) };
+}
+
+/// Reads a name; it stands for one of the kinds of [`Kinds::while_reading`].
 impl<'de> Deserialize<'de> for BodyKind {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
-        Self::from_name(&name)
-            .ok_or_else(|| de::Error::custom(format!("there is no kind `{name}`")))
+        let kind = READABLE.with_borrow(|kinds| kinds.find(&name));
+        kind.ok_or_else(|| de::Error::custom(format!("there is no kind `{name}`")))
     }
 }
 
+/// Kinds that several worlds show.
 impl BodyKind {
-    /// A robot.
-    pub const ROBOT: Self = Self::new(&KindSpec {
-        name: "robot",
-        noun: "robot",
-        rank: 0,
-        role: Role::Agent(TrailStyle::OnePerColor),
-        layer: 5,
-        paint: Paint::ByNumber { opacity: 1.0 },
-        outline: Outline::Dark,
-        legend: Legend::AGENT,
-        shows_heading: true,
-    });
-
-    /// A person, or another pedestrian.
-    pub const PERSON: Self = Self::new(&KindSpec {
-        name: "person",
-        noun: "person",
-        rank: 1,
-        role: Role::MovesAmong(Self::ROBOT),
-        layer: 4,
-        paint: Paint::Fixed { color: MOBILE_COLOR, open_opacity: 1.0 },
-        outline: Outline::Shade,
-        legend: Legend::new("mobile object"),
-        shows_heading: false,
-    });
-
-    /// A door.
-    pub const DOOR: Self = Self::new(&KindSpec {
-        name: "door",
-        noun: "door",
-        rank: 2,
-        role: Role::StandsAmong(Self::ROBOT),
-        layer: 1,
-        paint: Paint::Fixed { color: DOOR_COLOR, open_opacity: 0.25 },
-        outline: Outline::Shade,
-        legend: Legend { open: "door, open", ..Legend::new("door, closed") },
-        shows_heading: false,
-    });
-
-    /// A joint of a chain.
-    pub const CONNECTOR: Self = Self::new(&KindSpec {
-        name: "connector",
-        noun: "chain",
-        rank: 3,
-        role: Role::PartOfBody,
-        layer: 5,
-        paint: Paint::ByNumber { opacity: 1.0 },
-        outline: Outline::Seam,
-        legend: Legend::AGENT,
-        shows_heading: false,
-    });
-
-    /// The rods of a chain.
-    pub const RODS: Self = Self::new(&KindSpec {
-        name: "rods",
-        noun: "rods",
-        rank: 4,
-        role: Role::LineThroughParts(Self::CONNECTOR),
-        layer: 4,
-        paint: Paint::ByNumber { opacity: 1.0 },
-        outline: Outline::None,
-        legend: Legend::AGENT,
-        shows_heading: false,
-    });
-
-    /// An airplane.
-    pub const AIRPLANE: Self = Self::new(&KindSpec {
-        name: "airplane",
-        noun: "airplane",
-        rank: 5,
-        role: Role::Agent(TrailStyle::Lines),
-        layer: 5,
-        paint: Paint::ByNumber { opacity: 1.0 },
-        outline: Outline::White,
-        legend: Legend::AGENT,
-        shows_heading: false,
-    });
-
-    /// The zone around an airplane that is to be kept free.
-    pub const ZONE: Self = Self::new(&KindSpec {
-        name: "zone",
-        noun: "zone",
-        rank: 6,
-        role: Role::AroundAgent(Self::AIRPLANE),
-        layer: 3,
-        paint: Paint::Veil,
-        outline: Outline::Pale,
-        legend: Legend {
-            touching: "separation lost",
-            failed: "zone of separation",
-            ..Legend::new("zone of separation")
-        },
-        shows_heading: false,
-    });
-
     /// An obstacle.
     pub const OBSTACLE: Self = Self::new(&KindSpec {
         name: "obstacle",
@@ -341,36 +257,127 @@ impl BodyKind {
         legend: Legend::new("goal"),
         shows_heading: false,
     });
+}
 
-    /// A starting place.
-    pub const START: Self = Self::new(&KindSpec {
-        name: "start",
-        noun: "start",
-        rank: 9,
-        role: Role::StartOf(Self::AIRPLANE),
-        layer: 2,
-        paint: Paint::ByNumber { opacity: 0.1 },
-        outline: Outline::Dashed,
-        legend: Legend::new("start, as wide as its zone of separation"),
+/// The kinds of bodies that the worlds of a program show, by rank: names in files stand for these.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Kinds(Vec<BodyKind>);
+
+impl Kinds {
+    /// Returns the list of these kinds, in which each occurs once.
+    pub fn new(kinds: impl IntoIterator<Item = BodyKind>) -> Self {
+        let distinct: BTreeSet<BodyKind> = kinds.into_iter().collect();
+        Self(distinct.into_iter().collect())
+    }
+
+    /// Returns the kind with a name.
+    pub fn find(&self, name: &str) -> Option<BodyKind> {
+        self.iter().find(|kind| kind.name() == name)
+    }
+
+    /// Returns the kinds, by rank.
+    pub fn iter(&self) -> impl Iterator<Item = BodyKind> + '_ {
+        self.0.iter().copied()
+    }
+
+    /// Returns the kinds, by rank.
+    pub fn as_slice(&self) -> &[BodyKind] {
+        &self.0
+    }
+
+    /// Returns the names of the kinds.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.iter().map(BodyKind::name).collect()
+    }
+
+    /// Reads a text with bodies, whose names of kinds stand for these: without this, the text of a body cannot be read.
+    pub fn while_reading<T>(&self, read: impl FnOnce() -> T) -> T {
+        let before = READABLE.replace(self.clone());
+        let result = read();
+        READABLE.set(before);
+        result
+    }
+
+    /// Returns the body with a name such as `robot/3` or `connector/0/7`.
+    pub fn parse_body_id(&self, name: &str) -> Option<BodyId> {
+        let mut parts = name.split('/');
+        let kind = self.find(parts.next()?)?;
+        let number = parts.next()?.parse().ok()?;
+        let part = parts.next().map(str::parse).transpose().ok()?;
+        parts.next().is_none().then_some(BodyId { kind, number, part })
+    }
+}
+
+/// Kinds for tests.
+#[cfg(test)]
+pub(super) mod samples {
+    use super::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+
+    /// A robot.
+    pub(crate) const ROBOT: BodyKind = BodyKind::new(&KindSpec {
+        name: "robot",
+        noun: "robot",
+        rank: 0,
+        role: Role::Agent(TrailStyle::OnePerColor),
+        layer: 5,
+        paint: Paint::ByNumber { opacity: 1.0 },
+        outline: Outline::Dark,
+        legend: Legend::AGENT,
+        shows_heading: true,
+    });
+
+    /// A joint of a chain.
+    pub(crate) const CONNECTOR: BodyKind = BodyKind::new(&KindSpec {
+        name: "connector",
+        noun: "chain",
+        rank: 3,
+        role: Role::PartOfBody,
+        layer: 5,
+        paint: Paint::ByNumber { opacity: 1.0 },
+        outline: Outline::Seam,
+        legend: Legend::AGENT,
         shows_heading: false,
     });
 
-    /// All kinds.
-    pub const ALL: [Self; 10] = [
-        Self::ROBOT,
-        Self::PERSON,
-        Self::DOOR,
-        Self::CONNECTOR,
-        Self::RODS,
-        Self::AIRPLANE,
-        Self::ZONE,
-        Self::OBSTACLE,
-        Self::GOAL,
-        Self::START,
-    ];
+    /// An airplane.
+    pub(crate) const AIRPLANE: BodyKind = BodyKind::new(&KindSpec {
+        name: "airplane",
+        noun: "airplane",
+        rank: 5,
+        role: Role::Agent(TrailStyle::Lines),
+        layer: 5,
+        paint: Paint::ByNumber { opacity: 1.0 },
+        outline: Outline::White,
+        legend: Legend::AGENT,
+        shows_heading: false,
+    });
+}
 
-    /// Returns the kind with a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
+#[cfg(test)]
+mod tests {
+    use super::samples::{AIRPLANE, CONNECTOR, ROBOT};
+    use super::*;
+
+    #[test]
+    fn kinds_come_by_rank_and_are_found_by_name() {
+        let kinds = Kinds::new([BodyKind::GOAL, CONNECTOR, ROBOT, BodyKind::GOAL]);
+        assert_eq!(kinds.names(), ["robot", "connector", "goal"]);
+        assert_eq!(kinds.find("connector"), Some(CONNECTOR));
+        assert_eq!(kinds.parse_body_id("connector/0/7"), Some(BodyId::new(CONNECTOR, 0, Some(7))));
+        assert_eq!(kinds.parse_body_id("robot/3"), Some(BodyId::new(ROBOT, 3, None)));
+        for name in ["scenery", "robot", "robot/x", "robot/1/2/3", "cow/1", "airplane/0"] {
+            assert_eq!(kinds.parse_body_id(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_in_texts_stand_for_the_kinds_with_which_they_are_read() {
+        let id = BodyId::new(AIRPLANE, 7, None);
+        let text = serde_json::to_string(&id).expect("JSON");
+        assert_eq!(text, r#"["airplane",7,null]"#);
+        let read = || serde_json::from_str::<BodyId>(&text).ok();
+        assert_eq!(Kinds::new([ROBOT, AIRPLANE]).while_reading(read), Some(id));
+        assert_eq!(Kinds::new([ROBOT]).while_reading(read), None);
+        assert_eq!(read(), None);
     }
 }

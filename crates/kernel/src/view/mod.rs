@@ -18,7 +18,7 @@ pub use appearance::{
 };
 pub use body::{Body, BodyId, Condition, Shape};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
-pub use kind::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+pub use kind::{BodyKind, KindSpec, Kinds, Legend, Outline, Paint, Role, TrailStyle};
 pub use log::{Log, LogEvent, LogEventKind, Quantity, Severity};
 pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
 pub use trails::{Axis, PositionColumns, Trail, corner};
@@ -198,12 +198,13 @@ impl Scan {
 
 #[cfg(test)]
 mod tests {
+    use super::kind::samples::ROBOT;
     use super::*;
     use std::f64::consts::FRAC_PI_2;
 
     fn scan(bearings_rad: &[f64], ranges_m: &[f64]) -> Scan {
         Scan {
-            of: BodyId::new(BodyKind::ROBOT, 0, None),
+            of: BodyId::new(ROBOT, 0, None),
             sensor: "eye".into(),
             pose: Pose::from_position([0.0; 3]),
             bearings_rad: bearings_rad.to_vec(),

@@ -215,6 +215,7 @@ pub fn corner(from: Vec3, heading: u32, to: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::super::Pose;
+    use super::super::kind::samples::ROBOT;
     use super::*;
 
     #[test]
@@ -229,7 +230,7 @@ mod tests {
         let axis = |column| Axis { column, scale_m: 0.5, offset_m: 10.0 };
         PositionColumns {
             table: "trajectories",
-            kind: BodyKind::ROBOT,
+            kind: ROBOT,
             number: "body",
             part: None,
             axes: vec![axis("col"), axis("row")],
@@ -244,12 +245,8 @@ mod tests {
     /// The trails of a robot of two boxes that slips north while it goes east, until a cycle.
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
-        let robot = Body::new(
-            BodyKind::ROBOT,
-            7,
-            Pose::from_position([11.5, 11.0, 0.25]),
-            Shape::Cuboid { size_m },
-        );
+        let robot =
+            Body::new(ROBOT, 7, Pose::from_position([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
         let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
         let columns = [
             ("cycle", Values::U64(vec![1, 0, 0].into())),
@@ -267,7 +264,7 @@ mod tests {
             bodies: Vec::new(),
             names: Vec::new(),
         };
-        rows().trails(&scenery, &frame, &[BodyId::new(BodyKind::ROBOT, 7, None)], column)
+        rows().trails(&scenery, &frame, &[BodyId::new(ROBOT, 7, None)], column)
     }
 
     #[test]
@@ -279,10 +276,7 @@ mod tests {
             (2, [11.5, 10.5, 0.25]),
             (2, [11.5, 11.0, 0.25]),
         ];
-        assert_eq!(
-            (trail.of, &trail.points[..]),
-            (BodyId::new(BodyKind::ROBOT, 7, None), &way[..])
-        );
+        assert_eq!((trail.of, &trail.points[..]), (BodyId::new(ROBOT, 7, None), &way[..]));
     }
 
     #[test]

@@ -310,18 +310,13 @@ fn log_level(level: Severity) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_airspace::kinds::ZONE;
+    use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
     #[test]
     fn every_kind_has_the_colors_that_pictures_have() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        for kind in [
-            BodyKind::ROBOT,
-            BodyKind::PERSON,
-            BodyKind::DOOR,
-            BodyKind::ZONE,
-            BodyKind::OBSTACLE,
-            BodyKind::GOAL,
-        ] {
+        for kind in [ROBOT, PERSON, DOOR, ZONE, BodyKind::OBSTACLE, BodyKind::GOAL] {
             for dimensions in [2, 3] {
                 let body = Body::new(kind, 4, ViewPose::from_position([0.0; 3]), ball.clone());
                 let appearance = body.appearance(dimensions);

@@ -9,6 +9,7 @@ use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
 use crate::protocol::{Problem, ReplyBody};
+use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::{MetricInfo, Source, Worlds};
 use sidestep_session::{Error, RecordedRun, read_scenario};
@@ -278,6 +279,11 @@ impl OpenRun {
     /// Returns the host of Foxglove viewers.
     pub(crate) fn foxglove_host(&self) -> Option<Arc<FoxgloveHost>> {
         self.deps.foxglove.clone()
+    }
+
+    /// Returns the kinds of bodies that pages may ask for.
+    pub(crate) fn kinds(&self) -> Kinds {
+        self.deps.worlds.kinds()
     }
 
     /// Returns the descriptions of the world's metrics.

@@ -13,6 +13,7 @@ use super::trace::InspectionTrace;
 use super::view::obstacle_body_id;
 use super::world::ChainWorld;
 use super::{act, claim, join};
+use crate::kinds;
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
@@ -36,9 +37,9 @@ impl<const D: usize> ChainWorld<D> {
             return None;
         }
         let before = state.body(slot as usize).clone();
-        let parts = if kind == BodyKind::CONNECTOR {
+        let parts = if kind == kinds::CONNECTOR {
             before.chain.points().len()
-        } else if kind == BodyKind::ROBOT {
+        } else if kind == kinds::ROBOT {
             before.robots.len()
         } else {
             0
@@ -176,12 +177,12 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     fn connector(&self, k: usize) -> BodyId {
-        BodyId::new(BodyKind::CONNECTOR, self.slot, Some(k as u32))
+        BodyId::new(kinds::CONNECTOR, self.slot, Some(k as u32))
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
     fn position(&self, body: &Body<D>) -> [f64; 3] {
-        if self.kind == BodyKind::ROBOT {
+        if self.kind == kinds::ROBOT {
             with_dimensions(body.robots[self.k].pose.at)
         } else {
             with_dimensions(body.chain.points()[self.k])
@@ -213,7 +214,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
             table.push_row([
                 FactValue::count(turn + 1),
-                FactValue::Body(BodyId::new(BodyKind::RODS, slot, None)),
+                FactValue::Body(BodyId::new(kinds::RODS, slot, None)),
             ]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);

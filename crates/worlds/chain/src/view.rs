@@ -7,6 +7,7 @@ use super::perceive::Perceiver;
 use super::scratch::Scratch;
 use super::state::{Body as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
+use crate::kinds;
 use sidestep_kernel::view::{
     Axis, Body, BodyId, BodyKind, Condition, LogEvent, Pose, PositionColumns, Quantity, Scan,
     ScanSelection, Scenery, Severity, Shape, Vec3,
@@ -40,7 +41,7 @@ impl<const D: usize> ChainWorld<D> {
                 .zip(self.chains.iter())
                 // Those without a name are known by their number.
                 .filter(|(_, spec)| !spec.name.is_empty())
-                .map(|(id, spec)| (BodyKind::CONNECTOR, id, spec.name.clone()))
+                .map(|(id, spec)| (kinds::CONNECTOR, id, spec.name.clone()))
                 .collect(),
         }
     }
@@ -49,7 +50,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(crate) fn position_columns(interval: Cycle) -> Vec<PositionColumns> {
         vec![PositionColumns {
             table: "trajectories",
-            kind: BodyKind::CONNECTOR,
+            kind: kinds::CONNECTOR,
             number: "chain",
             part: Some("connector"),
             axes: ["x_m", "y_m", "z_m"][..D].iter().map(|axis| Axis::meters(axis)).collect(),
@@ -106,7 +107,7 @@ fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> 
     let true_m = laser.true_ranges(&perceiver.scratch.scan);
     let true_m = true_m.map(|range_m| hit_range_m(range_m, most_m)).collect();
     Some(Scan {
-        of: BodyId::new(BodyKind::CONNECTOR, slot, Some(percept.agent as u32)),
+        of: BodyId::new(kinds::CONNECTOR, slot, Some(percept.agent as u32)),
         sensor: LASER.into(),
         pose: Pose::from_heading([x_m, y_m, 0.0], percept.leader.pose.heading_rad),
         bearings_rad,
@@ -169,15 +170,14 @@ fn push_chain<const D: usize>(
     for (part, whole) in (0..).zip(whole_parts(chain)) {
         let points_m = points_m[whole].to_vec();
         let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
-        bodies.push(
-            Body::new(BodyKind::RODS, id, Pose::from_position([0.0; 3]), line).with_part(part),
-        );
+        bodies
+            .push(Body::new(kinds::RODS, id, Pose::from_position([0.0; 3]), line).with_part(part));
     }
     let leader = leader(spec, body);
     let connectors = (0_u32..).zip(chain.connectors()).zip(&points_m);
     bodies.extend(connectors.map(|((part, connector), at_m)| {
         let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
-        Body::new(BodyKind::CONNECTOR, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
+        Body::new(kinds::CONNECTOR, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
             .with_part(part)
             .with_state_if(leader == Some(part as usize), Condition::Leading)
             .with_state_if(connector.failed, Condition::Failed)
@@ -186,7 +186,7 @@ fn push_chain<const D: usize>(
         let [x_m, y_m] = robot.pose.at;
         let pose = Pose::from_heading([x_m, y_m, 0.0], robot.pose.heading_rad);
         let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
-        Body::new(BodyKind::ROBOT, id, pose, disc)
+        Body::new(kinds::ROBOT, id, pose, disc)
             .with_part(part)
             .with_state_if(robot.is_bumped, Condition::Touching)
     }));
@@ -258,7 +258,7 @@ pub(crate) fn view_event(event: &Event) -> LogEvent {
         cycle: event.cycle,
         level,
         kind: event.kind.view_kind(),
-        who: BodyId::new(BodyKind::CONNECTOR, event.chain, Some(event.connector)),
+        who: BodyId::new(kinds::CONNECTOR, event.chain, Some(event.connector)),
         with: event.obstacle.map(obstacle_body_id),
         at_m: Some(event.at_m),
         value: (unit != NO_VALUE).then(|| Quantity::new(event.value, unit)),
@@ -313,7 +313,7 @@ fn describe(event: &Event) -> (Severity, &'static str, String) {
 /// Returns the body of an obstacle: another chain stands for all of its parts.
 pub(crate) fn obstacle_body_id(id: u32) -> BodyId {
     match id.checked_sub(OTHER_CHAIN) {
-        Some(chain) => BodyId::new(BodyKind::RODS, chain, None),
+        Some(chain) => BodyId::new(kinds::RODS, chain, None),
         None => BodyId::new(BodyKind::OBSTACLE, id, None),
     }
 }

@@ -7,6 +7,7 @@ use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyState, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
+use crate::kinds;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::BoxWord;
 use sidestep_kernel::view::{
@@ -42,7 +43,7 @@ impl RobotsWorld {
             ["col_boxes", "row_boxes"].map(|column| view::Axis { column, scale_m, offset_m: 0.0 });
         vec![view::PositionColumns {
             table: "trajectories",
-            kind: BodyKind::ROBOT,
+            kind: kinds::ROBOT,
             number: "body",
             part: None,
             axes: vec![col, row],
@@ -96,7 +97,7 @@ impl RobotsWorld {
         let ids: Vec<EntityId> = match of {
             ScanSelection::First(robots) => self.robots.iter().take(*robots).copied().collect(),
             ScanSelection::Of(bodies) => {
-                let robots = bodies.iter().filter(|of| of.kind == BodyKind::ROBOT);
+                let robots = bodies.iter().filter(|of| of.kind == kinds::ROBOT);
                 let ids = robots.map(|of| of.number);
                 // Viewers may ask for ids that this run does not have.
                 ids.filter(|&id| (id as usize) < self.bodies.len()).collect()
@@ -157,7 +158,7 @@ impl RobotsWorld {
         let mut poses = Vec::with_capacity(odometry.len());
         for (id, reckoning) in (0..).zip(odometry) {
             let pose = reckoning.pose(self.map.box_size_m, &turns);
-            poses.push((BodyId::new(BodyKind::ROBOT, id, None), pose));
+            poses.push((BodyId::new(kinds::ROBOT, id, None), pose));
         }
         poses
     }
@@ -206,14 +207,14 @@ impl<'a> BodyViewBuilder<'a> {
         let ty = self.world.type_of(id);
         let box_m = self.world.map.box_size_m;
         let kind = ty.visible_kind();
-        let is_open = kind == BodyKind::DOOR && body.facing.get().is_open();
+        let is_open = kind == kinds::DOOR && body.facing.get().is_open();
         // The model is a plane; heights are chosen for the picture: robots below people and walls, and an open
         // door as a threshold.
         let (width, height) = ty.size;
         let side_m = f64::from(width.min(height)) * box_m;
         let height_m = if is_open {
             0.05 * side_m
-        } else if kind == BodyKind::ROBOT {
+        } else if kind == kinds::ROBOT {
             0.5 * side_m
         } else {
             side_m
@@ -244,9 +245,9 @@ impl<'a> BodyViewBuilder<'a> {
 impl BodyType {
     fn visible_kind(&self) -> BodyKind {
         match self.role {
-            Role::Robot(_) => BodyKind::ROBOT,
-            Role::Mover(_) => BodyKind::PERSON,
-            Role::Door(_) => BodyKind::DOOR,
+            Role::Robot(_) => kinds::ROBOT,
+            Role::Mover(_) => kinds::PERSON,
+            Role::Door(_) => kinds::DOOR,
         }
     }
 }
@@ -278,7 +279,7 @@ impl ScanCarrier {
             true_ranges_m.push(to_boundary_m + true_m);
         }
         Scan {
-            of: BodyId::new(BodyKind::ROBOT, self.id, None),
+            of: BodyId::new(kinds::ROBOT, self.id, None),
             sensor: sensor.name.clone(),
             pose: self.pose,
             ranges_m,
