@@ -16,11 +16,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, Orders};
 use sidestep::kernel::ports::{TableSchema, Values};
-use sidestep::kernel::view::{Body, BodyId, BodyKind, FrameOptions};
+use sidestep::kernel::view::{Body, BodyId, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
 use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
-use sidestep_session::{ManagedRun, OutputPaths, RowSelection, frame_rows};
+use sidestep_session::{ManagedRun, OutputPaths, RowSelection};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -567,7 +567,7 @@ impl Simulation {
     /// >>> len(sim.frame()), sim.frame().units["x_m"]
     /// (2, 'm')
     fn frame(&self, py: Python<'_>) -> PyResult<Table> {
-        let rows = self.with_run(py, |run| Ok(frame_rows(run.simulation_mut())));
+        let rows = self.with_run(py, |run| Ok(run.frame_rows()));
         rows.and_then(|(schema, columns)| Table::new(schema, columns))
     }
 
@@ -586,12 +586,12 @@ impl Simulation {
         number: u32,
         part: Option<u32>,
     ) -> PyResult<Py<PyAny>> {
-        let kind = BodyKind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| {
-            let names: Vec<_> = BodyKind::ALL.iter().map(|kind| kind.name()).collect();
+        let kinds = worlds::list().kinds();
+        let kind = kinds.find(kind).ok_or_else(|| {
             argument_error(
                 "kind",
                 format!("there is no kind `{kind}`"),
-                format!("one of {}", names.join(", ")),
+                format!("one of {}", kinds.names().join(", ")),
             )
         })?;
         let inspection = self.read(py, |run| {

@@ -187,10 +187,11 @@ fn receive_messages(child: &mut Child) -> Receiver<LinkMessage> {
     let (sender, messages) = channel();
     let out = child.stdout.take();
     std::thread::spawn(move || {
+        let kinds = worlds().kinds();
         for line in
             out.into_iter().flat_map(|out| BufReader::new(out).lines()).map_while(Result::ok)
         {
-            if let Ok(message) = serde_json::from_str(&line)
+            if let Ok(message) = kinds.while_reading(|| serde_json::from_str(&line))
                 && sender.send(message).is_err()
             {
                 return;

@@ -2,6 +2,7 @@
 //!
 //! The numbers are made up; they have the shape of results from a study of a robot team.
 
+use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
@@ -10,8 +11,8 @@ use sidestep_draw::{
     to_png,
 };
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Condition, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery,
-    Shape, Trail,
+    Body, BodyId, Condition, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery, Shape,
+    Trail,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -67,7 +68,7 @@ fn corridor() -> Result<String, DrawError> {
         Body::new(kind, number, pose, Shape::Cuboid { size_m: [width, height, 0.1] })
     };
     let door = |number, at: (f64, f64), width, open| {
-        body(BodyKind::Door, number, at, (width, 1.0)).with_state_if(open, Condition::Open)
+        body(DOOR, number, at, (width, 1.0)).with_state_if(open, Condition::Open)
     };
     let paths = [
         &[(3.0, 12.0), (3.0, 11.0), (6.0, 7.0), (21.0, 7.0), (26.0, 8.0), (26.0, 3.0)][..],
@@ -76,18 +77,17 @@ fn corridor() -> Result<String, DrawError> {
     ];
     let points = |path: &[(f64, f64)]| (0..).zip(path.iter().map(|&(x, y)| [x, y, 0.0])).collect();
     let trail = |(k, places): (u32, &&[(f64, f64)])| Trail {
-        of: BodyId::new(BodyKind::Robot, k, None),
+        of: BodyId::new(ROBOT, k, None),
         points: points(places),
     };
-    let robot = |(k, places): (u32, &&[(f64, f64)])| {
-        body(BodyKind::Robot, k, places[places.len() - 1], (2.0, 2.0))
-    };
+    let robot =
+        |(k, places): (u32, &&[(f64, f64)])| body(ROBOT, k, places[places.len() - 1], (2.0, 2.0));
     let others = [
         door(3, (5.0, 8.5), 2.0, true),
         door(4, (17.0, 8.5), 2.0, false),
         door(5, (16.5, 4.5), 3.0, false),
-        body(BodyKind::Person, 6, (9.5, 2.5), (1.0, 1.0)),
-        body(BodyKind::Person, 7, (29.5, 10.5), (1.0, 1.0)),
+        body(PERSON, 6, (9.5, 2.5), (1.0, 1.0)),
+        body(PERSON, 7, (29.5, 10.5), (1.0, 1.0)),
     ];
     let bodies = (0..).zip(&paths).map(robot).chain(others).collect();
     let scenery = Scenery {

@@ -140,6 +140,7 @@ impl AnimationFrame {
 mod tests {
     use super::*;
     use crate::testing::{ball, plane};
+    use sidestep_chain::kinds::CONNECTOR;
     use sidestep_kernel::view::{ALERT_COLOR, BODY_COLORS, Body, BodyKind, Condition};
 
     /// A film of 20 by 10 meters, 200 pixels wide.
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn north_is_up_and_a_meter_is_as_long_both_ways() {
-        let film = film(vec![ball(BodyKind::Connector, 0, [2.0, 9.0, 0.0], 1.0)]);
+        let film = film(vec![ball(CONNECTOR, 0, [2.0, 9.0, 0.0], 1.0)]);
         assert_eq!(film.size_px(), (200, 124));
         let picture = still(&film, vec![], "");
         assert_eq!(pixel(&picture, 20, 10), BODY_COLORS[0]);
@@ -168,8 +169,8 @@ mod tests {
     #[test]
     fn what_moves_is_on_top_of_one_picture_only() {
         let place = [5.0, 5.0, 0.0];
-        let film = film(vec![ball(BodyKind::Connector, 1, place, 1.0)]);
-        let moved = still(&film, vec![ball(BodyKind::Connector, 2, place, 1.0)], "");
+        let film = film(vec![ball(CONNECTOR, 1, place, 1.0)]);
+        let moved = still(&film, vec![ball(CONNECTOR, 2, place, 1.0)], "");
         assert_eq!(pixel(&moved, 50, 50), BODY_COLORS[2]);
         assert_eq!(pixel(&still(&film, vec![], ""), 50, 50), BODY_COLORS[1]);
     }
@@ -178,8 +179,8 @@ mod tests {
     fn agents_cover_what_is_in_the_way() {
         let place = [5.0, 5.0, 0.0];
         let bodies = vec![
-            ball(BodyKind::Connector, 0, place, 1.0).with_state_if(true, Condition::Failed),
-            ball(BodyKind::Obstacle, 0, place, 2.0),
+            ball(CONNECTOR, 0, place, 1.0).with_state_if(true, Condition::Failed),
+            ball(BodyKind::OBSTACLE, 0, place, 2.0),
         ];
         assert_eq!(pixel(&still(&film(vec![]), bodies, ""), 50, 50), ALERT_COLOR);
     }
@@ -193,7 +194,7 @@ mod tests {
             assert!(AnimationRenderer::new(plane(20, 10), &[], width_px).is_err());
         }
         for at in [f64::NAN, 1e300] {
-            let lost = vec![ball(BodyKind::Connector, 0, [at, 0.0, 0.0], 1.0)];
+            let lost = vec![ball(CONNECTOR, 0, [at, 0.0, 0.0], 1.0)];
             let frame = Frame { bodies: lost, ..Frame::default() };
             assert!(film(vec![]).render(&frame, &[], "").is_err());
         }

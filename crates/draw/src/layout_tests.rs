@@ -3,6 +3,9 @@
 
 use proptest::prelude::*;
 use resvg::usvg::{Group, Node, Rect};
+use sidestep_airspace::kinds::{AIRPLANE, ZONE};
+use sidestep_chain::kinds::{CONNECTOR, RODS};
+use sidestep_robots::kinds::ROBOT;
 
 use sidestep_kernel::view::{
     Body, BodyId, BodyKind, Frame, Isometry2, OccupancyGrid, Pose, Scenery, Shape, Trail,
@@ -86,19 +89,17 @@ fn map(width: u32, height: u32) -> String {
 /// Draws chains, and robots that have met in one corner.
 fn bodies(dimensions: u8, n: u32, style: Style) -> String {
     let at = |k: u32| [0, 1, 2].map(|i| f64::from(k) * (1.0 - 0.3 * f64::from(i)));
-    let still = |k| ball(BodyKind::Obstacle, k, at(k), 0.3).with_velocity([f64::from(k % 2); 3]);
-    let name = |k| (BodyKind::Connector, k, format!("a chain with a long name {k}"));
+    let still = |k| ball(BodyKind::OBSTACLE, k, at(k), 0.3).with_velocity([f64::from(k % 2); 3]);
+    let name = |k| (CONNECTOR, k, format!("a chain with a long name {k}"));
     let scenery = Scenery {
         bodies: (0..n).map(still).collect(),
         names: (0..n).map(name).collect(),
         ..open(dimensions)
     };
-    let chain = |k: u32| {
-        (0..=k).map(move |part| ball(BodyKind::Connector, k, at(part), 0.2).with_part(part))
-    };
+    let chain = |k: u32| (0..=k).map(move |part| ball(CONNECTOR, k, at(part), 0.2).with_part(part));
     let frame = moment((0..n).flat_map(chain).collect());
     let trail = |k: u32| Trail {
-        of: BodyId::new(BodyKind::Connector, k, Some(0)),
+        of: BodyId::new(CONNECTOR, k, Some(0)),
         points: (0..20).map(|cycle| (cycle, at(k + cycle as u32))).collect(),
     };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
@@ -109,14 +110,12 @@ fn bodies(dimensions: u8, n: u32, style: Style) -> String {
 fn meeting(dimensions: u8, n: u32, apart_m: f64) -> String {
     let dart = Shape::Dart { length_m: 500.0, width_m: 300.0 };
     let at = |k: u32| [apart_m * f64::from(k % 4), apart_m * f64::from(k / 4), 3000.0];
-    let airplane = |k| Body::new(BodyKind::Airplane, k, Pose::from_position(at(k)), dart.clone());
-    let zone = |k| ball(BodyKind::Zone, k, at(k), 2000.0);
+    let airplane = |k| Body::new(AIRPLANE, k, Pose::from_position(at(k)), dart.clone());
+    let zone = |k| ball(ZONE, k, at(k), 2000.0);
     let frame = moment((0..n).flat_map(|k| [airplane(k), zone(k)]).collect());
     let from = |k: u32| [30_000.0 - 900.0 * f64::from(k), 20_000.0 * f64::from(k % 2), 3000.0];
-    let trail = |k| Trail {
-        of: BodyId::new(BodyKind::Airplane, k, None),
-        points: vec![(0, from(k)), (90, at(k))],
-    };
+    let trail =
+        |k| Trail { of: BodyId::new(AIRPLANE, k, None), points: vec![(0, from(k)), (90, at(k))] };
     let trails: Vec<Trail> = (0..n).map(trail).collect();
     let scenery = open(dimensions);
     draw(&scenery, &frame, &trails, &options(Style::MAP, &scenery)).unwrap()
@@ -257,12 +256,12 @@ proptest! {
         (box_m, width) in (number(), 1u32..20),
     ) {
         let kinds = [
-            (BodyKind::Robot, Shape::Cuboid { size_m: [side_m, radius_m, 1.0] }),
-            (BodyKind::Zone, Shape::Cylinder { radius_m, height_m: side_m }),
-            (BodyKind::Connector, Shape::Sphere { radius_m }),
-            (BodyKind::Rods, Shape::Line { points_m: points.clone(), thickness_m: side_m }),
-            (BodyKind::Airplane, Shape::Dart { length_m: radius_m, width_m: side_m }),
-            (BodyKind::Obstacle, Shape::Cuboid { size_m: [side_m; 3] }),
+            (ROBOT, Shape::Cuboid { size_m: [side_m, radius_m, 1.0] }),
+            (ZONE, Shape::Cylinder { radius_m, height_m: side_m }),
+            (CONNECTOR, Shape::Sphere { radius_m }),
+            (RODS, Shape::Line { points_m: points.clone(), thickness_m: side_m }),
+            (AIRPLANE, Shape::Dart { length_m: radius_m, width_m: side_m }),
+            (BodyKind::OBSTACLE, Shape::Cuboid { size_m: [side_m; 3] }),
         ];
         let body = |(k, (kind, shape)): (usize, (BodyKind, Shape))| {
             let pose = Pose { at_m: points[k % 3], turn };
@@ -277,8 +276,8 @@ proptest! {
         };
         let way = |k: usize| (0..).zip(points.iter().skip(k).copied()).collect();
         let trails = [
-            Trail { of: BodyId::new(BodyKind::Robot, 0, None), points: way(0) },
-            Trail { of: BodyId::new(BodyKind::Connector, 2, None), points: way(1) },
+            Trail { of: BodyId::new(ROBOT, 0, None), points: way(0) },
+            Trail { of: BodyId::new(CONNECTOR, 2, None), points: way(1) },
         ];
         let drawn = draw(&scenery, &moment(bodies), &trails, &options(Style::MAP, &scenery));
         if let Ok(svg) = drawn {

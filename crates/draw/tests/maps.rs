@@ -7,6 +7,7 @@ use sidestep_kernel::view::{
     Body, BodyId, BodyKind, Condition, DOOR_COLOR, Frame, Isometry2, MOBILE_COLOR, Occupancy,
     OccupancyGrid, Pose, Scenery, Shape, Trail, Vec3, WALL_COLOR,
 };
+use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
 const WHITE: [u8; 3] = [255, 255, 255];
 /// The first robot's blue at 50 % on white.
@@ -110,8 +111,8 @@ fn body(kind: BodyKind, number: u32, at: (f64, f64), size: (f64, f64), quarters:
 fn moved_robot(number: u32, width: f64, way: &[(f64, f64)]) -> (Body, Trail) {
     // All in one cycle, so that the whole trail has one shade.
     let places = way.iter().map(|&at| (0 as Cycle, place(at))).collect();
-    let robot = body(BodyKind::Robot, number, way[way.len() - 1], (width, width), 0);
-    (robot, Trail { of: BodyId::new(BodyKind::Robot, number, None), points: places })
+    let robot = body(ROBOT, number, way[way.len() - 1], (width, width), 0);
+    (robot, Trail { of: BodyId::new(ROBOT, number, None), points: places })
 }
 
 /// Returns the room with robots that have gone ways.
@@ -133,11 +134,11 @@ fn newest(mut scene: Scene) -> Scene {
 #[test]
 fn walls_doors_people_and_tracks_have_their_colors_at_their_places() {
     let mut scene = newest(ways(&[(3.0, &[(3.5, 3.5), (3.5, 12.5), (10.5, 12.5)])]));
-    let door = |col: f64| body(BodyKind::Door, col as u32, (col, 6.5), (1.0, 3.0), 0);
+    let door = |col: f64| body(DOOR, col as u32, (col, 6.5), (1.0, 3.0), 0);
     scene.bodies.extend([
         door(0.5),
         door(19.5).with_state_if(true, Condition::Open),
-        body(BodyKind::Person, 9, (16.0, 16.0), (2.0, 2.0), 0),
+        body(PERSON, 9, (16.0, 16.0), (2.0, 2.0), 0),
     ]);
     let picture = Picture::from_scene(&scene);
     assert_eq!(picture.at(0.5, 0.5), WALL_COLOR);
@@ -184,7 +185,7 @@ fn a_place_crossed_often_is_no_darker() {
 fn a_robot_that_never_moved_covers_its_boxes() {
     let mut scene = newest(ways(&[(3.0, &[(9.5, 9.5)])]));
     // Moved slightly aside, so that the place where it was is visible.
-    scene.bodies[0] = body(BodyKind::Robot, 0, (15.5, 15.5), (3.0, 3.0), 0);
+    scene.bodies[0] = body(ROBOT, 0, (15.5, 15.5), (3.0, 3.0), 0);
     let picture = Picture::from_scene(&scene);
     assert_eq!(picture.at(8.1, 8.1), RIBBON);
     assert_eq!(picture.at(10.9, 10.9), RIBBON);
@@ -194,7 +195,7 @@ fn a_robot_that_never_moved_covers_its_boxes() {
 #[test]
 fn an_arrowhead_points_where_the_robot_heads() {
     for heading in 0..=5 {
-        let robot = body(BodyKind::Robot, 0, (10.0, 10.0), (4.0, 4.0), heading);
+        let robot = body(ROBOT, 0, (10.0, 10.0), (4.0, 4.0), heading);
         let picture = Picture::from_scene(&Scene { bodies: vec![robot], ..room() });
         // The tip is white, the same distance behind the middle is not.
         let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][usize::from(heading) % 4];

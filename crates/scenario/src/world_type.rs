@@ -3,6 +3,7 @@
 use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::view::{BodyKind, Kinds};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
 use std::path::Path;
@@ -44,6 +45,11 @@ pub trait WorldType: Send + Sync {
 
     /// Its metrics in words. Reports make words from the names of metrics that are not listed.
     fn metric_infos(&self) -> &'static [MetricInfo] {
+        &[]
+    }
+
+    /// The kinds of bodies that its runs show: names in files and requests stand for these.
+    fn kinds(&self) -> &'static [BodyKind] {
         &[]
     }
 
@@ -192,7 +198,12 @@ impl Worlds {
         self.iter().map(WorldType::name).collect()
     }
 
-    /// Returns the world with this name; names are compared as they are.
+    /// Returns the kinds of bodies that runs of any of these worlds show.
+    pub fn kinds(&self) -> Kinds {
+        Kinds::new(self.iter().flat_map(|world| world.kinds().iter().copied()))
+    }
+
+    /// Returns the world with this name.
     pub fn find(&self, name: &str) -> Option<&dyn WorldType> {
         self.iter().find(|world| world.name() == name)
     }

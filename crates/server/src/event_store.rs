@@ -121,11 +121,12 @@ impl EventStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::view::{BodyId, BodyKind, LogEvent, LogEventKind, Severity};
+    use sidestep::worlds::robots::kinds::ROBOT;
+    use sidestep_kernel::view::{BodyId, LogEvent, LogEventKind, Severity};
 
     fn frame(cycle: Cycle, happened: &[Cycle]) -> Frame {
         let entry = |&cycle: &Cycle| {
-            let (kind, who) = (LogEventKind::Contact, BodyId::new(BodyKind::Robot, 3, None));
+            let (kind, who) = (LogEventKind::Contact, BodyId::new(ROBOT, 3, None));
             let (with, at_m, value, words) = (None, None, None, format!("at {cycle}"));
             LogEvent { cycle, level: Severity::Info, kind, who, with, at_m, value, words }
         };

@@ -123,13 +123,14 @@ fn bits(values: &Values, row: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::view::{BodyKind, CoordinateColumn};
+    use sidestep_kernel::view::CoordinateColumn;
+    use sidestep_robots::kinds::ROBOT;
 
     #[test]
     fn one_changed_cell_is_found() {
         let rows = PositionTableColumns {
             table: "trajectories",
-            kind: BodyKind::Connector,
+            kind: ROBOT,
             number: "chain",
             part: Some("connector"),
             axes: vec![CoordinateColumn::meters("x_m")],
@@ -155,9 +156,6 @@ mod tests {
         let (was, is) = (bodies(2.0), bodies(2.0 + f64::EPSILON * 2.0));
         assert_eq!(was, bodies(2.0));
         let same = |of: &BodyId| was[of] == is[of];
-        assert!(
-            same(&BodyId::new(BodyKind::Connector, 0, Some(3)))
-                && !same(&BodyId::new(BodyKind::Connector, 0, Some(4)))
-        );
+        assert!(same(&BodyId::new(ROBOT, 0, Some(3))) && !same(&BodyId::new(ROBOT, 0, Some(4))));
     }
 }

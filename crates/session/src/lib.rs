@@ -52,7 +52,7 @@ pub mod sweep;
 pub use driver::{RunTiming, Sinks, drive};
 pub use error::Error;
 pub use files::{display_path, write_atomically};
-pub use frame_sink::{EndReason, FrameSink, McapSink, frame_rows};
+pub use frame_sink::{EndReason, FrameSink, McapSink};
 pub use identity::VERSION;
 pub use live::{LiveControl, ViewerAddress, ViewerOptions, ViewerServer, next_free_port};
 pub use managed_run::{ManagedRun, OutputPaths, RestoreError};

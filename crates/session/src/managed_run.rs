@@ -3,7 +3,7 @@
 use crate::VERSION;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::files::resolve_path;
-use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink};
+use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink, frame_rows};
 use crate::identity::Producer;
 use crate::live::{LiveControl, ViewerAddress};
 use crate::orders::has_orders;
@@ -12,6 +12,7 @@ use crate::run_recorder::{RunRecorder, restore_run};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_record::{IfExists, McapRecorder, RunFolder};
 use sidestep_scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
@@ -31,6 +32,8 @@ pub struct ManagedRun {
     /// Rows that [`Self::keep_rows`] asked for.
     rows: Option<RowStore>,
     frames: Option<FrameRows>,
+    /// The kinds of bodies of the program's worlds.
+    kinds: Kinds,
     viewers: Option<LiveControl>,
     workers: usize,
     /// The cycle to stop at, if before the planned end.
@@ -138,7 +141,7 @@ impl ManagedRun {
         outputs.check()?;
         if outputs.folder.is_none() && outputs.mcap.is_none() {
             let run = compiled.start(source, workers);
-            return Ok(Self::new(run, None, None, workers));
+            return Ok(Self::new(worlds, run, None, None, workers));
         }
         let resolved = compiled.resolve(source)?;
         let mut run = match outputs.folder {
@@ -150,7 +153,7 @@ impl ManagedRun {
             }
         };
         let (recording, mcap) = outputs.create(&resolved, run.as_mut(), worlds.build())?;
-        Ok(Self::new(run, recording, mcap, workers))
+        Ok(Self::new(worlds, run, recording, mcap, workers))
     }
 
     /// Returns a stopped run at the point from which its folder can continue, to go on to its end
@@ -179,10 +182,11 @@ impl ManagedRun {
         check_end(until, run.cycle(), run.config().cycles)?;
         refuse_without_orders(run.as_ref(), path)?;
         let recording = Some(RunRecorder::start(folder, run.as_mut())?);
-        Ok(Self { until, ..Self::new(run, recording, None, workers) })
+        Ok(Self { until, ..Self::new(worlds, run, recording, None, workers) })
     }
 
     fn new(
+        worlds: &Worlds,
         run: Box<dyn Simulation>,
         recording: Option<RunRecorder>,
         mcap: Option<McapSink>,
@@ -194,6 +198,7 @@ impl ManagedRun {
             mcap,
             rows: None,
             frames: None,
+            kinds: worlds.kinds(),
             viewers: None,
             workers,
             until: None,
@@ -217,6 +222,11 @@ impl ManagedRun {
     /// The run, for callers that watch it or hand controls over.
     pub fn simulation_mut(&mut self) -> &mut dyn Simulation {
         self.run.as_mut()
+    }
+
+    /// Returns the present frame as a table.
+    pub fn frame_rows(&mut self) -> (TableSchema, Vec<Values>) {
+        frame_rows(self.run.as_mut(), &self.kinds)
     }
 
     /// Shows the run to viewers while it advances.
@@ -260,7 +270,7 @@ impl ManagedRun {
         self.run.start_recording();
         let schemas = self.run.schemas();
         self.rows = Some(RowStore::new(&schemas, wanted.tables.as_deref(), self.run.cycle())?);
-        self.frames = wanted.frames.map(FrameRows::new);
+        self.frames = wanted.frames.map(|every| FrameRows::new(every, self.kinds.clone()));
         Ok(())
     }
 

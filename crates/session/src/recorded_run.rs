@@ -167,7 +167,10 @@ impl RecordedRun {
         self.check_end(start.config().cycles)?;
         let playback = match &self.folder {
             Some(folder) => RecordedPlayback::from_tables(start, folder, self.cycles_done)?,
-            None => RecordedPlayback::from_messages(start, &self.path, self.cycles_done)?,
+            None => {
+                let kinds = self.worlds.kinds();
+                RecordedPlayback::from_messages(start, &self.path, kinds, self.cycles_done)?
+            }
         };
         Ok(Box::new(playback))
     }

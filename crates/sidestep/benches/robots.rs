@@ -8,10 +8,11 @@ use cpu_time::ProcessTime;
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::robots::heap_bytes;
+use sidestep::worlds::robots::kinds::ROBOT;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld, robots_run};
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::ports::{Recorder, SystemClock};
-use sidestep_kernel::view::{BodyId, BodyKind, FrameOptions};
+use sidestep_kernel::view::{BodyId, FrameOptions};
 use sidestep_kernel::{PhaseContext, Phases, Simulation};
 use sidestep_record::{ParquetRecorder, Provenance};
 use std::hint::black_box;
@@ -268,7 +269,7 @@ fn looking() {
     advance(&mut run, 20);
     let frame_ms =
         best_ms(40, Box::new(|_| drop(black_box(run.frame(FrameOptions::WITHOUT_SCANS)))));
-    let asked = |k: u32| BodyId::new(BodyKind::Robot, 97 * k, None);
+    let asked = |k: u32| BodyId::new(ROBOT, 97 * k, None);
     let inspect_ms = best_ms(20, Box::new(|k| drop(black_box(run.inspect(asked(k))))));
     println!("{}: a frame in {frame_ms:.2} ms, an inspection in {inspect_ms:.1} ms", case.name);
     let traffic = |kind: &str, n: u32, more: &str| {

@@ -6,6 +6,7 @@
 
 mod external;
 mod facts;
+pub mod kinds;
 mod rows;
 mod world_impl;
 mod world_type;

@@ -1,5 +1,6 @@
 //! The hooks of a run of the pond, beside its phases.
 
+use super::kinds;
 use super::rows::{Event, FrogAction, Rows};
 use super::{PondState, PondWorld, Saved, Sums};
 use serde_json::{Value, json};
@@ -82,7 +83,7 @@ impl WorldRecording for PondWorld {
     fn position_columns(&self, _: &Collector) -> Vec<PositionTableColumns> {
         vec![PositionTableColumns {
             table: "trajectories",
-            kind: BodyKind::Robot,
+            kind: kinds::FROG,
             number: "frog",
             part: None,
             axes: vec![CoordinateColumn::meters("x_m"), CoordinateColumn::meters("y_m")],
@@ -143,7 +144,7 @@ impl WorldView for PondWorld {
         let frog = |(number, pad)| {
             let [x_m, y_m] = self.place_m(pad);
             let shape = Shape::Cylinder { radius_m: 0.3, height_m: 0.2 };
-            Body::new(BodyKind::Robot, number, Pose::from_position([x_m, y_m, 0.1]), shape)
+            Body::new(kinds::FROG, number, Pose::from_position([x_m, y_m, 0.1]), shape)
         };
         let bodies = (0..).zip(state.pad.iter()).map(frog).collect();
         Frame { cycle: now, time_s: now as f64, bodies, ..Frame::default() }
@@ -154,7 +155,7 @@ impl PondWorld {
     fn reed(&self, number: u32, pad: u32) -> Body {
         let [x_m, y_m] = self.place_m(pad);
         let shape = Shape::Cuboid { size_m: [1.0, 1.0, 0.5] };
-        Body::new(BodyKind::Obstacle, number, Pose::from_position([x_m, y_m, 0.25]), shape)
+        Body::new(BodyKind::OBSTACLE, number, Pose::from_position([x_m, y_m, 0.25]), shape)
     }
 }
 

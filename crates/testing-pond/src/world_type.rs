@@ -5,6 +5,7 @@ use super::{PondWorld, external};
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::text::{StateDescription, align_pairs, key_value};
+use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, Run, RunConfig, RunStart, Seed, Simulation};
 use sidestep_scenario::{
     CompiledScenario, Editing, ResolvedScenario, Source, WorldFacts, WorldType,
@@ -76,6 +77,10 @@ impl WorldType for Pond {
     fn default_scenario(&self) -> &'static str {
         "format = 1\nworld = \"pond\"\nname = \"evening\"\nseed = 1\ncycles = 6000\n\
          [pond]\nfrogs = 12\nwidth = 8\nheight = 6\ncheckpoint_every = 500\n"
+    }
+
+    fn kinds(&self) -> &'static [BodyKind] {
+        super::kinds::ALL
     }
 
     fn facts(&self) -> WorldFacts {

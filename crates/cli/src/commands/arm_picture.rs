@@ -3,6 +3,7 @@
 use crate::exit::Failure;
 use sidestep::arms::kinematics::{ObstacleSphere, Vector};
 use sidestep::kernel::view::{Body, BodyKind, Frame, Pose, Scenery, Shape};
+use sidestep::worlds::chain::kinds::{CONNECTOR, RODS};
 use sidestep_draw::{PictureOptions, draw};
 use sidestep_session::write_png;
 use std::path::Path;
@@ -40,7 +41,7 @@ impl ArmPicture<'_> {
             cycle_s: 1.0,
             floor: None,
             bodies: self.static_bodies(length_m),
-            names: vec![(BodyKind::Connector, 0, self.robot.into())],
+            names: vec![(CONNECTOR, 0, self.robot.into())],
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };
         let caption = "Positions in m in the frame of the base.";
@@ -61,10 +62,10 @@ impl ArmPicture<'_> {
             thickness_m: THICKNESS_FRACTION * length_m,
         };
         let ball = Shape::Sphere { radius_m: RADIUS_FRACTION * length_m };
-        let mut bodies = vec![Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), line)];
+        let mut bodies = vec![Body::new(RODS, 0, Pose::from_position([0.0; 3]), line)];
         for (part, at_m) in (0..).zip(self.connectors) {
             let pose = Pose::from_position(*at_m);
-            let connector = Body::new(BodyKind::Connector, 0, pose, ball.clone());
+            let connector = Body::new(CONNECTOR, 0, pose, ball.clone());
             bodies.push(connector.with_part(part));
         }
         bodies
@@ -75,11 +76,11 @@ impl ArmPicture<'_> {
         for (number, obstacle) in (0..).zip(self.obstacles) {
             let ball = Shape::Sphere { radius_m: obstacle.radius_m };
             let pose = Pose::from_position(obstacle.center_m);
-            bodies.push(Body::new(BodyKind::Obstacle, number, pose, ball));
+            bodies.push(Body::new(BodyKind::OBSTACLE, number, pose, ball));
         }
         if let Some(at_m) = self.target {
             let ball = Shape::Sphere { radius_m: TARGET_FRACTION * length_m };
-            let goal = Body::new(BodyKind::Goal, 0, Pose::from_position(at_m), ball);
+            let goal = Body::new(BodyKind::GOAL, 0, Pose::from_position(at_m), ball);
             bodies.push(goal.with_part(0));
         }
         bodies

@@ -9,7 +9,8 @@ use crate::style::{INK, hex};
 use crate::svg::{Anchor, Svg, SvgNumber, TextStyle};
 use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::{
-    Body, BodyKind, Color, Condition, Pose, Scenery, Shape, Vec3, WALL_COLOR, body_color,
+    Body, BodyKind, Color, Condition, Outline, Pose, Role, Scenery, Shape, Vec3, WALL_COLOR,
+    body_color,
 };
 
 /// Least width of a line, because thinner ones would vanish.
@@ -63,7 +64,7 @@ pub(super) fn draw_walls(svg: &mut Svg, scenery: &Scenery, canvas: &Canvas) {
 
 fn is_wall(body: &Body) -> bool {
     let is_thin = matches!(body.shape, Shape::Line { thickness_m: 0.0, .. });
-    body.kind == BodyKind::Obstacle && is_thin && !body.is_moving()
+    body.kind == BodyKind::OBSTACLE && is_thin && !body.is_moving()
 }
 
 /// Draws bodies seen from above, those of lower layers first.
@@ -135,7 +136,7 @@ fn draw_part(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, part: &DepthItem
 
 /// Returns whether a body is an obstacle of which there may be thousands.
 fn is_ball(body: &Body) -> bool {
-    body.kind == BodyKind::Obstacle && matches!(body.shape, Shape::Sphere { .. })
+    body.kind == BodyKind::OBSTACLE && matches!(body.shape, Shape::Sphere { .. })
 }
 
 /// Returns the attributes of a ball among many.
@@ -172,14 +173,13 @@ fn depth(canvas: &Canvas, at: Vec3) -> f64 {
 /// Returns the color of a body, paler with distance in space, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let appearance = body.appearance(scene.scenery.dimensions);
-    let acts = body.kind.is_agent() || body.kind == BodyKind::Rods;
-    if acts
+    if body.kind.is_of_agent()
         && matches!(body.state, Condition::Plain | Condition::Leading)
         && scene.lacks_trail(body)
     {
         return (UNTRACED_COLOR, appearance.opacity);
     }
-    if body.kind == BodyKind::Obstacle && !canvas.is_above() {
+    if body.kind == BodyKind::OBSTACLE && !canvas.is_above() {
         let color = paler(appearance.color, canvas.nearness(body.pose.at_m));
         return (color, appearance.opacity);
     }
@@ -215,24 +215,22 @@ fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
 
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     let white = [0xFF; 3];
-    match body.kind {
-        BodyKind::Door if body.state == Condition::Open => {
+    match body.kind.spec().outline {
+        Outline::Shade if body.state == Condition::Open => {
             format!(r#"{} stroke-dasharray="3 2""#, outline_attributes(color, 1.0))
         }
-        BodyKind::Obstacle if canvas.is_above() => outline_attributes(darker(color), 0.8),
-        BodyKind::Obstacle => {
+        Outline::Shade => outline_attributes(darker(color), 1.0),
+        Outline::ThinShade if canvas.is_above() => outline_attributes(darker(color), 0.8),
+        Outline::ThinShade => {
             format!(r#"{} stroke-opacity="0.5""#, outline_attributes(darker(color), 0.6))
         }
-        BodyKind::Zone => format!(r#"{} stroke-opacity="0.6""#, outline_attributes(color, 0.8)),
-        BodyKind::Start => format!(r#"{} stroke-dasharray="5 3""#, outline_attributes(color, 1.0)),
-        BodyKind::Goal | BodyKind::Person | BodyKind::Door => {
-            outline_attributes(darker(color), 1.0)
-        }
-        BodyKind::Connector if canvas.is_above() => outline_attributes(white, 0.6),
-        BodyKind::Airplane => outline_attributes(white, 0.6),
-        BodyKind::Robot => outline_attributes(UNTRACED_COLOR, 0.8),
-        BodyKind::Connector if is_seamed(canvas, body) => outline_attributes(white, SEAM_PX),
-        BodyKind::Connector | BodyKind::Rods => String::new(),
+        Outline::Pale => format!(r#"{} stroke-opacity="0.6""#, outline_attributes(color, 0.8)),
+        Outline::Dashed => format!(r#"{} stroke-dasharray="5 3""#, outline_attributes(color, 1.0)),
+        Outline::Dark => outline_attributes(UNTRACED_COLOR, 0.8),
+        Outline::White => outline_attributes(white, 0.6),
+        Outline::Seam if canvas.is_above() => outline_attributes(white, 0.6),
+        Outline::Seam if is_seamed(canvas, body) => outline_attributes(white, SEAM_PX),
+        Outline::Seam | Outline::None => String::new(),
     }
 }
 
@@ -243,7 +241,7 @@ fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
         Shape::Line { thickness_m, .. } => thickness_m,
         _ => 0.0,
     };
-    let is_part = matches!(body.kind, BodyKind::Connector | BodyKind::Rods);
+    let is_part = matches!(body.kind.role(), Role::PartOfBody | Role::LineThroughParts(_));
     is_part && !canvas.is_above() && thickness_m * canvas.px_per_m >= MIN_SEAMED_PX
 }
 
@@ -262,7 +260,7 @@ fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
             svg.path(&outline(circle(&body.pose, *radius_m).map(|p| canvas.px(p))), attributes);
         }
         Shape::Cylinder { radius_m, .. } | Shape::Sphere { radius_m } => {
-            let least_px = if body.kind == BodyKind::Goal { MIN_GOAL_PX } else { MIN_RADIUS_PX };
+            let least_px = if body.kind == BodyKind::GOAL { MIN_GOAL_PX } else { MIN_RADIUS_PX };
             let radius_px = (radius_m * canvas.px_per_m).max(least_px);
             svg.circle(canvas.px(body.pose.at_m), radius_px, attributes);
         }
@@ -293,15 +291,14 @@ fn draw_line(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body, poi
     svg.path(&data, attributes);
 }
 
-/// Draws an arrowhead on a robot that shows its heading.
+/// Draws an arrowhead on a body whose kind shows its heading.
 fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
     let (side_m, top_m) = match body.shape {
         Shape::Cuboid { size_m: [x, y, z] } => (x.min(y), 0.5 * z),
         Shape::Cylinder { radius_m, height_m } => (1.6 * radius_m, 0.5 * height_m),
         _ => return,
     };
-    if body.kind == BodyKind::Robot {
-        // A third of the side to each end, so that the color of the body stays visible around it.
+    if body.kind.spec().shows_heading {
         let size_m = 0.34 * side_m;
         let corners =
             [[size_m, 0.0], [-0.7 * size_m, 0.6 * size_m], [-0.7 * size_m, -0.6 * size_m]];
@@ -313,13 +310,13 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
 /// Draws marks over everything: the targets of moving things, and the leaders.
 pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    for body in bodies.clone().filter(|body| body.kind == BodyKind::Obstacle && body.is_moving()) {
+    for body in bodies.clone().filter(|body| body.kind == BodyKind::OBSTACLE && body.is_moving()) {
         let from = middle(body);
         let to = std::array::from_fn(|k| from[k] + ARROW_TIME_S * body.velocity_m_s[k]);
         arrow(svg, canvas.px(from), canvas.px(to));
     }
     let goals: Vec<&Body> =
-        bodies.clone().filter(|body| body.kind == BodyKind::Goal && body.part.is_some()).collect();
+        bodies.clone().filter(|body| body.kind == BodyKind::GOAL && body.part.is_some()).collect();
     let are_few = goals.len() <= MAX_NUMBERED_TARGETS;
     for goal in goals {
         draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));

@@ -132,7 +132,7 @@ pub(crate) fn animation_bounds(
     }
     let mut bounds = BoundingBox::default();
     for body in frames.iter().flat_map(|frame| &frame.bodies) {
-        if body.kind != BodyKind::Obstacle {
+        if body.kind != BodyKind::OBSTACLE {
             check_body(body)?;
             bounds.include_body(body);
         }

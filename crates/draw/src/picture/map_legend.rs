@@ -8,7 +8,7 @@ use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{body_dashes, hex};
 use crate::ticks::group_thousands;
 use sidestep_kernel::view::{
-    BodyKind, Color, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
+    BodyKind, Color, Frame, Occupancy, Role, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
 };
 
 /// Largest number of things with a color of their own in the legend; more share one line.
@@ -40,7 +40,7 @@ pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
 }
 
 fn plural(kind: BodyKind, n: usize) -> String {
-    let one = if kind == BodyKind::Connector { "chain" } else { kind.name() };
+    let one = kind.spec().noun;
     if n == 1 { one.into() } else { format!("{one}s") }
 }
 
@@ -96,12 +96,12 @@ fn swatch(color: Color, opacity: f64) -> LegendSymbol {
 /// Returns an entry for everything with a color of its own: agents with a trail, and chains.
 fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     let trails = scene.trails.iter().map(|trail| (trail.of.number, (trail.of.kind, trail.width_m)));
-    // Each chain once, by its first connector.
+    // Each body of parts once, by its first part.
     let chains = scene
         .frame
         .bodies
         .iter()
-        .filter(|body| body.kind == BodyKind::Connector && body.part == Some(0))
+        .filter(|body| body.kind.role() == Role::PartOfBody && body.part == Some(0))
         .filter(|body| {
             scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
         })

@@ -4,9 +4,12 @@ use super::{PictureOptions, draw};
 use crate::raster::to_png;
 use crate::style::hex;
 use crate::testing::{ball, moment, open};
+use sidestep_airspace::kinds::{AIRPLANE, START, ZONE};
+use sidestep_chain::kinds::{CONNECTOR, RODS};
 use sidestep_kernel::view::{
     BODY_COLORS, Body, BodyKind, Condition, Frame, Pose, Scenery, Shape, Vec3, WALL_COLOR,
 };
+use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
 fn picture(scenery: &Scenery, frame: &Frame) -> String {
     draw(scenery, frame, &[], &PictureOptions::page(scenery, "")).unwrap()
@@ -14,7 +17,7 @@ fn picture(scenery: &Scenery, frame: &Frame) -> String {
 
 /// Two marks that make the shown area 10 meters square, apart from the margin.
 fn corners() -> Vec<Body> {
-    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(BodyKind::Goal, 0, at, 0.0)).to_vec()
+    [[-2.0, 0.0, 0.0], [8.0, 10.0, 0.0]].map(|at| ball(BodyKind::GOAL, 0, at, 0.0)).to_vec()
 }
 
 fn numbers(text: &str) -> Vec<f64> {
@@ -55,7 +58,7 @@ fn colors<const N: usize>(
 }
 
 fn obstacle(pose: Pose, shape: Shape) -> Body {
-    Body::new(BodyKind::Obstacle, 0, pose, shape)
+    Body::new(BodyKind::OBSTACLE, 0, pose, shape)
 }
 
 #[test]
@@ -64,7 +67,7 @@ fn shapes_are_where_they_are() {
     let pole = Shape::Line { points_m: vec![[0.0, 1.0, 0.0], [3.0, 1.0, 0.0]], thickness_m: 0.8 };
     let still = || {
         vec![
-            ball(BodyKind::Obstacle, 0, [5.0, 5.0, 0.0], 1.0),
+            ball(BodyKind::OBSTACLE, 0, [5.0, 5.0, 0.0], 1.0),
             obstacle(turned, Shape::Cuboid { size_m: [2.0, 1.0, 0.1] }),
             obstacle(Pose::from_position([0.0; 3]), pole.clone()),
         ]
@@ -80,14 +83,10 @@ fn pair() -> Vec<Body> {
     let ends = [[4.0, 5.0, 0.0], [2.0, 5.0, 0.0]];
     let rod = Shape::Line { points_m: ends.to_vec(), thickness_m: 0.4 };
     let connector = |part: u32| {
-        let ball = ball(BodyKind::Connector, 0, ends[part as usize], 0.5);
+        let ball = ball(CONNECTOR, 0, ends[part as usize], 0.5);
         ball.with_part(part).with_state_if(part == 0, Condition::Leading)
     };
-    vec![
-        Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rod),
-        connector(0),
-        connector(1),
-    ]
+    vec![Body::new(RODS, 0, Pose::from_position([0.0; 3]), rod), connector(0), connector(1)]
 }
 
 #[test]
@@ -111,7 +110,7 @@ fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
         svg.matches(r#"class="arrow""#).count()
     };
     let mover =
-        |x_m_s: f64| ball(BodyKind::Obstacle, 0, [0.0; 3], 0.1).with_velocity([x_m_s, 0.0, 0.0]);
+        |x_m_s: f64| ball(BodyKind::OBSTACLE, 0, [0.0; 3], 0.1).with_velocity([x_m_s, 0.0, 0.0]);
     assert_eq!(arrows(vec![mover(0.0)]), 0);
     assert_eq!(arrows(vec![mover(1.0), mover(0.01)]), 1, "too short an arrow is none");
 }
@@ -121,8 +120,7 @@ fn near_things_are_drawn_over_far_ones() {
     // From near to far; the view looks along the opposite of this.
     let to_eye = super::canvas::Camera::CORNER.to_eye;
     let at = |k: u32| -> Vec3 { to_eye.map(|x| x * -f64::from(k)) };
-    let frame =
-        moment((0..4).map(|k| ball(BodyKind::Connector, k, at(k), 1.0).with_part(1)).collect());
+    let frame = moment((0..4).map(|k| ball(CONNECTOR, k, at(k), 1.0).with_part(1)).collect());
     let svg = picture(&open(3), &frame);
     let place =
         |k: usize| svg.find(&format!(r#"fill="{}""#, hex(BODY_COLORS[k]))).expect("a connector");
@@ -134,10 +132,8 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
     for (width_m, height_m) in [(10.0, 10.0), (40_000.0, 9000.0), (3.0, 70.0)] {
         let far = f64::max(width_m, height_m);
         let at = [[0.0, 0.0, 0.0], [width_m, 0.0, 0.0], [0.0, height_m, 0.0]];
-        let balls = (0..)
-            .zip(at)
-            .map(|(k, at)| ball(BodyKind::Connector, k, at, 0.01 * far).with_part(1))
-            .collect();
+        let balls =
+            (0..).zip(at).map(|(k, at)| ball(CONNECTOR, k, at, 0.01 * far).with_part(1)).collect();
         let svg = picture(&open(2), &moment(balls));
         let [origin, east, north] = [0, 1, 2].map(|k| circle(&svg, &hex(BODY_COLORS[k])));
         let (across, upward) = ((east[0] - origin[0]) / width_m, (origin[1] - north[1]) / height_m);
@@ -148,17 +144,8 @@ fn a_meter_is_as_long_in_every_direction_however_long_the_picture_is() {
 
 #[test]
 fn every_kind_has_the_colors_of_the_table() {
-    let kinds = [
-        BodyKind::Robot,
-        BodyKind::Person,
-        BodyKind::Door,
-        BodyKind::Connector,
-        BodyKind::Airplane,
-        BodyKind::Zone,
-        BodyKind::Obstacle,
-        BodyKind::Goal,
-        BodyKind::Start,
-    ];
+    let kinds =
+        [ROBOT, PERSON, DOOR, CONNECTOR, AIRPLANE, ZONE, BodyKind::OBSTACLE, BodyKind::GOAL, START];
     for kind in kinds {
         for state in [Condition::Plain, Condition::Touching, Condition::Failed] {
             let body = ball(kind, 1, [0.0; 3], 1.0).with_part(1).with_state_if(true, state);
@@ -177,12 +164,7 @@ fn every_kind_has_the_colors_of_the_table() {
 fn thick_parts_in_space_have_a_seam_and_thin_ones_none() {
     let rods = |thickness_m: f64| {
         let points_m = vec![[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]];
-        Body::new(
-            BodyKind::Rods,
-            0,
-            Pose::from_position([0.0; 3]),
-            Shape::Line { points_m, thickness_m },
-        )
+        Body::new(RODS, 0, Pose::from_position([0.0; 3]), Shape::Line { points_m, thickness_m })
     };
     let seams = |dimensions: u8, thickness_m: f64| {
         let svg = picture(&open(dimensions), &moment(vec![rods(thickness_m)]));

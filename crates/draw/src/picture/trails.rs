@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::style::body_dashes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    BODY_COLORS, Body, BodyId, BodyKind, Color, Condition, Frame, OccupancyGrid, Scenery, Shape,
-    Trail, Vec3, body_color,
+    BODY_COLORS, Body, BodyId, BodyKind, Color, Condition, Frame, OccupancyGrid, Role, Scenery,
+    Shape, Trail, TrailStyle, Vec3, body_color,
 };
 
 /// Largest number of lines in a picture: they are thin, so more of them than there are colors can be
@@ -49,39 +49,40 @@ pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
     let numbers: Vec<u32> = agents.into_iter().map(|(_, number)| number).collect();
-    match kind {
-        None => Vec::new(),
-        Some(BodyKind::Airplane) => {
-            let first = numbers.into_iter().take(MAX_LINES);
-            first.map(|number| BodyId::new(BodyKind::Airplane, number, None)).collect()
+    let Some(kind) = kind else { return Vec::new() };
+    let chosen = match kind.role() {
+        Role::PartOfBody => {
+            let first = numbers.into_iter().take(BODY_COLORS.len());
+            return first.flat_map(|number| ends(frame, kind, number)).collect();
         }
-        Some(BodyKind::Connector) => {
-            numbers.into_iter().take(BODY_COLORS.len()).flat_map(|n| chain_ends(frame, n)).collect()
-        }
-        Some(kind) => {
-            one_per_color(&numbers).into_iter().map(|n| BodyId::new(kind, n, None)).collect()
-        }
-    }
+        Role::Agent(TrailStyle::Lines) => numbers.into_iter().take(MAX_LINES).collect(),
+        _ => one_per_color(&numbers),
+    };
+    chosen.into_iter().map(|number| BodyId::new(kind, number, None)).collect()
 }
 
-/// Returns kinds and numbers of the agents, by number; everything with a start is an airplane, even
+/// Returns kinds and numbers of the agents, by number; everything with a start is an agent, even
 /// if it is not present.
 pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u32)> {
     // Robots that are parts of a chain keep to its connectors.
-    let acting = frame.bodies.iter().filter(|body| {
-        body.kind.is_agent() && (body.kind == BodyKind::Connector || body.part.is_none())
+    let acting = frame.bodies.iter().filter(|body| match body.kind.role() {
+        Role::Agent(_) => body.part.is_none(),
+        role => role == Role::PartOfBody,
     });
     let here = acting.map(|body| (body.kind, body.number));
-    let starts = scenery.bodies.iter().filter(|body| body.kind == BodyKind::Start);
-    here.chain(starts.map(|start| (BodyKind::Airplane, start.number))).collect()
+    let starting = scenery.bodies.iter().filter_map(|body| match body.kind.role() {
+        Role::StartOf(agent) => Some((agent, body.number)),
+        _ => None,
+    });
+    here.chain(starting).collect()
 }
 
-/// Returns the leader of a chain, or its first connector, and the other end.
-fn chain_ends(frame: &Frame, number: u32) -> Vec<BodyId> {
+/// Returns the leader of a body of parts, or its first part, and the other end.
+fn ends(frame: &Frame, kind: BodyKind, number: u32) -> Vec<BodyId> {
     let all = frame.bodies.iter();
-    let connectors = all.filter(|body| body.kind == BodyKind::Connector && body.number == number);
-    let leader = connectors.clone().find(|body| body.state == Condition::Leading);
-    let mut parts = connectors.map(Body::id);
+    let own = all.filter(|body| body.kind == kind && body.number == number);
+    let leader = own.clone().find(|body| body.state == Condition::Leading);
+    let mut parts = own.map(Body::id);
     let first = parts.next();
     let leader = leader.map(Body::id).or(first);
     let last = parts.next_back().filter(|last| Some(*last) != leader).or(first);

@@ -1,6 +1,7 @@
 //! The appearance of each kind of body: one table for pictures, animations and recordings for viewers.
 
-use super::body::{Body, BodyKind, Condition};
+use super::body::{Body, Condition};
+use super::kind::Paint;
 
 /// Red, green and blue, 0 to 255 each.
 pub type Color = [u8; 3];
@@ -48,60 +49,46 @@ impl Body {
     /// Returns its appearance: in three dimensions, obstacles let what is behind them show through.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
-        // Agents are on top, and what stands still at the bottom, because viewers follow what moves.
-        let layer = match self.kind {
-            BodyKind::Door | BodyKind::Obstacle => 1,
-            BodyKind::Start | BodyKind::Goal => 2,
-            BodyKind::Zone => 3,
-            BodyKind::Person | BodyKind::Rods => 4,
-            BodyKind::Robot | BodyKind::Connector | BodyKind::Airplane => 5,
-        };
-        Appearance { color, opacity, layer, legend: self.legend() }
+        Appearance { color, opacity, layer: self.kind.spec().layer, legend: self.legend() }
     }
 
     fn color(&self, dimensions: u8) -> (Color, f64) {
         let own = body_color(self.number);
-        // In space an opaque obstacle would hide everything behind it.
-        let opacity = if dimensions == 2 { 1.0 } else { 0.22 };
-        match (self.kind, self.state) {
-            // Zones, starts and goals let the bodies within them show through.
-            (BodyKind::Zone, Condition::Touching) => (ALERT_COLOR, 0.4),
-            (BodyKind::Zone, _) => (own, 0.15),
-            (_, Condition::Touching | Condition::Failed) => (ALERT_COLOR, 1.0),
-            (BodyKind::Door, Condition::Open) => (DOOR_COLOR, 0.25),
-            (BodyKind::Door, _) => (DOOR_COLOR, 1.0),
-            (BodyKind::Person, _) => (MOBILE_COLOR, 1.0),
-            (BodyKind::Obstacle, _) if self.is_moving() => (MOBILE_COLOR, opacity),
-            (BodyKind::Obstacle, _) => (WALL_COLOR, opacity),
-            (BodyKind::Start, _) => (own, 0.1),
-            (BodyKind::Goal, _) => (own, 0.45),
-            (BodyKind::Robot | BodyKind::Connector | BodyKind::Rods | BodyKind::Airplane, _) => {
-                (own, 1.0)
+        let is_alert = matches!(self.state, Condition::Touching | Condition::Failed);
+        match self.kind.spec().paint {
+            Paint::Veil if self.state == Condition::Touching => (ALERT_COLOR, 0.4),
+            Paint::Veil => (own, 0.15),
+            _ if is_alert => (ALERT_COLOR, 1.0),
+            Paint::ByNumber { opacity } => (own, opacity),
+            Paint::Fixed { color, open_opacity } if self.state == Condition::Open => {
+                (color, open_opacity)
+            }
+            Paint::Fixed { color, .. } => (color, 1.0),
+            Paint::Solid => {
+                let color = if self.is_moving() { MOBILE_COLOR } else { WALL_COLOR };
+                // In space an opaque obstacle would hide everything behind it.
+                let opacity = if dimensions == 2 { 1.0 } else { 0.22 };
+                (color, opacity)
             }
         }
     }
 
     fn legend(&self) -> &'static str {
-        match (self.kind, self.state) {
-            (BodyKind::Zone, Condition::Touching) => "separation lost",
-            (BodyKind::Zone, _) => "zone of separation",
-            (_, Condition::Touching) => "in contact",
-            (_, Condition::Failed) => "failed",
-            (BodyKind::Door, Condition::Open) => "door, open",
-            (BodyKind::Door, _) => "door, closed",
-            (BodyKind::Person, _) => "mobile object",
-            (BodyKind::Obstacle, _) if self.is_moving() => "moving obstacle (arrow: way of 1 s)",
-            (BodyKind::Obstacle, _) => "obstacle",
-            (BodyKind::Start, _) => "start, as wide as its zone of separation",
-            (BodyKind::Goal, _) => "goal",
-            (BodyKind::Robot | BodyKind::Connector | BodyKind::Rods | BodyKind::Airplane, _) => "",
+        let legend = &self.kind.spec().legend;
+        match self.state {
+            Condition::Touching => legend.touching,
+            Condition::Failed => legend.failed,
+            _ if self.is_moving() => legend.moving,
+            Condition::Open => legend.open,
+            Condition::Plain | Condition::Leading => legend.plain,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Pose, Shape};
+    use super::super::kind::samples::{AIRPLANE, CONNECTOR, ROBOT};
+    use super::super::{BodyKind, Pose, Shape};
     use super::*;
 
     #[test]
@@ -109,7 +96,7 @@ mod tests {
         let body = |kind| {
             Body::new(kind, 3, Pose::from_position([0.0; 3]), Shape::Sphere { radius_m: 1.0 })
         };
-        for kind in [BodyKind::Robot, BodyKind::Connector, BodyKind::Airplane] {
+        for kind in [ROBOT, CONNECTOR, AIRPLANE] {
             let plain = body(kind);
             assert_eq!(plain.appearance(2).color, BODY_COLORS[3]);
             let touching = plain.with_state_if(true, Condition::Touching).appearance(2);
@@ -120,7 +107,7 @@ mod tests {
     #[test]
     fn an_obstacle_hides_nothing_in_space_and_is_paler_when_it_moves() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        let still = Body::new(BodyKind::Obstacle, 0, Pose::from_position([0.0; 3]), ball);
+        let still = Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), ball);
         assert_eq!(still.appearance(2).opacity, 1.0);
         assert!(still.appearance(3).opacity < 0.5);
         let moving = still.clone().with_velocity([0.0, 1.0, 0.0]);

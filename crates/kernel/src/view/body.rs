@@ -1,5 +1,6 @@
-//! Bodies: kind, pose, shape and condition.
+//! Bodies: identity, pose, shape and condition.
 
+use super::kind::BodyKind;
 use super::pose::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -112,80 +113,6 @@ impl Body {
     }
 }
 
-/// Kinds of bodies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BodyKind {
-    /// A robot.
-    Robot,
-    /// A person, or another pedestrian.
-    Person,
-    /// A door.
-    Door,
-    /// A joint of a chain.
-    Connector,
-    /// The rods of a chain.
-    Rods,
-    /// An airplane.
-    Airplane,
-    /// The zone around an airplane that is to be kept free.
-    Zone,
-    /// An obstacle.
-    Obstacle,
-    /// A destination.
-    Goal,
-    /// A starting place.
-    Start,
-}
-
-impl BodyKind {
-    /// All kinds.
-    pub const ALL: [Self; 10] = [
-        Self::Robot,
-        Self::Person,
-        Self::Door,
-        Self::Connector,
-        Self::Rods,
-        Self::Airplane,
-        Self::Zone,
-        Self::Obstacle,
-        Self::Goal,
-        Self::Start,
-    ];
-
-    /// Returns the kind with a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Robot => "robot",
-            Self::Person => "person",
-            Self::Door => "door",
-            Self::Connector => "connector",
-            Self::Rods => "rods",
-            Self::Airplane => "airplane",
-            Self::Zone => "zone",
-            Self::Obstacle => "obstacle",
-            Self::Goal => "goal",
-            Self::Start => "start",
-        }
-    }
-
-    /// Returns whether it is an agent, whose trajectory is recorded.
-    pub fn is_agent(self) -> bool {
-        matches!(self, Self::Robot | Self::Connector | Self::Airplane)
-    }
-}
-
-impl fmt::Display for BodyKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// The condition of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -258,12 +185,13 @@ pub enum Shape {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kind::samples::CONNECTOR;
     use super::*;
 
     #[test]
     fn names_tell_kind_number_and_part() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        let body = Body::new(BodyKind::Connector, 2, Pose::from_position([0.0; 3]), ball);
+        let body = Body::new(CONNECTOR, 2, Pose::from_position([0.0; 3]), ball);
         assert_eq!(body.name(), "connector/2");
         assert_eq!(body.with_part(7).name(), "connector/2/7");
     }

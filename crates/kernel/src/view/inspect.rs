@@ -1,6 +1,7 @@
 //! Percepts and decisions of a body, and their outcome: facts for a panel, and marks for the scene.
 
-use super::body::{BodyId, BodyKind};
+use super::body::BodyId;
+use super::kind::BodyKind;
 use super::pose::Vec3;
 use crate::units::Cycle;
 use serde::{Serialize, Serializer};
@@ -338,12 +339,12 @@ impl<T: Into<Self>> From<Option<T>> for FactValue {
 
 #[cfg(test)]
 mod tests {
-    use super::super::BodyKind;
+    use super::super::kind::samples::ROBOT;
     use super::*;
 
     #[test]
     fn what_was_told_is_found_again_and_empty_sections_are_left_out() {
-        let who = BodyId::new(BodyKind::Robot, 3, None);
+        let who = BodyId::new(ROBOT, 3, None);
         let mut told = Inspection::new(who, 7, "robot 3");
         told.add_section(FactSection::new("nothing").table(FactTable::new(["a"])));
         let mut table = FactTable::new(["other", "apart"]);

@@ -7,6 +7,7 @@
 mod appearance;
 mod body;
 mod inspect;
+mod kind;
 mod log;
 mod pose;
 mod trails;
@@ -15,8 +16,9 @@ pub use appearance::{
     ALERT_COLOR, Appearance, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR,
     WALL_COLOR, body_color,
 };
-pub use body::{Body, BodyId, BodyKind, Condition, Shape};
+pub use body::{Body, BodyId, Condition, Shape};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
+pub use kind::{BodyKind, KindSpec, Kinds, Legend, Outline, Paint, Role, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
 pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
 pub use trails::{CoordinateColumn, PositionTableColumns, Trail, corner};
@@ -196,12 +198,13 @@ impl Scan {
 
 #[cfg(test)]
 mod tests {
+    use super::kind::samples::ROBOT;
     use super::*;
     use std::f64::consts::FRAC_PI_2;
 
     fn scan(bearings_rad: &[f64], ranges_m: &[f64]) -> Scan {
         Scan {
-            of: BodyId::new(BodyKind::Robot, 0, None),
+            of: BodyId::new(ROBOT, 0, None),
             sensor: "eye".into(),
             pose: Pose::from_position([0.0; 3]),
             bearings_rad: bearings_rad.to_vec(),

@@ -1,6 +1,7 @@
 //! The trails of bodies, and the recorded rows from which they are made.
 
-use super::body::{Body, BodyId, BodyKind, Shape};
+use super::body::{Body, BodyId, Shape};
+use super::kind::{BodyKind, Role};
 use super::pose::{Isometry2, Vec3};
 use super::{Frame, Scenery};
 use crate::ports::Values;
@@ -80,7 +81,7 @@ impl PositionTableColumns {
             let is_current = |last: &PositionRow| last.cycle + self.interval >= frame.cycle;
             if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
                 // A body that is gone has no shape in the frame, so that of its start is used.
-                let start = || scenery.bodies.iter().find(|body| is_start(body, id.number));
+                let start = || scenery.bodies.iter().find(|body| is_start(body, id));
                 let like = body.or_else(start);
                 let present = body.map(|body| (frame.cycle, body.pose.at_m));
                 trails.push(Trail { of: id, points: self.points(rows, like, present) });
@@ -173,8 +174,8 @@ impl PositionTableColumns {
     }
 }
 
-fn is_start(body: &Body, number: u32) -> bool {
-    body.kind == BodyKind::Start && body.number == number
+fn is_start(body: &Body, of: BodyId) -> bool {
+    body.kind.role() == Role::StartOf(of.kind) && body.number == of.number
 }
 
 /// Appends a point, and before it the corner of the move from the previous one, whose position and heading are given.
@@ -213,6 +214,7 @@ pub fn corner(from: Vec3, heading: u32, to: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::super::Pose;
+    use super::super::kind::samples::ROBOT;
     use super::*;
 
     #[test]
@@ -227,7 +229,7 @@ mod tests {
         let axis = |column| CoordinateColumn { column, scale_m: 0.5, offset_m: 10.0 };
         PositionTableColumns {
             table: "trajectories",
-            kind: BodyKind::Robot,
+            kind: ROBOT,
             number: "body",
             part: None,
             axes: vec![axis("col"), axis("row")],
@@ -242,12 +244,8 @@ mod tests {
     /// The trails of a robot of two boxes that slips north while it goes east, until a cycle.
     fn trails(until: Cycle) -> Option<Vec<Trail>> {
         let size_m = [1.0, 1.0, 0.5];
-        let robot = Body::new(
-            BodyKind::Robot,
-            7,
-            Pose::from_position([11.5, 11.0, 0.25]),
-            Shape::Cuboid { size_m },
-        );
+        let robot =
+            Body::new(ROBOT, 7, Pose::from_position([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
         let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
         let columns = [
             ("cycle", Values::U64(vec![1, 0, 0].into())),
@@ -265,7 +263,7 @@ mod tests {
             bodies: Vec::new(),
             names: Vec::new(),
         };
-        rows().trails(&scenery, &frame, &[BodyId::new(BodyKind::Robot, 7, None)], column)
+        rows().trails(&scenery, &frame, &[BodyId::new(ROBOT, 7, None)], column)
     }
 
     #[test]
@@ -277,10 +275,7 @@ mod tests {
             (2, [11.5, 10.5, 0.25]),
             (2, [11.5, 11.0, 0.25]),
         ];
-        assert_eq!(
-            (trail.of, &trail.points[..]),
-            (BodyId::new(BodyKind::Robot, 7, None), &way[..])
-        );
+        assert_eq!((trail.of, &trail.points[..]), (BodyId::new(ROBOT, 7, None), &way[..]));
     }
 
     #[test]

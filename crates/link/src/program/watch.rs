@@ -7,6 +7,7 @@ use crate::wire::view_server::ViewClient;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep::kernel::InputError;
+use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::{FleetFrame, FleetScene, LinkMessage, WatchJob};
 use std::thread::sleep;
@@ -76,7 +77,7 @@ impl ViewPoller<'_> {
 }
 
 fn read<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
-    serde_json::from_str(text).map_err(|e| {
+    WORLDS.kinds().while_reading(|| serde_json::from_str(text)).map_err(|e| {
         let remedy = "see whether this is the address of a fleet's server";
         InputError::new(job.connect.join(", "), format!("its view cannot be read: {e}"), remedy)
             .into()

@@ -5,8 +5,9 @@ use super::floor::Floor;
 use super::measure::{LoriaVariant, Track, run_recorded};
 use crate::Scene;
 use sidestep::kernel::ports::Values;
-use sidestep::kernel::view::{BodyId, BodyKind, FrameOptions, Trail};
+use sidestep::kernel::view::{BodyId, FrameOptions, Trail};
 use sidestep::kernel::{Cycle, Simulation};
+use sidestep::worlds::robots::kinds::ROBOT;
 use sidestep::worlds::robots::world::Regime;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
     let scenery = run.scenery();
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
     let columns = columns(&tracks, cycles.saturating_sub(TRAIL_CYCLES));
-    let robots = frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot);
+    let robots = frame.bodies.iter().filter(|body| body.kind == ROBOT);
     let bodies: Vec<BodyId> = robots.map(|body| body.id()).collect();
     let mut trails: Vec<Trail> = Vec::new();
     for positions in run.position_columns() {
@@ -85,8 +86,7 @@ mod tests {
     fn ways_are_whole_and_end_where_the_robots_are() {
         let scenes = all(&LoriaConfig { cycles: 450, ..LoriaConfig::quick() });
         for scene in &scenes {
-            let robots =
-                scene.frame.bodies.iter().filter(|body| body.kind == BodyKind::Robot).count();
+            let robots = scene.frame.bodies.iter().filter(|body| body.kind == ROBOT).count();
             assert_eq!(scene.trails.len(), robots);
             let box_m = scene.scenery.floor.as_ref().expect("a floor").box_m;
             let far = |pair: &[(Cycle, Vec3)]| {

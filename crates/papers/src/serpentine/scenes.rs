@@ -10,6 +10,7 @@ use sidestep::kernel::view::{
 };
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::rods::geometry::{Point, distance};
+use sidestep::worlds::chain::kinds::{CONNECTOR, RODS};
 use sidestep::worlds::chain::{ChainRun, chain_run};
 
 /// Number of cycles from one point of a trail to the next: 10 cm at the leader's 0.5 m/s.
@@ -51,7 +52,7 @@ fn trace_ends<const D: usize>(
 }
 
 fn empty_trail(connector: u32) -> Trail {
-    Trail { of: BodyId::new(BodyKind::Connector, 0, Some(connector)), points: Vec::new() }
+    Trail { of: BodyId::new(CONNECTOR, 0, Some(connector)), points: Vec::new() }
 }
 
 fn swarm(plan: &SerpentineConfig) -> Result<Scene, InputError> {
@@ -72,7 +73,7 @@ fn creeping(plan: &SerpentineConfig) -> Result<Scene, InputError> {
     let (mut run, trails) = trace_ends::<3>(snake::SCENARIO, &[cycles], plan.snake_cycles)?;
     let mut scenery = run.scenery();
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
-    let connectors = frame.bodies.iter().filter(|body| body.kind == BodyKind::Connector);
+    let connectors = frame.bodies.iter().filter(|body| body.kind == CONNECTOR);
     let snake: Vec<Vec3> = connectors.map(|body| body.pose.at_m).collect();
     scenery.bodies.retain(|body| is_near(body, &snake));
     Ok(Scene {
@@ -89,9 +90,10 @@ fn creeping(plan: &SerpentineConfig) -> Result<Scene, InputError> {
 
 /// Returns whether a ball is near to one of these places; always true for other bodies.
 fn is_near(body: &Body, places: &[Vec3]) -> bool {
-    let (BodyKind::Obstacle, Shape::Sphere { radius_m }) = (body.kind, &body.shape) else {
+    let Shape::Sphere { radius_m } = &body.shape else { return true };
+    if body.kind != BodyKind::OBSTACLE {
         return true;
-    };
+    }
     places.iter().any(|p| distance(*p, body.pose.at_m) - radius_m < MAX_BALL_DISTANCE_M)
 }
 
@@ -113,7 +115,7 @@ fn scene_of_chain(title: &str, points: Vec<Point<2>>) -> Scene {
             cycle_s: 1.0,
             floor: None,
             bodies: Vec::new(),
-            names: vec![(BodyKind::Connector, 0, "chain".into())],
+            names: vec![(CONNECTOR, 0, "chain".into())],
         },
         frame: Frame { bodies: chain(points), ..Frame::default() },
         trails: Vec::new(),
@@ -127,10 +129,10 @@ fn chain(points: Vec<Point<2>>) -> Vec<Body> {
     for (part, at_m) in (0..).zip(&points_m) {
         let ball = Shape::Sphere { radius_m: 0.2 };
         let at = Pose::from_position(*at_m);
-        balls.push(Body::new(BodyKind::Connector, 0, at, ball).with_part(part));
+        balls.push(Body::new(CONNECTOR, 0, at, ball).with_part(part));
     }
     let rods = Shape::Line { points_m, thickness_m: 0.1 };
-    let mut bodies = vec![Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), rods)];
+    let mut bodies = vec![Body::new(RODS, 0, Pose::from_position([0.0; 3]), rods)];
     bodies.append(&mut balls);
     bodies
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, Grid, LaserScan, Log, PosesInFrame, SceneUpdate};
 use sidestep_kernel::ports::RecordError;
-use sidestep_kernel::view::{BodyKind, Frame, Scenery};
+use sidestep_kernel::view::{Frame, Scenery};
 
 use super::messages;
 
@@ -76,10 +76,8 @@ impl FrameEncoder {
         }
         sink.write::<SceneUpdate>("/scene", now_ns, &scene)?;
         sink.write::<FrameTransforms>("/tf", now_ns, &messages::transforms(frame))?;
-        for kind in [BodyKind::Robot, BodyKind::Connector, BodyKind::Airplane] {
-            if let Some(poses) = messages::poses(frame, kind) {
-                sink.write::<PosesInFrame>(&format!("/poses/{kind}"), now_ns, &poses)?;
-            }
+        for (kind, poses) in messages::poses_by_kind(frame) {
+            sink.write::<PosesInFrame>(&format!("/poses/{kind}"), now_ns, &poses)?;
         }
         for scan in &frame.scans {
             let topic = format!("/scan/{}", scan.name());

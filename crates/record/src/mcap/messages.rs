@@ -1,6 +1,6 @@
 //! Frames as messages of Foxglove's schemas.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use foxglove::messages::{
     ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Grid,
@@ -190,7 +190,7 @@ fn add(entity: &mut SceneEntity, body: &Body, dimensions: u8) {
             entity.arrows.push(ArrowPrimitive { color, ..arrow(body, *length_m, *width_m) });
         }
     }
-    if body.kind == BodyKind::Robot {
+    if body.kind.spec().shows_heading {
         entity.arrows.extend(heading_arrow(body));
     }
 }
@@ -246,14 +246,19 @@ pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
     FrameTransforms { transforms: transforms.collect() }
 }
 
-/// Returns the poses of the agents of a kind; `None` if there are none.
-pub(super) fn poses(frame: &Frame, kind: BodyKind) -> Option<PosesInFrame> {
-    let poses: Vec<Pose> = agents(frame)
-        .filter(|body| body.kind == kind)
-        .filter_map(|body| pose(&body.pose))
-        .collect();
+/// Returns the poses of the agents, by kind.
+pub(super) fn poses_by_kind(frame: &Frame) -> BTreeMap<BodyKind, PosesInFrame> {
     let timestamp = timestamp(to_ns(frame.time_s));
-    (!poses.is_empty()).then(|| PosesInFrame { timestamp, frame_id: WORLD.into(), poses })
+    let mut by_kind = BTreeMap::new();
+    for body in agents(frame) {
+        let of_kind = by_kind.entry(body.kind).or_insert_with(|| PosesInFrame {
+            timestamp,
+            frame_id: WORLD.into(),
+            poses: Vec::new(),
+        });
+        of_kind.poses.extend(pose(&body.pose));
+    }
+    by_kind
 }
 
 /// Returns a scan with evenly spaced beams, as the schema requires.
@@ -307,18 +312,13 @@ fn log_level(level: Severity) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_airspace::kinds::ZONE;
+    use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
     #[test]
     fn every_kind_has_the_colors_that_pictures_have() {
         let ball = Shape::Sphere { radius_m: 1.0 };
-        for kind in [
-            BodyKind::Robot,
-            BodyKind::Person,
-            BodyKind::Door,
-            BodyKind::Zone,
-            BodyKind::Obstacle,
-            BodyKind::Goal,
-        ] {
+        for kind in [ROBOT, PERSON, DOOR, ZONE, BodyKind::OBSTACLE, BodyKind::GOAL] {
             for dimensions in [2, 3] {
                 let body = Body::new(kind, 4, ViewPose::from_position([0.0; 3]), ball.clone());
                 let appearance = body.appearance(dimensions);

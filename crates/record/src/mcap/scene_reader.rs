@@ -10,7 +10,7 @@ use ::mcap::sans_io::indexed_reader::{
 use foxglove::Decode;
 use foxglove::messages::{Log, SceneEntity, SceneUpdate, log};
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, LogEvent, LogEventKind, Pose, Severity, Shape,
+    Body, BodyId, Kinds, LogEvent, LogEventKind, Pose, Role, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, InputError};
 
@@ -28,14 +28,15 @@ pub struct McapSceneReader {
     source: McapFile,
     summary: Summary,
     cycle_s: f64,
+    kinds: Kinds,
 }
 
 impl McapSceneReader {
-    /// Opens a recording that any version of this program made.
+    /// Opens a recording that any version of this program made, with bodies of these kinds.
     ///
     /// # Errors
     /// A missing file; one of another program; one that is cut off or damaged.
-    pub fn open(path: &Path) -> Result<Self, InputError> {
+    pub fn open(path: &Path, kinds: Kinds) -> Result<Self, InputError> {
         let mut source = McapFile::open(path)?;
         let summary = source.summary()?;
         let description = describe_run(&mut source, &summary)?;
@@ -43,7 +44,7 @@ impl McapSceneReader {
         let cycle_s = cycle_s.filter(|s: &f64| s.is_finite() && *s > 0.0);
         let cycle_s =
             cycle_s.ok_or_else(|| damaged(path, "it does not say how long a cycle takes"))?;
-        Ok(Self { source, summary, cycle_s })
+        Ok(Self { source, summary, cycle_s, kinds })
     }
 
     /// Returns the bodies of the last recorded frame up to a cycle; none before the first.
@@ -59,7 +60,7 @@ impl McapSceneReader {
             ControlFlow::Break(())
         })?;
         let entities = update.into_iter().flat_map(|update| update.entities);
-        Ok(entities.flat_map(|entity| bodies(&entity)).collect())
+        Ok(entities.flat_map(|entity| bodies(&entity, &self.kinds)).collect())
     }
 
     /// Returns the events, by cycle; beyond some hundred thousand they are left out.
@@ -69,8 +70,9 @@ impl McapSceneReader {
     pub fn events(&mut self) -> Result<Vec<LogEvent>, InputError> {
         let mut events = Vec::new();
         let cycle_s = self.cycle_s;
+        let kinds = self.kinds.clone();
         self.for_each::<Log>("/log", IndexedReaderOptions::new(), |entry| {
-            events.extend(parse_event(&entry, cycle_s));
+            events.extend(parse_event(&entry, cycle_s, &kinds));
             if events.len() < MAX_EVENTS {
                 ControlFlow::Continue(())
             } else {
@@ -119,12 +121,14 @@ impl McapSceneReader {
     }
 }
 
-/// Returns the bodies that an entity shows; those of a chain are its connectors, in their order.
-fn bodies(entity: &SceneEntity) -> Vec<Body> {
-    let Some(BodyId { kind, number, .. }) = parse_body_id(&entity.id) else { return Vec::new() };
+/// Returns the bodies that an entity shows; those of a body of parts are the parts, in their order.
+fn bodies(entity: &SceneEntity, kinds: &Kinds) -> Vec<Body> {
+    let Some(BodyId { kind, number, .. }) = kinds.parse_body_id(&entity.id) else {
+        return Vec::new();
+    };
     let mut bodies = Vec::new();
     for (k, (pose, shape)) in (0u32..).zip(shapes(entity)) {
-        let part = (kind == BodyKind::Connector).then_some(k);
+        let part = (kind.role() == Role::PartOfBody).then_some(k);
         bodies.push(Body { part, ..Body::new(kind, number, pose, shape) });
     }
     bodies
@@ -166,17 +170,8 @@ fn shapes(entity: &SceneEntity) -> Vec<(Pose, Shape)> {
     darts.collect()
 }
 
-/// Returns the identity of a name such as `robot/3` or `connector/0/7`.
-fn parse_body_id(name: &str) -> Option<BodyId> {
-    let mut parts = name.split('/');
-    let kind = BodyKind::from_name(parts.next()?)?;
-    let number = parts.next()?.parse().ok()?;
-    let part = parts.next().map(str::parse).transpose().ok()?;
-    parts.next().is_none().then_some(BodyId { kind, number, part })
-}
-
 /// Returns the event of a body that a message reports. Its words are all that is known of it.
-fn parse_event(entry: &Log, cycle_s: f64) -> Option<LogEvent> {
+fn parse_event(entry: &Log, cycle_s: f64, kinds: &Kinds) -> Option<LogEvent> {
     let words = entry.message.strip_prefix(&entry.name).unwrap_or(&entry.message).trim();
     let level = match log::Level::try_from(entry.level) {
         Ok(log::Level::Warning) => Severity::Warning,
@@ -188,7 +183,7 @@ fn parse_event(entry: &Log, cycle_s: f64) -> Option<LogEvent> {
         cycle: (time_s / cycle_s).round() as Cycle,
         level,
         kind: LogEventKind::Changed,
-        who: parse_body_id(&entry.name)?,
+        who: kinds.parse_body_id(&entry.name)?,
         with: None,
         at_m: None,
         value: None,
@@ -199,11 +194,23 @@ fn parse_event(entry: &Log, cycle_s: f64) -> Option<LogEvent> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::view::Frame;
+    use sidestep_airspace::kinds::AIRPLANE;
+    use sidestep_chain::kinds::{CONNECTOR, RODS};
+    use sidestep_kernel::view::{BodyKind, Frame};
+    use sidestep_robots::kinds::{PERSON, ROBOT};
     use std::collections::BTreeSet;
 
     #[test]
     fn bodies_of_every_shape_are_read_back_as_they_were_written() {
+        let all = Kinds::new([
+            ROBOT,
+            PERSON,
+            BodyKind::OBSTACLE,
+            RODS,
+            CONNECTOR,
+            AIRPLANE,
+            BodyKind::GOAL,
+        ]);
         let turned = Pose::from_heading([1.0, 2.0, 0.5], 0.25);
         let shapes = [
             Shape::Cuboid { size_m: [1.0, 2.0, 3.0] },
@@ -212,8 +219,7 @@ mod tests {
             Shape::Line { points_m: vec![[0.0; 3], [1.0, 2.0, 3.0]], thickness_m: 0.0 },
             Shape::Line { points_m: vec![[0.0; 3], [1.0; 3]], thickness_m: 0.5 },
         ];
-        let kinds =
-            [BodyKind::Robot, BodyKind::Person, BodyKind::Obstacle, BodyKind::Rods, BodyKind::Goal];
+        let kinds = [ROBOT, PERSON, BodyKind::OBSTACLE, RODS, BodyKind::GOAL];
         let mut written: Vec<Body> = shapes
             .into_iter()
             .zip(kinds)
@@ -221,36 +227,23 @@ mod tests {
             .collect();
         let ball = || Shape::Sphere { radius_m: 0.1 };
         written.extend((0..3).map(|k| {
-            Body::new(BodyKind::Connector, 1, Pose::from_position([f64::from(k), 0.0, 0.0]), ball())
+            Body::new(CONNECTOR, 1, Pose::from_position([f64::from(k), 0.0, 0.0]), ball())
                 .with_part(k)
         }));
         let frame = Frame { bodies: written.clone(), ..Frame::default() };
         let update = messages::scene(&frame, 3, &mut BTreeSet::new());
-        let read: Vec<Body> = update.entities.iter().flat_map(bodies).collect();
+        let read: Vec<Body> =
+            update.entities.iter().flat_map(|entity| bodies(entity, &all)).collect();
         assert_eq!(read, written);
 
         let dart = Shape::Dart { length_m: 2.0, width_m: 1.0 };
-        let frame = Frame {
-            bodies: vec![Body::new(BodyKind::Airplane, 7, turned, dart)],
-            ..Frame::default()
-        };
+        let frame =
+            Frame { bodies: vec![Body::new(AIRPLANE, 7, turned, dart)], ..Frame::default() };
         let update = messages::scene(&frame, 2, &mut BTreeSet::new());
-        let [read] = &bodies(&update.entities[0])[..] else { panic!("one airplane") };
+        let [read] = &bodies(&update.entities[0], &all)[..] else { panic!("one airplane") };
         let Shape::Dart { length_m, width_m } = read.shape else { panic!("{read:?}") };
         assert!((length_m - 2.0).abs() < 1e-12 && width_m == 1.0);
         let off = read.pose.at_m.iter().zip(turned.at_m).map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0, f64::max) < 1e-12 && read.pose.turn == turned.turn, "{read:?}");
-    }
-
-    #[test]
-    fn names_that_are_no_bodies_are_left_out() {
-        assert_eq!(
-            parse_body_id("connector/0/7"),
-            Some(BodyId::new(BodyKind::Connector, 0, Some(7)))
-        );
-        assert_eq!(parse_body_id("robot/3"), Some(BodyId::new(BodyKind::Robot, 3, None)));
-        for name in ["scenery", "robot", "robot/x", "robot/1/2/3", "cow/1"] {
-            assert_eq!(parse_body_id(name), None, "{name}");
-        }
     }
 }

@@ -1,5 +1,8 @@
 //! Recordings for viewers: complete or absent, the same bytes for the same run, read back.
 
+use sidestep_airspace::kinds::{AIRPLANE, ZONE};
+use sidestep_chain::kinds::CONNECTOR;
+use sidestep_robots::kinds::ROBOT;
 use std::path::Path;
 
 use sidestep_kernel::view::{
@@ -40,7 +43,7 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         names: Vec::new(),
-        bodies: vec![Body::new(BodyKind::Obstacle, 0, Pose::from_position([0.0; 3]), wall)],
+        bodies: vec![Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), wall)],
     }
 }
 
@@ -49,16 +52,16 @@ fn frame(cycle: u64) -> Frame {
     let at_m = [0.1 * cycle as f64, 1.0, 0.0];
     let body = |kind, number, shape| Body::new(kind, number, Pose::from_heading(at_m, 0.3), shape);
     let mut bodies = vec![
-        body(BodyKind::Robot, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
-        body(BodyKind::Connector, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
-        body(BodyKind::Zone, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
+        body(ROBOT, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
+        body(CONNECTOR, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
+        body(ZONE, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
             .with_state_if(true, Condition::Touching),
     ];
     if cycle <= 4 {
-        bodies.push(body(BodyKind::Airplane, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
+        bodies.push(body(AIRPLANE, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));
     }
     let scan = Scan {
-        of: BodyId::new(BodyKind::Robot, 0, None),
+        of: BodyId::new(ROBOT, 0, None),
         sensor: "sonar".into(),
         pose: Pose::from_position(at_m),
         bearings_rad: vec![-0.5, 0.0, 0.5],
@@ -70,7 +73,7 @@ fn frame(cycle: u64) -> Frame {
         cycle,
         level: Severity::Warning,
         kind: LogEventKind::Contact,
-        who: BodyId::new(BodyKind::Robot, 0, None),
+        who: BodyId::new(ROBOT, 0, None),
         with: None,
         at_m: None,
         value: None,

@@ -4,7 +4,7 @@ use crate::protocol::{
     Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, Shape, StaticBody,
 };
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::{self, Body, LogEvent, Occupancy, Scenery, Severity};
+use sidestep_kernel::view::{self, Body, Kinds, LogEvent, Occupancy, Scenery, Severity};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
@@ -111,8 +111,8 @@ pub(crate) fn event(entry: &LogEvent) -> RunEvent {
 }
 
 /// Returns the body that a page asks for; `None` where there is no such kind.
-pub(crate) fn requested_body(id: &BodyId) -> Option<view::BodyId> {
-    let kind = view::BodyKind::from_name(&id.kind)?;
+pub(crate) fn requested_body(id: &BodyId, kinds: &Kinds) -> Option<view::BodyId> {
+    let kind = kinds.find(&id.kind)?;
     Some(view::BodyId::new(kind, id.number, id.part))
 }
 

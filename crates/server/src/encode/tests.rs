@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::protocol::Scan;
+use sidestep::worlds::chain::kinds::RODS;
+use sidestep::worlds::robots::kinds::{DOOR, ROBOT};
 use sidestep_kernel::view::{BODY_COLORS, Pose};
 
 fn scenery(dimensions: u8) -> Scenery {
@@ -11,18 +13,18 @@ fn scenery(dimensions: u8) -> Scenery {
         cycle_s: 0.5,
         floor: None,
         bodies: Vec::new(),
-        names: vec![(BodyKind::Robot, 1, "Anna".into())],
+        names: vec![(ROBOT, 1, "Anna".into())],
     }
 }
 
 fn robot(number: u32, at_m: [f64; 3], heading_rad: f64) -> Body {
     let shape = Shape::Cylinder { radius_m: 0.25, height_m: 1.0 };
-    Body::new(BodyKind::Robot, number, Pose::from_heading(at_m, heading_rad), shape)
+    Body::new(ROBOT, number, Pose::from_heading(at_m, heading_rad), shape)
 }
 
 fn line(points_m: Vec<[f64; 3]>) -> Body {
     let shape = Shape::Line { points_m, thickness_m: 0.1 };
-    Body::new(BodyKind::Rods, 0, Pose::from_position([0.0; 3]), shape)
+    Body::new(RODS, 0, Pose::from_position([0.0; 3]), shape)
 }
 
 fn frame(bodies: Vec<Body>) -> Frame {
@@ -130,7 +132,7 @@ fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
 fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
     let door = |height_m: f64| {
         let shape = Shape::Cuboid { size_m: [1.0, 0.2, height_m] };
-        frame(vec![Body::new(BodyKind::Door, 0, Pose::from_position([0.0; 3]), shape)])
+        frame(vec![Body::new(DOOR, 0, Pose::from_position([0.0; 3]), shape)])
     };
     for (dimensions, begins) in [(2, false), (3, true)] {
         let mut encoder = FrameEncoder::new(1, &scenery(dimensions));
@@ -142,7 +144,7 @@ fn a_height_begins_a_cast_in_space_and_none_in_a_plane() {
 #[test]
 fn scans_and_events_are_the_text_of_a_frame_and_nothing_in_range_is_null() {
     let seen = sidestep_kernel::view::Scan {
-        of: sidestep_kernel::view::BodyId::new(BodyKind::Robot, 1, None),
+        of: sidestep_kernel::view::BodyId::new(ROBOT, 1, None),
         sensor: "eye".into(),
         pose: Pose::from_position([0.0; 3]),
         bearings_rad: vec![0.0, 1.0],

@@ -4,8 +4,9 @@
 //! `inspection.ts` instead, and checked here against what the kernel serializes.
 
 use serde_json::json;
+use sidestep::worlds::chain::kinds::CONNECTOR;
 use sidestep_kernel::view::{
-    BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
+    BodyId, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
 };
 
 /// The declarations.
@@ -37,7 +38,7 @@ fn declared_shape(shape: &MarkShape) -> &'static str {
 }
 
 fn body() -> BodyId {
-    BodyId::new(BodyKind::Connector, 3, Some(1))
+    BodyId::new(CONNECTOR, 3, Some(1))
 }
 
 #[test]

@@ -9,6 +9,7 @@ use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
 use crate::protocol::{Problem, ReplyBody};
+use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::{MetricInfo, Source, Worlds};
 use sidestep_session::{Error, RecordedRun, read_scenario};
@@ -277,6 +278,12 @@ impl OpenRun {
         self.deps.foxglove.clone()
     }
 
+    /// Returns the kinds of bodies that pages may ask for.
+    pub(crate) fn kinds(&self) -> Kinds {
+        self.deps.worlds.kinds()
+    }
+
+    /// Returns the descriptions of the world's metrics.
     pub(crate) fn metric_infos(&self) -> &'static [MetricInfo] {
         let world_type = self.deps.worlds.find(self.run.world());
         world_type.map_or(&[], |world_type| world_type.metric_infos())

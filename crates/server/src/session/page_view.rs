@@ -1,12 +1,12 @@
 //! The output of a session to its page: frames for which there is credit, and the status when it changes.
 
 use crate::MAX_FRAMES_PER_S;
-use crate::encode::{FrameEncoder, requested_body, scan};
+use crate::encode::{FrameEncoder, scan};
 use crate::event_store::EventStore;
 use crate::outbox::Outbox;
-use crate::protocol::{BodyId, FrameText, ServerNotification, SessionId, SessionStatus};
+use crate::protocol::{FrameText, ServerNotification, SessionId, SessionStatus};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{Frame, FrameOptions, ScanSelection, Scenery};
+use sidestep_kernel::view::{BodyId, Frame, FrameOptions, ScanSelection, Scenery};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -111,9 +111,7 @@ impl PageView {
             return;
         }
         self.events_due = now + EVENTS_INTERVAL;
-        let mut frame = run.frame(FrameOptions {
-            scans: ScanSelection::Of(self.scans_of.iter().filter_map(requested_body).collect()),
-        });
+        let mut frame = run.frame(FrameOptions { scans: ScanSelection::Of(self.scans_of.clone()) });
         log.record(&mut frame);
         self.send_frame(&frame, log);
     }

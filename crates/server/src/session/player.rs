@@ -12,7 +12,7 @@ use super::page_view::{MAX_SCANNED_BODIES, PageView};
 use super::prefetcher::AheadRun;
 use super::save::SaveOptions;
 use crate::SPEED_RANGE;
-use crate::encode::scene;
+use crate::encode::{requested_body, scene};
 use crate::outbox::Outbox;
 use crate::protocol::{
     BodyId, Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId,
@@ -188,7 +188,8 @@ impl Player {
                 Ok(ReplyBody::Done)
             }
             RunMethod::Inspect { body } => {
-                inspection(self.open_run.run.as_ref(), &body).map(ReplyBody::Inspection)
+                let kinds = self.open_run.kinds();
+                inspection(self.open_run.run.as_ref(), &body, &kinds).map(ReplyBody::Inspection)
             }
             RunMethod::Metrics { from } => Ok(self.history.samples.samples_reply(from)),
             RunMethod::Events { from, until, skip, limit } => {
@@ -219,7 +220,9 @@ impl Player {
             let cause = format!("scans of at most {MAX_SCANNED_BODIES} bodies are shown");
             return Err(Problem::new("select-scans", cause, "select fewer"));
         }
-        self.page_view.set_scanned_bodies(bodies);
+        let kinds = self.open_run.kinds();
+        let known = bodies.iter().filter_map(|of| requested_body(of, &kinds)).collect();
+        self.page_view.set_scanned_bodies(known);
         Ok(ReplyBody::Done)
     }
 

@@ -201,7 +201,7 @@ fn a_body_is_inspected_as_by_the_library_and_the_digest_stays() {
         let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
         run.advance(20);
         let who = BodyId { kind: kind.into(), number: 1, part };
-        let by_library = inspect::inspection(run.as_ref(), &who);
+        let by_library = inspect::inspection(run.as_ref(), &who, &WORLDS.kinds());
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(20);
         let id = page.send(json!({ "do": "inspect", "body": who }));

@@ -183,6 +183,7 @@ mod tests {
     use crate::NoWatcher;
     use crate::driver::{Sinks, drive};
     use crate::testing::WORLDS;
+    use sidestep_robots::kinds::ROBOT;
     use sidestep_scenario::Source;
 
     /// Robots among walls that slip to the side, watched for 200 cycles.
@@ -214,11 +215,6 @@ mod tests {
                 assert!(moved(0).max(moved(1)) < 1.01 && moved(0).min(moved(1)) < 1e-9, "{pair:?}");
             }
         }
-        assert!(
-            pictures
-                .trail(BodyId::new(sidestep_kernel::view::BodyKind::Robot, 9, None), last)
-                .points
-                .is_empty()
-        );
+        assert!(pictures.trail(BodyId::new(ROBOT, 9, None), last).points.is_empty());
     }
 }

@@ -12,7 +12,7 @@ pub(crate) use gif::write_gif;
 pub(crate) use mcap::FRAME_OPTIONS;
 pub use mcap::{EndReason, McapSink};
 pub(crate) use rows::FrameRows;
-pub use rows::frame_rows;
+pub(crate) use rows::frame_rows;
 
 use crate::Error;
 use sidestep_kernel::Cycle;

@@ -4,7 +4,7 @@ use super::FrameSink;
 use crate::Error;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Table, TableSchema, Values};
-use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, FrameOptions};
+use sidestep_kernel::view::{Body, Condition, Frame, FrameOptions, Kinds};
 use sidestep_kernel::{Cycle, Simulation};
 use std::ops::Range;
 
@@ -22,7 +22,9 @@ struct Row {
 /// is over.
 pub(crate) struct FrameRows {
     every: Cycle,
-    /// The cycle of the first frame; `None` before it.
+    /// The kinds of bodies, which label the rows.
+    kinds: Kinds,
+    /// The cycle of the first frame.
     first: Option<Cycle>,
     /// The cycle of the last frame, so that none is taken twice.
     last: Option<Cycle>,
@@ -31,12 +33,12 @@ pub(crate) struct FrameRows {
 
 impl FrameRows {
     /// Returns a store of frames that are taken every `every` cycles.
-    pub(crate) fn new(every: Cycle) -> Self {
-        Self { every: every.max(1), first: None, last: None, rows: Vec::new() }
+    pub(crate) fn new(every: Cycle, kinds: Kinds) -> Self {
+        Self { every: every.max(1), kinds, first: None, last: None, rows: Vec::new() }
     }
 
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
-        let table = frames_table();
+        let table = frames_table(&self.kinds);
         let rows = std::mem::take(&mut self.rows);
         (table.schema(), table.block(&rows))
     }
@@ -73,9 +75,9 @@ impl FrameSink for FrameRows {
     }
 }
 
-/// Returns the present frame of a run as a table, one row for each body.
-pub fn frame_rows(run: &mut dyn Simulation) -> (TableSchema, Vec<Values>) {
-    let table = frames_table();
+/// Returns the present frame of a run as a table, in which these are all kinds of bodies.
+pub(crate) fn frame_rows(run: &mut dyn Simulation, kinds: &Kinds) -> (TableSchema, Vec<Values>) {
+    let table = frames_table(kinds);
     let rows: Vec<Row> = body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect();
     (table.schema(), table.block(&rows))
 }
@@ -85,12 +87,16 @@ fn body_rows(frame: Frame) -> impl Iterator<Item = Row> {
     bodies.into_iter().map(move |body| Row { cycle, time_s, body })
 }
 
-fn frames_table() -> Table<Row> {
+fn frames_table(kinds: &Kinds) -> Table<Row> {
+    // The labels are the kinds of the program, not only those of the run's world, so that tables of all its runs have the
+    // same schema.
+    let labels = kinds.names();
+    let kinds = kinds.clone();
     Table::new(FRAMES_TABLE)
         .u64("cycle", "cycles done: the frame shows the start of this cycle", |row: &Row| row.cycle)
         .f64("time_s", "simulated time since the start", |row| row.time_s)
-        .label("kind", "kind of the body", BodyKind::ALL.map(BodyKind::name), |row| {
-            label_index(&BodyKind::ALL, &row.body.kind)
+        .label("kind", "kind of the body", labels, move |row| {
+            label_index(kinds.as_slice(), &row.body.kind)
         })
         .u32("number", "its number among the bodies of its kind", |row| row.body.number)
         .u32("part", "its part, where the thing has parts", |row| row.body.part)

@@ -5,7 +5,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionTableColumns, Quantity, Severity,
+    Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionTableColumns, Quantity, Role, Severity,
 };
 use sidestep_record::{Table, read_table};
 use std::ops::Range;
@@ -70,13 +70,13 @@ impl EventRows<'_> {
 
     /// Returns the kind of a body, by its number, which counts on through all kinds.
     fn kind_of(&self, number: u32) -> BodyKind {
-        let kinds = [self.place.kind, BodyKind::Person, BodyKind::Door];
-        for kind in kinds {
-            if self.first.iter().any(|body| body.kind == kind && body.number == number) {
-                return kind;
-            }
-        }
-        self.place.kind
+        let agents = self.place.kind;
+        let among = [Role::MovesAmong(agents), Role::StandsAmong(agents)];
+        let other = self
+            .first
+            .iter()
+            .find(|body| body.number == number && among.contains(&body.kind.role()));
+        other.map_or(agents, |body| body.kind)
     }
 
     /// Returns all texts that the table has of an event.

@@ -13,7 +13,7 @@ use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{KeyValues, StateDescription};
 use sidestep_kernel::view::{
-    Body, BodyId, Frame, FrameOptions, Inspection, LogEvent, PositionTableColumns, Scenery,
+    Body, BodyId, Frame, FrameOptions, Inspection, Kinds, LogEvent, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::world::DecisionMode;
 use sidestep_kernel::{Cycle, Digest, InputError, Interrupt, RunConfig, Simulation};
@@ -52,16 +52,17 @@ impl BodySource {
 }
 
 impl RecordedPlayback {
-    /// Opens the messages of a recording for viewers.
+    /// Opens the messages of a recording for viewers, with bodies of these kinds.
     ///
     /// # Errors
     /// When they are damaged.
     pub(crate) fn from_messages(
         start: Box<dyn Simulation>,
         file: &Path,
+        kinds: Kinds,
         until: Cycle,
     ) -> Result<Self, InputError> {
-        let mut scenes = McapSceneReader::open(file)?;
+        let mut scenes = McapSceneReader::open(file, kinds)?;
         let events = scenes.events()?;
         // Read once to report damage now.
         scenes.bodies(until)?;

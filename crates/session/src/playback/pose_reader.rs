@@ -3,7 +3,7 @@
 use crate::run_tables::has_rows;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Frame, Pose, PositionTableColumns, Scenery, Shape, Trail, Vec3,
+    Body, BodyId, BodyKind, Frame, Pose, PositionTableColumns, Role, Scenery, Shape, Trail, Vec3,
 };
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, read_table};
@@ -106,7 +106,7 @@ impl PoseReader {
         let whose: Vec<BodyId> = headings.keys().copied().collect();
         let mut bodies = Vec::new();
         for body in self.first.iter().filter(|body| has_rows_in(rows, body)) {
-            // The numbers of people follow those of robots, in one table.
+            // In a table that has other bodies beside agents, all have the kind of the agents.
             bodies.push(Body { kind: rows.kind, ..body.clone() });
         }
         // Trails end before the cycle of a frame, so the next cycle includes the rows of this one.
@@ -128,21 +128,25 @@ impl PoseReader {
         let mut bodies = Vec::new();
         for body in &self.first {
             let recorded_id = self.recorded_id(body);
-            let moved = match body.kind {
+            let moved = match body.kind.role() {
                 // Rods have no rows of their own: they are lines through the connectors' places.
-                BodyKind::Rods => rods_body(body, poses, joints.entry(body.number).or_default()),
-                // A zone is centered at its airplane.
-                BodyKind::Zone => poses
-                    .get(&BodyId::new(BodyKind::Airplane, body.number, None))
+                Role::LineThroughParts(kind) => {
+                    let joint = joints.entry(body.number).or_default();
+                    line_through_parts(body, kind, poses, joint)
+                }
+                Role::AroundAgent(kind) => poses
+                    .get(&BodyId::new(kind, body.number, None))
                     .map(|pose| Body { pose: Pose::from_position(pose.at_m), ..body.clone() }),
                 _ => recorded_id.and_then(|id| poses.get(&id)).map(|pose| {
                     used.extend(recorded_id);
                     Body { pose: *pose, ..body.clone() }
                 }),
             };
-            // What has no rows in any table does not move, such as a door or an obstacle.
-            let stays = recorded_id.is_none()
-                && !matches!(body.kind, BodyKind::Rods | BodyKind::Zone | BodyKind::Robot);
+            // What has no rows in any table does not move, such as a door or an obstacle. Agents without rows do: robots
+            // on the joints of a chain.
+            let is_carried =
+                body.kind.is_of_agent() || matches!(body.kind.role(), Role::AroundAgent(_));
+            let stays = recorded_id.is_none() && !is_carried;
             match moved {
                 Some(moved) => bodies.push(moved),
                 None if stays => bodies.push(body.clone()),
@@ -189,21 +193,25 @@ fn last_pose(
     Some(Pose::from_heading(at_m, recorded_rad.or(motion_rad).unwrap_or(0.0)))
 }
 
-/// Returns whether a table is for bodies of this kind; people share that of the robots.
+/// Returns whether a body may have rows.
 fn has_rows_in(rows: &PositionTableColumns, body: &Body) -> bool {
-    let is_kind =
-        body.kind == rows.kind || (rows.kind == BodyKind::Robot && body.kind == BodyKind::Person);
+    let is_kind = body.kind == rows.kind || body.kind.role() == Role::MovesAmong(rows.kind);
     is_kind && body.part.is_some() == rows.part.is_some()
 }
 
-/// Returns the line through the next joints, after those of the lines before.
-fn rods_body(body: &Body, poses: &BTreeMap<BodyId, Pose>, joint: &mut u32) -> Option<Body> {
+/// Returns the line through the next parts of a kind, after those of the lines before.
+fn line_through_parts(
+    body: &Body,
+    kind: BodyKind,
+    poses: &BTreeMap<BodyId, Pose>,
+    joint: &mut u32,
+) -> Option<Body> {
     let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
     let from = *joint;
     *joint += points_m.len() as u32;
     let mut joints_m = Vec::with_capacity(points_m.len());
     for part in from..*joint {
-        let id = BodyId::new(BodyKind::Connector, body.number, Some(part));
+        let id = BodyId::new(kind, body.number, Some(part));
         joints_m.push(poses.get(&id)?.at_m);
     }
     let shape = Shape::Line { points_m: joints_m, thickness_m: *thickness_m };

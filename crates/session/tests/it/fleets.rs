@@ -1,18 +1,20 @@
 //! The language between the command and `sidestep-link`, with agents of a world that neither knows.
 
 use crate::support::TestFolder;
-use sidestep_kernel::view::FrameOptions;
+use sidestep_kernel::view::{BodyKind, FrameOptions, Kinds};
 use sidestep_session::OutputPaths;
 use sidestep_session::fleet::{
     AgentName, CommonSettings, FleetFrame, FleetScene, FleetStatus, Job, JobScenario, LinkMessage,
     NodeJob, NodeStatus,
 };
+use sidestep_testing_pond::kinds::FROG;
 
 /// Returns a value as the other end of a pipe reads it: as a line of JSON.
 fn sent<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -> T {
     let line = serde_json::to_string(value).expect("JSON");
     assert!(!line.contains('\n'));
-    serde_json::from_str(&line).expect("the same type")
+    let kinds = Kinds::new([FROG, BodyKind::OBSTACLE]);
+    kinds.while_reading(|| serde_json::from_str(&line)).expect("the same type")
 }
 
 #[test]

@@ -6,8 +6,8 @@ use sidestep_kernel::ports::Values;
 use sidestep_record::read_table;
 use sidestep_session::report::document;
 use sidestep_session::{
-    Error, ManagedRun, NoWatcher, OutputPaths, RecordedRun, RowSelection, RunStatus, frame_rows,
-    replay_all, replay_to,
+    Error, ManagedRun, NoWatcher, OutputPaths, RecordedRun, RowSelection, RunStatus, replay_all,
+    replay_to,
 };
 
 #[test]
@@ -118,6 +118,6 @@ fn rows_are_kept_of_the_tables_that_are_wanted_and_frames_at_multiples() {
     let mut cycles = cycles.to_vec();
     cycles.dedup();
     assert_eq!((schema.name.as_str(), cycles), ("frames", vec![0, 50, 100]));
-    let (_, now) = frame_rows(journey.simulation_mut());
+    let (_, now) = journey.frame_rows();
     assert_eq!(now[0], Values::U64(vec![120; now[0].len()].into()));
 }

@@ -4,10 +4,12 @@ use crate::chain::{SEVERAL, SWARM};
 use crate::common::{CROWD, source};
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::MemoryRecorder;
-use sidestep::kernel::view::{BodyId, BodyKind, FrameOptions, Shape};
+use sidestep::kernel::view::{BodyId, FrameOptions, Shape};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airspace_run;
+use sidestep::worlds::airspace::kinds::ZONE;
 use sidestep::worlds::chain::chain_run;
+use sidestep::worlds::robots::kinds::{DOOR, ROBOT};
 use sidestep::worlds::robots::robots_run;
 
 const LOOK: FrameOptions = FrameOptions::with_first_scans(usize::MAX);
@@ -101,7 +103,7 @@ fn bodies_keep_their_names_and_are_where_the_world_has_them() {
         let frame = run.frame(LOOK);
         assert_eq!((frame.cycle, frame.time_s), (5, 5.0 * scenery.cycle_s));
     }
-    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == BodyKind::Robot).count();
+    let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == ROBOT).count();
     assert_eq!(agents, robots(1).agents());
 }
 
@@ -138,11 +140,11 @@ fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
         run.advance(1);
         let frame = run.frame(LOOK);
         let is_marked = |b: &&sidestep::kernel::view::Body| {
-            b.kind == BodyKind::Zone && b.state == sidestep::kernel::view::Condition::Touching
+            b.kind == ZONE && b.state == sidestep::kernel::view::Condition::Touching
         };
         marked += frame.bodies.iter().filter(is_marked).count();
         losses += frame.log.iter().filter(|e| e.words.contains("loses separation")).count();
-        let zones = frame.bodies.iter().filter(|b| b.kind == BodyKind::Zone);
+        let zones = frame.bodies.iter().filter(|b| b.kind == ZONE);
         assert!(zones.clone().all(|b| matches!(b.shape, Shape::Cylinder { .. })));
         assert_eq!(frame.bodies.len(), 2 * zones.count(), "each airplane has its zone");
     }
@@ -154,9 +156,8 @@ fn a_look_names_the_bodies_whose_scans_are_wanted_and_truth_stands_beside_every_
     let mut run = robots(1);
     run.advance(10);
     let all = run.frame(LOOK).scans;
-    let asked = [30, 3].map(|id| BodyId::new(BodyKind::Robot, id, None));
-    let unknown =
-        [BodyId::new(BodyKind::Robot, 9_999, None), BodyId::new(BodyKind::Door, 30, None)];
+    let asked = [30, 3].map(|id| BodyId::new(ROBOT, id, None));
+    let unknown = [BodyId::new(ROBOT, 9_999, None), BodyId::new(DOOR, 30, None)];
     let some = run.frame(FrameOptions::with_scans_of([&asked[..], &unknown].concat())).scans;
     let of = |who| all.iter().filter(move |scan| scan.of == who).cloned();
     let expected: Vec<_> = asked.into_iter().flat_map(of).collect();

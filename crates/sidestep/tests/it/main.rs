@@ -14,6 +14,7 @@ mod exactness;
 mod examples;
 mod frames;
 mod inspect;
+mod kinds;
 mod laws;
 mod learned_profiles;
 mod obstacle_rule;

@@ -13,9 +13,10 @@ use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
 use super::trace::InspectionTrace;
 use super::world::AirspaceWorld;
+use crate::kinds;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
-    self, BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
+    self, BodyId, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
 };
 use sidestep_kernel::{Cycle, EntityId, Slot};
 
@@ -28,7 +29,7 @@ impl AirspaceWorld {
         who: BodyId,
     ) -> Option<Inspection> {
         let BodyId { kind, number: id, part } = who;
-        let is_airplane = kind == BodyKind::Airplane && part.is_none();
+        let is_airplane = kind == kinds::AIRPLANE && part.is_none();
         if !is_airplane || id as usize >= self.airplanes.len() || !state.is_active(self, id, now) {
             return None;
         }
@@ -189,5 +190,5 @@ impl Inspector<'_> {
 
 /// Returns the body that stands for an airplane.
 fn airplane(id: EntityId) -> BodyId {
-    BodyId::new(BodyKind::Airplane, id, None)
+    BodyId::new(kinds::AIRPLANE, id, None)
 }

@@ -35,6 +35,7 @@ mod generate;
 mod import;
 mod inspect;
 mod join;
+pub mod kinds;
 pub mod method;
 mod metric_info;
 pub mod metrics;

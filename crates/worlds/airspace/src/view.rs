@@ -4,6 +4,7 @@ use super::events::{Event, EventKind};
 use super::flight::{Point, distance_m};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
+use crate::kinds;
 use sidestep_kernel::view::{
     Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
     Quantity, Scenery, Severity, Shape,
@@ -26,13 +27,13 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     for (id, airplane) in (0..).zip(world.airplanes.iter()) {
         let [x_m, y_m] = airplane.start.at;
         let pose = Pose::from_position([x_m, y_m, airplane.altitude_m]);
-        bodies.push(Body::new(BodyKind::Start, id, pose, zone_shape(world, id)));
+        bodies.push(Body::new(kinds::START, id, pose, zone_shape(world, id)));
     }
     for (id, airplane) in (0..).zip(world.airplanes.iter()) {
         if let Some([x_m, y_m]) = airplane.mission.last() {
             let pose = Pose::from_position([*x_m, *y_m, airplane.altitude_m]);
             let radius_m = GOAL_FRACTION * zone_radius_m(world, id);
-            bodies.push(Body::new(BodyKind::Goal, id, pose, Shape::Sphere { radius_m }));
+            bodies.push(Body::new(BodyKind::GOAL, id, pose, Shape::Sphere { radius_m }));
         }
     }
     Scenery {
@@ -49,7 +50,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
 fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
     (0..)
         .zip(world.airplanes.iter())
-        .filter_map(|(id, airplane)| Some((BodyKind::Airplane, id, airplane.callsign.clone()?)))
+        .filter_map(|(id, airplane)| Some((kinds::AIRPLANE, id, airplane.callsign.clone()?)))
         .collect()
 }
 
@@ -57,7 +58,7 @@ fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
 pub(super) fn position_columns() -> Vec<PositionTableColumns> {
     vec![PositionTableColumns {
         table: "trajectories",
-        kind: BodyKind::Airplane,
+        kind: kinds::AIRPLANE,
         number: "airplane",
         part: None,
         axes: ["x_m", "y_m", "altitude_m"].map(CoordinateColumn::meters).to_vec(),
@@ -113,8 +114,8 @@ fn airplane_and_zone(
     let length_m = LENGTH_FRACTION * zone_radius_m(world, id);
     let dart = Shape::Dart { length_m, width_m: WIDTH_FRACTION * length_m };
     let bodies = [
-        Body::new(BodyKind::Airplane, id, pose, dart),
-        Body::new(BodyKind::Zone, id, pose, zone_shape(world, id)),
+        Body::new(kinds::AIRPLANE, id, pose, dart),
+        Body::new(kinds::ZONE, id, pose, zone_shape(world, id)),
     ];
     bodies.map(|body| body.with_state_if(too_near.binary_search(&id).is_ok(), Condition::Touching))
 }
@@ -178,7 +179,7 @@ pub(super) fn log_event(event: &Event) -> LogEvent {
             (Severity::Warning, "stays on its orbit: no control of it came in time".into())
         }
     };
-    let airplane = |id| BodyId::new(BodyKind::Airplane, id, None);
+    let airplane = |id| BodyId::new(kinds::AIRPLANE, id, None);
     LogEvent {
         cycle: event.cycle,
         level,

@@ -4,6 +4,7 @@ use super::method::{Method, Methods};
 use super::scenario::CompiledAirspace;
 use super::{AirspaceWorld, bundle, import, text};
 use sidestep_kernel::text::StateDescription;
+use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
     CompiledScenario as AnyCompiled, Editing, ImportedScenario, MetricInfo, ResolvedScenario,
@@ -61,6 +62,10 @@ impl WorldType for Airspace {
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
         &super::metric_info::METRIC_INFO
+    }
+
+    fn kinds(&self) -> &'static [BodyKind] {
+        super::kinds::ALL
     }
 
     fn facts(&self) -> WorldFacts {

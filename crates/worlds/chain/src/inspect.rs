@@ -13,6 +13,7 @@ use super::trace::InspectionTrace;
 use super::view::obstacle_body_id;
 use super::world::ChainWorld;
 use super::{act, claim, join};
+use crate::kinds;
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
@@ -36,10 +37,12 @@ impl<const D: usize> ChainWorld<D> {
             return None;
         }
         let before = state.body(slot as usize).clone();
-        let parts = match kind {
-            BodyKind::Connector => before.chain.points().len(),
-            BodyKind::Robot => before.robots.len(),
-            _ => 0,
+        let parts = if kind == kinds::CONNECTOR {
+            before.chain.points().len()
+        } else if kind == kinds::ROBOT {
+            before.robots.len()
+        } else {
+            0
         };
         if part as usize >= parts {
             return None;
@@ -175,14 +178,15 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     fn connector(&self, k: usize) -> BodyId {
-        BodyId::new(BodyKind::Connector, self.slot, Some(k as u32))
+        BodyId::new(kinds::CONNECTOR, self.slot, Some(k as u32))
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
     fn position(&self, body: &ChainBodyState<D>) -> [f64; 3] {
-        match self.kind {
-            BodyKind::Robot => with_dimensions(body.robots[self.k].pose.at),
-            _ => with_dimensions(body.chain.points()[self.k]),
+        if self.kind == kinds::ROBOT {
+            with_dimensions(body.robots[self.k].pose.at)
+        } else {
+            with_dimensions(body.chain.points()[self.k])
         }
     }
 
@@ -211,7 +215,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
             table.push_row([
                 FactValue::count(turn + 1),
-                FactValue::Body(BodyId::new(BodyKind::Rods, slot, None)),
+                FactValue::Body(BodyId::new(kinds::RODS, slot, None)),
             ]);
         }
         let turn = group.iter().position(|&slot| slot == self.slot).map_or(0, |turn| turn + 1);

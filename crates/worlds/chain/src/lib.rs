@@ -33,6 +33,7 @@ mod formation;
 pub mod ground;
 mod inspect;
 mod join;
+pub mod kinds;
 mod metric_info;
 pub mod metrics;
 mod motion;

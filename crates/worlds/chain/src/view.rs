@@ -7,6 +7,7 @@ use super::perceive::Perceiver;
 use super::scratch::Scratch;
 use super::state::{ChainBodyState as ChainBody, ChainState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
+use crate::kinds;
 use sidestep_kernel::view::{
     Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
     Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
@@ -40,7 +41,7 @@ impl<const D: usize> ChainWorld<D> {
                 .zip(self.chains.iter())
                 // Those without a name are known by their number.
                 .filter(|(_, spec)| !spec.name.is_empty())
-                .map(|(id, spec)| (BodyKind::Connector, id, spec.name.clone()))
+                .map(|(id, spec)| (kinds::CONNECTOR, id, spec.name.clone()))
                 .collect(),
         }
     }
@@ -49,7 +50,7 @@ impl<const D: usize> ChainWorld<D> {
     pub(crate) fn position_columns(interval: Cycle) -> Vec<PositionTableColumns> {
         vec![PositionTableColumns {
             table: "trajectories",
-            kind: BodyKind::Connector,
+            kind: kinds::CONNECTOR,
             number: "chain",
             part: Some("connector"),
             axes: ["x_m", "y_m", "z_m"][..D]
@@ -109,7 +110,7 @@ fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> 
     let true_m = laser.true_ranges(&perceiver.scratch.scan);
     let true_m = true_m.map(|range_m| hit_range_m(range_m, most_m)).collect();
     Some(Scan {
-        of: BodyId::new(BodyKind::Connector, slot, Some(percept.agent as u32)),
+        of: BodyId::new(kinds::CONNECTOR, slot, Some(percept.agent as u32)),
         sensor: LASER.into(),
         pose: Pose::from_heading([x_m, y_m, 0.0], percept.leader.pose.heading_rad),
         bearings_rad,
@@ -129,7 +130,7 @@ fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
     let mut goals = Vec::new();
     for (part, (at_m, tolerance_m)) in (0..).zip(spec.tasks.iter().flat_map(task_goals)) {
         let ball = Shape::Sphere { radius_m: tolerance_m.max(least_m) };
-        let goal = Body::new(BodyKind::Goal, id, Pose::from_position(at_m), ball);
+        let goal = Body::new(BodyKind::GOAL, id, Pose::from_position(at_m), ball);
         goals.push(goal.with_part(part));
     }
     goals
@@ -171,15 +172,14 @@ fn push_chain<const D: usize>(
     for (part, whole) in (0..).zip(whole_parts(chain)) {
         let points_m = points_m[whole].to_vec();
         let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
-        bodies.push(
-            Body::new(BodyKind::Rods, id, Pose::from_position([0.0; 3]), line).with_part(part),
-        );
+        bodies
+            .push(Body::new(kinds::RODS, id, Pose::from_position([0.0; 3]), line).with_part(part));
     }
     let leader = leader(spec, body);
     let connectors = (0_u32..).zip(chain.connectors()).zip(&points_m);
     bodies.extend(connectors.map(|((part, connector), at_m)| {
         let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
-        Body::new(BodyKind::Connector, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
+        Body::new(kinds::CONNECTOR, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
             .with_part(part)
             .with_state_if(leader == Some(part as usize), Condition::Leading)
             .with_state_if(connector.failed, Condition::Failed)
@@ -188,7 +188,7 @@ fn push_chain<const D: usize>(
         let [x_m, y_m] = robot.pose.at;
         let pose = Pose::from_heading([x_m, y_m, 0.0], robot.pose.heading_rad);
         let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
-        Body::new(BodyKind::Robot, id, pose, disc)
+        Body::new(kinds::ROBOT, id, pose, disc)
             .with_part(part)
             .with_state_if(robot.is_bumped, Condition::Touching)
     }));
@@ -233,7 +233,7 @@ fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
         }
         ConvexCore::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
-    Body::new(BodyKind::Obstacle, obstacle.id, pose, shape)
+    Body::new(BodyKind::OBSTACLE, obstacle.id, pose, shape)
         .with_velocity(with_dimensions(obstacle.velocity_m_s))
 }
 
@@ -262,7 +262,7 @@ pub(crate) fn view_event(event: &Event) -> LogEvent {
         cycle: event.cycle,
         level,
         kind: event.kind.view_kind(),
-        who: BodyId::new(BodyKind::Connector, event.chain, Some(event.connector)),
+        who: BodyId::new(kinds::CONNECTOR, event.chain, Some(event.connector)),
         with: event.obstacle.map(obstacle_body_id),
         at_m: Some(event.at_m),
         value: (unit != NO_VALUE).then(|| Quantity::new(event.value, unit)),
@@ -317,8 +317,8 @@ fn describe(event: &Event) -> (Severity, &'static str, String) {
 /// Returns the body of an obstacle: another chain stands for all of its parts.
 pub(crate) fn obstacle_body_id(id: u32) -> BodyId {
     match id.checked_sub(OTHER_CHAIN) {
-        Some(chain) => BodyId::new(BodyKind::Rods, chain, None),
-        None => BodyId::new(BodyKind::Obstacle, id, None),
+        Some(chain) => BodyId::new(kinds::RODS, chain, None),
+        None => BodyId::new(BodyKind::OBSTACLE, id, None),
     }
 }
 

@@ -5,6 +5,7 @@ use super::own_parts::OwnParts;
 use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
 use super::{bundle, remarks, text, world::ChainWorld};
 use sidestep_kernel::text::StateDescription;
+use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_rods::Reaction;
 use sidestep_scenario::{
@@ -72,6 +73,10 @@ impl WorldType for Chains {
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
         &super::metric_info::METRIC_INFO
+    }
+
+    fn kinds(&self) -> &'static [BodyKind] {
+        super::kinds::ALL
     }
 
     fn facts(&self) -> WorldFacts {

@@ -27,6 +27,7 @@ mod external;
 mod facts;
 mod inspect;
 mod join;
+pub mod kinds;
 mod metric_info;
 pub mod metrics;
 mod odometry;

@@ -7,6 +7,7 @@ use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyState, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
 use super::{Event, EventKind, RobotsWorld, Scratch};
+use crate::kinds;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
@@ -45,7 +46,7 @@ impl RobotsWorld {
         });
         vec![view::PositionTableColumns {
             table: "trajectories",
-            kind: BodyKind::Robot,
+            kind: kinds::ROBOT,
             number: "body",
             part: None,
             axes: vec![col, row],
@@ -99,7 +100,7 @@ impl RobotsWorld {
         let ids: Vec<EntityId> = match of {
             ScanSelection::First(robots) => self.robots.iter().take(*robots).copied().collect(),
             ScanSelection::Of(bodies) => {
-                let robots = bodies.iter().filter(|of| of.kind == BodyKind::Robot);
+                let robots = bodies.iter().filter(|of| of.kind == kinds::ROBOT);
                 let ids = robots.map(|of| of.number);
                 // Viewers may ask for ids that this run does not have.
                 ids.filter(|&id| (id as usize) < self.bodies.len()).collect()
@@ -160,7 +161,7 @@ impl RobotsWorld {
         let mut poses = Vec::with_capacity(odometry.len());
         for (id, reckoning) in (0..).zip(odometry) {
             let pose = reckoning.pose(self.map.box_size_m, &turns);
-            poses.push((BodyId::new(BodyKind::Robot, id, None), pose));
+            poses.push((BodyId::new(kinds::ROBOT, id, None), pose));
         }
         poses
     }
@@ -208,15 +209,17 @@ impl<'a> BodyViewBuilder<'a> {
         let ty = self.world.type_of(id);
         let box_m = self.world.map.box_size_m;
         let kind = ty.visible_kind();
-        let is_open = kind == BodyKind::Door && body.facing.get().is_open();
+        let is_open = kind == kinds::DOOR && body.facing.get().is_open();
         // The model is a plane; heights are chosen for the picture: robots below people and walls, and an open
         // door as a threshold.
         let (width, height) = ty.size;
         let side_m = f64::from(width.min(height)) * box_m;
-        let height_m = match kind {
-            BodyKind::Door if is_open => 0.05 * side_m,
-            BodyKind::Robot => 0.5 * side_m,
-            _ => side_m,
+        let height_m = if is_open {
+            0.05 * side_m
+        } else if kind == kinds::ROBOT {
+            0.5 * side_m
+        } else {
+            side_m
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
         Body::new(kind, id, self.pose(ty, body, 0.5 * height_m), Shape::Cuboid { size_m })
@@ -244,9 +247,9 @@ impl<'a> BodyViewBuilder<'a> {
 impl BodyType {
     fn visible_kind(&self) -> BodyKind {
         match self.role {
-            Role::Robot(_) => BodyKind::Robot,
-            Role::Mover(_) => BodyKind::Person,
-            Role::Door(_) => BodyKind::Door,
+            Role::Robot(_) => kinds::ROBOT,
+            Role::Mover(_) => kinds::PERSON,
+            Role::Door(_) => kinds::DOOR,
         }
     }
 }
@@ -278,7 +281,7 @@ impl ScanCarrier {
             true_ranges_m.push(to_boundary_m + true_m);
         }
         Scan {
-            of: BodyId::new(BodyKind::Robot, self.id, None),
+            of: BodyId::new(kinds::ROBOT, self.id, None),
             sensor: sensor.name.clone(),
             pose: self.pose,
             ranges_m,

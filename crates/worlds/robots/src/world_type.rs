@@ -4,6 +4,7 @@ use super::decide::Behaviour;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, text};
 use sidestep_kernel::text::StateDescription;
+use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
     CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
@@ -73,6 +74,10 @@ impl WorldType for Robots {
 
     fn metric_infos(&self) -> &'static [MetricInfo] {
         &super::metric_info::METRIC_INFO
+    }
+
+    fn kinds(&self) -> &'static [BodyKind] {
+        super::kinds::ALL
     }
 
     fn facts(&self) -> WorldFacts {

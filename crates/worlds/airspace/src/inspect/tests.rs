@@ -1,7 +1,8 @@
 use crate::flight::distance_m;
+use crate::kinds;
 use crate::{AirspaceRun, airspace_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole, MarkShape};
+use sidestep_kernel::view::{BodyId, FactValue, Inspection, MarkRole, MarkShape};
 use sidestep_scenario::Source;
 
 fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
@@ -13,7 +14,7 @@ fn run(airspace: &str, seed: u32, n: u32) -> AirspaceRun {
 }
 
 fn inspect_airplane(run: &AirspaceRun, id: u32) -> Inspection {
-    run.inspect(BodyId::new(BodyKind::Airplane, id, None)).expect("it is in the air")
+    run.inspect(BodyId::new(kinds::AIRPLANE, id, None)).expect("it is in the air")
 }
 
 /// Returns the probabilities of the actions; none of an airplane that is alone.
@@ -91,7 +92,7 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
     let mut kept = 0;
     while !run.is_over() && run.cycle() < 80 {
         for id in 0..6 {
-            let Some(inspection) = run.inspect(BodyId::new(BodyKind::Airplane, id, None)) else {
+            let Some(inspection) = run.inspect(BodyId::new(kinds::AIRPLANE, id, None)) else {
                 continue;
             };
             assert_eq!(
@@ -104,14 +105,12 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
                 continue;
             }
             kept += 1;
-            let Some(FactValue::Body(BodyId {
-                kind: BodyKind::Airplane,
-                number: other,
-                part: None,
-            })) = inspection.value("Shield", "because of")
+            let Some(FactValue::Body(BodyId { kind, number: other, part: None })) =
+                inspection.value("Shield", "because of")
             else {
                 panic!("nobody is the reason: {inspection:?}")
             };
+            assert_eq!(*kind, kinds::AIRPLANE);
             assert!(*other != id && *other < 6);
             assert_eq!(inspection.marks_with_role(MarkRole::Refused).count(), 1);
         }

@@ -1,8 +1,9 @@
 use crate::ChainRun;
+use crate::kinds;
 use crate::scenario::AnyChainScenario;
 use sidestep_kernel::control::{BufferMut, OrderLog, Orders, SpaceKind, Team};
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
-use sidestep_kernel::view::{BodyId, BodyKind, FactValue};
+use sidestep_kernel::view::{BodyId, FactValue};
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_rods::geometry::norm;
 use sidestep_scenario::Source;
@@ -343,11 +344,11 @@ fn who_looks_at_a_connector_sees_the_order_that_is_ahead() {
     order(&mut run, "to_m", 0, &[-1.5, -0.4]);
     order(&mut run, "connector", 0, &[5.0]);
     let digest = run.digest();
-    let told = run.inspect(BodyId::new(BodyKind::Connector, 0, Some(5))).expect("it is there");
+    let told = run.inspect(BodyId::new(kinds::CONNECTOR, 0, Some(5))).expect("it is there");
     assert_eq!(told.value("Wish", "what"), Some(&"go, as ordered".into()));
     assert_eq!(
         told.value("Wish", "of"),
-        Some(&FactValue::Body(BodyId::new(BodyKind::Connector, 0, Some(5))))
+        Some(&FactValue::Body(BodyId::new(kinds::CONNECTOR, 0, Some(5))))
     );
     assert_eq!(told.value("Ladder", "rung"), Some(&"as wanted".into()));
     assert_eq!(run.digest(), digest);

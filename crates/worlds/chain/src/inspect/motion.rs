@@ -1,12 +1,13 @@
 //! The rung of the ladder, the connectors that moved, the robots that follow, and the outcome.
 
 use super::{ConnectorInspection, line};
+use crate::kinds;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::state::ChainBodyState;
 use crate::view::obstacle_body_id;
 use sidestep_kernel::geometry::angle_rad;
 use sidestep_kernel::view::{
-    BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, Quantity,
+    BodyId, FactSection, FactTable, FactValue, Inspection, MarkRole, Quantity,
 };
 use sidestep_rods::CompletedMotion;
 use sidestep_rods::geometry::{distance, sub, with_dimensions};
@@ -107,7 +108,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             let then = FactValue::meters(lag_m(&self.after, k));
             let touches = self.after.robots[k].is_bumped;
             table.push_row([
-                BodyId::new(BodyKind::Robot, self.slot, Some(k as u32)).into(),
+                BodyId::new(kinds::ROBOT, self.slot, Some(k as u32)).into(),
                 now,
                 then,
                 touches.into(),

@@ -1,4 +1,5 @@
 use crate::chain_run;
+use crate::kinds;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole};
 use sidestep_scenario::Source;
@@ -9,7 +10,7 @@ fn run(text: &str) -> Box<dyn Simulation> {
 }
 
 fn told(run: &dyn Simulation, k: u32) -> Inspection {
-    run.inspect(BodyId::new(BodyKind::Connector, 0, Some(k))).expect("it is there")
+    run.inspect(BodyId::new(kinds::CONNECTOR, 0, Some(k))).expect("it is there")
 }
 
 /// A chain that an operator drives against a disc: its head touches it at x = 0.6.
@@ -26,10 +27,10 @@ fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
     assert_eq!(free.value("Ladder", "rung"), Some(&"as wanted".into()));
     run.advance(20);
     let told = told(&*run, 2);
-    let head: BodyId = BodyId::new(BodyKind::Connector, 0, Some(0));
+    let head: BodyId = BodyId::new(kinds::CONNECTOR, 0, Some(0));
     assert_eq!(told.value("Veto", "by"), Some(&FactValue::Body(head)));
     assert_eq!(told.value("Veto", "reason"), Some(&"target-blocked".into()));
-    let disc = BodyId::new(BodyKind::Obstacle, 0, None);
+    let disc = BodyId::new(BodyKind::OBSTACLE, 0, None);
     assert_eq!(told.value("Veto", "because of"), Some(&FactValue::from(Some(disc))));
     let Some(FactValue::Place([x_m, ..])) = told.value("Veto", "as far as") else {
         panic!("nowhere")
@@ -53,13 +54,13 @@ fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
         speed_m_s = 0.5\n";
     let mut run = run(text);
     run.advance(30);
-    let told = run.inspect(BodyId::new(BodyKind::Robot, 0, Some(3))).expect("it is there");
+    let told = run.inspect(BodyId::new(kinds::ROBOT, 0, Some(3))).expect("it is there");
     let Some(FactValue::Text(layer)) = told.value("Decides", "layer") else { panic!("no layer") };
     assert!(layer.starts_with(|digit| ('1'..='6').contains(&digit)), "{layer}");
     let robots = told.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     assert_eq!(robots.rows.len(), 4);
     run.advance(1);
-    let then = run.inspect(BodyId::new(BodyKind::Robot, 0, Some(3))).expect("it is there");
+    let then = run.inspect(BodyId::new(kinds::ROBOT, 0, Some(3))).expect("it is there");
     assert_eq!(then.value("Now", "place"), told.value("Outcome", "next place"));
     let table = then.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     let [was, is] = [(robots, "behind then"), (table, "behind now")]
@@ -71,11 +72,11 @@ fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
 fn nobody_is_told_of_who_is_not_there() {
     let run = run(AGAINST_A_DISC);
     for who in [
-        BodyId::new(BodyKind::Connector, 0, Some(4)),
-        BodyId::new(BodyKind::Connector, 1, Some(0)),
-        BodyId::new(BodyKind::Connector, 0, None),
-        BodyId::new(BodyKind::Robot, 0, Some(0)),
-        BodyId::new(BodyKind::Rods, 0, Some(0)),
+        BodyId::new(kinds::CONNECTOR, 0, Some(4)),
+        BodyId::new(kinds::CONNECTOR, 1, Some(0)),
+        BodyId::new(kinds::CONNECTOR, 0, None),
+        BodyId::new(kinds::ROBOT, 0, Some(0)),
+        BodyId::new(kinds::RODS, 0, Some(0)),
     ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }

@@ -3,12 +3,13 @@
 use super::Inspector;
 use crate::Scratch;
 use crate::decide::{Decision, Memory, Sector, TripEvent};
+use crate::kinds;
 use crate::sensor::{NOTHING, Reading};
 use crate::view::{center_to_boundary_m, class_middle_m};
 use crate::world::{MountedSensor, RobotModel, Role};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::OccupantWord;
-use sidestep_kernel::view::{self, BodyId, BodyKind, FactSection, FactTable, FactValue, MarkShape};
+use sidestep_kernel::view::{self, BodyId, FactSection, FactTable, FactValue, MarkShape};
 
 /// One row of the table of readings: what a beam truly meets, and what its sensor makes of that.
 struct BeamReading<'a, T> {
@@ -139,7 +140,7 @@ impl<T: OccupantWord> Inspector<'_, T> {
     fn add_messages(&mut self, scratch: &Scratch) {
         let mut table = FactTable::new(["sender", "word"]);
         for heard in &scratch.heard {
-            let sender = BodyId::new(BodyKind::Robot, heard.sender, None);
+            let sender = BodyId::new(kinds::ROBOT, heard.sender, None);
             table.push_row([sender.into(), format!("{:#018x}", heard.word).into()]);
         }
         if self.cycle.world.radio.is_some() {

@@ -1,6 +1,7 @@
+use crate::kinds;
 use crate::{RobotsRun, robots_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{BodyId, BodyKind, FactValue, Inspection, MarkRole};
+use sidestep_kernel::view::{BodyId, FactValue, Inspection, MarkRole};
 use sidestep_scenario::Source;
 
 /// Two robots that want the box between them; the one with the smaller id goes first.
@@ -18,7 +19,7 @@ fn head_on() -> RobotsRun {
 }
 
 fn robot(id: u32) -> BodyId {
-    BodyId::new(BodyKind::Robot, id, None)
+    BodyId::new(kinds::ROBOT, id, None)
 }
 
 fn told(run: &RobotsRun, id: u32) -> Inspection {
@@ -62,9 +63,9 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
 fn nobody_is_told_of_who_is_not_there() {
     let run = head_on();
     for who in [
-        BodyId::new(BodyKind::Robot, 2, None),
-        BodyId::new(BodyKind::Person, 0, None),
-        BodyId::new(BodyKind::Robot, 0, Some(0)),
+        BodyId::new(kinds::ROBOT, 2, None),
+        BodyId::new(kinds::PERSON, 0, None),
+        BodyId::new(kinds::ROBOT, 0, Some(0)),
     ] {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }

@@ -5,9 +5,10 @@ use crate::AirspaceRun;
 use crate::external::observation::MAX_NEIGHBORS;
 use crate::external_action::ExternalAction;
 use crate::flight::distance_m;
+use crate::kinds;
 use sidestep_kernel::control::{OrderLog, Orders};
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::view::{BodyId, BodyKind};
+use sidestep_kernel::view::BodyId;
 use sidestep_kernel::{EntityId, Simulation};
 
 /// One airplane far from its way-point, without the shield.
@@ -222,12 +223,10 @@ fn who_asks_what_was_ordered_does_not_use_it_up() {
     let mut run = lone("");
     run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.02] })
         .expect("right");
-    let inspection =
-        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+    let inspection = run.inspect(BodyId::new(kinds::AIRPLANE, 0, None)).expect("it is in the air");
     assert_eq!(inspection.value("Decides", "action"), Some(&"the turn that was ordered".into()));
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
-    let inspection =
-        run.inspect(BodyId::new(BodyKind::Airplane, 0, None)).expect("it is in the air");
+    let inspection = run.inspect(BodyId::new(kinds::AIRPLANE, 0, None)).expect("it is in the air");
     assert_eq!(inspection.value("Decides", "action"), Some(&"to the way-point".into()));
 }

@@ -1,0 +1,19 @@
+//! The kinds of bodies in a pond.
+
+use sidestep_kernel::view::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+
+/// All kinds of bodies in this world.
+pub(crate) const ALL: &[BodyKind] = &[FROG, BodyKind::OBSTACLE];
+
+/// A frog.
+pub const FROG: BodyKind = BodyKind::new(&KindSpec {
+    name: "frog",
+    noun: "frog",
+    rank: 100,
+    role: Role::Agent(TrailStyle::OnePerColor),
+    layer: 5,
+    paint: Paint::ByNumber { opacity: 1.0 },
+    outline: Outline::Dark,
+    legend: Legend::AGENT,
+    shows_heading: false,
+});
