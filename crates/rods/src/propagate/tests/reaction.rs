@@ -104,7 +104,7 @@ fn a_reaction_perceives_its_master_and_what_is_in_the_way() {
     }
 
     let rod = Rod { min_m: 0.8, max_m: 1.0, radius_m: 0.02 };
-    let wall = Obstacles::new(vec![Obstacle::ball(3, [-0.8, 0.9], 0.2)], 1.0).unwrap();
+    let wall = Obstacles::new(vec![Obstacle::ball(3, [-0.8, 0.7], 0.2)], 1.0).unwrap();
     for (obstacles, y_m) in [(Obstacles::default(), 0.5), (wall, 0.0)] {
         let mut chain =
             Chain::straight([0.0, 0.0], [-1.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
