@@ -1,6 +1,6 @@
 //! Bodies: identity, pose, shape and condition.
 
-use super::kind::BodyKind;
+use super::kind::{BodyKind, Kinds};
 use super::pose::{Pose, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -36,6 +36,17 @@ impl From<BodyIdTuple> for BodyId {
 impl From<BodyId> for BodyIdTuple {
     fn from(BodyId { kind, number, part }: BodyId) -> Self {
         (kind, number, part)
+    }
+}
+
+impl Kinds {
+    /// Returns the body with a name such as `robot/3` or `connector/0/7`.
+    pub fn parse_body_id(&self, name: &str) -> Option<BodyId> {
+        let mut parts = name.split('/');
+        let kind = self.find(parts.next()?)?;
+        let number = parts.next()?.parse().ok()?;
+        let part = parts.next().map(str::parse).transpose().ok()?;
+        parts.next().is_none().then_some(BodyId { kind, number, part })
     }
 }
 

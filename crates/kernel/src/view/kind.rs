@@ -1,7 +1,6 @@
 //! Kinds of bodies, which worlds declare: all that other code needs to show a body of a kind.
 
-use super::appearance::Color;
-use super::body::BodyId;
+use super::color::Color;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::cell::RefCell;
 use std::cmp::Ordering;
@@ -297,15 +296,6 @@ impl Kinds {
         READABLE.set(before);
         result
     }
-
-    /// Returns the body with a name such as `robot/3` or `connector/0/7`.
-    pub fn parse_body_id(&self, name: &str) -> Option<BodyId> {
-        let mut parts = name.split('/');
-        let kind = self.find(parts.next()?)?;
-        let number = parts.next()?.parse().ok()?;
-        let part = parts.next().map(str::parse).transpose().ok()?;
-        parts.next().is_none().then_some(BodyId { kind, number, part })
-    }
 }
 
 /// Kinds for tests.
@@ -355,6 +345,7 @@ pub(super) mod samples {
 
 #[cfg(test)]
 mod tests {
+    use super::super::BodyId;
     use super::samples::{AIRPLANE, CONNECTOR, ROBOT};
     use super::*;
 

@@ -6,17 +6,19 @@
 
 mod appearance;
 mod body;
+mod color;
 mod inspect;
 mod kind;
 mod log;
 mod pose;
 mod trails;
 
-pub use appearance::{
-    ALERT_COLOR, Appearance, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR,
-    WALL_COLOR, body_color,
-};
+pub use appearance::Appearance;
 pub use body::{Body, BodyId, Condition, Shape};
+pub use color::{
+    ALERT_COLOR, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR, WALL_COLOR,
+    body_color,
+};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
 pub use kind::{BodyKind, KindSpec, Kinds, Legend, Outline, Paint, Role, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
