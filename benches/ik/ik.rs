@@ -8,7 +8,7 @@
 //! every engine falls back on. In brackets what the prototype reached.
 
 use cpu_time::ProcessTime;
-use sidestep_arms::ik::{ChainIkGoal, Engine, IkSolver, SolutionKind};
+use sidestep_arms::ik::{ChainIkGoal, IkEngine, IkSolver, MotionOrPosture};
 use sidestep_arms::kinematics::{ArmGoal, SerialChain};
 use sidestep_import::urdf::Model;
 use sidestep_kernel::Seed;
@@ -62,7 +62,7 @@ fn percent(part: usize, all: usize) -> f64 {
 
 const TARGETS: usize = 300;
 
-fn measure<const D: usize>(chain: &Chain<D>, targets: &[Point<D>], engine: Engine) -> Row {
+fn measure<const D: usize>(chain: &Chain<D>, targets: &[Point<D>], engine: IkEngine) -> Row {
     let n = chain.rods().len();
     let mut solver = IkSolver::default();
     let (mut met, mut direct, mut steps) = (0, 0, Vec::new());
@@ -76,7 +76,7 @@ fn measure<const D: usize>(chain: &Chain<D>, targets: &[Point<D>], engine: Engin
         let answer = solver.solve(chain, &nothing, &goal(*target)).expect("right");
         let whole = chain_of_answer(chain, answer.points.clone());
         met += usize::from(answer.reached && whole);
-        direct += usize::from(answer.engine == Engine::Direct);
+        direct += usize::from(answer.engine == IkEngine::Direct);
         steps.push(answer.iterations);
     }
     let us = median_us(targets.len(), |i| {
@@ -207,7 +207,7 @@ fn free_in<const D: usize>() {
                 (0..TARGETS).map(|_| in_ball(part * n as f64, &mut draws)).collect();
             let other = measure_rebirth(&chain, &targets);
             print!("{D}-D, {n} rods, {part} reach:");
-            for engine in [Engine::Chain, Engine::Dls, Engine::Direct] {
+            for engine in [IkEngine::Chain, IkEngine::Dls, IkEngine::Direct] {
                 let row = measure(&chain, &targets, engine);
                 print!(
                     "  {} {:.1} % (itself {:.1})/{}/{:.2} us",
@@ -306,7 +306,7 @@ fn guarded_in<const D: usize>(n: usize, n_balls: u32, max_bend_deg: f64, before:
         times.push(started.elapsed().as_secs_f64() * 1e6);
         let answer = answer.expect("right");
         met += usize::from(answer.reached);
-        moved += usize::from(answer.reached && answer.kind == SolutionKind::Motion);
+        moved += usize::from(answer.reached && answer.kind == MotionOrPosture::Motion);
     }
     times.sort_by(f64::total_cmp);
     println!(
@@ -355,13 +355,14 @@ fn arms() {
             continue;
         };
         let arm = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("an arm");
-        for (engine, restarts) in [(Engine::Dls, 0), (Engine::Dls, 100), (Engine::Chain, 100)] {
+        for (engine, restarts) in [(IkEngine::Dls, 0), (IkEngine::Dls, 100), (IkEngine::Chain, 100)]
+        {
             arm_row(name, &arm, engine, restarts);
         }
     }
 }
 
-fn arm_row(name: &str, arm: &SerialChain, engine: Engine, restarts: usize) {
+fn arm_row(name: &str, arm: &SerialChain, engine: IkEngine, restarts: usize) {
     const RUNS: usize = 500;
     let mut draws = draws(77);
     let mut random = || -> Vec<f64> {
@@ -376,13 +377,13 @@ fn arm_row(name: &str, arm: &SerialChain, engine: Engine, restarts: usize) {
     };
     let (mut met, mut times) = (0, Vec::new());
     for _ in 0..RUNS {
-        let target = arm.forward(&random()).tip.origin_m;
+        let target = arm.forward_kinematics(&random()).tip.origin_m;
         let start = random();
         let goal = ArmGoal { engine, restarts, ..ArmGoal::new(target) };
         let started = ProcessTime::now();
         let answer = arm.solve(&goal, &start).expect("right");
         times.push(started.elapsed().as_secs_f64() * 1e6);
-        let there = distance(arm.forward(&answer.values).tip.origin_m, target) <= 1e-6;
+        let there = distance(arm.forward_kinematics(&answer.values).tip.origin_m, target) <= 1e-6;
         let legal = arm.outside_limits(&answer.values).is_empty();
         met += usize::from(answer.reached && there && legal);
     }
