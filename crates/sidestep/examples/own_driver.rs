@@ -20,8 +20,8 @@ const CORNERS_M: [Point<3>; 4] = [[2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0
 struct Square;
 
 impl Driver for Square {
-    fn decide(&self, percept: &DriverPercept, memory: &mut DriverMemory, _: &mut Draws) -> Proposal {
-        let [next, ..] = &mut memory.words;
+    fn decide(&self, percept: &DriverPercept, state: &mut DriverMemory, _: &mut Draws) -> Proposal {
+        let [next, ..] = &mut state.words;
         let Some(corner) = CORNERS_M.get(*next as usize) else { return Proposal::Done };
         if distance(percept.connectors_m[percept.connector], *corner) < 0.01 {
             *next += 1;
