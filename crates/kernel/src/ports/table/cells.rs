@@ -196,7 +196,7 @@ impl TextCells {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
-    /// Returns all texts without separators; [`end_offsets`](Self::ends) divides them.
+    /// Returns all texts without separators; [`end_offsets`](Self::end_offsets) divides them.
     pub fn text(&self) -> &str {
         &self.text
     }
