@@ -254,6 +254,7 @@ impl<const D: usize> ChainState<D> {
         let mut records = Vec::new();
         for slot in 0..self.len() {
             // Deferred motions change places and sums, and no component.
+            // Deferred motions change the chain alone, no component, so the body is not copied to follow them.
             if let Some(record) = component(&self.deferred_body(slot)).save(cycle) {
                 records.push((slot as EntityId, record));
             }
