@@ -149,10 +149,13 @@ impl<T: Protocol> PacketHeader<T> {
     }
 }
 
+// Both are part of each packet's way in; out of line they take as long as the rest of it.
+#[inline]
 fn read_u64(bytes: &[u8], offset: usize) -> u64 {
     u64::from_le_bytes(std::array::from_fn(|k| bytes[offset + k]))
 }
 
+#[inline]
 fn read_u32(bytes: &[u8], offset: usize) -> u32 {
     u32::from_le_bytes(std::array::from_fn(|k| bytes[offset + k]))
 }

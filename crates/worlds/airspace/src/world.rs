@@ -237,6 +237,8 @@ impl AirspaceWorld {
 
     /// Returns the distance in meters up to which two airplanes have to avoid each other, because
     /// they could come too near within the horizon, or on orbits after the next `dt`.
+    // Inlined, because the search for neighbors asks it of each pair.
+    #[inline]
     pub fn interaction_range_m(&self, a: usize, b: usize) -> f64 {
         let separation_a_m = self.airplanes[a].model.separation_m;
         let separation_b_m = self.airplanes[b].model.separation_m;

@@ -23,6 +23,7 @@ use sidestep_kernel::{Cycle, EntityId, InputError};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::local_solver::LocalSolver;
 use sidestep_rods::{Chain, Obstacles, ReactionRules, Rod};
+use std::sync::Arc;
 
 /// Most packets that wait for the beginning of their cycle: a neighbor is at most one cycle ahead.
 const MAX_HELD_PACKETS: usize = 64;
@@ -48,6 +49,8 @@ pub struct ConnectorAgent<const D: usize> {
     rungs: RecoveryLimits,
     /// The rods to its neighbors.
     rods: PerSide<Option<Rod>>,
+    /// Receivers of the packets to each neighbor; made once, because packets share their list of receivers.
+    receivers: PerSide<Option<Arc<[EntityId]>>>,
     solver: LocalSolver<D>,
     /// Obstacles that its sensors see in this cycle.
     obstacles: Obstacles<D>,
@@ -77,6 +80,14 @@ pub struct ConnectorAgent<const D: usize> {
     traffic: NetworkTraffic,
     /// Packets that it has dropped since it was started.
     dropped: DropCounts,
+}
+
+/// Returns the receivers of packets to the neighbors of connector `k` of a chain of `n`.
+fn neighbor_receivers(first_id: EntityId, k: u32, n: u32) -> PerSide<Option<Arc<[EntityId]>>> {
+    PerSide::from_fn(|side| {
+        let neighbor = side.neighbor(k, n)?;
+        Some(Arc::from([first_id + neighbor]))
+    })
 }
 
 /// The times for which it waits for others, where messages may get lost.
@@ -134,6 +145,7 @@ impl<const D: usize> ConnectorAgent<D> {
         agent.first_id = world.first_id(chain);
         agent.fingerprint = world.fingerprint;
         agent.members = member_digest(agent.first_id, agent.n);
+        agent.receivers = neighbor_receivers(agent.first_id, connector, agent.n);
         agent.radio = world.network.as_ref().map(|network| RadioTimeouts {
             retry: network.retry_policy(),
             ticks: network.deadline_ticks(),
@@ -169,6 +181,7 @@ impl<const D: usize> ConnectorAgent<D> {
             radio: None,
             rungs,
             rods,
+            receivers: neighbor_receivers(0, k, n),
             solver: LocalSolver::new(chain, k as usize, rules),
             obstacles: Obstacles::default(),
             cycle: None,

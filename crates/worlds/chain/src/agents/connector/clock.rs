@@ -56,7 +56,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
         }
         let mut out = Vec::new();
         for side in ChainSide::ALL {
-            let Some(neighbor) = side.neighbor(self.me, self.n) else { continue };
+            let Some(receivers) = &self.receivers[side] else { continue };
             let missing = self.missing[side.other()];
             let Some(parcel) =
                 self.links[side].as_mut().and_then(|link| link.next_parcel(self.now))
@@ -77,11 +77,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
             if let Some(link) = &mut self.links[side] {
                 link.record_packet(payload.len());
             }
-            out.push(OutgoingPacket {
-                to: Arc::from([self.first_id + neighbor]),
-                sequence,
-                payload,
-            });
+            out.push(OutgoingPacket { to: Arc::clone(receivers), sequence, payload });
         }
         out
     }
