@@ -7,7 +7,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::airspace::agents::traffic_state::TrafficPicture;
 use sidestep::worlds::airspace::pilot::{Percept, Pilot, Protocol};
 use sidestep::worlds::airspace::{AirspaceWorld, RemotePilotRun, airspace_run};
-use sidestep::worlds::chain::ChainState;
+use sidestep::worlds::chain::ChainWorldState;
 use sidestep::worlds::chain::agents::{ConnectorAgent, MotionProtocol};
 use sidestep::worlds::chain::scenario::ChainScenario;
 use std::collections::VecDeque;
@@ -24,8 +24,8 @@ pub(crate) fn to_a_connector(mut data: &[u8]) {
         ChainScenario::new(&Source::new("f", text, "")).expect("our own team")
     });
     let world = &*TEAM.world;
-    let state = ChainState::new(world).expect("a team at its start");
-    let (chain, mut sights) = world.percepts_at(&state, 0).remove(0);
+    let state = ChainWorldState::new(world).expect("a team at its start");
+    let (chain, mut sights) = world.percepts_in_cycle(&state, 0).remove(0);
     let ids: Vec<u32> = (0..sights.len() as u32).collect();
     let talk = ConversationId::new(0, MotionProtocol, &ids);
     let mut agent = ConnectorAgent::new(world, chain, 2);

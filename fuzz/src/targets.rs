@@ -38,7 +38,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("stl", |data| drop(stl::parse("f", data))),
     ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
     ("traffic", |data| text(data, |t| drop(traffic::parse(&"f", t)))),
-    ("translate", |data| drop(WORLDS.translate(&file("f.scn", data)))),
+    ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data)))),
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
     ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
     ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 use sidestep::arms::ik::IkEngine;
 use sidestep::arms::kinematics::{
-    ArmBody, ArmFiles, ArmGoal, ArmSelection, IkResult, LinkFrames, ObstacleSphere, PoseMask,
+    ArmBody, ArmFiles, ArmGoal, ArmModel, IkResult, LinkFrames, ObstacleSphere, PoseMask,
     Transform, Vector,
 };
 use sidestep::experiment::sweep::scheduler::run_trials;
@@ -32,7 +32,7 @@ use std::path::PathBuf;
 /// >>> len(arm.joints) == len(arm.units)
 /// True
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Arm(ArmSelection);
+pub(crate) struct Arm(ArmModel);
 
 /// Returns the error of an option of the command as that of an argument.
 fn option_error(e: &InputError) -> PyErr {
@@ -192,7 +192,7 @@ impl Arm {
         py: Python<'py>,
         name: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(PyArray1::from_vec(py, self.0.posture(name).map_err(|e| option_error(&e))?))
+        Ok(PyArray1::from_vec(py, self.0.named_posture(name).map_err(|e| option_error(&e))?))
     }
 
     fn __repr__(&self) -> String {
@@ -217,10 +217,11 @@ impl Arm {
         let rotation = frames.iter().flat_map(|f| f.tip.rotation.concat()).collect();
         let quaternion = frames.iter().flat_map(|f| f.tip.quaternion()).collect();
         let connectors =
-            frames.iter().flat_map(|f| chain.connectors(&skeleton, f).concat()).collect();
+            frames.iter().flat_map(|f| chain.connector_positions(&skeleton, f).concat()).collect();
         // Counted in a posture that always exists, because there may be no rows.
-        let count =
-            chain.connectors(&skeleton, &chain.forward_kinematics(&chain.rest_values())).len();
+        let count = chain
+            .connector_positions(&skeleton, &chain.forward_kinematics(&chain.rest_values()))
+            .len();
         let inside_limits: Vec<bool> =
             rows.iter().map(|row| chain.outside_limits(row).is_empty()).collect();
         Fields::new(py)
@@ -301,7 +302,7 @@ struct IkOptions {
 
 impl IkOptions {
     /// Returns the part of the goal that all targets share, and remarks on the arm's body.
-    fn common_goal(&self, arm: &ArmSelection) -> PyResult<(ArmGoal, Vec<String>)> {
+    fn common_goal(&self, arm: &ArmModel) -> PyResult<(ArmGoal, Vec<String>)> {
         let engine = choose("engine", &self.engine, &ENGINES)?;
         let model = choose("body", &self.body, &BODIES)?;
         let is_own = model == CollisionModel::OwnShapes;
@@ -339,7 +340,7 @@ impl IkOptions {
         let position = row_vector(target);
         let target_pose = match target.len() {
             3 => Transform { origin_m: position, ..Transform::IDENTITY },
-            6 => Transform::from_origin(&sidestep::import::urdf::Origin {
+            6 => Transform::from_urdf_origin(&sidestep::import::urdf::Origin {
                 xyz_m: position,
                 rpy_rad: row_vector(&target[3..]),
             }),

@@ -46,7 +46,7 @@ const MAX_WORKERS: usize = 1024;
 pub(crate) struct Batch {
     scenario: Arc<LoadedScenario>,
     /// Its teams, which never change.
-    teams: Vec<Arc<control::Team>>,
+    teams: Vec<Arc<control::AgentTeam>>,
     worlds: usize,
     workers: usize,
     batch: Mutex<batch::Batch>,
@@ -65,7 +65,7 @@ impl Batch {
         })
     }
 
-    fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::Team)> {
+    fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::AgentTeam)> {
         let (number, team) = crate::space::find_team(&self.teams, team)?;
         Ok((number, &**team))
     }
@@ -183,7 +183,7 @@ impl Batch {
         let start = start_function(&scenario)?;
         let batch = py.detach(|| batch::Batch::new(start, &seeds, workers));
         let batch = batch.map_err(|e| batch_error(&e))?;
-        let teams = batch.teams().iter().cloned().map(Arc::new).collect();
+        let teams = batch.agent_teams().iter().cloned().map(Arc::new).collect();
         Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
     }
 

@@ -14,7 +14,7 @@ pyo3::import_exception!(sidestep._errors, ReplayError);
 pyo3::import_exception!(sidestep._errors, ClosedError);
 
 pub(crate) fn input_error(error: &kernel::InputError) -> PyErr {
-    let (line, column) = error.position().unzip();
+    let (line, column) = error.line_and_column().unzip();
     InputError::new_err((
         error.to_string(),
         error.place().to_string(),

@@ -3,12 +3,12 @@
 use crate::error::OrderError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use sidestep::kernel::control::Team;
+use sidestep::kernel::control::AgentTeam;
 use sidestep::kernel::{Cycle, RunConfig};
 use std::sync::Arc;
 
 /// A team, preceded by its number.
-pub(crate) type IndexedTeam = (usize, Arc<Team>);
+pub(crate) type IndexedTeam = (usize, Arc<AgentTeam>);
 
 /// The part of a run that policies need.
 pub(crate) trait PolicyRun {
@@ -23,7 +23,7 @@ pub(crate) trait PolicyRun {
     /// Returns the observations of a team before the next cycle, one array by name for each space.
     fn observed<'py>(&self, py: Python<'py>, team: &IndexedTeam) -> PyResult<Bound<'py, PyDict>>;
     /// Gives an order to all agents of a team for the next cycle.
-    fn give_order(&self, order: &str, values: &Bound<'_, PyAny>, team: &Team) -> PyResult<()>;
+    fn give_order(&self, order: &str, values: &Bound<'_, PyAny>, team: &AgentTeam) -> PyResult<()>;
     /// Advances by one cycle.
     fn advance(&self, py: Python<'_>) -> PyResult<()>;
 }

@@ -14,7 +14,7 @@ use crate::worlds;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
-use sidestep::kernel::control::{self, Orders};
+use sidestep::kernel::control::{self, MultiAgentOrder};
 use sidestep::kernel::ports::{TableSchema, Values};
 use sidestep::kernel::view::{Body, BodyId, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
@@ -53,7 +53,7 @@ pub(crate) struct Simulation {
     scenario: Arc<LoadedScenario>,
     workers: usize,
     /// Its teams, which never change and are needed in every cycle.
-    teams: Vec<Arc<control::Team>>,
+    teams: Vec<Arc<control::AgentTeam>>,
     /// `None` when it is closed.
     run: Mutex<Option<ManagedRun>>,
     /// The renderer of its pictures, with their width in pixels: kept, since it draws the scenery once for all pictures.
@@ -87,7 +87,7 @@ impl Simulation {
             );
             run.map_err(|e| error::session_error(&e))
         })?;
-        let teams = run.simulation().teams().iter().cloned().map(Arc::new).collect();
+        let teams = run.simulation().agent_teams().iter().cloned().map(Arc::new).collect();
         let run = Mutex::new(Some(run));
         Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
     }
@@ -173,7 +173,7 @@ impl Simulation {
         &self,
         py: Python<'py>,
         number: usize,
-        team: &Arc<control::Team>,
+        team: &Arc<control::AgentTeam>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut buffers = ObservationBuffers::from_team(team);
         let buffers = self.with_run(py, |run| {
@@ -189,14 +189,14 @@ impl Simulation {
         order: &str,
         values: &Bound<'_, PyAny>,
         agents: &[EntityId],
-        team: &control::Team,
+        team: &control::AgentTeam,
     ) -> PyResult<()> {
         let py = values.py();
         let shape =
             team.action_spaces.iter().find(|space| space.name == order).map(|s| &s.shape[..]);
         let values = order_values(py, order, values, agents.len(), shape)?;
         self.with_run(py, |run| {
-            let orders = Orders { order, agents, values: &values };
+            let orders = MultiAgentOrder { order, agents, values: &values };
             run.order(&orders).map_err(|e| error::order_error(&e))
         })
     }
@@ -420,7 +420,7 @@ impl Simulation {
     }
 
     /// Returns the observations of a team's agents (by number or name) before the next cycle: arrays by name, of the
-    /// shape (agents, ...), in the order of `Team.agents`. They are the percepts of an agent that decides for itself,
+    /// shape (agents, ...), in the order of `AgentTeam.agents`. They are the percepts of an agent that decides for itself,
     /// errors included.
     ///
     /// Raises OrderError when there is no such team.
@@ -783,7 +783,7 @@ impl PolicyRun for Simulation {
         &self,
         order: &str,
         values: &Bound<'_, PyAny>,
-        team: &control::Team,
+        team: &control::AgentTeam,
     ) -> PyResult<()> {
         self.order_agents(order, values, &team.agents, team)
     }

@@ -7,7 +7,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
-use sidestep::kernel::control::{self, BufferMut, SpaceKind};
+use sidestep::kernel::control::{self, BufferMut, ValueDomain};
 use std::sync::Arc;
 
 /// One quantity of every agent of a team.
@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// ('action', (), ['forward', 'left', 'right', 'stay'])
 #[pyclass(module = "sidestep", frozen)]
 #[derive(Clone)]
-pub(crate) struct Space(pub(crate) control::Space);
+pub(crate) struct Space(pub(crate) control::ValueSpace);
 
 #[pymethods]
 impl Space {
@@ -48,7 +48,7 @@ impl Space {
     #[getter]
     fn choices(&self) -> Option<Vec<String>> {
         match &self.0.kind {
-            SpaceKind::Discrete(names) => Some(names.clone()),
+            ValueDomain::Discrete(names) => Some(names.clone()),
             _ => None,
         }
     }
@@ -57,9 +57,9 @@ impl Space {
     #[getter]
     fn low(&self) -> f64 {
         match self.0.kind {
-            SpaceKind::Discrete(_) => 0.0,
-            SpaceKind::Integer { low, .. } => low as f64,
-            SpaceKind::Real { low, .. } => low,
+            ValueDomain::Discrete(_) => 0.0,
+            ValueDomain::Integer { low, .. } => low as f64,
+            ValueDomain::Real { low, .. } => low,
         }
     }
 
@@ -67,9 +67,9 @@ impl Space {
     #[getter]
     fn high(&self) -> f64 {
         match &self.0.kind {
-            SpaceKind::Discrete(names) => names.len() as f64 - 1.0,
-            &SpaceKind::Integer { high, .. } => high as f64,
-            &SpaceKind::Real { high, .. } => high,
+            ValueDomain::Discrete(names) => names.len() as f64 - 1.0,
+            &ValueDomain::Integer { high, .. } => high as f64,
+            &ValueDomain::Real { high, .. } => high,
         }
     }
 
@@ -98,7 +98,7 @@ impl Space {
 /// >>> team.name, team.agents.tolist(), [space.name for space in team.action_spaces]
 /// ('robot', [0, 1], ['action', 'trip'])
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Team(pub(crate) Arc<control::Team>);
+pub(crate) struct Team(pub(crate) Arc<control::AgentTeam>);
 
 #[pymethods]
 impl Team {
@@ -143,7 +143,7 @@ impl Team {
     }
 
     fn __repr__(&self) -> String {
-        let control::Team { name, agents, observation_spaces, action_spaces } = &*self.0;
+        let control::AgentTeam { name, agents, observation_spaces, action_spaces } = &*self.0;
         let n = agents.len();
         let observed = joined_names(observation_spaces);
         let ordered = joined_names(action_spaces);
@@ -151,15 +151,15 @@ impl Team {
     }
 }
 
-fn joined_names(spaces: &[control::Space]) -> String {
+fn joined_names(spaces: &[control::ValueSpace]) -> String {
     spaces.iter().map(|space| space.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Returns a team by number or name, the first one without either, with its number.
 pub(crate) fn find_team<'a>(
-    teams: &'a [Arc<control::Team>],
+    teams: &'a [Arc<control::AgentTeam>],
     team: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(usize, &'a Arc<control::Team>)> {
+) -> PyResult<(usize, &'a Arc<control::AgentTeam>)> {
     let Some(team) = team else { return team_at(teams, 0) };
     if let Ok(number) = team.extract::<usize>() {
         return team_at(teams, number);
@@ -175,9 +175,9 @@ pub(crate) fn find_team<'a>(
 
 /// Returns a team by number; an error lists how many there are.
 pub(crate) fn team_at(
-    teams: &[Arc<control::Team>],
+    teams: &[Arc<control::AgentTeam>],
     number: usize,
-) -> PyResult<(usize, &Arc<control::Team>)> {
+) -> PyResult<(usize, &Arc<control::AgentTeam>)> {
     teams.get(number).map(|team| (number, team)).ok_or_else(|| {
         let message =
             format!("there is no team {number}; the scenario has {}, from 0", teams.len());
@@ -195,7 +195,7 @@ enum Buffer {
 
 impl Buffer {
     /// Returns a buffer for a quantity of this many agents.
-    fn zeroed(space: &control::Space, agents: usize) -> Self {
+    fn zeroed(space: &control::ValueSpace, agents: usize) -> Self {
         let n = agents * space.value_count();
         if space.is_integer() { Self::Whole(vec![0; n]) } else { Self::Real(vec![0.0; n]) }
     }
@@ -210,7 +210,7 @@ impl Buffer {
 
 impl ObservationBuffers {
     /// Returns zeroed buffers of the right lengths for all agents of `team`.
-    pub(crate) fn from_team(team: &control::Team) -> Self {
+    pub(crate) fn from_team(team: &control::AgentTeam) -> Self {
         let spaces = team.observation_spaces.iter();
         Self(spaces.map(|space| Buffer::zeroed(space, team.agents.len())).collect())
     }
@@ -223,7 +223,7 @@ impl ObservationBuffers {
     pub(crate) fn into_dict<'py>(
         self,
         py: Python<'py>,
-        team: &control::Team,
+        team: &control::AgentTeam,
     ) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         for (space, buffer) in team.observation_spaces.iter().zip(self.0) {
@@ -251,7 +251,7 @@ fn to_array<T: numpy::Element>(
 /// Returns arrays for the observations of a team in many worlds, by name.
 pub(crate) fn zeroed_arrays<'py>(
     py: Python<'py>,
-    team: &control::Team,
+    team: &control::AgentTeam,
     worlds: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
@@ -266,7 +266,7 @@ pub(crate) fn zeroed_arrays<'py>(
     Ok(dict)
 }
 
-fn shape(space: &control::Space, team: &control::Team, worlds: usize) -> Vec<usize> {
+fn shape(space: &control::ValueSpace, team: &control::AgentTeam, worlds: usize) -> Vec<usize> {
     [worlds, team.agents.len()].iter().chain(&space.shape).copied().collect()
 }
 
@@ -282,7 +282,7 @@ impl<'py> OutArrays<'py> {
     /// Returns the arrays of `out`, if they are those that a team needs.
     pub(crate) fn from_dict(
         out: &Bound<'py, PyDict>,
-        team: &control::Team,
+        team: &control::AgentTeam,
         worlds: usize,
     ) -> PyResult<Self> {
         let mut arrays = Vec::with_capacity(team.observation_spaces.len());
@@ -306,7 +306,7 @@ impl<'py> OutArrays<'py> {
     }
 }
 
-fn out_array_error(space: &control::Space, shape: &[usize]) -> PyErr {
+fn out_array_error(space: &control::ValueSpace, shape: &[usize]) -> PyErr {
     let dtype = if space.is_integer() { "int64" } else { "float64" };
     let cause = "it is missing, in use, or another array than an earlier call returned";
     let shape = format_shape(shape);

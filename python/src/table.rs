@@ -256,7 +256,7 @@ fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
         Values::I64(cells) => numbers::<_, Int64Type>(cells),
         Values::F64(cells) => numbers::<_, Float64Type>(cells),
         Values::Bool(cells) => {
-            Arc::new(cells.options().map(|cell| cell.copied()).collect::<BooleanArray>())
+            Arc::new(cells.iter_options().map(|cell| cell.copied()).collect::<BooleanArray>())
         }
         Values::Label(cells) => {
             let (keys, valid) = cells.into_parts();
@@ -264,7 +264,7 @@ fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
             let labels: ArrayRef = Arc::new(StringArray::from_iter_values(&spec.labels));
             Arc::new(DictionaryArray::<UInt32Type>::try_new(keys, labels)?)
         }
-        Values::Text(texts) => Arc::new(texts.options().collect::<StringArray>()),
+        Values::Text(texts) => Arc::new(texts.iter_options().collect::<StringArray>()),
     })
 }
 

@@ -1,8 +1,8 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
-use super::kinematics::{ArmGoal, JointTracker, SerialChain, Skeleton, Vector};
+use super::kinematics::{ArmGoal, ConnectorTargetTracker, SerialChain, Skeleton, Vector};
 use sidestep_kernel::InputError;
-use sidestep_rods::geometry::{Point, sub, with_dimensions};
+use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
 use std::f64::consts::PI;
 
@@ -25,14 +25,14 @@ pub struct Arm {
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
     /// Finds joint values that follow its connectors.
-    pub follower: JointTracker,
+    pub follower: ConnectorTargetTracker,
 }
 
 impl Arm {
     /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
         let skeleton = serial.skeleton();
-        let follower = JointTracker::new(&serial, &skeleton);
+        let follower = ConnectorTargetTracker::new(&serial, &skeleton);
         Self { values: follower.clamp(values), skeleton, serial, at_m, follower }
     }
 
@@ -62,12 +62,12 @@ impl Arm {
     /// Returns the places of the connectors in the world at these joint values.
     pub fn connector_positions<const D: usize>(&self, values: &[f64]) -> Vec<Point<D>> {
         let in_base = self.follower.connector_positions(values);
-        in_base.into_iter().map(|p| with_dimensions(self.to_world(p))).collect()
+        in_base.into_iter().map(|p| convert_dimensions(self.to_world(p))).collect()
     }
 
     /// Returns a place of the world in the frame of the base.
     pub fn to_base<const D: usize>(&self, p: Point<D>) -> Vector {
-        sub(with_dimensions(p), self.at_m)
+        sub(convert_dimensions(p), self.at_m)
     }
 
     /// Returns a goal for connector `k` at a place of the world, and the arm up to it.
@@ -78,7 +78,7 @@ impl Arm {
         tolerance_m: f64,
     ) -> (SerialChain, ArmGoal) {
         let goal = ArmGoal { tolerance_m, ..ArmGoal::new(self.to_base(at)) };
-        (self.serial.up_to(&self.skeleton, k), goal)
+        (self.serial.up_to_connector(&self.skeleton, k), goal)
     }
 
     fn to_world(&self, p: Vector) -> Vector {

@@ -10,7 +10,7 @@ use sidestep::worlds::airspace::Airspace;
 use sidestep::worlds::airspace::flight::distance_m;
 use sidestep::worlds::airspace::method::{Method, MethodPercept, Steering};
 use sidestep::worlds::chain::{
-    self, Chains, Driver, DriverPercept, MasterMove, Proposal, Reaction,
+    self, Chains, Driver, DriverAction, DriverPercept, MasterMove, Reaction,
 };
 use sidestep::worlds::robots::Robots;
 use sidestep::worlds::robots::decide::{Behaviour, Decision, Memory, Percept, Sector};
@@ -54,12 +54,12 @@ impl Driver for BackAndForth {
         percept: &DriverPercept<'_>,
         memory: &mut chain::DriverMemory,
         _: &mut Draws,
-    ) -> Proposal {
+    ) -> DriverAction {
         let [cycles, ..] = &mut memory.words;
         *cycles += 1;
         let seconds = f64::from(*cycles) * percept.dt_s;
         let side = if (seconds as u64).is_multiple_of(2) { 1.0 } else { -1.0 };
-        Proposal::GoTo(add(percept.connectors_m[percept.connector], [0.3, side, 0.0]))
+        DriverAction::GoTo(add(percept.connectors_m[percept.connector], [0.3, side, 0.0]))
     }
 }
 

@@ -8,7 +8,7 @@ use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 
 pub(crate) use sidestep::kernel::text::{
-    LINE_COLS, align_pairs, format_fixed, group_thousands, wrap,
+    LINE_COLS, align_pairs, format_fixed, group_thousands, wrap_text,
 };
 pub(crate) use sidestep_session::report::format_duration;
 
@@ -71,7 +71,7 @@ impl Console {
 
     /// Prints a warning: something is wrong, but the command continues.
     pub(crate) fn warn(self, text: impl Display) {
-        let lines = wrap(&format!("warning: {text}"), usize::from(prose_columns()));
+        let lines = wrap_text(&format!("warning: {text}"), usize::from(prose_columns()));
         let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
     }
 

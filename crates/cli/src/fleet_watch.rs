@@ -64,7 +64,7 @@ fn watch_fleets(job: &Job, endpoint: &str, first: &Sender<Result<Arc<FleetFeed>,
         match (watch_fleet(job, endpoint, first, &mut feed), &feed) {
             (Err(failure), Some(feed)) => {
                 let JobError { cause, remedy, .. } = JobError::from(&failure);
-                feed.mark_lost(&cause, &remedy);
+                feed.mark_disconnected(&cause, &remedy);
             }
             (Err(failure), None) => return drop(first.send(Err(failure))),
             (Ok(()), _) => {}

@@ -1,24 +1,26 @@
 //! The summary of a run as text.
 
 use crate::console::{align_pairs, format_duration, group_thousands};
-use sidestep::kernel::text::key_value;
+use sidestep::kernel::text::key_value_pair;
 use sidestep::kernel::world::DecisionMode;
 use sidestep_session::{Phases, RunStatus, Summary};
 
 pub(crate) fn summary_text(summary: &Summary) -> String {
     let mut lines = vec![
-        key_value(&format!("{}s", summary.agent), group_thousands(summary.agents as u64)),
-        key_value("cycles", cycles_text(summary)),
+        key_value_pair(&format!("{}s", summary.agent), group_thousands(summary.agents as u64)),
+        key_value_pair("cycles", cycles_text(summary)),
     ];
     lines.extend(summary.outcome.iter().cloned());
     lines.extend(summary.file_lines.iter().cloned());
     if summary.cycles_timed > 0 {
-        lines.push(key_value("speed", speed(summary)));
-        lines.push(key_value("time", phases_text(&summary.phases_s)));
+        lines.push(key_value_pair("speed", speed(summary)));
+        lines.push(key_value_pair("time", phases_text(&summary.phases_s)));
     }
-    lines.push(key_value("digest", summary.digest.clone()));
-    lines.extend(summary.folder.as_ref().map(|f| key_value("results", f.display().to_string())));
-    lines.extend(summary.mcap.as_ref().map(|f| key_value("viewers", f.display().to_string())));
+    lines.push(key_value_pair("digest", summary.digest.clone()));
+    lines.extend(
+        summary.folder.as_ref().map(|f| key_value_pair("results", f.display().to_string())),
+    );
+    lines.extend(summary.mcap.as_ref().map(|f| key_value_pair("viewers", f.display().to_string())));
     format!("{}\n{}", heading(summary), align_pairs(&lines))
 }
 

@@ -11,7 +11,7 @@ use sidestep_draw::{
     to_png,
 };
 use sidestep_kernel::view::{
-    Body, BodyId, Condition, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery, Shape,
+    Body, BodyCondition, BodyId, Frame, Isometry2, Occupancy, OccupancyGrid, Pose, Scenery, Shape,
     Trail,
 };
 
@@ -68,7 +68,7 @@ fn corridor() -> Result<String, DrawError> {
         Body::new(kind, number, pose, Shape::Cuboid { size_m: [width, height, 0.1] })
     };
     let door = |number, at: (f64, f64), width, open| {
-        body(DOOR, number, at, (width, 1.0)).with_state_if(open, Condition::Open)
+        body(DOOR, number, at, (width, 1.0)).with_condition_if(open, BodyCondition::Open)
     };
     let paths = [
         &[(3.0, 12.0), (3.0, 11.0), (6.0, 7.0), (21.0, 7.0), (26.0, 8.0), (26.0, 3.0)][..],

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use crate::testing::{ball, plane};
     use sidestep_chain::kinds::CONNECTOR;
-    use sidestep_kernel::view::{ALERT_COLOR, BODY_COLORS, Body, BodyKind, Condition};
+    use sidestep_kernel::view::{ALERT_COLOR, BODY_COLORS, Body, BodyCondition, BodyKind};
 
     /// A film of 20 by 10 meters, 200 pixels wide.
     fn film(bodies: Vec<Body>) -> AnimationRenderer {
@@ -179,7 +179,7 @@ mod tests {
     fn agents_cover_what_is_in_the_way() {
         let place = [5.0, 5.0, 0.0];
         let bodies = vec![
-            ball(CONNECTOR, 0, place, 1.0).with_state_if(true, Condition::Failed),
+            ball(CONNECTOR, 0, place, 1.0).with_condition_if(true, BodyCondition::Failed),
             ball(BodyKind::OBSTACLE, 0, place, 2.0),
         ];
         assert_eq!(pixel(&still(&film(vec![]), bodies, ""), 50, 50), ALERT_COLOR);

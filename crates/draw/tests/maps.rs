@@ -4,7 +4,7 @@ use image::{Rgba, RgbaImage};
 use sidestep_draw::{PictureOptions, draw, to_png};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Condition, DOOR_COLOR, Frame, Isometry2, MOBILE_COLOR, Occupancy,
+    Body, BodyCondition, BodyId, BodyKind, DOOR_COLOR, Frame, Isometry2, MOBILE_COLOR, Occupancy,
     OccupancyGrid, Pose, Scenery, Shape, Trail, Vec3, WALL_COLOR,
 };
 use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
@@ -137,7 +137,7 @@ fn walls_doors_people_and_tracks_have_their_colors_at_their_places() {
     let door = |col: f64| body(DOOR, col as u32, (col, 6.5), (1.0, 3.0), 0);
     scene.bodies.extend([
         door(0.5),
-        door(19.5).with_state_if(true, Condition::Open),
+        door(19.5).with_condition_if(true, BodyCondition::Open),
         body(PERSON, 9, (16.0, 16.0), (2.0, 2.0), 0),
     ]);
     let picture = Picture::from_scene(&scene);

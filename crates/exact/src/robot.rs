@@ -4,7 +4,7 @@ use crate::obstacle::GridPose;
 use sidestep_error_models::effector::{ActionId, EffectorModel, ObstacleRule, Transition};
 use sidestep_error_models::sensor::{FREE, SensorModel, WALL};
 use sidestep_kernel::InputError;
-use sidestep_kernel::distr::check_row;
+use sidestep_kernel::distr::check_probability_row;
 use sidestep_map::{Cell, GridMap};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -71,7 +71,7 @@ impl SingleRobot {
         }
         for (action, transitions) in self.effector.actions.iter().zip(&self.effector.transitions) {
             let row: Vec<f64> = transitions.iter().map(|transition| transition.p).collect();
-            if let Err(error) = check_row(&row) {
+            if let Err(error) = check_probability_row(&row) {
                 let cause = format!("action `{action}`: {error}");
                 let remedy = "make the probabilities `p` of its transitions sum to 1";
                 return Err(InputError::new(&self.place, cause, remedy));

@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn a_character_without_meaning_is_pointed_at() {
         let error = parse("map", "#.\n.x", 1.0).expect_err("an x");
-        assert_eq!(error.position(), Some((2, 2)));
+        assert_eq!(error.line_and_column(), Some((2, 2)));
         assert!(error.cause().contains("`x`"), "{error}");
         let tab = parse("map", "#\t", 1.0).expect_err("a tab");
         assert!(tab.cause().contains(r"`\t`"), "{tab}");
@@ -94,9 +94,9 @@ mod tests {
     #[test]
     fn ragged_rows_are_pointed_at_where_they_should_end() {
         let short = parse("map", "###\n#\n", 1.0).expect_err("short");
-        assert_eq!(short.position(), Some((2, 2)));
+        assert_eq!(short.line_and_column(), Some((2, 2)));
         let long = parse("map", "##\n####", 1.0).expect_err("long");
-        assert_eq!(long.position(), Some((2, 3)));
+        assert_eq!(long.line_and_column(), Some((2, 3)));
         assert!(parse("map", "##\n\n##", 1.0).is_err(), "an empty row inside");
     }
 
@@ -106,7 +106,7 @@ mod tests {
         let art =
             document.find("#.").expect("the drawing")..document.rfind("'''").expect("its end");
         let error = parse_within("s.toml", document, art.clone(), 1.0).expect_err("an x");
-        assert_eq!((error.place(), error.position()), ("s.toml", Some((4, 2))));
+        assert_eq!((error.place(), error.line_and_column()), ("s.toml", Some((4, 2))));
         let corrected = document.replace('x', "#");
         let map = parse_within("s.toml", &corrected, art, 1.0);
         assert_eq!(map, parse("art", "#.\n.#", 1.0));

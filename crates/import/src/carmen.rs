@@ -152,7 +152,7 @@ mod tests {
             ("FLASER\n", (1, 1)),
         ];
         for (text, position) in cases {
-            assert_eq!(parse("f", text).unwrap_err().position(), Some(position), "{text}");
+            assert_eq!(parse("f", text).unwrap_err().line_and_column(), Some(position), "{text}");
         }
     }
 

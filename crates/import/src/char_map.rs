@@ -23,7 +23,7 @@ impl<'a> SourceText<'a> {
         cause: impl Into<String>,
         remedy: impl Into<String>,
     ) -> InputError {
-        InputError::new(self.place, cause, remedy).with_offset(self.text, offset)
+        InputError::new(self.place, cause, remedy).with_byte_offset(self.text, offset)
     }
 
     /// Returns the number of bytes of the text before `part`, a piece of that text.

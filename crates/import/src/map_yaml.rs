@@ -169,7 +169,7 @@ impl<'a> Document<'a> {
 
     fn error(&self, value: &MarkedYaml<'a>, cause: impl Into<String>, remedy: &str) -> InputError {
         let offset = byte_offset(self.text, value.span.start.index());
-        InputError::new(self.place, cause, remedy).with_offset(self.text, offset)
+        InputError::new(self.place, cause, remedy).with_byte_offset(self.text, offset)
     }
 }
 
@@ -200,7 +200,7 @@ fn check_line_lengths(place: &str, text: &str) -> Result<(), InputError> {
 
 fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
     InputError::new(place, format!("is not YAML: {}", error.info()), KEYS)
-        .with_offset(text, byte_offset(text, error.marker().index()))
+        .with_byte_offset(text, byte_offset(text, error.marker().index()))
 }
 
 /// Converts the parser's position, counted in characters, to bytes.
@@ -323,7 +323,7 @@ free_thresh: 0.196
         assert_eq!(mode("trinary"), Ok(MapMode::Trinary));
         assert_eq!(mode("scale"), Ok(MapMode::Scale));
         assert_eq!(mode("'raw'"), Ok(MapMode::Raw));
-        assert_eq!(mode("Binary").expect_err("no mode").position(), Some((4, 7)));
+        assert_eq!(mode("Binary").expect_err("no mode").line_and_column(), Some((4, 7)));
     }
 
     #[test]
@@ -335,25 +335,29 @@ free_thresh: 0.196
             );
         }
         let degrees = error("0.]", "90]");
-        assert_eq!(degrees.position(), Some((3, 19)));
+        assert_eq!(degrees.line_and_column(), Some((3, 19)));
         assert!(degrees.remedy().contains("not degrees"), "{degrees}");
     }
 
     #[test]
     fn a_wrong_value_is_pointed_at() {
         for wrong in ["0", "-0.05", ".nan", ".inf", "fine", "[1]", ""] {
-            assert_eq!(error("0.05", wrong).position().map(|p| p.0), Some(2), "{wrong}");
+            assert_eq!(error("0.05", wrong).line_and_column().map(|p| p.0), Some(2), "{wrong}");
         }
-        assert_eq!(error("0.05", "-1").position(), Some((2, 13)));
+        assert_eq!(error("0.05", "-1").line_and_column(), Some((2, 13)));
         for wrong in ["[1, 2]", "[1, 2, 3, 4]", "0", "[a, 2, 0]", "[1, .inf, 0]", "[1, 2, .nan]"] {
-            assert_eq!(error("[-1.5, 2, 0.]", wrong).position().map(|p| p.0), Some(3), "{wrong}");
+            assert_eq!(
+                error("[-1.5, 2, 0.]", wrong).line_and_column().map(|p| p.0),
+                Some(3),
+                "{wrong}"
+            );
         }
-        assert_eq!(error("negate: 0", "negate: 2").position(), Some((4, 9)));
-        assert_eq!(error("0.65", "65").position(), Some((5, 18)));
-        assert_eq!(error("0.196", "0.7").position(), Some((6, 14)), "above occupied_thresh");
-        assert_eq!(error("map.rs", "none.pgm").position(), Some((1, 8)));
-        assert_eq!(error("map.rs", "''").position(), Some((1, 8)));
-        assert_eq!(error("map.rs", "7").position(), Some((1, 8)));
+        assert_eq!(error("negate: 0", "negate: 2").line_and_column(), Some((4, 9)));
+        assert_eq!(error("0.65", "65").line_and_column(), Some((5, 18)));
+        assert_eq!(error("0.196", "0.7").line_and_column(), Some((6, 14)), "above occupied_thresh");
+        assert_eq!(error("map.rs", "none.pgm").line_and_column(), Some((1, 8)));
+        assert_eq!(error("map.rs", "''").line_and_column(), Some((1, 8)));
+        assert_eq!(error("map.rs", "7").line_and_column(), Some((1, 8)));
     }
 
     #[test]
@@ -382,7 +386,7 @@ free_thresh: 0.196
             assert!(parse(&text).is_err());
         }
         let long = parse(&"- ".repeat(MAX_LINE_BYTES)).expect_err("a long line");
-        assert_eq!(long.position(), Some((1, MAX_LINE_BYTES + 1)));
+        assert_eq!(long.line_and_column(), Some((1, MAX_LINE_BYTES + 1)));
     }
 
     proptest! {
@@ -406,6 +410,6 @@ free_thresh: 0.196
     #[test]
     fn columns_are_right_behind_characters_of_many_bytes() {
         let text = YAML.replace("image", "# Größe é\nimage").replace("0.65", "'é'");
-        assert_eq!(parse(&text).expect_err("no number").position(), Some((6, 18)));
+        assert_eq!(parse(&text).expect_err("no number").line_and_column(), Some((6, 18)));
     }
 }

@@ -298,7 +298,7 @@ mod tests {
     }
 
     fn map_error(text: &str) -> (usize, usize) {
-        parse_map("m", text, 1.0).expect_err(text).position().expect("a position")
+        parse_map("m", text, 1.0).expect_err(text).line_and_column().expect("a position")
     }
 
     #[test]
@@ -350,7 +350,7 @@ mod tests {
         for wrong in
             [row("7\t3", "0\t1\t6\t1"), row("7\t2", "3\t0\t0\t0"), row("7\t2", "0\t0\t6\t0")]
         {
-            assert_eq!(wrong.expect_err("another map").position(), Some((2, 1)));
+            assert_eq!(wrong.expect_err("another map").line_and_column(), Some((2, 1)));
         }
     }
 
@@ -373,7 +373,7 @@ mod tests {
 
     fn scen_error(row: &str) -> (usize, usize) {
         let text = format!("version 1.0\r\n{row}\r\n");
-        parse_scen("s", &text).expect_err(row).position().expect("a position")
+        parse_scen("s", &text).expect_err(row).line_and_column().expect("a position")
     }
 
     #[test]
@@ -386,7 +386,7 @@ mod tests {
         assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t4\tNaN"), (2, 19), "no length");
         assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t4\t5\t6"), (2, 21), "ten fields");
         let other = parse_scen("s", "version 2\n").expect_err("another version");
-        assert_eq!(other.position(), Some((1, 1)));
+        assert_eq!(other.line_and_column(), Some((1, 1)));
         assert!(parse_scen("s", "").is_err());
     }
 }

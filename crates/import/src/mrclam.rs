@@ -233,7 +233,7 @@ mod tests {
         std::fs::write(&path, "# head\n10.05 14 far 0.1\n").unwrap();
         let error = read(folder.path()).unwrap_err();
         assert!(error.place().ends_with("Robot1_Measurement.dat"));
-        assert_eq!(error.position(), Some((2, 10)));
+        assert_eq!(error.line_and_column(), Some((2, 10)));
     }
 
     #[test]

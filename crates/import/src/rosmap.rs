@@ -154,7 +154,7 @@ mod tests {
         let (_folder, path) = written("b.pgm", IMAGE);
         let error = load(&path).expect_err("missing");
         assert!(error.place().ends_with("a.yaml"), "{error}");
-        assert_eq!(error.position(), Some((1, 8)));
+        assert_eq!(error.line_and_column(), Some((1, 8)));
         let (_folder, path) = written("a.pgm", &IMAGE[..12]);
         let error = load(&path).expect_err("cut");
         assert!(error.place().ends_with("a.pgm") && error.cause().contains("short"), "{error}");

@@ -301,16 +301,16 @@ mod tests {
     fn a_wrong_column_count_names_line_and_column() {
         let wrong = |text| rows::<2>(&"f.dat", text).find_map(Result::err).unwrap();
         let error = wrong("# head\n1 2\n 1 2 3\n");
-        assert_eq!(error.position(), Some((3, 6)));
+        assert_eq!(error.line_and_column(), Some((3, 6)));
         assert!(error.cause().contains("more columns than 2"));
-        assert_eq!(wrong("1 \t").position(), Some((1, 1)));
+        assert_eq!(wrong("1 \t").line_and_column(), Some((1, 1)));
     }
 
     #[test]
     fn a_bad_number_names_line_and_column() {
         let parsed: Vec<_> = rows::<2>(&"f.dat", "1 2\n3 \tx4\n").collect();
         let error = parsed[1].as_ref().unwrap()[1].number(&"f.dat").unwrap_err();
-        assert_eq!(error.position(), Some((2, 4)));
+        assert_eq!(error.line_and_column(), Some((2, 4)));
         for word in ["nan", "inf", "1e999", "", "-"] {
             assert!(Token { text: word, line: 1, column: 1 }.number(&"f").is_err(), "{word}");
         }
@@ -332,23 +332,23 @@ mod tests {
         let [a] = table.columns(["a"]).unwrap();
         assert_eq!(table.rows().next().unwrap().field(a).number(&"f").unwrap(), 2.0);
         let error = CsvTable::parse(&"f.csv", "a,b\n1,2\n1\n").unwrap_err();
-        assert_eq!(error.position(), Some((3, 1)));
+        assert_eq!(error.line_and_column(), Some((3, 1)));
         assert!(CsvTable::parse(&"f.csv", "").is_err());
         let row = CsvTable::parse(&"f.csv", "a,b\n1,x\n").unwrap();
         let error = row.rows().next().unwrap().field(1).number(&"f.csv").unwrap_err();
-        assert_eq!(error.position(), Some((2, 3)));
+        assert_eq!(error.line_and_column(), Some((2, 3)));
         let noted = CsvTable::parse(&"f.csv", "# a\n\nb,c\n1,2\n# d\n\n3,4\n").unwrap();
         let lines: Vec<usize> = noted.rows().map(|row| row.field(0).line).collect();
         assert_eq!(lines, [4, 7], "comments and empty lines count");
         let error = CsvTable::parse(&"f.csv", "a,b\r\n1,2\r\n# c\r\n1\r\n").unwrap_err();
-        assert_eq!(error.position(), Some((4, 1)));
+        assert_eq!(error.line_and_column(), Some((4, 1)));
     }
 
     #[test]
     fn all_columns_that_a_header_lacks_are_told_at_once_beside_those_it_has() {
         let table = CsvTable::parse(&"f.csv", "# a note\nx,lat,lon\n1,2,3\n").unwrap();
         let error = table.columns(["x", "lat_deg", "lon_deg"]).unwrap_err();
-        assert_eq!(error.position(), Some((2, 1)), "the header's line");
+        assert_eq!(error.line_and_column(), Some((2, 1)), "the header's line");
         let cause = "the header lacks `lat_deg`, `lon_deg`; it has `x`, and others: `lat`, `lon`";
         assert_eq!(error.cause(), cause);
         let other = table.columns(["a"]).unwrap_err();

@@ -296,7 +296,7 @@ mod tests {
             ("1,a,,46,6,1,2,3,up", 17),
         ] {
             let error = parsed(row).unwrap_err();
-            assert_eq!(error.position(), Some((2, column)), "{row}: {error}");
+            assert_eq!(error.line_and_column(), Some((2, column)), "{row}: {error}");
         }
         assert!(parse(&"t.csv", "time_s\n1\n").unwrap_err().cause().contains("icao24"));
     }
@@ -314,7 +314,7 @@ mod tests {
             ),
         ] {
             let error = parsed(rows).expect_err(rows);
-            assert_eq!(error.position(), Some(place), "{error}");
+            assert_eq!(error.line_and_column(), Some(place), "{error}");
             assert!(error.cause().contains(cause), "{error}");
         }
     }

@@ -66,7 +66,7 @@ fn malformed(place: &str, text: &str, error: &roxmltree::Error) -> InputError {
         Error::UnclosedRootNode | Error::UnexpectedEndOfStream => text.trim_end().len(),
         other => offset_of(text, other.pos()),
     };
-    InputError::new(place, cause, remedy).with_offset(text, offset)
+    InputError::new(place, cause, remedy).with_byte_offset(text, offset)
 }
 
 /// Returns the byte offset of a position that is given by line and column, the column in
@@ -153,7 +153,7 @@ impl<'a> Element<'a> {
 
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let offset = self.node.range().start;
-        InputError::new(self.file.place, cause, remedy).with_offset(self.file.text, offset)
+        InputError::new(self.file.place, cause, remedy).with_byte_offset(self.file.text, offset)
     }
 
     /// Returns the element's name, and the attribute that identifies it.
@@ -204,7 +204,7 @@ impl<'a> XmlAttribute<'a> {
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
         let file = self.element.file;
         let offset = self.attribute.range_value().start;
-        InputError::new(file.place, cause, remedy).with_offset(file.text, offset)
+        InputError::new(file.place, cause, remedy).with_byte_offset(file.text, offset)
     }
 }
 
@@ -219,9 +219,9 @@ mod tests {
     #[test]
     fn malformed_xml_is_pointed_at() {
         let error = error_of("<a>\n  <b></c>\n</a>");
-        assert_eq!(error.position(), Some((2, 6)), "{error}");
+        assert_eq!(error.line_and_column(), Some((2, 6)), "{error}");
         assert!(error.cause().contains("</c> closes <b>"), "{error}");
-        assert_eq!(error_of("<a>\n<b>").position(), Some((2, 4)));
+        assert_eq!(error_of("<a>\n<b>").line_and_column(), Some((2, 4)));
         assert!(error_of("<a><x:b/></a>").remedy().contains("xmlns:x"));
         for text in ["", "<", "<a", "no xml", "<!DOCTYPE a><a/>", "<a b=\"1\" b=\"2\"/>"] {
             assert!(!error_of(text).remedy().is_empty());
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(a.required("n").and_then(|v| v.number()), Ok(1.5));
         assert_eq!(a.required("t").and_then(|v| v.triple()), Ok([0.0, 0.0, 1e-3]));
         let wrong = a.required("w").and_then(|v| v.triple()).expect_err("no number");
-        assert_eq!(wrong.position(), Some((1, 31)), "{wrong}");
+        assert_eq!(wrong.line_and_column(), Some((1, 31)), "{wrong}");
         assert!(a.required("i").and_then(|v| v.number()).is_err());
         assert!(a.required("n").and_then(|v| v.triple()).is_err());
         assert!(a.required("missing").is_err());

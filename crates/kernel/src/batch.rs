@@ -13,7 +13,7 @@
 mod error;
 mod world;
 
-use crate::control::{BufferMut, OrderError, Orders, Space, Team};
+use crate::control::{AgentTeam, BufferMut, MultiAgentOrder, OrderError, ValueSpace};
 use crate::digest::Digest;
 use crate::error::InputError;
 use crate::simulation::Simulation;
@@ -22,7 +22,7 @@ use crate::workers::ThreadPool;
 pub use error::BatchError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use world::{BatchWorld, BufferLayout};
+use world::{BatchWorldEntry, BufferLayout};
 
 /// Makes a simulation at its start from a seed.
 pub type SimulationFactory = dyn Fn(u64) -> Result<Box<dyn Simulation>, InputError> + Send + Sync;
@@ -32,14 +32,14 @@ pub struct Batch {
     shared: Arc<SharedWorlds>,
     pool: ThreadPool,
     /// The teams of each world, which are equal: [`Batch::new`] refuses worlds that differ.
-    teams: Arc<[Team]>,
+    teams: Arc<[AgentTeam]>,
     /// Orders that are given before the next cycle.
     orders: Vec<QueuedOrder>,
 }
 
 struct SharedWorlds {
     factory: Arc<SimulationFactory>,
-    worlds: Vec<Mutex<BatchWorld>>,
+    worlds: Vec<Mutex<BatchWorldEntry>>,
     /// Whether a world may have an error: a call without errors then locks no world to search for one.
     has_error: AtomicBool,
 }
@@ -65,7 +65,7 @@ impl Batch {
         if seeds.is_empty() {
             return Err(BatchError::Empty);
         }
-        let worlds = seeds.iter().map(|&seed| Mutex::new(BatchWorld::new(seed))).collect();
+        let worlds = seeds.iter().map(|&seed| Mutex::new(BatchWorldEntry::new(seed))).collect();
         let shared = SharedWorlds { factory, worlds, has_error: AtomicBool::new(false) };
         let mut batch = Self {
             shared: Arc::new(shared),
@@ -78,10 +78,10 @@ impl Batch {
             world.restart(index, world.seed, &*shared.factory, None)
         });
         batch.check_errors()?;
-        let teams: Arc<[Team]> = batch.world(0).teams().into();
+        let teams: Arc<[AgentTeam]> = batch.world(0).agent_teams().into();
         batch.teams = teams;
         for index in 1..batch.len() {
-            if *batch.world(index).teams() != *batch.teams {
+            if *batch.world(index).agent_teams() != *batch.teams {
                 return Err(BatchError::Shape { world: index });
             }
         }
@@ -100,7 +100,7 @@ impl Batch {
     }
 
     /// Returns the teams, the same in each world; [`Batch::order`] and [`Batch::observe`] take a team's index here.
-    pub fn teams(&self) -> &[Team] {
+    pub fn agent_teams(&self) -> &[AgentTeam] {
         &self.teams
     }
 
@@ -110,7 +110,7 @@ impl Batch {
     /// # Errors
     /// When an order cannot be obeyed; no world gets it then.
     pub fn order(&mut self, team: usize, order: &str, values: Vec<f64>) -> Result<(), BatchError> {
-        let Some(Team { agents, .. }) = self.teams.get(team) else {
+        let Some(AgentTeam { agents, .. }) = self.teams.get(team) else {
             return Err(self.no_such_team(team).into());
         };
         let values_per_world = values.len() / self.len();
@@ -126,7 +126,7 @@ impl Batch {
         let first = self.world(0);
         for world in 0..self.len() {
             let values = &values[world * values_per_world..(world + 1) * values_per_world];
-            let orders = Orders { order, agents, values };
+            let orders = MultiAgentOrder { order, agents, values };
             if let Some(run) = &first.run {
                 run.check(&orders).map_err(|error| BatchError::Order { world, error })?;
             }
@@ -151,12 +151,12 @@ impl Batch {
         let mask = mask.map(<[bool]>::to_vec);
         self.for_each_world(move |world, index, _| {
             if mask.as_ref().is_none_or(|mask| mask[index]) {
-                world.with_run(index, |run| {
+                world.apply_to_run(index, |run| {
                     for QueuedOrder { team, order, values } in &orders {
                         let width = values.len() / worlds;
                         let values = &values[index * width..(index + 1) * width];
                         let agents = &teams[*team].agents;
-                        run.order(&Orders { order, agents, values })?;
+                        run.order(&MultiAgentOrder { order, agents, values })?;
                     }
                     if cycles > 0 && !run.is_over() {
                         run.advance(cycles);
@@ -179,7 +179,7 @@ impl Batch {
         buffers: &mut [BufferMut<'_>],
     ) -> Result<(), BatchError> {
         self.check_errors()?;
-        let Some(Team { agents, observation_spaces, .. }) = self.teams.get(team) else {
+        let Some(AgentTeam { agents, observation_spaces, .. }) = self.teams.get(team) else {
             return Err(self.no_such_team(team).into());
         };
         let layouts: Vec<BufferLayout> = observation_spaces
@@ -197,8 +197,8 @@ impl Batch {
         let observe_here = |index: usize| {
             let mut world = shared.world(index);
             let slices = &mut world_slices(buffers, &layouts, index);
-            world.with_run(index, |run| run.observe(team, slices));
-            shared.record_error(&world);
+            world.apply_to_run(index, |run| run.observe(team, slices));
+            shared.raise_error_flag(&world);
         };
         let shared_with_threads = Arc::clone(&self.shared);
         let thread_layouts = layouts.clone();
@@ -227,7 +227,7 @@ impl Batch {
             }
         });
         // Worlds that were broken before, and have no seed here, do not concern this call.
-        self.first_error(|index| seeds[index].is_some()).map_or(Ok(()), Err)
+        self.take_first_error(|index| seeds[index].is_some()).map_or(Ok(()), Err)
     }
 
     /// Returns the seed with which each world last started.
@@ -267,26 +267,26 @@ impl Batch {
         let mut values = Vec::with_capacity(self.len());
         for index in 0..self.len() {
             let world = self.world(index);
-            let run = world.run.as_deref().ok_or_else(|| world.no_run_error(index))?;
+            let run = world.run.as_deref().ok_or_else(|| world.broken_world_error(index))?;
             values.push(get(run));
         }
         Ok(values)
     }
 
-    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
+    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorldEntry> {
         self.shared.world(index)
     }
 
     /// Errors that the work leaves in a world also raise [`SharedWorlds::has_error`].
     fn for_each_world(
         &mut self,
-        work: impl Fn(&mut BatchWorld, usize, &SharedWorlds) + Send + Sync + 'static,
+        work: impl Fn(&mut BatchWorldEntry, usize, &SharedWorlds) + Send + Sync + 'static,
     ) {
         let shared = Arc::clone(&self.shared);
         let work = Arc::new(move |index: usize| {
             let mut world = shared.world(index);
             work(&mut world, index, &shared);
-            shared.record_error(&world);
+            shared.raise_error_flag(&world);
         });
         let work_on_thread = Arc::clone(&work);
         self.pool.run(self.len(), |index| work(index), work_on_thread);
@@ -295,7 +295,7 @@ impl Batch {
     /// Returns the error of the first world that has one.
     fn check_errors(&self) -> Result<(), BatchError> {
         if self.shared.has_error.load(Ordering::Relaxed) {
-            self.first_error(|_| true).map_or(Ok(()), Err)
+            self.take_first_error(|_| true).map_or(Ok(()), Err)
         } else {
             Ok(())
         }
@@ -303,7 +303,7 @@ impl Batch {
 
     /// Returns the error of the first of the selected worlds that has one, and clears the errors of all of them. The
     /// error of a broken world stays, because every later call has to fail with it until the world is restarted.
-    fn first_error(&self, is_selected: impl Fn(usize) -> bool) -> Option<BatchError> {
+    fn take_first_error(&self, is_selected: impl Fn(usize) -> bool) -> Option<BatchError> {
         let mut first = None;
         let mut has_error = false;
         for index in 0..self.len() {
@@ -341,7 +341,7 @@ impl Batch {
     /// Checks that the buffers have exactly the size that a team's observations in all worlds need.
     fn check_buffers(
         &self,
-        spaces: &[Space],
+        spaces: &[ValueSpace],
         layouts: &[BufferLayout],
         buffers: &[BufferMut<'_>],
     ) -> Result<(), OrderError> {
@@ -370,13 +370,13 @@ impl std::fmt::Debug for Batch {
 
 impl SharedWorlds {
     /// Locks a world. A poisoned lock is fine: a world that panicked has lost its run, so nothing half-done is read.
-    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorld> {
+    fn world(&self, index: usize) -> MutexGuard<'_, BatchWorldEntry> {
         self.worlds[index].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Raises the flag if a world has an error. Relaxed order is enough, because the caller reads the flag after
     /// [`ThreadPool::run`] has waited for all workers.
-    fn record_error(&self, world: &BatchWorld) {
+    fn raise_error_flag(&self, world: &BatchWorldEntry) {
         if world.error.is_some() {
             self.has_error.store(true, Ordering::Relaxed);
         }

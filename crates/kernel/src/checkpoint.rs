@@ -36,7 +36,7 @@ impl CheckpointHeader {
     ///
     /// # Errors
     /// When it is not; the error reports the first difference.
-    pub fn check_origin(&self, expected: &Self) -> Result<(), CheckpointError> {
+    pub fn check_compatibility(&self, expected: &Self) -> Result<(), CheckpointError> {
         check_match("version", &self.program_version, &expected.program_version)?;
         check_match("world", &self.world, &expected.world)?;
         check_match("scenario", &hex(&self.scenario), &hex(&expected.scenario))
@@ -102,7 +102,7 @@ pub fn decode<S: DeserializeOwned>(
     expected: &CheckpointHeader,
 ) -> Result<(Cycle, S), CheckpointError> {
     let (header, state) = split_checkpoint(bytes)?;
-    header.check_origin(expected)?;
+    header.check_compatibility(expected)?;
     let state = postcard::from_bytes(state).map_err(|_| CheckpointError::Damaged)?;
     Ok((header.cycle, state))
 }

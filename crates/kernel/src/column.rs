@@ -12,7 +12,7 @@ pub trait AtomicValue: Copy + Default + Send + Sync + 'static {
     /// The atomic that holds it.
     type Cell: Send + Sync;
     /// Returns the atomic of a new cell.
-    fn cell(self) -> Self::Cell;
+    fn into_atomic(self) -> Self::Cell;
     /// Reads a cell in relaxed order, see the module.
     fn load(cell: &Self::Cell) -> Self;
     /// Writes a cell in relaxed order, see the module.
@@ -24,7 +24,7 @@ macro_rules! word {
         impl AtomicValue for $t {
             type Cell = $atomic;
             #[inline(always)]
-            fn cell(self) -> $atomic { <$atomic>::new(self) }
+            fn into_atomic(self) -> $atomic { <$atomic>::new(self) }
             #[inline(always)]
             fn load(cell: &$atomic) -> Self { cell.load(Relaxed) }
             #[inline(always)]
@@ -37,7 +37,7 @@ word! { u8, AtomicU8; u16, AtomicU16; u32, AtomicU32; u64, AtomicU64; }
 impl AtomicValue for f64 {
     type Cell = AtomicU64;
     #[inline(always)]
-    fn cell(self) -> AtomicU64 {
+    fn into_atomic(self) -> AtomicU64 {
         AtomicU64::new(self.to_bits())
     }
     #[inline(always)]
@@ -63,8 +63,8 @@ pub trait Packed: Copy + Default + Send + Sync + 'static {
 impl<T: Packed> AtomicValue for T {
     type Cell = <T::Bits as AtomicValue>::Cell;
     #[inline(always)]
-    fn cell(self) -> Self::Cell {
-        self.to_bits().cell()
+    fn into_atomic(self) -> Self::Cell {
+        self.to_bits().into_atomic()
     }
     #[inline(always)]
     fn load(cell: &Self::Cell) -> Self {
@@ -83,7 +83,7 @@ impl<T: AtomicValue> AtomicCell<T> {
     /// Creates a cell, before any worker can read it.
     #[inline(always)]
     pub fn new(value: T) -> Self {
-        Self(value.cell())
+        Self(value.into_atomic())
     }
 
     /// Returns the value of before the last barrier, unless the cell has a writer in the present phase.
@@ -176,7 +176,7 @@ impl<T: AtomicValue> AtomicColumn<T> {
 
 impl<T: AtomicValue> FromIterator<T> for AtomicColumn<T> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
-        Self(values.into_iter().map(T::cell).collect())
+        Self(values.into_iter().map(T::into_atomic).collect())
     }
 }
 

@@ -7,27 +7,27 @@
 //! and no allocation.
 
 use crate::column::AtomicColumn;
-use crate::units::Slot;
+use crate::units::EntitySlot;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-const NONE: Slot = Slot::MAX;
+const NONE: EntitySlot = EntitySlot::MAX;
 
 /// The conflict groups of one cycle over slots `0..n`.
 #[derive(Debug)]
 pub struct ConflictGroups {
     /// Toward the leader; a leader points at itself.
-    parent: AtomicColumn<Slot>,
+    parent: AtomicColumn<EntitySlot>,
     /// Last slot that became a child of this one.
-    first_child: AtomicColumn<Slot>,
+    first_child: AtomicColumn<EntitySlot>,
     /// The previous child of the same parent.
-    next_sibling: AtomicColumn<Slot>,
+    next_sibling: AtomicColumn<EntitySlot>,
 }
 
 impl ConflictGroups {
     /// Creates groups of one slot each, for `n` slots.
     pub fn new(n: usize) -> Self {
         Self {
-            parent: (0..n as Slot).collect(),
+            parent: (0..n as EntitySlot).collect(),
             first_child: AtomicColumn::filled(n, NONE),
             next_sibling: AtomicColumn::filled(n, NONE),
         }
@@ -36,7 +36,7 @@ impl ConflictGroups {
     /// Makes `slot` a group of its own again; called by one worker, before the first join of a
     /// cycle.
     #[inline]
-    pub fn make_singleton(&self, slot: Slot) {
+    pub fn make_singleton(&self, slot: EntitySlot) {
         self.parent.set(slot as usize, slot);
         // `next_sibling` is read of children only, and a join writes it when it makes a slot a child.
         self.first_child.set(slot as usize, NONE);
@@ -44,7 +44,7 @@ impl ConflictGroups {
 
     /// Returns the leader of a slot's group: its smallest member, once all joins are done.
     #[inline]
-    pub fn leader(&self, mut slot: Slot) -> Slot {
+    pub fn leader(&self, mut slot: EntitySlot) -> EntitySlot {
         loop {
             let parent = self.parent.get(slot as usize);
             if parent == slot {
@@ -59,7 +59,7 @@ impl ConflictGroups {
     }
 
     /// Puts two slots into one group. Any worker may call it, at any time between two barriers.
-    pub fn join_groups(&self, a: Slot, b: Slot) {
+    pub fn join_groups(&self, a: EntitySlot, b: EntitySlot) {
         let mut a = a;
         let mut b = b;
         loop {
@@ -83,18 +83,18 @@ impl ConflictGroups {
 
     /// Returns whether a slot leads its group; valid after the barrier that ends joining.
     #[inline]
-    pub fn is_leader(&self, slot: Slot) -> bool {
+    pub fn is_leader(&self, slot: EntitySlot) -> bool {
         self.parent.get(slot as usize) == slot
     }
 
     /// Returns whether a leader is the only member of its group.
     #[inline]
-    pub fn is_singleton(&self, slot: Slot) -> bool {
+    pub fn is_singleton(&self, slot: EntitySlot) -> bool {
         self.first_child.get(slot as usize) == NONE && self.is_leader(slot)
     }
 
     /// Writes the members of a leader's group into `members`, in no particular order.
-    pub fn members(&self, leader: Slot, members: &mut Vec<Slot>) {
+    pub fn members(&self, leader: EntitySlot, members: &mut Vec<EntitySlot>) {
         members.clear();
         members.push(leader);
         // Breadth first, with the list itself as the queue.
@@ -115,7 +115,7 @@ impl ConflictGroups {
     }
 }
 
-fn cell(column: &AtomicColumn<Slot>, slot: Slot) -> &AtomicU32 {
+fn cell(column: &AtomicColumn<EntitySlot>, slot: EntitySlot) -> &AtomicU32 {
     &column.cells()[slot as usize]
 }
 
@@ -124,9 +124,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn partition(n: usize, groups: &ConflictGroups) -> Vec<Vec<Slot>> {
+    fn partition(n: usize, groups: &ConflictGroups) -> Vec<Vec<EntitySlot>> {
         let mut all = Vec::new();
-        for slot in (0..n as Slot).filter(|&s| groups.is_leader(s)) {
+        for slot in (0..n as EntitySlot).filter(|&s| groups.is_leader(s)) {
             let mut members = Vec::new();
             groups.members(slot, &mut members);
             assert_eq!(groups.is_singleton(slot), members.len() == 1);
@@ -138,7 +138,7 @@ mod tests {
     }
 
     /// Components by repeated relabeling: slow and obviously right.
-    fn oracle(n: usize, edges: &[(usize, usize)]) -> Vec<Vec<Slot>> {
+    fn oracle(n: usize, edges: &[(usize, usize)]) -> Vec<Vec<EntitySlot>> {
         let mut label: Vec<usize> = (0..n).collect();
         for _ in 0..n {
             for &(a, b) in edges {
@@ -148,7 +148,7 @@ mod tests {
         }
         let mut groups = vec![Vec::new(); n];
         for (slot, &l) in label.iter().enumerate() {
-            groups[l].push(slot as Slot);
+            groups[l].push(slot as EntitySlot);
         }
         groups.retain(|g| !g.is_empty());
         groups
@@ -159,7 +159,7 @@ mod tests {
         fn groups_are_the_connected_components(edges in prop::collection::vec((0usize..40, 0usize..40), 0..60)) {
             let groups = ConflictGroups::new(40);
             for &(a, b) in &edges {
-                groups.join_groups(a as Slot, b as Slot);
+                groups.join_groups(a as EntitySlot, b as EntitySlot);
             }
             prop_assert_eq!(partition(40, &groups), oracle(40, &edges));
         }
@@ -173,7 +173,7 @@ mod tests {
                     let (groups, edges) = (&groups, &edges);
                     scope.spawn(move || {
                         for (a, b) in edges.iter().skip(part).step_by(2) {
-                            groups.join_groups(*a as Slot, *b as Slot);
+                            groups.join_groups(*a as EntitySlot, *b as EntitySlot);
                         }
                     });
                 }

@@ -16,7 +16,7 @@ use crate::conflict::ConflictGroups;
 use crate::interrupt::{self, Interrupt};
 use crate::ports::Clock;
 use crate::run_config::GroupSizeHistogram;
-use crate::units::{Cycle, Slot};
+use crate::units::{Cycle, EntitySlot};
 use crate::workers::{Worker, WorkerTeam};
 use crate::world::{Auction, PhaseContext, Phases};
 use std::ops::ControlFlow;
@@ -63,9 +63,9 @@ pub struct WorkerStats {
     /// Calls of a single cycle so far, by which those to measure are chosen.
     single_cycle_calls: u64,
     /// Buffer for the members of a group, kept to allocate none per group.
-    members: Vec<Slot>,
+    members: Vec<EntitySlot>,
     /// Bodies in conflict that have not acted yet, in worlds with an auction.
-    pending: Vec<Slot>,
+    pending: Vec<EntitySlot>,
 }
 
 /// The first calls of a single cycle are all measured, because a short run has too few for a sample.
@@ -293,7 +293,7 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
             if self.is_observed {
                 // The observer locks the scratches of all workers, so each releases its own first.
                 guard = None;
-                worker.barrier();
+                worker.wait_at_barrier();
                 if let Some(leader) = &mut leader {
                     self.observe(now, leader);
                 }
@@ -305,7 +305,7 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
             {
                 self.stop.store(true, Ordering::Relaxed);
             }
-            worker.barrier();
+            worker.wait_at_barrier();
             if let Some(leader) = &mut leader
                 && worker.team_size() > 1
             {
@@ -349,13 +349,13 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
         // Three pools of tasks per cycle, one per phase, counted from the start of the segment.
         let pool = 3 * (now - segment.from);
         let context = &mut PhaseContext { world, state, now, clock, scratch };
-        let n = world.bodies(state);
+        let n = world.body_count(state);
         worker.for_each_chunk(pool, n, |bodies| {
             interrupt::check();
-            bodies.clone().for_each(|body| groups.make_singleton(body as Slot));
+            bodies.clone().for_each(|body| groups.make_singleton(body as EntitySlot));
             W::claim(context, bodies);
         });
-        worker.barrier();
+        worker.wait_at_barrier();
         if let Some(leader) = &mut leader {
             leader.end_phase(|times| &mut times.claim_ns);
         }
@@ -363,7 +363,7 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
             interrupt::check();
             W::join(context, bodies, groups);
         });
-        worker.barrier();
+        worker.wait_at_barrier();
         if let Some(leader) = &mut leader {
             leader.end_phase(|times| &mut times.join_ns);
         }
@@ -371,7 +371,7 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
         worker.for_each_chunk(pool + 2, n, |bodies| {
             interrupt::check();
             bodies.for_each(|body| {
-                act_if_leader(context, groups, stats, auction.is_some(), body as Slot);
+                act_if_group_leader(context, groups, stats, auction.is_some(), body as EntitySlot);
             });
         });
         if let Some(auction) = auction {
@@ -385,12 +385,12 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
 
 /// Lets the group of `body` act if `body` leads one.
 #[inline]
-fn act_if_leader<W: Phases>(
+fn act_if_group_leader<W: Phases>(
     context: &mut PhaseContext<'_, W>,
     groups: &ConflictGroups,
     stats: &mut WorkerStats,
     by_auction: bool,
-    body: Slot,
+    body: EntitySlot,
 ) {
     if !groups.is_leader(body) {
         return;
@@ -416,7 +416,7 @@ fn act_if_leader<W: Phases>(
 fn run_auction<W: Phases>(
     auction: &dyn Auction<W>,
     context: &mut PhaseContext<'_, W>,
-    pending: &mut Vec<Slot>,
+    pending: &mut Vec<EntitySlot>,
     worker: &Worker<'_>,
 ) {
     while worker.any_worker(!pending.is_empty()) {
@@ -424,9 +424,9 @@ fn run_auction<W: Phases>(
         for &body in &*pending {
             auction.bid(context, body);
         }
-        worker.barrier();
+        worker.wait_at_barrier();
         auction.act_on_bids(context, pending);
-        worker.barrier();
+        worker.wait_at_barrier();
         auction.retract_bids(context);
     }
 }

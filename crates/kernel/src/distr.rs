@@ -40,7 +40,7 @@ fn round_to_micro(value: f64) -> f64 {
 /// # Errors
 /// When it is empty, has an entry outside [0, 1], or does not sum to 1 within
 /// [`ROW_TOLERANCE`].
-pub fn check_row(row: &[f64]) -> Result<(), DistributionError> {
+pub fn check_probability_row(row: &[f64]) -> Result<(), DistributionError> {
     if row.is_empty() {
         return Err(DistributionError::Empty);
     }
@@ -87,9 +87,9 @@ impl Categorical {
     /// Creates the distribution with these probabilities.
     ///
     /// # Errors
-    /// See [`check_row`].
+    /// See [`check_probability_row`].
     pub fn new(row: &[f64]) -> Result<Self, DistributionError> {
-        check_row(row)?;
+        check_probability_row(row)?;
         let sum: f64 = row.iter().sum();
         let mut outcomes = Vec::new();
         let mut thresholds = Vec::new();
@@ -142,18 +142,21 @@ mod tests {
 
     #[test]
     fn a_row_that_does_not_sum_to_one_says_by_how_much() {
-        let error = check_row(&[0.5, 0.45]).expect_err("0.95 is not 1");
+        let error = check_probability_row(&[0.5, 0.45]).expect_err("0.95 is not 1");
         assert_eq!(error.to_string(), "the row sums to 0.95, short of 1 by 0.05");
-        let error = check_row(&[0.5, 0.75]).expect_err("1.25 is not 1");
+        let error = check_probability_row(&[0.5, 0.75]).expect_err("1.25 is not 1");
         assert_eq!(error.to_string(), "the row sums to 1.25, above 1 by 0.25");
-        let error = check_row(&[0.05, 0.6, 0.05]).expect_err("0.7 is not 1");
+        let error = check_probability_row(&[0.05, 0.6, 0.05]).expect_err("0.7 is not 1");
         assert_eq!(error.to_string(), "the row sums to 0.7, short of 1 by 0.3");
-        assert_eq!(check_row(&[]), Err(DistributionError::Empty));
+        assert_eq!(check_probability_row(&[]), Err(DistributionError::Empty));
         assert!(matches!(
-            check_row(&[1.5]),
+            check_probability_row(&[1.5]),
             Err(DistributionError::NotAProbability { index: 1, .. })
         ));
-        assert!(matches!(check_row(&[f64::NAN]), Err(DistributionError::NotAProbability { .. })));
+        assert!(matches!(
+            check_probability_row(&[f64::NAN]),
+            Err(DistributionError::NotAProbability { .. })
+        ));
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl<W: Phases> Engine<W> {
             // The bodies are arranged before the first cycle.
             since_arranged: ARRANGE_INTERVAL_CYCLES,
             worker_states: (0..workers.max(1))
-                .map(|_| Mutex::new(WorkerState::new(world.scratch())))
+                .map(|_| Mutex::new(WorkerState::new(world.new_scratch())))
                 .collect(),
             team: None,
             autotuner: WorkerCountTuner::default(),
@@ -129,7 +129,7 @@ impl<W: Phases> Engine<W> {
         let mut done = 0;
         while done < cycles {
             if self.since_arranged >= ARRANGE_INTERVAL_CYCLES {
-                world.arrange(state);
+                world.reorder_slots(state);
                 self.since_arranged = 0;
             }
             let options = self.autotuner.segment_options(self.worker_states.len());
@@ -150,7 +150,7 @@ impl<W: Phases> Engine<W> {
             };
             let observer = observer.as_mut().map(|observer| &mut **observer as _);
             let timing = advance(world, state, parts, segment, observer);
-            self.autotuner.record(options, &timing);
+            self.autotuner.record_timing(options, &timing);
             self.times.add(timing.times);
             self.since_arranged += timing.cycles;
             done += timing.cycles;
@@ -266,7 +266,7 @@ impl WorkerCountTuner {
         self.since_probe_ns >= self.probe_wait_ns || (is_first && serial_ns >= EAGER_PROBE_CYCLE_NS)
     }
 
-    fn record(&mut self, options: CycleSegmentOptions, timing: &CycleSegmentTiming) {
+    fn record_timing(&mut self, options: CycleSegmentOptions, timing: &CycleSegmentTiming) {
         let took_ns = timing.took_ns as f64;
         let is_parallel = self.favors_parallel != options.is_probe;
         let measured = if is_parallel { &mut self.parallel_ns } else { &mut self.serial_ns };
@@ -331,7 +331,7 @@ mod tests {
     use super::*;
     use crate::cycle::Scratches;
     use crate::ports::ManualClock;
-    use crate::units::Slot;
+    use crate::units::EntitySlot;
     use crate::world::PhaseContext;
     use std::ops::{ControlFlow, Range};
     use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -372,7 +372,7 @@ mod tests {
                     self.looking_ns += took_ns;
                 }
                 self.with_all_ns += if plan.workers > 1 { took_ns } else { 0 };
-                self.pace.record(plan, &timing);
+                self.pace.record_timing(plan, &timing);
                 self.now_ns += took_ns;
             }
             self
@@ -486,11 +486,11 @@ mod tests {
         type State = Ticks;
         type Scratch = Vec<(Cycle, usize)>;
 
-        fn scratch(&self) -> Self::Scratch {
+        fn new_scratch(&self) -> Self::Scratch {
             Vec::new()
         }
 
-        fn bodies(&self, state: &Ticks) -> usize {
+        fn body_count(&self, state: &Ticks) -> usize {
             // Every worker calls it once a cycle.
             let is_helper = std::thread::current().name().is_some_and(|n| n.starts_with("worker"));
             self.clock.advance_ns(if is_helper { self.helper_ns } else { self.serial_ns });
@@ -506,7 +506,7 @@ mod tests {
 
         fn join(_: &mut PhaseContext<'_, Self>, _: Range<usize>, _: &ConflictGroups) {}
 
-        fn act(_: &mut PhaseContext<'_, Self>, _: &mut [Slot]) {}
+        fn act(_: &mut PhaseContext<'_, Self>, _: &mut [EntitySlot]) {}
     }
 
     fn ticks(n: usize) -> Ticks {

@@ -56,7 +56,7 @@ impl InputError {
 
     /// Adds line and column of the byte at `offset` in `text`, and quotes that line.
     #[must_use]
-    pub fn with_offset(mut self, text: &str, offset: usize) -> Self {
+    pub fn with_byte_offset(mut self, text: &str, offset: usize) -> Self {
         let offset = floor_char_boundary(text, offset);
         let (line, column) = line_and_column(text, offset);
         let line_start = text[..offset].rfind('\n').map_or(0, |i| i + 1);
@@ -69,9 +69,9 @@ impl InputError {
     /// Adds line and column of the bytes `span` of `text` and of their end, and quotes the first
     /// line.
     #[must_use]
-    pub fn with_span(self, text: &str, span: Range<usize>) -> Self {
+    pub fn with_byte_span(self, text: &str, span: Range<usize>) -> Self {
         let end = line_and_column(text, floor_char_boundary(text, span.end.max(span.start)));
-        let mut error = self.with_offset(text, span.start);
+        let mut error = self.with_byte_offset(text, span.start);
         if let Some(position) = &mut error.position {
             position.end = Some(end);
         }
@@ -91,12 +91,12 @@ impl InputError {
     }
 
     /// Line and column, from 1, where known.
-    pub fn position(&self) -> Option<(usize, usize)> {
+    pub fn line_and_column(&self) -> Option<(usize, usize)> {
         self.position.as_ref().map(|p| (p.line, p.column))
     }
 
     /// Line and column after the wrong part, from 1, where known.
-    pub fn end(&self) -> Option<(usize, usize)> {
+    pub fn end_line_and_column(&self) -> Option<(usize, usize)> {
         self.position.as_ref()?.end
     }
 
@@ -166,8 +166,8 @@ mod tests {
     #[test]
     fn an_error_quotes_the_line_and_points_at_the_column() {
         let text = "a = 1\nbb = 2\n";
-        let error = InputError::new("x.toml", "bad value", "write 3").with_offset(text, 11);
-        assert_eq!(error.position(), Some((2, 6)));
+        let error = InputError::new("x.toml", "bad value", "write 3").with_byte_offset(text, 11);
+        assert_eq!(error.line_and_column(), Some((2, 6)));
         assert_eq!(
             error.to_string(),
             "x.toml:2:6: bad value\n  2 | bb = 2\n    |      ^\n  help: write 3"
@@ -177,18 +177,33 @@ mod tests {
     #[test]
     fn a_span_adds_the_end_and_a_key_the_key_and_neither_changes_what_is_displayed() {
         let text = "a = [\n  1,\n]\n";
-        let plain = InputError::new("x.toml", "c", "r").with_offset(text, 4);
-        let spanned = InputError::new("x.toml", "c", "r").with_span(text, 4..12).with_key("a");
-        assert_eq!((spanned.position(), spanned.end()), (Some((1, 5)), Some((3, 2))));
-        assert_eq!((spanned.key(), plain.key(), plain.end()), (Some("a"), None, None));
+        let plain = InputError::new("x.toml", "c", "r").with_byte_offset(text, 4);
+        let spanned = InputError::new("x.toml", "c", "r").with_byte_span(text, 4..12).with_key("a");
+        assert_eq!(
+            (spanned.line_and_column(), spanned.end_line_and_column()),
+            (Some((1, 5)), Some((3, 2)))
+        );
+        assert_eq!(
+            (spanned.key(), plain.key(), plain.end_line_and_column()),
+            (Some("a"), None, None)
+        );
         assert_eq!(spanned.to_string(), plain.to_string());
     }
 
     #[test]
     fn an_offset_behind_the_end_or_inside_a_character_is_no_panic() {
         let text = "é";
-        assert_eq!(InputError::new("f", "c", "r").with_offset(text, 1).position(), Some((1, 1)));
-        assert_eq!(InputError::new("f", "c", "r").with_offset(text, 99).position(), Some((1, 2)));
-        assert_eq!(InputError::new("f", "c", "r").with_span(text, 1..99).end(), Some((1, 2)));
+        assert_eq!(
+            InputError::new("f", "c", "r").with_byte_offset(text, 1).line_and_column(),
+            Some((1, 1))
+        );
+        assert_eq!(
+            InputError::new("f", "c", "r").with_byte_offset(text, 99).line_and_column(),
+            Some((1, 2))
+        );
+        assert_eq!(
+            InputError::new("f", "c", "r").with_byte_span(text, 1..99).end_line_and_column(),
+            Some((1, 2))
+        );
     }
 }

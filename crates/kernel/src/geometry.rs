@@ -80,7 +80,7 @@ pub fn normalized<const D: usize>(a: Point<D>) -> Option<Point<D>> {
 
 /// The component of `a` perpendicular to the unit vector `axis`.
 #[inline]
-pub fn rejection<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
+pub fn perpendicular_component<const D: usize>(a: Point<D>, axis: Point<D>) -> Point<D> {
     sub(a, scaled(axis, dot(a, axis)))
 }
 
@@ -92,12 +92,12 @@ pub fn move_toward<const D: usize>(from: Point<D>, to: Point<D>, step_m: f64) ->
 
 /// A point in another number of dimensions: further coordinates are left out, missing ones are 0.
 #[inline]
-pub fn with_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
+pub fn convert_dimensions<const D: usize, const N: usize>(p: Point<D>) -> Point<N> {
     std::array::from_fn(|i| if i < D { p[i] } else { 0.0 })
 }
 
 /// The unit vector along the first coordinate.
-pub fn first_axis<const D: usize>() -> Point<D> {
+pub fn unit_x<const D: usize>() -> Point<D> {
     std::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 })
 }
 
@@ -121,7 +121,7 @@ pub fn cross_2d<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
 
 /// Angle between two vectors, in [0, pi]. By the arc tangent, because the arc cosine loses half of the digits near 0
 /// and pi.
-pub fn angle_rad<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
+pub fn angle_between_rad<const D: usize>(a: Point<D>, b: Point<D>) -> f64 {
     let cosine = dot(a, b);
     let sine = if D == 2 { cross_2d(a, b).abs() } else { norm(cross(a, b)) };
     // Both are scaled by the product of the lengths, which cancels.
@@ -159,8 +159,8 @@ mod tests {
 
     #[test]
     fn angles_are_exact_near_zero_and_a_half_turn() {
-        assert!((angle_rad([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9).abs() < 1e-20);
-        assert_eq!(angle_rad([1.0, 0.0], [-2.0, 0.0]), std::f64::consts::PI);
+        assert!((angle_between_rad([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9).abs() < 1e-20);
+        assert_eq!(angle_between_rad([1.0, 0.0], [-2.0, 0.0]), std::f64::consts::PI);
     }
 
     #[test]
@@ -172,13 +172,13 @@ mod tests {
 
     #[test]
     fn points_get_as_many_coordinates_as_asked_for() {
-        assert_eq!(with_dimensions::<2, 3>([1.0, 2.0]), [1.0, 2.0, 0.0]);
-        assert_eq!(with_dimensions::<3, 2>([1.0, 2.0, 3.0]), [1.0, 2.0]);
+        assert_eq!(convert_dimensions::<2, 3>([1.0, 2.0]), [1.0, 2.0, 0.0]);
+        assert_eq!(convert_dimensions::<3, 2>([1.0, 2.0, 3.0]), [1.0, 2.0]);
     }
 
     #[test]
     fn axes_make_a_right_handed_frame() {
         assert_eq!(cross([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
-        assert_eq!(rejection([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]), [1.0, 2.0, 0.0]);
+        assert_eq!(perpendicular_component([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]), [1.0, 2.0, 0.0]);
     }
 }

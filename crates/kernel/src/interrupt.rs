@@ -36,14 +36,14 @@ struct WorkerLostPayload;
 /// The interrupt that a thread polls. Each thread counts its own checks, so that workers that check all the
 /// time do not wait for each other's cache lines.
 #[derive(Debug)]
-struct InterruptAttachment {
+struct ThreadInterrupt {
     interrupt: Interrupt,
     checks: u64,
 }
 
 thread_local! {
     /// The interrupt that the present computation of this thread polls.
-    static ATTACHMENT: RefCell<Option<InterruptAttachment>> = const { RefCell::new(None) };
+    static ATTACHMENT: RefCell<Option<ThreadInterrupt>> = const { RefCell::new(None) };
 }
 
 /// Checks the interrupt attached to this thread, if any. A computation calls it at least
@@ -55,13 +55,13 @@ thread_local! {
 #[inline]
 pub fn check() {
     let is_raised = ATTACHMENT
-        .with_borrow_mut(|attached| attached.as_mut().is_some_and(InterruptAttachment::check));
+        .with_borrow_mut(|attached| attached.as_mut().is_some_and(ThreadInterrupt::check));
     if is_raised {
         resume_unwind(Box::new(InterruptPayload));
     }
 }
 
-impl InterruptAttachment {
+impl ThreadInterrupt {
     fn check(&mut self) -> bool {
         self.checks += 1;
         self.interrupt.0.is_raised.load(Relaxed)
@@ -76,12 +76,12 @@ impl Interrupt {
 
     /// Attaches the interrupt to this thread until the returned guard is dropped.
     pub fn attach(&self) -> InterruptGuard {
-        let attachment = InterruptAttachment { interrupt: self.clone(), checks: 0 };
+        let attachment = ThreadInterrupt { interrupt: self.clone(), checks: 0 };
         InterruptGuard { previous: ATTACHMENT.replace(Some(attachment)) }
     }
 
     /// Number of checks by threads from which it was detached, for tests of the frequency of checks.
-    pub fn check_count(&self) -> u64 {
+    pub fn total_checks(&self) -> u64 {
         self.0.checks.load(Relaxed)
     }
 
@@ -98,12 +98,12 @@ impl Interrupt {
 #[derive(Debug)]
 pub struct InterruptGuard {
     /// The attachment to restore.
-    previous: Option<InterruptAttachment>,
+    previous: Option<ThreadInterrupt>,
 }
 
 impl Drop for InterruptGuard {
     fn drop(&mut self) {
-        if let Some(InterruptAttachment { interrupt, checks }) =
+        if let Some(ThreadInterrupt { interrupt, checks }) =
             ATTACHMENT.replace(self.previous.take())
         {
             interrupt.0.checks.fetch_add(checks, Relaxed);
@@ -135,11 +135,11 @@ mod tests {
                     check();
                 }
                 assert!(worker.index() + 1 < workers, "a bug");
-                worker.barrier();
+                worker.wait_at_barrier();
             };
             let run = || workers::run(&mut vec![(); workers], work);
             let payload = catch_unwind(AssertUnwindSafe(run)).expect_err("it unwinds");
-            assert!(interrupt.check_count() >= u64::from(raises));
+            assert!(interrupt.total_checks() >= u64::from(raises));
             interrupt.has_caused_unwind(payload.as_ref())
         };
         for workers in [1, 3] {

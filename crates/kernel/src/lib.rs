@@ -54,13 +54,13 @@ pub use column::AtomicColumn;
 pub use digest::Digest;
 pub use error::InputError;
 pub use interrupt::Interrupt;
-pub use run::{Run, RunStart};
+pub use run::{Run, RunSetup};
 pub use run_config::{GroupSizeHistogram, RunConfig, RunStats};
 pub use simulation::Simulation;
-pub use units::{Cycle, EntityId, Seed, Slot};
+pub use units::{Cycle, EntityId, EntitySlot, Seed};
 pub use world::{
-    PhaseContext, Phases, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
-    WorldView,
+    CheckpointableWorld, ControllableWorld, PhaseContext, Phases, RecordableWorld, World,
+    WorldMetrics, WorldView,
 };
 
 /// The example of the README, which is tested.

@@ -2,20 +2,22 @@
 
 use crate::checkpoint::{self, CheckpointError, CheckpointHeader};
 use crate::control::{
-    self, BufferMut, ControlLog, ControlRow, OrderError, OrderLog, OrderRow, Orders, Team, Teams,
+    self, AgentTeam, AgentTeams, BufferMut, ControlLog, ControlRow, MultiAgentOrder, OrderError,
+    OrderLog, OrderRow,
 };
 use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::{CycleRange, Engine};
 use crate::interrupt::Interrupt;
-use crate::ports::{Buffer, RecordError, Recorder, RowBuffer, SystemClock, TableSchema};
+use crate::ports::{RecordError, Recorder, SystemClock, TableBuffer, TableRowsBuffer, TableSchema};
 use crate::run_config::{GroupSizeHistogram, RunConfig, RunStats};
 use crate::simulation::Simulation;
-use crate::text::{KeyValues, StateDescription};
+use crate::text::{KeyValues, StateReport};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::{
-    DecisionMode, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+    CheckpointableWorld, ControllableWorld, DecisionMode, RecordableWorld, World, WorldMetrics,
+    WorldView,
 };
 use serde_json::Value;
 use std::fmt;
@@ -23,7 +25,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// The start of a run: its settings, its state, and the collector beside the state.
-pub struct RunStart<W: World> {
+pub struct RunSetup<W: World> {
     /// The settings, from the keys that all scenarios share.
     pub config: RunConfig,
     /// The state before the first cycle.
@@ -47,7 +49,7 @@ pub struct Run<W: World> {
     clock: SystemClock,
     /// Whether rows are kept for a recorder.
     records: bool,
-    teams: Arc<Teams>,
+    teams: Arc<AgentTeams>,
     /// Orders to be replayed when the run reaches their cycles.
     order_log: OrderLog,
     /// Controls to be replayed likewise.
@@ -55,18 +57,18 @@ pub struct Run<W: World> {
     /// The last cycle for which that was done: `advance` may be called several times in one cycle.
     last_applied: Option<Cycle>,
     /// Orders that were given and wait to be recorded.
-    order_rows: RowBuffer<OrderRow>,
+    order_rows: TableRowsBuffer<OrderRow>,
     /// Controls that were submitted and wait to be recorded.
-    control_rows: RowBuffer<ControlRow>,
+    control_rows: TableRowsBuffer<ControlRow>,
 }
 
-impl<W: WorldControl> Run<W> {
+impl<W: ControllableWorld> Run<W> {
     /// Creates a run at its start, with `workers` workers; the world is shared, not copied.
     /// `scenario` is the resolved scenario's text.
-    pub fn new(world: Arc<W>, start: RunStart<W>, scenario: &str, workers: usize) -> Self {
-        let RunStart { config, state, collector } = start;
-        let engine = Engine::new(&*world, world.bodies(&state), workers);
-        let teams = world.teams();
+    pub fn new(world: Arc<W>, start: RunSetup<W>, scenario: &str, workers: usize) -> Self {
+        let RunSetup { config, state, collector } = start;
+        let engine = Engine::new(&*world, world.body_count(&state), workers);
+        let teams = world.agent_teams();
         Self {
             world,
             config,
@@ -82,8 +84,8 @@ impl<W: WorldControl> Run<W> {
             order_log: OrderLog::default(),
             control_log: ControlLog::default(),
             last_applied: None,
-            order_rows: RowBuffer::default(),
-            control_rows: RowBuffer::default(),
+            order_rows: TableRowsBuffer::default(),
+            control_rows: TableRowsBuffer::default(),
         }
     }
 }
@@ -124,7 +126,7 @@ impl<W: World> Run<W> {
         stats
     }
 
-    fn header(&self) -> CheckpointHeader {
+    fn checkpoint_header(&self) -> CheckpointHeader {
         CheckpointHeader {
             format: checkpoint::FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").into(),
@@ -140,7 +142,7 @@ impl<W: World> Run<W> {
         for worker in engine.worker_states_mut() {
             world.collect(collector, &mut worker.scratch);
         }
-        world.commit(collector);
+        world.commit_results(collector);
     }
 
     /// Number of cycles that may run before rows must be recorded.
@@ -160,7 +162,7 @@ impl<W: World> Run<W> {
         let Self { world, state, collector, engine, clock, .. } = self;
         let range = CycleRange { from: self.cycle, cycles };
         let done = if W::OBSERVES_EACH_CYCLE {
-            let mut observer = WorldObserver { world: &**world, collector };
+            let mut observer = WorldHookObserver { world: &**world, collector };
             engine.advance_with_observer(world, state, range, clock, &mut observer)
         } else {
             engine.advance(world, state, range, clock);
@@ -171,15 +173,15 @@ impl<W: World> Run<W> {
     }
 
     /// Returns the first cycle after the present one before which orders or controls are replayed.
-    fn next_due(&self) -> Option<Cycle> {
+    fn next_replay_cycle(&self) -> Option<Cycle> {
         let orders = self.order_log.next_after(self.cycle);
         orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
     }
 }
 
-impl<W: WorldControl> Run<W> {
+impl<W: ControllableWorld> Run<W> {
     /// Gives an order, or refuses it as a whole.
-    fn apply_orders(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    fn apply_orders(&mut self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.check_orders(orders)?;
         let Self { world, state, teams, .. } = self;
         teams.for_each_order(orders, |order| {
@@ -207,7 +209,7 @@ impl<W: WorldControl> Run<W> {
     }
 
     /// Checks shape and bounds by the teams, and then each order by the world.
-    fn check_orders(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    fn check_orders(&self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.teams.for_each_order(orders, |order| {
             self.world.check_order(order).map_err(|cause| OrderError::Invalid {
                 order: orders.order.into(),
@@ -251,7 +253,7 @@ impl<W: WorldControl> Run<W> {
     }
 }
 
-impl<W: WorldCheckpoint> Run<W> {
+impl<W: CheckpointableWorld> Run<W> {
     /// Returns the content that a checkpoint of the present state would have.
     pub fn snapshot(&self) -> W::Snapshot {
         self.world.save(&self.state, &self.collector, self.cycle)
@@ -265,12 +267,12 @@ impl<W: WorldMetrics> Run<W> {
     }
 }
 
-impl<W: WorldRecording> Run<W> {
+impl<W: RecordableWorld> Run<W> {
     /// Sets up all workers for gathering the rows and events that are now enabled.
-    fn prepare_workers(&mut self) {
+    fn prepare_scratches(&mut self) {
         let Self { world, collector, engine, .. } = self;
         for worker in engine.worker_states_mut() {
-            world.prepare(collector, &mut worker.scratch);
+            world.prepare_scratch(collector, &mut worker.scratch);
         }
     }
 }
@@ -282,12 +284,12 @@ impl<W: World> fmt::Debug for Run<W> {
 }
 
 /// An observer between cycles, for worlds that ask for one.
-struct WorldObserver<'a, W: World> {
+struct WorldHookObserver<'a, W: World> {
     world: &'a W,
     collector: &'a mut W::Collector,
 }
 
-impl<W: World> Observer<W> for WorldObserver<'_, W> {
+impl<W: World> Observer<W> for WorldHookObserver<'_, W> {
     fn before_cycle(&mut self, now: Cycle, state: &W::State) {
         self.world.before_cycle(state, self.collector, now);
     }
@@ -299,7 +301,7 @@ impl<W: World> Observer<W> for WorldObserver<'_, W> {
         mut scratches: Scratches<'_, W::Scratch>,
     ) -> ControlFlow<()> {
         scratches.for_each(|scratch| self.world.collect(self.collector, scratch));
-        self.world.commit(self.collector);
+        self.world.commit_results(self.collector);
         let is_full = self.world.cycles_until_flush(state, self.collector, now + 1) == 0;
         if is_full || self.world.is_over(state) {
             ControlFlow::Break(())
@@ -311,13 +313,13 @@ impl<W: World> Observer<W> for WorldObserver<'_, W> {
 
 impl<W> Simulation for Run<W>
 where
-    W: WorldCheckpoint + WorldControl + WorldMetrics + WorldRecording + WorldView,
+    W: CheckpointableWorld + ControllableWorld + WorldMetrics + RecordableWorld + WorldView,
 {
-    fn world(&self) -> &'static str {
+    fn world_name(&self) -> &'static str {
         W::NAME
     }
 
-    fn agent(&self) -> &'static str {
+    fn agent_noun(&self) -> &'static str {
         W::AGENT
     }
 
@@ -333,8 +335,8 @@ where
         self.cycle
     }
 
-    fn agents(&self) -> usize {
-        self.world.agents()
+    fn agent_count(&self) -> usize {
+        self.world.agent_count()
     }
 
     fn is_over(&self) -> bool {
@@ -346,7 +348,7 @@ where
         while done < cycles {
             self.apply_due();
             let mut segment = cycles - done;
-            if let Some(next) = self.next_due() {
+            if let Some(next) = self.next_replay_cycle() {
                 segment = segment.min(next - self.cycle);
             }
             let segment_done = self.run_segment(segment);
@@ -368,11 +370,12 @@ where
     }
 
     fn checkpoint(&self) -> Vec<u8> {
-        checkpoint::encode(&self.header(), &(self.stats().groups, self.snapshot()))
+        checkpoint::encode(&self.checkpoint_header(), &(self.stats().groups, self.snapshot()))
     }
 
     fn restore(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
-        let (cycle, (groups, snapshot)) = checkpoint::decode(checkpoint, &self.header())?;
+        let (cycle, (groups, snapshot)) =
+            checkpoint::decode(checkpoint, &self.checkpoint_header())?;
         self.state = self.world.restore(snapshot, &mut self.collector)?;
         self.groups_before = groups;
         for worker in self.engine.worker_states_mut() {
@@ -386,13 +389,14 @@ where
     fn start_recording(&mut self) {
         self.records = true;
         self.world.start_recording(&mut self.state, &mut self.collector, self.cycle);
-        if self.teams.accept_orders() {
-            self.order_rows.start(Some(control::orders_table(self.teams.order_names().to_vec())));
+        if self.teams.has_action_spaces() {
+            self.order_rows
+                .set_table(Some(control::orders_table(self.teams.order_names().to_vec())));
         }
         if self.world.records_controls(&self.collector) {
-            self.control_rows.start(Some(control::controls_table()));
+            self.control_rows.set_table(Some(control::controls_table()));
         }
-        self.prepare_workers();
+        self.prepare_scratches();
     }
 
     fn schemas(&self) -> Vec<TableSchema> {
@@ -423,12 +427,12 @@ where
 
     fn enable_events(&mut self) {
         self.world.enable_events(&mut self.collector);
-        self.prepare_workers();
+        self.prepare_scratches();
     }
 
     fn enable_odometry(&mut self) {
         self.world.enable_odometry(&mut self.collector);
-        self.prepare_workers();
+        self.prepare_scratches();
     }
 
     fn frame(&mut self, options: FrameOptions) -> Frame {
@@ -440,8 +444,8 @@ where
         self.world.inspect(&self.state, &self.collector, self.cycle, body)
     }
 
-    fn teams(&self) -> &[Team] {
-        self.teams.all()
+    fn agent_teams(&self) -> &[AgentTeam] {
+        self.teams.as_slice()
     }
 
     fn observe(&self, team: usize, buffers: &mut [BufferMut<'_>]) -> Result<(), OrderError> {
@@ -450,11 +454,11 @@ where
         Ok(())
     }
 
-    fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    fn check(&self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.check_orders(orders)
     }
 
-    fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    fn order(&mut self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.apply_orders(orders)
     }
 
@@ -494,7 +498,7 @@ where
         self.world.summary_lines(&Run::metrics(self))
     }
 
-    fn poses(&self) -> StateDescription {
+    fn poses(&self) -> StateReport {
         self.world.poses(&self.state, self.cycle)
     }
 

@@ -1,13 +1,15 @@
 //! The object-safe interface of a run, through which the command, a server or a binding uses any world.
 
 use crate::checkpoint::CheckpointError;
-use crate::control::{BufferMut, ControlLog, OrderError, OrderLog, Orders, Team, Teams};
+use crate::control::{
+    AgentTeam, AgentTeams, BufferMut, ControlLog, MultiAgentOrder, OrderError, OrderLog,
+};
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::interrupt::Interrupt;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::run_config::RunConfig;
-use crate::text::{KeyValues, StateDescription};
+use crate::text::{KeyValues, StateReport};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::DecisionMode;
@@ -18,10 +20,10 @@ use std::any::Any;
 /// [`crate::Run`] by [`Any`].
 pub trait Simulation: Any + Send {
     /// Name of the world, e.g. `robots`.
-    fn world(&self) -> &'static str;
+    fn world_name(&self) -> &'static str;
 
     /// The noun for one of its agents, e.g. `robot`.
-    fn agent(&self) -> &'static str;
+    fn agent_noun(&self) -> &'static str;
 
     /// The phase in which its agents decide, which determines the names of the phases in reports.
     fn decision_mode(&self) -> DecisionMode;
@@ -33,7 +35,7 @@ pub trait Simulation: Any + Send {
     fn cycle(&self) -> Cycle;
 
     /// Number of entities that act (robots, connectors of chains, airplanes).
-    fn agents(&self) -> usize;
+    fn agent_count(&self) -> usize;
 
     /// Returns whether the run has finished early, e.g. because every agent has arrived.
     fn is_over(&self) -> bool;
@@ -89,7 +91,7 @@ pub trait Simulation: Any + Send {
     fn inspect(&self, body: BodyId) -> Option<Inspection>;
 
     /// The teams of agents with the same observations and orders.
-    fn teams(&self) -> &[Team] {
+    fn agent_teams(&self) -> &[AgentTeam] {
         &[]
     }
 
@@ -107,8 +109,8 @@ pub trait Simulation: Any + Send {
     ///
     /// # Errors
     /// When one of them cannot be obeyed.
-    fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        Teams::default().check(orders)
+    fn check(&self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
+        AgentTeams::default().check(orders)
     }
 
     /// Gives an order to several agents for the next cycle. An order stands until its agent has
@@ -116,8 +118,8 @@ pub trait Simulation: Any + Send {
     ///
     /// # Errors
     /// When one of them cannot be obeyed; no agent gets an order then.
-    fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
-        Teams::default().check(orders)
+    fn order(&mut self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
+        AgentTeams::default().check(orders)
     }
 
     /// Gives these orders, each before its cycle, whenever the run gets there: also after
@@ -126,7 +128,7 @@ pub trait Simulation: Any + Send {
     /// # Errors
     /// When one of them cannot be obeyed; all then remain as they were.
     fn replay_orders(&mut self, orders: OrderLog) -> Result<(), OrderError> {
-        orders.iter().try_for_each(|(_, orders)| Teams::default().check(&orders))
+        orders.iter().try_for_each(|(_, orders)| AgentTeams::default().check(&orders))
     }
 
     /// Submits the actions of agents that decide outside of the run, for the next cycle, each as a message of its
@@ -137,7 +139,7 @@ pub trait Simulation: Any + Send {
     /// When no agents of this world decide outside of the run, or an action is impossible; when the run is recorded
     /// without its controls, and could not be reproduced.
     fn submit_controls(&mut self, _: &[(EntityId, Vec<u8>)]) -> Result<(), OrderError> {
-        let cause = format!("agents of the world {} decide only within the run", self.world());
+        let cause = format!("agents of the world {} decide only within the run", self.world_name());
         Err(OrderError::NoExternalAgents { cause })
     }
 
@@ -162,7 +164,7 @@ pub trait Simulation: Any + Send {
     fn summary_lines(&self) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self) -> StateDescription;
+    fn poses(&self) -> StateReport;
 
     /// Returns the time spent in each phase in this process.
     fn phase_times(&self) -> PhaseTimes;

@@ -60,7 +60,7 @@ impl Streams {
     }
 
     /// Returns four words for a pair of entities, e.g. a message from one to the other.
-    pub fn pair_words(
+    pub fn words_for_pair(
         &self,
         entity: EntityId,
         other: EntityId,

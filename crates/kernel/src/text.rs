@@ -7,7 +7,7 @@ pub type KeyValues = Vec<(String, String)>;
 
 /// A statement about a state: as JSON, and in words.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StateDescription {
+pub struct StateReport {
     /// The form for machines, which `--json` prints.
     pub json: Value,
     /// The form for people; every line ends in a line feed.
@@ -15,7 +15,7 @@ pub struct StateDescription {
 }
 
 /// Returns a line of a name and a value.
-pub fn key_value(name: &str, value: impl Into<String>) -> (String, String) {
+pub fn key_value_pair(name: &str, value: impl Into<String>) -> (String, String) {
     (name.into(), value.into())
 }
 
@@ -58,7 +58,7 @@ pub fn align_pairs(rows: &[(String, String)]) -> String {
     for (name, value) in rows {
         let is_command = value.starts_with(COMMAND_PREFIX);
         let cols = if is_command { usize::MAX } else { LINE_COLS.saturating_sub(indent) };
-        let value = wrap(value, cols).join(&line_break);
+        let value = wrap_text(value, cols).join(&line_break);
         text.push_str(&format!("  {name:<width$}  {value}\n"));
     }
     text
@@ -66,7 +66,7 @@ pub fn align_pairs(rows: &[(String, String)]) -> String {
 
 /// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
 /// that fits, and each line feed in it, stays unchanged.
-pub fn wrap(text: &str, cols: usize) -> Vec<String> {
+pub fn wrap_text(text: &str, cols: usize) -> Vec<String> {
     text.split('\n').flat_map(|line| wrap_line(line, cols)).collect()
 }
 
@@ -75,7 +75,7 @@ fn wrap_line(text: &str, cols: usize) -> Vec<String> {
         return vec![text.into()];
     }
     let mut lines: Vec<String> = Vec::new();
-    for word in split_words(text) {
+    for word in split_at_spaces(text) {
         match lines.last_mut() {
             Some(line) if line.chars().count() + 1 + word.chars().count() <= cols => {
                 line.push(' ');
@@ -88,7 +88,7 @@ fn wrap_line(text: &str, cols: usize) -> Vec<String> {
 }
 
 /// Splits text at its spaces, except one before a percent sign: a number keeps its unit.
-fn split_words(text: &str) -> Vec<&str> {
+fn split_at_spaces(text: &str) -> Vec<&str> {
     let mut words = Vec::new();
     let mut start = 0;
     for (space, _) in text.match_indices(' ') {
@@ -107,27 +107,30 @@ mod tests {
 
     #[test]
     fn a_number_is_not_parted_from_its_percent_sign() {
-        assert_eq!(wrap("claim 93 %, record 0 %", 20), ["claim 93 %, record", "0 %"]);
-        assert_eq!(wrap("a b  c", 3), ["a b", " c"]);
+        assert_eq!(wrap_text("claim 93 %, record 0 %", 20), ["claim 93 %, record", "0 %"]);
+        assert_eq!(wrap_text("a b  c", 3), ["a b", " c"]);
     }
 
     #[test]
     fn values_stand_below_each_other() {
-        let rows = [key_value("a", "1"), key_value("long", "2")];
+        let rows = [key_value_pair("a", "1"), key_value_pair("long", "2")];
         assert_eq!(align_pairs(&rows), "  a     1\n  long  2\n");
     }
 
     #[test]
     fn long_values_are_broken_at_spaces_and_stand_below_their_first_line() {
         let words = ["seventeen_columns"; 6].join(" ");
-        let told = align_pairs(&[key_value("name", words)]);
+        let told = align_pairs(&[key_value_pair("name", words)]);
         let lines: Vec<&str> = told.lines().collect();
         assert_eq!(lines.len(), 2, "{told}");
         assert!(lines[1].starts_with("        seventeen") && lines.iter().all(|l| l.len() <= 80));
         let command = format!("sidestep report {}", "x".repeat(99));
-        assert_eq!(align_pairs(&[key_value("look", &command)]), format!("  look  {command}\n"));
-        assert_eq!(wrap(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
-        assert_eq!(wrap("a  b\nc", 80), ["a  b", "c"]);
+        assert_eq!(
+            align_pairs(&[key_value_pair("look", &command)]),
+            format!("  look  {command}\n")
+        );
+        assert_eq!(wrap_text(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
+        assert_eq!(wrap_text("a  b\nc", 80), ["a  b", "c"]);
     }
 
     #[test]

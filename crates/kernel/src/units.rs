@@ -11,7 +11,7 @@ pub type Cycle = u64;
 
 /// The index of an entity in a state's columns. Slots may be permuted without changing any result,
 /// because draws and ties depend on the entity's [`EntityId`].
-pub type Slot = u32;
+pub type EntitySlot = u32;
 
 /// The identity of an entity: constant through a run and independent of storage.
 pub type EntityId = u32;

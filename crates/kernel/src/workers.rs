@@ -86,13 +86,13 @@ impl Worker<'_> {
         let size = team.size();
         // No worker uses the cursors of the next pool but one now, so they can be reset without a
         // barrier.
-        team.cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
+        team.chunk_cursor((pool + 2) % POOLS as u64, self.index).store(0, Ordering::Relaxed);
         let chunk = (n / (size * MIN_CHUNKS_PER_SHARE)).clamp(1, MAX_CHUNK);
         for k in 0..size {
             let owner = (self.index + k) % size;
             let start = n * owner / size;
             let end = n * (owner + 1) / size;
-            let cursor = team.cursor(pool % POOLS as u64, owner);
+            let cursor = team.chunk_cursor(pool % POOLS as u64, owner);
             loop {
                 let from = start + cursor.fetch_add(chunk, Ordering::Relaxed);
                 if from >= end {
@@ -108,7 +108,7 @@ impl Worker<'_> {
     /// # Panics
     /// When another worker panicked.
     #[inline]
-    pub fn barrier(&self) {
+    pub fn wait_at_barrier(&self) {
         if let Some(team) = self.team {
             team.barrier.wait(team.size as u32, team.spins);
         }
@@ -120,10 +120,10 @@ impl Worker<'_> {
         if own {
             votes.fetch_add(1, Ordering::Relaxed);
         }
-        self.barrier();
+        self.wait_at_barrier();
         let any = votes.load(Ordering::Relaxed) > 0;
         // No vote may be withdrawn before all workers have read the count.
-        self.barrier();
+        self.wait_at_barrier();
         if own {
             votes.fetch_sub(1, Ordering::Relaxed);
         }
@@ -207,7 +207,7 @@ impl WorkerTeam {
     }
 
     #[inline]
-    fn cursor(&self, pool: u64, worker: usize) -> &AtomicUsize {
+    fn chunk_cursor(&self, pool: u64, worker: usize) -> &AtomicUsize {
         &self.cursors[worker * POOLS + pool as usize].0
     }
 }
@@ -259,20 +259,20 @@ impl Barrier {
     /// and takes longer to wake up.
     fn wait_for_generation(&self, generation: u32, spins: u32) {
         for _ in 0..spins {
-            if self.has_ended(generation) {
+            if self.has_generation_ended(generation) {
                 return;
             }
             std::hint::spin_loop();
         }
         for _ in 0..YIELDS_BEFORE_SLEEP {
-            if self.has_ended(generation) {
+            if self.has_generation_ended(generation) {
                 return;
             }
             std::thread::yield_now();
         }
         let mut guard = self.sleeping.lock().unwrap_or_else(PoisonError::into_inner);
         self.sleepers.fetch_add(1, Ordering::SeqCst);
-        while !self.has_ended(generation) {
+        while !self.has_generation_ended(generation) {
             guard = self.wake.wait(guard).unwrap_or_else(PoisonError::into_inner);
         }
         self.sleepers.fetch_sub(1, Ordering::SeqCst);
@@ -281,7 +281,7 @@ impl Barrier {
     /// Returns whether nothing is left to wait for. A worker that arrives after a panic must not wait either: its
     /// generation never ends.
     #[inline]
-    fn has_ended(&self, generation: u32) -> bool {
+    fn has_generation_ended(&self, generation: u32) -> bool {
         self.generation.load(Ordering::SeqCst) != generation || self.broken.load(Ordering::SeqCst)
     }
 }
@@ -317,7 +317,7 @@ mod tests {
                                 assert_eq!(done[i].fetch_add(1, Ordering::Relaxed), pool);
                             }
                         });
-                        worker.barrier();
+                        worker.wait_at_barrier();
                     }
                 });
                 assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 9));
@@ -335,13 +335,17 @@ mod tests {
                     worker.for_each_chunk(pool, 10, |range| {
                         done.fetch_add(range.len() as u64, Ordering::Relaxed);
                     });
-                    worker.barrier();
+                    worker.wait_at_barrier();
                 }
             };
             team.run(&mut [(); 2], work, work);
             assert_eq!(done.into_inner(), 10 * (runs + 1));
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                team.run(&mut [(); 2], |_, ()| panic!("a bug"), |worker, ()| worker.barrier());
+                team.run(
+                    &mut [(); 2],
+                    |_, ()| panic!("a bug"),
+                    |worker, ()| worker.wait_at_barrier(),
+                );
             }));
             assert!(outcome.is_err());
         }
@@ -364,7 +368,7 @@ mod tests {
         let outcome = std::panic::catch_unwind(|| {
             run(&mut [(); 3], |worker, ()| {
                 assert!(worker.index() != 1, "a bug");
-                worker.barrier();
+                worker.wait_at_barrier();
             });
         });
         assert!(outcome.is_err());
@@ -376,7 +380,7 @@ mod tests {
             run(&mut [(); 2], |worker, ()| {
                 assert!(worker.index() != 1, "a bug");
                 std::thread::sleep(std::time::Duration::from_millis(20));
-                worker.barrier();
+                worker.wait_at_barrier();
             });
         });
         assert!(outcome.is_err());
@@ -389,7 +393,7 @@ mod tests {
                 if worker.index() == 0 {
                     std::thread::sleep(std::time::Duration::from_millis(20));
                 }
-                worker.barrier();
+                worker.wait_at_barrier();
             }
         });
     }

@@ -13,12 +13,12 @@
 
 use crate::checkpoint::CheckpointError;
 use crate::conflict::ConflictGroups;
-use crate::control::{BufferMut, Order, OrderError, Teams};
+use crate::control::{AgentTeams, BufferMut, Order, OrderError};
 use crate::digest::Digest;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::run_config::RunStats;
-use crate::text::{KeyValues, StateDescription};
-use crate::units::{Cycle, EntityId, Slot};
+use crate::text::{KeyValues, StateReport};
+use crate::units::{Cycle, EntityId, EntitySlot};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -65,14 +65,14 @@ pub trait Phases: Sync + Sized {
     const DECISION_MODE: DecisionMode = DecisionMode::Independent;
 
     /// Returns an empty scratch; called once per worker.
-    fn scratch(&self) -> Self::Scratch;
+    fn new_scratch(&self) -> Self::Scratch;
 
     /// Number of bodies, which is the number of tasks in a pool.
-    fn bodies(&self, state: &Self::State) -> usize;
+    fn body_count(&self, state: &Self::State) -> usize;
 
     /// Moves bodies to other slots, occasionally between cycles, so that neighbors in the world are
     /// neighbors in memory and each worker stays in one part of both. No result may depend on it.
-    fn arrange(&self, _: &mut Self::State) {}
+    fn reorder_slots(&self, _: &mut Self::State) {}
 
     /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
     /// decide alone), and claims everything that its action may need. Writes only the intents and claims of
@@ -86,7 +86,7 @@ pub trait Phases: Sync + Sized {
     /// *Act*: the bodies of one conflict group decide (where agents decide together) and act, in an
     /// order that depends on state and seed alone. Writes only things that the group has claimed.
     /// The order of `group` itself is arbitrary.
-    fn act(context: &mut PhaseContext<'_, Self>, group: &mut [Slot]);
+    fn act(context: &mut PhaseContext<'_, Self>, group: &mut [EntitySlot]);
 
     /// The auction by which bodies in conflict act, in worlds that hold one.
     fn auction(&self) -> Option<&dyn Auction<Self>> {
@@ -99,10 +99,10 @@ pub trait Phases: Sync + Sized {
 /// inside a large group, and the outcome is the same as acting in the order of the bids.
 pub trait Auction<W: Phases> {
     /// Bids for everything that a body claims, and adds the bids to the scratch.
-    fn bid(&self, context: &mut PhaseContext<'_, W>, body: Slot);
+    fn bid(&self, context: &mut PhaseContext<'_, W>, body: EntitySlot);
 
     /// Lets the bodies of `pending` with the highest bids act, and removes them from the list.
-    fn act_on_bids(&self, context: &mut PhaseContext<'_, W>, pending: &mut Vec<Slot>);
+    fn act_on_bids(&self, context: &mut PhaseContext<'_, W>, pending: &mut Vec<EntitySlot>);
 
     /// Withdraws all bids of the scratch.
     fn retract_bids(&self, context: &mut PhaseContext<'_, W>);
@@ -127,7 +127,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
     type Collector: Send;
 
     /// Number of agents, the same in every cycle.
-    fn agents(&self) -> usize;
+    fn agent_count(&self) -> usize;
 
     /// Number of cycles that may run before rows must be recorded.
     fn cycles_until_flush(&self, _: &Self::State, _: &Self::Collector, _: Cycle) -> u64 {
@@ -149,12 +149,12 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Adds the collected results of all workers to the sums and rows, in an order that does not
     /// depend on each worker's share.
-    fn commit(&self, collector: &mut Self::Collector);
+    fn commit_results(&self, collector: &mut Self::Collector);
 }
 
 /// The rows and events that a world keeps during a run.
-pub trait WorldRecording: World {
-    /// Starts to keep the rows that [`WorldRecording::record`] records.
+pub trait RecordableWorld: World {
+    /// Starts to keep the rows that [`RecordableWorld::record`] records.
     fn start_recording(&self, state: &mut Self::State, collector: &mut Self::Collector, now: Cycle);
 
     /// Starts to keep events for frames, which costs time and memory that no recording needs.
@@ -164,8 +164,8 @@ pub trait WorldRecording: World {
     fn enable_odometry(&self, _: &mut Self::Collector) {}
 
     /// Sets up a worker's scratch for gathering rows and events, after
-    /// [`WorldRecording::start_recording`] and [`WorldRecording::enable_events`].
-    fn prepare(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
+    /// [`RecordableWorld::start_recording`] and [`RecordableWorld::enable_events`].
+    fn prepare_scratch(&self, _: &Self::Collector, _: &mut Self::Scratch) {}
 
     /// Returns the recorded tables; the index is a table's number in the recorder.
     fn schemas(&self, collector: &Self::Collector) -> Vec<TableSchema>;
@@ -189,7 +189,7 @@ pub trait WorldRecording: World {
 }
 
 /// The digests of a world's states, and the content of its checkpoints.
-pub trait WorldCheckpoint: World {
+pub trait CheckpointableWorld: World {
     /// The content of a checkpoint: the state, and those parts of the collector on which results
     /// depend, by entity id.
     type Snapshot: Serialize + DeserializeOwned;
@@ -240,9 +240,9 @@ pub trait WorldView: World {
 }
 
 /// The control of agents from outside the run. A world without such control implements nothing of it.
-pub trait WorldControl: World {
+pub trait ControllableWorld: World {
     /// Returns the teams of agents with the same observations and orders.
-    fn teams(&self) -> Arc<Teams> {
+    fn agent_teams(&self) -> Arc<AgentTeams> {
         Arc::default()
     }
 
@@ -280,7 +280,7 @@ pub trait WorldControl: World {
     /// Writes the observations of a team's agents in cycle `now` from the frozen state into one
     /// buffer for each of the team's [`observation_spaces`]; their sizes were checked.
     ///
-    /// [`observation_spaces`]: crate::control::Team::observation_spaces
+    /// [`observation_spaces`]: crate::control::AgentTeam::observation_spaces
     fn observe(&self, _: &Self::State, _: Cycle, _team: usize, _: &mut [BufferMut<'_>]) {}
 }
 
@@ -310,5 +310,5 @@ pub trait WorldMetrics: World {
     fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self, state: &Self::State, now: Cycle) -> StateDescription;
+    fn poses(&self, state: &Self::State, now: Cycle) -> StateReport;
 }

@@ -4,7 +4,7 @@ use std::fmt::{Formatter, Result};
 
 use super::holdout::HoldoutTest;
 use super::{Estimate, LowCountRow};
-use sidestep_kernel::text::{LINE_COLS, format_fixed, wrap};
+use sidestep_kernel::text::{LINE_COLS, format_fixed, wrap_text};
 use sidestep_statistics::{Moments, holm};
 
 /// The names of a table's rows and columns.
@@ -19,7 +19,7 @@ pub(super) fn write_warnings(f: &mut Formatter<'_>, warnings: &[String]) -> Resu
 }
 
 fn warning_line(warning: &str) -> String {
-    wrap(&format!("WARNING: {warning}"), LINE_COLS).join("\n")
+    wrap_text(&format!("WARNING: {warning}"), LINE_COLS).join("\n")
 }
 
 /// Writes named moments, one per line; those without values are left out.

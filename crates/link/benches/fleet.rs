@@ -9,7 +9,7 @@ use sidestep::worlds::WORLDS;
 use sidestep_link::protocol::{FleetMember, Incarnation};
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Peer, Wire};
+use sidestep_link::wire::{PeerId, Wire};
 use sidestep_session::fleet::{
     ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobScenario, LinkMessage, Topology,
 };
@@ -63,7 +63,7 @@ fn rounds(team: u32, rounds: usize) {
         .map(|agent| {
             let (server, members, barrier) = (server.clone(), members.clone(), barrier.clone());
             std::thread::spawn(move || {
-                let me = Peer::Node(agent);
+                let me = PeerId::Node(agent);
                 let wire = ZenohWire::node_wire(me, &[server], None, TIMEOUT).expect("it answers");
                 let own = members[agent as usize].listens.iter();
                 let held = own.map(|endpoint| reserve_port(endpoint).expect("free")).collect();
@@ -118,7 +118,7 @@ fn meet(wire: &mut dyn Wire, agent: u32, team: u32) {
 }
 
 fn send_frame(wire: &mut dyn Wire, agent: u32, team: u32, round: u32) {
-    let others: Vec<Peer> = (0..team).filter(|other| *other != agent).map(Peer::Node).collect();
+    let others: Vec<PeerId> = (0..team).filter(|other| *other != agent).map(PeerId::Node).collect();
     wire.send(&others, &frame(round, agent));
 }
 

@@ -79,7 +79,7 @@ pub trait AgentProgram: Send {
 
 /// A packet in transit to one receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Transmission {
+pub struct PacketInTransit {
     /// The receiver.
     pub to: EntityId,
     /// The tick in which it is sent. In real time it is that in which the cycle began, so that the same packets
@@ -103,7 +103,7 @@ pub struct PacketTiming {
 /// The faults of packets from one agent to others, drawn from the scenario's seed.
 pub trait ChannelModel: Send {
     /// Returns the arrivals of a packet: none if it is lost, two if it is duplicated.
-    fn arrivals(&mut self, packet: &Transmission) -> Vec<PacketTiming>;
+    fn arrivals(&mut self, packet: &PacketInTransit) -> Vec<PacketTiming>;
 
     /// Duration of a tick, in seconds of the scenario.
     fn tick_s(&self) -> f64;

@@ -41,13 +41,13 @@ impl DistributedAirspace {
     }
 }
 
-fn airspace_run(run: &dyn Simulation) -> &AirspaceRun {
+fn downcast_airspace_run(run: &dyn Simulation) -> &AirspaceRun {
     let run: &dyn Any = run;
     run.downcast_ref().expect("it is a run of an airspace")
 }
 
 impl DistributedWorld for DistributedAirspace {
-    fn count(&self) -> usize {
+    fn agent_count(&self) -> usize {
         self.world.airplanes.len()
     }
 
@@ -57,7 +57,7 @@ impl DistributedWorld for DistributedAirspace {
 
     fn id(&self, name: &AgentName) -> Option<EntityId> {
         let id = name.number;
-        let exists = (id as usize) < self.count() && *name == self.name(id);
+        let exists = (id as usize) < self.agent_count() && *name == self.name(id);
         exists.then_some(id)
     }
 
@@ -69,7 +69,7 @@ impl DistributedWorld for DistributedAirspace {
         self.world.network.is_some()
     }
 
-    fn timeout_override(&self, _: f64) -> Option<String> {
+    fn response_timeout_override(&self, _: f64) -> Option<String> {
         // As long as a scenario may give: processes answer more slowly than agents in memory, and a shorter time would
         // repeat requests that are about to be answered.
         let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
@@ -77,9 +77,9 @@ impl DistributedWorld for DistributedAirspace {
     }
 
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
-        let run = airspace_run(run);
+        let run = downcast_airspace_run(run);
         let out_of_range: BTreeMap<EntityId, Vec<EntityId>> =
-            run.out_of_radio_range().into_iter().collect();
+            run.unreachable_members().into_iter().collect();
         let mut agent_percepts = Vec::new();
         for percept in run.percepts() {
             let agent = percept.own.id;
@@ -93,17 +93,17 @@ impl DistributedWorld for DistributedAirspace {
         agent_percepts
     }
 
-    fn invalid_controls(
+    fn find_invalid_controls(
         &self,
         run: &dyn Simulation,
         controls: &SerializedControls,
     ) -> Vec<InvalidControl> {
-        let invalid = airspace_run(run).invalid_controls(controls).into_iter();
+        let invalid = downcast_airspace_run(run).find_invalid_controls(controls).into_iter();
         invalid.map(|(agent, reason)| InvalidControl { agent, reason }).collect()
     }
 
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram> {
-        let pilot = Pilot::new(self.world.clone(), agent, Default::default()).with_build(build);
+        let pilot = Pilot::new(self.world.clone(), agent, Default::default()).with_build_id(build);
         Box::new(PilotProgram {
             world: self.world.clone(),
             pilot,

@@ -63,7 +63,7 @@ impl Default for ArqLink {
 
 /// What has to be sent to the other end now.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct DueMessages {
+pub(crate) struct DueRetransmissions {
     /// Messages to retransmit, with their sequence numbers.
     pub(crate) retransmissions: Vec<(u64, Arc<Message>)>,
     /// Whether an acknowledgment is due in a frame of its own.
@@ -72,7 +72,7 @@ pub(crate) struct DueMessages {
 
 impl ArqLink {
     /// Keeps a message until it is acknowledged, and returns its sequence number.
-    pub(crate) fn send(&mut self, message: Arc<Message>, now: Duration) -> u64 {
+    pub(crate) fn push_unacked(&mut self, message: Arc<Message>, now: Duration) -> u64 {
         self.unacked.push_back(message);
         self.oldest_since.get_or_insert(now);
         self.retransmit_at.get_or_insert(now + self.retransmit_delay);
@@ -80,7 +80,7 @@ impl ArqLink {
     }
 
     /// Returns the cumulative acknowledgment for the next frame to the other end; no frame of its own is due for it then.
-    pub(crate) fn take_cumulative_ack(&mut self) -> u64 {
+    pub(crate) fn take_outgoing_ack(&mut self) -> u64 {
         self.acknowledge_at = None;
         self.next_received
     }
@@ -111,8 +111,8 @@ impl ArqLink {
     }
 
     /// Returns what is due by now, and sets the time of the next retransmission.
-    pub(crate) fn take_due(&mut self, now: Duration) -> DueMessages {
-        let mut due = DueMessages::default();
+    pub(crate) fn take_due_retransmissions(&mut self, now: Duration) -> DueRetransmissions {
+        let mut due = DueRetransmissions::default();
         if self.retransmit_at.is_some_and(|at| at <= now) {
             let sequence = (self.oldest..).zip(&self.unacked).take(MAX_RETRANSMIT_BURST);
             due.retransmissions =
@@ -134,7 +134,7 @@ impl ArqLink {
     }
 
     /// Returns the time at which frames are due next.
-    pub(crate) fn next_due(&self) -> Option<Duration> {
+    pub(crate) fn next_send_time(&self) -> Option<Duration> {
         self.retransmit_at.into_iter().chain(self.acknowledge_at).min()
     }
 
@@ -173,7 +173,7 @@ mod tests {
         }
 
         fn transmit(&mut self, from: usize, message: Option<(u64, Arc<Message>)>) {
-            let ack = self.links[from].take_cumulative_ack();
+            let ack = self.links[from].take_outgoing_ack();
             self.in_transit.push((1 - from, (ack, message)));
         }
 
@@ -189,7 +189,7 @@ mod tests {
         fn step(&mut self) {
             self.now += STEP;
             for from in 0..2 {
-                let due = self.links[from].take_due(self.now);
+                let due = self.links[from].take_due_retransmissions(self.now);
                 let acknowledges = due.acknowledge;
                 due.retransmissions
                     .into_iter()
@@ -209,7 +209,7 @@ mod tests {
         ) {
             let mut pair = Pair::new();
             for sequence in 0..count {
-                let assigned = pair.links[0].send(message(sequence), pair.now);
+                let assigned = pair.links[0].push_unacked(message(sequence), pair.now);
                 prop_assert_eq!(assigned, sequence);
                 pair.transmit(0, Some((sequence, message(sequence))));
             }
@@ -245,25 +245,25 @@ mod tests {
     #[test]
     fn a_message_is_retransmitted_less_and_less_often_until_it_is_acknowledged() {
         let mut link = ArqLink::default();
-        link.send(message(0), Duration::ZERO);
+        link.push_unacked(message(0), Duration::ZERO);
         let mut times = Vec::new();
         while times.len() < 6 {
-            let at = link.next_due().expect("it waits");
-            assert_eq!(link.take_due(at).retransmissions, [(0, message(0))]);
+            let at = link.next_send_time().expect("it waits");
+            assert_eq!(link.take_due_retransmissions(at).retransmissions, [(0, message(0))]);
             times.push(at.as_millis());
         }
         assert_eq!(times, [200, 600, 1400, 3000, 5000, 7000]);
         link.on_ack(1, Duration::from_secs(8));
-        assert!(link.has_delivered() && link.next_due().is_none());
+        assert!(link.has_delivered() && link.next_send_time().is_none());
     }
 
     #[test]
     fn a_number_that_was_never_sent_is_no_harm() {
         let mut link = ArqLink::default();
-        link.send(message(0), Duration::ZERO);
+        link.push_unacked(message(0), Duration::ZERO);
         link.on_ack(u64::MAX, Duration::ZERO);
         assert!(link.has_delivered());
-        assert_eq!(link.send(message(1), Duration::ZERO), 1);
+        assert_eq!(link.push_unacked(message(1), Duration::ZERO), 1);
     }
 
     #[test]
@@ -272,7 +272,7 @@ mod tests {
         let (mut link, message) = (ArqLink::default(), Arc::new(Message::Hello));
         assert_eq!(link.unacked_since(), None);
         for second in 1..4 {
-            link.send(message.clone(), at(second));
+            link.push_unacked(message.clone(), at(second));
         }
         assert_eq!(link.unacked_since(), Some(at(1)));
         link.on_ack(2, at(8));

@@ -10,7 +10,9 @@ use crate::protocol::CycleStart;
 use crate::recent_senders::{RecentSenders, drop_counts};
 use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
-use sidestep::worlds::chain::agents::{ChainControls, ConnectorAgent, ConnectorPercept as Percept};
+use sidestep::worlds::chain::agents::{
+    ChainAgentControls, ConnectorAgent, ConnectorPercept as Percept,
+};
 use sidestep::worlds::chain::{ChainRun, ChainWorld, Deployment};
 use sidestep_session::fleet::AgentName;
 use std::any::Any;
@@ -39,7 +41,7 @@ impl<const D: usize> DistributedChains<D> {
         Ok(Self { world })
     }
 
-    fn chain_run<'a>(&self, run: &'a dyn Simulation) -> &'a ChainRun<D> {
+    fn downcast_chain_run<'a>(&self, run: &'a dyn Simulation) -> &'a ChainRun<D> {
         let run: &dyn Any = run;
         run.downcast_ref().expect("it is a run of these chains")
     }
@@ -50,7 +52,7 @@ impl<const D: usize> DistributedChains<D> {
     }
 
     /// Returns the neighbors that a connector's radio does not reach, in ascending order.
-    fn unreachable_neighbors(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
+    fn out_of_range_neighbors(&self, agent: EntityId, percept: &Percept<D>) -> Vec<EntityId> {
         let range_m = self.world.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
         let neighbors =
             [agent.wrapping_sub(1), agent + 1].into_iter().zip(percept.neighbor_distances_m());
@@ -66,7 +68,7 @@ impl<const D: usize> DistributedChains<D> {
 const CONNECTOR: &str = "connector";
 
 impl<const D: usize> DistributedWorld for DistributedChains<D> {
-    fn count(&self) -> usize {
+    fn agent_count(&self) -> usize {
         // Chains are numbered from 0 on; one that does not exist has no connectors.
         let connectors = (0..).map(|chain| self.world.connector_count(chain) as usize);
         connectors.take_while(|&count| count > 0).sum()
@@ -92,7 +94,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         self.world.network.is_some()
     }
 
-    fn timeout_override(&self, speed: f64) -> Option<String> {
+    fn response_timeout_override(&self, speed: f64) -> Option<String> {
         let patience_s = RETRY_DELAY_FRACTION * self.cycle_s();
         if let Some(network) = &self.world.network {
             let given_s = network.patience_s;
@@ -111,16 +113,16 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         true
     }
 
-    fn keeps_controls_of_lost_nodes(&self) -> bool {
+    fn accepts_controls_of_lost_nodes(&self) -> bool {
         // What it has sent its neighbors since its decision may be lost with it: they may have decided otherwise, and a rod
         // would tear if only one of its ends moved.
         false
     }
 
     fn percepts(&self, run: &dyn Simulation) -> Vec<AgentPercept> {
-        let run = self.chain_run(run);
+        let run = self.downcast_chain_run(run);
         let mut agent_percepts = Vec::new();
-        for (chain, percepts) in self.world.percepts_at(run.state(), run.cycle()) {
+        for (chain, percepts) in self.world.percepts_in_cycle(run.state(), run.cycle()) {
             let n = percepts.len() as u32;
             let first = self.world.connector_id(chain, 0).expect("a chain has connectors");
             let group: Vec<EntityId> = (first..first + n).collect();
@@ -128,7 +130,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
                 let start = CycleStart {
                     cycle: percept.cycle,
                     percept: postcard::to_stdvec(percept).expect("percepts are plain data"),
-                    out_of_range: self.unreachable_neighbors(agent, percept),
+                    out_of_range: self.out_of_range_neighbors(agent, percept),
                 };
                 agent_percepts.push(AgentPercept { agent, group: group.clone(), start });
             }
@@ -138,7 +140,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
     }
 
     fn max_further_rounds(&self, run: &dyn Simulation, groups: usize) -> usize {
-        let run = self.chain_run(run);
+        let run = self.downcast_chain_run(run);
         let undecided = (0..run.state().len())
             .filter(|&chain| !run.state().has_submitted_controls(chain, run.cycle()))
             .count();
@@ -153,13 +155,16 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         controls: &mut SerializedControls,
         lost: &[EntityId],
     ) -> Vec<InvalidControl> {
-        let run = self.chain_run(run);
-        let invalid = self.invalid_controls(run, controls);
+        let run = self.downcast_chain_run(run);
+        let invalid = self.find_invalid_controls(run, controls);
         controls.retain(|(agent, _)| invalid.iter().all(|one| one.agent != *agent));
         // The neighbors of a lost connector have decided without its answers: the world must know that it was absent.
-        controls.extend(lost.iter().map(|&id| (id, ChainControls::<D>::ABSENT_CONTROL.to_vec())));
-        let by_chain = self.world.read_controls(run.cycle(), controls).expect("all are valid");
-        let mut by_chain: Vec<Option<ChainControls<D>>> = by_chain.into_iter().map(Some).collect();
+        controls
+            .extend(lost.iter().map(|&id| (id, ChainAgentControls::<D>::ABSENT_CONTROL.to_vec())));
+        let by_chain =
+            self.world.decode_agent_controls(run.cycle(), controls).expect("all are valid");
+        let mut by_chain: Vec<Option<ChainAgentControls<D>>> =
+            by_chain.into_iter().map(Some).collect();
         for group in groups {
             let (chain, _) = self.chain_and_number(group[0]);
             let controls = by_chain[chain as usize].take().expect("a chain decides once a cycle");
@@ -168,7 +173,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         invalid
     }
 
-    fn invalid_controls(
+    fn find_invalid_controls(
         &self,
         run: &dyn Simulation,
         controls: &SerializedControls,

@@ -7,7 +7,7 @@ use sidestep_session::fleet::AgentName;
 /// A world of agents with programs of their own.
 pub trait DistributedWorld: Send + Sync {
     /// Number of agents; their ids on the network are those below.
-    fn count(&self) -> usize;
+    fn agent_count(&self) -> usize;
 
     /// Returns the name by which users call an agent.
     fn name(&self, agent: EntityId) -> AgentName;
@@ -24,7 +24,7 @@ pub trait DistributedWorld: Send + Sync {
     /// Returns the change of the scenario, as `key=value`, that gives agents a timeout for the answers of others, where
     /// time passes `speed` times as fast: without one they would wait forever for an agent whose node is lost. None where
     /// the scenario's own timeout will do.
-    fn timeout_override(&self, speed: f64) -> Option<String>;
+    fn response_timeout_override(&self, speed: f64) -> Option<String>;
 
     /// Returns whether a fleet in lockstep waits for a lost node to be replaced. Otherwise it ends.
     fn waits_for_lost_nodes(&self) -> bool {
@@ -41,13 +41,13 @@ pub trait DistributedWorld: Send + Sync {
     }
 
     /// Returns whether a control counts if it arrived before the node of its agent was lost.
-    fn keeps_controls_of_lost_nodes(&self) -> bool {
+    fn accepts_controls_of_lost_nodes(&self) -> bool {
         true
     }
 
     /// Receives the controls of a round with the given groups, where later rounds depend on them, and removes invalid
     /// ones, which it returns. `lost` are the agents without a node; `controls` has none of theirs unless these count
-    /// ([`DistributedWorld::keeps_controls_of_lost_nodes`]).
+    /// ([`DistributedWorld::accepts_controls_of_lost_nodes`]).
     fn accept_controls(
         &self,
         _run: &dyn Simulation,
@@ -59,7 +59,7 @@ pub trait DistributedWorld: Send + Sync {
     }
 
     /// Returns the controls of the present cycle that cannot be read or carried out.
-    fn invalid_controls(
+    fn find_invalid_controls(
         &self,
         run: &dyn Simulation,
         controls: &SerializedControls,
@@ -75,7 +75,7 @@ pub trait DistributedWorld: Send + Sync {
     ///
     /// # Errors
     /// When there is no such agent.
-    fn find(&self, name: &AgentName) -> Result<EntityId, InputError> {
+    fn find_agent(&self, name: &AgentName) -> Result<EntityId, InputError> {
         self.id(name).ok_or_else(|| {
             let cause = format!("the scenario has no {} {name}", name.noun);
             InputError::new(name.option(), cause, self.agent_hint())
@@ -84,7 +84,7 @@ pub trait DistributedWorld: Send + Sync {
 
     /// Returns a remedy that lists the existing agents, by the option that selects one.
     fn agent_hint(&self) -> String {
-        let last = self.name(self.count().saturating_sub(1) as EntityId);
+        let last = self.name(self.agent_count().saturating_sub(1) as EntityId);
         format!("give {} to {last}", self.name(0).option())
     }
 }

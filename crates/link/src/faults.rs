@@ -1,18 +1,18 @@
 //! The faults of a scenario's network, for the packets of one agent.
 
-use crate::agent::{ChannelModel, PacketTiming, Transmission};
+use crate::agent::{ChannelModel, PacketInTransit, PacketTiming};
 use sidestep::kernel::network::FaultInjector;
 use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// Returns the first ticks of a cycle's conversations, each with its time in seconds after the start of the run.
-type ConversationStarts = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
+type ConversationTimesFn = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
 
 /// The faults of the scenario's network, for the packets of one agent.
 pub(crate) struct FaultyChannel {
     injector: FaultInjector,
     sender: EntityId,
-    conversation_starts: ConversationStarts,
+    conversation_starts: ConversationTimesFn,
 }
 
 impl FaultyChannel {
@@ -27,8 +27,8 @@ impl FaultyChannel {
 }
 
 impl ChannelModel for FaultyChannel {
-    fn arrivals(&mut self, packet: &Transmission) -> Vec<PacketTiming> {
-        let &Transmission { to, tick, sequence, bytes } = packet;
+    fn arrivals(&mut self, packet: &PacketInTransit) -> Vec<PacketTiming> {
+        let &PacketInTransit { to, tick, sequence, bytes } = packet;
         let envelope = Envelope {
             // A transport of the kernel counts ticks where an envelope has its cycle.
             cycle: tick,

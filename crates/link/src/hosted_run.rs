@@ -47,11 +47,11 @@ impl HostedRun {
 
     /// Returns the agents that have nodes, in ascending order.
     pub fn all_agents(&self) -> impl Iterator<Item = EntityId> + use<> {
-        0..self.world.count() as EntityId
+        0..self.world.agent_count() as EntityId
     }
 
     /// Returns the name of an agent for people, e.g. `airplane 3`.
-    pub fn agent_label(&self, agent: EntityId) -> String {
+    pub fn agent_display_name(&self, agent: EntityId) -> String {
         let name = self.world.name(agent);
         format!("{} {name}", name.noun)
     }
@@ -103,7 +103,7 @@ impl HostedRun {
         // A simulation takes all controls or none. So the check of each by itself, which costs as much again, is made only
         // if there is an invalid one.
         if self.run.simulation_mut().submit_controls(&controls).is_err() {
-            invalid = self.world.invalid_controls(self.simulation(), &controls);
+            invalid = self.world.find_invalid_controls(self.simulation(), &controls);
             controls.retain(|(agent, _)| invalid.iter().all(|one| one.agent != *agent));
             let submitted = self.run.simulation_mut().submit_controls(&controls);
             submitted

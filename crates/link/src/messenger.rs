@@ -1,8 +1,8 @@
 //! A peer's messages to and from all others over one wire: best-effort ones, which may be lost, and reliable ones.
 
 use crate::arq::ArqLink;
-use crate::protocol::{FleetMember, Incarnation, Message, MessageFrame, RecipientHeader};
-use crate::wire::{Peer, Wire, WireError};
+use crate::protocol::{FleetMember, Incarnation, Message, RecipientHeader, TransportFrame};
+use crate::wire::{PeerId, Wire, WireSetupError};
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
@@ -47,11 +47,11 @@ struct PeerState {
 
 impl PeerState {
     /// Returns the recipient of a frame to this peer; `sequence` is that of a reliable message.
-    fn recipient_header(&mut self, peer: Peer, sequence: Option<u64>) -> RecipientHeader {
+    fn recipient_header(&mut self, peer: PeerId, sequence: Option<u64>) -> RecipientHeader {
         RecipientHeader {
             peer,
             incarnation: Some(self.incarnation),
-            ack: self.link.take_cumulative_ack(),
+            ack: self.link.take_outgoing_ack(),
             sequence,
         }
     }
@@ -61,7 +61,7 @@ impl PeerState {
 #[derive(Debug, PartialEq)]
 pub struct ReceivedMessage {
     /// The sender.
-    pub from: Peer,
+    pub from: PeerId,
     /// The sender's incarnation.
     pub incarnation: Incarnation,
     /// The message; reliable ones of a sender come in order.
@@ -70,18 +70,18 @@ pub struct ReceivedMessage {
 
 /// A peer's reliable and best-effort messages to and from all other peers.
 pub struct Messenger {
-    me: Peer,
+    me: PeerId,
     incarnation: Incarnation,
     wire: Box<dyn Wire>,
     started: Instant,
     /// The peers with which it has connected.
-    peers: BTreeMap<Peer, PeerState>,
+    peers: BTreeMap<PeerId, PeerState>,
     stats: MessengerStats,
 }
 
 impl Messenger {
     /// Returns the messenger of a peer in a new incarnation, not connected with any other.
-    pub fn new(me: Peer, wire: Box<dyn Wire>) -> Self {
+    pub fn new(me: PeerId, wire: Box<dyn Wire>) -> Self {
         Self {
             me,
             incarnation: new_incarnation(),
@@ -103,7 +103,7 @@ impl Messenger {
     }
 
     /// Returns whether all reliable messages to another peer were acknowledged, or the two are not connected.
-    pub fn has_delivered_to(&self, peer: Peer) -> bool {
+    pub fn has_delivered_to(&self, peer: PeerId) -> bool {
         self.peers.get(&peer).is_none_or(|state| state.link.has_delivered())
     }
 
@@ -113,7 +113,7 @@ impl Messenger {
 
     /// Connects with one incarnation of another peer, so that reliable messages can be exchanged. Those that an earlier
     /// incarnation has not acknowledged are lost with it.
-    pub fn connect(&mut self, peer: Peer, incarnation: Incarnation) {
+    pub fn connect(&mut self, peer: PeerId, incarnation: Incarnation) {
         let is_connected =
             self.peers.get(&peer).is_some_and(|state| state.incarnation == incarnation);
         if !is_connected {
@@ -124,12 +124,12 @@ impl Messenger {
     }
 
     /// Ends the exchange with another peer; reliable messages that it has not acknowledged are lost.
-    pub fn disconnect(&mut self, peer: Peer) {
+    pub fn disconnect(&mut self, peer: PeerId) {
         self.peers.remove(&peer);
     }
 
     /// Returns the time since a connected peer was last heard.
-    pub fn silent_for(&self, peer: Peer) -> Option<Duration> {
+    pub fn silent_for(&self, peer: PeerId) -> Option<Duration> {
         let last_heard = self.peers.get(&peer)?.last_heard;
         Some(self.now().saturating_sub(last_heard))
     }
@@ -137,7 +137,7 @@ impl Messenger {
     /// Returns whether the direct link to another node is half-open: no message arrives there, and the link's other end
     /// has left probes unanswered for the given time.
     pub fn is_half_open(&mut self, member: &FleetMember, within: Duration) -> bool {
-        let state = self.peers.get(&Peer::Node(member.agent));
+        let state = self.peers.get(&PeerId::Node(member.agent));
         let Some(since) = state.and_then(|state| state.link.unacked_since()) else { return false };
         self.now().saturating_sub(since) > LINK_CHECK_TIMEOUT
             && self.wire.is_half_open(member, within)
@@ -147,7 +147,7 @@ impl Messenger {
     ///
     /// # Errors
     /// When an endpoint cannot be bound again: everything goes through the server then, and the call can be repeated.
-    pub fn reopen_links(&mut self) -> Result<(), WireError> {
+    pub fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         self.wire.reopen_links()
     }
 
@@ -157,12 +157,12 @@ impl Messenger {
     }
 
     /// Sends a message that may be lost.
-    pub fn send_best_effort(&mut self, to: Peer, message: Message) {
+    pub fn send_best_effort(&mut self, to: PeerId, message: Message) {
         self.multicast_best_effort(&[to], &message);
     }
 
     /// Sends a message that may be lost to several peers.
-    pub fn multicast_best_effort(&mut self, to: &[Peer], message: &Message) {
+    pub fn multicast_best_effort(&mut self, to: &[PeerId], message: &Message) {
         let mut recipients = Vec::with_capacity(to.len());
         for &peer in to {
             recipients.push(match self.peers.get_mut(&peer) {
@@ -170,25 +170,25 @@ impl Messenger {
                 None => RecipientHeader { peer, incarnation: None, ack: 0, sequence: None },
             });
         }
-        self.transmit(recipients, Some(message));
+        self.send_frame(recipients, Some(message));
     }
 
     /// Sends a message that may be lost to one incarnation of another peer, whether or not it is the connected one: a
     /// second process for an agent that has a node already must be answered, too.
-    pub fn reply(&mut self, to: Peer, incarnation: Incarnation, message: Message) {
+    pub fn reply(&mut self, to: PeerId, incarnation: Incarnation, message: Message) {
         let recipient =
             RecipientHeader { peer: to, incarnation: Some(incarnation), ack: 0, sequence: None };
-        self.transmit(vec![recipient], Some(&message));
+        self.send_frame(vec![recipient], Some(&message));
     }
 
     /// Sends a message that is retransmitted until it has arrived; it is lost if the peer is not connected.
-    pub fn send_reliable(&mut self, to: Peer, message: Message) {
+    pub fn send_reliable(&mut self, to: PeerId, message: Message) {
         self.multicast_reliable(&[to], message);
     }
 
     /// Sends a message to several peers, to each of which it is retransmitted until it has arrived there; it is lost for
     /// peers that are not connected.
-    pub fn multicast_reliable(&mut self, to: &[Peer], message: Message) {
+    pub fn multicast_reliable(&mut self, to: &[PeerId], message: Message) {
         let now = self.now();
         let message = Arc::new(message);
         let mut recipients = Vec::with_capacity(to.len());
@@ -197,19 +197,19 @@ impl Messenger {
                 self.count_drop(drop_reason::STRANGER);
                 continue;
             };
-            let sequence = state.link.send(message.clone(), now);
+            let sequence = state.link.push_unacked(message.clone(), now);
             recipients.push(state.recipient_header(peer, Some(sequence)));
         }
-        self.transmit(recipients, Some(&message));
+        self.send_frame(recipients, Some(&message));
     }
 
-    fn transmit(&mut self, to: Vec<RecipientHeader>, message: Option<&Message>) {
+    fn send_frame(&mut self, to: Vec<RecipientHeader>, message: Option<&Message>) {
         if to.is_empty() {
             return;
         }
-        let peers: Vec<Peer> = to.iter().map(|recipient| recipient.peer).collect();
+        let peers: Vec<PeerId> = to.iter().map(|recipient| recipient.peer).collect();
         let frame =
-            MessageFrame { from: self.me, incarnation: self.incarnation, to, message }.encode();
+            TransportFrame { from: self.me, incarnation: self.incarnation, to, message }.encode();
         self.stats.frames += 1;
         self.stats.bytes += frame.len() as u64;
         self.wire.send(&peers, &frame);
@@ -224,21 +224,21 @@ impl Messenger {
         let now = self.now();
         let mut due_peers = Vec::new();
         for (&peer, state) in &self.peers {
-            if state.link.next_due().is_some_and(|at| at <= now) {
+            if state.link.next_send_time().is_some_and(|at| at <= now) {
                 due_peers.push(peer);
             }
         }
         for peer in due_peers {
             let Some(state) = self.peers.get_mut(&peer) else { continue };
-            let due = state.link.take_due(now);
+            let due = state.link.take_due_retransmissions(now);
             let recipient = state.recipient_header(peer, None);
             self.stats.retries += due.retransmissions.len() as u64;
             for (sequence, message) in due.retransmissions {
                 let recipient = RecipientHeader { sequence: Some(sequence), ..recipient };
-                self.transmit(vec![recipient], Some(&message));
+                self.send_frame(vec![recipient], Some(&message));
             }
             if due.acknowledge {
-                self.transmit(vec![recipient], None);
+                self.send_frame(vec![recipient], None);
             }
         }
     }
@@ -247,7 +247,11 @@ impl Messenger {
     ///
     /// # Errors
     /// When an endpoint cannot be bound.
-    pub fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
+    pub fn connect_mesh(
+        &mut self,
+        me: EntityId,
+        members: &[FleetMember],
+    ) -> Result<(), WireSetupError> {
         self.wire.connect_mesh(me, members)
     }
 
@@ -259,7 +263,8 @@ impl Messenger {
             self.send_due();
             let now = self.now();
             // Wakes up for retransmissions and acknowledgments that become due while it waits.
-            let next_due = self.peers.values().filter_map(|state| state.link.next_due()).min();
+            let next_due =
+                self.peers.values().filter_map(|state| state.link.next_send_time()).min();
             let wake_at = next_due.map_or(until, |due| due.min(until));
             if let Some(bytes) = self.wire.receive(wake_at.saturating_sub(now)) {
                 if let Some(received) = self.decode_frame(&bytes) {
@@ -272,14 +277,14 @@ impl Messenger {
     }
 
     fn decode_frame(&mut self, bytes: &[u8]) -> Option<ReceivedMessage> {
-        let frame = match MessageFrame::decode(bytes) {
+        let frame = match TransportFrame::decode(bytes) {
             Ok(frame) => frame,
             Err(reason) => {
                 self.count_drop(reason.name());
                 return None;
             }
         };
-        let MessageFrame { from, incarnation, to, message } = frame;
+        let TransportFrame { from, incarnation, to, message } = frame;
         // A frame for most nodes is published to all of them, so some frames are not for this peer.
         let recipient = to.into_iter().find(|recipient| recipient.peer == self.me)?;
         // A frame to the process that was here before has sequence numbers that mean nothing to this one.
@@ -297,7 +302,7 @@ impl Messenger {
     /// Processes the acknowledgment and the sequence number of a frame; an error is the reason why its message is dropped.
     fn process_header(
         &mut self,
-        from: Peer,
+        from: PeerId,
         incarnation: Incarnation,
         header: &RecipientHeader,
     ) -> Result<(), &'static str> {
@@ -341,7 +346,7 @@ mod tests {
     }
 
     impl Wire for Lossy {
-        fn send(&mut self, to: &[Peer], frame: &[u8]) {
+        fn send(&mut self, to: &[PeerId], frame: &[u8]) {
             match self.drops {
                 0 => self.wire.send(to, frame),
                 _ => {
@@ -356,14 +361,14 @@ mod tests {
         }
     }
 
-    fn messenger(hub: &MemoryHub, me: Peer, drops: usize) -> Messenger {
-        Messenger::new(me, Box::new(Lossy { wire: Box::new(hub.peer_wire(me)), drops }))
+    fn messenger(hub: &MemoryHub, me: PeerId, drops: usize) -> Messenger {
+        Messenger::new(me, Box::new(Lossy { wire: Box::new(hub.open_wire(me)), drops }))
     }
 
     #[test]
     fn a_reliable_message_arrives_although_its_frame_is_lost_and_a_best_effort_one_does_not() {
         let hub = MemoryHub::default();
-        let (a, b) = (Peer::Server, Peer::Node(3));
+        let (a, b) = (PeerId::Server, PeerId::Node(3));
         let (mut first, mut second) = (messenger(&hub, a, 2), messenger(&hub, b, 0));
         first.connect(b, second.incarnation());
         second.connect(a, first.incarnation());
@@ -389,7 +394,7 @@ mod tests {
     #[test]
     fn a_reliable_multicast_arrives_once_at_each_peer_in_the_order_of_its_link() {
         let hub = MemoryHub::default();
-        let [a, b, c] = [1, 2, 3].map(Peer::Node);
+        let [a, b, c] = [1, 2, 3].map(PeerId::Node);
         let mut first = messenger(&hub, a, 0);
         let mut peers = [b, c].map(|peer| messenger(&hub, peer, 0));
         first.connect(b, peers[0].incarnation());
@@ -397,7 +402,7 @@ mod tests {
         first.multicast_reliable(&[b, c], Message::Close(1));
         assert_eq!(first.stats().dropped["stranger"], 1, "one of them is not connected");
         first.connect(c, peers[1].incarnation());
-        first.wire = Box::new(Lossy { wire: Box::new(hub.peer_wire(a)), drops: 1 });
+        first.wire = Box::new(Lossy { wire: Box::new(hub.open_wire(a)), drops: 1 });
         first.multicast_reliable(&[b, c], Message::Close(2));
         for peer in &mut peers {
             peer.connect(a, first.incarnation());
@@ -416,7 +421,7 @@ mod tests {
     #[test]
     fn frames_to_a_former_incarnation_and_reliable_messages_of_strangers_are_dropped_and_counted() {
         let hub = MemoryHub::default();
-        let (a, b) = (Peer::Server, Peer::Node(3));
+        let (a, b) = (PeerId::Server, PeerId::Node(3));
         let (mut first, mut second) = (messenger(&hub, a, 0), messenger(&hub, b, 0));
         first.connect(b, Incarnation(17));
         first.send_reliable(b, Message::End);
@@ -427,7 +432,7 @@ mod tests {
         first.send_reliable(b, Message::End);
         assert_eq!(second.receive(SOON), None, "it has not connected with the server");
         assert_eq!(second.stats().dropped["stranger"], 1);
-        hub.peer_wire(Peer::Node(9)).send(&[b], b"something else");
+        hub.open_wire(PeerId::Node(9)).send(&[b], b"something else");
         assert_eq!(second.receive(SOON), None);
         assert_eq!(second.stats().dropped["foreign"], 1);
     }

@@ -6,14 +6,14 @@ use std::fmt;
 
 /// A participant of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Peer {
+pub enum PeerId {
     /// The server of the world.
     Server,
     /// The node of an agent.
     Node(EntityId),
 }
 
-impl fmt::Display for Peer {
+impl fmt::Display for PeerId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Server => write!(f, "server"),

@@ -3,7 +3,7 @@
 //! A frame is a magic number with the version of this format, followed by postcard. An unreadable frame is counted
 //! and dropped: a foreign program on the same network must not be able to stop a fleet.
 
-use crate::peer::Peer;
+use crate::peer::PeerId;
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{ClockMode, Topology};
@@ -20,9 +20,9 @@ pub struct Incarnation(pub u64);
 
 /// A frame on a wire: a message for some peers, or only acknowledgments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MessageFrame<M = Message> {
+pub struct TransportFrame<M = Message> {
     /// The sender.
-    pub from: Peer,
+    pub from: PeerId,
     /// The sender's incarnation.
     pub incarnation: Incarnation,
     /// The receivers; another peer that gets the frame ignores it.
@@ -35,7 +35,7 @@ pub struct MessageFrame<M = Message> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecipientHeader {
     /// The receiver.
-    pub peer: Peer,
+    pub peer: PeerId,
     /// Its incarnation, if the sender knows it.
     pub incarnation: Option<Incarnation>,
     /// Cumulative acknowledgment: the sender has received all reliable messages of the receiver below this number.
@@ -57,7 +57,7 @@ pub enum Message {
     /// Server to node, best-effort: the node may not join, or has lost its place, with the reasons.
     Refused(JoinError),
     /// Node to server, best-effort: its status.
-    Status(Status),
+    Status(NodeStatusReport),
     /// Server to node: all nodes, sent when they are complete or have changed.
     Roster(Vec<FleetMember>),
     /// Node to node: a test whether the other one receives it; the acknowledgment is the answer.
@@ -71,7 +71,7 @@ pub enum Message {
     /// Node to server: it has done a tick.
     TickDone(AdvanceDone),
     /// Node to node: packets of a conversation, sent in one step.
-    Packets(Vec<Packet>),
+    Packets(Vec<AgentPacket>),
     /// Server to node: the cycle's conversations are over, or its time is up.
     Close(Cycle),
     /// Node to server: the agent's control.
@@ -179,7 +179,7 @@ pub struct AdvanceDone {
 
 /// A packet of a conversation between agents.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Packet {
+pub struct AgentPacket {
     /// The cycle of the conversation.
     pub cycle: Cycle,
     /// The tick in which its last byte left the sender.
@@ -223,7 +223,7 @@ pub struct Control {
 
 /// The state of a node, reported twice a second.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Status {
+pub struct NodeStatusReport {
     /// The cycle that it is in.
     pub cycle: Cycle,
     /// Name of its activity in the cycle, e.g. `optimize`.
@@ -255,14 +255,14 @@ pub enum DecodeError {
     TooLong,
 }
 
-impl<M: Serialize> MessageFrame<M> {
+impl<M: Serialize> TransportFrame<M> {
     /// Returns the frame as a wire carries it, the magic number first.
     pub fn encode(&self) -> Vec<u8> {
         postcard::to_extend(self, MAGIC.to_vec()).expect("frames are plain data")
     }
 }
 
-impl MessageFrame {
+impl TransportFrame {
     /// Reads a frame.
     ///
     /// # Errors
@@ -325,24 +325,24 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn frame(payload: Vec<u8>) -> MessageFrame {
-        let packet = Packet { cycle: 3, departs: 5, sequence: 7, arrives: 6, payload };
+    fn frame(payload: Vec<u8>) -> TransportFrame {
+        let packet = AgentPacket { cycle: 3, departs: 5, sequence: 7, arrives: 6, payload };
         let recipient = |id, sequence| RecipientHeader {
-            peer: Peer::Node(id),
+            peer: PeerId::Node(id),
             incarnation: Some(Incarnation(2)),
             ack: 11,
             sequence,
         };
         let to = vec![recipient(5, Some(9)), recipient(6, None)];
         let message = Some(Message::Packets(vec![packet.clone(), packet]));
-        MessageFrame { from: Peer::Node(4), incarnation: Incarnation(1), to, message }
+        TransportFrame { from: PeerId::Node(4), incarnation: Incarnation(1), to, message }
     }
 
     proptest! {
         #[test]
         fn frames_are_read_as_they_were_written(payload: Vec<u8>) {
             let frame = frame(payload);
-            prop_assert_eq!(MessageFrame::decode(&frame.encode()), Ok(frame));
+            prop_assert_eq!(TransportFrame::decode(&frame.encode()), Ok(frame));
         }
 
         #[test]
@@ -350,16 +350,16 @@ mod tests {
             if is_ours {
                 bytes.splice(0..0, MAGIC);
             }
-            let _ = MessageFrame::decode(&bytes);
+            let _ = TransportFrame::decode(&bytes);
         }
 
         #[test]
         fn a_frame_that_is_cut_short_or_goes_on_is_not_read(payload: Vec<u8>, cut in 0usize..40) {
             let mut bytes = frame(payload).encode();
             bytes.push(0);
-            prop_assert_eq!(MessageFrame::decode(&bytes), Err(DecodeError::Damaged));
+            prop_assert_eq!(TransportFrame::decode(&bytes), Err(DecodeError::Damaged));
             let length = bytes.len() - 2 - cut.min(bytes.len() - 2);
-            prop_assert!(MessageFrame::decode(&bytes[..length]).is_err());
+            prop_assert!(TransportFrame::decode(&bytes[..length]).is_err());
         }
     }
 }

@@ -139,7 +139,7 @@ impl RunFolder {
     }
 
     /// Replaces the checkpoint by the state before `cycle`.
-    /// [Seal](sidestep_kernel::ports::Recorder::seal) the recorder at `cycle` first: a kill between
+    /// [Seal](sidestep_kernel::ports::Recorder::make_durable) the recorder at `cycle` first: a kill between
     /// the two then loses only rows of later cycles, which the resumed run writes again.
     ///
     /// # Errors

@@ -163,7 +163,10 @@ mod tests {
     fn a_damaged_manifest_is_refused_where_it_is_damaged() {
         let whole = text();
         let error = read(&whole[..whole.len() / 2]).unwrap_err();
-        assert!(error.position().is_some() && error.cause().contains("no manifest"), "{error}");
+        assert!(
+            error.line_and_column().is_some() && error.cause().contains("no manifest"),
+            "{error}"
+        );
         assert!(read("").is_err());
         assert!(read("{}").is_err());
         assert!(read(&whole.replace("running", "sleeping")).is_err());

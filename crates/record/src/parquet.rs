@@ -3,7 +3,7 @@
 //! A table `trajectories` is the folder `trajectories/` of files `part-CYCLE.parquet`, which
 //! pyarrow, polars and DuckDB read as one table. While the run continues, the folder is called
 //! `trajectories.partial/`, and the part that is being written ends in `.parquet.partial`. Each
-//! checkpoint [seals](sidestep_kernel::ports::Recorder::seal) the part; the name of the next one is
+//! checkpoint [seals](sidestep_kernel::ports::Recorder::make_durable) the part; the name of the next one is
 //! the cycle at which it starts. So a folder without `.partial` holds every row of the run, and
 //! returning to a checkpoint at cycle C means deleting the parts that start at C or later.
 
@@ -48,7 +48,7 @@ impl ParquetRecorder {
     /// Continues the tables in `folder` at `cycle`: rows of that cycle and later ones are deleted,
     /// because the run is about to write them again. Cycle 0 starts from the beginning.
     ///
-    /// `cycle` must be one at which the recorder was [sealed](Recorder::seal).
+    /// `cycle` must be one at which the recorder was [sealed](Recorder::make_durable).
     ///
     /// # Errors
     /// A schema that cannot become a file; a cycle at which the recorder was not sealed; an I/O
@@ -85,7 +85,7 @@ impl Recorder for ParquetRecorder {
         self.run_unless_failed(|tables| tables[table].append(block))
     }
 
-    fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+    fn make_durable(&mut self, next_cycle: u64) -> Result<(), RecordError> {
         self.run_unless_failed(|tables| tables.iter_mut().try_for_each(|t| t.seal(next_cycle)))
     }
 

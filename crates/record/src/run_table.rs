@@ -25,7 +25,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{Cells, ColumnType, RecordError, RoleColumn, Values};
+use sidestep_kernel::ports::{Cells, ColumnType, ColumnWithRole, RecordError, Values};
 
 use crate::disk;
 use crate::format::{self, FormatVersion};
@@ -48,7 +48,7 @@ struct RoleColumnEntry {
 pub struct LoadedTable<R> {
     /// Its columns, all of the same length; those with a role that this version does not know are
     /// left out.
-    pub columns: Vec<RoleColumn<R>>,
+    pub columns: Vec<ColumnWithRole<R>>,
     /// Version of the program that wrote it.
     pub program_version: String,
 }
@@ -60,7 +60,7 @@ pub struct LoadedTable<R> {
 /// A column of a type that such files do not support; an I/O error. An earlier file stays then.
 pub fn write<R: Serialize>(
     path: &Path,
-    columns: &[&RoleColumn<R>],
+    columns: &[&ColumnWithRole<R>],
     program_version: &str,
     extra: &[(&str, String)],
 ) -> Result<(), RecordError> {
@@ -85,7 +85,7 @@ impl TableStream {
     /// A column of a type that such files do not support; an I/O error.
     pub fn create<R: Serialize>(
         path: &Path,
-        columns: &[&RoleColumn<R>],
+        columns: &[&ColumnWithRole<R>],
         program_version: &str,
         extra: &[(&str, String)],
     ) -> Result<Self, RecordError> {
@@ -106,7 +106,7 @@ impl TableStream {
 
     fn start<R>(
         &self,
-        columns: &[&RoleColumn<R>],
+        columns: &[&ColumnWithRole<R>],
         pairs: Vec<KeyValue>,
     ) -> ParquetResult<SerializedFileWriter<HashingWriter>> {
         let sink = HashingWriter { file: File::create(&self.partial)?, hash: self.hash.clone() };
@@ -120,11 +120,11 @@ impl TableStream {
     ///
     /// # Errors
     /// Another number or type of columns; an I/O error.
-    pub fn append<R>(&mut self, columns: &[&RoleColumn<R>]) -> Result<(), RecordError> {
+    pub fn append<R>(&mut self, columns: &[&ColumnWithRole<R>]) -> Result<(), RecordError> {
         self.append_groups(columns).map_err(|e| self.write_error(e))
     }
 
-    fn append_groups<R>(&mut self, columns: &[&RoleColumn<R>]) -> ParquetResult<()> {
+    fn append_groups<R>(&mut self, columns: &[&ColumnWithRole<R>]) -> ParquetResult<()> {
         let Some(writer) = &mut self.writer else { return Ok(()) };
         let rows = columns.first().map_or(0, |c| c.values.len());
         for start in (0..rows).step_by(GROUP_ROWS) {
@@ -175,7 +175,7 @@ fn properties(pairs: Vec<KeyValue>) -> WriterProperties {
 }
 
 fn key_values<R: Serialize>(
-    columns: &[&RoleColumn<R>],
+    columns: &[&ColumnWithRole<R>],
     program_version: &str,
     extra: &[(&str, String)],
 ) -> ParquetResult<Vec<KeyValue>> {
@@ -189,7 +189,7 @@ fn key_values<R: Serialize>(
     Ok(pairs)
 }
 
-fn entries_json<R: Serialize>(columns: &[&RoleColumn<R>]) -> serde_json::Result<String> {
+fn entries_json<R: Serialize>(columns: &[&ColumnWithRole<R>]) -> serde_json::Result<String> {
     let mut entries = Vec::with_capacity(columns.len());
     for column in columns {
         let role = serde_json::to_value(&column.role)?;
@@ -198,12 +198,12 @@ fn entries_json<R: Serialize>(columns: &[&RoleColumn<R>]) -> serde_json::Result<
     serde_json::to_string(&entries)
 }
 
-fn parquet_schema<R>(columns: &[&RoleColumn<R>]) -> ParquetResult<TypePtr> {
+fn parquet_schema<R>(columns: &[&ColumnWithRole<R>]) -> ParquetResult<TypePtr> {
     let fields = columns.iter().map(|column| field(column)).collect::<ParquetResult<_>>()?;
     Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
 }
 
-fn field<R>(column: &RoleColumn<R>) -> ParquetResult<TypePtr> {
+fn field<R>(column: &ColumnWithRole<R>) -> ParquetResult<TypePtr> {
     let (physical, logical) = match column.values.column_type() {
         ColumnType::I64 => (PhysicalType::INT64, None),
         ColumnType::F64 => (PhysicalType::DOUBLE, None),
@@ -225,7 +225,7 @@ fn wrong_type(column: &str, ty: ColumnType) -> ParquetError {
 
 fn write_column<R>(
     group: &mut SerializedRowGroupWriter<'_, HashingWriter>,
-    RoleColumn { name, values, .. }: &RoleColumn<R>,
+    ColumnWithRole { name, values, .. }: &ColumnWithRole<R>,
     rows: Range<usize>,
 ) -> ParquetResult<()> {
     let Some(mut column) = group.next_column()? else {
@@ -377,7 +377,7 @@ impl<R: DeserializeOwned + Clone> TableReader<R> {
         let mut columns = Vec::new();
         for ((name, role), values) in self.names.iter().zip(&self.roles).zip(values) {
             if let Some(role) = role.clone() {
-                columns.push(RoleColumn { name: name.clone(), role, values });
+                columns.push(ColumnWithRole { name: name.clone(), role, values });
             }
         }
         LoadedTable { columns, program_version: self.program_version.clone() }
@@ -460,11 +460,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn column(name: &str, values: Values) -> RoleColumn<String> {
-        RoleColumn { name: name.into(), role: "metric".into(), values }
+    fn column(name: &str, values: Values) -> ColumnWithRole<String> {
+        ColumnWithRole { name: name.into(), role: "metric".into(), values }
     }
 
-    fn back(columns: &[RoleColumn<String>]) -> Vec<RoleColumn<String>> {
+    fn back(columns: &[ColumnWithRole<String>]) -> Vec<ColumnWithRole<String>> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         write(

@@ -220,13 +220,13 @@ pub(crate) fn checksums_from_text(
 
 #[cfg(test)]
 mod tests {
-    use sidestep_kernel::ports::recorder::conformance_schemas;
+    use sidestep_kernel::ports::recorder::conformance_test_schemas;
 
     use super::*;
 
     #[test]
     fn columns_survive_their_json() {
-        for schema in conformance_schemas() {
+        for schema in conformance_test_schemas() {
             let text = columns_to_json(&schema.columns);
             assert_eq!(columns_from_json(&text).unwrap(), schema.columns);
         }
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn schemas_that_cannot_become_a_file_are_refused() {
-        let [good, labelled] = conformance_schemas().try_into().unwrap();
+        let [good, labelled] = conformance_test_schemas().try_into().unwrap();
         assert!(check_schema(&good).is_ok());
         let with = |change: &dyn Fn(&mut TableSchema)| {
             let mut schema = labelled.clone();

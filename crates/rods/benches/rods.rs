@@ -8,7 +8,7 @@ use cpu_time::ProcessTime;
 use sidestep_kernel::Seed;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_rods::geometry::{Point, add, add_scaled, first_axis, norm, normalized, scaled, sub};
+use sidestep_rods::geometry::{Point, add, add_scaled, norm, normalized, scaled, sub, unit_x};
 use sidestep_rods::{
     Chain, Connector, MotionOutcome, MotionRequest, Obstacle, Obstacles, Propagator, Rod, wavefront,
 };
@@ -53,7 +53,7 @@ fn snake(n: usize) -> Chain<3> {
         let u = [-1.0, bent * sin(i as f64 * 0.1), bent * cos(i as f64 * 0.07)];
         points.push(add_scaled(points[i - 1], normalized(u).expect("not zero"), 0.1));
     }
-    let rod = Rod::fixed(0.1, 0.01);
+    let rod = Rod::with_fixed_length(0.1, 0.01);
     Chain::new(points, vec![Connector::free(0.02); n], vec![rod; n - 1]).expect("right")
 }
 
@@ -103,7 +103,7 @@ fn pull_open(case: &OpenCase, to: impl Fn(Point<3>, usize) -> Point<3>) {
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;
-            let request = MotionRequest::operator_request(by, to(home, k));
+            let request = MotionRequest::from_operator(by, to(home, k));
             let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
             touched += outcome.motion().map_or(0, |moved| moved.touched.len());
         }
@@ -143,7 +143,7 @@ fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;
-            let request = MotionRequest::operator_request(0, head(k));
+            let request = MotionRequest::from_operator(0, head(k));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
             assert!(outcome.motion().is_some(), "nothing is in the way");
         }
@@ -181,14 +181,14 @@ fn field() {
         .filter(|(_, c)| c[0] > 0.6 || c[1] * c[1] + c[2] * c[2] > 0.6 * 0.6)
         .map(|(id, c)| Obstacle::ball(id, c, radius_m))
         .collect();
-    let rod = Rod::fixed(0.1, 0.02);
+    let rod = Rod::with_fixed_length(0.1, 0.02);
     let obstacles = Obstacles::new(balls, 0.14).expect("right");
-    let back = scaled(first_axis(), -1.0);
+    let back = scaled(unit_x(), -1.0);
     let mut chain =
         Chain::straight([0.0; 3], back, n - 1, rod, Connector::free(0.03)).expect("right");
     let mut propagator = Propagator::default();
     propagator.rules.step_m = Some(0.01);
-    let mut u = first_axis();
+    let mut u = unit_x();
     let (mut vetoes, mut own_vetoes, mut moves, mut rotated, mut touched) = (0, 0, 0, 0, 0);
     let started = ProcessTime::now();
     while moves < 4000 {
@@ -197,7 +197,7 @@ fn field() {
         // Near the border it heads home.
         let inward = if from.iter().any(|x| x.abs() > half_m - 1.0) { -0.1 } else { 0.0 };
         u = normalized(add_scaled(u, from, inward)).expect("not zero");
-        let request = MotionRequest::operator_request(0, add_scaled(from, u, 0.0099));
+        let request = MotionRequest::from_operator(0, add_scaled(from, u, 0.0099));
         match propagator.propagate(&mut chain, &obstacles, &request).expect("right") {
             MotionOutcome::Moved(moved) => {
                 moves += 1;
@@ -299,7 +299,7 @@ fn pull(width_m: f64, followers: usize, rod: Rod, look_at_every_step: bool) -> P
     let started = ProcessTime::now();
     for (at, _) in line[..line.len() - 100].iter().filter(|(at, _)| is_ahead(at)) {
         let way_m = norm(sub(*at, chain.points()[0]));
-        let request = MotionRequest::operator_request(0, *at);
+        let request = MotionRequest::from_operator(0, *at);
         let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
         steps += 1;
         match outcome {

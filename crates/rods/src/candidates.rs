@@ -2,21 +2,21 @@
 
 use super::chain::{Mobility, Rod};
 use super::geometry::{
-    ConvexCore, Cuboid, Point, add, add_scaled, angle_rad, distance, dot, first_axis, lerp, norm,
-    normalized, scaled, sub, with_dimensions,
+    ConvexCore, Cuboid, Point, add, add_scaled, angle_between_rad, convert_dimensions, distance,
+    dot, lerp, norm, normalized, scaled, sub, unit_x,
 };
 use super::interval::{
-    self, AngleInterval, MasterRod, TurnDirection, bend_forbidden_arc, block_rod, block_tip,
-    min_turn_rad,
+    self, AngleInterval, RodReach, TurnDirection, bend_forbidden_arc, block_rod, block_rod_tip,
+    min_turn_to_free_rad,
 };
 use super::motion_context::{
-    BlockingPart, BlockingPartOwner, MotionContext, PendingVeto, SKIN_M, SlaveStep,
+    BlockingPart, BlockingPartOwner, IncompleteVeto, MotionContext, SKIN_M, SlaveStep,
     is_length_allowed,
 };
 use super::obstacle::bounds_around;
 use super::reaction::{MasterMove, Reaction};
 use super::rules::RotationRule;
-use super::search::{DirectionSearch, cosine_of_half_angle, direction_off};
+use super::search::{DirectionSearch, blocking_half_angle_cosine, direction_at_angle};
 use super::veto::VetoReason;
 use std::f64::consts::PI;
 
@@ -51,7 +51,7 @@ pub(super) struct CandidateScratch<const D: usize> {
 
 /// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
 #[inline]
-pub(super) fn follow_guide_line<const D: usize>(
+pub(super) fn guide_line_position<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
     min_move_m: f64,
@@ -64,7 +64,7 @@ pub(super) fn follow_guide_line<const D: usize>(
     } else if d > 0.0 {
         add_scaled(mn, g, t / d)
     } else {
-        add_scaled(mn, normalized(sub(so, mo)).unwrap_or(first_axis()), t)
+        add_scaled(mn, normalized(sub(so, mo)).unwrap_or(unit_x()), t)
     }
 }
 
@@ -85,8 +85,8 @@ const MAX_BOX_ROUNDS: usize = 200;
 const ROUNDING: f64 = 1e-9;
 
 /// Direction of the guide line (A1), or of the old rod if the master is at the slave's place.
-fn guide_line<const D: usize>(step: &SlaveStep<D>) -> Point<D> {
-    normalized(sub(step.so, step.mn)).or(normalized(sub(step.so, step.mo))).unwrap_or(first_axis())
+fn guide_line_direction<const D: usize>(step: &SlaveStep<D>) -> Point<D> {
+    normalized(sub(step.so, step.mn)).or(normalized(sub(step.so, step.mo))).unwrap_or(unit_x())
 }
 
 impl<const D: usize> MotionContext<'_, D> {
@@ -96,18 +96,18 @@ impl<const D: usize> MotionContext<'_, D> {
         &self,
         step: &SlaveStep<D>,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         scratch.found.clear();
         scratch.has_other_side = false;
         let connector = &self.chain.connectors()[step.slave];
         if connector.is_still() {
-            return self.place_fixed(step, scratch);
+            return self.place_fixed_slave(step, scratch);
         }
         if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
-            return self.place_on_line(step, scratch);
+            return self.add_line_candidates(step, scratch);
         }
         let guided =
-            follow_guide_line([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+            guide_line_position([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
         if let Some(reaction) = self.reaction {
             return self.place_by_reaction(reaction, step, guided, scratch);
         }
@@ -117,7 +117,7 @@ impl<const D: usize> MotionContext<'_, D> {
         };
         // Lines and planes were handled above, so it is a box that forbids the place.
         if objection.reason == VetoReason::Mobility
-            && let Some(at) = self.place_in_box(step, guided)
+            && let Some(at) = self.project_into_box(step, guided)
             && self.check_slave(step, at).is_ok()
         {
             scratch.found.push(CandidatePosition { at, rotated: false, turn_rad: 0.0 });
@@ -126,7 +126,7 @@ impl<const D: usize> MotionContext<'_, D> {
         match self.rules.rotation {
             RotationRule::Never => Err(objection),
             RotationRule::Literal => self.rotate_once(step, guided, scratch),
-            RotationRule::Union => self.rotate(step, guided, objection, scratch),
+            RotationRule::Union => self.find_rotated_places(step, guided, objection, scratch),
         }
     }
 
@@ -137,41 +137,41 @@ impl<const D: usize> MotionContext<'_, D> {
         step: &SlaveStep<D>,
         guided: Point<D>,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         let check = |at_m: Point<3>| {
-            let checked = self.check_rod_and_place(step, with_dimensions(at_m));
+            let checked = self.check_rod_and_place(step, convert_dimensions(at_m));
             checked.map_err(|objection| objection.reason)
         };
         let percept = MasterMove {
-            at_m: with_dimensions(step.so),
-            master_from_m: with_dimensions(step.mo),
-            master_to_m: with_dimensions(step.mn),
-            behind_master_m: step.prev.map(with_dimensions),
-            guided_m: with_dimensions(guided),
+            at_m: convert_dimensions(step.so),
+            master_from_m: convert_dimensions(step.mo),
+            master_to_m: convert_dimensions(step.mn),
+            behind_master_m: step.prev.map(convert_dimensions),
+            guided_m: convert_dimensions(guided),
             rod_m: [step.rod.min_m, step.rod.max_m],
             radius_m: step.tip_radius_m,
             max_bend_rad: step.max_bend_rad,
             check: &check,
         };
-        let at = with_dimensions(reaction.react(&percept).map_err(PendingVeto::new)?);
+        let at = convert_dimensions(reaction.react(&percept).map_err(IncompleteVeto::new)?);
         self.check_rod_and_place(step, at)?;
         scratch.found.push(CandidatePosition { at, rotated: at != guided, turn_rad: 0.0 });
         Ok(())
     }
 
     /// Checks a place of a slave that may be at any distance from its master.
-    fn check_rod_and_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
+    fn check_rod_and_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), IncompleteVeto> {
         // No comparison holds for a coordinate that is no number.
         if !is_length_allowed(step.rod, distance(step.mn, at)) {
             // A rod out of its limits has no reason of its own: it limits where its slave may be.
-            return Err(PendingVeto::new(VetoReason::Mobility));
+            return Err(IncompleteVeto::new(VetoReason::Mobility));
         }
         self.check_place(step, at)
     }
 
     /// Returns a position that the rod allows for a slave confined to a box, by alternating projections
     /// onto the box and onto the rod's lengths.
-    fn place_in_box(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
+    fn project_into_box(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
         let mobility = &self.chain.connectors()[step.slave].mobility;
         let mut at = guided;
         for _ in 0..MAX_BOX_ROUNDS {
@@ -186,21 +186,21 @@ impl<const D: usize> MotionContext<'_, D> {
         None
     }
 
-    fn check_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), PendingVeto> {
+    fn check_place(&self, step: &SlaveStep<D>, at: Point<D>) -> Result<(), IncompleteVeto> {
         if !self.may_be_at(step.slave, at) {
-            return Err(PendingVeto::new(VetoReason::Mobility));
+            return Err(IncompleteVeto::new(VetoReason::Mobility));
         }
         self.check_slave(step, at)
     }
 
     /// Handles a slave that never moves: it objects unless the rod is within its limits as it is.
-    fn place_fixed(
+    fn place_fixed_slave(
         &self,
         step: &SlaveStep<D>,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         if !is_length_allowed(step.rod, distance(step.mn, step.so)) {
-            return Err(PendingVeto::new(self.chain.connectors()[step.slave].still_reason()));
+            return Err(IncompleteVeto::new(self.chain.connectors()[step.slave].still_reason()));
         }
         self.check_slave(step, step.so)?;
         scratch.found.push(CandidatePosition { at: step.so, rotated: false, turn_rad: 0.0 });
@@ -208,25 +208,25 @@ impl<const D: usize> MotionContext<'_, D> {
     }
 
     /// Handles a slave on a line or in a plane: finds the nearest places there that the rod allows.
-    fn place_on_line(
+    fn add_line_candidates(
         &self,
         step: &SlaveStep<D>,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         let d = distance(step.mn, step.so);
         let t = d.max(step.rod.min_m).min(step.rod.max_m);
         let places = if (t - d).abs() <= self.chain.min_move_m() {
             [Some(step.so), None]
         } else {
             match self.chain.connectors()[step.slave].mobility {
-                Mobility::OnSegment(ends) => segment_points_at(step.mn, t, ends),
+                Mobility::OnSegment(ends) => segment_points_at_distance(step.mn, t, ends),
                 Mobility::OnPlane { normal, offset_m } => {
-                    plane_points_at(step.mn, t, step.so, normal, offset_m)
+                    plane_points_at_distance(step.mn, t, step.so, normal, offset_m)
                 }
                 _ => [None; 2],
             }
         };
-        let mut last_objection = PendingVeto::new(VetoReason::Mobility);
+        let mut last_objection = IncompleteVeto::new(VetoReason::Mobility);
         for at in places.into_iter().flatten() {
             match self.check_slave(step, at) {
                 Ok(()) => {
@@ -246,14 +246,17 @@ impl<const D: usize> MotionContext<'_, D> {
         step: &SlaveStep<D>,
         guided: Point<D>,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
-        self.collect_blocks(step, distance(step.mn, guided), scratch);
-        let hits = scratch.blocks.iter().filter_map(|block| RodHit::find(step, guided, block));
+    ) -> Result<(), IncompleteVeto> {
+        self.collect_blocking_parts(step, distance(step.mn, guided), scratch);
+        let hits = scratch
+            .blocks
+            .iter()
+            .filter_map(|block| RodObstacleHit::from_block(step, guided, block));
         let first = hits
             .min_by(|a, b| a.from_master_m.total_cmp(&b.from_master_m).then(a.name.cmp(&b.name)));
         let at = first.and_then(|hit| hit.tangent_place(step, guided)).unwrap_or(guided);
         if !self.may_be_at(step.slave, at) {
-            return Err(PendingVeto::new(VetoReason::Mobility));
+            return Err(IncompleteVeto::new(VetoReason::Mobility));
         }
         scratch.found.push(CandidatePosition { at, rotated: true, turn_rad: 0.0 });
         Ok(())
@@ -261,15 +264,15 @@ impl<const D: usize> MotionContext<'_, D> {
 
     /// Applies the union rule: for the rod's length, and for others it may have, finds the nearest
     /// directions free of all obstacles.
-    fn rotate(
+    fn find_rotated_places(
         &self,
         step: &SlaveStep<D>,
         guided: Point<D>,
-        objection: PendingVeto,
+        objection: IncompleteVeto,
         scratch: &mut CandidateScratch<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         let Rod { min_m, max_m, .. } = step.rod;
-        self.collect_blocks(step, max_m, scratch);
+        self.collect_blocking_parts(step, max_m, scratch);
         // The present length first, because it is nearly always free and moves the slave least. Of all others in the
         // interval these three stand for a short, a long and a middle one.
         let own_m = distance(step.mn, guided);
@@ -279,7 +282,8 @@ impl<const D: usize> MotionContext<'_, D> {
         let mut inside = None;
         for &length_m in &lengths_m[..n] {
             if scratch.found.is_empty() || scratch.all_lengths {
-                inside = inside.or(self.add_turns(step, length_m, scratch, &mut informative));
+                inside =
+                    inside.or(self.add_turn_candidates(step, length_m, scratch, &mut informative));
             }
         }
         sort(step, &mut scratch.found);
@@ -287,26 +291,27 @@ impl<const D: usize> MotionContext<'_, D> {
             scratch.has_turned = true;
             return Ok(());
         }
-        let inside = inside.map(|name| PendingVeto::from_owner(VetoReason::Inside, name));
+        let inside =
+            inside.map(|name| IncompleteVeto::from_blocking_owner(VetoReason::Inside, name));
         Err(informative.or(inside).unwrap_or(objection))
     }
 
     /// Adds the good places for one length of the rod; returns the block that contains the master.
-    fn add_turns(
+    fn add_turn_candidates(
         &self,
         step: &SlaveStep<D>,
         length_m: f64,
         scratch: &mut CandidateScratch<D>,
-        informative: &mut Option<PendingVeto>,
+        informative: &mut Option<IncompleteVeto>,
     ) -> Option<BlockingPartOwner> {
-        let u0 = guide_line(step);
+        let u0 = guide_line_direction(step);
         let CandidateScratch { blocks, arcs, found, has_other_side, .. } = scratch;
         let finds_all = scratch.all_lengths || scratch.both_sides;
-        let mut turns = TurnedPlaces { context: self, step, length_m, u0, found, informative };
+        let mut turns = RodTurnCandidates { context: self, step, length_m, u0, found, informative };
         if D == 2 {
-            let plane = PlanarRod { step, length_m, u0: to_plane(u0), blocks };
+            let plane = PlanarDirectionSearch { step, length_m, u0: to_plane(u0), blocks };
             let mut sides = plane.free_directions(arcs);
-            while let Some(u) = sides.next(|u| turns.is_useless(u)) {
+            while let Some(u) = sides.next(|u| turns.is_useless_direction(u)) {
                 if turns.add(u) && !finds_all {
                     *has_other_side = sides.has_more();
                     break;
@@ -321,7 +326,7 @@ impl<const D: usize> MotionContext<'_, D> {
         if search.turn_away(u0).is_some_and(|u| turns.add(u)) {
             return inside;
         }
-        if let Some(u) = search.rings(u0, |u| turns.is_valid(u)) {
+        if let Some(u) = search.search_rings(u0, |u| turns.is_valid(u)) {
             turns.add(u);
         }
         inside
@@ -334,7 +339,7 @@ impl<const D: usize> MotionContext<'_, D> {
 
     /// Collects all blocks that a rod of a length may meet on any side. The order is that of the grid
     /// or the tree, and must not matter, so ties go to the lower name.
-    fn collect_blocks(
+    fn collect_blocking_parts(
         &self,
         step: &SlaveStep<D>,
         length_m: f64,
@@ -345,16 +350,21 @@ impl<const D: usize> MotionContext<'_, D> {
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         scratch.blocks.clear();
         let rod = step.master.min(step.slave);
-        self.visit_blocks(&bounds_around(step.mn, reach_m), Some(rod), step.slave, |block| {
-            if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
-                scratch.blocks.push(*block);
-            }
-        });
+        self.visit_blocking_parts(
+            &bounds_around(step.mn, reach_m),
+            Some(rod),
+            step.slave,
+            |block| {
+                if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
+                    scratch.blocks.push(*block);
+                }
+            },
+        );
     }
 }
 
 /// An obstacle that a rod meets in the direction of its guide line.
-struct RodHit<const D: usize> {
+struct RodObstacleHit<const D: usize> {
     /// The point of the obstacle's core that is nearest to the rod.
     on_core: Point<D>,
     radius_m: f64,
@@ -363,8 +373,8 @@ struct RodHit<const D: usize> {
     name: BlockingPartOwner,
 }
 
-impl<const D: usize> RodHit<D> {
-    fn find(step: &SlaveStep<D>, guided: Point<D>, block: &BlockingPart<D>) -> Option<Self> {
+impl<const D: usize> RodObstacleHit<D> {
+    fn from_block(step: &SlaveStep<D>, guided: Point<D>, block: &BlockingPart<D>) -> Option<Self> {
         let nearest = block.core.nearest_to_segment([step.mn, guided]);
         let radius_m = block.radius_m + step.rod.radius_m;
         (nearest.distance_m < radius_m).then(|| Self {
@@ -379,23 +389,23 @@ impl<const D: usize> RodHit<D> {
     fn tangent_place(&self, step: &SlaveStep<D>, guided: Point<D>) -> Option<Point<D>> {
         let length_m = distance(step.mn, guided);
         let to = sub(self.on_core, step.mn);
-        let cosine = cosine_of_half_angle(norm(to), self.radius_m, length_m, false)?;
-        let u = direction_off(guide_line(step), normalized(to)?, cosine);
+        let cosine = blocking_half_angle_cosine(norm(to), self.radius_m, length_m, false)?;
+        let u = direction_at_angle(guide_line_direction(step), normalized(to)?, cosine);
         Some(add_scaled(step.mn, u, length_m))
     }
 }
 
 /// The places of a slave found by turning its rod, at one length of it.
-struct TurnedPlaces<'a, const D: usize> {
+struct RodTurnCandidates<'a, const D: usize> {
     context: &'a MotionContext<'a, D>,
     step: &'a SlaveStep<D>,
     length_m: f64,
     u0: Point<D>,
     found: &'a mut Vec<CandidatePosition<D>>,
-    informative: &'a mut Option<PendingVeto>,
+    informative: &'a mut Option<IncompleteVeto>,
 }
 
-impl<const D: usize> TurnedPlaces<'_, D> {
+impl<const D: usize> RodTurnCandidates<'_, D> {
     fn place(&self, u: Point<D>) -> Point<D> {
         add_scaled(self.step.mn, u, self.length_m)
     }
@@ -405,7 +415,7 @@ impl<const D: usize> TurnedPlaces<'_, D> {
     }
 
     /// Returns whether a direction, and any farther from the guide line, neither gives a place nor a better reason.
-    fn is_useless(&self, u: Point<D>) -> bool {
+    fn is_useless_direction(&self, u: Point<D>) -> bool {
         self.informative.is_some() && self.context.is_too_far(self.step, self.place(u))
     }
 
@@ -414,12 +424,12 @@ impl<const D: usize> TurnedPlaces<'_, D> {
         let at = self.place(u);
         match self.context.check_place(self.step, at) {
             Ok(()) => {
-                let turn_rad = angle_rad(self.u0, u);
+                let turn_rad = angle_between_rad(self.u0, u);
                 self.found.push(CandidatePosition { at, rotated: true, turn_rad });
                 true
             }
             Err(objection) => {
-                keep_informative(self.informative, objection);
+                keep_informative_veto(self.informative, objection);
                 false
             }
         }
@@ -428,7 +438,7 @@ impl<const D: usize> TurnedPlaces<'_, D> {
 
 /// Keeps the first informative objection: a direction free of obstacles that fails for another reason.
 #[inline]
-fn keep_informative(informative: &mut Option<PendingVeto>, objection: PendingVeto) {
+fn keep_informative_veto(informative: &mut Option<IncompleteVeto>, objection: IncompleteVeto) {
     if !matches!(objection.reason, VetoReason::BothSidesBlocked | VetoReason::BendLimit) {
         informative.get_or_insert(objection);
     }
@@ -460,14 +470,14 @@ struct BlockedArcs {
 }
 
 /// A plane rod of one length that looks for a free direction near `u0`.
-struct PlanarRod<'a, const D: usize> {
+struct PlanarDirectionSearch<'a, const D: usize> {
     step: &'a SlaveStep<D>,
     length_m: f64,
     u0: Point<2>,
     blocks: &'a [BlockingPart<D>],
 }
 
-impl<const D: usize> PlanarRod<'_, D> {
+impl<const D: usize> PlanarDirectionSearch<'_, D> {
     /// Returns the nearest free directions to the left and to the right, the nearer one first.
     fn free_directions<'a>(&'a self, known: &'a mut BlockedArcs) -> FreeDirections<'a, D> {
         known.arcs.clear();
@@ -487,16 +497,16 @@ impl<const D: usize> PlanarRod<'_, D> {
         let s = add_scaled(self.step.mn, u, self.length_m);
         let mut has_added = false;
         for (k, block) in self.blocks.iter().enumerate() {
-            if !known.known[k] && self.meets(s, block) {
+            if !known.known[k] && self.intersects_block(s, block) {
                 known.known[k] = true;
-                self.add_block(block, known);
+                self.add_blocked_arcs(block, known);
                 has_added = true;
             }
         }
         has_added
     }
 
-    fn meets(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
+    fn intersects_block(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
         // More than the skin in the arcs, so that no direction in an arc looks free by rounding.
         let near_m = block.radius_m + 2.0 * SKIN_M;
         let rod = [self.step.mn, s];
@@ -504,10 +514,10 @@ impl<const D: usize> PlanarRod<'_, D> {
             || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
     }
 
-    fn add_block(&self, block: &BlockingPart<D>, known: &mut BlockedArcs) {
+    fn add_blocked_arcs(&self, block: &BlockingPart<D>, known: &mut BlockedArcs) {
         let step = self.step;
-        let reach = MasterRod { master: to_plane(step.mn), length_m: self.length_m };
-        let core = core_to_plane(&block.core);
+        let reach = RodReach { master: to_plane(step.mn), length_m: self.length_m };
+        let core = project_core_to_plane(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
         // If the master is within the skin of a surface, the half-plane behind it is blocked; with the
@@ -518,7 +528,7 @@ impl<const D: usize> PlanarRod<'_, D> {
         }
         if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
             let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
-            block_tip(&reach, &core, tip_m, &mut known.arcs);
+            block_rod_tip(&reach, &core, tip_m, &mut known.arcs);
         }
     }
 }
@@ -529,7 +539,7 @@ impl<const D: usize> PlanarRod<'_, D> {
 /// all these arcs, and in which the rod meets no other block, is also the first outside the arcs of
 /// all blocks.
 struct FreeDirections<'a, const D: usize> {
-    plane: &'a PlanarRod<'a, D>,
+    plane: &'a PlanarDirectionSearch<'a, D>,
     known: &'a mut BlockedArcs,
     start_rad: f64,
     /// Whether there may be a direction to the left, and one to the right.
@@ -547,7 +557,9 @@ impl<const D: usize> FreeDirections<'_, D> {
         loop {
             let turns_rad = [TurnDirection::Left, TurnDirection::Right].map(|side| {
                 let is_open = self.is_open[side as usize];
-                is_open.then(|| min_turn_rad(&self.known.arcs, self.start_rad, side)).flatten()
+                is_open
+                    .then(|| min_turn_to_free_rad(&self.known.arcs, self.start_rad, side))
+                    .flatten()
             });
             self.is_open = turns_rad.map(|turn| turn.is_some());
             let (side, turn_rad) = match turns_rad {
@@ -573,7 +585,7 @@ fn to_plane<const D: usize>(p: Point<D>) -> Point<2> {
     [p[0], p[1]]
 }
 
-fn core_to_plane<const D: usize>(core: &ConvexCore<D>) -> ConvexCore<2> {
+fn project_core_to_plane<const D: usize>(core: &ConvexCore<D>) -> ConvexCore<2> {
     match core {
         ConvexCore::Point(c) => ConvexCore::Point(to_plane(*c)),
         ConvexCore::Segment([a, b]) => ConvexCore::Segment([to_plane(*a), to_plane(*b)]),
@@ -586,7 +598,7 @@ fn core_to_plane<const D: usize>(core: &ConvexCore<D>) -> ConvexCore<2> {
 }
 
 /// Returns the points of a segment at distance `t` from `m`, the one nearer to its start first.
-fn segment_points_at<const D: usize>(
+fn segment_points_at_distance<const D: usize>(
     m: Point<D>,
     t: f64,
     [a, b]: [Point<D>; 2],
@@ -607,7 +619,7 @@ fn segment_points_at<const D: usize>(
 
 /// Returns the points of a plane at a given distance from `m` that are nearest to and farthest from
 /// `so`.
-fn plane_points_at<const D: usize>(
+fn plane_points_at_distance<const D: usize>(
     m: Point<D>,
     t: f64,
     so: Point<D>,

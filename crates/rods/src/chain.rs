@@ -3,7 +3,7 @@
 //! A rod's length is never stored: it is the distance between its ends (V7), so that it cannot disagree
 //! with them.
 
-use super::geometry::{self, Point, angle_rad, distance, dot, norm, sub};
+use super::geometry::{self, Point, angle_between_rad, distance, dot, norm, sub};
 use super::veto::VetoReason;
 use sidestep_kernel::InputError;
 use std::f64::consts::PI;
@@ -120,7 +120,7 @@ pub struct Rod {
 impl Rod {
     /// Returns a rod of one length; its radius is at most that of its connectors.
     #[inline]
-    pub fn fixed(length_m: f64, radius_m: f64) -> Self {
+    pub fn with_fixed_length(length_m: f64, radius_m: f64) -> Self {
         Self { min_m: length_m, max_m: length_m, radius_m }
     }
 }
@@ -141,8 +141,8 @@ const CLOSABLE_FRACTION: f64 = 1e-3;
 
 /// Returns the least of radii and rod lengths. Rods that can close would make every sub-step tiny, so they
 /// count only where there is nothing else.
-fn min_size_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
-    let open = rods.iter().filter(|rod| !can_close(rod)).map(|rod| rod.min_m);
+fn smallest_part_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
+    let open = rods.iter().filter(|rod| !can_ends_meet(rod)).map(|rod| rod.min_m);
     let min_m = open.chain(radii).fold(f64::INFINITY, f64::min);
     if min_m.is_finite() {
         return min_m;
@@ -152,7 +152,7 @@ fn min_size_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
 
 /// Returns whether the ends of a rod can meet, or nearly so. A least length of 0 is not allowed, so the joints of
 /// prismatic arms that retract to nothing have a tiny one.
-fn can_close(rod: &Rod) -> bool {
+fn can_ends_meet(rod: &Rod) -> bool {
     rod.min_m < CLOSABLE_FRACTION * rod.max_m
 }
 
@@ -219,7 +219,7 @@ impl<const D: usize> Chain<D> {
         let special = connectors.iter().filter(|c| !c.is_plain()).count();
         let max_rod_m = rods.iter().map(|r| r.max_m).fold(0.0, f64::max);
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
-        let min_size_m = min_size_m(&rods, radii);
+        let min_size_m = smallest_part_m(&rods, radii);
         let max_radius_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
         let measures = FixedMeasures { max_rod_m, min_size_m, max_radius_m };
         Ok(Self { points, connectors, rods, special, measures })
@@ -317,7 +317,7 @@ impl<const D: usize> Chain<D> {
     pub fn bend_rad(&self, i: usize) -> Option<f64> {
         (i > 0 && i + 1 < self.points.len()).then(|| {
             let into = sub(self.points[i], self.points[i - 1]);
-            angle_rad(into, sub(self.points[i + 1], self.points[i]))
+            angle_between_rad(into, sub(self.points[i + 1], self.points[i]))
         })
     }
 
@@ -351,7 +351,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Marks a connector as failed, or as repaired (slide R8).
-    pub fn set_failed(&mut self, i: usize, failed: bool) {
+    pub fn set_connector_failed(&mut self, i: usize, failed: bool) {
         self.change(i, |c| c.failed = failed);
     }
 
@@ -370,7 +370,7 @@ impl<const D: usize> Chain<D> {
     /// # Errors
     /// When the limit is out of range.
     pub fn set_max_bend_rad(&mut self, i: usize, max_bend_rad: f64) -> Result<(), InputError> {
-        check_bend(i, max_bend_rad)?;
+        check_bend_limit(i, max_bend_rad)?;
         self.change(i, |c| c.max_bend_rad = max_bend_rad);
         Ok(())
     }
@@ -419,7 +419,7 @@ fn check_connector<const D: usize>(
         let cause = format!("has radius {} m", connector.radius_m);
         return Err(InputError::new(place, cause, "give 0 to 1e6 m"));
     }
-    check_bend(i, connector.max_bend_rad)?;
+    check_bend_limit(i, connector.max_bend_rad)?;
     check_mobility(i, &connector.mobility)?;
     if !connector.mobility.allows(*point, *point) {
         let cause = format!("is at {point:?}, where its mobility does not allow it");
@@ -428,7 +428,7 @@ fn check_connector<const D: usize>(
     Ok(())
 }
 
-fn check_bend(i: usize, max_bend_rad: f64) -> Result<(), InputError> {
+fn check_bend_limit(i: usize, max_bend_rad: f64) -> Result<(), InputError> {
     if max_bend_rad > 0.0 && max_bend_rad <= PI {
         return Ok(());
     }
@@ -489,7 +489,7 @@ mod tests {
 
     #[test]
     fn wrong_chains_name_the_part() {
-        let rod = Rod::fixed(1.0, 0.05);
+        let rod = Rod::with_fixed_length(1.0, 0.05);
         let place = |r: Result<Chain<2>, InputError>| r.unwrap_err().place().to_string();
         assert_eq!(place(chain_of(vec![], rod)), "chain");
         assert_eq!(place(chain_of(vec![[0.0, f64::NAN]], rod)), "chain, connector 0");
@@ -497,23 +497,24 @@ mod tests {
         assert_eq!(place(chain_of(vec![[0.0, 0.0], [0.0, 2.0]], rod)), "chain, rod 0");
         let swapped = Rod { min_m: 2.0, max_m: 1.0, radius_m: 0.0 };
         assert_eq!(place(chain_of(vec![[0.0, 0.0], [0.0, 1.0]], swapped)), "chain, rod 0");
-        let thick = Rod::fixed(1.0, 0.2);
+        let thick = Rod::with_fixed_length(1.0, 0.2);
         assert_eq!(place(chain_of(vec![[0.0, 0.0], [0.0, 1.0]], thick)), "chain, rod 0");
     }
 
     #[test]
     fn one_connector_alone_is_a_chain() {
-        assert!(chain_of(vec![[1.0, 2.0]], Rod::fixed(1.0, 0.0)).is_ok());
+        assert!(chain_of(vec![[1.0, 2.0]], Rod::with_fixed_length(1.0, 0.0)).is_ok());
     }
 
     #[test]
     fn constraints_come_and_go_while_it_runs() {
-        let mut chain = chain_of(vec![[0.0, 0.0], [1.0, 0.0]], Rod::fixed(1.0, 0.05)).unwrap();
+        let mut chain =
+            chain_of(vec![[0.0, 0.0], [1.0, 0.0]], Rod::with_fixed_length(1.0, 0.05)).unwrap();
         assert!(chain.is_plain());
-        chain.set_failed(1, true);
+        chain.set_connector_failed(1, true);
         chain.set_mobility(1, Mobility::Fixed).unwrap();
         assert!(!chain.is_plain());
-        chain.set_failed(1, false);
+        chain.set_connector_failed(1, false);
         assert!(!chain.is_plain());
         chain.set_mobility(1, Mobility::Free).unwrap();
         assert!(chain.is_plain());

@@ -5,9 +5,9 @@
 //! off by up to 4e-8 for nearly parallel segments, too much for a promise of 1e-9 m.
 
 pub use sidestep_kernel::geometry::{
-    Point, add, add_scaled, angle_rad, cross, cross_2d, distance, dot, first_axis, is_finite, lerp,
-    move_toward, nearest_on_segment, norm, norm_squared, normalized, perpendicular, rejection,
-    scaled, sub, with_dimensions,
+    Point, add, add_scaled, angle_between_rad, convert_dimensions, cross, cross_2d, distance, dot,
+    is_finite, lerp, move_toward, nearest_on_segment, norm, norm_squared, normalized,
+    perpendicular, perpendicular_component, scaled, sub, unit_x,
 };
 
 /// Nearest points of two bodies, and their distance.
@@ -122,7 +122,7 @@ impl<const D: usize> Cuboid<D> {
         let from = self.to_local(p);
         let to = self.to_local(q);
         let d = sub(to, from);
-        let fraction = self.min_slope_fraction(from, d);
+        let fraction = self.nearest_fraction(from, d);
         let local = add_scaled(from, d, fraction);
         let clamped: Point<D> =
             std::array::from_fn(|i| local[i].clamp(-self.half_m[i], self.half_m[i]));
@@ -144,7 +144,7 @@ impl<const D: usize> Cuboid<D> {
     }
 
     /// Returns the fraction of the segment at which the squared distance is least.
-    fn min_slope_fraction(&self, from: Point<D>, d: Point<D>) -> f64 {
+    fn nearest_fraction(&self, from: Point<D>, d: Point<D>) -> f64 {
         let mut low = 0.0;
         let mut high = 1.0;
         if self.slope(from, d, low) >= 0.0 {
@@ -383,7 +383,7 @@ impl<const D: usize> Aabb<D> {
 
     /// Returns whether the boxes touch.
     #[inline]
-    pub fn meets(&self, other: &Self) -> bool {
+    pub fn intersects(&self, other: &Self) -> bool {
         let mut meets = true;
         for i in 0..D {
             meets &= self.lo[i] <= other.hi[i] && self.hi[i] >= other.lo[i];

@@ -41,7 +41,7 @@ impl<const D: usize> SpatialGrid<D> {
         self.bounds.clear();
         self.bounds.extend(bounds);
         if !self.bounds.is_empty() {
-            self.cells = CellLayout::choose(&self.bounds, reach_m);
+            self.cells = CellLayout::from_boxes(&self.bounds, reach_m);
             self.fill();
         }
     }
@@ -59,7 +59,7 @@ impl<const D: usize> SpatialGrid<D> {
         starts.clear();
         starts.resize(n_cells + 2, 0);
         for b in &*bounds {
-            cells.for_each(cells.range(b), |_, index| starts[index + 2] += 1);
+            cells.for_each(cells.cell_range(b), |_, index| starts[index + 2] += 1);
         }
         for k in 0..n_cells {
             starts[k + 2] += starts[k + 1];
@@ -67,7 +67,7 @@ impl<const D: usize> SpatialGrid<D> {
         entries.clear();
         entries.resize(starts[n_cells + 1] as usize, 0);
         for (k, b) in (0u32..).zip(&*bounds) {
-            cells.for_each(cells.range(b), |_, index| {
+            cells.for_each(cells.cell_range(b), |_, index| {
                 entries[starts[index + 1] as usize] = k;
                 starts[index + 1] += 1;
             });
@@ -80,7 +80,7 @@ impl<const D: usize> SpatialGrid<D> {
         if self.bounds.is_empty() {
             return;
         }
-        let range = self.cells.range(near);
+        let range = self.cells.cell_range(near);
         self.cells.for_each(range, |cell, index| {
             let from = self.starts[index] as usize;
             let to = self.starts[index + 1] as usize;
@@ -89,7 +89,7 @@ impl<const D: usize> SpatialGrid<D> {
                 // A box in several cells is reported only in the first cell that it shares with the
                 // query.
                 let is_first = (0..D).all(|i| cell[i] == self.first[k][i].max(range[0][i]));
-                if is_first && self.bounds[k].meets(near) {
+                if is_first && self.bounds[k].intersects(near) {
                     visit_one(k);
                 }
             }
@@ -121,7 +121,7 @@ impl<const D: usize> Default for CellLayout<D> {
 
 impl<const D: usize> CellLayout<D> {
     /// Chooses cells for boxes, of which there is at least one, and queries of about `reach_m`.
-    fn choose(bounds: &[Aabb<D>], reach_m: f64) -> Self {
+    fn from_boxes(bounds: &[Aabb<D>], reach_m: f64) -> Self {
         let n = bounds.len();
         let around = bounds.iter().fold(Aabb::empty(), |all, b| all.joined(b));
         let mean_m = bounds.iter().map(extent_m).sum::<f64>() / n as f64;
@@ -130,9 +130,9 @@ impl<const D: usize> CellLayout<D> {
             .max(extent_m(&around) * MIN_CELL_FRACTION)
             .max(MIN_CELL_M);
         loop {
-            let cells = Self::cover(&around, cell_m);
+            let cells = Self::from_bounds(&around, cell_m);
             if cells.len() <= MAX_CELLS_PER_BOX * (n + 1)
-                && cells.count_entries(bounds) <= MAX_ENTRIES_PER_BOX * (n + 1)
+                && cells.sum_cell_counts(bounds) <= MAX_ENTRIES_PER_BOX * (n + 1)
             {
                 return cells;
             }
@@ -141,14 +141,14 @@ impl<const D: usize> CellLayout<D> {
     }
 
     /// Returns the cells of a side that cover a box.
-    fn cover(around: &Aabb<D>, cell_m: f64) -> Self {
+    fn from_bounds(around: &Aabb<D>, cell_m: f64) -> Self {
         let per_m = 1.0 / cell_m;
         let n = std::array::from_fn(|i| ((around.hi[i] - around.lo[i]) * per_m) as u32 + 1);
         Self { origin: around.lo, per_m, n }
     }
 
     /// Returns the number of cells that boxes meet, summed over the boxes.
-    fn count_entries(&self, bounds: &[Aabb<D>]) -> usize {
+    fn sum_cell_counts(&self, bounds: &[Aabb<D>]) -> usize {
         bounds.iter().map(|b| self.count_cells(b)).sum()
     }
 
@@ -157,7 +157,7 @@ impl<const D: usize> CellLayout<D> {
     }
 
     fn count_cells(&self, b: &Aabb<D>) -> usize {
-        let [lo, hi] = self.range(b);
+        let [lo, hi] = self.cell_range(b);
         (0..D).map(|i| (hi[i] - lo[i]) as usize + 1).product()
     }
 
@@ -169,7 +169,7 @@ impl<const D: usize> CellLayout<D> {
 
     /// Returns the lowest and the highest cell that a box meets.
     #[inline]
-    fn range(&self, b: &Aabb<D>) -> [CellIndex<D>; 2] {
+    fn cell_range(&self, b: &Aabb<D>) -> [CellIndex<D>; 2] {
         [self.cell_at(b.lo), self.cell_at(b.hi)]
     }
 

@@ -36,7 +36,7 @@ impl AngleInterval {
 
 /// What of a rod decides in which directions an obstacle is in its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct MasterRod {
+pub(super) struct RodReach {
     pub(crate) master: Point<2>,
     pub(crate) length_m: f64,
 }
@@ -44,7 +44,7 @@ pub(super) struct MasterRod {
 /// Adds the directions in which a rod of no thickness meets the points within `radius_m` of a
 /// core. Returns false, and adds nothing, where the master itself is inside.
 pub(super) fn block_rod(
-    reach: &MasterRod,
+    reach: &RodReach,
     core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -62,7 +62,7 @@ pub(super) fn block_rod(
 }
 
 fn block_by_capsule(
-    reach: &MasterRod,
+    reach: &RodReach,
     [a, b]: [Point<2>; 2],
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -79,7 +79,7 @@ fn block_by_capsule(
     }
     // Seen from outside, a convex body lies within a quarter turn of its nearest point, so angles
     // from there never wrap.
-    let view = AngularView { middle: nearest, length_m: reach.length_m, radius_m };
+    let view = ObstacleAngularView { middle: nearest, length_m: reach.length_m, radius_m };
     let mut extent = AngularExtent { low_rad: 0.0, high_rad: 0.0 };
     view.widen_by_disc(a, &mut extent);
     if a != b {
@@ -98,13 +98,13 @@ struct AngularExtent {
 }
 
 /// The view of an obstacle from the master, in angles from the direction of the nearest point.
-struct AngularView {
+struct ObstacleAngularView {
     middle: Point<2>,
     length_m: f64,
     radius_m: f64,
 }
 
-impl AngularView {
+impl ObstacleAngularView {
     #[inline]
     fn angle_to(&self, p: Point<2>) -> f64 {
         math::atan2(cross_2d(self.middle, p), dot(self.middle, p))
@@ -112,7 +112,7 @@ impl AngularView {
 
     fn widen_by_disc(&self, center: Point<2>, extent: &mut AngularExtent) {
         let apart_m = norm(center);
-        if let Some(half_rad) = half_angle_rad(apart_m, self.radius_m, self.length_m) {
+        if let Some(half_rad) = blocking_half_angle_rad(apart_m, self.radius_m, self.length_m) {
             let angle_rad = self.angle_to(center);
             extent.low_rad = extent.low_rad.min(angle_rad - half_rad);
             extent.high_rad = extent.high_rad.max(angle_rad + half_rad);
@@ -126,7 +126,7 @@ impl AngularView {
         let normal = [-d[1] / length_m, d[0] / length_m];
         for side in [-self.radius_m, self.radius_m] {
             let from = [a[0] + normal[0] * side, a[1] + normal[1] * side];
-            for p in clipped(from, d, self.length_m).into_iter().flatten() {
+            for p in clip_to_circle(from, d, self.length_m).into_iter().flatten() {
                 let angle_rad = self.angle_to(p);
                 extent.low_rad = extent.low_rad.min(angle_rad);
                 extent.high_rad = extent.high_rad.max(angle_rad);
@@ -139,7 +139,7 @@ impl AngularView {
 /// that is out of reach, up to where the rod's tip touches. `None` if the disc is out of reach; the
 /// master must not be inside.
 #[inline]
-pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
+pub(super) fn blocking_half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Option<f64> {
     if apart_m - radius_m >= length_m {
         return None;
     }
@@ -152,7 +152,7 @@ pub(super) fn half_angle_rad(apart_m: f64, radius_m: f64, length_m: f64) -> Opti
 }
 
 /// Returns the ends of the part of the segment from `a` along `d` within `reach_m` of the origin.
-fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
+fn clip_to_circle(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
     let dd = dot(d, d);
     let ad = dot(a, d);
     let discriminant = ad * ad - dd * (dot(a, a) - reach_m * reach_m);
@@ -170,25 +170,25 @@ fn clipped(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 2] {
 
 /// Adds the directions in which the rod's far end is within `radius_m` of a core: arcs of the
 /// circle on which it turns, up to four for a capsule.
-pub(super) fn block_tip(
-    reach: &MasterRod,
+pub(super) fn block_rod_tip(
+    reach: &RodReach,
     core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
 ) {
     match core {
-        ConvexCore::Point(c) => block_tip_by_capsule(reach, [*c, *c], radius_m, arcs),
-        ConvexCore::Segment(ends) => block_tip_by_capsule(reach, *ends, radius_m, arcs),
+        ConvexCore::Point(c) => add_tip_arcs_of_capsule(reach, [*c, *c], radius_m, arcs),
+        ConvexCore::Segment(ends) => add_tip_arcs_of_capsule(reach, *ends, radius_m, arcs),
         ConvexCore::Cuboid(cuboid) => {
             for edge in cuboid.edges_2d() {
-                block_tip_by_capsule(reach, edge, radius_m, arcs);
+                add_tip_arcs_of_capsule(reach, edge, radius_m, arcs);
             }
         }
     }
 }
 
-fn block_tip_by_capsule(
-    reach: &MasterRod,
+fn add_tip_arcs_of_capsule(
+    reach: &RodReach,
     [a, b]: [Point<2>; 2],
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -205,7 +205,7 @@ fn block_tip_by_capsule(
     borders.add_disc(a, radius_m, t);
     if a != b {
         borders.add_disc(b, radius_m, t);
-        borders.add_edges(a, b, radius_m, t);
+        borders.add_edge_crossings(a, b, radius_m, t);
     }
     borders.arcs_where(
         |angle_rad| {
@@ -241,7 +241,7 @@ impl BorderAngles {
         }
     }
 
-    fn add_edges(&mut self, a: Point<2>, b: Point<2>, radius_m: f64, t: f64) {
+    fn add_edge_crossings(&mut self, a: Point<2>, b: Point<2>, radius_m: f64, t: f64) {
         let d = sub(b, a);
         let length_m = norm(d);
         let normal = [-d[1] / length_m, d[0] / length_m];
@@ -310,7 +310,7 @@ pub(super) enum TurnDirection {
 
 /// Returns the least turn from a direction to one in no arc, in [0, 2 pi); `None` if all are
 /// blocked.
-pub(super) fn min_turn_rad(
+pub(super) fn min_turn_to_free_rad(
     arcs: &[AngleInterval],
     start_rad: f64,
     side: TurnDirection,
@@ -373,14 +373,14 @@ mod tests {
         std::env::var("SIDESTEP_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
     }
 
-    fn tip(reach: &MasterRod, angle_rad: f64) -> Point<2> {
-        let MasterRod { master: [x, y], length_m } = *reach;
+    fn tip(reach: &RodReach, angle_rad: f64) -> Point<2> {
+        let RodReach { master: [x, y], length_m } = *reach;
         [x + length_m * math::cos(angle_rad), y + length_m * math::sin(angle_rad)]
     }
 
     #[derive(Debug, Clone)]
     struct Case {
-        reach: MasterRod,
+        reach: RodReach,
         core: ConvexCore<2>,
         radius_m: f64,
         tip_radius_m: f64,
@@ -404,7 +404,7 @@ mod tests {
         let angles = prop::collection::vec(0.0..TAU, 8);
         (point(), 0.05..2.5f64, core, radii, angles).prop_map(
             |(master, length_m, core, (radius_m, more_m), angles_rad)| Case {
-                reach: MasterRod { master, length_m },
+                reach: RodReach { master, length_m },
                 core,
                 radius_m,
                 tip_radius_m: radius_m + more_m,
@@ -423,7 +423,7 @@ mod tests {
             return Ok(());
         }
         let mut tips = Vec::new();
-        block_tip(reach, core, *tip_radius_m, &mut tips);
+        block_rod_tip(reach, core, *tip_radius_m, &mut tips);
         let borders = arcs
             .iter()
             .chain(&tips)
@@ -466,7 +466,7 @@ mod tests {
 
     /// Returns the depth of the rod, or its end, in any core, meters.
     fn depth_m(
-        reach: &MasterRod,
+        reach: &RodReach,
         cores: &[ConvexCore<2>],
         [rod_m, tip_m]: [f64; 2],
         angle_rad: f64,
@@ -490,16 +490,16 @@ mod tests {
             rod_m in 0.01..0.2f64, more_m in 0.01..0.3f64, start_rad in 0.0..TAU,
         ) {
             // Walls in a row: where one ends the next begins.
-            let reach = MasterRod { master, length_m };
+            let reach = RodReach { master, length_m };
             let cores: Vec<_> =
                 corners.windows(2).map(|ends| ConvexCore::Segment([ends[0], ends[1]])).collect();
             let (mut arcs, radii_m) = (Vec::new(), [rod_m, rod_m + more_m]);
             for core in &cores {
                 prop_assume!(block_rod(&reach, core, rod_m, &mut arcs));
-                block_tip(&reach, core, radii_m[1], &mut arcs);
+                block_rod_tip(&reach, core, radii_m[1], &mut arcs);
             }
             for (side, sign) in [(TurnDirection::Left, 1.0), (TurnDirection::Right, -1.0)] {
-                let turn_rad = min_turn_rad(&arcs, start_rad, side);
+                let turn_rad = min_turn_to_free_rad(&arcs, start_rad, side);
                 if let Some(turn_rad) = turn_rad {
                     let depth_m = depth_m(&reach, &cores, radii_m, start_rad + sign * turn_rad);
                     prop_assert!(depth_m < 1e-9, "{side:?} {turn_rad}: {depth_m}");
@@ -521,8 +521,8 @@ mod tests {
         for gap_rad in [0.0, 1e-16, 2e-16, 1e-15] {
             let second = AngleInterval { from_rad: 1.0 + gap_rad, width_rad: 1.0 };
             let arcs = [AngleInterval { from_rad: 0.3, width_rad: 0.7 }, second];
-            assert!(min_turn_rad(&arcs, 0.5, TurnDirection::Left).unwrap() > 1.4);
-            assert!(min_turn_rad(&arcs, 1.5, TurnDirection::Right).unwrap() > 1.1);
+            assert!(min_turn_to_free_rad(&arcs, 0.5, TurnDirection::Left).unwrap() > 1.4);
+            assert!(min_turn_to_free_rad(&arcs, 1.5, TurnDirection::Right).unwrap() > 1.1);
         }
     }
 
@@ -532,11 +532,14 @@ mod tests {
             AngleInterval { from_rad: 6.0, width_rad: 1.0 },
             AngleInterval { from_rad: 0.5, width_rad: 1.0 },
         ];
-        assert!((min_turn_rad(&arcs, 0.0, TurnDirection::Left).unwrap() - 1.5).abs() < 1e-12);
         assert!(
-            (min_turn_rad(&arcs, 0.0, TurnDirection::Right).unwrap() - (TAU - 6.0)).abs() < 1e-12
+            (min_turn_to_free_rad(&arcs, 0.0, TurnDirection::Left).unwrap() - 1.5).abs() < 1e-12
         );
-        assert_eq!(min_turn_rad(&arcs, 3.0, TurnDirection::Left), Some(0.0));
+        assert!(
+            (min_turn_to_free_rad(&arcs, 0.0, TurnDirection::Right).unwrap() - (TAU - 6.0)).abs()
+                < 1e-12
+        );
+        assert_eq!(min_turn_to_free_rad(&arcs, 3.0, TurnDirection::Left), Some(0.0));
     }
 
     #[test]
@@ -545,7 +548,7 @@ mod tests {
             AngleInterval { from_rad: 1.0, width_rad: 4.0 },
             AngleInterval { from_rad: 4.5, width_rad: 3.0 },
         ];
-        assert_eq!(min_turn_rad(&arcs, 2.0, TurnDirection::Left), None);
-        assert_eq!(min_turn_rad(&arcs, 2.0, TurnDirection::Right), None);
+        assert_eq!(min_turn_to_free_rad(&arcs, 2.0, TurnDirection::Left), None);
+        assert_eq!(min_turn_to_free_rad(&arcs, 2.0, TurnDirection::Right), None);
     }
 }

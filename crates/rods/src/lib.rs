@@ -37,7 +37,7 @@ pub use chain::{
 };
 pub use grid::SpatialGrid;
 pub use motion_context::{
-    BEND_TOLERANCE_RAD, PendingVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
+    BEND_TOLERANCE_RAD, IncompleteVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
 };
 pub use obstacle::{Obstacle, Obstacles, bounds_around, outline_walls};
 pub use propagate::{Propagator, local_solver};

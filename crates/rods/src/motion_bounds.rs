@@ -28,7 +28,7 @@ const STALE_FRACTION: f64 = 0.25;
 
 /// Distances of a chain's rods from all parts that can be in their way, with the travel since.
 #[derive(Debug, Clone, Default)]
-pub(super) struct MotionBounds<const D: usize> {
+pub(super) struct SeparationBounds<const D: usize> {
     /// Positions to which the odometer has counted.
     points: Vec<Point<D>>,
     /// Twice the sum of the longest travel of each motion so far, meters: two parts approach each other at
@@ -41,9 +41,9 @@ pub(super) struct MotionBounds<const D: usize> {
     built_at_m: f64,
 }
 
-impl<const D: usize> MotionBounds<D> {
+impl<const D: usize> SeparationBounds<D> {
     /// Returns whether a chain is long enough for this to be worth the effort.
-    pub(super) fn is_long_enough(chain: &Chain<D>) -> bool {
+    pub(super) fn is_chain_long_enough(chain: &Chain<D>) -> bool {
         chain.rods().len() >= MIN_RODS
     }
 
@@ -121,11 +121,13 @@ impl<const D: usize> MotionBounds<D> {
         }
         let points = chain.points();
         let ends = [points[rod], points[rod + 1]];
-        let mut clearance_m = search_m.min(end_distance_m(points, rod));
+        let mut clearance_m = search_m.min(rod_connector_distance_m(points, rod));
         let near = Aabb::from_points(&ends).grown(search_m + self.odometer_m - self.built_at_m);
         self.tree.visit(&near, |other| {
             let other_ends = [points[other], points[other + 1]];
-            if other.abs_diff(rod) > NEIGHBORS && !is_beyond(ends, other_ends, clearance_m) {
+            if other.abs_diff(rod) > NEIGHBORS
+                && !are_rods_surely_apart(ends, other_ends, clearance_m)
+            {
                 clearance_m = clearance_m.min(between_segments(ends, other_ends).distance_m);
             }
         });
@@ -136,7 +138,7 @@ impl<const D: usize> MotionBounds<D> {
 /// Returns whether two rods are surely as far from each other as `clearance_m`, less half of the margin:
 /// by the distance of their middles, which is much cheaper than that of the segments.
 #[inline]
-fn is_beyond<const D: usize>(
+fn are_rods_surely_apart<const D: usize>(
     [a, b]: [Point<D>; 2],
     [c, d]: [Point<D>; 2],
     clearance_m: f64,
@@ -147,7 +149,7 @@ fn is_beyond<const D: usize>(
 
 /// Returns the distance of a rod from the connectors nearest to it that may not touch it: those
 /// beyond its neighbors' far ends.
-fn end_distance_m<const D: usize>(points: &[Point<D>], rod: usize) -> f64 {
+fn rod_connector_distance_m<const D: usize>(points: &[Point<D>], rod: usize) -> f64 {
     let before = rod.checked_sub(NEIGHBORS).and_then(|k| points.get(k));
     let after = points.get(rod + NEIGHBORS + 1);
     let mut least_m = f64::INFINITY;

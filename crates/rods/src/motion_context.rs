@@ -4,7 +4,7 @@
 //! surroundings (slide E4), never on anything farther along the chain.
 
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
-use super::geometry::{Aabb, ConvexCore, Point, angle_rad, distance, sub};
+use super::geometry::{Aabb, ConvexCore, Point, angle_between_rad, distance, sub};
 use super::obstacle::{Obstacles, swept_bounds};
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
@@ -86,7 +86,7 @@ pub(super) enum BlockingPartOwner {
 
 impl BlockingPartOwner {
     #[inline]
-    pub(super) fn obstacle(self) -> Option<u32> {
+    pub(super) fn obstacle_id(self) -> Option<u32> {
         match self {
             Self::Obstacle(id) => Some(id),
             Self::OwnRod(_) | Self::OwnConnector(_) => None,
@@ -96,23 +96,23 @@ impl BlockingPartOwner {
 
 /// An objection, before the length of the motion is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PendingVeto {
+pub struct IncompleteVeto {
     /// The constraint that would be broken.
     pub reason: VetoReason,
     /// The obstacle in the way, if there is one.
     pub obstacle: Option<u32>,
 }
 
-impl PendingVeto {
+impl IncompleteVeto {
     #[inline]
     pub(super) fn new(reason: VetoReason) -> Self {
         Self { reason, obstacle: None }
     }
 
     #[inline]
-    pub(super) fn from_owner(reason: VetoReason, name: BlockingPartOwner) -> Self {
-        let reason = if name.obstacle().is_none() { VetoReason::SelfCollision } else { reason };
-        Self { reason, obstacle: name.obstacle() }
+    pub(super) fn from_blocking_owner(reason: VetoReason, name: BlockingPartOwner) -> Self {
+        let reason = if name.obstacle_id().is_none() { VetoReason::SelfCollision } else { reason };
+        Self { reason, obstacle: name.obstacle_id() }
     }
 }
 
@@ -136,7 +136,7 @@ pub(super) struct SlaveStep<const D: usize> {
 }
 
 impl<const D: usize> SlaveStep<D> {
-    fn sweep(&self, s: Point<D>) -> RodSweep<D> {
+    fn rod_sweep(&self, s: Point<D>) -> RodSweep<D> {
         RodSweep { from: [self.mo, self.so], to: [self.mn, s] }
     }
 
@@ -144,7 +144,7 @@ impl<const D: usize> SlaveStep<D> {
     pub(super) fn is_bend_allowed_at(&self, s: Point<D>) -> bool {
         let Some(prev) = self.prev else { return true };
         self.max_bend_rad >= PI
-            || angle_rad(sub(self.mn, prev), sub(s, self.mn))
+            || angle_between_rad(sub(self.mn, prev), sub(s, self.mn))
                 <= self.max_bend_rad + BEND_TOLERANCE_RAD
     }
 }
@@ -175,7 +175,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
 
     /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
     /// `None`, the connector `tip` is alone.
-    pub(super) fn visit_blocks(
+    pub(super) fn visit_blocking_parts(
         &self,
         near: &Aabb<D>,
         rod: Option<usize>,
@@ -193,7 +193,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         });
         if self.rules.self_collision {
             self.own_rods.visit(near, |other| {
-                for block in self.own_blocks(other, rod, tip).into_iter().flatten() {
+                for block in self.own_blocking_parts(other, rod, tip).into_iter().flatten() {
                     visit_one(&block);
                 }
             });
@@ -202,7 +202,7 @@ impl<'a, const D: usize> MotionContext<'a, D> {
 
     /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
     /// Neighbors are exempt because they touch by construction, or nearly so in a tight bend.
-    fn own_blocks(
+    fn own_blocking_parts(
         &self,
         other: usize,
         rod: Option<usize>,
@@ -217,13 +217,13 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         };
         // Each rod stands for the connector at its lower end, so that none is visited twice.
         let is_last = other + 2 == self.chain.connectors().len();
-        let lower = self.own_connector(other, rod, tip);
-        let upper = is_last.then(|| self.own_connector(other + 1, rod, tip));
+        let lower = self.own_blocking_connector(other, rod, tip);
+        let upper = is_last.then(|| self.own_blocking_connector(other + 1, rod, tip));
         [Some(own_rod), Some(lower), upper].map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
     }
 
     #[inline]
-    fn own_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> BlockingPart<D> {
+    fn own_blocking_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> BlockingPart<D> {
         BlockingPart {
             core: ConvexCore::Point(self.position(c)),
             radius_m: self.chain.connectors()[c].radius_m,
@@ -234,20 +234,24 @@ impl<'a, const D: usize> MotionContext<'a, D> {
     }
 
     /// Checks whether the slave may be at `s`; returns the first objection otherwise.
-    pub(super) fn check_slave(&self, step: &SlaveStep<D>, s: Point<D>) -> Result<(), PendingVeto> {
+    pub(super) fn check_slave(
+        &self,
+        step: &SlaveStep<D>,
+        s: Point<D>,
+    ) -> Result<(), IncompleteVeto> {
         if !step.is_bend_allowed_at(s) {
-            return Err(PendingVeto::new(VetoReason::BendLimit));
+            return Err(IncompleteVeto::new(VetoReason::BendLimit));
         }
         let max_step_m = self.rules.slave_step_max_m;
         if max_step_m < f64::INFINITY && distance(step.so, s) > max_step_m {
-            return Err(PendingVeto::new(VetoReason::StepLimit));
+            return Err(IncompleteVeto::new(VetoReason::StepLimit));
         }
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);
         let near = swept_bounds([step.mo, step.so, step.mn, s], reach_m);
         let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
         let rod = step.master.min(step.slave);
-        let travel_m = step.sweep(s).max_travel_m();
-        self.visit_blocks(&near, Some(rod), step.slave, |block| {
+        let travel_m = step.rod_sweep(s).max_travel_m();
+        self.visit_blocking_parts(&near, Some(rod), step.slave, |block| {
             if let Some((depth_m, reason)) = depth_and_reason(step, s, travel_m, block) {
                 // Of equal depths the lower name counts, because blocks come in no particular order.
                 let is_deeper = worst
@@ -257,7 +261,9 @@ impl<'a, const D: usize> MotionContext<'a, D> {
                 }
             }
         });
-        worst.map_or(Ok(()), |(_, name, reason)| Err(PendingVeto::from_owner(reason, name)))
+        worst.map_or(Ok(()), |(_, name, reason)| {
+            Err(IncompleteVeto::from_blocking_owner(reason, name))
+        })
     }
 
     /// Returns whether a connector's mobility allows a position.
@@ -292,7 +298,7 @@ fn depth_and_reason<const D: usize>(
     if rod_is_clear && tip_is_clear {
         // A rod that starts inside has no clear path, and must be able to get out.
         let is_allowed =
-            step.sweep(s).is_path_clear(core, rod_m, travel_m) || was_inside(step, block);
+            step.rod_sweep(s).is_path_clear(core, rod_m, travel_m) || was_inside(step, block);
         return (!is_allowed).then_some((0.0, VetoReason::WouldTunnel));
     }
     let now_m = depth_m(step.mn, s, step, block);

@@ -25,18 +25,18 @@ pub struct Obstacle<const D: usize> {
 
 impl<const D: usize> Obstacle<D> {
     /// Returns a static obstacle.
-    pub fn still(id: u32, core: ConvexCore<D>, radius_m: f64) -> Self {
+    pub fn new_static(id: u32, core: ConvexCore<D>, radius_m: f64) -> Self {
         Self { id, core, radius_m, velocity_m_s: [0.0; D] }
     }
 
     /// Returns a static disc or sphere.
     pub fn ball(id: u32, center: Point<D>, radius_m: f64) -> Self {
-        Self::still(id, ConvexCore::Point(center), radius_m)
+        Self::new_static(id, ConvexCore::Point(center), radius_m)
     }
 
     /// Returns a static thin wall or capsule.
     pub fn capsule(id: u32, ends: [Point<D>; 2], radius_m: f64) -> Self {
-        Self::still(id, ConvexCore::Segment(ends), radius_m)
+        Self::new_static(id, ConvexCore::Segment(ends), radius_m)
     }
 
     /// Returns whether it has a velocity; the grid of static obstacles leaves it out then.
@@ -109,7 +109,7 @@ const MAX_LINEAR_SCAN: usize = 12;
 
 impl<const D: usize> Obstacles<D> {
     /// Returns the same obstacles for a world in the plane; none if `D` is not 2.
-    pub fn in_plane(&self) -> Option<&Obstacles<2>> {
+    pub fn as_planar(&self) -> Option<&Obstacles<2>> {
         (self as &dyn Any).downcast_ref()
     }
 
@@ -141,7 +141,7 @@ impl<const D: usize> Obstacles<D> {
         &self.still.all
     }
 
-    /// Returns the moving obstacles, by id, also those that [`Self::set_moving`] gave no velocity.
+    /// Returns the moving obstacles, by id, also those that [`Self::replace_moving`] gave no velocity.
     pub fn moving(&self) -> &[Obstacle<D>] {
         &self.moving
     }
@@ -151,7 +151,7 @@ impl<const D: usize> Obstacles<D> {
     ///
     /// # Errors
     /// As [`Self::new`]; then nothing has changed.
-    pub fn set_moving(&mut self, moving: &[Obstacle<D>]) -> Result<(), InputError> {
+    pub fn replace_moving(&mut self, moving: &[Obstacle<D>]) -> Result<(), InputError> {
         moving.iter().try_for_each(Obstacle::check)?;
         self.moving.clear();
         self.moving.extend_from_slice(moving);
@@ -184,13 +184,13 @@ impl<const D: usize> Obstacles<D> {
         if self.moving.len() > MAX_LINEAR_SCAN {
             return self.moving_grid.visit(near, |k| visit_one(&self.moving[k]));
         }
-        for obstacle in self.moving.iter().filter(|o| o.bounds().meets(near)) {
+        for obstacle in self.moving.iter().filter(|o| o.bounds().intersects(near)) {
             visit_one(obstacle);
         }
     }
 
     /// Returns the obstacle with the lowest id among those that a capsule overlaps.
-    pub fn first_overlap(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
+    pub fn first_overlapping_id(&self, [p, q]: [Point<D>; 2], radius_m: f64) -> Option<u32> {
         let mut first: Option<u32> = None;
         // A negative radius asks for overlaps that are deeper than it.
         self.visit(&Aabb::from_points(&[p, q]).grown(radius_m.max(0.0)), |o| {
@@ -264,17 +264,17 @@ mod tests {
                 moving.into_iter().map(|o| Obstacle { velocity_m_s: by, ..o }).collect();
             let near = bounds_around(at, half_m);
             let expected = |moving: &[Obstacle<2>]| -> Vec<u32> {
-                let near_by = |o: &&Obstacle<2>| o.bounds().meets(&near);
+                let near_by = |o: &&Obstacle<2>| o.bounds().intersects(&near);
                 still.iter().chain(moving).filter(near_by).map(|o| o.id).collect()
             };
             let mut obstacles = Obstacles::new(still.clone(), reach_m).unwrap();
             let copy = obstacles.clone();
-            obstacles.set_moving(&moving).unwrap();
+            obstacles.replace_moving(&moving).unwrap();
             prop_assert_eq!(seen(&obstacles, &near), expected(&moving));
             obstacles.advance(0.5);
             prop_assert_eq!(seen(&obstacles, &near), expected(obstacles.moving()));
             prop_assert_eq!(seen(&copy, &near), expected(&[]));
-            obstacles.set_moving(&moving[..moving.len() / 4]).unwrap();
+            obstacles.replace_moving(&moving[..moving.len() / 4]).unwrap();
             prop_assert_eq!(seen(&obstacles, &near), expected(&moving[..moving.len() / 4]));
         }
 
@@ -287,7 +287,7 @@ mod tests {
             other_order.rotate_left(from.min(moving.len()));
             let order = |moving: &[Obstacle<2>]| {
                 let mut obstacles = Obstacles::default();
-                obstacles.set_moving(moving).unwrap();
+                obstacles.replace_moving(moving).unwrap();
                 let mut seen = Vec::new();
                 obstacles.visit(&bounds_around([0.0; 2], half_m), |o| seen.push(o.id));
                 seen
@@ -305,8 +305,8 @@ mod tests {
     #[test]
     fn wrong_moving_obstacles_change_nothing() {
         let mut obstacles = Obstacles::<2>::default();
-        obstacles.set_moving(&[Obstacle::ball(1, [0.0; 2], 1.0)]).unwrap();
-        assert!(obstacles.set_moving(&[Obstacle::ball(2, [f64::NAN; 2], 1.0)]).is_err());
+        obstacles.replace_moving(&[Obstacle::ball(1, [0.0; 2], 1.0)]).unwrap();
+        assert!(obstacles.replace_moving(&[Obstacle::ball(2, [f64::NAN; 2], 1.0)]).is_err());
         assert_eq!(obstacles.moving()[0].id, 1);
     }
 

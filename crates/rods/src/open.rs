@@ -7,11 +7,11 @@
 //! motions of the same connector overlap likewise: each follows the one before it, two connectors
 //! behind.
 
-use super::candidates::follow_guide_line;
+use super::candidates::guide_line_position;
 use super::chain::{Chain, Rod};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
-use super::pass::{ChainDirection, MotionTally};
+use super::pass::{ChainDirection, MotionEffects};
 
 /// The rule by which a slave counts as staying in place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,12 +23,12 @@ pub(super) enum StayRule {
 }
 
 /// Moves connector `k`, and all connectors that must follow.
-pub(super) fn pull_connector<const D: usize>(
+pub(super) fn pull_chain_by_connector<const D: usize>(
     chain: &mut Chain<D>,
     k: usize,
     to: Point<D>,
     stays: StayRule,
-    tally: &mut MotionTally,
+    tally: &mut MotionEffects,
 ) {
     match stays {
         StayRule::Exactly => sweep::<D, false>(chain, k, to, tally),
@@ -43,12 +43,13 @@ fn sweep<const D: usize, const NEARLY: bool>(
     chain: &mut Chain<D>,
     k: usize,
     to: Point<D>,
-    tally: &mut MotionTally,
+    tally: &mut MotionEffects,
 ) {
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
     let from = std::mem::replace(&mut points[k], to);
-    let mut sweeps = ChainDirection::BOTH.map(|direction| OpenSweep::start(direction, k, from, to));
+    let mut sweeps =
+        ChainDirection::BOTH.map(|direction| ObstacleFreeSweep::start(direction, k, from, to));
     let [up, down] = &mut sweeps;
     // In turn until one has ended, then the rest of the other one.
     while up.advance::<NEARLY>(points, rods, min_move_m)
@@ -56,7 +57,7 @@ fn sweep<const D: usize, const NEARLY: bool>(
     {}
     while up.advance::<NEARLY>(points, rods, min_move_m) {}
     while down.advance::<NEARLY>(points, rods, min_move_m) {}
-    tally.record_run(down.master..up.master + 1);
+    tally.record_touched_range(down.master..up.master + 1);
     tally.changed += 1 + up.changed + down.changed;
     tally.record_slave_move(up.longest2.max(down.longest2).sqrt());
 }
@@ -70,11 +71,11 @@ const LANE_OFFSET: usize = 2;
 
 /// Moves connector `k` through at most [`MAX_BATCH`] places, and all connectors that must follow; slaves stay
 /// as by [`StayRule::Nearly`]. Returns a bound on the travel of any connector, meters.
-pub(super) fn pull_batch<const D: usize>(
+pub(super) fn pull_through_targets<const D: usize>(
     chain: &mut Chain<D>,
     k: usize,
     to: &[Point<D>],
-    tally: &mut MotionTally,
+    tally: &mut MotionEffects,
 ) -> f64 {
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
@@ -83,18 +84,18 @@ pub(super) fn pull_batch<const D: usize>(
         std::array::from_fn::<_, MAX_BATCH, _>(|j| {
             // Sweeps beyond the last motion fill the array and are never advanced.
             let j = j.min(to.len() - 1);
-            OpenSweep::start(direction, k, motion_start(at, to, j), to[j])
+            ObstacleFreeSweep::start(direction, k, motion_start_point(at, to, j), to[j])
         })
     });
     for sweeps in &mut sweeps {
-        advance_batch(&mut sweeps[..to.len()], points, rods, min_move_m);
+        advance_sweep_batch(&mut sweeps[..to.len()], points, rods, min_move_m);
     }
     let [up, down] = sweeps;
     let mut travel_m = 0.0;
     for (j, (up, down)) in up.iter().zip(&down).take(to.len()).enumerate() {
         let slave_m = up.longest2.max(down.longest2).sqrt();
-        travel_m += slave_m.max(distance(motion_start(at, to, j), to[j]));
-        tally.record_run(down.master..up.master + 1);
+        travel_m += slave_m.max(distance(motion_start_point(at, to, j), to[j]));
+        tally.record_touched_range(down.master..up.master + 1);
         tally.changed += 1 + up.changed + down.changed;
         tally.record_slave_move(slave_m);
     }
@@ -104,12 +105,12 @@ pub(super) fn pull_batch<const D: usize>(
 
 /// Returns where the initiator is before motion `j`: at `at` before the first, then at the target of the one before.
 #[inline]
-fn motion_start<const D: usize>(at: Point<D>, to: &[Point<D>], j: usize) -> Point<D> {
+fn motion_start_point<const D: usize>(at: Point<D>, to: &[Point<D>], j: usize) -> Point<D> {
     if j == 0 { at } else { to[j - 1] }
 }
 
-fn advance_batch<const D: usize>(
-    sweeps: &mut [OpenSweep<D>],
+fn advance_sweep_batch<const D: usize>(
+    sweeps: &mut [ObstacleFreeSweep<D>],
     points: &mut [Point<D>],
     rods: &[Rod],
     min_move_m: f64,
@@ -129,7 +130,7 @@ fn advance_batch<const D: usize>(
 }
 
 /// One sweep, outward from the initiator.
-struct OpenSweep<const D: usize> {
+struct ObstacleFreeSweep<const D: usize> {
     direction: ChainDirection,
     /// The connector that moved last, and its position before and after.
     master: usize,
@@ -140,7 +141,7 @@ struct OpenSweep<const D: usize> {
     longest2: f64,
 }
 
-impl<const D: usize> OpenSweep<D> {
+impl<const D: usize> ObstacleFreeSweep<D> {
     /// Returns the sweep of connector `k` that moves.
     fn start(direction: ChainDirection, k: usize, mo: Point<D>, mn: Point<D>) -> Self {
         Self { direction, master: k, mo, mn, changed: 0, longest2: 0.0 }
@@ -157,7 +158,7 @@ impl<const D: usize> OpenSweep<D> {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];
-        let guided = follow_guide_line([self.mo, self.mn, so], rod, min_move_m);
+        let guided = guide_line_position([self.mo, self.mn, so], rod, min_move_m);
         let new = if NEARLY && distance(guided, so) <= min_move_m { so } else { guided };
         if new == so && self.may_end_at(slave, points, rods) {
             return false;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Results of a request so far.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct MotionTally {
+pub(super) struct MotionEffects {
     /// First and one past the last connector that reacted.
     pub(super) from: usize,
     pub(super) to: usize,
@@ -16,7 +16,7 @@ pub(super) struct MotionTally {
     pub(super) max_slave_step_m: f64,
 }
 
-impl MotionTally {
+impl MotionEffects {
     /// Returns the tally of a motion of connector `first` that nothing has followed yet.
     #[inline]
     pub(super) fn start(first: usize) -> Self {
@@ -25,7 +25,7 @@ impl MotionTally {
 
     /// Counts the connectors around the initiator that have reacted.
     #[inline]
-    pub(super) fn record_run(&mut self, run: Range<usize>) {
+    pub(super) fn record_touched_range(&mut self, run: Range<usize>) {
         self.from = self.from.min(run.start);
         self.to = self.to.max(run.end);
     }
@@ -33,7 +33,7 @@ impl MotionTally {
     /// Adds the results of a separate motion.
     #[inline]
     pub(super) fn add(&mut self, motion: &Self) {
-        self.record_run(motion.from..motion.to);
+        self.record_touched_range(motion.from..motion.to);
         self.changed += motion.changed;
         self.rotated += motion.rotated;
         self.record_slave_move(motion.max_slave_step_m);

@@ -7,14 +7,14 @@
 use super::candidates::{CandidatePosition, CandidateScratch};
 use super::chain::{Chain, is_in_range, out_of_range};
 use super::geometry::{Aabb, Point, distance, lerp};
-use super::motion_bounds::MotionBounds;
+use super::motion_bounds::SeparationBounds;
 use super::motion_context::{
-    BlockingPartOwner, MotionContext, PendingVeto, SlaveStep, TOLERANCE_M, TentativePositions,
+    BlockingPartOwner, IncompleteVeto, MotionContext, SlaveStep, TOLERANCE_M, TentativePositions,
     contact_distance_m, is_length_allowed,
 };
 use super::obstacle::{Obstacles, swept_bounds};
 use super::open::{self, StayRule};
-use super::pass::{ChainDirection, MotionTally};
+use super::pass::{ChainDirection, MotionEffects};
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
 use super::rules::{ReactionRules, RotationRule};
@@ -43,7 +43,7 @@ pub struct Propagator<const D: usize> {
     reaction: Option<Arc<dyn Reaction>>,
     tentative: TentativePositions<D>,
     own_rods: RodBvh<D>,
-    motion_bounds: MotionBounds<D>,
+    motion_bounds: SeparationBounds<D>,
     /// When to try proofs of single sub-steps.
     proofs: SeparationProofSchedule,
     /// When to try proofs of all sub-steps of a request at once.
@@ -53,7 +53,7 @@ pub struct Propagator<const D: usize> {
     /// Positions before the request, of the run of connectors that have moved since: a veto in a
     /// later sub-step takes back the earlier ones.
     original: TentativePositions<D>,
-    tally: MotionTally,
+    tally: MotionEffects,
 }
 
 /// A choice point of the depth-first search: another reaction of an earlier slave.
@@ -68,13 +68,13 @@ enum BacktrackAlternative<const D: usize> {
 
 /// The connectors that are moved from outside: one, or the two of a rod.
 #[derive(Debug, Clone, Copy)]
-struct DrivenConnectors<const D: usize> {
+struct InitiatingConnectors<const D: usize> {
     first: usize,
     n: usize,
     to: [Point<D>; 2],
 }
 
-impl<const D: usize> DrivenConnectors<D> {
+impl<const D: usize> InitiatingConnectors<D> {
     fn from_motion(motion: &RequestedMotion<D>) -> Self {
         match *motion {
             RequestedMotion::Connector { k, to } => Self { first: k, n: 1, to: [to, to] },
@@ -101,7 +101,7 @@ impl<const D: usize> DrivenConnectors<D> {
 }
 
 /// The index of the connector that objects, and its objection.
-type ConnectorVeto = (usize, PendingVeto);
+type ConnectorVeto = (usize, IncompleteVeto);
 
 /// The inputs of one sweep outward from the initiator; nothing changes them before the commit.
 #[derive(Clone, Copy)]
@@ -141,23 +141,23 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         request: &MotionRequest<D>,
     ) -> Result<MotionOutcome<D>, InputError> {
-        let mut driven = DrivenConnectors::from_motion(&request.motion);
+        let mut driven = InitiatingConnectors::from_motion(&request.motion);
         check(chain, &driven)?;
         let from = driven.positions(chain);
-        self.tally = MotionTally::start(driven.first);
+        self.tally = MotionEffects::start(driven.first);
         self.original.start(chain.points().len(), driven.first);
         if let Err((by, objection)) = project(chain, &mut driven, request.mode) {
             return Ok(MotionOutcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
-        if self.reaction.is_none() && self.pull_all_if_separated(chain, obstacles, &driven, n) {
+        if self.reaction.is_none() && self.try_batch_pull(chain, obstacles, &driven, n) {
             return Ok(MotionOutcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
             if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
                 interrupt::check();
             }
-            let driven = DrivenConnectors { to: driven.positions_at(from, [k, n]), ..driven };
+            let driven = InitiatingConnectors { to: driven.positions_at(from, [k, n]), ..driven };
             if let Err((by, objection)) = self.sub_step(chain, obstacles, driven, k == n) {
                 let veto = make_veto(chain, driven.first, by, objection);
                 return Ok(self.end_at_veto(chain, request.mode, veto));
@@ -171,7 +171,7 @@ impl<const D: usize> Propagator<D> {
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
         from: [Point<D>; 2],
     ) -> Result<usize, InputError> {
         let travel_m =
@@ -195,7 +195,7 @@ impl<const D: usize> Propagator<D> {
     }
 
     fn completed_motion(&self, cut_short: Option<Veto<D>>) -> CompletedMotion<D> {
-        let MotionTally { from, to, changed, rotated, max_slave_step_m } = self.tally;
+        let MotionEffects { from, to, changed, rotated, max_slave_step_m } = self.tally;
         CompletedMotion { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
@@ -205,7 +205,7 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: DrivenConnectors<D>,
+        driven: InitiatingConnectors<D>,
         is_last: bool,
     ) -> Result<(), ConnectorVeto> {
         if has_arrived(chain, &driven) {
@@ -215,9 +215,9 @@ impl<const D: usize> Propagator<D> {
         // applies, so which of them runs is a matter of speed alone. The cheap ones know the built-in
         // reaction only.
         let is_built_in = self.reaction.is_none();
-        let is_open = is_built_in && is_open(chain, obstacles, &driven);
+        let is_open = is_built_in && is_obstacle_free(chain, obstacles, &driven);
         if is_open && !self.rules.self_collision {
-            open::pull_connector(
+            open::pull_chain_by_connector(
                 chain,
                 driven.first,
                 driven.to[0],
@@ -226,11 +226,11 @@ impl<const D: usize> Propagator<D> {
             );
             return Ok(());
         }
-        if is_open && self.pull_if_separated(chain, &driven, is_last) {
+        if is_open && self.pull_if_parts_separated(chain, &driven, is_last) {
             return Ok(());
         }
         if self.rules.self_collision {
-            if is_built_in && !is_open && self.sweep_if_separated(chain, obstacles, &driven) {
+            if is_built_in && !is_open && self.sweep_if_parts_separated(chain, obstacles, &driven) {
                 return Ok(());
             }
             let points = chain.points();
@@ -238,7 +238,7 @@ impl<const D: usize> Propagator<D> {
             self.own_rods.refit(rods.map(|i| rod_box(chain, i, [points[i], points[i + 1]])));
         }
         let rotated = self.tally.rotated;
-        let followed = self.sweep_from(chain, obstacles, &driven);
+        let followed = self.propagate_from_driven(chain, obstacles, &driven);
         match followed {
             Ok(()) => self.commit(chain, &driven),
             Err(_) => self.tally.rotated = rotated,
@@ -247,14 +247,14 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Finds new places for the driven connectors and all that follow them.
-    fn sweep_from(
+    fn propagate_from_driven(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
     ) -> Result<(), ConnectorVeto> {
         self.tentative.start(chain.points().len(), driven.first);
-        self.place_driven(chain, obstacles, driven)?;
+        self.place_driven_connectors(chain, obstacles, driven)?;
         // A fixed order: the second sweep sees the new places of the first one, for the bend at the
         // initiator and for collisions of the chain with itself.
         let up = PropagationContext { chain, obstacles, direction: ChainDirection::Up };
@@ -263,11 +263,11 @@ impl<const D: usize> Propagator<D> {
         self.sweep(down, driven.first)
     }
 
-    fn place_driven(
+    fn place_driven_connectors(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
     ) -> Result<(), ConnectorVeto> {
         // Both are checked before one is placed: the ends of a driven rod move at once, so neither
         // is an obstacle to the other at a new place.
@@ -289,13 +289,13 @@ impl<const D: usize> Propagator<D> {
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
     ) -> Result<(), ConnectorVeto> {
         let slave = driven.first + 1;
         let context = self.context(chain, obstacles);
-        let step = SlaveStep { mn: driven.to[0], ..context.step(slave, ChainDirection::Up) };
+        let step = SlaveStep { mn: driven.to[0], ..context.slave_step(slave, ChainDirection::Up) };
         if !is_length_allowed(step.rod, distance(driven.to[0], driven.to[1])) {
-            return Err((slave, PendingVeto::new(VetoReason::Mobility)));
+            return Err((slave, IncompleteVeto::new(VetoReason::Mobility)));
         }
         // Its bends are checked by the sweeps, when the connectors on both sides are placed.
         let without_bend = SlaveStep { prev: None, ..step };
@@ -355,12 +355,12 @@ impl<const D: usize> Propagator<D> {
                 Err(objection) => {
                     // The first one is reported: the later ones are those of detours around it.
                     let first = *first_objection.get_or_insert((slave, objection));
-                    self.backtrack(sweep, &mut backtracks_left, first)?
+                    self.backtrack_to_alternative(sweep, &mut backtracks_left, first)?
                 }
             };
             let so = chain.points()[at_slave];
             let stays = distance(chosen.at, so) <= chain.min_move_m();
-            if stays && self.may_stop(sweep, at_slave) {
+            if stays && self.can_stop_propagation(sweep, at_slave) {
                 return Ok(());
             }
             self.place(chain, at_slave, if stays { so } else { chosen.at });
@@ -375,8 +375,8 @@ impl<const D: usize> Propagator<D> {
         &mut self,
         sweep: PropagationContext<'_, D>,
         slave: usize,
-    ) -> Result<CandidatePosition<D>, PendingVeto> {
-        self.find_candidates(sweep, slave)?;
+    ) -> Result<CandidatePosition<D>, IncompleteVeto> {
+        self.find_slave_places(sweep, slave)?;
         let Self { scratch, alternatives, .. } = self;
         let chosen = scratch.found[0];
         // A stack: the next best goes on top, and the side not examined yet above all, because it may hold a shorter
@@ -391,20 +391,20 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Fills `scratch.found` with places for a slave.
-    fn find_candidates(
+    fn find_slave_places(
         &mut self,
         PropagationContext { chain, obstacles, direction }: PropagationContext<'_, D>,
         slave: usize,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         let Self { rules, reaction, tentative, own_rods, scratch, .. } = self;
         let reaction = reaction.as_deref();
         let context = MotionContext { chain, obstacles, rules, tentative, own_rods, reaction };
-        context.candidates(&context.step(slave, direction), scratch)
+        context.candidates(&context.slave_step(slave, direction), scratch)
     }
 
     /// Backtracks after an objection: the latest of the earlier slaves with an alternative takes it.
     /// Returns that slave and its new place, or the objection if no alternative is left.
-    fn backtrack(
+    fn backtrack_to_alternative(
         &mut self,
         sweep: PropagationContext<'_, D>,
         backtracks_left: &mut usize,
@@ -413,7 +413,7 @@ impl<const D: usize> Propagator<D> {
         while let Some(alternative) = self.alternatives.pop() {
             if *backtracks_left == 0 {
                 let (by, veto) = objection;
-                return Err((by, PendingVeto { reason: VetoReason::Limit, ..veto }));
+                return Err((by, IncompleteVeto { reason: VetoReason::Limit, ..veto }));
             }
             *backtracks_left -= 1;
             match alternative {
@@ -424,7 +424,7 @@ impl<const D: usize> Propagator<D> {
                 BacktrackAlternative::OtherSide { slave, tried } => {
                     self.revert(sweep.chain, slave, sweep.direction);
                     self.scratch.both_sides = true;
-                    let result = self.find_candidates(sweep, slave);
+                    let result = self.find_slave_places(sweep, slave);
                     self.scratch.both_sides = false;
                     let other = self.scratch.found.iter().find(|c| c.at != tried);
                     if let (Ok(()), Some(&candidate)) = (result, other) {
@@ -438,9 +438,9 @@ impl<const D: usize> Propagator<D> {
 
     /// Returns whether the rest of the chain has nothing to react to: this slave stays, and the bend at it
     /// and the rod beyond it are allowed as they are.
-    fn may_stop(&self, sweep: PropagationContext<'_, D>, slave: usize) -> bool {
+    fn can_stop_propagation(&self, sweep: PropagationContext<'_, D>, slave: usize) -> bool {
         let Some(next) = sweep.next(slave) else { return true };
-        let step = self.context(sweep.chain, sweep.obstacles).step(next, sweep.direction);
+        let step = self.context(sweep.chain, sweep.obstacles).slave_step(next, sweep.direction);
         // The bend counts as well: its inner rod has turned, though its outer one stays. Without this
         // test a chain with a limit of 60 degrees stopped at 86.
         is_length_allowed(step.rod, distance(step.so, step.mn)) && step.is_bend_allowed_at(step.so)
@@ -482,7 +482,7 @@ impl<const D: usize> Propagator<D> {
 
     /// Moves the chain; where a connector was before the request is kept the first time that it
     /// moves.
-    fn commit(&mut self, chain: &mut Chain<D>, driven: &DrivenConnectors<D>) {
+    fn commit(&mut self, chain: &mut Chain<D>, driven: &InitiatingConnectors<D>) {
         let run = self.tentative.moved_range();
         // Outward from the driven connectors, so that the run of original positions has no gap.
         for i in (driven.first..run.end).chain((run.start..driven.first).rev()) {
@@ -497,12 +497,12 @@ impl<const D: usize> Propagator<D> {
             }
             chain.points_mut()[i] = new;
         }
-        self.tally.record_run(run);
+        self.tally.record_touched_range(run);
     }
 }
 
 /// Returns whether every driven connector is at its target, up to the least move.
-fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> bool {
+fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &InitiatingConnectors<D>) -> bool {
     driven
         .indices()
         .enumerate()
@@ -510,10 +510,10 @@ fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -
 }
 
 /// Returns whether only the chain itself can be in the way of a motion.
-fn is_open<const D: usize>(
+fn is_obstacle_free<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
-    driven: &DrivenConnectors<D>,
+    driven: &InitiatingConnectors<D>,
 ) -> bool {
     obstacles.is_empty() && chain.is_plain() && driven.n == 1
 }
@@ -559,7 +559,7 @@ fn has_more_places<const D: usize>(
 
 impl<const D: usize> MotionContext<'_, D> {
     /// Returns the step of a slave whose master's new place is settled.
-    fn step(&self, slave: usize, direction: ChainDirection) -> SlaveStep<D> {
+    fn slave_step(&self, slave: usize, direction: ChainDirection) -> SlaveStep<D> {
         let points = self.chain.points();
         let master = direction.master(slave);
         let behind_master = match direction {
@@ -584,7 +584,7 @@ impl<const D: usize> MotionContext<'_, D> {
     }
 
     /// Checks whether the path of an initiator is free of obstacles and of the chain's own parts.
-    fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), PendingVeto> {
+    fn check_initiator(&self, k: usize, to: Point<D>) -> Result<(), IncompleteVeto> {
         // The slides know collisions with obstacles only, so without any there is nothing to check.
         if self.rules.rotation == RotationRule::Literal && self.obstacles.is_empty() {
             return Ok(());
@@ -593,7 +593,7 @@ impl<const D: usize> MotionContext<'_, D> {
         let radius_m = self.chain.connectors()[k].radius_m;
         let near = swept_bounds([from, from, to, to], radius_m);
         let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
-        self.visit_blocks(&near, None, k, |block| {
+        self.visit_blocking_parts(&near, None, k, |block| {
             let keep_m = block.radius_m + radius_m;
             if !block.stops_tip
                 || block.core.is_clear_of_segment([from, to], contact_distance_m(keep_m))
@@ -616,14 +616,16 @@ impl<const D: usize> MotionContext<'_, D> {
                 worst = Some((after_m, block.name, reason));
             }
         });
-        worst.map_or(Ok(()), |(_, name, reason)| Err(PendingVeto::from_owner(reason, name)))
+        worst.map_or(Ok(()), |(_, name, reason)| {
+            Err(IncompleteVeto::from_blocking_owner(reason, name))
+        })
     }
 }
 
 /// Projects the targets of driven connectors to allowed places, or returns the objection.
 fn project<const D: usize>(
     chain: &Chain<D>,
-    driven: &mut DrivenConnectors<D>,
+    driven: &mut InitiatingConnectors<D>,
     mode: VetoEffect,
 ) -> Result<(), ConnectorVeto> {
     for (h, k) in driven.indices().enumerate() {
@@ -633,11 +635,11 @@ fn project<const D: usize>(
             continue;
         }
         if connector.is_still() && distance(driven.to[h], at) > chain.min_move_m() {
-            return Err((k, PendingVeto::new(connector.still_reason())));
+            return Err((k, IncompleteVeto::new(connector.still_reason())));
         }
         if !connector.mobility.allows(driven.to[h], at) {
             if mode == VetoEffect::Exact || driven.n > 1 {
-                return Err((k, PendingVeto::new(VetoReason::Mobility)));
+                return Err((k, IncompleteVeto::new(VetoReason::Mobility)));
             }
             driven.to[h] = connector.mobility.project(driven.to[h], at);
         }
@@ -658,14 +660,17 @@ fn make_veto<const D: usize>(
     chain: &Chain<D>,
     from: usize,
     by: usize,
-    objection: PendingVeto,
+    objection: IncompleteVeto,
 ) -> Veto<D> {
-    let PendingVeto { reason, obstacle } = objection;
+    let IncompleteVeto { reason, obstacle } = objection;
     Veto { by, from, reason, obstacle, reached: chain.points()[from] }
 }
 
 /// Refuses a motion of connectors that the chain does not have, or to a target out of range.
-fn check<const D: usize>(chain: &Chain<D>, driven: &DrivenConnectors<D>) -> Result<(), InputError> {
+fn check<const D: usize>(
+    chain: &Chain<D>,
+    driven: &InitiatingConnectors<D>,
+) -> Result<(), InputError> {
     if driven.first + driven.n > chain.points().len() {
         return Err(InputError::new(
             "initiator",

@@ -61,14 +61,14 @@ pub enum ReachOutcome<const D: usize> {
 
 /// A connector that is held, its place before, and its constraint.
 #[derive(Debug, Clone, Copy)]
-struct ConstrainedConnector<const D: usize> {
+struct HeldConnector<const D: usize> {
     k: usize,
     home: Point<D>,
     mobility: Mobility<D>,
     failed: bool,
 }
 
-impl<const D: usize> ConstrainedConnector<D> {
+impl<const D: usize> HeldConnector<D> {
     /// Returns the place to which the connector is to return.
     fn home_position(&self, chain: &Chain<D>) -> Point<D> {
         if self.failed {
@@ -82,12 +82,12 @@ impl<const D: usize> ConstrainedConnector<D> {
 }
 
 /// A chain whose held connectors are set free, and the goal of its passes.
-struct ReachPasses<'a, const D: usize> {
+struct ReachSolver<'a, const D: usize> {
     propagator: &'a mut Propagator<D>,
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     request: &'a ReachRequest<D>,
-    held: &'a [ConstrainedConnector<D>],
+    held: &'a [HeldConnector<D>],
 }
 
 /// Moves a connector to a target while the base keeps its place, bit for bit, and all other held
@@ -112,13 +112,13 @@ pub fn reach_target<const D: usize>(
     let held = held_connectors(chain, request);
     for h in &held {
         chain.set_mobility(h.k, Mobility::Free)?;
-        chain.set_failed(h.k, false);
+        chain.set_connector_failed(h.k, false);
     }
-    let passes = ReachPasses { propagator, chain, obstacles, request, held: &held };
+    let passes = ReachSolver { propagator, chain, obstacles, request, held: &held };
     let outcome = passes.run();
     for h in &held {
         chain.set_mobility(h.k, h.mobility)?;
-        chain.set_failed(h.k, h.failed);
+        chain.set_connector_failed(h.k, h.failed);
     }
     let outcome = outcome.map(|outcome| checked_path(outcome, chain, obstacles, &before, request));
     if !matches!(outcome, Ok(ReachOutcome::There { .. })) {
@@ -131,20 +131,20 @@ pub fn reach_target<const D: usize>(
 fn held_connectors<const D: usize>(
     chain: &Chain<D>,
     request: &ReachRequest<D>,
-) -> Vec<ConstrainedConnector<D>> {
+) -> Vec<HeldConnector<D>> {
     let mut held = Vec::new();
     for (k, connector) in chain.connectors().iter().enumerate() {
         let is_bound = connector.failed || connector.mobility != Mobility::Free;
         if k != request.k && (k == request.base || is_bound) {
             let home = chain.points()[k];
             let Connector { mobility, failed, .. } = *connector;
-            held.push(ConstrainedConnector { k, home, mobility, failed });
+            held.push(HeldConnector { k, home, mobility, failed });
         }
     }
     held
 }
 
-impl<const D: usize> ReachPasses<'_, D> {
+impl<const D: usize> ReachSolver<'_, D> {
     fn run(mut self) -> Result<ReachOutcome<D>, InputError> {
         let ReachRequest { k, target, tolerance_m, .. } = *self.request;
         let max_passes = if self.held.len() > 1 { MAX_MUTUAL_PASSES } else { MAX_DOUBLE_PASSES };
@@ -174,12 +174,12 @@ impl<const D: usize> ReachPasses<'_, D> {
     /// there is one.
     fn double_pass(&mut self) -> Result<Option<Veto<D>>, InputError> {
         let ReachRequest { k, target, .. } = *self.request;
-        if let Some(veto) = self.lead_connector(k, target)? {
+        if let Some(veto) = self.move_connector(k, target)? {
             return Ok(Some(veto));
         }
         for h in self.held {
             let home = h.home_position(self.chain);
-            if let Some(veto) = self.lead_connector(h.k, home)? {
+            if let Some(veto) = self.move_connector(h.k, home)? {
                 return Ok(Some(veto));
             }
             // A last move shorter than the least counts as none, so a held connector is put exactly
@@ -190,7 +190,7 @@ impl<const D: usize> ReachPasses<'_, D> {
     }
 
     /// Moves one connector, or returns the veto.
-    fn lead_connector(&mut self, k: usize, to: Point<D>) -> Result<Option<Veto<D>>, InputError> {
+    fn move_connector(&mut self, k: usize, to: Point<D>) -> Result<Option<Veto<D>>, InputError> {
         let motion = RequestedMotion::Connector { k, to };
         let request =
             MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
@@ -260,7 +260,7 @@ mod tests {
     use super::*;
 
     fn arm() -> Chain<2> {
-        let rod = Rod::fixed(1.0, 0.02);
+        let rod = Rod::with_fixed_length(1.0, 0.02);
         let mut arm =
             Chain::straight([0.0, 0.0], [1.0, 0.0], 6, rod, Connector::free(0.05)).unwrap();
         arm.set_mobility(0, Mobility::Fixed).unwrap();

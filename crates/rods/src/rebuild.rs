@@ -6,14 +6,14 @@
 //! parts only just reach, passes converge too slowly, and the parts are laid out instead. If the gap is
 //! longer than the remaining parts, one end is pulled nearer, if it is allowed to move.
 
-use super::candidates::follow_guide_line;
+use super::candidates::guide_line_position;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Point, distance, lerp};
 use super::motion_context::is_length_allowed;
 use super::obstacle::Obstacles;
 use super::pass::ChainDirection;
 use super::propagate::Propagator;
-use super::span::joints;
+use super::span::joints_across_gap;
 use super::veto::MotionRequest;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
@@ -78,7 +78,7 @@ pub fn reform_chain<const D: usize>(
 ) -> Result<ReformResult, InputError> {
     let first = *scattered.start();
     let last = *scattered.end();
-    check_ends(chain, first, last)?;
+    check_scattered_range(chain, first, last)?;
     let before = chain.points().to_vec();
     let low = first - 1;
     let high = last + 1;
@@ -87,7 +87,7 @@ pub fn reform_chain<const D: usize>(
     if need_m > have_m + LENGTH_TOLERANCE_M {
         match movable {
             MovableEnd::Nobody => {
-                let missing = missing_rods(&chain.rods()[low..high], need_m - have_m);
+                let missing = count_missing_rods(&chain.rods()[low..high], need_m - have_m);
                 return Ok(ReformResult::GapTooLong { have_m, need_m, missing });
             }
             MovableEnd::First => pull_end(chain, 0..=low, high, have_m)?,
@@ -104,7 +104,7 @@ pub fn reform_chain<const D: usize>(
     }
     if !is_whole(chain, low, high) {
         let [a, b] = [chain.points()[low], chain.points()[high]];
-        let places = joints(a, b, &chain.rods()[low..high]);
+        let places = joints_across_gap(a, b, &chain.rods()[low..high]);
         chain.points_mut()[first..=last].copy_from_slice(&places);
     }
     if is_whole(chain, low, high) {
@@ -115,7 +115,7 @@ pub fn reform_chain<const D: usize>(
     Ok(ReformResult::NotReached { off_m })
 }
 
-fn check_ends<const D: usize>(
+fn check_scattered_range<const D: usize>(
     chain: &Chain<D>,
     first: usize,
     last: usize,
@@ -133,7 +133,7 @@ fn is_whole<const D: usize>(chain: &Chain<D>, low: usize, high: usize) -> bool {
 }
 
 /// Returns the least number of rods, each as long as the longest, that fill a gap.
-fn missing_rods(rods: &[Rod], gap_m: f64) -> usize {
+fn count_missing_rods(rods: &[Rod], gap_m: f64) -> usize {
     let longest_m = rods.iter().map(|rod| rod.max_m).fold(0.0, f64::max);
     // A gap of a whole number of rods needs no further part because of rounding.
     ((gap_m - LENGTH_TOLERANCE_M) / longest_m).ceil().max(1.0) as usize
@@ -170,7 +170,7 @@ fn run_pass<const D: usize>(
         let mn = chain.points()[master];
         let so = chain.points()[slave];
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = follow_guide_line([mo, mn, so], rod, min_move_m);
+        chain.points_mut()[slave] = guide_line_position([mo, mn, so], rod, min_move_m);
         master = slave;
         mo = so;
     }
@@ -196,7 +196,7 @@ fn pull_end<const D: usize>(
         chain.connectors()[low..=high].to_vec(),
         chain.rods()[low..high].to_vec(),
     )?;
-    let request = MotionRequest::operator_request(stub - low, target);
+    let request = MotionRequest::from_operator(stub - low, target);
     // If the end cannot move, the check of all rods that follows says so.
     let _ = Propagator::default().propagate(&mut alone, &Obstacles::default(), &request)?;
     chain.points_mut()[low..=high].copy_from_slice(alone.points());
@@ -321,7 +321,7 @@ mod tests {
     /// Passes along a line never leave it, so they cannot fold rods of fixed length.
     #[test]
     fn parts_on_a_line_fold_where_they_are_too_long_for_the_gap() {
-        let rod = Rod::fixed(1.0, 0.0);
+        let rod = Rod::with_fixed_length(1.0, 0.0);
         let points: Vec<Point<3>> = (0..8).map(|i| [0.7 * i as f64, 0.0, 0.0]).collect();
         let mut chain =
             Chain::new_broken(points, vec![Connector::free(0.0); 8], vec![rod; 7]).unwrap();

@@ -32,10 +32,10 @@ impl<const D: usize> RodBvh<D> {
         for (rod, bounds) in boxes.enumerate() {
             if self.rods[rod] != bounds {
                 self.rods[rod] = bounds;
-                self.mark_loose(rod / RODS_PER_LEAF);
+                self.mark_leaf_loose(rod / RODS_PER_LEAF);
             }
         }
-        self.fit_loose();
+        self.refit_loose_leaves();
     }
 
     /// Builds the tree anew, in the memory that it has.
@@ -46,10 +46,10 @@ impl<const D: usize> RodBvh<D> {
         self.nodes.clear();
         self.nodes.resize(2 * self.leaves, Aabb::empty());
         self.loose = 0..self.leaves;
-        self.fit_loose();
+        self.refit_loose_leaves();
     }
 
-    fn mark_loose(&mut self, leaf: usize) {
+    fn mark_leaf_loose(&mut self, leaf: usize) {
         self.loose = if self.loose.is_empty() {
             leaf..leaf + 1
         } else {
@@ -58,7 +58,7 @@ impl<const D: usize> RodBvh<D> {
     }
 
     /// Fits the loose leaves, and everything above them.
-    fn fit_loose(&mut self) {
+    fn refit_loose_leaves(&mut self) {
         let loose = std::mem::take(&mut self.loose);
         if loose.is_empty() {
             return;
@@ -86,7 +86,7 @@ impl<const D: usize> RodBvh<D> {
     /// Updates the box of a rod that has moved.
     pub fn set(&mut self, rod: usize, bounds: Aabb<D>) {
         self.rods[rod] = bounds;
-        self.mark_loose(rod / RODS_PER_LEAF);
+        self.mark_leaf_loose(rod / RODS_PER_LEAF);
         let mut node = self.leaves + rod / RODS_PER_LEAF;
         // If a node contains the box, so do all above it.
         while node > 0 && !self.nodes[node].contains(&bounds) {
@@ -106,7 +106,7 @@ impl<const D: usize> RodBvh<D> {
         while n > 0 {
             n -= 1;
             let node = stack[n];
-            if !self.nodes[node].meets(near) {
+            if !self.nodes[node].intersects(near) {
                 continue;
             }
             if node < self.leaves {
@@ -118,7 +118,7 @@ impl<const D: usize> RodBvh<D> {
             }
             let from = (node - self.leaves) * RODS_PER_LEAF;
             for rod in from..(from + RODS_PER_LEAF).min(self.rods.len()) {
-                if self.rods[rod].meets(near) {
+                if self.rods[rod].intersects(near) {
                     visit_one(rod);
                 }
             }
@@ -162,7 +162,7 @@ mod tests {
         let near = Aabb::from_points(&[at]).grown(2.0);
         let mut seen = Vec::new();
         tree.visit(&near, |k| seen.push(k));
-        let expected: Vec<_> = (0..boxes.len()).filter(|&k| boxes[k].meets(&near)).collect();
+        let expected: Vec<_> = (0..boxes.len()).filter(|&k| boxes[k].intersects(&near)).collect();
         prop_assert_eq!(seen, expected);
         Ok(())
     }

@@ -6,7 +6,7 @@
 //! first free direction is brought as near to the wanted one as it stays free.
 
 use super::geometry::{
-    Point, add, add_scaled, angle_rad, dot, norm, normalized, perpendicular, scaled, sub,
+    Point, add, add_scaled, angle_between_rad, dot, norm, normalized, perpendicular, scaled, sub,
 };
 use super::motion_context::{
     BlockingPart, BlockingPartOwner, SKIN_M, SlaveStep, contact_distance_m,
@@ -66,10 +66,10 @@ impl<const D: usize> DirectionSearch<'_, D> {
     /// Returns a free direction near `wanted`, found by turning away from the worst block, if that
     /// works.
     pub(super) fn turn_away(&self, wanted: Point<D>) -> Option<Point<D>> {
-        let mut u = self.within_bend(wanted);
+        let mut u = self.clamp_to_bend_limit(wanted);
         for _ in 0..MAX_TURNS {
             let Some(hit) = self.worst_block(u) else { return Some(u) };
-            u = self.within_bend(self.turn_from(u, &hit)?);
+            u = self.clamp_to_bend_limit(self.turn_past_block(u, &hit)?);
             if dot(u, wanted) < LOST_COSINE {
                 return None;
             }
@@ -78,7 +78,7 @@ impl<const D: usize> DirectionSearch<'_, D> {
     }
 
     /// Returns the first free direction on rings around `wanted`, brought near it.
-    pub(super) fn rings(
+    pub(super) fn search_rings(
         &self,
         wanted: Point<D>,
         is_valid: impl Fn(Point<D>) -> bool,
@@ -119,13 +119,13 @@ impl<const D: usize> DirectionSearch<'_, D> {
     }
 
     /// Returns the direction itself, or the nearest on the cone of the bend limit.
-    fn within_bend(&self, u: Point<D>) -> Point<D> {
+    fn clamp_to_bend_limit(&self, u: Point<D>) -> Point<D> {
         let Some(prev) = self.step.prev.filter(|_| self.step.max_bend_rad < PI) else { return u };
         let Some(into) = normalized(sub(self.step.mn, prev)) else { return u };
-        if angle_rad(into, u) <= self.step.max_bend_rad {
+        if angle_between_rad(into, u) <= self.step.max_bend_rad {
             return u;
         }
-        let side = side_of(into, u);
+        let side = perpendicular_toward(into, u);
         let c = math::cos(self.step.max_bend_rad);
         let s = math::sin(self.step.max_bend_rad);
         add(scaled(into, c), scaled(side, s))
@@ -167,12 +167,12 @@ impl<const D: usize> DirectionSearch<'_, D> {
     }
 
     /// Returns the direction turned from `u` until the rod only touches the block; `None` if there is none.
-    fn turn_from(&self, u: Point<D>, hit: &WorstBlock<D>) -> Option<Point<D>> {
+    fn turn_past_block(&self, u: Point<D>, hit: &WorstBlock<D>) -> Option<Point<D>> {
         let to = sub(hit.point, self.step.mn);
         let apart_m = norm(to);
         let radius_m = hit.radius_m + SKIN_M;
-        let cosine = cosine_of_half_angle(apart_m, radius_m, self.length_m, hit.by_tip)?;
-        Some(direction_off(u, scaled(to, 1.0 / apart_m), cosine))
+        let cosine = blocking_half_angle_cosine(apart_m, radius_m, self.length_m, hit.by_tip)?;
+        Some(direction_at_angle(u, scaled(to, 1.0 / apart_m), cosine))
     }
 }
 
@@ -183,14 +183,18 @@ fn turned_toward<const D: usize>(wanted: Point<D>, side: Point<D>, angle_rad: f6
 }
 
 /// Returns the direction at an angle from `d`, in the plane of both, on the side of `u`.
-pub(super) fn direction_off<const D: usize>(u: Point<D>, d: Point<D>, cosine: f64) -> Point<D> {
+pub(super) fn direction_at_angle<const D: usize>(
+    u: Point<D>,
+    d: Point<D>,
+    cosine: f64,
+) -> Point<D> {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-    let turned = add(scaled(d, cosine), scaled(side_of(d, u), sine));
+    let turned = add(scaled(d, cosine), scaled(perpendicular_toward(d, u), sine));
     normalized(turned).unwrap_or(u)
 }
 
 /// Returns the unit vector perpendicular to `d` on the side of `u`.
-fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
+fn perpendicular_toward<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
     let across = add_scaled(u, d, -dot(u, d));
     if norm(across) > 1e-9 { normalized(across).unwrap_or(across) } else { perpendicular(d) }
 }
@@ -198,7 +202,7 @@ fn side_of<const D: usize>(d: Point<D>, u: Point<D>) -> Point<D> {
 /// Returns the cosine of half the angle under which a ball blocks a rod or its end; `None` if there
 /// is no such direction.
 #[inline]
-pub(super) fn cosine_of_half_angle(
+pub(super) fn blocking_half_angle_cosine(
     apart_m: f64,
     radius_m: f64,
     length_m: f64,

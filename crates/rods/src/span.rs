@@ -6,21 +6,25 @@
 
 use super::chain::Rod;
 use super::geometry::{
-    Point, add, add_scaled, distance, first_axis, lerp, normalized, perpendicular, scaled, sub,
+    Point, add, add_scaled, distance, lerp, normalized, perpendicular, scaled, sub, unit_x,
 };
 
 /// Returns places for the joints of rods from `a` to `b`; rods that cannot span this gap come as near
 /// to it as they can. They lie straight if they can be so short, and as a triangle otherwise.
-pub(super) fn joints<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> Vec<Point<D>> {
+pub(super) fn joints_across_gap<const D: usize>(
+    a: Point<D>,
+    b: Point<D>,
+    rods: &[Rod],
+) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let sum_min_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
     let sum_max_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
     if gap_m < sum_min_m {
-        return triangle(a, b, &folded_m(rods, gap_m));
+        return triangle_joints(a, b, &folded_rod_lengths_m(rods, gap_m));
     }
     let fraction = (gap_m - sum_min_m) / (sum_max_m - sum_min_m).max(f64::MIN_POSITIVE);
     let lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, fraction)).collect();
-    on_line([a, b], &lengths_m)
+    joints_on_line([a, b], &lengths_m)
 }
 
 /// Returns a length of a rod: the least for fraction 0, the greatest for fraction 1.
@@ -30,7 +34,7 @@ fn length_m(rod: &Rod, fraction: f64) -> f64 {
 
 /// Returns lengths for rods that are too long to lie straight: the least, unless one rod is longer
 /// than the gap and all others, which then get as long as they must.
-fn folded_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
+fn folded_rod_lengths_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
     let longest = (0..rods.len()).max_by(|&i, &j| rods[i].min_m.total_cmp(&rods[j].min_m));
     let longest_m = longest.map_or(0.0, |k| rods[k].min_m);
     let mut others_m = 0.0;
@@ -51,7 +55,7 @@ fn folded_m(rods: &[Rod], gap_m: f64) -> Vec<f64> {
 }
 
 /// Returns the joints between rods that lie one after the other from one place to the other.
-fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Point<D>> {
+fn joints_on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Point<D>> {
     let whole_m: f64 = lengths_m.iter().sum();
     let ends_m = lengths_m.iter().scan(0.0, |along_m, length_m| {
         *along_m += length_m;
@@ -64,10 +68,10 @@ fn on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> Vec<Poin
 /// Returns the joints of rods that lie as a triangle. Its first side is the gap, extended beyond `a`
 /// by as many rods as half of the perimeter has room for; its second is the next rod; the others
 /// make the third. So none is longer than the two others together.
-fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<Point<D>> {
+fn triangle_joints<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let half_m = 0.5 * (gap_m + lengths_m.iter().sum::<f64>());
-    let ahead = normalized(sub(b, a)).unwrap_or(first_axis());
+    let ahead = normalized(sub(b, a)).unwrap_or(unit_x());
     let mut joints = Vec::with_capacity(lengths_m.len());
     let mut back_m = 0.0;
     for length_m in lengths_m {
@@ -90,7 +94,7 @@ fn triangle<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<
     let side_m = (second_m * second_m - foot_m * foot_m).max(0.0).sqrt();
     let apex = add(add_scaled(corner, ahead, foot_m), scaled(perpendicular(ahead), side_m));
     joints.push(apex);
-    joints.extend(on_line([apex, b], rest));
+    joints.extend(joints_on_line([apex, b], rest));
     joints
 }
 
@@ -132,7 +136,7 @@ mod tests {
 
     fn worst_m<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> f64 {
         let mut points = vec![a];
-        points.extend(joints(a, b, rods));
+        points.extend(joints_across_gap(a, b, rods));
         points.push(b);
         assert_eq!(points.len(), rods.len() + 1);
         let outside_m = |(ends, rod): (&[Point<D>], &Rod)| {

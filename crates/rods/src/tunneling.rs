@@ -101,7 +101,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn rod_at<const D: usize>(ends: [Point<D>; 2]) -> Chain<D> {
-        let rod = Rod::fixed(distance(ends[0], ends[1]), 0.001);
+        let rod = Rod::with_fixed_length(distance(ends[0], ends[1]), 0.001);
         Chain::new(ends.to_vec(), vec![Connector::free(0.01); 2], vec![rod]).unwrap()
     }
 

@@ -60,7 +60,7 @@ pub struct MotionRequest<const D: usize> {
 
 impl<const D: usize> MotionRequest<D> {
     /// Returns an operator's request that connector `k` goes to `to`, or nothing moves.
-    pub fn operator_request(k: usize, to: Point<D>) -> Self {
+    pub fn from_operator(k: usize, to: Point<D>) -> Self {
         Self {
             motion: RequestedMotion::Connector { k, to },
             source: RequestSource::Operator,

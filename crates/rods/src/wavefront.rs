@@ -13,7 +13,7 @@
     reason = "an index is a lane or a coordinate of several arrays"
 )]
 
-use super::candidates::{clamped, follow_guide_line};
+use super::candidates::{clamped, guide_line_position};
 use super::chain::{Chain, MAX_COORDINATE_M, Rod, is_in_range, out_of_range};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
@@ -64,7 +64,7 @@ pub fn pull_first<const D: usize>(
             propagator.propagate(
                 chain,
                 &Obstacles::default(),
-                &MotionRequest::operator_request(0, *head),
+                &MotionRequest::from_operator(0, *head),
             )?;
         }
     }
@@ -73,7 +73,7 @@ pub fn pull_first<const D: usize>(
 
 /// Measures of several motions, equal to those of a chain measured after each of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct WavefrontMeasures {
+pub struct MotionBatchMeasures {
     /// Connectors that have changed, the initiator included, summed over the motions.
     pub changed: u64,
     /// Longest move of a connector other than the initiator in one motion, meters.
@@ -119,7 +119,7 @@ impl<const D: usize> DeferredMotions<D> {
     }
 
     /// Lets the other connectors follow all deferred motions; returns their measures, if there were any.
-    pub fn catch_up(&mut self, chain: &mut Chain<D>) -> Option<WavefrontMeasures> {
+    pub fn apply_to_chain(&mut self, chain: &mut Chain<D>) -> Option<MotionBatchMeasures> {
         chain.points_mut()[0] = self.start.take()?;
         let measures = pull_lanes::<D, true>(chain, &self.heads);
         self.heads.clear();
@@ -133,11 +133,11 @@ type LaneRow = [f64; LANES + 1];
 
 /// Positions of the connectors that lanes are at, lane 0 farthest along the chain.
 #[derive(Clone, Copy)]
-struct LanePositions<const D: usize> {
+struct SimdLanePositions<const D: usize> {
     rows: [LaneRow; D],
 }
 
-impl<const D: usize> LanePositions<D> {
+impl<const D: usize> SimdLanePositions<D> {
     /// Returns positions apart from each other, which are never read.
     fn far_apart() -> Self {
         Self { rows: [std::array::from_fn(|w| -4.0 * w as f64); D] }
@@ -155,7 +155,7 @@ impl<const D: usize> LanePositions<D> {
 }
 
 /// Of the rods between slaves and masters, by lane.
-struct LaneLimits {
+struct LaneRodLimits {
     min_m: [f64; LANES],
     max_m: [f64; LANES],
     /// Number of rods in a row that equal the last. Once all lanes have the same limits, they need not be
@@ -163,7 +163,7 @@ struct LaneLimits {
     equal_rods: usize,
 }
 
-impl LaneLimits {
+impl LaneRodLimits {
     /// Passes every lane's rod on to the next lane, and a new one to the first.
     #[inline]
     fn shift(&mut self, next: Rod) {
@@ -183,7 +183,7 @@ struct LaneMotions<const D: usize, const MEASURES: bool> {
     /// Number of motions, at most [`LANES`].
     n: usize,
     connectors: usize,
-    limits: LaneLimits,
+    limits: LaneRodLimits,
     min_move_m: f64,
     /// Length of a move above which a slave surely moves; -1 in lanes without a motion, where it is never read.
     sure_move_m: [f64; LANES],
@@ -206,7 +206,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         Self {
             n,
             connectors: chain.points().len(),
-            limits: LaneLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], equal_rods: LANES },
+            limits: LaneRodLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], equal_rods: LANES },
             min_move_m: chain.min_move_m(),
             sure_move_m: std::array::from_fn(|w| if w < n { sure_move_m } else { -1.0 }),
             rests: [false; LANES],
@@ -219,15 +219,15 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
     }
 
     /// Returns whether a lane is at a slave when lane 0 is at connector `j`.
-    fn is_at_slave(&self, w: usize, j: usize) -> bool {
+    fn is_lane_at_slave(&self, w: usize, j: usize) -> bool {
         w < self.n && w < j && j - w < self.connectors
     }
 
-    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`follow_guide_line`], lane
+    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guide_line_position`], lane
     /// by lane. Before the call, `next` holds the positions of one connector ago; after it, those of
     /// the slaves that now become masters.
     #[inline]
-    fn react(&mut self, now: &LanePositions<D>, next: &mut LanePositions<D>, j: usize) {
+    fn react(&mut self, now: &SimdLanePositions<D>, next: &mut SimdLanePositions<D>, j: usize) {
         let mut g = [[0.0; LANES]; D];
         let mut square = [0.0; LANES];
         for i in 0..D {
@@ -247,7 +247,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             scale[w] = t / d[w];
         }
         if one_by_one {
-            return self.react_one_by_one(now, next, j);
+            return self.react_lane_by_lane(now, next, j);
         }
         for i in 0..D {
             for w in 0..LANES {
@@ -261,7 +261,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
 
     /// Measures all lanes at once, each of which has a slave that moves.
     #[inline]
-    fn measure(&mut self, now: &LanePositions<D>, next: &LanePositions<D>) {
+    fn measure(&mut self, now: &SimdLanePositions<D>, next: &SimdLanePositions<D>) {
         let mut move2 = [0.0; LANES];
         let mut length2 = [0.0; LANES];
         for i in 0..D {
@@ -284,10 +284,15 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
 
     /// The same as [`LaneMotions::react`] by single lanes, some of which rest, have ended, or are at no slave.
     #[cold]
-    fn react_one_by_one(&mut self, now: &LanePositions<D>, next: &mut LanePositions<D>, j: usize) {
+    fn react_lane_by_lane(
+        &mut self,
+        now: &SimdLanePositions<D>,
+        next: &mut SimdLanePositions<D>,
+        j: usize,
+    ) {
         // Downward, because lane w - 1 still needs its master's old position, at w - 1.
         for w in (0..LANES).rev() {
-            if !self.is_at_slave(w, j) {
+            if !self.is_lane_at_slave(w, j) {
                 next.set(w + 1, now.get(w));
                 continue;
             }
@@ -300,17 +305,17 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = follow_guide_line([mo, mn, so], rod, self.min_move_m);
+            let new = guide_line_position([mo, mn, so], rod, self.min_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
-                self.measure_one(w, [mn, so, new], rod);
+                self.measure_lane(w, [mn, so, new], rod);
             }
         }
         self.is_mixed = (0..self.n).any(|w| self.rests[w] || self.ended[w]);
     }
 
-    fn measure_one(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
+    fn measure_lane(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
         let moved = sub(new, so);
         let length_m = distance(mn, new);
         let outside_m = (length_m - rod.max_m).max(rod.min_m - length_m);
@@ -324,8 +329,8 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         self.is_mixed && self.ended[..self.n].iter().all(|&ended| ended)
     }
 
-    fn measures(&self) -> WavefrontMeasures {
-        WavefrontMeasures {
+    fn measures(&self) -> MotionBatchMeasures {
+        MotionBatchMeasures {
             changed: self.changed,
             longest_m: max_of(&self.longest2[..self.n]).sqrt(),
             max_rod_violation_m: max_of(&self.violation_m[..self.n]),
@@ -340,7 +345,7 @@ fn max_of(by_lane: &[f64]) -> f64 {
 /// Returns a position for step `j`, past the last connector: it differs from the one before, so that no rod of an unused
 /// lane has length zero.
 fn beyond_last<const D: usize>(j: usize) -> Point<D> {
-    super::geometry::scaled(super::geometry::first_axis(), 4.0 * j as f64)
+    super::geometry::scaled(super::geometry::unit_x(), 4.0 * j as f64)
 }
 
 /// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
@@ -348,13 +353,13 @@ fn beyond_last<const D: usize>(j: usize) -> Point<D> {
 fn pull_lanes<const D: usize, const MEASURES: bool>(
     chain: &mut Chain<D>,
     heads: &[Point<D>],
-) -> WavefrontMeasures {
+) -> MotionBatchMeasures {
     let n = heads.len();
     let mut motions = LaneMotions::<D, MEASURES>::new(chain, n);
     let (points, rods) = chain.parts_mut();
     let unused = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
-    let mut now = LanePositions::far_apart();
-    let mut next = LanePositions::far_apart();
+    let mut now = SimdLanePositions::far_apart();
+    let mut next = SimdLanePositions::far_apart();
     for j in 0..points.len() + n - 1 {
         now.set(0, points.get(j).copied().unwrap_or_else(|| beyond_last(j)));
         motions.limits.shift(rods.get(j.wrapping_sub(1)).copied().unwrap_or(unused));
@@ -387,7 +392,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn same_bits<const D: usize>(n_rods: usize, rod: Rod, n_heads: usize, step_m: f64, seed: u64) {
-        let axis = super::super::geometry::first_axis();
+        let axis = super::super::geometry::unit_x();
         let mut one_by_one =
             Chain::<D>::straight([0.0; D], axis, n_rods, rod, Connector::free(0.0)).unwrap();
         let mut walk = Wanderer::new(seed);
@@ -400,7 +405,7 @@ mod tests {
         let mut at_once = one_by_one.clone();
         let mut propagator = Propagator::default();
         for head in &heads {
-            let request = MotionRequest::operator_request(0, *head);
+            let request = MotionRequest::from_operator(0, *head);
             propagator.propagate(&mut one_by_one, &Obstacles::default(), &request).unwrap();
         }
         let start = at_once.clone();
@@ -413,9 +418,9 @@ mod tests {
     fn measures_as_single_motions_do<const D: usize>(start: Chain<D>, heads: &[Point<D>]) {
         for group in heads.chunks(LANES) {
             let (mut at_once, mut single) = (start.clone(), start.clone());
-            let mut expected = WavefrontMeasures::default();
+            let mut expected = MotionBatchMeasures::default();
             for head in group {
-                let request = MotionRequest::operator_request(0, *head);
+                let request = MotionRequest::from_operator(0, *head);
                 let mut propagator = Propagator::default();
                 let outcome =
                     propagator.propagate(&mut single, &Obstacles::default(), &request).unwrap();
@@ -451,7 +456,7 @@ mod tests {
         let (mut at_once, mut single) = (start.clone(), start.clone());
         pull_first(&mut at_once, &heads).unwrap();
         for head in &heads {
-            let request = MotionRequest::operator_request(0, *head);
+            let request = MotionRequest::from_operator(0, *head);
             Propagator::default().propagate(&mut single, &Obstacles::default(), &request).unwrap();
         }
         assert_eq!(at_once.points(), single.points());
@@ -472,12 +477,12 @@ mod tests {
 
     #[test]
     fn a_head_on_its_slave_is_no_trouble() {
-        let rod = Rod::fixed(1.0, 0.0);
+        let rod = Rod::with_fixed_length(1.0, 0.0);
         let mut chain =
             Chain::straight([0.0; 2], [1.0, 0.0], 3, rod, Connector::free(0.0)).unwrap();
         let mut single = chain.clone();
         pull_first(&mut chain, &[[1.0, 0.0]; LANES]).unwrap();
-        let request = MotionRequest::operator_request(0, [1.0, 0.0]);
+        let request = MotionRequest::from_operator(0, [1.0, 0.0]);
         Propagator::default().propagate(&mut single, &Obstacles::default(), &request).unwrap();
         assert_eq!(chain.points(), single.points());
     }

@@ -125,7 +125,7 @@ mod tests {
         let error = find("ambre").expect_err("unknown");
         assert_eq!(error.cause(), "unknown value `ambre`");
         assert_eq!(error.remedy(), "did you mean `amber`?");
-        assert_eq!(error.position(), Some((1, 9)));
+        assert_eq!(error.line_and_column(), Some((1, 9)));
         let error = find("something else").expect_err("unknown");
         assert_eq!(error.remedy(), "known are: blue, dark-red, amber");
     }

@@ -111,7 +111,7 @@ mod tests {
     fn an_unknown_key_is_answered_with_the_nearest() {
         let error = Source::new("s.toml", "seed = 1\ncylces = 3\n", "").parse::<Small>();
         let error = error.expect_err("misspelled");
-        assert_eq!(error.position(), Some((2, 1)));
+        assert_eq!(error.line_and_column(), Some((2, 1)));
         assert_eq!(
             (error.cause(), error.remedy()),
             ("unknown key `cylces`", "did you mean `cycles`?")

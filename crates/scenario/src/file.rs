@@ -33,7 +33,7 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
     let text = String::from_utf8(read_bytes(path, max_bytes)?).map_err(|error| {
         let readable = String::from_utf8_lossy(error.as_bytes());
         InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
-            .with_offset(&readable, error.utf8_error().valid_up_to())
+            .with_byte_offset(&readable, error.utf8_error().valid_up_to())
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
@@ -113,7 +113,7 @@ mod tests {
     fn text_that_is_not_utf8_is_pointed_at() {
         let file = file_with(b"ok\nab\xff");
         let error = read_text(file.path(), 100).expect_err("not UTF-8");
-        assert_eq!(error.position(), Some((2, 3)));
+        assert_eq!(error.line_and_column(), Some((2, 3)));
     }
 
     #[test]

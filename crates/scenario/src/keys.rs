@@ -166,7 +166,7 @@ mod tests {
         "a = 1\n[[robots]]\ncount = 2\n[[robots]]\nat = [[1, 2]]\nb = { c = 3 }\n[people]\nn = 1\n";
 
     fn position(path: &str) -> Option<(usize, usize)> {
-        Source::new("s.toml", TEXT, "").error_at(path, "c", "r").position()
+        Source::new("s.toml", TEXT, "").error_at(path, "c", "r").line_and_column()
     }
 
     #[test]
@@ -224,7 +224,11 @@ mod tests {
             let told = source.error(start..start + 1, "c", "r");
             let key = told.key().expect("a key").to_string();
             let again = source.error_at(&key, "c", "r");
-            assert_eq!((again.position(), again.key()), (told.position(), told.key()), "{key}");
+            assert_eq!(
+                (again.line_and_column(), again.key()),
+                (told.line_and_column(), told.key()),
+                "{key}"
+            );
         }
         let value = |key| source.value(key).and_then(|value| value.as_integer());
         assert_eq!((value("kinds.\"a.b\".n"), value("kinds.'0'.n")), (Some(1), Some(2)));
@@ -242,7 +246,7 @@ mod tests {
         let refused = source.refuse_unused_keys(second.clone(), &keys, "beside `scen`");
         let error = refused.expect_err("`at` is unused");
         assert_eq!(
-            (error.position(), error.cause()),
+            (error.line_and_column(), error.cause()),
             (Some((5, 1)), "`at` does nothing beside `scen`")
         );
         assert!(source.refuse_unused_keys(second, &keys[..1], "beside `scen`").is_ok());
@@ -252,7 +256,7 @@ mod tests {
     fn an_idle_key_is_refused_where_it_stands() {
         let error = Source::new("s.toml", TEXT, "").unused_key("robots.1.at", "beside `scen`");
         assert_eq!(
-            (error.position(), error.cause()),
+            (error.line_and_column(), error.cause()),
             (Some((5, 1)), "`at` does nothing beside `scen`")
         );
     }

@@ -17,7 +17,7 @@
 //! let radio = read("range_m = 4\nchannels = 2").expect("right");
 //! assert_eq!((radio.range_m.get(), radio.loss, radio.channels.get()), (4.0, None, 2));
 //! let error = read("range_m = 4\nloss = nan\nchannels = 2").expect_err("not a fraction");
-//! assert_eq!(error.position(), Some((2, 8)));
+//! assert_eq!(error.line_and_column(), Some((2, 8)));
 //! assert_eq!((error.cause(), error.remedy()), ("loss = NaN", "give 0 to 1"));
 //! ```
 
@@ -417,7 +417,7 @@ mod tests {
             ("f = -1e-9", 5, "f = -0.000000001", "at least 0"),
         ] {
             let error = read(text).expect_err(text);
-            assert_eq!((error.position(), error.cause()), (Some((2, column)), cause));
+            assert_eq!((error.line_and_column(), error.cause()), (Some((2, column)), cause));
             assert!(error.remedy().contains(remedy), "{error}");
         }
         let error = read("a = \"far\"").expect_err("text");

@@ -134,7 +134,7 @@ impl Source {
         let mut last_line = None;
         for error in errors {
             let error = self.toml_error(&error, &[]);
-            let line = error.position().map(|(line, _)| line);
+            let line = error.line_and_column().map(|(line, _)| line);
             if !reported.is_empty() && line == last_line {
                 continue;
             }
@@ -160,7 +160,7 @@ impl Source {
     /// Adds a span of the text to an error: position, end and key.
     fn with_span(&self, error: InputError, span: Range<usize>) -> InputError {
         let error = self.with_key_at(span.clone(), error);
-        error.with_span(&self.text, span)
+        error.with_byte_span(&self.text, span)
     }
 
     /// Returns the remedy that points to an example of the scenario's own world.
@@ -258,7 +258,7 @@ impl Source {
         let Some(key) = error.key().filter(|_| error.place() != self.place) else {
             return error.clone();
         };
-        let position = match error.position() {
+        let position = match error.line_and_column() {
             Some((line, column)) => format!(":{line}:{column}"),
             None => String::new(),
         };
@@ -296,7 +296,7 @@ mod tests {
         assert_eq!((named.place(), named.key()), ("a.png", Some("map.file")));
         let told = source.error_at_reference(&named);
         assert_eq!((told.place(), told.key()), ("s.toml", Some("map.file")));
-        assert_eq!(told.position().map(|(line, _)| line), Some(3));
+        assert_eq!(told.line_and_column().map(|(line, _)| line), Some(3));
         assert_eq!((told.cause(), told.remedy()), ("a.png:3:4: it is cut off", "copy it again"));
         // An error of the text itself, and one of a file that no key names, stay the same.
         let own = source.error(0..1, "wrong", "right");
@@ -345,7 +345,7 @@ mod tests {
             ("n = = 3", (3, 5), "write valid TOML"),
         ] {
             let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
-            assert_eq!(error.position(), Some(at), "{error}");
+            assert_eq!(error.line_and_column(), Some(at), "{error}");
             assert!(error.remedy().contains(remedy), "{error}");
             // Text that is no TOML has no keys.
             let key = line.split_once(' ').map(|(key, _)| key).filter(|_| !line.contains("= ="));
@@ -369,7 +369,7 @@ mod tests {
         };
         for (line, key) in [("profiles = []", "profiles"), ("seed = 3", "seed")] {
             let error = read(line);
-            assert_eq!(error.position(), Some((5, 1)), "{error}");
+            assert_eq!(error.line_and_column(), Some((5, 1)), "{error}");
             let remedy = format!("`{key}` belongs to the top level: above the first [section]");
             assert!(error.remedy().starts_with(&remedy), "{error}");
         }
@@ -380,7 +380,7 @@ mod tests {
     fn all_lines_that_are_no_toml_are_told_and_nothing_that_follows_from_an_open_end() {
         let lines = |text: &str| {
             let errors = Source::new("s.toml", text, "").syntax_errors();
-            errors.iter().map(|e| e.position().expect("a place").0).collect::<Vec<_>>()
+            errors.iter().map(|e| e.line_and_column().expect("a place").0).collect::<Vec<_>>()
         };
         assert_eq!(lines("a = 1\n[b]\nc = \"d\"\n"), [0; 0]);
         assert_eq!(lines("a = = 1\nb = 2\nc\n[d\ne = 3\n"), [1, 3, 4]);
@@ -392,9 +392,12 @@ mod tests {
     #[test]
     fn the_place_of_a_default_is_nowhere() {
         let source = Source::new("s.toml", "a = 1", "");
-        assert_eq!(source.error(0..0, "c", "r").position(), None);
+        assert_eq!(source.error(0..0, "c", "r").line_and_column(), None);
         let error = source.error(4..5, "c", "r");
-        assert_eq!((error.position(), error.end()), (Some((1, 5)), Some((1, 6))));
+        assert_eq!(
+            (error.line_and_column(), error.end_line_and_column()),
+            (Some((1, 5)), Some((1, 6)))
+        );
         assert_eq!(error.key(), Some("a"));
         let part = InputError::new("part", "is wrong", "mend it");
         assert_eq!(source.error_from(4..5, &part).cause(), "part: is wrong");

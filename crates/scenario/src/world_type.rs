@@ -2,7 +2,7 @@
 
 use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::text::{KeyValues, StateReport};
 use sidestep_kernel::view::{BodyKind, Kinds};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
@@ -68,7 +68,7 @@ pub trait WorldType: Send + Sync {
     ///
     /// # Errors
     /// When such a file cannot be read.
-    fn translate(&self, _: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    fn import_scenario(&self, _: &Path) -> Result<Option<ImportedScenario>, InputError> {
         Ok(None)
     }
 
@@ -91,7 +91,7 @@ pub trait CompiledScenario: Send + Sync {
     fn body_count(&self) -> usize;
 
     /// Returns the contents of the scenario, for people to check.
-    fn contents(&self, source: &Source) -> StateDescription;
+    fn contents(&self, source: &Source) -> StateReport;
 
     /// Returns the effects that the scenario's author may not expect, warnings first.
     fn remarks(&self) -> Vec<Remark> {
@@ -225,9 +225,9 @@ impl Worlds {
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    pub fn import_scenario(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
         for world in self.iter() {
-            if let Some(foreign) = world.translate(file)? {
+            if let Some(foreign) = world.import_scenario(file)? {
                 return Ok(Some(foreign));
             }
         }

@@ -93,7 +93,7 @@ impl EventStore {
     }
 
     /// Keeps unsent events for Foxglove viewers, too.
-    pub(crate) fn enable_viewers(&mut self) {
+    pub(crate) fn enable_viewer_events(&mut self) {
         self.unsent_to_viewers.get_or_insert_default();
     }
 

@@ -124,12 +124,12 @@ impl AllowedFiles {
     ///
     /// # Errors
     /// With the value.
-    pub(crate) fn check_text(&self, source: &Source) -> Result<(), Problem> {
+    pub(crate) fn check_referenced_files(&self, source: &Source) -> Result<(), Problem> {
         let names = strings_in(source).map_err(|e| problem(&e))?;
-        names.iter().try_for_each(|name| self.check_value(source, name))
+        names.iter().try_for_each(|name| self.check_referenced_path(source, name))
     }
 
-    fn check_value(&self, source: &Source, text: &str) -> Result<(), Problem> {
+    fn check_referenced_path(&self, source: &Source, text: &str) -> Result<(), Problem> {
         // Paths start at the scenario's folder, wherever the server was started.
         let real = source.path(Path::new(text)).canonicalize();
         if real.is_ok_and(|real| !self.contains(&real)) { Err(outside_roots(text)) } else { Ok(()) }
@@ -149,7 +149,7 @@ impl AllowedFiles {
             return Ok(roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect());
         };
         let path = self.resolve(folder)?;
-        let mut paths = paths_in(&path).map_err(|e| {
+        let mut paths = folder_paths(&path).map_err(|e| {
             Problem::new(folder, format!("cannot be listed: {e}"), "give a folder that may be read")
         })?;
         paths.sort();
@@ -167,7 +167,7 @@ impl AllowedFiles {
 }
 
 /// Returns the paths of the entries of a folder, at most [`MAX_ENTRIES`].
-fn paths_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+fn folder_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
     fs::read_dir(folder)?.take(MAX_ENTRIES).map(|item| Ok(item?.path())).collect()
 }
 
@@ -241,7 +241,7 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
     if *foreign > MAX_FOREIGN_FILES {
         return None;
     }
-    let imported = worlds.translate(path).ok()??;
+    let imported = worlds.import_scenario(path).ok()??;
     imported.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
 }
 
@@ -351,7 +351,7 @@ mod tests {
         let (folder, files) = places();
         let check = |text: &str| {
             let source = Source::new("s.toml", text, folder.path().join("in"));
-            files.check_text(&source).map_err(|problem| problem.place)
+            files.check_referenced_files(&source).map_err(|problem| problem.place)
         };
         assert_eq!(check("a = \"deep/b.toml\"\nb = [{ c = \"no such file\" }]"), Ok(()));
         assert_eq!(check("a = [{ b = \"../out/secret.toml\" }]"), Err("../out/secret.toml".into()));
@@ -366,7 +366,7 @@ mod tests {
         let files = AllowedFiles::from_roots(&[".".into()]).expect("a folder");
         assert!(files.resolve(".").is_ok());
         let source = Source::new("s.toml", "a = \".\"", folder.path().join("out"));
-        assert_eq!(files.check_text(&source).map_err(|p| p.place), Err(".".into()));
+        assert_eq!(files.check_referenced_files(&source).map_err(|p| p.place), Err(".".into()));
     }
 
     #[test]
@@ -376,8 +376,9 @@ mod tests {
         fs::write(path("out/map.txt"), "....").expect("written");
         fs::write(path("in/a.toml"), "map = { file = \"../out/map.txt\" }\n").expect("written");
         let files = files.with_files_referenced_by([Path::new(&path("in/a.toml"))].into_iter());
-        let check =
-            |text: &str| files.check_text(&Source::new("s.toml", text, folder.path().join("in")));
+        let check = |text: &str| {
+            files.check_referenced_files(&Source::new("s.toml", text, folder.path().join("in")))
+        };
         assert_eq!(check("a = \"../out/map.txt\""), Ok(()));
         assert!(files.resolve(&path("out/map.txt")).is_ok());
         assert!(

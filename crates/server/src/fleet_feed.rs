@@ -50,7 +50,7 @@ impl FleetFeed {
     }
 
     /// Records why no more views of a running fleet arrive.
-    pub fn mark_lost(&self, cause: &str, remedy: &str) {
+    pub fn mark_disconnected(&self, cause: &str, remedy: &str) {
         let mut snapshot = self.lock();
         if snapshot.view.as_ref().is_none_or(|view| !view.is_over) {
             snapshot.lost = Some(Problem::new(self.endpoint.as_str(), cause, remedy));

@@ -95,7 +95,7 @@ fn too_many_pages() -> Response {
 /// Answers whether the browser has the cookie, and whether another page may connect.
 async fn access_status(State(state): State<Arc<AppState>>, headers: HeaderMap) -> Response {
     match state.access.authorize(&headers) {
-        Ok(()) if state.is_full() => too_many_pages(),
+        Ok(()) if state.is_socket_limit_reached() => too_many_pages(),
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
         Err(refusal) => refusal.into_response(),
     }

@@ -106,17 +106,17 @@ impl StudioServer {
     /// # Errors
     /// When something that was named does not exist, or the port cannot be bound.
     pub fn start(options: ServerOptions) -> Result<Self, Error> {
-        let (folders, mut open) = split_targets(&options.targets);
+        let (folders, mut open) = classify_targets(&options.targets);
         for fleet in &options.fleets {
             open.push(TargetRef { kind: "fleet".into(), path: fleet.endpoint.clone() });
         }
         let scenarios = open.iter().filter(|target| target.kind == "scenario");
-        let files = AllowedFiles::from_roots(&folders).map_err(|p| input_error(&p))?;
+        let files = AllowedFiles::from_roots(&folders).map_err(|p| problem_to_input_error(&p))?;
         let files = files.with_files_referenced_by(scenarios.map(|target| Path::new(&target.path)));
         let listener = listen::bind(&options.host, options.port)?;
-        listener.set_nonblocking(true).map_err(start_error)?;
-        let address = listener.local_addr().map_err(start_error)?;
-        let access = AccessPolicy::new(address, &options.host).map_err(start_error)?;
+        listener.set_nonblocking(true).map_err(server_start_error)?;
+        let address = listener.local_addr().map_err(server_start_error)?;
+        let access = AccessPolicy::new(address, &options.host).map_err(server_start_error)?;
         let token = access.token().map(String::from);
         let deps = SessionDeps {
             worlds: options.worlds,
@@ -134,18 +134,18 @@ impl StudioServer {
             .enable_all()
             .max_blocking_threads(MAX_BLOCKING_THREADS)
             .build()
-            .map_err(start_error)?;
+            .map_err(server_start_error)?;
         let thread = std::thread::Builder::new()
             .name("studio".into())
             .spawn(move || run(runtime, listener, &state))
-            .map_err(start_error)?;
+            .map_err(server_start_error)?;
         Ok(Self { address, token, shutdown, thread: Some(thread) })
     }
 
     /// Returns the page's address, with the token in it where one is needed: one that others can open, too, if they
     /// can reach it and this machine's address is known.
     pub fn url(&self) -> String {
-        let host = match self.ip() {
+        let host = match self.reachable_ip() {
             None => "localhost".to_string(),
             Some(ip) if ip.is_ipv6() => format!("[{ip}]"),
             Some(ip) => ip.to_string(),
@@ -155,14 +155,14 @@ impl StudioServer {
     }
 
     /// Returns the IP address by which it is reached; `None` where it listens at all of them and none is known.
-    fn ip(&self) -> Option<IpAddr> {
+    fn reachable_ip(&self) -> Option<IpAddr> {
         let ip = self.address.ip();
-        if ip.is_unspecified() { listen::own_address(ip) } else { Some(ip) }
+        if ip.is_unspecified() { listen::outbound_address(ip) } else { Some(ip) }
     }
 
     /// Returns whether its address names this machine in a way that other machines cannot use.
     pub fn has_local_address(&self) -> bool {
-        self.ip().is_none_or(|ip| ip.is_loopback())
+        self.reachable_ip().is_none_or(|ip| ip.is_loopback())
     }
 
     /// Returns whether other machines can reach it.
@@ -192,7 +192,7 @@ fn run(runtime: Runtime, listener: TcpListener, state: &Arc<AppState>) {
         // A bound, nonblocking listener is never refused.
         let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
         let routes = http::routes(state.clone());
-        serve::serve(listener, routes, state.shutdown_signal(), Timeouts::default()).await;
+        serve::serve(listener, routes, state.shutdown_receiver(), Timeouts::default()).await;
         state.wait_for_sessions().await;
     });
     // A report or an export in progress is not waited for.
@@ -200,7 +200,7 @@ fn run(runtime: Runtime, listener: TcpListener, state: &Arc<AppState>) {
 }
 
 /// Returns the folders that may be read, and the things to open.
-fn split_targets(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
+fn classify_targets(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
     let mut folders: Vec<PathBuf> = Vec::new();
     let mut open = Vec::new();
     for path in targets {
@@ -237,14 +237,14 @@ fn split_targets(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
     (folders, open)
 }
 
-fn start_error(error: std::io::Error) -> Error {
+fn server_start_error(error: std::io::Error) -> Error {
     Error::other(
         format!("the server cannot be started: {error}"),
         "end other programs, and try again",
     )
 }
 
-fn input_error(problem: &Problem) -> InputError {
+fn problem_to_input_error(problem: &Problem) -> InputError {
     InputError::new(&problem.place, &*problem.cause, &*problem.remedy)
 }
 
@@ -263,13 +263,13 @@ mod tests {
         std::fs::write(path("a.toml"), "").expect("written");
         std::fs::write(path("b.mcap"), "").expect("written");
         let targets = ["run", "a.toml", "b.mcap", "sweep"].map(path);
-        let (folders, open) = split_targets(&targets);
+        let (folders, open) = classify_targets(&targets);
         assert_eq!(folders, [path("run"), place.path().to_path_buf(), path("sweep")]);
         let kinds: Vec<&str> = open.iter().map(|target| target.kind.as_str()).collect();
         assert_eq!(kinds, ["recording", "scenario", "recording", "sweep"]);
-        assert_eq!(split_targets(&[]), (vec![".".into()], vec![]));
+        assert_eq!(classify_targets(&[]), (vec![".".into()], vec![]));
         assert_eq!(
-            split_targets(&["a.toml".into()]).0,
+            classify_targets(&["a.toml".into()]).0,
             [PathBuf::from("a.toml")],
             "it does not exist"
         );

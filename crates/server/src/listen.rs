@@ -17,17 +17,17 @@ const PORT_COUNT: u16 = 100;
 pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputError> {
     let ip = resolve(host)?;
     let Some(port) = port else {
-        return bind_first_free(ip).map_err(|e| host_error(host, &e));
+        return bind_first_free(ip).map_err(|e| listen_address_error(host, &e));
     };
     let bound = bind_port(ip, port);
-    if is_taken(&bound) {
+    if is_address_in_use(&bound) {
         let remedy = match next_free_port(ip, port) {
             Some(free) => format!("give --port {free}, which is free, or leave it out"),
             None => "leave it out to use a free one".into(),
         };
         return Err(InputError::new(format!("--port {port}"), "the port is in use", remedy));
     }
-    bound.map_err(|e| host_error(&format!("{host} --port {port}"), &e))
+    bound.map_err(|e| listen_address_error(&format!("{host} --port {port}"), &e))
 }
 
 /// Binds the first free port of the range, else any that the system has: addresses in bookmarks and terminals stay the
@@ -35,7 +35,7 @@ pub(crate) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener, InputEr
 fn bind_first_free(ip: IpAddr) -> io::Result<TcpListener> {
     for port in FIRST_PORT..FIRST_PORT + PORT_COUNT {
         let bound = bind_port(ip, port);
-        if !is_taken(&bound) {
+        if !is_address_in_use(&bound) {
             return bound;
         }
     }
@@ -46,25 +46,25 @@ fn bind_port(ip: IpAddr, port: u16) -> io::Result<TcpListener> {
     TcpListener::bind(SocketAddr::new(ip, port))
 }
 
-fn is_taken(bound: &io::Result<TcpListener>) -> bool {
+fn is_address_in_use(bound: &io::Result<TcpListener>) -> bool {
     bound.as_ref().is_err_and(|e| e.kind() == io::ErrorKind::AddrInUse)
 }
 
 fn resolve(host: &str) -> Result<IpAddr, InputError> {
     let name = host.trim_start_matches('[').trim_end_matches(']');
-    let found = (name, 0).to_socket_addrs().map_err(|e| host_error(host, &e))?;
+    let found = (name, 0).to_socket_addrs().map_err(|e| listen_address_error(host, &e))?;
     let first = found.map(|address| address.ip()).next();
-    first.ok_or_else(|| host_error(host, &io::ErrorKind::AddrNotAvailable.into()))
+    first.ok_or_else(|| listen_address_error(host, &io::ErrorKind::AddrNotAvailable.into()))
 }
 
-fn host_error(host: &str, error: &io::Error) -> InputError {
+fn listen_address_error(host: &str, error: &io::Error) -> InputError {
     let remedy = "give an address of this machine, such as 127.0.0.1 or 0.0.0.0, and a port that you may use";
     InputError::new(format!("--addr {host}"), error.to_string(), remedy)
 }
 
 /// Returns the address at which other machines reach this one, if it has one: that from which it would send to them.
 /// Nothing is sent to find it.
-pub(crate) fn own_address(ip: IpAddr) -> Option<IpAddr> {
+pub(crate) fn outbound_address(ip: IpAddr) -> Option<IpAddr> {
     // Addresses reserved for documentation: they lead nowhere, but take the route of all others.
     let far: SocketAddr = match ip {
         IpAddr::V4(_) => ([192, 0, 2, 1], 9).into(),
@@ -100,9 +100,9 @@ mod tests {
 
     #[test]
     fn an_own_address_is_one_that_can_be_listened_at() {
-        if let Some(own) = own_address(IpAddr::from([0, 0, 0, 0])) {
+        if let Some(own) = outbound_address(IpAddr::from([0, 0, 0, 0])) {
             assert!(bind(&own.to_string(), Some(0)).is_ok(), "{own}");
         }
-        assert_eq!(own_address(IpAddr::from([127, 0, 0, 1])), None, "others cannot reach it");
+        assert_eq!(outbound_address(IpAddr::from([127, 0, 0, 1])), None, "others cannot reach it");
     }
 }

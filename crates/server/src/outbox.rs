@@ -56,7 +56,7 @@ impl Outbox {
     }
 
     /// Records that a request was received; each needs one reply.
-    pub(crate) fn expect_reply(&self) {
+    pub(crate) fn record_request(&self) {
         self.lock().open_requests += 1;
     }
 
@@ -67,12 +67,12 @@ impl Outbox {
     }
 
     /// Records that the request just received is a long one.
-    pub(crate) fn record_long_request(&self, id: u32, bytes: usize) {
+    pub(crate) fn record_large_request(&self, id: u32, bytes: usize) {
         self.lock().long.push((id, bytes));
     }
 
     /// Returns the bytes of all long requests without a reply.
-    pub(crate) fn long_bytes(&self) -> usize {
+    pub(crate) fn large_request_bytes(&self) -> usize {
         self.lock().long.iter().map(|(_, bytes)| bytes).sum()
     }
 
@@ -125,7 +125,7 @@ impl Outbox {
     }
 
     /// Removes the frame and the status of a session that were not sent; returns whether there was a frame.
-    pub(crate) fn clear_session(&self, session: SessionId) -> bool {
+    pub(crate) fn discard_update(&self, session: SessionId) -> bool {
         let newest = self.lock().newest.remove(&session);
         newest.is_some_and(|newest| newest.frame.is_some())
     }
@@ -186,7 +186,7 @@ mod tests {
         assert!(outbox.send_frame(1, None, vec![2]));
         outbox.send_status(1, &notice("old"));
         outbox.send_status(1, &notice("new"));
-        outbox.expect_reply();
+        outbox.record_request();
         assert_eq!(outbox.backlog(), 1);
         outbox.send_reply(&reply(1));
         assert_eq!(outbox.backlog(), 1);
@@ -207,7 +207,7 @@ mod tests {
     fn what_was_taken_back_is_not_sent() {
         let outbox = Outbox::default();
         outbox.send_frame(1, None, vec![1]);
-        assert!(outbox.clear_session(1) && !outbox.clear_session(1));
+        assert!(outbox.discard_update(1) && !outbox.discard_update(1));
         assert_eq!(outbox.pop(), None);
     }
 }

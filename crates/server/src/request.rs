@@ -92,7 +92,7 @@ fn read_arguments<M: DeserializeOwned>(
 ) -> Result<M, Problem> {
     M::deserialize(call).map_err(|error| {
         let error = error.to_string();
-        let field = wrong_field::<M>(call, &error);
+        let field = find_wrong_field::<M>(call, &error);
         let cause = field.map_or_else(|| error.clone(), |field| format!("`{field}`: {error}"));
         let remedy = format!("give `{name}` the arguments that its type in protocol/types.ts has");
         Problem::new(format!("request {id}, call `{name}`"), cause, remedy)
@@ -101,7 +101,7 @@ fn read_arguments<M: DeserializeOwned>(
 
 /// Returns the argument that an error is about. Messages of serde describe a wrong value without its field; they change if
 /// that field is left out.
-fn wrong_field<'a, M: DeserializeOwned>(
+fn find_wrong_field<'a, M: DeserializeOwned>(
     call: &'a Map<String, Value>,
     error: &str,
 ) -> Option<&'a str> {

@@ -50,7 +50,7 @@ impl MetricSamples {
         cycle > last && since >= self.spacing.max(self.last_cost.saturating_mul(MIN_COST_RATIO))
     }
 
-    pub(crate) fn is_new(&self, cycle: Cycle) -> bool {
+    pub(crate) fn is_new_cycle(&self, cycle: Cycle) -> bool {
         self.cycles.last().is_none_or(|&last| cycle > last)
     }
 
@@ -63,7 +63,7 @@ impl MetricSamples {
         self.cycles.push(cycle);
         self.values.iter_mut().for_each(|column| column.push(None));
         for (key, value) in found {
-            if let Some(metric) = self.column(key) {
+            if let Some(metric) = self.find_or_add_column(key) {
                 self.values[metric][row] = Some(value);
             }
         }
@@ -73,7 +73,7 @@ impl MetricSamples {
     }
 
     /// Returns the column of a metric, a new one for a new metric.
-    fn column(&mut self, key: String) -> Option<usize> {
+    fn find_or_add_column(&mut self, key: String) -> Option<usize> {
         let known = self.names.iter().position(|name| name.key == key);
         if known.is_some() || self.names.len() == MAX_METRICS {
             return known;
@@ -86,11 +86,11 @@ impl MetricSamples {
 
     /// Drops every second sample, but never the first.
     fn drop_every_second(&mut self) {
-        fn halve<T: Copy>(all: &mut Vec<T>) {
+        fn keep_every_second<T: Copy>(all: &mut Vec<T>) {
             *all = all.iter().copied().step_by(2).collect();
         }
-        halve(&mut self.cycles);
-        self.values.iter_mut().for_each(halve);
+        keep_every_second(&mut self.cycles);
+        self.values.iter_mut().for_each(keep_every_second);
         self.thinned += 1;
         self.spacing = self.spacing.saturating_mul(2);
     }
@@ -179,7 +179,7 @@ mod tests {
         let mut samples = MetricSamples::new(&[]);
         assert!(samples.is_due(0, Duration::ZERO));
         samples.push(7, &json!({}), Duration::from_millis(5));
-        assert!(!samples.is_due(7, MIN_SPACING * 100) && !samples.is_new(7));
+        assert!(!samples.is_due(7, MIN_SPACING * 100) && !samples.is_new_cycle(7));
         assert!(
             samples.is_due(8, MIN_SPACING * 5) && !samples.is_due(8, MIN_SPACING),
             "one in a hundred"

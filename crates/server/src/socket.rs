@@ -103,7 +103,7 @@ async fn run(socket: &mut WebSocket, mut sessions: SocketSessions, outbox: &Outb
 
 /// Returns whether a further request may be read.
 fn can_read_request(outbox: &Outbox) -> bool {
-    outbox.backlog() < MAX_BACKLOG && outbox.long_bytes() < MAX_LONG_REQUEST_BYTES
+    outbox.backlog() < MAX_BACKLOG && outbox.large_request_bytes() < MAX_LONG_REQUEST_BYTES
 }
 
 /// Sends a message; returns whether the page is still connected.
@@ -150,7 +150,7 @@ impl Drop for SocketSessions {
 impl SocketSessions {
     /// Processes a request; it is answered now, or later by a session.
     fn on_request(&mut self, text: &str) {
-        self.outbox.expect_reply();
+        self.outbox.record_request();
         match decode(text) {
             Err(unreadable) => {
                 let (id, problem) = *unreadable;
@@ -160,7 +160,7 @@ impl SocketSessions {
                 let (ClientRequest::Server { id, .. } | ClientRequest::Session { id, .. }) =
                     request;
                 if text.len() > LONG_REQUEST_BYTES {
-                    self.outbox.record_long_request(id, text.len());
+                    self.outbox.record_large_request(id, text.len());
                 }
                 let outbox = self.outbox.clone();
                 catch_panic(&outbox, id, || match request {
@@ -174,7 +174,7 @@ impl SocketSessions {
     }
 
     fn refuse_binary(&self) {
-        self.outbox.expect_reply();
+        self.outbox.record_request();
         let problem = Problem::new("request", "it is not text", "send JSON as the protocol has it");
         refuse(&self.outbox, 0, problem);
     }
@@ -214,19 +214,23 @@ impl SocketSessions {
         match call {
             SessionMethod::Close {} => {
                 let closed = self.sessions.remove(&session).ok_or_else(no_such_session);
-                self.outbox.clear_session(session);
+                self.outbox.discard_update(session);
                 Some(closed.map(|_| ReplyBody::Done))
             }
-            SessionMethod::Check { text } => self.on_text(id, session, move |deps, source| {
-                Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
-            }),
+            SessionMethod::Check { text } => {
+                self.answer_text_request(id, session, move |deps, source| {
+                    Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
+                })
+            }
             SessionMethod::Edit { text, edits } => {
-                self.on_text(id, session, move |deps, source| {
+                self.answer_text_request(id, session, move |deps, source| {
                     apply_edits(deps, source, text, edits)
                 })
             }
             SessionMethod::Model { text } => {
-                self.on_text(id, session, move |deps, source| text_values_reply(deps, source, text))
+                self.answer_text_request(id, session, move |deps, source| {
+                    text_values_reply(deps, source, text)
+                })
             }
             SessionMethod::Run(call) => {
                 let Some(session) = self.sessions.get(&session) else {
@@ -255,13 +259,13 @@ impl SocketSessions {
     }
 
     /// Answers a request on a text that stands for a session's scenario.
-    fn on_text(
+    fn answer_text_request(
         &self,
         id: u32,
         session: SessionId,
         work: impl FnOnce(&SessionDeps, &Source) -> Result<ReplyBody, Problem> + Send + 'static,
     ) -> Option<Result<ReplyBody, Problem>> {
-        let Some(source) = self.sessions.get(&session).and_then(Session::source) else {
+        let Some(source) = self.sessions.get(&session).and_then(Session::scenario_source) else {
             return Some(Err(no_such_session()));
         };
         let deps = self.state.deps.clone();

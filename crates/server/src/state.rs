@@ -83,18 +83,18 @@ impl AppState {
     }
 
     /// Returns whether no further socket is accepted now.
-    pub(crate) fn is_full(&self) -> bool {
+    pub(crate) fn is_socket_limit_reached(&self) -> bool {
         self.sockets.available_permits() == 0
     }
 
     /// Returns the receiver that signals the end of the server.
-    pub(crate) fn shutdown_signal(&self) -> watch::Receiver<bool> {
+    pub(crate) fn shutdown_receiver(&self) -> watch::Receiver<bool> {
         self.shutdown.clone()
     }
 
     /// Waits until the server ends.
     pub(crate) async fn wait_for_shutdown(&self) {
-        wait_for_shutdown(self.shutdown_signal()).await;
+        wait_for_shutdown(self.shutdown_receiver()).await;
     }
 
     /// Waits until all sessions have ended, but not forever.

@@ -89,7 +89,7 @@ pub(crate) fn replace_file(
         return Ok(old.map(|old| old.text));
     }
     let partial = PartialFile::new(target)
-        .and_then(|partial| partial.with_text(text, old.as_ref()))
+        .and_then(|partial| partial.write_text(text, old.as_ref()))
         .map_err(|error| write_error(target, &error))?;
     // Writing takes some time, in which another program may have changed the file.
     if let Some(present) = read_old_content(target)?
@@ -105,7 +105,7 @@ pub(crate) fn replace_file(
 fn read_old_content(target: &WriteTarget) -> Result<Option<OldContent>, Problem> {
     let place = target.path.display().to_string();
     let other_name = "save it under another name";
-    let (bytes, permissions) = match try_read(&target.real) {
+    let (bytes, permissions) = match read_with_permissions(&target.real) {
         Ok(content) => content,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => {
@@ -130,7 +130,7 @@ fn read_old_content(target: &WriteTarget) -> Result<Option<OldContent>, Problem>
     Ok(Some(OldContent { text, has_byte_order_mark, permissions }))
 }
 
-fn try_read(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {
+fn read_with_permissions(path: &Path) -> io::Result<(Vec<u8>, Permissions)> {
     let file = File::open(path)?;
     let permissions = file.metadata()?.permissions();
     let mut bytes = Vec::new();
@@ -184,7 +184,7 @@ impl PartialFile {
         Ok(Self { path, file, is_done: false })
     }
 
-    fn with_text(mut self, text: &str, old: Option<&OldContent>) -> io::Result<Self> {
+    fn write_text(mut self, text: &str, old: Option<&OldContent>) -> io::Result<Self> {
         if let Some(old) = old {
             self.file.set_permissions(old.permissions.clone())?;
         }

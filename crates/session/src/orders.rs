@@ -1,6 +1,6 @@
 //! The recorded orders and controls of a run that was decided from outside.
 
-use sidestep_kernel::control::{ControlReader, OrderReader};
+use sidestep_kernel::control::{ControlTableReader, OrderTableReader};
 use sidestep_kernel::ports::{TableSchema, Values};
 use sidestep_kernel::{InputError, Simulation};
 use sidestep_record::{for_each_block, tables};
@@ -11,17 +11,20 @@ use std::path::Path;
 /// # Errors
 /// When they cannot be read, or can no longer be obeyed.
 pub(crate) fn replay_recorded(run: &mut dyn Simulation, folder: &Path) -> Result<(), InputError> {
-    let mut orders = OrderReader::default();
-    if read_blocks(folder, OrderReader::TABLE, |schema, columns| orders.read(schema, columns))? {
+    let mut orders = OrderTableReader::default();
+    if read_blocks(folder, OrderTableReader::TABLE, |schema, columns| {
+        orders.read_block(schema, columns)
+    })? {
         run.replay_orders(orders.into_log()).map_err(|error| {
-            let place = folder.join(OrderReader::TABLE).display().to_string();
+            let place = folder.join(OrderTableReader::TABLE).display().to_string();
             let remedy = "the recording was changed, or another program made it: run it again";
             InputError::new(place, error.to_string(), remedy)
         })?;
     }
-    let mut controls = ControlReader::default();
-    if read_blocks(folder, ControlReader::TABLE, |schema, columns| controls.read(schema, columns))?
-    {
+    let mut controls = ControlTableReader::default();
+    if read_blocks(folder, ControlTableReader::TABLE, |schema, columns| {
+        controls.read_block(schema, columns)
+    })? {
         run.replay_controls(controls.into_log());
     }
     Ok(())
@@ -51,11 +54,11 @@ fn read_blocks(
 /// # Errors
 /// When they cannot be read.
 pub(crate) fn has_orders(folder: &Path) -> Result<bool, InputError> {
-    if !tables(folder)?.iter().any(|name| name == OrderReader::TABLE) {
+    if !tables(folder)?.iter().any(|name| name == OrderTableReader::TABLE) {
         return Ok(false);
     }
     // An error is the only way to stop reading at the first row; the rest may be gigabytes.
-    let found = for_each_block(folder, OrderReader::TABLE, .., |block| {
+    let found = for_each_block(folder, OrderTableReader::TABLE, .., |block| {
         if block.rows() > 0 { Err(ReadStop::Found) } else { Ok(()) }
     });
     match found {

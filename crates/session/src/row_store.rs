@@ -81,7 +81,7 @@ impl RowStore {
             let count = cycles.iter().rev().take_while(|&&cycle| cycle >= now).count();
             if count > 0 {
                 let rows: Vec<_> = (cycles.len() - count..cycles.len()).collect();
-                let block = columns.iter().map(|column| column.pick(&rows)).collect();
+                let block = columns.iter().map(|column| column.gather_rows(&rows)).collect();
                 pending.push((table, block));
             }
         }

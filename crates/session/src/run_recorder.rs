@@ -38,7 +38,7 @@ impl RunRecorder {
     ) -> Result<Self, Error> {
         let plan = run.config();
         let new = NewRun {
-            world: run.world().into(),
+            world: run.world_name().into(),
             build: build.into(),
             origin: Provenance {
                 program_version: VERSION.into(),
@@ -85,7 +85,7 @@ impl RunRecorder {
     /// Makes everything recorded so far durable. The tables are sealed first: a checkpoint that is newer than the rows
     /// before it could not be resumed from.
     fn save_checkpoint(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
-        self.recorder.seal(run.cycle())?;
+        self.recorder.make_durable(run.cycle())?;
         self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
     }
 

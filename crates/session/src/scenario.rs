@@ -62,7 +62,7 @@ impl GivenScenario {
     /// # Errors
     /// When the file cannot be read, or nothing in it can be simulated.
     pub fn read(worlds: &Worlds, file: &Path) -> Result<Self, InputError> {
-        let Some(import) = worlds.translate(file)? else {
+        let Some(import) = worlds.import_scenario(file)? else {
             return Ok(Source::read(file, &[])?.into());
         };
         let text = import.scenario.clone()?;
@@ -219,7 +219,8 @@ mod tests {
         std::fs::write(&file, text).expect("written");
         let overrides = ["airspace.beta=7", "cycles=5", "airspace.generator.n=-3"];
         let told = problems(&WORLDS, &file, &overrides.map(String::from)).expect("read");
-        let told: Vec<_> = told.iter().map(|e| (e.key().unwrap_or(""), e.position())).collect();
+        let told: Vec<_> =
+            told.iter().map(|e| (e.key().unwrap_or(""), e.line_and_column())).collect();
         assert_eq!(
             told,
             [
@@ -243,7 +244,7 @@ mod tests {
         std::fs::write(&file, text).expect("written");
         let error = read_scenario(&WORLDS, &file, &[]).err().expect("wrong");
         let place = format!("the scenario made from {}", file.display());
-        assert_eq!((error.place(), error.position()), (place.as_str(), None), "{error}");
+        assert_eq!((error.place(), error.line_and_column()), (place.as_str(), None), "{error}");
         assert!(error.cause().contains("orders") && error.key().is_some(), "{error}");
         assert_eq!(problems(&WORLDS, &file, &[]), Ok(vec![error.clone()]));
         let other = read_scenario(&WORLDS, &file, &["seed=3".into()]).err().expect("wrong");
@@ -266,10 +267,10 @@ mod tests {
         };
         let error = of(&["airspace.dt_s=4", "airspace.generator.n=-3", "airspace.shield=off"]);
         assert!(error.place().ends_with("s.toml with --set airspace.generator.n=-3"), "{error}");
-        assert_eq!((error.position(), error.cause()), (None, "n = -3"));
+        assert_eq!((error.line_and_column(), error.cause()), (None, "n = -3"));
         std::fs::write(&file, text.replace("n = 3", "n = -4")).expect("written");
         let error = of(&["airspace.dt_s=4"]);
-        assert_eq!((error.position(), error.cause()), (Some((5, 5)), "n = -4"));
+        assert_eq!((error.line_and_column(), error.cause()), (Some((5, 5)), "n = -4"));
         assert!(error.place().ends_with("s.toml"), "{error}");
     }
 }

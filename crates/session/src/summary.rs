@@ -139,7 +139,7 @@ impl Summary {
     pub(crate) fn new(run: &dyn Simulation, cost: RunCost, folder: Option<&Path>) -> Self {
         let config = run.config();
         let cycles = run.cycle();
-        let agents = run.agents();
+        let agents = run.agent_count();
         let timing = cost.timing;
         let cpu_s = timing.cpu.as_secs_f64();
         // The CPU clock may not have moved in a run of a few cycles; JSON has no infinity.
@@ -148,8 +148,8 @@ impl Summary {
         let status = if is_incomplete { RunStatus::Incomplete } else { RunStatus::Complete };
         Self {
             version: VERSION,
-            world: run.world(),
-            agent: run.agent(),
+            world: run.world_name(),
+            agent: run.agent_noun(),
             name: config.name.clone(),
             status,
             seed: config.seed,

@@ -190,7 +190,7 @@ fn plain_loop() {
         let mut engine = case.simulation(1);
         let plain = case.simulation(1);
         let (world, state) = (plain.world().clone(), plain.state());
-        let (mut scratch, groups) = (world.scratch(), ConflictGroups::new(world.bodies.len()));
+        let (mut scratch, groups) = (world.new_scratch(), ConflictGroups::new(world.bodies.len()));
         let n = world.bodies.len();
         let clock = &SystemClock::default();
         let mut now = 0;

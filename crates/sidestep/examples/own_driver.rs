@@ -3,7 +3,7 @@
 use sidestep::kernel::stream::Draws;
 use sidestep::rods::geometry::{Point, distance};
 use sidestep::worlds::WORLDS;
-use sidestep::worlds::chain::{Chains, Driver, DriverMemory, DriverPercept, Proposal};
+use sidestep::worlds::chain::{Chains, Driver, DriverAction, DriverMemory, DriverPercept};
 use sidestep::{Error, Scenario};
 
 const SCENARIO: &str = r#"format = 1
@@ -20,13 +20,18 @@ const CORNERS_M: [Point<3>; 4] = [[2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0
 struct Square;
 
 impl Driver for Square {
-    fn decide(&self, percept: &DriverPercept, state: &mut DriverMemory, _: &mut Draws) -> Proposal {
+    fn decide(
+        &self,
+        percept: &DriverPercept,
+        state: &mut DriverMemory,
+        _: &mut Draws,
+    ) -> DriverAction {
         let [next, ..] = &mut state.words;
-        let Some(corner) = CORNERS_M.get(*next as usize) else { return Proposal::Done };
+        let Some(corner) = CORNERS_M.get(*next as usize) else { return DriverAction::Done };
         if distance(percept.connectors_m[percept.connector], *corner) < 0.01 {
             *next += 1;
         }
-        Proposal::GoTo(*corner)
+        DriverAction::GoTo(*corner)
     }
 }
 

@@ -75,7 +75,7 @@
 //! let text = "format = 1\nworld = \"robots\"\nsede = 7\n[map]\nascii = \"....\"\n[robots]\ncount = -1\n";
 //! let problems = sidestep::parse(text).check().unwrap_err();
 //! assert_eq!(problems.0.len(), 2);
-//! assert_eq!(problems.0[0].position(), Some((3, 1)));
+//! assert_eq!(problems.0[0].line_and_column(), Some((3, 1)));
 //! assert_eq!(problems.0[0].remedy(), "did you mean `seed`?");
 //! ```
 //!

@@ -2,30 +2,30 @@
 
 use super::{Hop, PondState, PondWorld};
 use sidestep_kernel::World;
-use sidestep_kernel::control::{BufferMut, Space, SpaceKind, Team, Teams};
+use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, ValueDomain, ValueSpace};
 
 /// The order to hop.
 pub(crate) const HOP: &str = "hop";
 
 /// Returns the teams of a pond: one of all frogs, if they take orders.
-pub(crate) fn teams(frogs: u32, pads: u32, is_external: bool) -> Teams {
+pub(crate) fn teams(frogs: u32, pads: u32, is_external: bool) -> AgentTeams {
     if !is_external {
-        return Teams::default();
+        return AgentTeams::default();
     }
-    let last_pad = SpaceKind::Integer { low: 0, high: i64::from(pads) - 1 };
-    let hops = SpaceKind::Discrete(Hop::NAMES.map(String::from).into());
-    let team = Team {
+    let last_pad = ValueDomain::Integer { low: 0, high: i64::from(pads) - 1 };
+    let hops = ValueDomain::Discrete(Hop::NAMES.map(String::from).into());
+    let team = AgentTeam {
         name: PondWorld::AGENT.into(),
         agents: (0..frogs).collect(),
-        observation_spaces: vec![Space::new("pad", last_pad, "number of the pad under it")],
-        action_spaces: vec![Space::new(HOP, hops, "the hop that it tries")],
+        observation_spaces: vec![ValueSpace::new("pad", last_pad, "number of the pad under it")],
+        action_spaces: vec![ValueSpace::new(HOP, hops, "the hop that it tries")],
     };
-    Teams::new(vec![team], PondWorld::AGENT)
+    AgentTeams::new(vec![team], PondWorld::AGENT)
 }
 
 impl PondWorld {
     pub(crate) fn takes_orders(&self) -> bool {
-        !self.teams.all().is_empty()
+        !self.teams.as_slice().is_empty()
     }
 
     pub(crate) fn write_observations(&self, state: &PondState, buffers: &mut [BufferMut<'_>]) {

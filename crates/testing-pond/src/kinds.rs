@@ -1,6 +1,8 @@
 //! The kinds of bodies in a pond.
 
-use sidestep_kernel::view::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+use sidestep_kernel::view::{
+    BodyKind, BodyRole, KindSpec, LegendTexts, Outline, Paint, TrailStyle,
+};
 
 /// All kinds of bodies in this world.
 pub(crate) const ALL: &[BodyKind] = &[FROG, BodyKind::OBSTACLE];
@@ -10,10 +12,10 @@ pub const FROG: BodyKind = BodyKind::new(&KindSpec {
     name: "frog",
     noun: "frog",
     rank: 100,
-    role: Role::Agent(TrailStyle::OnePerColor),
+    role: BodyRole::Agent(TrailStyle::OnePerColor),
     layer: 5,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::Dark,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: false,
 });

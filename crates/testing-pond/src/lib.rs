@@ -16,9 +16,9 @@ pub use world_type::Pond;
 use rows::{Event, FrogAction};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::conflict::ConflictGroups;
-use sidestep_kernel::control::Teams;
+use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_kernel::{AtomicColumn, Cycle, PhaseContext, Phases, Slot};
+use sidestep_kernel::{AtomicColumn, Cycle, EntitySlot, PhaseContext, Phases};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(crate) struct PondWorld {
     reeds: Vec<u32>,
     streams: Streams,
     /// The frogs as a caller sees them, if they take orders.
-    teams: Arc<Teams>,
+    teams: Arc<AgentTeams>,
 }
 
 /// The pads of all frogs: everything that changes in a run, except sums.
@@ -105,7 +105,7 @@ impl PondWorld {
             state.order.set(frog, Hop::Stay as u32);
             return Hop::ALL[order];
         }
-        match self.streams.draws(frog as Slot, now, HOP).uniform_below(4) {
+        match self.streams.draws(frog as EntitySlot, now, HOP).uniform_below(4) {
             0 => Hop::East,
             1 => Hop::West,
             2 => Hop::North,
@@ -136,11 +136,11 @@ impl Phases for PondWorld {
     type State = PondState;
     type Scratch = Vec<Event>;
 
-    fn scratch(&self) -> Vec<Event> {
+    fn new_scratch(&self) -> Vec<Event> {
         Vec::new()
     }
 
-    fn bodies(&self, _: &PondState) -> usize {
+    fn body_count(&self, _: &PondState) -> usize {
         self.frogs as usize
     }
 
@@ -159,11 +159,11 @@ impl Phases for PondWorld {
             let meets = |other: &usize| claims(*other).iter().any(|pad| own.contains(pad));
             (0..frog)
                 .filter(meets)
-                .for_each(|other| groups.join_groups(frog as Slot, other as Slot));
+                .for_each(|other| groups.join_groups(frog as EntitySlot, other as EntitySlot));
         }
     }
 
-    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+    fn act(turn: &mut PhaseContext<'_, Self>, group: &mut [EntitySlot]) {
         group.sort_unstable();
         let state = turn.state;
         for &mut frog in group {

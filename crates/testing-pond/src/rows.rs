@@ -1,14 +1,14 @@
 //! The tables recorded of a pond.
 
 use super::{PondState, PondWorld};
-use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::ports::{Table, TableBuffer, TableBuffers, TableRowsBuffer};
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// An action of a frog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Event {
     pub(super) cycle: Cycle,
-    pub(super) frog: Slot,
+    pub(super) frog: EntitySlot,
     pub(super) what: FrogAction,
 }
 
@@ -22,7 +22,7 @@ pub(crate) enum FrogAction {
 #[derive(Debug)]
 struct PadRow {
     cycle: Cycle,
-    frog: Slot,
+    frog: EntitySlot,
     at_m: [f64; 2],
 }
 
@@ -44,14 +44,14 @@ fn events() -> Table<Event> {
 /// Rows that wait to be passed on.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    places: RowBuffer<PadRow>,
-    events: RowBuffer<Event>,
+    places: TableRowsBuffer<PadRow>,
+    events: TableRowsBuffer<Event>,
 }
 
 impl Rows {
     pub(super) fn begin(&mut self) {
-        self.places.start(Some(trajectories()));
-        self.events.start(Some(events()));
+        self.places.set_table(Some(trajectories()));
+        self.events.set_table(Some(events()));
     }
 
     pub(super) fn poses(&mut self, world: &PondWorld, state: &PondState, now: Cycle) {
@@ -65,12 +65,12 @@ impl Rows {
     }
 }
 
-impl Buffers for Rows {
-    fn buffers(&self) -> Vec<&dyn Buffer> {
+impl TableBuffers for Rows {
+    fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
         vec![&self.places, &self.events]
     }
 
-    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+    fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
         vec![&mut self.places, &mut self.events]
     }
 }

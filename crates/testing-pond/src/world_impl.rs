@@ -5,17 +5,17 @@ use super::rows::{Event, FrogAction, Rows};
 use super::{PondState, PondWorld, Saved, Sums};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{BufferMut, Order, Teams};
+use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateDescription, key_value};
+use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
+use sidestep_kernel::text::{KeyValues, StateReport, key_value_pair};
 use sidestep_kernel::view::{
     Body, BodyKind, CoordinateColumn, Frame, FrameOptions, Pose, PositionTableColumns, Scenery,
     Shape,
 };
 use sidestep_kernel::{
-    Cycle, Digest, RunStats, World, WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording,
-    WorldView,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, RecordableWorld, RunStats, World,
+    WorldMetrics, WorldView,
 };
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ impl World for PondWorld {
 
     type Collector = Collector;
 
-    fn agents(&self) -> usize {
+    fn agent_count(&self) -> usize {
         self.frogs as usize
     }
 
@@ -46,7 +46,7 @@ impl World for PondWorld {
         books.gathered.append(scratch);
     }
 
-    fn commit(&self, books: &mut Collector) {
+    fn commit_results(&self, books: &mut Collector) {
         let mut events = std::mem::take(&mut books.gathered);
         events.sort_unstable_by_key(|event| (event.cycle, event.frog));
         for event in events {
@@ -59,7 +59,7 @@ impl World for PondWorld {
     }
 }
 
-impl WorldRecording for PondWorld {
+impl RecordableWorld for PondWorld {
     fn start_recording(&self, _: &mut PondState, books: &mut Collector, _: Cycle) {
         books.rows.begin();
     }
@@ -96,7 +96,7 @@ impl WorldRecording for PondWorld {
     }
 }
 
-impl WorldCheckpoint for PondWorld {
+impl CheckpointableWorld for PondWorld {
     type Snapshot = Saved;
 
     fn digest(&self, state: &PondState, now: Cycle) -> Digest {
@@ -159,8 +159,8 @@ impl PondWorld {
     }
 }
 
-impl WorldControl for PondWorld {
-    fn teams(&self) -> Arc<Teams> {
+impl ControllableWorld for PondWorld {
+    fn agent_teams(&self) -> Arc<AgentTeams> {
         Arc::clone(&self.teams)
     }
 
@@ -187,11 +187,11 @@ impl WorldMetrics for PondWorld {
     }
 
     fn summary_lines(&self, metrics: &Value) -> KeyValues {
-        vec![key_value("hops", metrics["hops"].to_string())]
+        vec![key_value_pair("hops", metrics["hops"].to_string())]
     }
 
-    fn poses(&self, state: &PondState, _: Cycle) -> StateDescription {
+    fn poses(&self, state: &PondState, _: Cycle) -> StateReport {
         let pads: Vec<u32> = state.pad.iter().collect();
-        StateDescription { text: format!("  pads {pads:?}\n"), json: json!(pads) }
+        StateReport { text: format!("  pads {pads:?}\n"), json: json!(pads) }
     }
 }

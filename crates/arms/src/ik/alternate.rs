@@ -7,7 +7,7 @@
 
 use super::dls::bend_to_arc;
 use super::limb::RodLengthRange;
-use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, norm, sub};
+use sidestep_rods::geometry::{Point, add, add_scaled, distance, norm, sub, unit_x};
 
 /// Largest number of double passes before the search is given up: FABRIK takes a median of 135 for a target within 0.9 of
 /// the reach of 450 rods in space, and ever more toward the full reach.
@@ -63,16 +63,16 @@ fn slave_position<const D: usize>(
     let g = sub(slave, master);
     let d = norm(g);
     if d > 0.0 {
-        add_scaled(master, g, span.nearest_m(d) / d)
+        add_scaled(master, g, span.clamp_m(d) / d)
     } else {
         // Connectors in one place give no direction; any fixed one will do.
-        add_scaled(master, first_axis(), span.min_m)
+        add_scaled(master, unit_x(), span.min_m)
     }
 }
 
 /// Solves like [`solve`], for rod vectors from a base at the origin. A limb that lies in one line
 /// with the target, where passes get stuck, is bowed once.
-pub(super) fn solve_vectors<const D: usize>(
+pub(super) fn solve_rod_vectors<const D: usize>(
     vectors: &mut [Point<D>],
     spans: &[RodLengthRange],
     target: Point<D>,

@@ -93,7 +93,7 @@ impl<const D: usize> ConstraintSearch<'_, D> {
         let limb = &mut solver.limb;
         direct::solve(&mut limb.vectors, &limb.spans, sub(target, points[base]));
         let mut at = points[base];
-        for (i, v) in limb::connector_path(base, k).skip(1).zip(&limb.vectors) {
+        for (i, v) in limb::connector_indices(base, k).skip(1).zip(&limb.vectors) {
             at = add(at, *v);
             points[i] = at;
         }

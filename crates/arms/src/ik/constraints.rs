@@ -1,7 +1,7 @@
 //! A validity check of postures (OMPL's state validity checker): rods, bends, mobilities, obstacles and
 //! the chain's own body, as propagation checks them, but without a motion that leads there.
 
-use sidestep_rods::geometry::{Aabb, Point, angle_rad, between_segments, distance, sub};
+use sidestep_rods::geometry::{Aabb, Point, angle_between_rad, between_segments, distance, sub};
 use sidestep_rods::{
     BEND_TOLERANCE_RAD, Chain, Obstacle, Obstacles, Veto, VetoReason, contact_distance_m,
     is_length_allowed,
@@ -79,11 +79,11 @@ impl<const D: usize> ConstraintChecker<'_, D> {
     fn touches(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
         let keep_m = contact_distance_m(o.radius_m + self.chain.rods()[i].radius_m);
         !o.core.is_clear_of_segment([points[i], points[i + 1]], keep_m)
-            || self.connector_touches(points, i, o)
-            || self.connector_touches(points, i + 1, o)
+            || self.is_connector_touching(points, i, o)
+            || self.is_connector_touching(points, i + 1, o)
     }
 
-    fn connector_touches(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
+    fn is_connector_touching(&self, points: &[Point<D>], i: usize, o: &Obstacle<D>) -> bool {
         let keep_m = contact_distance_m(o.radius_m + self.chain.connectors()[i].radius_m);
         self.has_moved(points, i) && !o.core.is_clear_of_point(points[i], keep_m)
     }
@@ -111,7 +111,7 @@ impl<const D: usize> ConstraintChecker<'_, D> {
     ) -> impl Iterator<Item = OwnPair<D>> + 'a {
         let near = self.bounds(points, i).grown(margin_m);
         (i + 1..self.chain.rods().len())
-            .filter(move |&j| self.bounds(points, j).meets(&near))
+            .filter(move |&j| self.bounds(points, j).intersects(&near))
             .flat_map(move |j| self.own_pairs_of(points, i, j))
     }
 
@@ -188,5 +188,5 @@ impl<const D: usize> OwnPair<D> {
 
 /// Returns the angle between the directions of the rods at an inner connector.
 pub(super) fn bend_rad<const D: usize>(points: &[Point<D>], i: usize) -> f64 {
-    angle_rad(sub(points[i], points[i - 1]), sub(points[i + 1], points[i]))
+    angle_between_rad(sub(points[i], points[i - 1]), sub(points[i + 1], points[i]))
 }

@@ -8,7 +8,7 @@
 
 use super::limb::{ReachShell, RodLengthRange};
 use sidestep_rods::geometry::{
-    Point, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
+    Point, add_scaled, dot, norm, normalized, perpendicular, scaled, sub, unit_x,
 };
 
 /// Lays `vectors` so that their sum is `target`, or as near as possible. Lengths of rods are kept
@@ -18,22 +18,26 @@ pub(super) fn solve<const D: usize>(
     spans: &[RodLengthRange],
     target: Point<D>,
 ) {
-    let target = ReachShell::from_spans(spans).nearest(target);
+    let target = ReachShell::from_length_ranges(spans).nearest(target);
     let far_m = norm(target);
-    let toward = normalized(target).unwrap_or(first_axis());
+    let toward = normalized(target).unwrap_or(unit_x());
     let side = perpendicular(toward);
     let mut lengths_m: Vec<f64> =
-        vectors.iter().zip(spans).map(|(v, span)| span.nearest_m(norm(*v))).collect();
-    fit_lengths(&mut lengths_m, spans, far_m);
+        vectors.iter().zip(spans).map(|(v, span)| span.clamp_m(norm(*v))).collect();
+    fit_lengths_to_distance(&mut lengths_m, spans, far_m);
     let middle = middle_rod(&lengths_m);
     let before_m: f64 = lengths_m[..middle].iter().sum();
     let behind_m: f64 = lengths_m[middle + 1..].iter().sum();
     // The bend behind the middle rod is as far from the base as both triangles allow.
     let diagonal_m = (before_m + lengths_m[middle]).min(behind_m + far_m);
-    let second = apex(toward, side, far_m, [diagonal_m, behind_m]);
+    let second = triangle_apex(toward, side, far_m, [diagonal_m, behind_m]);
     let arm = normalized(second).unwrap_or(toward);
-    let first =
-        apex(arm, bend_direction(arm, toward, side), diagonal_m, [before_m, lengths_m[middle]]);
+    let first = triangle_apex(
+        arm,
+        bend_direction(arm, toward, side),
+        diagonal_m,
+        [before_m, lengths_m[middle]],
+    );
     let straight = [
         normalized(first).unwrap_or(arm),
         normalized(sub(second, first)).unwrap_or(arm),
@@ -46,7 +50,7 @@ pub(super) fn solve<const D: usize>(
 }
 
 /// Changes lengths as little as possible so that they allow the tip's distance.
-fn fit_lengths(lengths_m: &mut [f64], spans: &[RodLengthRange], far_m: f64) {
+fn fit_lengths_to_distance(lengths_m: &mut [f64], spans: &[RodLengthRange], far_m: f64) {
     let sum_m: f64 = lengths_m.iter().sum();
     let longest =
         (0..lengths_m.len()).max_by(|&i, &j| lengths_m[i].total_cmp(&lengths_m[j])).unwrap_or(0);
@@ -67,7 +71,7 @@ fn fit_lengths(lengths_m: &mut [f64], spans: &[RodLengthRange], far_m: f64) {
     let room_m: f64 = changes.sum();
     let part = if room_m > 0.0 { (missing_m / room_m).min(1.0) } else { 0.0 };
     for i in 0..lengths_m.len() {
-        lengths_m[i] = spans[i].nearest_m(lengths_m[i] + part * (ends_m[i] - lengths_m[i]));
+        lengths_m[i] = spans[i].clamp_m(lengths_m[i] + part * (ends_m[i] - lengths_m[i]));
     }
 }
 
@@ -86,7 +90,7 @@ fn middle_rod(lengths_m: &[f64]) -> usize {
 
 /// Returns the corner of a triangle over a base line of `base_m` along `u`, on the side of `side`,
 /// with the other two edges as given: the first from the line's start.
-fn apex<const D: usize>(
+fn triangle_apex<const D: usize>(
     u: Point<D>,
     side: Point<D>,
     base_m: f64,

@@ -17,7 +17,7 @@
 
 use super::limb::RodLengthRange;
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, first_axis, norm, normalized, perpendicular, scaled, sub,
+    Point, add, add_scaled, norm, normalized, perpendicular, scaled, sub, unit_x,
 };
 
 /// Newton steps with hardly any gain before the posture becomes the new reference: at a kink they no longer help.
@@ -54,7 +54,7 @@ struct TipProblem<'a, const D: usize> {
 }
 
 /// The tip's position for a multiplier.
-struct TipPosition<const D: usize> {
+struct TipError<const D: usize> {
     /// The remaining vector to the target.
     error: Point<D>,
     error_m: f64,
@@ -98,7 +98,7 @@ impl<const D: usize> TipProblem<'_, D> {
     /// Applies Newton's method to the multiplier; returns it and the remaining error.
     fn solve_multiplier(
         &self,
-        start: TipPosition<D>,
+        start: TipError<D>,
         tolerance_m: f64,
         steps: &mut usize,
     ) -> (Point<D>, f64) {
@@ -128,13 +128,13 @@ impl<const D: usize> TipProblem<'_, D> {
     }
 
     #[inline]
-    fn tip_position(&self, y: Point<D>) -> TipPosition<D> {
+    fn tip_position(&self, y: Point<D>) -> TipError<D> {
         let mut tip = [0.0; D];
         let mut slope = [[0.0; D]; D];
         for (v, span) in self.vectors.iter().zip(self.spans) {
             let w = add(*v, y);
             let r = norm(w).max(f64::MIN_POSITIVE);
-            let length_m = span.nearest_m(r);
+            let length_m = span.clamp_m(r);
             let per_m = 1.0 / r;
             let u = scaled(w, per_m);
             tip = add_scaled(tip, u, length_m);
@@ -149,7 +149,7 @@ impl<const D: usize> TipProblem<'_, D> {
             }
         }
         let error = sub(self.target, tip);
-        TipPosition { error, error_m: norm(error), slope }
+        TipError { error, error_m: norm(error), slope }
     }
 }
 
@@ -187,15 +187,15 @@ fn adopt<const D: usize>(vectors: &mut [Point<D>], spans: &[RodLengthRange], y: 
     for (v, span) in vectors.iter_mut().zip(spans) {
         let w = add(*v, y);
         let r = norm(w);
-        let u = if r > 0.0 { scaled(w, 1.0 / r) } else { normalized(*v).unwrap_or(first_axis()) };
-        *v = scaled(u, span.nearest_m(r));
+        let u = if r > 0.0 { scaled(w, 1.0 / r) } else { normalized(*v).unwrap_or(unit_x()) };
+        *v = scaled(u, span.clamp_m(r));
     }
 }
 
 /// Bends the limb to an arc, to the side given by `perpendicular`.
 pub(super) fn bend_to_arc<const D: usize>(vectors: &mut [Point<D>], target: Point<D>) {
     let total = vectors.iter().fold([0.0; D], |sum, v| add(sum, *v));
-    let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(first_axis()));
+    let side = perpendicular(normalized(total).or(normalized(target)).unwrap_or(unit_x()));
     let n = vectors.len() as f64;
     for (i, v) in vectors.iter_mut().enumerate() {
         // From 1 at the base to -1 at the tip: rods alike lean to both sides equally, and the tip

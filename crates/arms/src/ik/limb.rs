@@ -1,7 +1,7 @@
 //! The part of a chain that a solve moves: the rods from the base to the connector that has a
 //! target, in that order.
 
-use sidestep_rods::geometry::{Point, first_axis, norm, scaled, sub};
+use sidestep_rods::geometry::{Point, norm, scaled, sub, unit_x};
 use sidestep_rods::{Chain, Mobility, Rod};
 
 /// Rods from a base outward, and the target of the tip, relative to the base.
@@ -25,7 +25,7 @@ impl RodLengthRange {
     }
 
     #[inline]
-    pub(super) fn nearest_m(&self, length_m: f64) -> f64 {
+    pub(super) fn clamp_m(&self, length_m: f64) -> f64 {
         length_m.max(self.min_m).min(self.max_m)
     }
 }
@@ -41,7 +41,7 @@ pub struct ReachShell {
 
 impl ReachShell {
     /// Returns the distances at which these rods can hold their ends, if they bend without limit.
-    pub(super) fn from_spans(spans: &[RodLengthRange]) -> Self {
+    pub(super) fn from_length_ranges(spans: &[RodLengthRange]) -> Self {
         let reach_m: f64 = spans.iter().map(|s| s.max_m).sum();
         // Take one rod as short as possible, against all others as long as possible.
         let longest_m = spans.iter().map(|s| s.min_m + s.max_m).fold(0.0, f64::max);
@@ -58,13 +58,13 @@ impl ReachShell {
         } else if far_m > 0.0 {
             scaled(target, self.hole_m / far_m)
         } else {
-            scaled(first_axis(), self.hole_m)
+            scaled(unit_x(), self.hole_m)
         }
     }
 }
 
 /// Returns the indices of the connectors from `base` to `k`, both included.
-pub(super) fn connector_path(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone {
+pub(super) fn connector_indices(base: usize, k: usize) -> impl Iterator<Item = usize> + Clone {
     let n = base.abs_diff(k);
     (0..=n).map(move |i| if k > base { base + i } else { base - i })
 }
@@ -86,8 +86,12 @@ impl<const D: usize> Limb<D> {
 }
 
 /// Returns the connector nearest to `k` between it and `base` that never moves: the effective base.
-pub(super) fn nearest_fixed<const D: usize>(chain: &Chain<D>, base: usize, k: usize) -> usize {
-    let inward = connector_path(k, base).skip(1);
+pub(super) fn nearest_fixed_connector<const D: usize>(
+    chain: &Chain<D>,
+    base: usize,
+    k: usize,
+) -> usize {
+    let inward = connector_indices(k, base).skip(1);
     let mut still = inward.filter(|&i| chain.connectors()[i].is_still());
     still.next().unwrap_or(base)
 }

@@ -34,7 +34,7 @@ pub use limb::ReachShell;
 
 use limb::{Limb, RodLengthRange};
 use sidestep_kernel::InputError;
-use sidestep_rods::geometry::{Point, add, add_scaled, distance, first_axis, is_finite, norm, sub};
+use sidestep_rods::geometry::{Point, add, add_scaled, distance, is_finite, norm, sub, unit_x};
 use sidestep_rods::{Chain, Obstacles, Propagator, ReactionRules};
 
 /// Number of rods up to which the chain's own rule is faster (bench `ik`, part `free`).
@@ -74,10 +74,10 @@ impl<const D: usize> IkSolver<D> {
         goal: &ChainIkGoal<D>,
     ) -> Result<ChainIkResult<D>, InputError> {
         check(chain, goal)?;
-        let base = limb::nearest_fixed(chain, goal.base, goal.k);
+        let base = limb::nearest_fixed_connector(chain, goal.base, goal.k);
         let goal = &ChainIkGoal { base, ..*goal };
         self.limb.read(chain, chain.points(), base, goal.k);
-        let shell = ReachShell::from_spans(&self.limb.spans);
+        let shell = ReachShell::from_length_ranges(&self.limb.spans);
         let home = chain.points()[base];
         // A target out of reach is replaced by the nearest one within it, so that every engine can converge.
         let reachable = add(home, shell.nearest(sub(goal.target, home)));
@@ -92,17 +92,17 @@ impl<const D: usize> IkSolver<D> {
                 &ChainIkGoal { target: reachable, ..*goal },
             )?
         } else {
-            self.solve_free(chain, &ChainIkGoal { target: reachable, ..*goal })
+            self.solve_unconstrained(chain, &ChainIkGoal { target: reachable, ..*goal })
         };
-        Ok(answer.relative_to(goal, &shell, home))
+        Ok(answer.compared_with_goal(goal, &shell, home))
     }
 
     /// Solves a goal within reach, which always works where nothing constrains the chain.
-    fn solve_free(&mut self, chain: &Chain<D>, goal: &ChainIkGoal<D>) -> ChainIkResult<D> {
+    fn solve_unconstrained(&mut self, chain: &Chain<D>, goal: &ChainIkGoal<D>) -> ChainIkResult<D> {
         self.points.clear();
         self.points.extend_from_slice(chain.points());
-        let EngineResult { iterations, engine } = self.free_posture(goal);
-        self.write_points(goal);
+        let EngineResult { iterations, engine } = self.unconstrained_posture(goal);
+        self.update_points(goal);
         follow_beyond(&mut self.points, chain, goal);
         ChainIkResult {
             reached: true,
@@ -116,7 +116,7 @@ impl<const D: usize> IkSolver<D> {
     }
 
     /// Brings `self.limb` to the target, which is within its reach.
-    fn free_posture(&mut self, goal: &ChainIkGoal<D>) -> EngineResult {
+    fn unconstrained_posture(&mut self, goal: &ChainIkGoal<D>) -> EngineResult {
         let Self { limb: Limb { spans, vectors }, points, .. } = self;
         let target = sub(goal.target, points[goal.base]);
         let engines: &[IkEngine] = match goal.engine {
@@ -130,7 +130,7 @@ impl<const D: usize> IkSolver<D> {
         let mut iterations = 0;
         for &engine in engines {
             let solve =
-                if engine == IkEngine::Chain { alternate::solve_vectors } else { dls::solve };
+                if engine == IkEngine::Chain { alternate::solve_rod_vectors } else { dls::solve };
             let (used, left_m) = solve(vectors, spans, target, goal.tolerance_m);
             iterations += used;
             if left_m <= goal.tolerance_m {
@@ -142,9 +142,9 @@ impl<const D: usize> IkSolver<D> {
     }
 
     /// Writes the limb's positions from the base on.
-    fn write_points(&mut self, goal: &ChainIkGoal<D>) {
+    fn update_points(&mut self, goal: &ChainIkGoal<D>) {
         let mut at = self.points[goal.base];
-        for (i, v) in limb::connector_path(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
+        for (i, v) in limb::connector_indices(goal.base, goal.k).skip(1).zip(&self.limb.vectors) {
             at = add(at, *v);
             self.points[i] = at;
         }
@@ -155,14 +155,14 @@ impl<const D: usize> IkSolver<D> {
 fn follow_beyond<const D: usize>(points: &mut [Point<D>], chain: &Chain<D>, goal: &ChainIkGoal<D>) {
     let end = if goal.k > goal.base { points.len() - 1 } else { 0 };
     let mut master = goal.k;
-    for slave in limb::connector_path(goal.k, end).skip(1) {
+    for slave in limb::connector_indices(goal.k, end).skip(1) {
         let span = RodLengthRange::from_rod(&chain.rod_between(master, slave));
         let g = sub(points[slave], points[master]);
         let d = norm(g);
         points[slave] = if d > 0.0 {
-            add_scaled(points[master], g, span.nearest_m(d) / d)
+            add_scaled(points[master], g, span.clamp_m(d) / d)
         } else {
-            add_scaled(points[master], first_axis(), span.min_m)
+            add_scaled(points[master], unit_x(), span.min_m)
         };
         master = slave;
     }
@@ -196,7 +196,12 @@ fn check<const D: usize>(chain: &Chain<D>, goal: &ChainIkGoal<D>) -> Result<(), 
 
 impl<const D: usize> ChainIkResult<D> {
     /// Returns the answer compared with the goal as it was given, which may be out of reach.
-    fn relative_to(mut self, goal: &ChainIkGoal<D>, shell: &ReachShell, home: Point<D>) -> Self {
+    fn compared_with_goal(
+        mut self,
+        goal: &ChainIkGoal<D>,
+        shell: &ReachShell,
+        home: Point<D>,
+    ) -> Self {
         self.error_m = distance(self.points[goal.k], goal.target);
         self.reached = self.error_m <= goal.tolerance_m && self.reason.is_none();
         if !self.reached {

@@ -4,7 +4,7 @@
 use super::ChainIkGoal;
 use sidestep_kernel::{InputError, math};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, distance, first_axis, normalized, perpendicular, scaled, sub,
+    Point, add, add_scaled, distance, normalized, perpendicular, scaled, sub, unit_x,
 };
 use sidestep_rods::{Chain, Obstacles, Propagator, ReachOutcome, ReachRequest, Veto, reach_target};
 
@@ -106,12 +106,12 @@ impl<const D: usize> StepwiseMotion<'_, D> {
     /// Makes one step toward the target, or along the first heading of the fan that works.
     fn try_fan(&mut self, chain: &mut Chain<D>, step_m: f64) -> Result<bool, InputError> {
         let from = chain.points()[self.goal.k];
-        let ahead = normalized(sub(self.goal.target, from)).unwrap_or(first_axis());
+        let ahead = normalized(sub(self.goal.target, from)).unwrap_or(unit_x());
         let tolerance_m = (STEP_TOLERANCE * step_m).max(self.goal.tolerance_m);
         if self.step(chain, add_scaled(from, ahead, step_m), tolerance_m)? {
             return Ok(true);
         }
-        let sides = sides(ahead, self.side);
+        let sides = sideways_directions(ahead, self.side);
         for turn_rad in FAN_RAD {
             for (i, side) in sides.iter().flatten().enumerate() {
                 let [c, s] = [math::cos(turn_rad), math::sin(turn_rad)];
@@ -127,7 +127,7 @@ impl<const D: usize> StepwiseMotion<'_, D> {
 }
 
 /// Returns directions across `u`: two in the plane, four in space; the one on the side of `sign` first.
-fn sides<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
+fn sideways_directions<const D: usize>(u: Point<D>, sign: f64) -> [Option<Point<D>>; 4] {
     let e = scaled(perpendicular(u), sign);
     let other = (D == 3).then(|| -> Point<D> {
         std::array::from_fn(|i| {

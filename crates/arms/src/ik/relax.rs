@@ -10,8 +10,8 @@ use super::{ChainIkGoal, dls, follow_beyond};
 use sidestep_kernel::math;
 use sidestep_rods::Veto;
 use sidestep_rods::geometry::{
-    NearestPoints, Point, add, add_scaled, between_segments, distance, dot, first_axis, norm,
-    normalized, perpendicular, scaled, sub,
+    NearestPoints, Point, add, add_scaled, between_segments, distance, dot, norm, normalized,
+    perpendicular, scaled, sub, unit_x,
 };
 use std::f64::consts::PI;
 
@@ -48,7 +48,8 @@ pub(super) fn relax<const D: usize>(
 ) -> RelaxResult<D> {
     let longest_m = checker.chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
     let home = points[goal.base];
-    let mut pusher = Pusher { checker, goal, margin_m: MARGIN * longest_m, violation_m: 0.0 };
+    let mut pusher =
+        ConstraintProjector { checker, goal, margin_m: MARGIN * longest_m, violation_m: 0.0 };
     let mut best_m = f64::INFINITY;
     let mut best_round = 0;
     let mut veto = None;
@@ -80,7 +81,7 @@ fn lay_out<const D: usize>(
     goal: &ChainIkGoal<D>,
 ) {
     let mut at = points[goal.base];
-    for (i, v) in limb::connector_path(goal.base, goal.k).skip(1).zip(&limb.vectors) {
+    for (i, v) in limb::connector_indices(goal.base, goal.k).skip(1).zip(&limb.vectors) {
         at = add(at, *v);
         points[i] = at;
     }
@@ -97,7 +98,7 @@ struct PushedRod<const D: usize> {
 }
 
 /// A round of pushes that move parts out of obstacles and bends.
-struct Pusher<'a, const D: usize> {
+struct ConstraintProjector<'a, const D: usize> {
     checker: &'a ConstraintChecker<'a, D>,
     goal: &'a ChainIkGoal<D>,
     margin_m: f64,
@@ -105,7 +106,7 @@ struct Pusher<'a, const D: usize> {
     violation_m: f64,
 }
 
-impl<const D: usize> Pusher<'_, D> {
+impl<const D: usize> ConstraintProjector<'_, D> {
     fn push(&mut self, points: &mut [Point<D>]) {
         self.violation_m = 0.0;
         for i in 1..points.len() - 1 {
@@ -121,7 +122,7 @@ impl<const D: usize> Pusher<'_, D> {
 
     /// Returns the weight with which a connector yields, the inverse mass of position-based dynamics: 0 for
     /// the tip, the base and what lies behind it, 1 for all others.
-    fn weight(&self, i: usize) -> f64 {
+    fn inverse_mass(&self, i: usize) -> f64 {
         let ChainIkGoal { k, base, .. } = *self.goal;
         let is_before_base = if k > base { i <= base } else { i >= base };
         if is_before_base || i == k { 0.0 } else { 1.0 }
@@ -143,7 +144,7 @@ impl<const D: usize> Pusher<'_, D> {
         let u = normalized(between).unwrap_or(perpendicular(
             normalized(sub(points[i], points[i - 1])).unwrap_or([1.0; D]),
         ));
-        let weights = [self.weight(i - 1), self.weight(i + 1)];
+        let weights = [self.inverse_mass(i - 1), self.inverse_mass(i + 1)];
         let missing_m = chord_m - norm(between);
         self.violation_m += missing_m.max(0.0);
         let sum = weights[0] + weights[1];
@@ -201,7 +202,7 @@ impl<const D: usize> Pusher<'_, D> {
             normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| across_rod(before));
         let fraction =
             if i == j { 0.0 } else { fraction_along(nearest.on_body, [points[i], points[j]]) };
-        let weights = [self.weight(i) * (1.0 - fraction), self.weight(j) * fraction];
+        let weights = [self.inverse_mass(i) * (1.0 - fraction), self.inverse_mass(j) * fraction];
         // The displacement of the nearest point per unit of push; near an end that may not move, a push
         // would swing the other one far away.
         let square = weights[0] * (1.0 - fraction) + weights[1] * fraction;
@@ -220,7 +221,7 @@ impl<const D: usize> Pusher<'_, D> {
 }
 
 fn across_rod<const D: usize>(rod: [Point<D>; 2]) -> Point<D> {
-    perpendicular(normalized(sub(rod[1], rod[0])).unwrap_or(first_axis()))
+    perpendicular(normalized(sub(rod[1], rod[0])).unwrap_or(unit_x()))
 }
 
 /// Returns the position of a point along a segment, in [0, 1].

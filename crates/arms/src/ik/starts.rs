@@ -6,7 +6,7 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_rods::Chain;
-use sidestep_rods::geometry::{Point, add, add_scaled, dot, first_axis, normalized, scaled, sub};
+use sidestep_rods::geometry::{Point, add, add_scaled, dot, normalized, scaled, sub, unit_x};
 
 /// A stream of its own, so that no other draw shifts these.
 const START: Purpose = Purpose(0x1C);
@@ -27,21 +27,21 @@ pub(super) fn start<const D: usize>(
     match index {
         0 => {}
         1 => mirror(&mut points, goal, end),
-        _ => random_walk(&mut points, chain, goal, end, index),
+        _ => place_random_walk(&mut points, chain, goal, end, index),
     }
     points
 }
 
 fn mirror<const D: usize>(points: &mut [Point<D>], goal: &ChainIkGoal<D>, end: usize) {
     let home = points[goal.base];
-    let u = normalized(sub(goal.target, home)).unwrap_or(first_axis());
-    for i in limb::connector_path(goal.base, end).skip(1) {
+    let u = normalized(sub(goal.target, home)).unwrap_or(unit_x());
+    for i in limb::connector_indices(goal.base, end).skip(1) {
         let v = sub(points[i], home);
         points[i] = add_scaled(add(home, scaled(u, 2.0 * dot(v, u))), v, -1.0);
     }
 }
 
-fn random_walk<const D: usize>(
+fn place_random_walk<const D: usize>(
     points: &mut [Point<D>],
     chain: &Chain<D>,
     goal: &ChainIkGoal<D>,
@@ -52,7 +52,7 @@ fn random_walk<const D: usize>(
     let spread = SPREADS[draws.uniform_below(SPREADS.len() as u32) as usize];
     let mut u = random_direction(&mut draws);
     let mut inner = goal.base;
-    for i in limb::connector_path(goal.base, end).skip(1) {
+    for i in limb::connector_indices(goal.base, end).skip(1) {
         points[i] = add_scaled(points[inner], u, chain.length_m(inner.min(i)));
         u = normalized(add_scaled(u, random_direction(&mut draws), spread)).unwrap_or(u);
         inner = i;
@@ -61,5 +61,5 @@ fn random_walk<const D: usize>(
 
 fn random_direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     let drawn: Point<D> = std::array::from_fn(|_| normal(draws));
-    normalized(drawn).unwrap_or(first_axis())
+    normalized(drawn).unwrap_or(unit_x())
 }

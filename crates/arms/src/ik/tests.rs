@@ -1,7 +1,7 @@
 use super::alternate;
 use super::*;
 use proptest::prelude::*;
-use sidestep_rods::geometry::{angle_rad, nearest_on_segment, normalized};
+use sidestep_rods::geometry::{angle_between_rad, nearest_on_segment, normalized};
 use sidestep_rods::{Connector, Mobility, Obstacle, Rod, VetoReason};
 
 const ENGINES: [IkEngine; 4] = [IkEngine::Auto, IkEngine::Chain, IkEngine::Dls, IkEngine::Direct];
@@ -11,7 +11,7 @@ fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
     let mut points = vec![std::array::from_fn(|i| 0.3 * i as f64 - 0.1)];
     let mut rods = Vec::new();
     for (i, turn) in turns.iter().enumerate() {
-        let u = normalized(std::array::from_fn(|k| turn[k])).unwrap_or(first_axis());
+        let u = normalized(std::array::from_fn(|k| turn[k])).unwrap_or(unit_x());
         let length_m = 0.4 + 0.6 * (turn[2].abs() * 7.0).fract();
         points.push(add_scaled(points[i], u, length_m));
         let (min_m, max_m) = (length_m * (1.0 - slack), length_m * (1.0 + slack));
@@ -24,8 +24,8 @@ fn chain_of<const D: usize>(turns: &[[f64; 3]], slack: f64) -> Chain<D> {
 /// The point at a part of the shell's thickness from the base, in a direction.
 fn target_of<const D: usize>(chain: &Chain<D>, part: f64, toward: [f64; 3]) -> Point<D> {
     let spans: Vec<RodLengthRange> = chain.rods().iter().map(RodLengthRange::from_rod).collect();
-    let ReachShell { hole_m, reach_m } = ReachShell::from_spans(&spans);
-    let u = normalized(std::array::from_fn(|k| toward[k])).unwrap_or(first_axis());
+    let ReachShell { hole_m, reach_m } = ReachShell::from_length_ranges(&spans);
+    let u = normalized(std::array::from_fn(|k| toward[k])).unwrap_or(unit_x());
     add_scaled(chain.points()[0], u, hole_m + part * (reach_m - hole_m))
 }
 
@@ -89,8 +89,8 @@ proptest! {
         let (base, k) = (base % n, k % n);
         prop_assume!(base != k);
         let spans: Vec<RodLengthRange> = chain.rods()[base.min(k)..base.max(k)].iter().map(RodLengthRange::from_rod).collect();
-        let ReachShell { hole_m, reach_m } = ReachShell::from_spans(&spans);
-        let u = normalized(toward).unwrap_or(first_axis());
+        let ReachShell { hole_m, reach_m } = ReachShell::from_length_ranges(&spans);
+        let u = normalized(toward).unwrap_or(unit_x());
         let target = add_scaled(chain.points()[base], u, hole_m + part * (reach_m - hole_m));
         let goal = ChainIkGoal::new(k, base, target);
         let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
@@ -171,7 +171,7 @@ fn one_double_pass_is_one_iteration_of_fabrik() {
 
 #[test]
 fn straight_and_folded_chains_are_no_trap() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     let straight =
         Chain::<2>::straight([0.0, 0.0], [1.0, 0.0], 10, rod, Connector::free(0.0)).expect("right");
     let zigzag: Vec<Point<2>> = (0..11).map(|i| [f64::from(i % 2), 0.0]).collect();
@@ -196,7 +196,7 @@ fn out_of_reach_is_told_with_the_nearest_point() {
     assert!(!answer.reached && (answer.error_m - 0.5).abs() < 1e-6, "{answer:?}");
     assert!(matches!(answer.reason, Some(ChainIkFailure::TooFar { .. })), "{answer:?}");
 
-    let rods = vec![Rod::fixed(3.0, 0.0), Rod::fixed(1.0, 0.0)];
+    let rods = vec![Rod::with_fixed_length(3.0, 0.0), Rod::with_fixed_length(1.0, 0.0)];
     let points = vec![[0.0; 3], [3.0, 0.0, 0.0], [3.0, 1.0, 0.0]];
     let long = Chain::new(points, vec![Connector::free(0.0); 3], rods).expect("right");
     let answer = solve(&long, ChainIkGoal::new(2, 0, [0.0, 0.5, 0.0]));
@@ -223,14 +223,14 @@ fn wrong_goals_are_named() {
         assert_eq!(error.place(), place);
     }
     let mut still = chain;
-    still.set_failed(3, true);
+    still.set_connector_failed(3, true);
     assert!(IkSolver::default().solve(&still, &Obstacles::default(), &right).is_err());
 }
 
 #[test]
 fn a_failed_connector_on_the_way_is_the_base_that_counts() {
     let mut chain = chain_of::<2>(&[[1.0, 0.3, 0.2]; 6], 0.0);
-    chain.set_failed(2, true);
+    chain.set_connector_failed(2, true);
     let target = add(chain.points()[2], [0.5, 1.0]);
     let goal = ChainIkGoal::new(6, 0, target);
     let answer = IkSolver::default().solve(&chain, &Obstacles::default(), &goal).expect("right");
@@ -240,7 +240,7 @@ fn a_failed_connector_on_the_way_is_the_base_that_counts() {
 
 /// An arm of 8 rods along the first axis, with discs around.
 fn scene() -> (Chain<2>, Obstacles<2>, Vec<(Point<2>, f64)>) {
-    let rod = Rod::fixed(1.0, 0.02);
+    let rod = Rod::with_fixed_length(1.0, 0.02);
     let mut chain =
         Chain::straight([0.0, 0.0], [1.0, 0.0], 8, rod, Connector::free(0.05)).expect("right");
     chain.set_mobility(0, Mobility::Fixed).expect("right");
@@ -271,7 +271,7 @@ fn arms_among_discs_reach_without_touching_them() {
         assert!(is_clear(&answer.points, &discs), "{target:?} {:?}", answer.kind);
         for i in 1..8 {
             let p = &answer.points;
-            let bend_rad = angle_rad(sub(p[i], p[i - 1]), sub(p[i + 1], p[i]));
+            let bend_rad = angle_between_rad(sub(p[i], p[i - 1]), sub(p[i + 1], p[i]));
             assert!(bend_rad <= 1.2 + 1e-8, "{bend_rad}");
         }
         assert_eq!(answer, solve(), "the same seed gives the same bits");
@@ -315,7 +315,7 @@ fn whoever_wants_a_motion_gets_no_mere_posture() {
 
 #[test]
 fn a_chain_that_minds_itself_does_not_cross_itself() {
-    let rod = Rod::fixed(1.0, 0.05);
+    let rod = Rod::with_fixed_length(1.0, 0.05);
     let chain =
         Chain::<2>::straight([0.0, 0.0], [1.0, 0.0], 10, rod, Connector::free(0.1)).expect("right");
     let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };

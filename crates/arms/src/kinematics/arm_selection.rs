@@ -25,7 +25,7 @@ pub struct ArmFiles {
 
 /// An arm, with the model that it is a part of.
 #[derive(Debug, Clone)]
-pub struct ArmSelection {
+pub struct ArmModel {
     /// The whole robot, also what is beside the arm.
     pub model: Model,
     /// Groups, postures and pairs that may touch; `None` without an SRDF file.
@@ -40,11 +40,11 @@ impl ArmFiles {
     ///
     /// # Errors
     /// When a file, a link or a group is wrong.
-    pub fn load(&self) -> Result<ArmSelection, InputError> {
+    pub fn load(&self) -> Result<ArmModel, InputError> {
         let model = Model::load(&self.urdf)?;
         let semantics = self.srdf.as_ref().map(|path| Semantics::load(path, &model)).transpose()?;
         let chain = self.chain(&model, semantics.as_ref())?;
-        Ok(ArmSelection { model, semantics, chain, urdf: self.urdf.clone() })
+        Ok(ArmModel { model, semantics, chain, urdf: self.urdf.clone() })
     }
 
     fn chain(
@@ -73,19 +73,19 @@ impl ArmFiles {
     }
 }
 
-impl ArmSelection {
+impl ArmModel {
     /// Returns the joint values of a named posture of the SRDF file, or those at rest.
     ///
     /// # Errors
     /// When there is no such posture.
-    pub fn posture(&self, name: Option<&str>) -> Result<Vec<f64>, InputError> {
+    pub fn named_posture(&self, name: Option<&str>) -> Result<Vec<f64>, InputError> {
         let Some(name) = name else { return Ok(self.chain.rest_values()) };
         let Some(semantics) = &self.semantics else {
             let cause = format!("`{name}` is a posture of an SRDF file, and there is none");
             return Err(InputError::new("--posture", cause, "give the SRDF file as well"));
         };
         let posture = semantics.posture("--posture", name)?;
-        Ok(self.chain.with_posture(&self.model, &posture))
+        Ok(self.chain.posture_values(&self.model, &posture))
     }
 
     /// Returns the shapes of its links, and remarks on those that are not among them.

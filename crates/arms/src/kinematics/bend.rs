@@ -6,10 +6,10 @@
 
 use std::f64::consts::PI;
 
-use super::serial::{JointMotion, SerialChain};
+use super::serial::{JointMotionKind, SerialChain};
 use super::skeleton::Skeleton;
 use super::transform::Vector;
-use sidestep_kernel::geometry::{cross, dot, norm, rejection, scaled, sub};
+use sidestep_kernel::geometry::{cross, dot, norm, perpendicular_component, scaled, sub};
 use sidestep_kernel::math::{acos, atan2, cos, wrap_angle};
 
 /// Angles that differ by less count as equal, because models are written with some ten digits.
@@ -50,11 +50,12 @@ impl SerialChain {
             return None;
         }
         let joint = &self.joints[held_by];
-        if joint.motion != JointMotion::Turn || !joint.drive.is_own() {
+        if joint.motion != JointMotionKind::Turn || !joint.drive.is_identity() {
             return None;
         }
         let after = sub(next.position_m(&frames), here_m);
-        let bend = BendFunction::new(before, after, joint.line(&frames.links[held_by]).along)?;
+        let bend =
+            JointBendFunction::new(before, after, joint.axis_line(&frames.links[held_by]).along)?;
         let (max_bend_rad, is_exact) = match joint.limits {
             Some(limits) => bend.limit(limits.lower, limits.upper),
             None => (bend.max_rad(), bend.can_be_straight()),
@@ -64,19 +65,19 @@ impl SerialChain {
 }
 
 /// cos(bend) = `along` + `across` cos(q - `straight_rad`).
-struct BendFunction {
+struct JointBendFunction {
     along: f64,
     across: f64,
     straight_rad: f64,
 }
 
-impl BendFunction {
+impl JointBendFunction {
     /// Returns the bend, or none if the joint turns one of the rods about itself.
     fn new(before: Vector, after: Vector, axis: Vector) -> Option<Self> {
         let before = scaled(before, 1.0 / norm(before));
         let after = scaled(after, 1.0 / norm(after));
-        let u = rejection(before, axis);
-        let v = rejection(after, axis);
+        let u = perpendicular_component(before, axis);
+        let v = perpendicular_component(after, axis);
         let product = norm(u) * norm(v);
         if product < ANGLE_TOLERANCE_RAD {
             return None;

@@ -33,15 +33,15 @@ mod skeleton;
 mod tests;
 mod transform;
 
-pub use arm_selection::{ArmFiles, ArmSelection};
+pub use arm_selection::{ArmFiles, ArmModel};
 pub use bend::BendLimit;
 pub use body::ArmBody;
 pub use inverse::{
-    ArmGoal, ArmPart, Axis, CollidesWith, Collision, IkFailure, IkResult, IkSolution,
+    ArmBodyPart, ArmGoal, CollidesWith, Collision, FrameAxis, IkFailure, IkResult, IkSolution,
     MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask,
 };
-pub use inverse::{ConnectorTarget, JointTracker};
+pub use inverse::{ConnectorTarget, ConnectorTargetTracker};
 pub use recover::{RecoverError, RecoveredJoints};
-pub use serial::{Dof, JointMotion, LinkFrames, SerialChain};
+pub use serial::{Dof, JointMotionKind, LinkFrames, SerialChain};
 pub use skeleton::{Skeleton, SkeletonRod};
 pub use transform::{Transform, Vector};

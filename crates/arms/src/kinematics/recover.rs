@@ -9,11 +9,11 @@
 
 use std::f64::consts::TAU;
 
-use super::serial::{JointMotion, MovingJoint, SerialChain};
+use super::serial::{JointMotionKind, MovingJoint, SerialChain};
 use super::skeleton::Skeleton;
 use super::transform::{Line, Transform, Vector};
 use sidestep_import::urdf::Limits;
-use sidestep_kernel::geometry::{add, cross, dot, norm, rejection, scaled, sub};
+use sidestep_kernel::geometry::{add, cross, dot, norm, perpendicular_component, scaled, sub};
 use sidestep_kernel::math::{atan2, wrap_angle};
 
 /// Largest distance between a connector and its nearest possible place, as a fraction of the reach: positions in single
@@ -115,7 +115,7 @@ impl SerialChain {
             return Err(RecoverError::WrongCount { found: finite, expected });
         }
         for (i, joint) in self.joints.iter().enumerate() {
-            if !joint.drive.is_own() || joint.drive.variable != i {
+            if !joint.drive.is_identity() || joint.drive.variable != i {
                 return Err(RecoverError::Mimics { joint: joint.name.clone() });
             }
         }
@@ -130,7 +130,7 @@ impl SerialChain {
             tries: 0,
             best_failure: None,
         };
-        if !search.place_connectors(0, 0, Transform::IDENTITY) {
+        if !search.solve_from_connector(0, 0, Transform::IDENTITY) {
             return Err(search.best_failure.expect("a search that fails says why").1);
         }
         Ok(search.finish())
@@ -143,7 +143,7 @@ impl SerialChain {
             let joints = &self.joints[known.min(anchor.first)..anchor.first];
             let solvable = match joints {
                 [] | [_] => true,
-                [a, b] => a.motion == JointMotion::Turn && b.motion == JointMotion::Turn,
+                [a, b] => a.motion == JointMotionKind::Turn && b.motion == JointMotionKind::Turn,
                 _ => false,
             };
             if !solvable {
@@ -180,18 +180,18 @@ struct SearchProgress {
 impl JointSearch<'_> {
     /// Places the connectors from `connector` on, with the first `known` joints decided and the
     /// link behind them at `link`. Returns whether that worked.
-    fn place_connectors(&mut self, connector: usize, known: usize, link: Transform) -> bool {
+    fn solve_from_connector(&mut self, connector: usize, known: usize, link: Transform) -> bool {
         let Some(anchor) = self.skeleton.connectors.get(connector) else { return true };
         let target_m = self.positions_m[connector];
         let until = anchor.first.max(known);
         if until == known {
             // This connector is fixed in a link that is already placed.
             let frames = self.chain.forward_kinematics(&self.values);
-            return self.fits(connector, sub(anchor.position_m(&frames), target_m))
-                && self.place_connectors(connector + 1, known, link);
+            return self.check_fit(connector, sub(anchor.position_m(&frames), target_m))
+                && self.solve_from_connector(connector + 1, known, link);
         }
         let joints = &self.chain.joints[known..until];
-        let placement = PointPlacement { link: &link, p_m: anchor.point_m, target_m };
+        let placement = PointPlacementProblem { link: &link, p_m: anchor.point_m, target_m };
         for solution in self.solutions(joints, known, placement) {
             self.tries += 1;
             if self.tries > MAX_TRIES {
@@ -210,7 +210,7 @@ impl JointSearch<'_> {
         connector: usize,
         known: usize,
         link: Transform,
-        found: &[CandidateValue],
+        found: &[JointValueCandidate],
     ) -> bool {
         let mut outer = link;
         for (i, value) in found.iter().enumerate() {
@@ -220,15 +220,15 @@ impl JointSearch<'_> {
             outer = outer.compose(&joint.origin).compose(&joint.transform(value.value));
         }
         let anchor = &self.skeleton.connectors[connector];
-        self.fits(
+        self.check_fit(
             connector,
             sub(outer.transform_point(anchor.point_m), self.positions_m[connector]),
         ) && self.are_valid(connector, known, found)
-            && self.place_connectors(connector + 1, known + found.len(), outer)
+            && self.solve_from_connector(connector + 1, known + found.len(), outer)
     }
 
     /// Checks limits of the joints from `known` on, and records the first one that is exceeded.
-    fn are_valid(&mut self, connector: usize, known: usize, found: &[CandidateValue]) -> bool {
+    fn are_valid(&mut self, connector: usize, known: usize, found: &[JointValueCandidate]) -> bool {
         for (joint, found) in self.chain.joints[known..].iter().zip(found) {
             if let Some(limits) = joint.limits.filter(|l| !l.contains(found.value)) {
                 self.record_failure(
@@ -241,7 +241,7 @@ impl JointSearch<'_> {
         true
     }
 
-    fn fits(&mut self, connector: usize, error_m: Vector) -> bool {
+    fn check_fit(&mut self, connector: usize, error_m: Vector) -> bool {
         let distance_m = norm(error_m);
         let fits = distance_m <= FIT_TOLERANCE * self.skeleton.reach_m;
         if !fits {
@@ -262,11 +262,11 @@ impl JointSearch<'_> {
         &self,
         joints: &[MovingJoint],
         known: usize,
-        placement: PointPlacement<'_>,
-    ) -> Vec<Vec<CandidateValue>> {
+        placement: PointPlacementProblem<'_>,
+    ) -> Vec<Vec<JointValueCandidate>> {
         let reference = &self.reference[known..known + joints.len()];
         match joints {
-            [joint] => vec![vec![self.solve_one(joint, placement, reference[0])]],
+            [joint] => vec![vec![self.solve_single_joint(joint, placement, reference[0])]],
             [inner, outer] => {
                 let mut found = self.solve_two([inner, outer], placement, reference);
                 found.sort_by(|a, b| {
@@ -278,17 +278,17 @@ impl JointSearch<'_> {
         }
     }
 
-    fn solve_one(
+    fn solve_single_joint(
         &self,
         joint: &MovingJoint,
-        PointPlacement { link, p_m, target_m }: PointPlacement<'_>,
+        PointPlacementProblem { link, p_m, target_m }: PointPlacementProblem<'_>,
         reference: f64,
-    ) -> CandidateValue {
-        let line = joint.line(link);
+    ) -> JointValueCandidate {
+        let line = joint.axis_line(link);
         let p_m = link.compose(&joint.origin).transform_point(p_m);
         match joint.motion {
-            JointMotion::Slide => CandidateValue::new(dot(sub(target_m, p_m), line.along)),
-            JointMotion::Turn => self.solve_turn(joint, &line, [p_m, target_m], reference),
+            JointMotionKind::Slide => JointValueCandidate::new(dot(sub(target_m, p_m), line.along)),
+            JointMotionKind::Turn => self.solve_turn(joint, &line, [p_m, target_m], reference),
         }
     }
 
@@ -299,16 +299,16 @@ impl JointSearch<'_> {
         line: &Line,
         [p_m, target_m]: [Vector; 2],
         reference: f64,
-    ) -> CandidateValue {
+    ) -> JointValueCandidate {
         let on_axis_m = ON_AXIS_TOLERANCE * self.skeleton.reach_m;
-        let from = rejection(sub(p_m, line.through_m), line.along);
-        let to = rejection(sub(target_m, line.through_m), line.along);
+        let from = perpendicular_component(sub(p_m, line.through_m), line.along);
+        let to = perpendicular_component(sub(target_m, line.through_m), line.along);
         // A point on the axis does not move, and so says nothing about the turn.
         if norm(from) <= on_axis_m || norm(to) <= on_axis_m {
-            return CandidateValue { value: reference, is_open: true };
+            return JointValueCandidate { value: reference, is_open: true };
         }
         let angle_rad = atan2(dot(cross(from, to), line.along), dot(from, to));
-        CandidateValue::new(nearest_turn(angle_rad, reference, joint.limits))
+        JointValueCandidate::new(nearest_turn(angle_rad, reference, joint.limits))
     }
 
     /// Returns two turns: the inner one brings to `target_m` the point that the outer one leaves at
@@ -317,15 +317,15 @@ impl JointSearch<'_> {
     fn solve_two(
         &self,
         [inner, outer]: [&MovingJoint; 2],
-        PointPlacement { link, p_m, target_m }: PointPlacement<'_>,
+        PointPlacementProblem { link, p_m, target_m }: PointPlacementProblem<'_>,
         reference: &[f64],
-    ) -> Vec<Vec<CandidateValue>> {
-        let first = inner.line(link);
+    ) -> Vec<Vec<JointValueCandidate>> {
+        let first = inner.axis_line(link);
         let at_zero = link.compose(&inner.origin);
-        let second = outer.line(&at_zero);
+        let second = outer.axis_line(&at_zero);
         let p_m = at_zero.compose(&outer.origin).transform_point(p_m);
         let mut found = Vec::new();
-        for mut z in meeting_points(&first, target_m, &second, p_m) {
+        for mut z in circle_intersections(&first, target_m, &second, p_m) {
             let q1 = self.solve_turn(inner, &first, [z, target_m], reference[0]);
             if q1.is_open {
                 // An open first turn is at its reference, and the second has to fit it.
@@ -340,7 +340,7 @@ impl JointSearch<'_> {
 
     fn finish(self) -> RecoveredJoints {
         let frames = self.chain.forward_kinematics(&self.values);
-        let found = self.chain.connectors(self.skeleton, &frames);
+        let found = self.chain.connector_positions(self.skeleton, &frames);
         let errors = found.iter().zip(self.positions_m).map(|(&a, &b)| norm(sub(a, b)));
         let variables = self.chain.variables.iter().zip(&self.open);
         RecoveredJoints {
@@ -353,7 +353,7 @@ impl JointSearch<'_> {
 
 /// A point to be placed by the joints behind a link.
 #[derive(Debug, Clone, Copy)]
-struct PointPlacement<'a> {
+struct PointPlacementProblem<'a> {
     /// The link before the joints.
     link: &'a Transform,
     /// The point in the frame of the link behind the joints.
@@ -364,18 +364,18 @@ struct PointPlacement<'a> {
 
 /// A value that places a point; `is_open` if the point lies on the axis and any value would.
 #[derive(Debug, Clone, Copy)]
-struct CandidateValue {
+struct JointValueCandidate {
     value: f64,
     is_open: bool,
 }
 
-impl CandidateValue {
+impl JointValueCandidate {
     fn new(value: f64) -> Self {
         Self { value, is_open: false }
     }
 }
 
-fn total_change(values: &[CandidateValue], reference: &[f64]) -> f64 {
+fn total_change(values: &[JointValueCandidate], reference: &[f64]) -> f64 {
     values.iter().zip(reference).map(|(v, r)| (v.value - r).abs()).sum()
 }
 
@@ -404,7 +404,7 @@ fn nearest_turn(angle_rad: f64, reference_rad: f64, limits: Option<Limits>) -> f
 /// The planes of the circles meet in a line, and that meets the sphere about a point of `second`
 /// through `b`. Circles about parallel axes lie in one plane; then the line is that of the points
 /// with equal power. There is one point if circles just touch, or miss each other by rounding.
-fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
+fn circle_intersections(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vector> {
     // All coordinates are relative to the second circle's center.
     let center = second.nearest(b);
     let radius = norm(sub(b, center));
@@ -413,7 +413,7 @@ fn meeting_points(first: &Line, a: Vector, second: &Line, b: Vector) -> Vec<Vect
         Some(_) => (first.along, dot(first.along, sub(a, center))),
         None => {
             let other = first.nearest(a);
-            let between = rejection(sub(other, center), n2);
+            let between = perpendicular_component(sub(other, center), n2);
             let radius_1 = norm(sub(a, other));
             let d = dot(between, between);
             (between, 0.5 * (d + radius * radius - radius_1 * radius_1))

@@ -29,7 +29,7 @@ pub struct Dof {
     /// mimics it.
     pub name: String,
     /// Whether the value is an angle in rad or a displacement in m.
-    pub motion: JointMotion,
+    pub motion: JointMotionKind,
     /// Lowest and highest value; none for continuous joints.
     pub limits: Option<Limits>,
     /// Highest speed, in rad/s or m/s; none where the model gives none.
@@ -38,14 +38,14 @@ pub struct Dof {
 
 /// How a joint with one degree of freedom moves; others cannot be between base and tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum JointMotion {
+pub enum JointMotionKind {
     /// About its axis, in rad.
     Turn,
     /// Along its axis, in m.
     Slide,
 }
 
-impl JointMotion {
+impl JointMotionKind {
     /// Returns the motion of joints of a kind that a single value moves.
     pub(super) fn from_kind(kind: JointKind) -> Option<Self> {
         match kind {
@@ -76,7 +76,7 @@ impl JointMotion {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MovingJoint {
     pub(super) name: String,
-    pub(super) motion: JointMotion,
+    pub(super) motion: JointMotionKind,
     /// The joint's frame in the link before it.
     pub(super) origin: Transform,
     pub(super) axis: Vector,
@@ -98,7 +98,7 @@ impl JointCoupling {
         self.multiplier * values[self.variable] + self.offset
     }
 
-    pub(super) fn is_own(&self) -> bool {
+    pub(super) fn is_identity(&self) -> bool {
         self.multiplier == 1.0 && self.offset == 0.0
     }
 }
@@ -110,7 +110,7 @@ impl MovingJoint {
     }
 
     /// Returns its axis, if the link before it stands at `before`.
-    pub(super) fn line(&self, before: &Transform) -> Line {
+    pub(super) fn axis_line(&self, before: &Transform) -> Line {
         let frame = before.compose(&self.origin);
         Line { through_m: frame.origin_m, along: frame.transform_direction(self.axis) }
     }
@@ -160,12 +160,12 @@ impl SerialChain {
         place: &str,
     ) -> Result<(), InputError> {
         let joint = &model.joints[index];
-        let origin = self.to_tip.compose(&Transform::from_origin(&joint.origin));
+        let origin = self.to_tip.compose(&Transform::from_urdf_origin(&joint.origin));
         if joint.kind == JointKind::Fixed {
             self.to_tip = origin;
             return Ok(());
         }
-        let motion = JointMotion::from_kind(joint.kind).ok_or_else(|| {
+        let motion = JointMotionKind::from_kind(joint.kind).ok_or_else(|| {
             let cause = format!("joint `{}` has more than one degree of freedom", joint.name);
             InputError::new(place, cause, "choose base and tip on one side of it")
         })?;
@@ -173,7 +173,7 @@ impl SerialChain {
         let known = drivers.iter().position(|&known| known == driver);
         let variable = known.unwrap_or_else(|| {
             drivers.push(driver);
-            self.variables.push(to_dof(model, driver));
+            self.variables.push(joint_to_dof(model, driver));
             drivers.len() - 1
         });
         self.joints.push(MovingJoint {
@@ -217,7 +217,7 @@ impl SerialChain {
 
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
     /// rest. Of several values for one joint the last one holds.
-    pub fn with_posture(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
+    pub fn posture_values(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {
         let mut values = self.rest_values();
         for (value, variable) in values.iter_mut().zip(&self.variables) {
             let mut given = posture.iter().rev();
@@ -240,7 +240,7 @@ impl SerialChain {
     ///
     /// # Errors
     /// When there are more or fewer values, with the names; or when one is not finite.
-    pub fn check_count(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
+    pub fn check_joint_values(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
         let names: Vec<&str> = self.variables.iter().map(|v| v.name.as_str()).collect();
         if values.len() != names.len() {
             let cause = format!(
@@ -265,7 +265,7 @@ impl SerialChain {
     /// # Errors
     /// When one is outside, with its name and its limits.
     pub fn check_limits(&self, place: &str, values: &[f64]) -> Result<(), InputError> {
-        if let Some((name, motion, limits, value)) = self.outside(values).next() {
+        if let Some((name, motion, limits, value)) = self.values_outside_limits(values).next() {
             let unit = motion.unit();
             let cause = format!("joint `{name}` cannot be at {value} {unit}");
             let remedy = format!("stay between {} and {} {unit}", limits.lower, limits.upper);
@@ -277,7 +277,7 @@ impl SerialChain {
     /// Returns the names of the joints outside their limits, including mimicking ones, each once.
     pub fn outside_limits<'a>(&'a self, values: &'a [f64]) -> Vec<&'a str> {
         let mut names = Vec::new();
-        for (name, ..) in self.outside(values) {
+        for (name, ..) in self.values_outside_limits(values) {
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -285,10 +285,10 @@ impl SerialChain {
         names
     }
 
-    fn outside<'a>(
+    fn values_outside_limits<'a>(
         &'a self,
         values: &'a [f64],
-    ) -> impl Iterator<Item = (&'a str, JointMotion, Limits, f64)> {
+    ) -> impl Iterator<Item = (&'a str, JointMotionKind, Limits, f64)> {
         let of_variables = self
             .variables
             .iter()
@@ -320,11 +320,11 @@ fn mimic_source(model: &Model, joint: usize) -> (usize, f64, f64) {
     (driver, multiplier, offset)
 }
 
-fn to_dof(model: &Model, joint: usize) -> Dof {
+fn joint_to_dof(model: &Model, joint: usize) -> Dof {
     let joint = &model.joints[joint];
     let motion = match joint.kind {
-        JointKind::Prismatic => JointMotion::Slide,
-        _ => JointMotion::Turn,
+        JointKind::Prismatic => JointMotionKind::Slide,
+        _ => JointMotionKind::Turn,
     };
     let limits = joint.limits;
     let max_speed = joint.max_speed;

@@ -5,9 +5,9 @@
 //! the one farthest out that shares a link with the last one, so that points between which no joint
 //! bends (such as the elbow offsets of a Panda) drop out.
 
-use super::serial::{JointMotion, LinkFrames, MovingJoint, SerialChain};
+use super::serial::{JointMotionKind, LinkFrames, MovingJoint, SerialChain};
 use super::transform::{Line, Transform, Vector};
-use sidestep_kernel::geometry::{add, dot, norm, rejection, scaled, sub};
+use sidestep_kernel::geometry::{add, dot, norm, perpendicular_component, scaled, sub};
 
 /// Points nearer to each other than this fraction of the arm's reach count as one: models are written with some ten
 /// digits, and a rod between two such points would have no direction.
@@ -17,7 +17,7 @@ const SAME_POINT_TOLERANCE: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     /// The connectors, one more than rods; the last is the tip.
-    pub(super) connectors: Vec<Anchor>,
+    pub(super) connectors: Vec<LinkAnchor>,
     /// One between each two connectors, from the base out.
     pub rods: Vec<SkeletonRod>,
     /// Unit vector in the base's frame along the first joint's axis, from which the bend at the
@@ -38,14 +38,14 @@ pub struct SkeletonRod {
 
 /// A point that is fixed in the links `first..=last`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Anchor {
+pub(super) struct LinkAnchor {
     /// Its position in the frame of link `first`, in m.
     pub(super) point_m: Vector,
     pub(super) first: usize,
     pub(super) last: usize,
 }
 
-impl Anchor {
+impl LinkAnchor {
     pub(super) fn position_m(&self, frames: &LinkFrames) -> Vector {
         frames.links[self.first].transform_point(self.point_m)
     }
@@ -65,13 +65,13 @@ impl SerialChain {
 
     /// Returns the positions of the connectors of `skeleton` (this chain's) at `frames`, in m in
     /// the base's frame.
-    pub fn connectors(&self, skeleton: &Skeleton, frames: &LinkFrames) -> Vec<Vector> {
+    pub fn connector_positions(&self, skeleton: &Skeleton, frames: &LinkFrames) -> Vec<Vector> {
         skeleton.connectors.iter().map(|anchor| anchor.position_m(frames)).collect()
     }
 
     /// Returns the arm up to connector `k` of `skeleton` (this chain's), as if that were its tip, with all its
     /// variables.
-    pub fn up_to(&self, skeleton: &Skeleton, k: usize) -> Self {
+    pub fn up_to_connector(&self, skeleton: &Skeleton, k: usize) -> Self {
         let anchor = &skeleton.connectors[k];
         Self {
             tip: format!("connector {k}"),
@@ -82,7 +82,11 @@ impl SerialChain {
     }
 
     fn joint_axes(&self, frames: &LinkFrames) -> Vec<Line> {
-        self.joints.iter().zip(&frames.links).map(|(joint, before)| joint.line(before)).collect()
+        self.joints
+            .iter()
+            .zip(&frames.links)
+            .map(|(joint, before)| joint.axis_line(before))
+            .collect()
     }
 
     fn reach_m(&self) -> f64 {
@@ -94,7 +98,7 @@ impl SerialChain {
 /// Returns the farthest that a joint slides within its limits; 0 of a joint that turns, or without limits.
 fn slide_limit_m(joint: &MovingJoint) -> f64 {
     match (joint.motion, joint.limits) {
-        (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+        (JointMotionKind::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
         _ => 0.0,
     }
 }
@@ -108,18 +112,18 @@ struct SkeletonBuilder<'a> {
 }
 
 impl SkeletonBuilder<'_> {
-    fn connectors(&self) -> Vec<Anchor> {
+    fn connectors(&self) -> Vec<LinkAnchor> {
         let tip_link = self.chain.joints.len();
-        let tip = self.anchor(self.frames.tip.origin_m, tip_link);
+        let tip = self.anchor_at(self.frames.tip.origin_m, tip_link);
         let candidates = self.candidates();
         let Some(&base) = candidates.iter().filter(|c| c.first == 0).reduce(outer_anchor) else {
-            return self.without_joints(tip);
+            return self.rigid_body_anchors(tip);
         };
         let mut connectors = vec![base];
         let mut last = base;
-        while !self.is_adjacent(&last, &tip) {
+        while !self.can_rod_join(&last, &tip) {
             let next =
-                candidates.iter().filter(|c| c.last > last.last && self.is_adjacent(&last, c));
+                candidates.iter().filter(|c| c.last > last.last && self.can_rod_join(&last, c));
             // Far from the origin rounding may part a connector from its axis; the rest of the arm is then one rod.
             let Some(next) = next.reduce(outer_anchor) else { break };
             last = *next;
@@ -132,33 +136,33 @@ impl SkeletonBuilder<'_> {
     }
 
     /// Returns the anchors of a single rigid body: its base and its tip.
-    fn without_joints(&self, tip: Anchor) -> Vec<Anchor> {
-        let base = self.anchor([0.0; 3], 0);
+    fn rigid_body_anchors(&self, tip: LinkAnchor) -> Vec<LinkAnchor> {
+        let base = self.anchor_at([0.0; 3], 0);
         if self.is_coincident(&base, &tip) { vec![tip] } else { vec![base, tip] }
     }
 
     /// Returns points on the axes, from the base out: feet of the common perpendiculars of
     /// neighbors.
-    fn candidates(&self) -> Vec<Anchor> {
+    fn candidates(&self) -> Vec<LinkAnchor> {
         let Some(first) = self.lines.first() else { return Vec::new() };
         let mut candidates = Vec::new();
         let mut entry = first.through_m;
         // A first joint that slides carries the next axis away from the base, so a point on its own axis stays there.
-        if self.lines.len() == 1 || self.chain.joints[0].motion == JointMotion::Slide {
-            candidates.push(self.anchor(entry, 0));
+        if self.lines.len() == 1 || self.chain.joints[0].motion == JointMotionKind::Slide {
+            candidates.push(self.anchor_at(entry, 0));
         }
         for (joint, pair) in self.lines.windows(2).enumerate() {
             let (near, far) =
                 pair[0].common_perpendicular(&pair[1]).unwrap_or((entry, pair[1].nearest(entry)));
-            candidates.push(self.anchor(near, joint + 1));
-            candidates.push(self.anchor(far, joint + 1));
+            candidates.push(self.anchor_at(near, joint + 1));
+            candidates.push(self.anchor_at(far, joint + 1));
             entry = far;
         }
         candidates
     }
 
     /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
-    fn anchor(&self, p_m: Vector, link: usize) -> Anchor {
+    fn anchor_at(&self, p_m: Vector, link: usize) -> LinkAnchor {
         let mut first = link;
         let mut last = link;
         while first > 0 && self.is_on_axis(p_m, first - 1) {
@@ -167,42 +171,42 @@ impl SkeletonBuilder<'_> {
         while last < self.lines.len() && self.is_on_axis(p_m, last) {
             last += 1;
         }
-        Anchor { point_m: self.frames.links[first].inverse_transform_point(p_m), first, last }
+        LinkAnchor { point_m: self.frames.links[first].inverse_transform_point(p_m), first, last }
     }
 
     /// Returns whether a turn of the joint leaves the point where it is.
     fn is_on_axis(&self, p_m: Vector, joint: usize) -> bool {
-        self.chain.joints[joint].motion == JointMotion::Turn
+        self.chain.joints[joint].motion == JointMotionKind::Turn
             && self.lines[joint].distance_m(p_m) <= SAME_POINT_TOLERANCE * self.reach_m
     }
 
     /// Returns whether a rod can join two points: fixed in one link, or on either side of a slide.
-    fn is_adjacent(&self, inner: &Anchor, outer: &Anchor) -> bool {
-        outer.first <= inner.last || self.slide_between(inner, outer).is_some()
+    fn can_rod_join(&self, inner: &LinkAnchor, outer: &LinkAnchor) -> bool {
+        outer.first <= inner.last || self.sliding_joint_between(inner, outer).is_some()
     }
 
-    fn slide_between(&self, inner: &Anchor, outer: &Anchor) -> Option<usize> {
+    fn sliding_joint_between(&self, inner: &LinkAnchor, outer: &LinkAnchor) -> Option<usize> {
         let slides = outer.first == inner.last + 1
-            && self.chain.joints[inner.last].motion == JointMotion::Slide;
+            && self.chain.joints[inner.last].motion == JointMotionKind::Slide;
         slides.then_some(inner.last)
     }
 
-    fn between_m(&self, inner: &Anchor, outer: &Anchor) -> Vector {
+    fn vector_between_m(&self, inner: &LinkAnchor, outer: &LinkAnchor) -> Vector {
         sub(outer.position_m(&self.frames), inner.position_m(&self.frames))
     }
 
-    fn is_coincident(&self, inner: &Anchor, outer: &Anchor) -> bool {
-        self.slide_between(inner, outer).is_none()
-            && norm(self.between_m(inner, outer)) <= SAME_POINT_TOLERANCE * self.reach_m
+    fn is_coincident(&self, inner: &LinkAnchor, outer: &LinkAnchor) -> bool {
+        self.sliding_joint_between(inner, outer).is_none()
+            && norm(self.vector_between_m(inner, outer)) <= SAME_POINT_TOLERANCE * self.reach_m
     }
 
-    fn rod(&self, inner: &Anchor, outer: &Anchor) -> SkeletonRod {
-        let v = self.between_m(inner, outer);
-        let Some(joint) = self.slide_between(inner, outer) else {
+    fn rod(&self, inner: &LinkAnchor, outer: &LinkAnchor) -> SkeletonRod {
+        let v = self.vector_between_m(inner, outer);
+        let Some(joint) = self.sliding_joint_between(inner, outer) else {
             return SkeletonRod { min_m: norm(v), max_m: norm(v) };
         };
         let axis = self.lines[joint].along;
-        let offset_m = norm(rejection(v, axis));
+        let offset_m = norm(perpendicular_component(v, axis));
         let joint = &self.chain.joints[joint];
         // The frames of the builder have every variable at zero, a mimic joint at its offset.
         let zero = joint.drive.offset;
@@ -218,16 +222,17 @@ impl SkeletonBuilder<'_> {
         }
     }
 
-    fn base_direction(&self, connectors: &[Anchor]) -> Option<Vector> {
+    fn base_direction(&self, connectors: &[LinkAnchor]) -> Option<Vector> {
         let first = connectors.first().filter(|c| c.first == 0 && c.last > 0)?;
         let axis = self.lines[0].along;
-        let outward = connectors.get(1).map_or(0.0, |next| dot(self.between_m(first, next), axis));
+        let outward =
+            connectors.get(1).map_or(0.0, |next| dot(self.vector_between_m(first, next), axis));
         // Adding 0 turns -0 into 0, so that equal directions are equal in every bit.
         Some(if outward < 0.0 { scaled(axis, -1.0) } else { add(axis, [0.0; 3]) })
     }
 }
 
 /// Returns the anchor that is fixed farther out; of several the first.
-fn outer_anchor<'a>(a: &'a Anchor, b: &'a Anchor) -> &'a Anchor {
+fn outer_anchor<'a>(a: &'a LinkAnchor, b: &'a LinkAnchor) -> &'a LinkAnchor {
     if b.last > a.last { b } else { a }
 }

@@ -101,7 +101,7 @@ fn every_shared_arm_has_rods_of_its_lengths_in_every_posture() {
             let values = posture(&chain, seed);
             let frames = chain.forward_kinematics(&values);
             check_rotation(&frames.tip);
-            let connectors = chain.connectors(&skeleton, &frames);
+            let connectors = chain.connector_positions(&skeleton, &frames);
             assert_near(connectors[connectors.len() - 1], frames.tip.origin_m, 1e-9);
             for (pair, rod) in connectors.windows(2).zip(&skeleton.rods) {
                 let length_m = norm(sub(pair[1], pair[0]));
@@ -141,7 +141,7 @@ fn rod_lengths(skeleton: &Skeleton) -> Vec<f64> {
 fn connectors_are_where_axes_meet_and_not_the_origins_of_joints() {
     let Some(iiwa) = shared_chain("chain/iiwa7.urdf", None) else { return };
     let skeleton = iiwa.skeleton();
-    let connectors = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&[0.0; 7]));
+    let connectors = iiwa.connector_positions(&skeleton, &iiwa.forward_kinematics(&[0.0; 7]));
     let expected = [0.34, 0.74, 1.14, 1.266].map(|z| [0.0, 0.0, z]);
     assert_eq!(connectors.len(), 4);
     for (found, expected) in connectors.iter().zip(expected) {
@@ -199,7 +199,7 @@ fn a_prismatic_joint_is_a_rod_of_variable_length_also_off_its_axis() {
 
 fn check_recovery(chain: &SerialChain, values: &[f64], reference: &[f64]) -> RecoveredJoints {
     let skeleton = chain.skeleton();
-    let connectors = chain.connectors(&skeleton, &chain.forward_kinematics(values));
+    let connectors = chain.connector_positions(&skeleton, &chain.forward_kinematics(values));
     let found =
         chain.recover_joint_values(&skeleton, &connectors, reference).expect("joint values");
     assert!(found.residual_m < 1e-9, "{values:?}: {found:?}");
@@ -249,7 +249,7 @@ fn what_cannot_be_recovered_has_a_reason() {
     let Some(panda) = shared_chain("chain/panda.urdf", Some("panda_link8")) else { return };
     let skeleton = panda.skeleton();
     let values = panda.rest_values();
-    let connectors = panda.connectors(&skeleton, &panda.forward_kinematics(&values));
+    let connectors = panda.connector_positions(&skeleton, &panda.forward_kinematics(&values));
     let error = panda.recover_joint_values(&skeleton, &connectors, &values).expect_err("offsets");
     assert!(
         matches!(&error, RecoverError::Coupled { connector: 1, joints } if joints.len() == 3),
@@ -260,14 +260,14 @@ fn what_cannot_be_recovered_has_a_reason() {
     let skeleton = iiwa.skeleton();
     let mut bent = [0.0; 7];
     bent[3] = 2.5;
-    let connectors = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&bent));
+    let connectors = iiwa.connector_positions(&skeleton, &iiwa.forward_kinematics(&bent));
     let error = iiwa.recover_joint_values(&skeleton, &connectors, &[0.0; 7]).expect_err("a limit");
     assert!(
         matches!(&error, RecoverError::OutsideLimits { joint, .. } if joint == "iiwa_joint_4"),
         "{error}"
     );
     bent[3] = 1.5;
-    let mut torn = iiwa.connectors(&skeleton, &iiwa.forward_kinematics(&bent));
+    let mut torn = iiwa.connector_positions(&skeleton, &iiwa.forward_kinematics(&bent));
     torn[2][0] += 0.1;
     let error = iiwa.recover_joint_values(&skeleton, &torn, &[0.0; 7]).expect_err("torn");
     assert!(matches!(error, RecoverError::DoesNotFit { connector: 2, .. }), "{error}");
@@ -288,7 +288,7 @@ fn mimic_joints_follow_their_driver() {
         (norm(sub(hand.forward_kinematics(&values).tip.origin_m, closed)) - 0.03).abs() < 1e-12
     );
     let skeleton = hand.skeleton();
-    let connectors = hand.connectors(&skeleton, &hand.forward_kinematics(&values));
+    let connectors = hand.connector_positions(&skeleton, &hand.forward_kinematics(&values));
     assert!(hand.recover_joint_values(&skeleton, &connectors, &values).is_err());
 }
 
@@ -302,11 +302,11 @@ fn an_arm_without_joints_is_one_rod_or_one_point() {
 #[test]
 fn wrong_values_are_errors_that_name_the_joints() {
     let arm = serial(&[("revolute", O, O, Z, TURN), ("revolute", X, O, Z, TURN)]);
-    let error = arm.check_count("--joints", &[1.0]).expect_err("one too few");
+    let error = arm.check_joint_values("--joints", &[1.0]).expect_err("one too few");
     assert!(error.remedy().contains("j0, j1"), "{error}");
     let error = arm.check_limits("--joints", &[1.0, 3.5]).expect_err("outside");
     assert!(error.cause().contains("`j1`") && error.remedy().contains("-3 and 3"), "{error}");
-    assert!(arm.check_count("--joints", &[1.0, f64::NAN]).is_err());
+    assert!(arm.check_joint_values("--joints", &[1.0, f64::NAN]).is_err());
 }
 
 fn vector() -> impl Strategy<Value = [f64; 3]> {
@@ -326,7 +326,7 @@ proptest! {
         let chain = serial(&rows);
         let skeleton = chain.skeleton();
         let frames = chain.forward_kinematics(&values[..joints.len()]);
-        let connectors = chain.connectors(&skeleton, &frames);
+        let connectors = chain.connector_positions(&skeleton, &frames);
         prop_assert_eq!(connectors.len(), skeleton.rods.len() + 1);
         for (pair, rod) in connectors.windows(2).zip(&skeleton.rods) {
             let length_m = norm(sub(pair[1], pair[0]));
@@ -346,10 +346,10 @@ proptest! {
         };
         let (values, reference) = (at(&shares), at(&reference));
         let skeleton = chain.skeleton();
-        let connectors = chain.connectors(&skeleton, &chain.forward_kinematics(&values));
+        let connectors = chain.connector_positions(&skeleton, &chain.forward_kinematics(&values));
         let found = chain.recover_joint_values(&skeleton, &connectors, &reference).expect("joint values");
         prop_assert!(found.residual_m < 1e-9);
-        let again = chain.connectors(&skeleton, &chain.forward_kinematics(&found.values));
+        let again = chain.connector_positions(&skeleton, &chain.forward_kinematics(&found.values));
         for (a, b) in again.iter().zip(&connectors) {
             prop_assert!(norm(sub(*a, *b)) < 1e-9);
         }
@@ -384,7 +384,7 @@ fn numbers_of_joints_that_no_robot_has_are_refused_at_their_place() {
         numbers[k] = "1e300";
         let error = mimic(numbers).expect_err("an absurd number");
         assert_eq!(error.cause(), "1e300 is beyond 1e6");
-        assert_eq!(error.position().map(|(line, _)| line), Some(line), "{error}");
+        assert_eq!(error.line_and_column().map(|(line, _)| line), Some(line), "{error}");
     }
 }
 
@@ -393,7 +393,8 @@ fn arms_far_from_their_base_have_connectors_from_base_to_tip() {
     for offset in ["1e3", "1e4", "1e5", "1e6", "-1e6", "123456.789"] {
         let arm = chain_of(&mimic([offset, "-1", "1", "1"]).expect("a model"), None);
         let skeleton = arm.skeleton();
-        let places = arm.connectors(&skeleton, &arm.forward_kinematics(&arm.rest_values()));
+        let places =
+            arm.connector_positions(&skeleton, &arm.forward_kinematics(&arm.rest_values()));
         assert_eq!(places.len(), skeleton.rods.len() + 1, "{offset}");
         assert!(places.iter().flatten().all(|x| x.is_finite()), "{offset}");
     }

@@ -26,13 +26,13 @@ impl Transform {
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin_m: [0.0; 3] };
 
     /// Returns the frame that a URDF's `<origin>` describes.
-    pub fn from_origin(origin: &Origin) -> Self {
+    pub fn from_urdf_origin(origin: &Origin) -> Self {
         let [roll, pitch, yaw] = origin.rpy_rad;
         let [x, y, z] = Self::IDENTITY.rotation;
         let about_x = Self::from_axis_angle(x, roll).rotation;
         let about_y = Self::from_axis_angle(y, pitch).rotation;
         let about_z = Self::from_axis_angle(z, yaw).rotation;
-        let rotation = multiply(&multiply(&about_z, &about_y), &about_x);
+        let rotation = multiply_matrices(&multiply_matrices(&about_z, &about_y), &about_x);
         Self { rotation, origin_m: origin.xyz_m }
     }
 
@@ -136,7 +136,7 @@ impl Transform {
     #[must_use]
     pub fn compose(&self, inner: &Self) -> Self {
         Self {
-            rotation: multiply(&self.rotation, &inner.rotation),
+            rotation: multiply_matrices(&self.rotation, &inner.rotation),
             origin_m: self.transform_point(inner.origin_m),
         }
     }
@@ -160,7 +160,7 @@ impl Transform {
 }
 
 #[inline]
-pub(super) fn multiply(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
+pub(super) fn multiply_matrices(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
     a.map(|row| add(add(scaled(b[0], row[0]), scaled(b[1], row[1])), scaled(b[2], row[2])))
 }
 

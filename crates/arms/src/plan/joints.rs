@@ -3,7 +3,7 @@
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
 use crate::ik::constraints::ConstraintChecker;
-use crate::kinematics::{ArmGoal, JointMotion};
+use crate::kinematics::{ArmGoal, JointMotionKind};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
@@ -97,7 +97,7 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
         moves.map(|((a, b), lever_m)| (b - a).abs() * lever_m).sum()
     }
 
-    fn squared_spread(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
+    fn squared_distance(&self, a: &Vec<f64>, b: &Vec<f64>) -> f64 {
         let moves = a.iter().zip(b).zip(self.arm.follower.levers_m());
         moves.map(|((a, b), lever_m)| (b - a) * (b - a) * lever_m * lever_m).sum()
     }
@@ -129,9 +129,9 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
             // A joint that turns without limits gets everywhere within half a turn to either side; slides without
             // limits go as far as the arm is long.
             let max = match variable.motion {
-                JointMotion::Turn if lower.is_finite() => f64::INFINITY,
-                JointMotion::Turn => PI,
-                JointMotion::Slide => self.arm.skeleton.reach_m.max(1.0),
+                JointMotionKind::Turn if lower.is_finite() => f64::INFINITY,
+                JointMotionKind::Turn => PI,
+                JointMotionKind::Slide => self.arm.skeleton.reach_m.max(1.0),
             };
             let lower = lower.max(-max);
             let upper = upper.min(max);

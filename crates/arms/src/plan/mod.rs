@@ -22,7 +22,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, ReactionRules};
-pub use space::RodSpace;
+pub use space::RodConfigurationSpace;
 
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.
@@ -62,7 +62,7 @@ pub trait ConfigurationSpace {
     fn distance_m(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
     /// Returns a measure of nearness: the sum of the squared moves of all moving parts.
-    fn squared_spread(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
+    fn squared_distance(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
     /// Returns the posture at a fraction of the straight path from one to another: all parts turn and change
     /// their lengths evenly.
@@ -90,7 +90,7 @@ pub fn plan<const D: usize>(
     query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
-    let space = RodSpace::new(chain, obstacles, rules.self_collision, query.k)?;
+    let space = RodConfigurationSpace::new(chain, obstacles, rules.self_collision, query.k)?;
     let goals = goals(&space, rules, query, draws)?;
     Ok(find_path(&space, goals, draws))
 }
@@ -123,7 +123,7 @@ fn find_path<S: ConfigurationSpace>(
 /// Returns valid postures that reach the target: the first sought from the present posture, the others
 /// from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
-    space: &RodSpace<'_, D>,
+    space: &RodConfigurationSpace<'_, D>,
     rules: ReactionRules,
     query: &PlanningQuery<D>,
     draws: &mut Draws,
@@ -136,7 +136,7 @@ fn goals<const D: usize>(
             tolerance_m: query.tolerance_m,
             restarts: MAX_RESTARTS,
             seed: draws.next_u64(),
-            ..ChainIkGoal::new(query.k, space.base(), query.target)
+            ..ChainIkGoal::new(query.k, space.base_connector(), query.target)
         };
         let result = solver.solve(&from, space.obstacles(), &goal)?;
         if result.reached && space.is_free(&result.points) && !goals.contains(&result.points) {

@@ -6,13 +6,13 @@ use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, distance, first_axis, lerp, norm, norm_squared, normalized, scaled, sub,
+    Point, add, add_scaled, distance, lerp, norm, norm_squared, normalized, scaled, sub, unit_x,
 };
 use sidestep_rods::{Chain, Obstacles};
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
-pub struct RodSpace<'a, const D: usize> {
+pub struct RodConfigurationSpace<'a, const D: usize> {
     checker: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
@@ -21,7 +21,7 @@ pub struct RodSpace<'a, const D: usize> {
     step_m: f64,
 }
 
-impl<'a, const D: usize> RodSpace<'a, D> {
+impl<'a, const D: usize> RodConfigurationSpace<'a, D> {
     /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
@@ -56,12 +56,12 @@ impl<'a, const D: usize> RodSpace<'a, D> {
         self.checker.obstacles
     }
 
-    pub(super) fn base(&self) -> usize {
+    pub(super) fn base_connector(&self) -> usize {
         self.limb[0]
     }
 }
 
-impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
+impl<const D: usize> ConfigurationSpace for RodConfigurationSpace<'_, D> {
     type Posture = ChainPosture<D>;
 
     fn present_posture(&self) -> ChainPosture<D> {
@@ -77,7 +77,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
         self.limb.iter().map(|&i| distance(a[i], b[i])).fold(0.0, f64::max)
     }
 
-    fn squared_spread(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
+    fn squared_distance(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
         self.limb.iter().map(|&i| norm_squared(sub(a[i], b[i]))).sum()
     }
 
@@ -97,7 +97,7 @@ impl<const D: usize> ConfigurationSpace for RodSpace<'_, D> {
             let [from_m, to_m] = [norm(from), norm(to)];
             let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), fraction);
             // Opposite directions have no mean; just beside it they turn one way or the other.
-            let u = normalized(mean).or(normalized(from)).unwrap_or(first_axis());
+            let u = normalized(mean).or(normalized(from)).unwrap_or(unit_x());
             posture[outer] = add_scaled(posture[inner], u, from_m + fraction * (to_m - from_m));
         }
         posture
@@ -145,5 +145,5 @@ const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {
     let drawn: Point<D> = std::array::from_fn(|_| normal(draws));
-    normalized(drawn).unwrap_or(first_axis())
+    normalized(drawn).unwrap_or(unit_x())
 }

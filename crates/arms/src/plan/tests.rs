@@ -23,7 +23,7 @@ fn clearance_m<const D: usize>(chain: &Chain<D>, obstacles: &Obstacles<D>) -> f6
 
 /// An arm of five rods along the first axis.
 fn arm() -> Chain<2> {
-    let rod = Rod::fixed(0.4, 0.02);
+    let rod = Rod::with_fixed_length(0.4, 0.02);
     let mut arm = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();
     arm
@@ -44,7 +44,7 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
         let way =
             plan(&chain, &obstacles, ReactionRules::default(), &BEHIND, &mut draws(seed)).unwrap();
         let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
-        let space = RodSpace::new(&chain, &obstacles, false, 5).unwrap();
+        let space = RodConfigurationSpace::new(&chain, &obstacles, false, 5).unwrap();
         let mut at = chain.clone();
         for next in &way {
             let from = at.points().to_vec();
@@ -70,7 +70,7 @@ fn a_folded_arm_finds_a_posture_that_it_can_get_to() {
     let points = vec![[0.0, 0.0], [0.69383, 0.72014], [-0.29946, 0.83574], [0.70042, 0.82014]];
     let rods: Vec<_> = points
         .windows(2)
-        .map(|w| Rod::fixed(sidestep_rods::geometry::distance(w[0], w[1]), 0.03))
+        .map(|w| Rod::with_fixed_length(sidestep_rods::geometry::distance(w[0], w[1]), 0.03))
         .collect();
     let mut arm = Chain::new(points, vec![Connector::free(0.05); 4], rods).unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();
@@ -101,7 +101,7 @@ fn no_way_leads_into_an_obstacle_or_out_of_reach() {
 
 #[test]
 fn a_chain_without_a_base_has_no_plan() {
-    let rod = Rod::fixed(0.4, 0.02);
+    let rod = Rod::with_fixed_length(0.4, 0.02);
     let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
     let error =
         plan(&chain, &wall(), ReactionRules::default(), &BEHIND, &mut draws(1)).unwrap_err();

@@ -29,14 +29,14 @@ impl<S: ConfigurationSpace> PostureTree<S> {
 
     /// Returns the posture nearest to another; of equal ones the first.
     fn nearest(&self, space: &S, to: &S::Posture) -> usize {
-        let spreads = self.postures.iter().map(|posture| space.squared_spread(posture, to));
+        let spreads = self.postures.iter().map(|posture| space.squared_distance(posture, to));
         let nearest = spreads.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
         nearest.map_or(0, |(i, _)| i)
     }
 
     /// Grows toward a posture stride by stride, as far as the path is free; returns the last posture
     /// and whether that is the target, or `None` if there was no stride at all.
-    fn grow(
+    fn grow_toward(
         &mut self,
         space: &S,
         to: &S::Posture,
@@ -61,7 +61,7 @@ impl<S: ConfigurationSpace> PostureTree<S> {
         Some((last, false))
     }
 
-    fn path_to_root(&self, mut i: usize) -> Vec<S::Posture> {
+    fn postures_to_root(&self, mut i: usize) -> Vec<S::Posture> {
         let mut path = vec![self.postures[i].clone()];
         while let Some(from) = self.parents[i] {
             i = from;
@@ -88,16 +88,19 @@ pub(super) fn find_path<S: ConfigurationSpace>(
         // The trees take turns; the first tries are straight to the goals.
         let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
         let (to, strides) = toward.unwrap_or_else(|| (space.sample(draws), 1));
-        let Some((tip, _)) = trees[one].grow(space, &to, stride_m, strides) else { continue };
+        let Some((tip, _)) = trees[one].grow_toward(space, &to, stride_m, strides) else {
+            continue;
+        };
         let tip_posture = trees[one].postures[tip].clone();
-        let Some((meeting, true)) = trees[other].grow(space, &tip_posture, stride_m, max_strides)
+        let Some((meeting, true)) =
+            trees[other].grow_toward(space, &tip_posture, stride_m, max_strides)
         else {
             continue;
         };
         let ends = if one == 0 { [tip, meeting] } else { [meeting, tip] };
-        let mut path = trees[0].path_to_root(ends[0]);
+        let mut path = trees[0].postures_to_root(ends[0]);
         path.reverse();
-        path.extend(trees[1].path_to_root(ends[1]).into_iter().skip(1));
+        path.extend(trees[1].postures_to_root(ends[1]).into_iter().skip(1));
         return Some(path);
     }
     None

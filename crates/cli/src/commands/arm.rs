@@ -5,7 +5,7 @@ use crate::console::{align_pairs, format_fixed};
 use clap::Args;
 use serde::Serialize;
 use sidestep::arms::kinematics::{
-    ArmFiles, ArmSelection, Dof, ObstacleSphere, SkeletonRod, Transform, Vector,
+    ArmFiles, ArmModel, Dof, ObstacleSphere, SkeletonRod, Transform, Vector,
 };
 use sidestep::kernel::InputError;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ pub(crate) struct ArmArgs {
 
 /// An arm in a posture.
 pub(crate) struct Arm {
-    pub(crate) selection: ArmSelection,
+    pub(crate) selection: ArmModel,
     pub(crate) values: Vec<f64>,
 }
 
@@ -57,9 +57,9 @@ impl ArmArgs {
         let selection = self.files().load()?;
         let (place, values) = match &self.joints {
             Some(text) => ("--joints", parse_numbers("--joints", text)?),
-            None => ("--posture", selection.posture(self.posture.as_deref())?),
+            None => ("--posture", selection.named_posture(self.posture.as_deref())?),
         };
-        selection.chain.check_count(place, &values)?;
+        selection.chain.check_joint_values(place, &values)?;
         Ok(Arm { selection, values })
     }
 
@@ -149,7 +149,7 @@ impl Arm {
                 .map(|(v, &q)| joint_position(v, q))
                 .collect(),
             outside_limits: chain.outside_limits(values).into_iter().map(str::to_owned).collect(),
-            connectors: chain.connectors(&skeleton, &frames),
+            connectors: chain.connector_positions(&skeleton, &frames),
             rods: skeleton.rods.iter().map(rod_limits).collect(),
         }
     }

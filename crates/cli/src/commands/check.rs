@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::Value;
 use sidestep::experiment::MAX_PROBLEMS;
 use sidestep::kernel::InputError;
-use sidestep::kernel::text::StateDescription;
+use sidestep::kernel::text::StateReport;
 use sidestep::scenario::{CompiledScenario, ImportedScenario, Remark, Source};
 
 const EXAMPLES: &str = "\
@@ -33,7 +33,7 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
-    let foreign = worlds().translate(&args.scenario.file)?;
+    let foreign = worlds().import_scenario(&args.scenario.file)?;
     if let Some(ImportedScenario { scenario: Err(error), json, lines }) = foreign {
         // The report lists the contents of the file, and the error says why it cannot be run.
         let mut json = json;
@@ -82,11 +82,7 @@ fn print_all_errors(
 }
 
 /// Adds the memory that a run takes: the peak of this process once it has started one with one worker.
-fn measure_memory(
-    source: &Source,
-    compiled: &dyn CompiledScenario,
-    contents: &mut StateDescription,
-) {
+fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &mut StateReport) {
     let _run = compiled.start(source, 1);
     let Some(bytes) = peak_bytes() else { return };
     let recorded =

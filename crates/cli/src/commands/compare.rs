@@ -1,6 +1,6 @@
 //! `sidestep compare`: collision avoidance methods on the same traffic, side by side.
 
-use crate::console::{Console, LINE_COLS, format_columns, wrap};
+use crate::console::{Console, LINE_COLS, format_columns, wrap_text};
 use crate::exit::{ExitCode, Failure};
 use crate::progress::StageBar;
 use crate::scenario_args::{ScenarioArgs, WorkersArg, downcast_scenario};
@@ -86,6 +86,6 @@ pub(crate) fn compare(args: &CompareArgs, console: Console) -> Result<ExitCode, 
 fn text(table: &Table) -> String {
     let title =
         if table.title.is_empty() { String::new() } else { format!("# {}\n\n", table.title) };
-    let note = wrap(&table.note, LINE_COLS).join("\n");
+    let note = wrap_text(&table.note, LINE_COLS).join("\n");
     format!("{title}{}\n{note}\n", format_columns(table))
 }

@@ -7,7 +7,7 @@ use crate::link::{LinkArgs, run_job};
 use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use sidestep::kernel::text::{KeyValues, key_value};
+use sidestep::kernel::text::{KeyValues, key_value_pair};
 use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
 use std::path::PathBuf;
 
@@ -173,11 +173,12 @@ impl FleetArgs {
         console.print_result_or_short(&all, &format!("{digest}\n"), || {
             let name = summary["name"].as_str().unwrap_or_default();
             let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
-            let mut lines = vec![key_value("cycles", cycles)];
+            let mut lines = vec![key_value_pair("cycles", cycles)];
             lines.extend(outcome);
             lines.extend(self.network_lines(fleet));
-            lines.push(key_value("digest", digest));
-            lines.extend(summary["folder"].as_str().map(|folder| key_value("results", folder)));
+            lines.push(key_value_pair("digest", digest));
+            lines
+                .extend(summary["folder"].as_str().map(|folder| key_value_pair("results", folder)));
             format!("{name}, seed {}\n{}", summary["seed"], align_pairs(&lines))
         })
     }
@@ -190,8 +191,8 @@ impl FleetArgs {
         let packets = nodes.iter().map(|node| node.packets).sum();
         let bytes = nodes.iter().map(|node| node.bytes).sum();
         let mut lines = vec![
-            key_value("nodes", format!("{} in a {topology}, {clock}", nodes.len())),
-            key_value(
+            key_value_pair("nodes", format!("{} in a {topology}, {clock}", nodes.len())),
+            key_value_pair(
                 "packets",
                 format!("{} sent, {} bytes", group_thousands(packets), group_thousands(bytes)),
             ),
@@ -202,10 +203,10 @@ impl FleetArgs {
                 group_thousands(nodes.iter().map(|node| node.late).sum()),
                 group_thousands(fleet.late_cycles)
             );
-            lines.push(key_value("late", late));
+            lines.push(key_value_pair("late", late));
         }
         if restarted > 0 {
-            lines.push(key_value("restarted", format!("{restarted} nodes")));
+            lines.push(key_value_pair("restarted", format!("{restarted} nodes")));
         }
         lines
     }

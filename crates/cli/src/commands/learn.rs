@@ -1,6 +1,6 @@
 //! `sidestep learn`: error distributions of a real robot, from its logs.
 
-use crate::console::{Console, LINE_COLS, wrap};
+use crate::console::{Console, LINE_COLS, wrap_text};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -316,7 +316,7 @@ fn smoothing(estimate: &EstimateArgs) -> String {
 }
 
 fn indented(text: &str) -> String {
-    format!("  {}\n", wrap(text, LINE_COLS - 2).join("\n  "))
+    format!("  {}\n", wrap_text(text, LINE_COLS - 2).join("\n  "))
 }
 
 fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {

@@ -2,7 +2,7 @@
 
 use super::finish::run_to_end;
 use super::sweep::{SweepRequest, run_sweep};
-use crate::console::{Console, LINE_COLS, wrap};
+use crate::console::{Console, LINE_COLS, wrap_text};
 use crate::exit::{ExitCode, Failure};
 use crate::foxglove;
 use crate::interrupt;
@@ -93,7 +93,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     args.many.check_single_run()?;
     let (source, compiled) = args.scenario.compile()?;
     print_warnings(&compiled.remarks(), console);
-    let import = worlds().translate(&args.scenario.file)?;
+    let import = worlds().import_scenario(&args.scenario.file)?;
     let workers = args.workers.count();
     let paths = OutputPaths {
         folder: args.out.as_deref(),
@@ -124,6 +124,7 @@ fn serve_viewers(
 /// Prints the warnings that `sidestep check` prints, too: few users want a run to which they apply.
 fn print_warnings(remarks: &[Remark], console: Console) {
     for remark in remarks.iter().filter(|remark| remark.severity == Severity::Warning) {
-        console.warn(wrap(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));
+        console
+            .warn(wrap_text(&format!("{}: {}", remark.key, remark.words), LINE_COLS).join("\n  "));
     }
 }

@@ -1,7 +1,7 @@
 //! The results of a sweep, as text and as JSON.
 
 use crate::console::{
-    Console, LINE_COLS, align_pairs, format_columns, format_duration, group_thousands, wrap,
+    Console, LINE_COLS, align_pairs, format_columns, format_duration, group_thousands, wrap_text,
 };
 use crate::exit::{ExitCode, Failure};
 use crate::progress::StageBar;
@@ -94,7 +94,7 @@ fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCod
 fn tables(summary: &Summary) -> String {
     let mut texts = Vec::new();
     for table in &summary.brief() {
-        let title = wrap(&table.title, LINE_COLS).join("\n");
+        let title = wrap_text(&table.title, LINE_COLS).join("\n");
         texts.push(format!("{title}\n{}", format_columns(table)));
     }
     texts.join("\n")

@@ -9,8 +9,8 @@ use crate::style::{INK, hex};
 use crate::svg::{Anchor, Svg, SvgNumber, TextStyle};
 use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::{
-    Body, BodyKind, Color, Condition, Outline, Pose, Role, Scenery, Shape, Vec3, WALL_COLOR,
-    body_color,
+    Body, BodyCondition, BodyKind, BodyRole, Color, Outline, Pose, Scenery, Shape, Vec3,
+    WALL_COLOR, body_color,
 };
 
 /// Least width of a line, because thinner ones would vanish.
@@ -174,7 +174,7 @@ fn depth(canvas: &Canvas, at: Vec3) -> f64 {
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let appearance = body.appearance(scene.scenery.dimensions);
     if body.kind.is_of_agent()
-        && matches!(body.state, Condition::Plain | Condition::Leading)
+        && matches!(body.state, BodyCondition::Plain | BodyCondition::Leading)
         && scene.lacks_trail(body)
     {
         return (UNTRACED_COLOR, appearance.opacity);
@@ -216,7 +216,7 @@ fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
 fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
     let white = [0xFF; 3];
     match body.kind.spec().outline {
-        Outline::Shade if body.state == Condition::Open => {
+        Outline::Shade if body.state == BodyCondition::Open => {
             format!(r#"{} stroke-dasharray="3 2""#, outline_attributes(color, 1.0))
         }
         Outline::Shade => outline_attributes(darker(color), 1.0),
@@ -241,7 +241,7 @@ fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
         Shape::Line { thickness_m, .. } => thickness_m,
         _ => 0.0,
     };
-    let is_part = matches!(body.kind.role(), Role::PartOfBody | Role::LineThroughParts(_));
+    let is_part = matches!(body.kind.role(), BodyRole::PartOfBody | BodyRole::LineThroughParts(_));
     is_part && !canvas.is_above() && thickness_m * canvas.px_per_m >= MIN_SEAMED_PX
 }
 
@@ -332,7 +332,7 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
 }
 
 pub(super) fn is_leader(body: &Body) -> bool {
-    body.state == Condition::Leading
+    body.state == BodyCondition::Leading
 }
 
 /// Draws a target over everything that hides it: a ring with a cross, and its number if there are few.

@@ -8,7 +8,7 @@ use crate::style::{Style, hex};
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
 use crate::text::{self, Weight};
 use sidestep_kernel::math::hypot;
-use sidestep_kernel::view::{Body, BodyKind, Role, Shape};
+use sidestep_kernel::view::{Body, BodyKind, BodyRole, Shape};
 
 /// Largest number of trails in a picture with names: with more there is no space.
 const MAX_LABELS: usize = 12;
@@ -71,7 +71,7 @@ fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> 
     let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
     let kept_free = bodies.filter(|body| {
         body.kind.is_agent()
-            || matches!(body.kind.role(), Role::MovesAmong(_) | Role::StartOf(_))
+            || matches!(body.kind.role(), BodyRole::MovesAmong(_) | BodyRole::StartOf(_))
             || body.kind == BodyKind::GOAL
     });
     kept_free.map(|body| square_around(canvas.px(body.pose.at_m), radius_m(body) * canvas.px_per_m))

@@ -8,7 +8,8 @@ use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{body_dashes, hex};
 use crate::ticks::group_thousands;
 use sidestep_kernel::view::{
-    BodyKind, Color, Frame, Occupancy, Role, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR, body_color,
+    BodyKind, BodyRole, Color, Frame, Occupancy, Scenery, Trail, UNKNOWN_COLOR, WALL_COLOR,
+    body_color,
 };
 
 /// Largest number of things with a color of their own in the legend; more share one line.
@@ -101,7 +102,7 @@ fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
         .frame
         .bodies
         .iter()
-        .filter(|body| body.kind.role() == Role::PartOfBody && body.part == Some(0))
+        .filter(|body| body.kind.role() == BodyRole::PartOfBody && body.part == Some(0))
         .filter(|body| {
             scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
         })

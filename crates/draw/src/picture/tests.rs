@@ -7,7 +7,7 @@ use crate::testing::{ball, moment, open};
 use sidestep_airspace::kinds::{AIRPLANE, START, ZONE};
 use sidestep_chain::kinds::{CONNECTOR, RODS};
 use sidestep_kernel::view::{
-    BODY_COLORS, Body, BodyKind, Condition, Frame, Pose, Scenery, Shape, Vec3, WALL_COLOR,
+    BODY_COLORS, Body, BodyCondition, BodyKind, Frame, Pose, Scenery, Shape, Vec3, WALL_COLOR,
 };
 use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
@@ -84,7 +84,7 @@ fn pair() -> Vec<Body> {
     let rod = Shape::Line { points_m: ends.to_vec(), thickness_m: 0.4 };
     let connector = |part: u32| {
         let ball = ball(CONNECTOR, 0, ends[part as usize], 0.5);
-        ball.with_part(part).with_state_if(part == 0, Condition::Leading)
+        ball.with_part(part).with_condition_if(part == 0, BodyCondition::Leading)
     };
     vec![Body::new(RODS, 0, Pose::from_position([0.0; 3]), rod), connector(0), connector(1)]
 }
@@ -147,8 +147,8 @@ fn every_kind_has_the_colors_of_the_table() {
     let kinds =
         [ROBOT, PERSON, DOOR, CONNECTOR, AIRPLANE, ZONE, BodyKind::OBSTACLE, BodyKind::GOAL, START];
     for kind in kinds {
-        for state in [Condition::Plain, Condition::Touching, Condition::Failed] {
-            let body = ball(kind, 1, [0.0; 3], 1.0).with_part(1).with_state_if(true, state);
+        for state in [BodyCondition::Plain, BodyCondition::Touching, BodyCondition::Failed] {
+            let body = ball(kind, 1, [0.0; 3], 1.0).with_part(1).with_condition_if(true, state);
             let look = body.appearance(2);
             let svg = picture(&open(2), &moment(vec![body]));
             let fill = format!(r#"fill="{}""#, hex(look.color));

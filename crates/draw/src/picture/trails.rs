@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::style::body_dashes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    BODY_COLORS, Body, BodyId, BodyKind, Color, Condition, Frame, OccupancyGrid, Role, Scenery,
-    Shape, Trail, TrailStyle, Vec3, body_color,
+    BODY_COLORS, Body, BodyCondition, BodyId, BodyKind, BodyRole, Color, Frame, OccupancyGrid,
+    Scenery, Shape, Trail, TrailStyle, Vec3, body_color,
 };
 
 /// Largest number of lines in a picture: they are thin, so more of them than there are colors can be
@@ -51,11 +51,11 @@ pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
     let numbers: Vec<u32> = agents.into_iter().map(|(_, number)| number).collect();
     let Some(kind) = kind else { return Vec::new() };
     let chosen = match kind.role() {
-        Role::PartOfBody => {
+        BodyRole::PartOfBody => {
             let first = numbers.into_iter().take(BODY_COLORS.len());
             return first.flat_map(|number| ends(frame, kind, number)).collect();
         }
-        Role::Agent(TrailStyle::Lines) => numbers.into_iter().take(MAX_LINES).collect(),
+        BodyRole::Agent(TrailStyle::Lines) => numbers.into_iter().take(MAX_LINES).collect(),
         _ => one_per_color(&numbers),
     };
     chosen.into_iter().map(|number| BodyId::new(kind, number, None)).collect()
@@ -66,12 +66,12 @@ pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
 pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u32)> {
     // Robots that are parts of a chain keep to its connectors.
     let acting = frame.bodies.iter().filter(|body| match body.kind.role() {
-        Role::Agent(_) => body.part.is_none(),
-        role => role == Role::PartOfBody,
+        BodyRole::Agent(_) => body.part.is_none(),
+        role => role == BodyRole::PartOfBody,
     });
     let here = acting.map(|body| (body.kind, body.number));
     let starting = scenery.bodies.iter().filter_map(|body| match body.kind.role() {
-        Role::StartOf(agent) => Some((agent, body.number)),
+        BodyRole::StartOf(agent) => Some((agent, body.number)),
         _ => None,
     });
     here.chain(starting).collect()
@@ -81,7 +81,7 @@ pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u3
 fn ends(frame: &Frame, kind: BodyKind, number: u32) -> Vec<BodyId> {
     let all = frame.bodies.iter();
     let own = all.filter(|body| body.kind == kind && body.number == number);
-    let leader = own.clone().find(|body| body.state == Condition::Leading);
+    let leader = own.clone().find(|body| body.state == BodyCondition::Leading);
     let mut parts = own.map(Body::id);
     let first = parts.next();
     let leader = leader.map(Body::id).or(first);

@@ -67,11 +67,11 @@ impl Draft {
 
     /// An error in another file than the given text stays as it is.
     pub(super) fn map_error_back(&self, given: &Source, error: &InputError) -> InputError {
-        let Some(start) = error.position().filter(|_| error.place() == given.place) else {
+        let Some(start) = error.line_and_column().filter(|_| error.place() == given.place) else {
             return error.clone();
         };
         let start = offset(self.text(), start);
-        let end = error.end().map_or(start, |end| offset(self.text(), end));
+        let end = error.end_line_and_column().map_or(start, |end| offset(self.text(), end));
         let start = self.map_back(start, false);
         let end = if end > start { self.map_back(end, true).max(start) } else { start };
         given.error(start..end, error.cause(), error.remedy())
@@ -107,7 +107,7 @@ mod tests {
             let start = draft.text().find(part).expect(part);
             let error = draft.source().error(start..start + part.len(), "c", "r");
             let told = draft.map_error_back(&given, &error);
-            (told.key().map(String::from), told.position(), told.end())
+            (told.key().map(String::from), told.line_and_column(), told.end_line_and_column())
         };
         assert_eq!(place("5"), (Some("e".into()), Some((4, 5)), Some((4, 6))));
         assert_eq!(place("é"), (Some("c".into()), Some((3, 6)), Some((3, 7))));

@@ -37,7 +37,7 @@ pub fn problems(worlds: &Worlds, source: &Source) -> Vec<InputError> {
         recovery.run(first);
         errors = recovery.reported;
     }
-    errors.sort_by_key(|error| error.position());
+    errors.sort_by_key(|error| error.line_and_column());
     errors.truncate(MAX_PROBLEMS);
     errors
 }
@@ -134,8 +134,8 @@ fn is_same_error(one: &InputError, other: &InputError) -> bool {
 /// Returns whether two errors with a position are about the same part of the text: the second one of a value is of its
 /// repair.
 fn is_at_same_place(one: &InputError, other: &InputError) -> bool {
-    other.position().is_some()
+    other.line_and_column().is_some()
         && one.place() == other.place()
-        && one.position() == other.position()
-        && one.end() == other.end()
+        && one.line_and_column() == other.line_and_column()
+        && one.end_line_and_column() == other.end_line_and_column()
 }

@@ -554,7 +554,7 @@ max_runs = 200
         ] {
             let error = parse(&format!("{head}{text}")).expect_err(text);
             assert!(error.cause().contains(cause), "{error}");
-            assert!(error.position().is_some(), "{error}");
+            assert!(error.line_and_column().is_some(), "{error}");
         }
     }
 

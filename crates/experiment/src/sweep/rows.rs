@@ -133,7 +133,7 @@ impl RunTableBuilder {
                     let builder = &mut self.columns[*k];
                     let empty = Values::empty(ColumnType::F64);
                     let unsorted = std::mem::replace(&mut builder.column.values, empty);
-                    unsorted.pick(&order)
+                    unsorted.gather_rows(&order)
                 }
                 None => Values::empty(ty),
             };

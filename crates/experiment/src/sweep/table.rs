@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::RoleColumn;
+use sidestep_kernel::ports::ColumnWithRole;
 
 /// The role of a column in a table of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -28,7 +28,7 @@ pub enum Role {
 }
 
 /// A column of a table of runs; the name of a parameter is the path of its key.
-pub type RunColumn = RoleColumn<Role>;
+pub type RunColumn = ColumnWithRole<Role>;
 
 /// A table of runs, with one row per run.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -280,7 +280,7 @@ fn the_order_of_rows_is_no_part_of_a_summary() {
     let mut turned = table.clone();
     let backwards: Vec<usize> = (0..table.runs()).rev().collect();
     for column in &mut turned.columns {
-        column.values = column.values.pick(&backwards);
+        column.values = column.values.gather_rows(&backwards);
     }
     assert_eq!(summed(&turned), summed(&table));
 }

@@ -193,7 +193,7 @@ mod tests {
         ];
         for (text, column) in wrong {
             let error = join_lines(text).0[0].commands(&"f.scn").unwrap_err();
-            assert_eq!(error.position(), Some((1, column)), "{text}");
+            assert_eq!(error.line_and_column(), Some((1, column)), "{text}");
         }
     }
 

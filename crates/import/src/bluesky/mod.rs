@@ -297,6 +297,6 @@ pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
     // A stable sort, so that commands of one time stay in the order of the file.
     commands.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let mut file = Interpreter::new(place, file).run(commands);
-    file.unparsed.sort_by_key(InputError::position);
+    file.unparsed.sort_by_key(InputError::line_and_column);
     file
 }

@@ -213,7 +213,7 @@ fn what_is_wrong_is_pointed_at_and_the_rest_is_read() {
         00:00:00.00>ADDWPT C 52\n";
     let file = parse(&"f.scn", text);
     let places = |errors: &[InputError]| -> Vec<_> {
-        errors.iter().map(|error| error.position().unwrap()).collect()
+        errors.iter().map(|error| error.line_and_column().unwrap()).collect()
     };
     assert_eq!(places(&file.unparsed), [(1, 27), (2, 1), (5, 32), (6, 13)]);
     assert_eq!(places(&file.refused), [(4, 17), (5, 17), (5, 50), (7, 20)]);

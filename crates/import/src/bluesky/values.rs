@@ -300,7 +300,7 @@ mod tests {
     fn what_is_no_degrees_is_an_error_with_its_place() {
         for text in ["91", "12'60", "1'2'3'4", "--5", "N", "5W", "inf", "1e999", "'", "12'-3"] {
             let error = degrees(&"f.scn", word(text), LATITUDE).unwrap_err();
-            assert_eq!(error.position(), Some((3, 7)), "{text}");
+            assert_eq!(error.line_and_column(), Some((3, 7)), "{text}");
         }
     }
 

@@ -67,7 +67,7 @@ pub(super) fn items(place: &str, text: &str, file: usize) -> Result<Vec<Item>, I
         };
         let cause = format!("{actual} where {expected} is expected");
         InputError::new(place, cause, format!("write {expected} there"))
-            .with_offset(text, error.offset())
+            .with_byte_offset(text, error.offset())
     })
 }
 
@@ -90,7 +90,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
         }
         if depth > MAX_NESTING {
             let cause = format!("more than {MAX_NESTING} models in each other");
-            return Err(InputError::new(place, cause, "use fewer").with_offset(text, offset));
+            return Err(InputError::new(place, cause, "use fewer").with_byte_offset(text, offset));
         }
     }
     Ok(())

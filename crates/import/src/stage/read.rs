@@ -103,7 +103,7 @@ impl WorldReader {
 
     fn error(&self, at: SourcePosition, cause: impl Into<String>, remedy: &str) -> InputError {
         let SourceFile { path, text } = &self.sources[at.file];
-        InputError::new(path.display(), cause, remedy).with_offset(text, at.offset)
+        InputError::new(path.display(), cause, remedy).with_byte_offset(text, at.offset)
     }
 
     fn count_ignored(&mut self, name: impl Into<String>) {

@@ -91,7 +91,7 @@ fn wrong_syntax_and_values_are_pointed_at() {
         ("include \"none.inc\"", (1, 9)),
     ] {
         let error = error(text);
-        assert_eq!(error.position(), Some(position), "{error}");
+        assert_eq!(error.line_and_column(), Some(position), "{error}");
     }
     assert!(read(&[("a.world", "model ( bitmap \"none.png\" )")]).is_err());
 }
@@ -100,7 +100,7 @@ fn wrong_syntax_and_values_are_pointed_at() {
 fn files_that_include_themselves_are_refused() {
     let loop_of_two = [("a.world", "include \"b.inc\""), ("b.inc", "\ninclude \"a.world\"")];
     let error = read(&loop_of_two).expect_err("a loop");
-    assert_eq!(error.position(), Some((2, 9)), "{error}");
+    assert_eq!(error.line_and_column(), Some((2, 9)), "{error}");
     assert!(error.place().ends_with("b.inc"), "{error}");
 }
 

@@ -60,7 +60,7 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
 
 /// Moves `error` to the position of another.
 fn at_position_of(other: &InputError, error: InputError) -> InputError {
-    match other.position() {
+    match other.line_and_column() {
         Some((line, column)) => error.with_position(line, column),
         None => error,
     }

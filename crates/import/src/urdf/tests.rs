@@ -62,10 +62,10 @@ fn every_wrong_thing_is_named_with_its_place_and_what_would_be_right() {
     ];
     for (old, new, line, cause, remedy) in cases {
         let error = error_of(old, new);
-        assert_eq!(error.position().map(|p| p.0), Some(line), "{error}");
+        assert_eq!(error.line_and_column().map(|p| p.0), Some(line), "{error}");
         assert!(error.cause().contains(cause) && error.remedy().contains(remedy), "{error}");
     }
-    assert_eq!(error_of("\"0 0 2\"", "\"0 0 0\"").position(), Some((7, 16)));
+    assert_eq!(error_of("\"0 0 2\"", "\"0 0 0\"").line_and_column(), Some((7, 16)));
     let circle = ARM.replace("<link name=\"hand\"/>", "").replace("\"hand\"", "\"base\"");
     let error = Model::parse("arm.urdf", &circle).expect_err("no root");
     assert!(error.cause().contains("every link hangs on another"), "{error}");
@@ -79,7 +79,7 @@ fn xacro_is_refused_and_its_unused_prefix_is_not() {
     let undeclared = ARM.replace("<link name=\"hand\"/>", "<xacro:hand/>");
     for text in [used, undeclared] {
         let error = Model::parse("f", &text).expect_err("xacro");
-        assert!(error.cause().contains("xacro") && error.position().is_some(), "{error}");
+        assert!(error.cause().contains("xacro") && error.line_and_column().is_some(), "{error}");
         assert!(error.remedy().contains("xacro FILE"), "{error}");
     }
     assert!(
@@ -162,7 +162,7 @@ fn an_srdf_is_read_whole_and_its_errors_are_pointed_at() {
     ];
     for (old, new, line, remedy) in cases {
         let error = Semantics::parse("f", &SRDF.replacen(old, new, 1), &arm).expect_err(new);
-        assert_eq!(error.position().map(|p| p.0), Some(line), "{error}");
+        assert_eq!(error.line_and_column().map(|p| p.0), Some(line), "{error}");
         assert!(error.remedy().contains(remedy), "{error}");
     }
 }

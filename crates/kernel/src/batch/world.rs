@@ -1,13 +1,13 @@
 //! One world of a batch: its run, the observations of its agents, and its error.
 
 use super::{BatchError, SimulationFactory};
-use crate::control::{BufferMut, OrderError, Team};
+use crate::control::{AgentTeam, BufferMut, OrderError};
 use crate::simulation::Simulation;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A world behind its lock: any worker may work on it, one at a time.
-pub(super) struct BatchWorld {
+pub(super) struct BatchWorldEntry {
     pub(super) seed: u64,
     /// `None` if it panicked, or never started.
     pub(super) run: Option<Box<dyn Simulation>>,
@@ -33,19 +33,19 @@ enum ObservationBuffer {
     Real(Vec<f64>),
 }
 
-impl BatchWorld {
+impl BatchWorldEntry {
     /// Returns a world that has not started.
     pub(super) fn new(seed: u64) -> Self {
         Self { seed, run: None, error: None, buffers: Vec::new(), has_observations: false }
     }
 
     /// Returns the teams of its agents; none without a run.
-    pub(super) fn teams(&self) -> &[Team] {
-        self.run.as_ref().map_or(&[], |run| run.teams())
+    pub(super) fn agent_teams(&self) -> &[AgentTeam] {
+        self.run.as_ref().map_or(&[], |run| run.agent_teams())
     }
 
     /// A world without a run keeps its error, so the other answer would mean that the error was lost.
-    pub(super) fn no_run_error(&self, index: usize) -> BatchError {
+    pub(super) fn broken_world_error(&self, index: usize) -> BatchError {
         self.error.clone().unwrap_or_else(|| BatchError::Broken {
             world: index,
             seed: self.seed,
@@ -55,7 +55,7 @@ impl BatchWorld {
     }
 
     /// Works with the run; keeps the error, and drops the run if it panics.
-    pub(super) fn with_run(
+    pub(super) fn apply_to_run(
         &mut self,
         index: usize,
         work: impl FnOnce(&mut dyn Simulation) -> Result<(), OrderError>,
@@ -84,11 +84,11 @@ impl BatchWorld {
         index: usize,
         seed: u64,
         factory: &SimulationFactory,
-        teams: Option<&[Team]>,
+        teams: Option<&[AgentTeam]>,
     ) {
         let started = catch_unwind(AssertUnwindSafe(|| factory(seed)));
         let error = match started {
-            Ok(Ok(run)) if teams.is_some_and(|teams| *run.teams() != *teams) => {
+            Ok(Ok(run)) if teams.is_some_and(|teams| *run.agent_teams() != *teams) => {
                 BatchError::Shape { world: index }
             }
             Ok(Ok(run)) => {
@@ -119,7 +119,7 @@ impl BatchWorld {
         }
         let mut borrowed: Vec<BufferMut<'_>> =
             buffers.iter_mut().map(ObservationBuffer::as_mut).collect();
-        self.with_run(index, |run| run.observe(team, &mut borrowed));
+        self.apply_to_run(index, |run| run.observe(team, &mut borrowed));
         self.buffers = buffers;
         self.has_observations = true;
     }

@@ -83,24 +83,24 @@ impl ControlLog {
     /// Returns the controls that a run recorded; `None` if there is no table of them.
     pub fn from_recorder(recorder: &MemoryRecorder) -> Option<Self> {
         let (schema, columns) = recorder.table(CONTROLS)?;
-        let mut reader = ControlReader::default();
-        reader.read(schema, columns)?;
+        let mut reader = ControlTableReader::default();
+        reader.read_block(schema, columns)?;
         Some(reader.into_log())
     }
 }
 
 /// Reads the controls of the table `controls`, block after block.
 #[derive(Debug, Default)]
-pub struct ControlReader {
+pub struct ControlTableReader {
     log: ControlLog,
 }
 
-impl ControlReader {
+impl ControlTableReader {
     /// Name of the table in a recording.
     pub const TABLE: &'static str = CONTROLS;
 
     /// Reads the next rows. `None` if they are not those of controls.
-    pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
+    pub fn read_block(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
         let column =
             |name: &str| columns.get(schema.columns.iter().position(|column| column.name == name)?);
         let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
@@ -151,12 +151,12 @@ mod tests {
             control_rows(4, &controls).chain(control_rows(6, &[])).collect();
         assert_eq!(rows.len(), 1 + 3 + 1 + 1 + 1);
         for cut in 0..=rows.len() {
-            let mut reader = ControlReader::default();
+            let mut reader = ControlTableReader::default();
             for part in [&rows[..cut], &rows[cut..]] {
                 let mut recorder = MemoryRecorder::new(&[controls_table().schema()]);
-                recorder.append(0, &controls_table().block(part)).expect("it fits");
+                recorder.append(0, &controls_table().block_from_rows(part)).expect("it fits");
                 let (schema, columns) = recorder.table(CONTROLS).expect("it is there");
-                assert_eq!(reader.read(schema, columns), Some(()));
+                assert_eq!(reader.read_block(schema, columns), Some(()));
             }
             assert_eq!(reader.into_log(), book, "cut before row {cut}");
         }
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn another_table_is_none_of_controls() {
         let schema = TableSchema::new(CONTROLS, Vec::new());
-        assert_eq!(ControlReader::default().read(&schema, &[]), None);
+        assert_eq!(ControlTableReader::default().read_block(&schema, &[]), None);
         assert_eq!(ControlLog::from_recorder(&MemoryRecorder::new(&[])), None);
     }
 }

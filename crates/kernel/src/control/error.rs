@@ -51,7 +51,7 @@ pub enum OrderError {
         agent: String,
         /// The first of the agent's values that is out of bounds.
         value: f64,
-        /// The allowed values in words, by [`Space::describe`](super::Space::describe).
+        /// The allowed values in words, by [`Space::describe`](super::ValueSpace::describe).
         expected: String,
     },
     /// Controls were submitted to a run whose agents decide within it.

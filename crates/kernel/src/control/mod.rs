@@ -25,12 +25,12 @@ mod rows;
 mod space;
 mod team;
 
-pub use controls::{ControlLog, ControlReader};
+pub use controls::{ControlLog, ControlTableReader};
 pub use error::OrderError;
 pub use orders::OrderLog;
-pub use rows::OrderReader;
-pub use space::{BufferMut, Space, SpaceKind};
-pub use team::{Order, Orders, Team, Teams};
+pub use rows::OrderTableReader;
+pub use space::{BufferMut, ValueDomain, ValueSpace};
+pub use team::{AgentTeam, AgentTeams, MultiAgentOrder, Order};
 
 pub(crate) use controls::{ControlRow, control_rows, controls_table};
 pub(crate) use orders::{OrderRow, orders_table};

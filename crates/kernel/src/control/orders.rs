@@ -1,6 +1,6 @@
 //! Orders to agents: recorded as rows of a table, and kept in order to be replayed.
 
-use super::team::Orders;
+use super::team::MultiAgentOrder;
 use crate::ports::Table;
 use crate::units::{Cycle, EntityId};
 use std::ops::Range;
@@ -53,7 +53,7 @@ struct OrderEntry {
 
 impl OrderLog {
     /// Adds orders that are given before a cycle, after those of the same cycle.
-    pub fn add(&mut self, cycle: Cycle, orders: &Orders<'_>) {
+    pub fn add(&mut self, cycle: Cycle, orders: &MultiAgentOrder<'_>) {
         let agents = append(&mut self.agents, orders.agents);
         let values = append(&mut self.values, orders.values);
         // Recorded orders come back agent by agent: joining them restores the one order to all of them, which is
@@ -77,12 +77,12 @@ impl OrderLog {
     }
 
     /// Iterates over the orders, each with the cycle before which it is given.
-    pub fn iter(&self) -> impl Iterator<Item = (Cycle, Orders<'_>)> {
-        self.entries.iter().map(|entry| (entry.cycle, self.orders(entry)))
+    pub fn iter(&self) -> impl Iterator<Item = (Cycle, MultiAgentOrder<'_>)> {
+        self.entries.iter().map(|entry| (entry.cycle, self.entry_order(entry)))
     }
 
-    fn orders<'a>(&'a self, entry: &'a OrderEntry) -> Orders<'a> {
-        Orders {
+    fn entry_order<'a>(&'a self, entry: &'a OrderEntry) -> MultiAgentOrder<'a> {
+        MultiAgentOrder {
             order: &entry.order,
             agents: &self.agents[entry.agents.clone()],
             values: &self.values[entry.values.clone()],
@@ -90,9 +90,9 @@ impl OrderLog {
     }
 
     /// Iterates over the orders that are given before `cycle`.
-    pub(crate) fn orders_due(&self, cycle: Cycle) -> impl Iterator<Item = Orders<'_>> {
+    pub(crate) fn orders_due(&self, cycle: Cycle) -> impl Iterator<Item = MultiAgentOrder<'_>> {
         let due = self.count_before(cycle)..self.count_before(cycle.saturating_add(1));
-        self.entries[due].iter().map(|entry| self.orders(entry))
+        self.entries[due].iter().map(|entry| self.entry_order(entry))
     }
 
     /// Returns the first cycle after `cycle` before which an order is given.
@@ -116,7 +116,7 @@ fn append<T: Copy>(all: &mut Vec<T>, more: &[T]) -> Range<usize> {
 
 impl OrderEntry {
     /// Returns whether further orders can be joined to the entry: the same order, with as many values per agent.
-    fn can_extend_with(&self, cycle: Cycle, orders: &Orders<'_>) -> bool {
+    fn can_extend_with(&self, cycle: Cycle, orders: &MultiAgentOrder<'_>) -> bool {
         let own_width = self.values.len().checked_div(self.agents.len());
         let other_width = orders.values.len().checked_div(orders.agents.len());
         self.cycle == cycle && self.order == orders.order && own_width == other_width
@@ -131,7 +131,10 @@ mod tests {
     fn orders_are_due_by_cycle_and_stay_in_their_order() {
         let mut book = OrderLog::default();
         for (cycle, agent) in [(5, 2), (3, 1), (5, 0), (5, 7), (9, 4)] {
-            book.add(cycle, &Orders { order: "a", agents: &[agent], values: &[f64::from(agent)] });
+            book.add(
+                cycle,
+                &MultiAgentOrder { order: "a", agents: &[agent], values: &[f64::from(agent)] },
+            );
         }
         let agents =
             |cycle| book.orders_due(cycle).flat_map(|o| o.agents.to_vec()).collect::<Vec<_>>();
@@ -144,7 +147,7 @@ mod tests {
     fn orders_of_one_cycle_are_joined_where_they_are_alike() {
         let mut book = OrderLog::default();
         let note = |book: &mut OrderLog, order, values: &[f64]| {
-            book.add(1, &Orders { order, agents: &[0], values });
+            book.add(1, &MultiAgentOrder { order, agents: &[0], values });
         };
         note(&mut book, "a", &[1.0]);
         note(&mut book, "a", &[2.0]);

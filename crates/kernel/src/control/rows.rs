@@ -1,32 +1,32 @@
 //! Orders read back from the rows that record them.
 
 use super::orders::{ORDERS, OrderLog};
-use super::team::Orders;
+use super::team::MultiAgentOrder;
 use crate::ports::{MemoryRecorder, TableSchema, Values};
 use crate::units::{Cycle, EntityId};
 
 /// Reads the orders of the table `orders`, block after block: each row has one value.
 #[derive(Debug, Default)]
-pub struct OrderReader {
+pub struct OrderTableReader {
     log: OrderLog,
-    pending: Option<IncompleteOrder>,
+    pending: Option<OrderBuilder>,
 }
 
 /// An order with values that are still being read.
 #[derive(Debug)]
-struct IncompleteOrder {
+struct OrderBuilder {
     cycle: Cycle,
     agent: EntityId,
     order: String,
     values: Vec<f64>,
 }
 
-impl OrderReader {
+impl OrderTableReader {
     /// Name of the table in a recording.
     pub const TABLE: &'static str = ORDERS;
 
     /// Reads the next rows. `None` if the columns are not those of orders.
-    pub fn read(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
+    pub fn read_block(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
         let index = |name: &str| schema.columns.iter().position(|column| column.name == name);
         let column = |name: &str| columns.get(index(name)?);
         let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
@@ -42,7 +42,7 @@ impl OrderReader {
             // A block may end within an order, so an order is complete only when the next one begins.
             if *parts.get(row)? == 0 {
                 self.finish_order();
-                self.pending = Some(IncompleteOrder {
+                self.pending = Some(OrderBuilder {
                     cycle: *cycles.get(row)?,
                     agent: *agents.get(row)?,
                     order: order_column.text(orders, row),
@@ -64,8 +64,9 @@ impl OrderReader {
 
     /// Adds the order that has all of its values to the log.
     fn finish_order(&mut self) {
-        if let Some(IncompleteOrder { cycle, agent, order, values }) = self.pending.take() {
-            self.log.add(cycle, &Orders { order: &order, agents: &[agent], values: &values });
+        if let Some(OrderBuilder { cycle, agent, order, values }) = self.pending.take() {
+            self.log
+                .add(cycle, &MultiAgentOrder { order: &order, agents: &[agent], values: &values });
         }
     }
 }
@@ -74,8 +75,8 @@ impl OrderLog {
     /// Returns the orders that a run recorded; `None` if there is no table of them.
     pub fn from_recorder(recorder: &MemoryRecorder) -> Option<Self> {
         let (schema, columns) = recorder.table(ORDERS)?;
-        let mut reader = OrderReader::default();
-        reader.read(schema, columns)?;
+        let mut reader = OrderTableReader::default();
+        reader.read_block(schema, columns)?;
         Some(reader.into_log())
     }
 }
@@ -100,17 +101,17 @@ mod tests {
             row(7, 1, 1, 1, 2.0),
         ];
         let mut book = OrderLog::default();
-        book.add(3, &Orders { order: "to", agents: &[1], values: &[0.5, 0.25] });
-        book.add(3, &Orders { order: "go", agents: &[2], values: &[4.0] });
-        book.add(7, &Orders { order: "to", agents: &[1], values: &[1.0, 2.0] });
+        book.add(3, &MultiAgentOrder { order: "to", agents: &[1], values: &[0.5, 0.25] });
+        book.add(3, &MultiAgentOrder { order: "go", agents: &[2], values: &[4.0] });
+        book.add(7, &MultiAgentOrder { order: "to", agents: &[1], values: &[1.0, 2.0] });
         let table = || orders_table(vec!["go".into(), "to".into()]);
         for cut in 0..=rows.len() {
-            let mut reader = OrderReader::default();
+            let mut reader = OrderTableReader::default();
             for part in [&rows[..cut], &rows[cut..]] {
                 let mut recorder = MemoryRecorder::new(&[table().schema()]);
-                recorder.append(0, &table().block(part)).expect("it fits");
+                recorder.append(0, &table().block_from_rows(part)).expect("it fits");
                 let (schema, columns) = recorder.table("orders").expect("it is there");
-                assert_eq!(reader.read(schema, columns), Some(()));
+                assert_eq!(reader.read_block(schema, columns), Some(()));
             }
             assert_eq!(reader.into_log(), book, "cut before row {cut}");
         }
@@ -119,7 +120,7 @@ mod tests {
     #[test]
     fn another_table_is_none_of_orders() {
         let schema = TableSchema::new("orders", Vec::new());
-        assert_eq!(OrderReader::default().read(&schema, &[]), None);
+        assert_eq!(OrderTableReader::default().read_block(&schema, &[]), None);
         assert_eq!(OrderLog::from_recorder(&MemoryRecorder::new(&[])), None);
     }
 }

@@ -5,20 +5,20 @@ use crate::ports::table::split_unit;
 /// One quantity of every agent of a team: its name, the shape of one agent's share of it, and its
 /// allowed values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Space {
+pub struct ValueSpace {
     /// Name; ends in the unit where the quantity has one.
     pub name: String,
     /// Shape of one agent's share; empty for a single number.
     pub shape: Vec<usize>,
     /// The allowed values, the same for every number of the shape.
-    pub kind: SpaceKind,
+    pub kind: ValueDomain,
     /// Its meaning, in one sentence.
     pub meaning: String,
 }
 
 /// Type and bounds of the values of a space, the same for every number of an array.
 #[derive(Debug, Clone, PartialEq)]
-pub enum SpaceKind {
+pub enum ValueDomain {
     /// Named choices; a value is the index of a name.
     Discrete(Vec<String>),
     /// Whole numbers from `low` to `high`, both included.
@@ -37,13 +37,13 @@ pub enum SpaceKind {
     },
 }
 
-impl Space {
+impl ValueSpace {
     /// The greatest whole number in an order: orders are floats, and up to it no two whole numbers become the same
     /// float.
     pub const MAX_INTEGER: i64 = (1 << 53) - 1;
 
     /// Creates a space with one number per agent.
-    pub fn new(name: impl Into<String>, kind: SpaceKind, meaning: impl Into<String>) -> Self {
+    pub fn new(name: impl Into<String>, kind: ValueDomain, meaning: impl Into<String>) -> Self {
         Self { name: name.into(), shape: Vec::new(), kind, meaning: meaning.into() }
     }
 
@@ -60,7 +60,7 @@ impl Space {
 
     /// Returns whether its values are whole numbers.
     pub fn is_integer(&self) -> bool {
-        !matches!(self.kind, SpaceKind::Real { .. })
+        !matches!(self.kind, ValueDomain::Real { .. })
     }
 
     /// The unit of its values, where its name ends in one.
@@ -71,32 +71,32 @@ impl Space {
     /// Returns whether a value is allowed in it.
     pub fn contains(&self, value: f64) -> bool {
         match &self.kind {
-            SpaceKind::Discrete(names) => {
+            ValueDomain::Discrete(names) => {
                 (0.0..=names.len() as f64 - 1.0).contains(&value) && is_whole(value)
             }
-            &SpaceKind::Integer { low, high } => {
+            &ValueDomain::Integer { low, high } => {
                 (low as f64..=high as f64).contains(&value) && is_whole(value)
             }
-            &SpaceKind::Real { low, high } => value.is_finite() && (low..=high).contains(&value),
+            &ValueDomain::Real { low, high } => value.is_finite() && (low..=high).contains(&value),
         }
     }
 
     /// Returns its values in words: `one of 0 forward, 1 left`, `a number from 0 to 1`.
     pub fn describe(&self) -> String {
         match &self.kind {
-            SpaceKind::Discrete(names) => {
+            ValueDomain::Discrete(names) => {
                 let choices: Vec<_> =
                     names.iter().enumerate().map(|(k, name)| format!("{k} {name}")).collect();
                 format!("one of {}", choices.join(", "))
             }
-            SpaceKind::Integer { low, high } => format!("a whole number from {low} to {high}"),
-            SpaceKind::Real { low, high } if low.is_infinite() && high.is_infinite() => {
+            ValueDomain::Integer { low, high } => format!("a whole number from {low} to {high}"),
+            ValueDomain::Real { low, high } if low.is_infinite() && high.is_infinite() => {
                 "a finite number".into()
             }
-            SpaceKind::Real { low, high } if high.is_infinite() => {
+            ValueDomain::Real { low, high } if high.is_infinite() => {
                 format!("a finite number of at least {low}")
             }
-            SpaceKind::Real { low, high } => format!("a number from {low} to {high}"),
+            ValueDomain::Real { low, high } => format!("a number from {low} to {high}"),
         }
     }
 }
@@ -110,9 +110,9 @@ fn is_whole(value: f64) -> bool {
 /// A caller's buffer for the values of all agents of a team in one space, one agent after the other.
 #[derive(Debug)]
 pub enum BufferMut<'a> {
-    /// For [`SpaceKind::Discrete`] and [`SpaceKind::Integer`].
+    /// For [`ValueDomain::Discrete`] and [`ValueDomain::Integer`].
     Integer(&'a mut [i64]),
-    /// For [`SpaceKind::Real`].
+    /// For [`ValueDomain::Real`].
     Real(&'a mut [f64]),
 }
 
@@ -154,21 +154,24 @@ mod tests {
     #[test]
     fn a_space_holds_what_its_words_say() {
         let choice =
-            Space::new("action", SpaceKind::Discrete(vec!["go".into(), "stay".into()]), "");
+            ValueSpace::new("action", ValueDomain::Discrete(vec!["go".into(), "stay".into()]), "");
         assert_eq!(choice.describe(), "one of 0 go, 1 stay");
         assert_eq!(
             [0.0, 1.0, 2.0, -1.0, 0.5, f64::NAN].map(|v| choice.contains(v)),
             [true, true, false, false, false, false]
         );
-        let whole =
-            Space::new("word", SpaceKind::Integer { low: -2, high: Space::MAX_INTEGER }, "");
-        assert!(whole.contains(-2.0) && whole.contains(Space::MAX_INTEGER as f64));
+        let whole = ValueSpace::new(
+            "word",
+            ValueDomain::Integer { low: -2, high: ValueSpace::MAX_INTEGER },
+            "",
+        );
+        assert!(whole.contains(-2.0) && whole.contains(ValueSpace::MAX_INTEGER as f64));
         assert!(!whole.contains(-3.0) && !whole.contains(1.5) && !whole.contains(f64::INFINITY));
-        let real =
-            Space::new("rate_rad_s", SpaceKind::Real { low: -1.0, high: 1.0 }, "").with_shape([3]);
+        let real = ValueSpace::new("rate_rad_s", ValueDomain::Real { low: -1.0, high: 1.0 }, "")
+            .with_shape([3]);
         assert_eq!((real.value_count(), real.unit(), choice.value_count()), (3, Some("rad/s"), 1));
         assert!(real.contains(-1.0) && !real.contains(1.1) && !real.contains(f64::NAN));
-        let free = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
-        assert!(!Space::new("x_m", free, "").contains(f64::INFINITY));
+        let free = ValueDomain::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
+        assert!(!ValueSpace::new("x_m", free, "").contains(f64::INFINITY));
     }
 }

@@ -1,27 +1,27 @@
 //! Agents that are alike, and orders to them.
 
 use super::error::OrderError;
-use super::space::{BufferMut, Space};
+use super::space::{BufferMut, ValueSpace};
 use crate::units::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Agents with the same observations and orders.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Team {
+pub struct AgentTeam {
     /// Name, by which a caller selects it: the kind of its agents, and a number where several teams have the same.
     pub name: String,
     /// Its agents, rising; rows of arrays are in this order.
     pub agents: Vec<EntityId>,
     /// Spaces of their observations, in the order of the buffers of
     /// [`Simulation::observe`](crate::Simulation::observe).
-    pub observation_spaces: Vec<Space>,
+    pub observation_spaces: Vec<ValueSpace>,
     /// Spaces of orders to them; empty for agents that decide for themselves.
-    pub action_spaces: Vec<Space>,
+    pub action_spaces: Vec<ValueSpace>,
 }
 
 /// One order to several agents: one row of values for each.
 #[derive(Debug, Clone, Copy)]
-pub struct Orders<'a> {
+pub struct MultiAgentOrder<'a> {
     /// Name of one of the receivers' action spaces.
     pub order: &'a str,
     /// Ids of the receivers, which may be of several teams that take this order.
@@ -33,9 +33,9 @@ pub struct Orders<'a> {
 /// One order to one agent, checked against its space.
 #[derive(Debug, Clone, Copy)]
 pub struct Order<'a> {
-    /// Index of the receiver's team in [`Teams::all`].
+    /// Index of the receiver's team in [`AgentTeams::as_slice`].
     pub team: usize,
-    /// Index of the space in [`Team::action_spaces`].
+    /// Index of the space in [`AgentTeam::action_spaces`].
     pub space: usize,
     /// Id of the receiver.
     pub agent: EntityId,
@@ -45,8 +45,8 @@ pub struct Order<'a> {
 
 /// The teams of a world, and their members.
 #[derive(Debug, Clone, Default)]
-pub struct Teams {
-    all: Vec<Team>,
+pub struct AgentTeams {
+    all: Vec<AgentTeam>,
     /// Number of each entity's team, by id; [`NONE`] for those in none.
     team_of: Vec<u32>,
     /// The world's noun for an agent, for errors.
@@ -57,10 +57,10 @@ pub struct Teams {
 
 const NONE: u32 = u32::MAX;
 
-impl Teams {
+impl AgentTeams {
     /// Returns these teams; no agent is in two of them. `noun` is the noun for an agent. A repeated name
     /// gets a number: `robot`, `robot 2`.
-    pub fn new(mut all: Vec<Team>, noun: &'static str) -> Self {
+    pub fn new(mut all: Vec<AgentTeam>, noun: &'static str) -> Self {
         number_duplicates(&mut all);
         let last_id = all.iter().flat_map(|team| &team.agents).max();
         let mut team_of = vec![NONE; last_id.map_or(0, |&id| id as usize + 1)];
@@ -77,11 +77,11 @@ impl Teams {
     }
 
     /// Returns the teams; the index is a team's number everywhere else.
-    pub fn all(&self) -> &[Team] {
+    pub fn as_slice(&self) -> &[AgentTeam] {
         &self.all
     }
 
-    pub(crate) fn accept_orders(&self) -> bool {
+    pub(crate) fn has_action_spaces(&self) -> bool {
         self.all.iter().any(|team| !team.action_spaces.is_empty())
     }
 
@@ -90,7 +90,7 @@ impl Teams {
     }
 
     /// Checks that orders have the shape and the bounds of their spaces.
-    pub(crate) fn check(&self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    pub(crate) fn check(&self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.for_each_order(orders, |_| Ok(()))
     }
 
@@ -101,11 +101,11 @@ impl Teams {
     /// The first one that is wrong, or the error of `give`.
     pub(crate) fn for_each_order<'a>(
         &self,
-        orders: &Orders<'a>,
+        orders: &MultiAgentOrder<'a>,
         mut give: impl FnMut(&Order<'a>) -> Result<(), OrderError>,
     ) -> Result<(), OrderError> {
-        let &Orders { order, agents, values } = orders;
-        let Some(&first) = agents.first() else { return check_empty(orders) };
+        let &MultiAgentOrder { order, agents, values } = orders;
+        let Some(&first) = agents.first() else { return check_order_without_agents(orders) };
         // Usually all agents are of one team, so its space is looked up once.
         let mut action = self.action_space(order, first)?;
         let width = action.space.value_count();
@@ -166,7 +166,7 @@ impl Teams {
         team: usize,
         buffers: &[BufferMut<'_>],
     ) -> Result<(), OrderError> {
-        let Some(Team { agents, observation_spaces: spaces, .. }) = self.all.get(team) else {
+        let Some(AgentTeam { agents, observation_spaces: spaces, .. }) = self.all.get(team) else {
             return Err(OrderError::NoTeam { team, teams: self.all.len() });
         };
         let fits = spaces.len() == buffers.len()
@@ -196,11 +196,11 @@ struct ActionSpace<'a> {
     team: usize,
     /// Number of the space among the team's action spaces.
     index: usize,
-    space: &'a Space,
+    space: &'a ValueSpace,
 }
 
 /// Checks an order to no agents: it is right if it has no values.
-fn check_empty(orders: &Orders<'_>) -> Result<(), OrderError> {
+fn check_order_without_agents(orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
     if orders.values.is_empty() {
         return Ok(());
     }
@@ -212,7 +212,7 @@ fn check_empty(orders: &Orders<'_>) -> Result<(), OrderError> {
 }
 
 /// Gives a number to each repeated name.
-fn number_duplicates(teams: &mut [Team]) {
+fn number_duplicates(teams: &mut [AgentTeam]) {
     let mut used = BTreeSet::new();
     // The next number to try for each name, because thousands of teams may share one.
     let mut next: BTreeMap<String, u32> = BTreeMap::new();
@@ -234,7 +234,7 @@ mod tests {
     fn no_two_teams_have_one_name() {
         let team = |name: &str| {
             let (observed, ordered) = (Vec::new(), Vec::new());
-            Team {
+            AgentTeam {
                 name: name.into(),
                 agents: Vec::new(),
                 observation_spaces: observed,
@@ -242,8 +242,8 @@ mod tests {
             }
         };
         let all = ["snake", "snake 2", "snake", "crane", "snake"].map(team).to_vec();
-        let teams = Teams::new(all, "chain");
-        let names: Vec<_> = teams.all().iter().map(|team| &team.name[..]).collect();
+        let teams = AgentTeams::new(all, "chain");
+        let names: Vec<_> = teams.as_slice().iter().map(|team| &team.name[..]).collect();
         assert_eq!(names, ["snake", "snake 2", "snake 3", "crane", "snake 4"]);
     }
 }

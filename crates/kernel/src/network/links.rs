@@ -102,7 +102,12 @@ impl NetworkPartition {
 
 impl UnidirectionalLink {
     /// Returns whether the fault stops a message at a time.
-    pub(super) fn is_blocking(&self, sender: EntityId, receiver: EntityId, at_s: f64) -> bool {
+    pub(super) fn is_direction_blocked(
+        &self,
+        sender: EntityId,
+        receiver: EntityId,
+        at_s: f64,
+    ) -> bool {
         self.window.contains(at_s) && (self.receiver, self.sender) == (sender, receiver)
     }
 }
@@ -127,7 +132,7 @@ impl GilbertElliott {
         let mut step = (at_s / step_s) as u64;
         // Back to the step in which the present state was drawn.
         loop {
-            let words = streams.streams.pair_words(link[0], link[1], step, streams.burst, 0);
+            let words = streams.streams.words_for_pair(link[0], link[1], step, streams.burst, 0);
             if step == 0 || is_renewed.sample(words[0]) {
                 return is_burst.sample(words[1]);
             }

@@ -24,12 +24,12 @@ const CHECKSUM_OFFSET: usize = HEADER_BYTES - 8;
 const TYPICAL_BYTES: usize = 512;
 
 /// The topics of conversations in a world, rising in the order in which a cycle has them.
-pub trait Protocol: Copy + Ord {
+pub trait ConversationTopic: Copy + Ord {
     /// Returns its number on the wire.
-    fn number(self) -> u8;
+    fn wire_number(self) -> u8;
 
     /// Returns the topic of a number, if there is one.
-    fn from_number(number: u8) -> Option<Self>;
+    fn from_wire_number(number: u8) -> Option<Self>;
 }
 
 /// The identity of a conversation: a message of one is never accepted in another.
@@ -43,11 +43,11 @@ pub struct ConversationId<T> {
     pub members: u64,
 }
 
-impl<T: Protocol> ConversationId<T> {
+impl<T: ConversationTopic> ConversationId<T> {
     /// Returns the identity of the conversation of these agents, by rising id.
     pub fn new(cycle: Cycle, topic: T, members: &[EntityId]) -> Self {
         let bytes: Vec<u8> = members.iter().flat_map(|id| id.to_le_bytes()).collect();
-        Self { cycle, topic, members: digest([&bytes, &[]]) }
+        Self { cycle, topic, members: digest_pieces([&bytes, &[]]) }
     }
 
     /// Returns whether it comes before another one, regardless of its members.
@@ -81,7 +81,7 @@ impl PacketBuffer {
     }
 
     /// The serialized message, without the room for the header.
-    pub fn message(&self) -> &[u8] {
+    pub fn message_bytes(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]
     }
 
@@ -92,10 +92,10 @@ impl PacketBuffer {
     }
 
     /// Writes the header and the checksum into the room before the message, without a copy of it.
-    pub fn into_packet<T: Protocol>(mut self, header: &PacketHeader<T>) -> Vec<u8> {
+    pub fn into_packet<T: ConversationTopic>(mut self, header: &PacketHeader<T>) -> Vec<u8> {
         header.write(&mut self.0[..CHECKSUM_OFFSET]);
         let (head, message) = self.0.split_at(HEADER_BYTES);
-        let checksum = digest([&head[..CHECKSUM_OFFSET], message]).to_le_bytes();
+        let checksum = digest_pieces([&head[..CHECKSUM_OFFSET], message]).to_le_bytes();
         self.0[CHECKSUM_OFFSET..HEADER_BYTES].copy_from_slice(&checksum);
         self.0
     }
@@ -114,12 +114,12 @@ pub struct PacketHeader<T> {
     pub sequence: u32,
 }
 
-impl<T: Protocol> PacketHeader<T> {
+impl<T: ConversationTopic> PacketHeader<T> {
     fn write(&self, bytes: &mut [u8]) {
         let ConversationId { cycle, topic, members } = self.conversation;
         bytes[..2].copy_from_slice(&MAGIC);
         bytes[2] = VERSION;
-        bytes[3] = topic.number();
+        bytes[3] = topic.wire_number();
         bytes[4..12].copy_from_slice(&self.fingerprint.to_le_bytes());
         bytes[12..20].copy_from_slice(&cycle.to_le_bytes());
         bytes[20..28].copy_from_slice(&members.to_le_bytes());
@@ -135,7 +135,7 @@ impl<T: Protocol> PacketHeader<T> {
         if bytes[2] != VERSION {
             return Err(DropReason::Version);
         }
-        let topic = T::from_number(bytes[3]).ok_or(DropReason::Damaged)?;
+        let topic = T::from_wire_number(bytes[3]).ok_or(DropReason::Damaged)?;
         Ok(Self {
             fingerprint: read_u64(bytes, 4),
             conversation: ConversationId {
@@ -164,7 +164,7 @@ fn read_u32(bytes: &[u8], offset: usize) -> u32 {
 ///
 /// # Errors
 /// When the bytes are no packet of `fingerprint`, or were damaged.
-pub fn parse_packet<T: Protocol>(
+pub fn parse_packet<T: ConversationTopic>(
     bytes: &[u8],
     fingerprint: u64,
 ) -> Result<(PacketHeader<T>, &[u8]), DropReason> {
@@ -174,7 +174,7 @@ pub fn parse_packet<T: Protocol>(
     let (fields, checksum) = head.split_at(CHECKSUM_OFFSET);
     // Before the checksum, which another version may compute differently.
     let header = PacketHeader::read(fields)?;
-    if digest([fields, message]).to_le_bytes() != *checksum {
+    if digest_pieces([fields, message]).to_le_bytes() != *checksum {
         return Err(DropReason::Damaged);
     }
     if header.fingerprint != fingerprint {
@@ -266,7 +266,7 @@ impl DropCounts {
 }
 
 /// Returns a digest of two pieces of bytes, one after the other: fast, but no defense against forgery.
-pub fn digest(pieces: [&[u8]; 2]) -> u64 {
+pub fn digest_pieces(pieces: [&[u8]; 2]) -> u64 {
     let mut sum = FACTOR;
     for piece in pieces {
         // With the length, so that a byte that moves from one piece to the other changes the digest.
@@ -312,7 +312,7 @@ fn mix_pair(sum: u64, bytes: &[u8; 16]) -> u64 {
 
 /// Returns the digest of a scenario's text and seed.
 pub fn fingerprint(text: &str, seed: u64) -> u64 {
-    digest([text.as_bytes(), &seed.to_le_bytes()])
+    digest_pieces([text.as_bytes(), &seed.to_le_bytes()])
 }
 
 #[cfg(test)]
@@ -322,12 +322,12 @@ mod tests {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
     struct Weather;
 
-    impl Protocol for Weather {
-        fn number(self) -> u8 {
+    impl ConversationTopic for Weather {
+        fn wire_number(self) -> u8 {
             9
         }
 
-        fn from_number(number: u8) -> Option<Self> {
+        fn from_wire_number(number: u8) -> Option<Self> {
             (number == 9).then_some(Self)
         }
     }

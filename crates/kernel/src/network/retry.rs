@@ -24,7 +24,7 @@ impl RetryTimer {
     }
 
     /// Records the size of a packet: a large one takes its time on the way, and so may its answer.
-    pub fn record_packet(&mut self, bytes: usize) {
+    pub fn record_packet_size(&mut self, bytes: usize) {
         self.max_packet_bytes = self.max_packet_bytes.max(bytes);
     }
 

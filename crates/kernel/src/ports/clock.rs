@@ -58,7 +58,7 @@ impl Clock for ManualClock {
 ///
 /// # Panics
 /// When the clock runs backwards.
-pub fn conformance(clock: &impl Clock) {
+pub fn check_conformance(clock: &impl Clock) {
     let mut last_ns = clock.now_ns();
     for _ in 0..1000 {
         let now_ns = clock.now_ns();
@@ -73,9 +73,9 @@ mod tests {
 
     #[test]
     fn both_clocks_conform() {
-        conformance(&SystemClock::default());
+        check_conformance(&SystemClock::default());
         let manual = ManualClock::default();
-        conformance(&manual);
+        check_conformance(&manual);
         manual.advance_ns(5);
         assert_eq!(manual.now_ns(), 5);
     }

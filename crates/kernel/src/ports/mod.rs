@@ -9,7 +9,7 @@ pub mod transport;
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use recorder::{MemoryRecorder, RecordError, Recorder};
 pub use table::{
-    Buffer, Buffers, Cells, ColumnBlockBuffer, ColumnSpec, ColumnType, RoleColumn, RowBuffer,
-    Table, TableSchema, Values,
+    Cells, ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnWithRole, Table, TableBuffer,
+    TableBuffers, TableRowsBuffer, TableSchema, Values,
 };
 pub use transport::{Envelope, MemoryTransport, NetworkFaults, Transport};

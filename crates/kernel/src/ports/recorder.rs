@@ -45,7 +45,7 @@ pub trait Recorder: Send {
     ///
     /// # Errors
     /// When rows cannot be stored.
-    fn seal(&mut self, _next_cycle: u64) -> Result<(), RecordError> {
+    fn make_durable(&mut self, _next_cycle: u64) -> Result<(), RecordError> {
         Ok(())
     }
 
@@ -92,7 +92,7 @@ impl MemoryRecorder {
     }
 
     /// Returns the number of rows of table `table`; 0 for one that does not exist.
-    pub fn rows(&self, table: &str) -> usize {
+    pub fn row_count(&self, table: &str) -> usize {
         let t = self.schemas.iter().position(|s| s.name == table);
         t.map_or(0, |t| self.tables[t].first().map_or(0, Values::len))
     }
@@ -165,7 +165,7 @@ fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<Str
 fn max_valid_value(indices: &Cells<u32>) -> Option<&u32> {
     match indices.valid() {
         None => indices.iter().max(),
-        Some(_) => indices.options().flatten().max(),
+        Some(_) => indices.iter_options().flatten().max(),
     }
 }
 
@@ -186,8 +186,8 @@ impl Recorder for MemoryRecorder {
     }
 }
 
-/// Returns the schemas that [`conformance`] writes to: create the recorder under test with them.
-pub fn conformance_schemas() -> Vec<TableSchema> {
+/// Returns the schemas that [`check_conformance`] writes to: create the recorder under test with them.
+pub fn conformance_test_schemas() -> Vec<TableSchema> {
     let column = |name: &str, ty| ColumnSpec::new(name, ty, &format!("test column {name}"));
     // One table of plain numbers, and one with a label and a missing text: every way in which columns are encoded.
     let event = ColumnSpec::label("event", "test column event", ["contact", "trip"]);
@@ -208,18 +208,23 @@ pub fn conformance_schemas() -> Vec<TableSchema> {
 /// A function that returns a table's column, both by index, after the recording is finished.
 pub type ColumnReadBack = Box<dyn Fn(usize, usize) -> Values>;
 
-/// Checks the guarantees of a [`Recorder`]. `recorder` is fresh, made with [`conformance_schemas`];
+/// Checks the guarantees of a [`Recorder`]. `recorder` is fresh, made with [`conformance_test_schemas`];
 /// `read_back` opens the finished recording.
 ///
 /// # Panics
 /// When a guarantee is broken.
-pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> ColumnReadBack) {
-    recorder.append(0, &first_block(10)).expect("a block that fits is stored");
-    recorder.append(1, &second_block()).expect("tables are independent");
-    recorder.append(1, &second(vec![], vec![])).expect("no rows are fine");
+pub fn check_conformance<R: Recorder>(
+    mut recorder: R,
+    read_back: impl FnOnce(R) -> ColumnReadBack,
+) {
+    recorder.append(0, &first_conformance_block(10)).expect("a block that fits is stored");
+    recorder.append(1, &second_conformance_block()).expect("tables are independent");
+    recorder.append(1, &build_second_block(vec![], vec![])).expect("no rows are fine");
     refuses_what_does_not_fit(&mut recorder);
-    recorder.seal(13).expect("sealing succeeds after a refused block");
-    recorder.append(0, &first_block(u64::MAX - 3)).expect("blocks append after sealing");
+    recorder.make_durable(13).expect("sealing succeeds after a refused block");
+    recorder
+        .append(0, &first_conformance_block(u64::MAX - 3))
+        .expect("blocks append after sealing");
     recorder.finish().expect("finishing succeeds");
 
     let column = read_back(recorder);
@@ -233,11 +238,11 @@ pub fn conformance<R: Recorder>(mut recorder: R, read_back: impl FnOnce(R) -> Co
     let expected = [-0.5, -0.0, 1e300].map(f64::to_bits).repeat(2);
     assert_eq!(bits, expected, "f64 keeps its bits");
     let second = (0..3).map(|k| column(1, k)).collect::<Vec<_>>();
-    assert_eq!(second, second_block(), "i32, labels and text with a gap come back");
+    assert_eq!(second, second_conformance_block(), "i32, labels and text with a gap come back");
 }
 
 /// Three rows of the first conformance table.
-fn first_block(cycle: u64) -> Vec<Values> {
+fn first_conformance_block(cycle: u64) -> Vec<Values> {
     vec![
         Values::U64((cycle..cycle + 3).collect()),
         Values::U32(vec![0, 7, u32::MAX].into()),
@@ -246,12 +251,12 @@ fn first_block(cycle: u64) -> Vec<Values> {
 }
 
 /// Three rows of the second conformance table.
-fn second_block() -> Vec<Values> {
-    second(vec![i32::MIN, 0, i32::MAX], vec![1, 0, 1])
+fn second_conformance_block() -> Vec<Values> {
+    build_second_block(vec![i32::MIN, 0, i32::MAX], vec![1, 0, 1])
 }
 
 /// Rows of the second conformance table; the second of every two has no note.
-fn second(delta: Vec<i32>, event: Vec<u32>) -> Vec<Values> {
+fn build_second_block(delta: Vec<i32>, event: Vec<u32>) -> Vec<Values> {
     let note = |row| (row % 2 == 0).then(|| format!("row {row}"));
     let notes = Values::Text((0..delta.len()).map(note).collect());
     vec![Values::I32(delta.into()), Values::Label(event.into()), notes]
@@ -261,12 +266,12 @@ fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
     let mut refuses = |table: usize, block: &[Values], what: &str| {
         assert!(recorder.append(table, block).is_err(), "{what} is refused");
     };
-    refuses(0, &second_block(), "a block of another table");
-    refuses(0, &first_block(10)[..2], "a missing column");
-    refuses(9, &second_block(), "a table that does not exist");
-    refuses(1, &second(vec![1], vec![]), "a column of another length");
-    refuses(1, &second(vec![1], vec![2]), "a label without a name");
-    let mut missing = second(vec![1], vec![0]);
+    refuses(0, &second_conformance_block(), "a block of another table");
+    refuses(0, &first_conformance_block(10)[..2], "a missing column");
+    refuses(9, &second_conformance_block(), "a table that does not exist");
+    refuses(1, &build_second_block(vec![1], vec![]), "a column of another length");
+    refuses(1, &build_second_block(vec![1], vec![2]), "a label without a name");
+    let mut missing = build_second_block(vec![1], vec![0]);
     missing[0] = Values::I32([None].into_iter().collect());
     refuses(1, &missing, "a missing value of a column that is declared without");
 }
@@ -286,9 +291,9 @@ mod tests {
 
     #[test]
     fn the_memory_recorder_drops_rows_of_tables_for_which_that_is_told() {
-        let mut recorder = MemoryRecorder::new(&conformance_schemas());
-        recorder.append(0, &first_block(5)).expect("it fits");
-        recorder.append(1, &second_block()).expect("it fits");
+        let mut recorder = MemoryRecorder::new(&conformance_test_schemas());
+        recorder.append(0, &first_conformance_block(5)).expect("it fits");
+        recorder.append(1, &second_conformance_block()).expect("it fits");
         recorder.retain_rows(|schema, columns| {
             let Values::U64(cycles) = &columns[0] else { return None };
             assert_eq!(schema.name, "first");
@@ -299,12 +304,12 @@ mod tests {
             Some(&Values::U32(vec![0, u32::MAX].into()))
         );
         let tables: Vec<_> = recorder.tables().map(|(schema, _)| schema.name.as_str()).collect();
-        assert_eq!((tables, recorder.rows("second")), (vec!["first", "second"], 3));
+        assert_eq!((tables, recorder.row_count("second")), (vec!["first", "second"], 3));
     }
 
     #[test]
     fn the_memory_recorder_conforms() {
-        conformance(MemoryRecorder::new(&conformance_schemas()), |r| {
+        check_conformance(MemoryRecorder::new(&conformance_test_schemas()), |r| {
             assert!(r.is_finished());
             Box::new(move |table, column| r.tables[table][column].clone())
         });

@@ -76,7 +76,7 @@ impl MemoryTransport {
         Self { streams, purpose, faults, waiting: BTreeMap::new(), messages: 0, bytes: 0 }
     }
 
-    fn deliver(&mut self, envelope: Envelope, delay_word: u32) {
+    fn schedule_arrival(&mut self, envelope: Envelope, delay_word: u32) {
         let choices = u64::from(self.faults.max_delay_cycles) + 1;
         // The high half of the product is uniform in `0..choices`, without a division.
         let delay_cycles = (u64::from(delay_word) * choices) >> 32;
@@ -90,15 +90,15 @@ impl Transport for MemoryTransport {
         self.messages += 1;
         self.bytes += envelope.payload.len() as u64;
         let Envelope { cycle, sender, sequence, receiver, .. } = envelope;
-        let words = self.streams.pair_words(sender, receiver, cycle, self.purpose, sequence);
+        let words = self.streams.words_for_pair(sender, receiver, cycle, self.purpose, sequence);
         if Bernoulli::new(self.faults.loss).sample(words[0]) {
             return;
         }
         if Bernoulli::new(self.faults.duplication).sample(words[1]) {
             // The duplicate has a delay of its own.
-            self.deliver(envelope.clone(), words[3]);
+            self.schedule_arrival(envelope.clone(), words[3]);
         }
-        self.deliver(envelope, words[2]);
+        self.schedule_arrival(envelope, words[2]);
     }
 
     fn receive(&mut self, receiver: EntityId, now: Cycle) -> Vec<Envelope> {
@@ -119,7 +119,7 @@ impl Transport for MemoryTransport {
 ///
 /// # Panics
 /// When a guarantee is broken.
-pub fn conformance(transport: &mut impl Transport) {
+pub fn check_conformance(transport: &mut impl Transport) {
     let envelope = |cycle, sender, sequence, receiver| Envelope {
         cycle,
         sender,
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn the_memory_transport_conforms_and_counts() {
         let mut transport = network(NetworkFaults::default());
-        conformance(&mut transport);
+        check_conformance(&mut transport);
         assert_eq!((transport.messages, transport.bytes), (5, 15));
         let payload = Vec::new();
         transport.send(Envelope { cycle: 7, sender: 1, sequence: 0, receiver: 2, payload });

@@ -11,7 +11,7 @@
 //! has written its own over it.
 
 use crate::column::{AtomicColumn, AtomicValue};
-use crate::units::Slot;
+use crate::units::EntitySlot;
 use std::ops::BitAnd;
 
 /// The content of a box in one word. The highest bit means that nothing stands there, so the
@@ -24,14 +24,14 @@ pub trait OccupantWord: AtomicValue + Eq + BitAnd<Output = Self> {
     /// The number of bodies that can be distinguished.
     const MAX_BODIES: usize;
     /// The body in `slot` stands here.
-    fn from_body(slot: Slot) -> Self;
+    fn from_body(slot: EntitySlot) -> Self;
     /// Nothing stands here; the body in `slot` claims it.
-    fn from_claim(slot: Slot) -> Self;
+    fn from_claim(slot: EntitySlot) -> Self;
     /// Returns whether nothing stands here.
     fn is_free(self) -> bool;
     /// The slot of the body that stands here or claims it; an invalid slot for a wall or an
     /// unclaimed box.
-    fn slot(self) -> Slot;
+    fn slot(self) -> EntitySlot;
 }
 
 macro_rules! box_word {
@@ -41,11 +41,11 @@ macro_rules! box_word {
             const WALL: Self = <$t>::MAX >> 1;
             const MAX_BODIES: usize = (<$t>::MAX >> 1) as usize;
             #[inline(always)]
-            fn from_body(slot: Slot) -> Self {
+            fn from_body(slot: EntitySlot) -> Self {
                 slot as Self
             }
             #[inline(always)]
-            fn from_claim(slot: Slot) -> Self {
+            fn from_claim(slot: EntitySlot) -> Self {
                 slot as Self | !(Self::MAX >> 1)
             }
             #[inline(always)]
@@ -53,8 +53,8 @@ macro_rules! box_word {
                 self > Self::MAX >> 1
             }
             #[inline(always)]
-            fn slot(self) -> Slot {
-                Slot::from(self & Self::MAX >> 1)
+            fn slot(self) -> EntitySlot {
+                EntitySlot::from(self & Self::MAX >> 1)
             }
         }
     };
@@ -64,7 +64,7 @@ box_word! { u32 }
 
 /// The boxes of a grid, row by row; match once, then work on one of the columns.
 #[derive(Debug, Clone)]
-pub enum Floor {
+pub enum OccupantGrid {
     /// Indices of up to 32,767 bodies.
     Narrow(AtomicColumn<u16>),
     /// Indices of more bodies.
@@ -79,10 +79,10 @@ pub enum Occupant {
     /// A wall, which stays for the whole run.
     Wall,
     /// The body in this slot.
-    Body(Slot),
+    Body(EntitySlot),
 }
 
-impl Floor {
+impl OccupantGrid {
     /// Creates a floor for `bodies` bodies, none of which stands on it yet; `walls` has one entry
     /// per box.
     pub fn new(walls: impl Iterator<Item = bool>, bodies: usize) -> Self {
@@ -113,7 +113,7 @@ impl Floor {
     }
 
     /// Places the body in `slot` on the box with this index.
-    pub fn place(&self, index: usize, slot: Slot) {
+    pub fn place(&self, index: usize, slot: EntitySlot) {
         match self {
             Self::Narrow(boxes) => boxes.set(index, OccupantWord::from_body(slot)),
             Self::Wide(boxes) => boxes.set(index, OccupantWord::from_body(slot)),
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn words_tell_all_states_apart<T: OccupantWord + std::fmt::Debug>(slot: Slot) {
+    fn words_tell_all_states_apart<T: OccupantWord + std::fmt::Debug>(slot: EntitySlot) {
         let (standing, claimed) = (T::from_body(slot), T::from_claim(slot));
         assert!(!standing.is_free() && !T::WALL.is_free());
         assert!(claimed.is_free() && T::FREE.is_free());
@@ -146,7 +146,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_box_is_free_claimed_walled_or_stood_in(slot in 0..(u16::MAX_BODIES as Slot)) {
+        fn a_box_is_free_claimed_walled_or_stood_in(slot in 0..(u16::MAX_BODIES as EntitySlot)) {
             words_tell_all_states_apart::<u16>(slot);
             words_tell_all_states_apart::<u32>(slot);
             words_tell_all_states_apart::<u32>(slot << 15);
@@ -156,8 +156,8 @@ mod tests {
     #[test]
     fn a_floor_shows_who_stands_on_it_whatever_its_width() {
         for bodies in [2, u16::MAX_BODIES, u16::MAX_BODIES + 1] {
-            let floor = Floor::new([false, true, false].into_iter(), bodies);
-            let last = bodies as Slot - 1;
+            let floor = OccupantGrid::new([false, true, false].into_iter(), bodies);
+            let last = bodies as EntitySlot - 1;
             floor.place(2, last);
             let seen = [0, 1, 2].map(|index| floor.occupant(index));
             assert_eq!(seen, [Occupant::Empty, Occupant::Wall, Occupant::Body(last)]);

@@ -5,5 +5,5 @@ pub mod floor;
 pub mod position;
 
 pub use bit_set::AtomicBitSet;
-pub use floor::{Floor, Occupant, OccupantWord};
-pub use position::Position;
+pub use floor::{Occupant, OccupantGrid, OccupantWord};
+pub use position::GridPosition;

@@ -2,9 +2,9 @@
 
 /// Column (from the west) and row (from the south) of a box; both below 65,536.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Position(u32);
+pub struct GridPosition(u32);
 
-impl Position {
+impl GridPosition {
     /// Creates the position in this column and row.
     #[inline(always)]
     pub fn new(col: u32, row: u32) -> Self {
@@ -12,7 +12,7 @@ impl Position {
         Self(row << 16 | col)
     }
 
-    /// Creates a position from the word of [`Position::word`].
+    /// Creates a position from the word of [`GridPosition::word`].
     #[inline(always)]
     pub fn from_word(word: u32) -> Self {
         Self(word)
@@ -38,13 +38,13 @@ impl Position {
 
     /// Index in a grid stored row by row, `width` boxes wide.
     #[inline(always)]
-    pub fn index(self, width: u32) -> u32 {
+    pub fn row_major_index(self, width: u32) -> u32 {
         self.row() * width + self.col()
     }
 
     /// Returns the box `dx` columns east and `dy` rows north; the caller makes sure that it exists.
     #[inline(always)]
-    pub fn offset(self, dx: i32, dy: i32) -> Self {
+    pub fn translate(self, dx: i32, dy: i32) -> Self {
         Self::new(self.col().wrapping_add_signed(dx), self.row().wrapping_add_signed(dy))
     }
 }

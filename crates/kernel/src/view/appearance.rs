@@ -1,6 +1,6 @@
 //! The appearance of each kind of body: one table for pictures, animations and recordings for viewers.
 
-use super::body::{Body, Condition};
+use super::body::{Body, BodyCondition};
 use super::color::{ALERT_COLOR, Color, MOBILE_COLOR, WALL_COLOR, body_color};
 use super::kind::Paint;
 
@@ -21,18 +21,18 @@ impl Body {
     /// Returns its appearance: in three dimensions, obstacles let what is behind them show through.
     pub fn appearance(&self, dimensions: u8) -> Appearance {
         let (color, opacity) = self.color(dimensions);
-        Appearance { color, opacity, layer: self.kind.spec().layer, legend: self.legend() }
+        Appearance { color, opacity, layer: self.kind.spec().layer, legend: self.legend_text() }
     }
 
     fn color(&self, dimensions: u8) -> (Color, f64) {
         let own = body_color(self.number);
-        let is_alert = matches!(self.state, Condition::Touching | Condition::Failed);
+        let is_alert = matches!(self.state, BodyCondition::Touching | BodyCondition::Failed);
         match self.kind.spec().paint {
-            Paint::Veil if self.state == Condition::Touching => (ALERT_COLOR, 0.4),
+            Paint::Veil if self.state == BodyCondition::Touching => (ALERT_COLOR, 0.4),
             Paint::Veil => (own, 0.15),
             _ if is_alert => (ALERT_COLOR, 1.0),
             Paint::ByNumber { opacity } => (own, opacity),
-            Paint::Fixed { color, open_opacity } if self.state == Condition::Open => {
+            Paint::Fixed { color, open_opacity } if self.state == BodyCondition::Open => {
                 (color, open_opacity)
             }
             Paint::Fixed { color, .. } => (color, 1.0),
@@ -45,14 +45,14 @@ impl Body {
         }
     }
 
-    fn legend(&self) -> &'static str {
+    fn legend_text(&self) -> &'static str {
         let legend = &self.kind.spec().legend;
         match self.state {
-            Condition::Touching => legend.touching,
-            Condition::Failed => legend.failed,
+            BodyCondition::Touching => legend.touching,
+            BodyCondition::Failed => legend.failed,
             _ if self.is_moving() => legend.moving,
-            Condition::Open => legend.open,
-            Condition::Plain | Condition::Leading => legend.plain,
+            BodyCondition::Open => legend.open,
+            BodyCondition::Plain | BodyCondition::Leading => legend.plain,
         }
     }
 }
@@ -71,7 +71,7 @@ mod tests {
         for kind in [ROBOT, CONNECTOR, AIRPLANE] {
             let plain = body(kind);
             assert_eq!(plain.appearance(2).color, BODY_COLORS[3]);
-            let touching = plain.with_state_if(true, Condition::Touching).appearance(2);
+            let touching = plain.with_condition_if(true, BodyCondition::Touching).appearance(2);
             assert_eq!((touching.color, touching.legend), (ALERT_COLOR, "in contact"));
         }
     }

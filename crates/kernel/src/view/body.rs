@@ -71,7 +71,7 @@ pub struct Body {
     /// Its shape.
     pub shape: Shape,
     /// Its condition.
-    pub state: Condition,
+    pub state: BodyCondition,
     /// The velocity of a moving obstacle, which does not act; zero for all other bodies.
     pub velocity_m_s: Vec3,
 }
@@ -85,7 +85,7 @@ impl Body {
             part: None,
             pose,
             shape,
-            state: Condition::Plain,
+            state: BodyCondition::Plain,
             velocity_m_s: [0.0; 3],
         }
     }
@@ -98,7 +98,7 @@ impl Body {
 
     /// Returns the same body in another condition, if `is_so`.
     #[must_use]
-    pub fn with_state_if(self, is_so: bool, state: Condition) -> Self {
+    pub fn with_condition_if(self, is_so: bool, state: BodyCondition) -> Self {
         if is_so { Self { state, ..self } } else { self }
     }
 
@@ -127,7 +127,7 @@ impl Body {
 /// The condition of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Condition {
+pub enum BodyCondition {
     /// Nothing special.
     Plain,
     /// The part that leads the others.
@@ -140,7 +140,7 @@ pub enum Condition {
     Failed,
 }
 
-impl Condition {
+impl BodyCondition {
     /// All conditions.
     pub const ALL: [Self; 5] =
         [Self::Plain, Self::Leading, Self::Open, Self::Touching, Self::Failed];

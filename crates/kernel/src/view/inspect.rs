@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The inspected body; serialized with the names of its fields.
-    #[serde(serialize_with = "body_fields")]
+    #[serde(serialize_with = "serialize_body_fields")]
     pub body: BodyId,
     /// The cycle that is about to run.
     pub cycle: Cycle,
@@ -58,7 +58,7 @@ pub enum FactValue {
     /// Words, shown as they are.
     Text(String),
     /// A body by its identity, so that viewers can select it.
-    #[serde(serialize_with = "body_fields")]
+    #[serde(serialize_with = "serialize_body_fields")]
     Body(BodyId),
     /// A position in meters.
     Place(Vec3),
@@ -149,7 +149,7 @@ pub enum MarkShape {
 }
 
 /// Serializes an identity with the names of its fields; files have it as a tuple, which is shorter in long tables.
-fn body_fields<S: Serializer>(
+fn serialize_body_fields<S: Serializer>(
     &BodyId { kind, number, part }: &BodyId,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
@@ -215,7 +215,7 @@ impl Inspection {
     }
 
     /// Returns the value of a fact, by the titles of its section and itself.
-    pub fn value(&self, section: &str, label: &str) -> Option<&FactValue> {
+    pub fn fact_value(&self, section: &str, label: &str) -> Option<&FactValue> {
         let fact = self.section(section)?.facts.iter().find(|fact| fact.label == label)?;
         Some(&fact.value)
     }
@@ -354,7 +354,7 @@ mod tests {
         );
         told.add_weighted_mark(MarkRole::Wish, "on", 1.5, MarkShape::Point { at_m: [0.0; 3] });
         assert_eq!(told.sections.len(), 1);
-        assert_eq!(told.value("sees", "heading"), Some(&FactValue::number(0.0, "°")));
+        assert_eq!(told.fact_value("sees", "heading"), Some(&FactValue::number(0.0, "°")));
         let table = told.section("sees").and_then(|s| s.table.as_ref()).unwrap();
         assert_eq!(table.column("apart").unwrap().collect::<Vec<_>>(), [&FactValue::None]);
         assert_eq!(

@@ -23,7 +23,7 @@ pub struct KindSpec {
     /// ranks stay as they are.
     pub rank: u16,
     /// Its relation to the agents of its world.
-    pub role: Role,
+    pub role: BodyRole,
     /// The drawing order: seen from above, higher layers cover lower ones.
     pub layer: u8,
     /// Its color.
@@ -31,14 +31,14 @@ pub struct KindSpec {
     /// The line around it.
     pub outline: Outline,
     /// Its lines in a legend.
-    pub legend: Legend,
+    pub legend: LegendTexts,
     /// Whether a mark on the body shows its heading.
     pub shows_heading: bool,
 }
 
 /// The relation of a kind of bodies to the agents of its world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Role {
+pub enum BodyRole {
     /// An agent, whose trajectory is recorded.
     Agent(TrailStyle),
     /// A part of a body whose parts are agents; pictures show the trails of its two ends.
@@ -113,7 +113,7 @@ pub enum Outline {
 
 /// The lines of a kind in a legend, by condition; empty for agents, which have names of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Legend {
+pub struct LegendTexts {
     /// The line of a body in plain condition.
     pub plain: &'static str,
     /// The line of a body with a velocity.
@@ -126,7 +126,7 @@ pub struct Legend {
     pub failed: &'static str,
 }
 
-impl Legend {
+impl LegendTexts {
     /// The lines of agents.
     pub const AGENT: Self = Self::new("");
 
@@ -153,18 +153,18 @@ impl BodyKind {
     }
 
     /// Its relation to the agents of its world.
-    pub const fn role(self) -> Role {
+    pub const fn role(self) -> BodyRole {
         self.0.role
     }
 
     /// Returns whether it is an agent, whose trajectory is recorded.
     pub const fn is_agent(self) -> bool {
-        matches!(self.0.role, Role::Agent(_) | Role::PartOfBody)
+        matches!(self.0.role, BodyRole::Agent(_) | BodyRole::PartOfBody)
     }
 
     /// Returns whether it is an agent, or lines through the parts of one.
     pub const fn is_of_agent(self) -> bool {
-        self.is_agent() || matches!(self.0.role, Role::LineThroughParts(_))
+        self.is_agent() || matches!(self.0.role, BodyRole::LineThroughParts(_))
     }
 }
 
@@ -215,12 +215,12 @@ impl Serialize for BodyKind {
 }
 
 thread_local! {
-    /// The kinds that the names in a text stand for while [`Kinds::while_reading`] reads it: Serde hands no context to the
+    /// The kinds that the names in a text stand for while [`Kinds::resolve_names_in`] reads it: Serde hands no context to the
     /// code that it derives.
     static READABLE: RefCell<Kinds> = const { RefCell::new(Kinds(Vec::new())) };
 }
 
-/// Reads a name; it stands for one of the kinds of [`Kinds::while_reading`].
+/// Reads a name; it stands for one of the kinds of [`Kinds::resolve_names_in`].
 impl<'de> Deserialize<'de> for BodyKind {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
@@ -236,11 +236,14 @@ impl BodyKind {
         name: "obstacle",
         noun: "obstacle",
         rank: 7,
-        role: Role::Thing,
+        role: BodyRole::Thing,
         layer: 1,
         paint: Paint::Solid,
         outline: Outline::ThinShade,
-        legend: Legend { moving: "moving obstacle (arrow: way of 1 s)", ..Legend::new("obstacle") },
+        legend: LegendTexts {
+            moving: "moving obstacle (arrow: way of 1 s)",
+            ..LegendTexts::new("obstacle")
+        },
         shows_heading: false,
     });
 
@@ -249,11 +252,11 @@ impl BodyKind {
         name: "goal",
         noun: "goal",
         rank: 8,
-        role: Role::Thing,
+        role: BodyRole::Thing,
         layer: 2,
         paint: Paint::ByNumber { opacity: 0.45 },
         outline: Outline::Shade,
-        legend: Legend::new("goal"),
+        legend: LegendTexts::new("goal"),
         shows_heading: false,
     });
 }
@@ -290,7 +293,7 @@ impl Kinds {
     }
 
     /// Reads a text with bodies, whose names of kinds stand for these: without this, the text of a body cannot be read.
-    pub fn while_reading<T>(&self, read: impl FnOnce() -> T) -> T {
+    pub fn resolve_names_in<T>(&self, read: impl FnOnce() -> T) -> T {
         let before = READABLE.replace(self.clone());
         let result = read();
         READABLE.set(before);
@@ -301,18 +304,18 @@ impl Kinds {
 /// Kinds for tests.
 #[cfg(test)]
 pub(super) mod samples {
-    use super::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+    use super::{BodyKind, BodyRole, KindSpec, LegendTexts, Outline, Paint, TrailStyle};
 
     /// A robot.
     pub(crate) const ROBOT: BodyKind = BodyKind::new(&KindSpec {
         name: "robot",
         noun: "robot",
         rank: 0,
-        role: Role::Agent(TrailStyle::OnePerColor),
+        role: BodyRole::Agent(TrailStyle::OnePerColor),
         layer: 5,
         paint: Paint::ByNumber { opacity: 1.0 },
         outline: Outline::Dark,
-        legend: Legend::AGENT,
+        legend: LegendTexts::AGENT,
         shows_heading: true,
     });
 
@@ -321,11 +324,11 @@ pub(super) mod samples {
         name: "connector",
         noun: "chain",
         rank: 3,
-        role: Role::PartOfBody,
+        role: BodyRole::PartOfBody,
         layer: 5,
         paint: Paint::ByNumber { opacity: 1.0 },
         outline: Outline::Seam,
-        legend: Legend::AGENT,
+        legend: LegendTexts::AGENT,
         shows_heading: false,
     });
 
@@ -334,11 +337,11 @@ pub(super) mod samples {
         name: "airplane",
         noun: "airplane",
         rank: 5,
-        role: Role::Agent(TrailStyle::Lines),
+        role: BodyRole::Agent(TrailStyle::Lines),
         layer: 5,
         paint: Paint::ByNumber { opacity: 1.0 },
         outline: Outline::White,
-        legend: Legend::AGENT,
+        legend: LegendTexts::AGENT,
         shows_heading: false,
     });
 }
@@ -367,8 +370,8 @@ mod tests {
         let text = serde_json::to_string(&id).expect("JSON");
         assert_eq!(text, r#"["airplane",7,null]"#);
         let read = || serde_json::from_str::<BodyId>(&text).ok();
-        assert_eq!(Kinds::new([ROBOT, AIRPLANE]).while_reading(read), Some(id));
-        assert_eq!(Kinds::new([ROBOT]).while_reading(read), None);
+        assert_eq!(Kinds::new([ROBOT, AIRPLANE]).resolve_names_in(read), Some(id));
+        assert_eq!(Kinds::new([ROBOT]).resolve_names_in(read), None);
         assert_eq!(read(), None);
     }
 }

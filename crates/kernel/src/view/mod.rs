@@ -14,16 +14,16 @@ mod pose;
 mod trails;
 
 pub use appearance::Appearance;
-pub use body::{Body, BodyId, Condition, Shape};
+pub use body::{Body, BodyCondition, BodyId, Shape};
 pub use color::{
     ALERT_COLOR, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR, WALL_COLOR,
     body_color,
 };
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
-pub use kind::{BodyKind, KindSpec, Kinds, Legend, Outline, Paint, Role, TrailStyle};
+pub use kind::{BodyKind, BodyRole, KindSpec, Kinds, LegendTexts, Outline, Paint, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
 pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
-pub use trails::{CoordinateColumn, PositionTableColumns, Trail, corner};
+pub use trails::{CoordinateColumn, PositionTableColumns, Trail, corner_of_move};
 
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
@@ -168,7 +168,7 @@ impl Scan {
     /// Returns the first and last bearing, and ranges at equal steps between them, as laser scans of ROS and Foxglove
     /// require. Beams that are not evenly spaced are put into a raster of degrees, in which directions without a beam
     /// have the range `no_beam`.
-    pub fn evenly_spaced(&self, no_beam: f64) -> (f64, f64, Vec<f64>) {
+    pub fn resample_evenly(&self, no_beam: f64) -> (f64, f64, Vec<f64>) {
         let Self { bearings_rad, ranges_m, .. } = self;
         let (Some(&first), Some(&last)) = (bearings_rad.first(), bearings_rad.last()) else {
             return (0.0, 0.0, Vec::new());
@@ -219,17 +219,18 @@ mod tests {
     #[test]
     fn evenly_spaced_beams_stay_as_they_are() {
         let bearings: Vec<f64> = (0..4).map(|k| f64::from(k) * FRAC_PI_2).collect();
-        let (first, last, ranges) = scan(&bearings, &[1.0, 2.0, 3.0, 4.0]).evenly_spaced(9.0);
+        let (first, last, ranges) = scan(&bearings, &[1.0, 2.0, 3.0, 4.0]).resample_evenly(9.0);
         assert_eq!((first, last), (0.0, 3.0 * FRAC_PI_2));
         assert_eq!(ranges, [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(scan(&[0.5], &[1.0]).evenly_spaced(9.0), (0.5, 0.5, vec![1.0]));
-        assert_eq!(scan(&[], &[]).evenly_spaced(9.0).2, Vec::<f64>::new());
+        assert_eq!(scan(&[0.5], &[1.0]).resample_evenly(9.0), (0.5, 0.5, vec![1.0]));
+        assert_eq!(scan(&[], &[]).resample_evenly(9.0).2, Vec::<f64>::new());
     }
 
     #[test]
     fn other_beams_keep_their_direction_in_a_raster_of_degrees() {
         let bearings = [90.0, 0.0, -10.0].map(f64::to_radians);
-        let (first, last, ranges) = scan(&bearings, &[3.0, 2.0, 1.0]).evenly_spaced(f64::INFINITY);
+        let (first, last, ranges) =
+            scan(&bearings, &[3.0, 2.0, 1.0]).resample_evenly(f64::INFINITY);
         assert!((first + 10f64.to_radians()).abs() < 1e-12);
         assert!((last - 90f64.to_radians()).abs() < 1e-12);
         assert_eq!((ranges.len(), ranges[0], ranges[10], ranges[100]), (101, 1.0, 2.0, 3.0));

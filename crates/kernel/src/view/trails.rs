@@ -1,7 +1,7 @@
 //! The trails of bodies, and the recorded rows from which they are made.
 
 use super::body::{Body, BodyId, Shape};
-use super::kind::{BodyKind, Role};
+use super::kind::{BodyKind, BodyRole};
 use super::pose::{Isometry2, Vec3};
 use super::{Frame, Scenery};
 use crate::ports::Values;
@@ -81,7 +81,7 @@ impl PositionTableColumns {
             let is_current = |last: &PositionRow| last.cycle + self.interval >= frame.cycle;
             if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
                 // A body that is gone has no shape in the frame, so that of its start is used.
-                let start = || scenery.bodies.iter().find(|body| is_start(body, id));
+                let start = || scenery.bodies.iter().find(|body| is_start_of(body, id));
                 let like = body.or_else(start);
                 let present = body.map(|body| (frame.cycle, body.pose.at_m));
                 trails.push(Trail { of: id, points: self.points(rows, like, present) });
@@ -174,8 +174,8 @@ impl PositionTableColumns {
     }
 }
 
-fn is_start(body: &Body, of: BodyId) -> bool {
-    body.kind.role() == Role::StartOf(of.kind) && body.number == of.number
+fn is_start_of(body: &Body, of: BodyId) -> bool {
+    body.kind.role() == BodyRole::StartOf(of.kind) && body.number == of.number
 }
 
 /// Appends a point, and before it the corner of the move from the previous one, whose position and heading are given.
@@ -185,7 +185,7 @@ fn push_with_corner(
     (cycle, at_m): (Cycle, Vec3),
 ) {
     if let Some((from_m, heading)) = previous {
-        let between_m = corner(from_m, heading, at_m);
+        let between_m = corner_of_move(from_m, heading, at_m);
         if between_m != from_m && between_m != at_m {
             points.push((cycle, between_m));
         }
@@ -207,7 +207,7 @@ impl CoordinateColumn {
 
 /// Returns the position between two others where a body was if it moved ahead before it slipped to a
 /// side: `heading` is the direction in which it left the first one, in quarter turns from east.
-pub fn corner(from: Vec3, heading: u32, to: Vec3) -> Vec3 {
+pub fn corner_of_move(from: Vec3, heading: u32, to: Vec3) -> Vec3 {
     if heading.is_multiple_of(2) { [to[0], from[1], from[2]] } else { [from[0], to[1], from[2]] }
 }
 
@@ -220,9 +220,9 @@ mod tests {
     #[test]
     fn a_slip_goes_ahead_before_it_goes_aside() {
         let (east, north) = (0, 1);
-        assert_eq!(corner([5.0, 5.0, 0.0], east, [6.0, 6.0, 0.0]), [6.0, 5.0, 0.0]);
-        assert_eq!(corner([5.0, 5.0, 0.0], north, [4.0, 6.0, 0.0]), [5.0, 6.0, 0.0]);
-        assert_eq!(corner([5.0, 5.0, 0.0], east, [5.0, 5.0, 0.0]), [5.0, 5.0, 0.0]);
+        assert_eq!(corner_of_move([5.0, 5.0, 0.0], east, [6.0, 6.0, 0.0]), [6.0, 5.0, 0.0]);
+        assert_eq!(corner_of_move([5.0, 5.0, 0.0], north, [4.0, 6.0, 0.0]), [5.0, 6.0, 0.0]);
+        assert_eq!(corner_of_move([5.0, 5.0, 0.0], east, [5.0, 5.0, 0.0]), [5.0, 5.0, 0.0]);
     }
 
     fn rows() -> PositionTableColumns {

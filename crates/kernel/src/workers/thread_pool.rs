@@ -85,10 +85,10 @@ impl ThreadPool {
         if self.workers == 1 || n <= 1 {
             return (0..n).for_each(own_task);
         }
-        let shared = Arc::clone(&self.threads().shared);
-        shared.start(n, task);
+        let shared = Arc::clone(&self.ensure_threads().shared);
+        shared.start_call(n, task);
         // A guard, because the threads must be done with the caller's data also when `own_task` unwinds.
-        let guard = JoinGuard(&shared);
+        let guard = CompletionWaitGuard(&shared);
         shared.do_share(0, n, &mut own_task);
         drop(guard);
         if shared.is_broken.load(Ordering::Relaxed) {
@@ -97,7 +97,7 @@ impl ThreadPool {
         }
     }
 
-    fn threads(&mut self) -> &PoolThreads {
+    fn ensure_threads(&mut self) -> &PoolThreads {
         let process = std::process::id();
         if let Some(threads) = self.threads.take() {
             if threads.process != process {
@@ -129,7 +129,7 @@ impl PoolThreads {
             let shared = Arc::clone(&shared);
             std::thread::Builder::new()
                 .name(format!("worker {index}"))
-                .spawn(move || shared.run_jobs(index))
+                .spawn(move || shared.run_thread_loop(index))
                 .expect("the system can start a thread");
         }
         Self { process, shared }
@@ -149,7 +149,7 @@ impl PoolState {
     }
 
     /// Resets the cursors before the call is visible, and wakes the threads.
-    fn start(&self, n: usize, task: Job) {
+    fn start_call(&self, n: usize, task: Job) {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.lock_call();
         call.number += 1;
@@ -161,10 +161,10 @@ impl PoolState {
     }
 
     /// Runs call after call on a thread, until the pool is dropped.
-    fn run_jobs(&self, index: usize) {
+    fn run_thread_loop(&self, index: usize) {
         let mut last_number = 0;
         loop {
-            poll_until(|| self.number.load(Ordering::Acquire) != last_number);
+            poll_briefly(|| self.number.load(Ordering::Acquire) != last_number);
             let mut call = self.lock_call();
             while (call.number == last_number || call.task.is_none()) && !call.is_last {
                 call = self.called.wait(call).unwrap_or_else(PoisonError::into_inner);
@@ -210,7 +210,7 @@ impl PoolState {
 }
 
 /// Returns early if a condition holds; callers check it again under the lock, and sleep if it does not.
-fn poll_until(mut condition: impl FnMut() -> bool) {
+fn poll_briefly(mut condition: impl FnMut() -> bool) {
     for _ in 0..POLLS_BEFORE_SLEEP {
         if condition() {
             return;
@@ -236,14 +236,14 @@ impl Drop for CompletionGuard<'_> {
 }
 
 /// A guard that waits until all threads that have started have finished their part.
-struct JoinGuard<'a>(&'a PoolState);
+struct CompletionWaitGuard<'a>(&'a PoolState);
 
-impl Drop for JoinGuard<'_> {
+impl Drop for CompletionWaitGuard<'_> {
     fn drop(&mut self) {
         // All numbers are taken: a thread that has not started, because its processor has other work, would find
         // nothing to do, and is not waited for.
         self.0.lock_call().task = None;
-        poll_until(|| self.0.is_idle());
+        poll_briefly(|| self.0.is_idle());
         let mut call = self.0.lock_call();
         while !self.0.is_idle() {
             call = self.0.done.wait(call).unwrap_or_else(PoisonError::into_inner);

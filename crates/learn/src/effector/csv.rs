@@ -359,7 +359,7 @@ mod tests {
             ("forward,1,0,720\n", (2, 13)),
         ];
         for (row, position) in cases {
-            assert_eq!(learned(row, 0.5).unwrap_err().position(), Some(position), "{row}");
+            assert_eq!(learned(row, 0.5).unwrap_err().line_and_column(), Some(position), "{row}");
         }
         assert!(learned("", 0.5).unwrap_err().cause().contains("no displacements"));
     }

@@ -83,7 +83,7 @@ fn with_section(
 fn parse(place: &str, text: &str) -> Result<DocumentMut, InputError> {
     let document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| {
         let error = InputError::new(place, e.message(), "write valid TOML");
-        e.span().map_or(error.clone(), |span| error.with_offset(text, span.start))
+        e.span().map_or(error.clone(), |span| error.with_byte_offset(text, span.start))
     })?;
     let format = document.get("format").and_then(Item::as_integer);
     if format != Some(i64::from(FORMAT)) || !document.contains_key("profile") {

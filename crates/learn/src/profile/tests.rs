@@ -68,7 +68,7 @@ fn adding_leaves_comments_and_other_sections_alone_and_replaces_its_own() {
 #[test]
 fn text_that_is_no_profile_is_refused() {
     let add = |text: &str, name: &str| with_sensor("p.toml", text, name, &sensor_model());
-    assert_eq!(add("format = 1\nx = [", "eye").unwrap_err().position().unwrap().0, 2);
+    assert_eq!(add("format = 1\nx = [", "eye").unwrap_err().line_and_column().unwrap().0, 2);
     assert!(add("", "eye").unwrap_err().remedy().contains("format = 1"));
     assert!(add("format = 2\nprofile = \"p\"\n", "eye").is_err());
     assert!(add("format = 1\nprofile = \"p\"\nsensors = 3\n", "eye").is_err());

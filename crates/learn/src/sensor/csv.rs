@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(model.report.distance_counts.0.row(0), [0.0, 1.0]);
         assert_eq!(model.report.distance3_counts, None);
         let error = learned(text, &SensorOptions::default()).unwrap_err();
-        assert_eq!(error.position(), Some((2, 13)));
+        assert_eq!(error.line_and_column(), Some((2, 13)));
         assert!(error.remedy().contains("d0, d1"));
     }
 
@@ -305,7 +305,7 @@ mod tests {
         ];
         for (row, position) in cases {
             let error = learned(&format!("{head}{row}"), &SensorOptions::default()).unwrap_err();
-            assert_eq!(error.position(), Some(position), "{row}");
+            assert_eq!(error.line_and_column(), Some(position), "{row}");
         }
         assert!(learned(head, &SensorOptions::default()).is_err(), "no readings");
         assert!(learned("true,reported\na,a\n", &SensorOptions::default()).is_err());

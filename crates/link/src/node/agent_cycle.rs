@@ -1,11 +1,11 @@
 //! One cycle of an agent at its node: packets out and in, until its control is ready.
 
-use crate::agent::{AgentProgram, ChannelModel, OutgoingPacket, PacketTiming, Transmission};
+use crate::agent::{AgentProgram, ChannelModel, OutgoingPacket, PacketInTransit, PacketTiming};
 use crate::messenger::Messenger;
 use crate::protocol::{
-    AdvanceDone, AdvanceGrant, ClockMode, Control, CycleStart, Message, Packet, PacketRecord,
+    AdvanceDone, AdvanceGrant, AgentPacket, ClockMode, Control, CycleStart, Message, PacketRecord,
 };
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use sidestep::kernel::{Cycle, EntityId};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ enum TimeMode {
 }
 
 /// What a cycle works with: the agent's program, and its connection to others.
-pub(super) struct AgentIo<'a> {
+pub(super) struct CycleResources<'a> {
     pub(super) program: &'a mut dyn AgentProgram,
     pub(super) channel: Option<&'a mut (dyn ChannelModel + 'static)>,
     pub(super) messenger: &'a mut Messenger,
@@ -47,15 +47,15 @@ pub(super) struct AgentCycle {
     /// Number of its next packet.
     sequence: u32,
     /// Packets that the program has not received yet, by the tick of their arrival.
-    arrived: BTreeMap<u64, Vec<(EntityId, Packet)>>,
+    arrived: BTreeMap<u64, Vec<(EntityId, AgentPacket)>>,
     /// Number of packets that the program has received.
     processed: u64,
     /// The tick to which it may advance.
     grant: Option<AdvanceGrant>,
     /// Delayed packets, by the time at which they leave, and in their order.
-    delayed: BTreeMap<(Instant, EntityId, u32), Packet>,
+    delayed: BTreeMap<(Instant, EntityId, u32), AgentPacket>,
     /// Packets that leave at the end of the step, by receiver.
-    outgoing: BTreeMap<EntityId, Vec<Packet>>,
+    outgoing: BTreeMap<EntityId, Vec<AgentPacket>>,
     /// Whether the first step was done, where time is counted in ticks.
     has_stepped: bool,
     /// Whether the server has closed the conversations.
@@ -117,7 +117,7 @@ impl AgentCycle {
     /// Sends the server the records of packets sent since the last call.
     pub(super) fn send_log(&mut self, messenger: &mut Messenger) {
         if let Some(log) = self.log.as_mut().filter(|log| !log.is_empty()) {
-            messenger.send_reliable(Peer::Server, Message::PacketLog(std::mem::take(log)));
+            messenger.send_reliable(PeerId::Server, Message::PacketLog(std::mem::take(log)));
         }
     }
 
@@ -137,11 +137,11 @@ impl AgentCycle {
         }
     }
 
-    pub(super) fn close(&mut self) {
+    pub(super) fn on_close(&mut self) {
         self.is_closed = true;
     }
 
-    pub(super) fn on_packet(&mut self, from: EntityId, packet: Packet) {
+    pub(super) fn on_packet(&mut self, from: EntityId, packet: AgentPacket) {
         // Where time is not counted in ticks, a packet arrives when it arrives.
         let arrives = if self.time == TimeMode::Ticks { packet.arrives } else { 0 };
         self.arrived.entry(arrives).or_default().push((from, packet));
@@ -170,7 +170,7 @@ impl AgentCycle {
     }
 
     /// Does everything that can be done now.
-    pub(super) fn advance(&mut self, io: &mut AgentIo<'_>) {
+    pub(super) fn advance(&mut self, io: &mut CycleResources<'_>) {
         match self.time {
             TimeMode::Untimed => {
                 self.process_tick(u64::MAX, io);
@@ -182,12 +182,12 @@ impl AgentCycle {
                 self.release_delayed();
             }
         }
-        self.flush_packets(io.messenger);
+        self.multicast_outgoing(io.messenger);
         self.send_control(io);
     }
 
     /// Sends the agent's control, once.
-    fn send_control(&mut self, io: &mut AgentIo<'_>) {
+    fn send_control(&mut self, io: &mut CycleResources<'_>) {
         // Where time is counted in ticks, an agent that is done still answers others until the server closes the cycle:
         // the numbers of messages, which are results, would else depend on which node is faster.
         let may_send = self.time != TimeMode::Ticks || self.is_closed;
@@ -198,11 +198,11 @@ impl AgentCycle {
         self.has_sent_control = true;
         self.send_log(io.messenger);
         let control = Control { cycle: self.number, control };
-        io.messenger.send_reliable(Peer::Server, Message::Control(control));
+        io.messenger.send_reliable(PeerId::Server, Message::Control(control));
     }
 
     /// Advances to the tick that the server has granted, once all packets that arrive by then are there.
-    fn advance_to_grant(&mut self, io: &mut AgentIo<'_>) {
+    fn advance_to_grant(&mut self, io: &mut CycleResources<'_>) {
         // The first step, in which the agent starts its conversation, needs no grant.
         if self.has_stepped {
             let Some(grant) = self.grant else { return };
@@ -223,15 +223,15 @@ impl AgentCycle {
             next_timer: io.program.next_timer(),
             is_done: io.program.is_done(),
         };
-        io.messenger.send_reliable(Peer::Server, Message::TickDone(report));
+        io.messenger.send_reliable(PeerId::Server, Message::TickDone(report));
     }
 
     /// Gives the program the packets that have arrived by a tick, does everything that is due, and sends the resulting
     /// packets. Returns the receivers of these, with the ticks of arrival.
-    fn process_tick(&mut self, by: u64, io: &mut AgentIo<'_>) -> Vec<(EntityId, u64)> {
+    fn process_tick(&mut self, by: u64, io: &mut CycleResources<'_>) -> Vec<(EntityId, u64)> {
         let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
-        let mut due: Vec<(EntityId, Packet)> = due.into_values().flatten().collect();
+        let mut due: Vec<(EntityId, AgentPacket)> = due.into_values().flatten().collect();
         // The order of one process, regardless of the order in which they have arrived here.
         due.sort_by_key(|(from, packet)| (packet.departs, *from, packet.sequence));
         self.processed += due.len() as u64;
@@ -252,7 +252,7 @@ impl AgentCycle {
     }
 
     /// Sends the program's packets.
-    fn send_all(&mut self, io: &mut AgentIo<'_>, sent: &mut Vec<(EntityId, u64)>) {
+    fn send_all(&mut self, io: &mut CycleResources<'_>, sent: &mut Vec<(EntityId, u64)>) {
         for packet in io.program.take_packets() {
             self.send(packet, io, sent);
         }
@@ -262,7 +262,7 @@ impl AgentCycle {
     fn send(
         &mut self,
         packet: OutgoingPacket,
-        io: &mut AgentIo<'_>,
+        io: &mut CycleResources<'_>,
         sent: &mut Vec<(EntityId, u64)>,
     ) {
         let bytes = packet.payload.len();
@@ -276,7 +276,7 @@ impl AgentCycle {
         for &to in &*packet.to {
             self.sent.packets += 1;
             self.sent.bytes += bytes as u64;
-            let transmission = Transmission { to, tick: draw_tick, sequence, bytes };
+            let transmission = PacketInTransit { to, tick: draw_tick, sequence, bytes };
             let mut arrivals = self.arrivals(&transmission, io);
             for arrival in &mut arrivals {
                 arrival.departs = self.tick + (arrival.departs - draw_tick);
@@ -286,14 +286,15 @@ impl AgentCycle {
             for PacketTiming { departs, arrives } in arrivals {
                 sent.push((to, arrives));
                 let payload = packet.payload.clone();
-                let packet = Packet { cycle: self.number, departs, sequence, arrives, payload };
+                let packet =
+                    AgentPacket { cycle: self.number, departs, sequence, arrives, payload };
                 self.schedule_packet(to, packet);
             }
         }
     }
 
     /// Returns the arrivals of a packet, counted from the tick for which its faults are drawn.
-    fn arrivals(&self, packet: &Transmission, io: &mut AgentIo<'_>) -> Vec<PacketTiming> {
+    fn arrivals(&self, packet: &PacketInTransit, io: &mut CycleResources<'_>) -> Vec<PacketTiming> {
         if self.out_of_range.binary_search(&packet.to).is_ok() {
             return Vec::new();
         }
@@ -303,7 +304,7 @@ impl AgentCycle {
         }
     }
 
-    fn log_packet(&mut self, packet: Transmission, arrivals: &[PacketTiming]) {
+    fn log_packet(&mut self, packet: PacketInTransit, arrivals: &[PacketTiming]) {
         let Some(log) = &mut self.log else { return };
         let first_arrival = arrivals.iter().map(|arrival| arrival.arrives).min();
         log.push(PacketRecord {
@@ -318,7 +319,7 @@ impl AgentCycle {
     }
 
     /// Schedules the sending of a packet: at the end of the step, or after its delay.
-    fn schedule_packet(&mut self, to: EntityId, packet: Packet) {
+    fn schedule_packet(&mut self, to: EntityId, packet: AgentPacket) {
         // One tick of delay is what the real network takes, so only the rest is waited for.
         let delay = packet.arrives.saturating_sub(self.tick + 1);
         match self.time {
@@ -340,10 +341,10 @@ impl AgentCycle {
 
     /// Sends the packets of a step: one message to all that get the same packets. A broadcast to a team is then encoded
     /// once, and published once.
-    fn flush_packets(&mut self, messenger: &mut Messenger) {
-        let mut multicasts: Vec<(Vec<Packet>, Vec<Peer>)> = Vec::new();
+    fn multicast_outgoing(&mut self, messenger: &mut Messenger) {
+        let mut multicasts: Vec<(Vec<AgentPacket>, Vec<PeerId>)> = Vec::new();
         for (to, packets) in std::mem::take(&mut self.outgoing) {
-            let to = Peer::Node(to);
+            let to = PeerId::Node(to);
             match multicasts.iter_mut().find(|(same, _)| *same == packets) {
                 Some((_, receivers)) => receivers.push(to),
                 None => multicasts.push((packets, vec![to])),

@@ -3,7 +3,7 @@
 use super::NodeError;
 use crate::messenger::{Messenger, ReceivedMessage};
 use crate::protocol::{JoinRequest, Message, Welcome};
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use std::time::{Duration, Instant};
 
 /// Time after which it asks again: the request or the answer to it may be lost.
@@ -25,22 +25,22 @@ pub struct JoinConfig {
 pub fn join(messenger: &mut Messenger, config: &JoinConfig) -> Result<Welcome, NodeError> {
     let until = Instant::now() + config.timeout;
     while Instant::now() < until {
-        messenger.send_best_effort(Peer::Server, Message::Join(config.join.clone()));
+        messenger.send_best_effort(PeerId::Server, Message::Join(config.join.clone()));
         let retry_at = Instant::now() + JOIN_RETRY_DELAY;
         while let Some(received) =
             messenger.receive(retry_at.saturating_duration_since(Instant::now()))
         {
             match received {
                 ReceivedMessage {
-                    from: Peer::Server,
+                    from: PeerId::Server,
                     message: Message::Welcome(welcome),
                     incarnation,
                 } => {
-                    messenger.connect(Peer::Server, incarnation);
+                    messenger.connect(PeerId::Server, incarnation);
                     return Ok(welcome);
                 }
                 ReceivedMessage {
-                    from: Peer::Server, message: Message::Refused(error), ..
+                    from: PeerId::Server, message: Message::Refused(error), ..
                 } => {
                     return Err(NodeError::Refused(error));
                 }

@@ -12,10 +12,10 @@ mod join;
 use crate::agent::{AgentActivity, AgentProgram, ChannelModel};
 use crate::messenger::{Messenger, ReceivedMessage};
 use crate::protocol::{
-    ClockMode, CycleStart, FleetMember, JoinError, Message, Packet, Status, Welcome,
+    AgentPacket, ClockMode, CycleStart, FleetMember, JoinError, Message, NodeStatusReport, Welcome,
 };
-use crate::wire::{Peer, WireError};
-use agent_cycle::{AgentCycle, AgentIo};
+use crate::wire::{PeerId, WireSetupError};
+use agent_cycle::{AgentCycle, CycleResources};
 pub use join::{JoinConfig, join};
 use sidestep::kernel::{Cycle, EntityId};
 use std::time::{Duration, Instant};
@@ -50,7 +50,7 @@ pub enum NodeError {
     Refused(JoinError),
     /// There is no wire.
     #[error(transparent)]
-    Wire(#[from] WireError),
+    Wire(#[from] WireSetupError),
     /// The server does not answer, or no longer.
     #[error("the server was not heard for {0} s")]
     ServerSilent(u64),
@@ -63,7 +63,7 @@ pub enum NodeError {
 }
 
 /// A listener for the status of a node, called whenever the status is sent to the server.
-type StatusListener = Box<dyn FnMut(&Status)>;
+type StatusListener = Box<dyn FnMut(&NodeStatusReport)>;
 
 /// A node that has joined a fleet.
 pub struct Node {
@@ -81,8 +81,8 @@ pub struct Node {
     is_ready: bool,
     cycle: Option<AgentCycle>,
     /// Packets of a cycle that has not started here.
-    early_packets: Vec<(EntityId, Packet)>,
-    status: Status,
+    early_packets: Vec<(EntityId, AgentPacket)>,
+    status: NodeStatusReport,
     /// The activity that was logged last, and its cycle: only changes are logged.
     logged_activity: (Cycle, &'static str),
     report_at: Instant,
@@ -114,7 +114,7 @@ impl Node {
             is_ready: false,
             cycle: None,
             early_packets: Vec::new(),
-            status: Status::default(),
+            status: NodeStatusReport::default(),
             logged_activity: Default::default(),
             report_at: Instant::now(),
             reopen_at: Instant::now(),
@@ -125,13 +125,13 @@ impl Node {
 
     /// Makes the node end when it has not heard the server for some time.
     #[must_use]
-    pub fn with_lease(self, lease: Duration) -> Self {
+    pub fn with_server_timeout(self, lease: Duration) -> Self {
         Self { lease, ..self }
     }
 
     /// Reports the status of the node to a listener as well, twice a second.
     #[must_use]
-    pub fn with_listener(self, listener: impl FnMut(&Status) + 'static) -> Self {
+    pub fn with_status_listener(self, listener: impl FnMut(&NodeStatusReport) + 'static) -> Self {
         Self { listener: Box::new(listener), ..self }
     }
 
@@ -139,7 +139,7 @@ impl Node {
     ///
     /// # Errors
     /// When the server is silent, has given the node up, or sends a percept that cannot be read.
-    pub fn run(mut self) -> Result<Status, NodeError> {
+    pub fn run(mut self) -> Result<NodeStatusReport, NodeError> {
         loop {
             let max_wait = self.cycle.as_ref().and_then(|cycle| cycle.max_wait(&*self.program));
             let wait = max_wait.map_or(POLL_INTERVAL, |wait| wait.min(POLL_INTERVAL));
@@ -149,7 +149,7 @@ impl Node {
             };
             self.advance();
             self.report_status();
-            let silent = self.messenger.silent_for(Peer::Server);
+            let silent = self.messenger.silent_for(PeerId::Server);
             // If this process was stopped, messages have queued up meanwhile: they are received before the server counts
             // as silent.
             if received == 0 && silent.is_some_and(|silent| silent > self.lease) {
@@ -164,10 +164,10 @@ impl Node {
             cycle.send_log(&mut self.messenger);
         }
         self.update_status();
-        self.messenger.send_reliable(Peer::Server, Message::Status(self.status.clone()));
-        self.messenger.send_reliable(Peer::Server, Message::Goodbye);
+        self.messenger.send_reliable(PeerId::Server, Message::Status(self.status.clone()));
+        self.messenger.send_reliable(PeerId::Server, Message::Goodbye);
         let until = Instant::now() + REPORT_INTERVAL;
-        while !self.messenger.has_delivered_to(Peer::Server) && Instant::now() < until {
+        while !self.messenger.has_delivered_to(PeerId::Server) && Instant::now() < until {
             self.messenger.receive(POLL_INTERVAL);
         }
     }
@@ -193,23 +193,23 @@ impl Node {
     /// Processes a message. Returns whether the fleet has ended.
     fn on_message(&mut self, received: ReceivedMessage) -> Result<bool, NodeError> {
         match (received.from, received.message) {
-            (Peer::Server, Message::End) => return Ok(true),
-            (Peer::Server, Message::Refused(error)) => return Err(NodeError::Dismissed(error)),
-            (Peer::Server, Message::Roster(members)) => self.on_roster(members)?,
-            (Peer::Server, Message::CycleStart(start)) => self.on_cycle_start(start)?,
-            (Peer::Server, Message::Grant(grant)) => {
+            (PeerId::Server, Message::End) => return Ok(true),
+            (PeerId::Server, Message::Refused(error)) => return Err(NodeError::Dismissed(error)),
+            (PeerId::Server, Message::Roster(members)) => self.on_roster(members)?,
+            (PeerId::Server, Message::CycleStart(start)) => self.on_cycle_start(start)?,
+            (PeerId::Server, Message::Grant(grant)) => {
                 if let Some(cycle) = &mut self.cycle {
                     cycle.on_grant(grant);
                 }
             }
-            (Peer::Server, Message::Close(number)) => {
+            (PeerId::Server, Message::Close(number)) => {
                 if let Some(cycle) =
                     self.cycle.as_mut().filter(|cycle| cycle.cycle_number() == number)
                 {
-                    cycle.close();
+                    cycle.on_close();
                 }
             }
-            (Peer::Node(from), Message::Packets(packets)) => {
+            (PeerId::Node(from), Message::Packets(packets)) => {
                 packets.into_iter().for_each(|packet| self.on_packet(from, packet));
             }
             // `Hello` and `Heartbeat` have done their work by arriving; all else is not for a node.
@@ -245,7 +245,7 @@ impl Node {
             if member.agent == self.agent || self.members.contains(member) {
                 continue;
             }
-            let peer = Peer::Node(member.agent);
+            let peer = PeerId::Node(member.agent);
             self.messenger.connect(peer, member.incarnation);
             self.messenger.send_reliable(peer, Message::Hello);
         }
@@ -253,7 +253,7 @@ impl Node {
         Ok(())
     }
 
-    fn on_packet(&mut self, from: EntityId, packet: Packet) {
+    fn on_packet(&mut self, from: EntityId, packet: AgentPacket) {
         let current = self.cycle.as_ref().map(AgentCycle::cycle_number);
         match &mut self.cycle {
             Some(cycle) if current == Some(packet.cycle) => cycle.on_packet(from, packet),
@@ -272,10 +272,10 @@ impl Node {
     fn advance(&mut self) {
         if !self.is_ready && !self.members.is_empty() && self.messenger.has_delivered() {
             self.is_ready = true;
-            self.messenger.send_reliable(Peer::Server, Message::Ready);
+            self.messenger.send_reliable(PeerId::Server, Message::Ready);
         }
         if let Some(cycle) = &mut self.cycle {
-            cycle.advance(&mut AgentIo {
+            cycle.advance(&mut CycleResources {
                 program: &mut *self.program,
                 channel: self.channel.as_deref_mut(),
                 messenger: &mut self.messenger,
@@ -314,7 +314,7 @@ impl Node {
         self.report_at = now + REPORT_INTERVAL;
         self.update_status();
         (self.listener)(&self.status);
-        self.messenger.send_best_effort(Peer::Server, Message::Status(self.status.clone()));
+        self.messenger.send_best_effort(PeerId::Server, Message::Status(self.status.clone()));
         self.repair_links(now);
     }
 

@@ -14,7 +14,7 @@ pub(super) fn check_encryption<'a>(
     tls: Option<&Tls>,
 ) -> Result<(), InputError> {
     tls.map_or(Ok(()), check_certificates)?;
-    check_endpoints(endpoints, tls)
+    check_endpoint_encryption(endpoints, tls)
 }
 
 /// Checks that the files exist, and are certificates that are valid today.
@@ -24,10 +24,10 @@ pub(super) fn check_encryption<'a>(
 fn check_certificates(tls: &Tls) -> Result<(), InputError> {
     for (option, file) in [("--tls-ca", &tls.authority), ("--tls-cert", &tls.certificate)] {
         let place = format!("{option} {}", file.display());
-        check_certificate(&place, &read(&place, file)?)?;
+        check_certificate(&place, &read_tls_file(&place, file)?)?;
     }
     let place = format!("--tls-key {}", tls.key.display());
-    let key = read(&place, &tls.key)?;
+    let key = read_tls_file(&place, &tls.key)?;
     if !String::from_utf8_lossy(&key).contains("PRIVATE KEY-----") {
         let remedy = "give the file that begins with -----BEGIN PRIVATE KEY-----";
         return Err(InputError::new(place, "there is no private key in it", remedy));
@@ -39,7 +39,7 @@ fn check_certificates(tls: &Tls) -> Result<(), InputError> {
 ///
 /// # Errors
 /// With the first endpoint for which that is not so.
-fn check_endpoints<'a>(
+fn check_endpoint_encryption<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
     tls: Option<&Tls>,
 ) -> Result<(), InputError> {
@@ -57,7 +57,7 @@ fn check_endpoints<'a>(
     Ok(())
 }
 
-fn read(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
+fn read_tls_file(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {
     std::fs::read(file)
         .map_err(|e| InputError::new(place, e.to_string(), "give a file that can be read"))
 }

@@ -131,7 +131,7 @@ impl NodeProcesses {
     ///
     /// # Errors
     /// When one cannot be started again.
-    pub(super) fn poll(
+    pub(super) fn poll_and_restart(
         &mut self,
         listens: impl Fn(EntityId) -> Option<Vec<String>>,
     ) -> Result<Vec<(EntityId, String)>, Error> {

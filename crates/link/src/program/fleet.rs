@@ -14,10 +14,10 @@ use crate::messenger::Messenger;
 use crate::protocol::{ClockMode, PacketRecord, Topology, Welcome};
 use crate::server::histogram::Histogram;
 use crate::server::{
-    FleetError, FleetServer, FleetView, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
+    FleetContext, FleetError, FleetServer, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
 };
-use crate::wire::Peer;
-use crate::wire::endpoint::{PortReservation, WireError, reserve_port, with_port};
+use crate::wire::PeerId;
+use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port, with_port};
 use crate::wire::view_server::ViewServer;
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::ports::RecordError;
@@ -55,8 +55,8 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&fleet_scene(run.simulation()));
-    let views = ViewPublisher::new(ViewServer::open(&wire, scene).map_err(endpoint_error)?);
-    let messenger = Messenger::new(Peer::Server, Box::new(wire));
+    let views = ViewPublisher::new(ViewServer::start(&wire, scene).map_err(endpoint_error)?);
+    let messenger = Messenger::new(PeerId::Server, Box::new(wire));
     let config = ServerConfig {
         scenario: fingerprint,
         build: WORLDS.build().into(),
@@ -76,7 +76,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let run_config = run.simulation().config();
     let mut supervisor = FleetSupervisor::new(children, parent, run_config.cycles, exporter, views);
     supervisor.packets = create_packet_table(job, &scenario.source.text, run_config.seed)?;
-    let mut run = HostedRun::new(run, scenario.world, &TracingWatcher);
+    let mut run = HostedRun::new(run, scenario.world, &WarningLogger);
     let (result, _) = FleetServer::new(messenger, &mut run, &mut supervisor, config).run();
     supervisor.children.shut_down();
     let result = result.and_then(|()| supervisor.finish_packets());
@@ -90,8 +90,8 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
 fn fleet_scene(run: &dyn Simulation) -> FleetScene {
     FleetScene {
         build: WORLDS.build().into(),
-        world: run.world().into(),
-        agent: run.agent().into(),
+        world: run.world_name().into(),
+        agent: run.agent_noun().into(),
         seed: run.config().seed,
         scenery: run.scenery(),
     }
@@ -118,7 +118,7 @@ fn create_packet_table(
 }
 
 /// Returns the endpoints at which the server listens, with a port in place of each 0.
-fn resolve_ports(listen: &[String]) -> Result<Vec<String>, WireError> {
+fn resolve_ports(listen: &[String]) -> Result<Vec<String>, WireSetupError> {
     // All ports are reserved at once, so that they differ; the server binds them right afterwards.
     let ports: Vec<PortReservation> =
         listen.iter().map(|endpoint| reserve_port(endpoint)).collect::<Result<_, _>>()?;
@@ -136,7 +136,7 @@ fn node_jobs(
         Topology::Mesh => vec![with_port(&connect[0], 0)],
         Topology::Star => Vec::new(),
     };
-    let count = job.nodes.unwrap_or(usize::MAX).min(world.count());
+    let count = job.nodes.unwrap_or(usize::MAX).min(world.agent_count());
     let mut jobs = BTreeMap::new();
     for agent in 0..count as EntityId {
         let job = NodeJob {
@@ -162,7 +162,7 @@ fn finish(
         // A recording that has failed would fail again.
         return Err(error);
     }
-    let summary = run.finish(&TracingWatcher)?;
+    let summary = run.finish(&WarningLogger)?;
     let folder = summary.folder.clone();
     let outcome = summary.outcome.clone();
     let summary = serde_json::to_value(&summary).expect("summaries are plain data");
@@ -185,9 +185,9 @@ fn finish(
 
 /// The watcher of the run, which only logs: the run advances by one cycle at a time, and the [`FleetSupervisor`] decides
 /// when to stop.
-struct TracingWatcher;
+struct WarningLogger;
 
-impl Watcher for TracingWatcher {
+impl Watcher for WarningLogger {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
     }
@@ -246,7 +246,7 @@ impl<'a> FleetSupervisor<'a> {
         stored.map_err(|e| FleetError::World(e.into()))
     }
 
-    fn update_status(&mut self, fleet: &FleetView<'_>) {
+    fn update_status(&mut self, fleet: &FleetContext<'_>) {
         // Two updates may follow each other at once, at the end.
         let passed_s = self.status_at.elapsed().as_secs_f64().max(1e-3);
         self.status_at = Instant::now();
@@ -273,7 +273,7 @@ impl<'a> FleetSupervisor<'a> {
     /// Returns the present state of a node, a number of seconds after the last status.
     fn node_status(
         &mut self,
-        fleet: &FleetView<'_>,
+        fleet: &FleetContext<'_>,
         agent: EntityId,
         node: &NodeEntry,
         passed_s: f64,
@@ -281,7 +281,7 @@ impl<'a> FleetSupervisor<'a> {
         let status = &node.status;
         let last_traffic = self.traffic.insert(agent, (status.packets, status.bytes));
         let (last_packets, last_bytes) = last_traffic.unwrap_or_default();
-        let silent = fleet.messenger.silent_for(Peer::Node(agent));
+        let silent = fleet.messenger.silent_for(PeerId::Node(agent));
         let state = match &node.member {
             None => "awaited",
             Some(_) if node.is_lost => "gone",
@@ -313,7 +313,7 @@ impl<'a> FleetSupervisor<'a> {
         }
     }
 
-    fn report(&mut self, fleet: &FleetView<'_>) {
+    fn report(&mut self, fleet: &FleetContext<'_>) {
         self.update_status(fleet);
         self.exporter.replace_text(|| fleet_metrics(&self.status, fleet));
         print_message(&LinkMessage::Fleet(self.status.clone()));
@@ -324,7 +324,7 @@ impl<'a> FleetSupervisor<'a> {
 }
 
 impl ServerHooks for FleetSupervisor<'_> {
-    fn on_poll(&mut self, fleet: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
+    fn on_poll(&mut self, fleet: &FleetContext<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
         if self.parent.has_ended() {
             return Err(FleetError::Interrupted);
         }
@@ -338,14 +338,14 @@ impl ServerHooks for FleetSupervisor<'_> {
             self.report_at = Instant::now() + REPORT_INTERVAL;
             self.report(fleet);
         }
-        let ended = self.children.poll(|agent| {
+        let ended = self.children.poll_and_restart(|agent| {
             let member = fleet.nodes.get(&agent)?.member.as_ref()?;
             Some(member.listens.clone())
         })?;
         // A node that ends before it has joined would end again: its job is wrong.
         if let Some((agent, reason)) = ended.first().filter(|_| !fleet.has_begun) {
             return Err(FleetError::NodeLost {
-                agent: fleet.run.agent_label(*agent),
+                agent: fleet.run.agent_display_name(*agent),
                 cycle: fleet.run.cycle(),
                 reason: reason.clone(),
             });
@@ -353,7 +353,7 @@ impl ServerHooks for FleetSupervisor<'_> {
         Ok(ended)
     }
 
-    fn on_end(&mut self, fleet: &FleetView<'_>) {
+    fn on_end(&mut self, fleet: &FleetContext<'_>) {
         self.update_status(fleet);
         self.views.publish_view(&self.status, true);
     }
@@ -362,7 +362,7 @@ impl ServerHooks for FleetSupervisor<'_> {
         self.views.wants_frame(cycle)
     }
 
-    fn on_frame(&mut self, frame: Frame) {
+    fn on_view_frame(&mut self, frame: Frame) {
         self.status.cycle = frame.cycle;
         self.views.push_frame(frame);
         self.views.publish_view(&self.status, false);

@@ -1,9 +1,9 @@
 //! Metrics in Prometheus' text format (version 0.0.4), served at an address.
 
-use crate::protocol::Status;
+use crate::protocol::NodeStatusReport;
 use crate::server::histogram::Histogram;
-use crate::server::{FleetView, ServerMetrics};
-use crate::wire::http_text::serve;
+use crate::server::{FleetContext, ServerMetrics};
+use crate::wire::http_text::serve_http_text;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
 use std::fmt::Write;
@@ -21,7 +21,7 @@ impl MetricsExporter {
     pub(super) fn serve_at(address: Option<&str>) -> Result<Self, InputError> {
         let Some(address) = address else { return Ok(Self::default()) };
         let text = Arc::new(Mutex::new(String::new()));
-        serve(address, text.clone()).map_err(|e| {
+        serve_http_text(address, text.clone()).map_err(|e| {
             let remedy = "give --metrics HOST:PORT with a free port of this machine";
             InputError::new(format!("--metrics {address}"), e.to_string(), remedy)
         })?;
@@ -77,7 +77,7 @@ impl MetricsText {
 }
 
 /// Returns the metrics that the server's address serves: its own, and those of all nodes.
-pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetView<'_>) -> String {
+pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetContext<'_>) -> String {
     let mut text = MetricsText::default();
     text.push_header("cycle", "gauge", "Cycles done.");
     text.push_sample("cycle", "", status.cycle);
@@ -187,7 +187,7 @@ const NODE_METRICS: [NodeMetric; 8] = [
     },
 ];
 
-fn push_node_metrics(text: &mut MetricsText, status: &FleetStatus, fleet: &FleetView<'_>) {
+fn push_node_metrics(text: &mut MetricsText, status: &FleetStatus, fleet: &FleetContext<'_>) {
     for NodeMetric { name, kind, help, value } in &NODE_METRICS {
         let values =
             status.nodes.iter().map(|node| (format_label(&status.noun, &node.name), value(node)));
@@ -207,7 +207,7 @@ fn format_label(name: &str, value: &str) -> String {
 }
 
 /// Adds the counts of the nodes' messengers, by the labels of their agents.
-fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]) {
+fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &NodeStatusReport)]) {
     let retries = statuses.iter().map(|(agent, status)| (agent.clone(), status.retries as f64));
     text.push_per_agent(
         "retries_total",
@@ -229,7 +229,7 @@ fn push_messenger_metrics(text: &mut MetricsText, statuses: &[(String, &Status)]
 }
 
 /// Returns the metrics that a node's own address serves.
-pub(super) fn node_metrics(agent: &AgentName, status: &Status) -> String {
+pub(super) fn node_metrics(agent: &AgentName, status: &NodeStatusReport) -> String {
     let mut text = MetricsText::default();
     let agent = format_label(&agent.noun, &agent.to_string());
     text.push_header("node_cycle", "gauge", "The cycle that a node is in.");

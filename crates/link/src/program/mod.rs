@@ -66,24 +66,24 @@ fn program_and_build() -> String {
 fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
-            check_and_start_log(&job.common, &job.listen)?;
+            apply_common_settings(&job.common, &job.listen)?;
             fleet::run(&job, &ParentMonitor::watch_stdin())
         }
         Job::Node(job) => {
-            check_and_start_log(&job.common, job.connect.iter().chain(&job.listen))?;
+            apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
             ParentMonitor::exit_with_parent();
             node::run(&job)
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
             certificates::check_encryption(&job.connect, job.tls.as_ref())?;
-            watch::watch(&job, &ParentMonitor::watch_stdin())
+            watch::watch_fleet(&job, &ParentMonitor::watch_stdin())
         }
     }
 }
 
 /// Checks the options that server and nodes share, and starts their log.
-fn check_and_start_log<'a>(
+fn apply_common_settings<'a>(
     common: &CommonSettings,
     endpoints: impl IntoIterator<Item = &'a String>,
 ) -> Result<(), Error> {

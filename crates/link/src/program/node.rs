@@ -5,8 +5,8 @@ use super::scenario::Scenario;
 use crate::messenger::Messenger;
 use crate::node::{JoinConfig, Node, NodeError, join};
 use crate::protocol::{JoinError, JoinRequest, Topology};
-use crate::wire::Peer;
-use crate::wire::endpoint::{PortReservation, WireError, reserve_port};
+use crate::wire::PeerId;
+use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port};
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
 use sidestep::worlds::WORLDS;
@@ -20,7 +20,7 @@ use std::time::Duration;
 /// When anything is wrong with the job, or the server is gone.
 pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
-    let agent = scenario.world.find(&job.agent)?;
+    let agent = scenario.world.find_agent(&job.agent)?;
     let ports: Vec<PortReservation> = job
         .listen
         .iter()
@@ -38,10 +38,10 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
         process: std::process::id(),
     };
     let wire =
-        ZenohWire::node_wire(Peer::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
+        ZenohWire::node_wire(PeerId::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
             .map_err(endpoint_error)?
             .with_listeners(ports);
-    let mut messenger = Messenger::new(Peer::Node(agent), Box::new(wire));
+    let mut messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
     let welcome = join(&mut messenger, &JoinConfig { join: request, timeout })
         .map_err(|e| node_error(e, job))?;
     // Only the server knows the topology.
@@ -57,29 +57,29 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
     let node = Node::new(agent, messenger, program, channel, &welcome)
-        .with_lease(Duration::from_secs_f64(job.common.lease_s))
-        .with_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)));
+        .with_server_timeout(Duration::from_secs_f64(job.common.lease_s))
+        .with_status_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)));
     node.run().map(drop).map_err(|e| node_error(e, job))
 }
 
 /// Converts the error of a wire that could not be made.
-pub(super) fn endpoint_error(error: WireError) -> Error {
+pub(super) fn endpoint_error(error: WireSetupError) -> Error {
     let cause = error.to_string();
     match error {
-        WireError::NoEndpoint(endpoint) => {
+        WireSetupError::NoEndpoint(endpoint) => {
             let remedy = "write it as tcp/HOST:PORT, or tls/HOST:PORT with certificates";
             InputError::new(endpoint, cause, remedy).into()
         }
-        WireError::Taken { endpoint, .. } => {
+        WireSetupError::Taken { endpoint, .. } => {
             let remedy = "end what listens there, or give another port; 0 stands for any free one";
             InputError::new(endpoint, cause, remedy).into()
         }
-        WireError::Distrust { endpoint, .. } => {
+        WireSetupError::Distrust { endpoint, .. } => {
             let remedy = "have the certificates of all parties made by one authority, for the names or addresses at \
                           which they are reached, and give them by --tls-ca, --tls-cert and --tls-key";
             InputError::new(endpoint, cause, remedy).into()
         }
-        WireError::NoAnswer { .. } => {
+        WireSetupError::NoAnswer { .. } => {
             let remedy = "start the fleet first, and see whether its address can be reached; where it asks for \
                           certificates, give --tls-ca, --tls-cert and --tls-key";
             Error::other(cause, remedy)

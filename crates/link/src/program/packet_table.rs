@@ -74,7 +74,7 @@ impl PacketTable {
     }
 
     fn write_block(&mut self) -> Result<(), RecordError> {
-        let block = self.table.block(&self.rows);
+        let block = self.table.block_from_rows(&self.rows);
         self.rows.clear();
         self.recorder.append(0, &block)
     }

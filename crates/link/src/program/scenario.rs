@@ -64,7 +64,7 @@ impl Scenario {
             overrides.push("record.controls=true".to_string());
         }
         if let ClockMode::Realtime { speed } = clock {
-            overrides.extend(self.world.timeout_override(speed));
+            overrides.extend(self.world.response_timeout_override(speed));
         }
         overrides
     }

@@ -20,7 +20,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// When there is no reply, the fleet is of another build, or it has fallen silent.
-pub(super) fn watch(job: &WatchJob, parent: &ParentMonitor) -> Result<(), Error> {
+pub(super) fn watch_fleet(job: &WatchJob, parent: &ParentMonitor) -> Result<(), Error> {
     let timeout = Duration::from_secs_f64(job.patience_s);
     let client =
         ViewClient::new(&job.connect, job.tls.as_ref(), timeout).map_err(endpoint_error)?;
@@ -28,11 +28,11 @@ pub(super) fn watch(job: &WatchJob, parent: &ParentMonitor) -> Result<(), Error>
     let Some(scene) = poller.poll_until_answered(|| client.query_scene())? else { return Ok(()) };
     // Before the rest is read: the scene of another build may have another form.
     check_build(&scene, job)?;
-    print_message(&LinkMessage::Scene(Box::new(read::<FleetScene>(&scene, job)?)));
+    print_message(&LinkMessage::Scene(Box::new(parse_reply::<FleetScene>(&scene, job)?)));
     let mut number = 0;
     while let Some(text) = poller.poll_until_answered(|| client.query_view(number))? {
         if !text.is_empty() {
-            let view: FleetFrame = read(&text, job)?;
+            let view: FleetFrame = parse_reply(&text, job)?;
             let is_over = view.is_over;
             number = view.number;
             print_message(&LinkMessage::Seen(Box::new(view)));
@@ -76,8 +76,8 @@ impl ViewPoller<'_> {
     }
 }
 
-fn read<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
-    WORLDS.kinds().while_reading(|| serde_json::from_str(text)).map_err(|e| {
+fn parse_reply<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
+    WORLDS.kinds().resolve_names_in(|| serde_json::from_str(text)).map_err(|e| {
         let remedy = "see whether this is the address of a fleet's server";
         InputError::new(job.connect.join(", "), format!("its view cannot be read: {e}"), remedy)
             .into()
@@ -90,7 +90,7 @@ fn check_build(scene: &str, job: &WatchJob) -> Result<(), Error> {
     struct SceneBuild {
         build: String,
     }
-    let SceneBuild { build } = read(scene, job)?;
+    let SceneBuild { build } = parse_reply(scene, job)?;
     if build == job.build {
         return Ok(());
     }

@@ -2,7 +2,7 @@
 
 use super::{FleetError, FleetServer, NodeEntry};
 use crate::protocol::{FleetMember, Incarnation, JoinError, JoinRequest, Message};
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use sidestep::kernel::EntityId;
 
 /// A refusal of a node.
@@ -25,7 +25,7 @@ impl FleetServer<'_> {
     /// # Errors
     /// When the fleet is asked to end.
     pub(super) fn wait_for_nodes(&mut self) -> Result<(), FleetError> {
-        self.wait_for_all()?;
+        self.wait_until_all_ready()?;
         tracing::info!(nodes = self.nodes.len(), "all nodes are there");
         Ok(())
     }
@@ -36,21 +36,21 @@ impl FleetServer<'_> {
             let JoinError { cause, remedy } = &error;
             tracing::warn!(agent, process = join.process, cause, remedy, "a node is refused");
             *self.metrics.refused.entry(reason).or_default() += 1;
-            self.messenger.reply(Peer::Node(agent), incarnation, Message::Refused(error));
+            self.messenger.reply(PeerId::Node(agent), incarnation, Message::Refused(error));
             return;
         }
         let is_known = self.nodes[&agent].incarnation() == Some(incarnation);
-        self.messenger.connect(Peer::Node(agent), incarnation);
+        self.messenger.connect(PeerId::Node(agent), incarnation);
         let welcome = Message::Welcome(self.config.welcome.clone());
-        self.messenger.reply(Peer::Node(agent), incarnation, welcome);
+        self.messenger.reply(PeerId::Node(agent), incarnation, welcome);
         if is_known {
             return;
         }
         let process = join.process;
         if let Some(node) = self.nodes.get_mut(&agent) {
-            node.assign(FleetMember { agent, incarnation, listens: join.listens }, process);
+            node.record_join(FleetMember { agent, incarnation, listens: join.listens }, process);
         }
-        let who = self.run.agent_label(agent);
+        let who = self.run.agent_display_name(agent);
         tracing::info!(agent, who, process, "a node has joined");
         self.send_roster();
     }
@@ -61,7 +61,7 @@ impl FleetServer<'_> {
         let Some(members) = members.collect::<Option<Vec<FleetMember>>>() else { return };
         let joined: Vec<EntityId> = self.joined_agents().collect();
         for agent in joined {
-            self.messenger.send_reliable(Peer::Node(agent), Message::Roster(members.clone()));
+            self.messenger.send_reliable(PeerId::Node(agent), Message::Roster(members.clone()));
         }
     }
 
@@ -77,12 +77,12 @@ impl FleetServer<'_> {
             let cause = format!("the fleet has no agent {agent}");
             return Err(JoinRefusal::new("unknown", cause, &self.run.world().agent_hint()));
         };
-        self.check_program(join)?;
-        self.check_entry(entry, incarnation, join)
+        self.check_build_and_scenario(join)?;
+        self.check_agent_free(entry, incarnation, join)
     }
 
     /// Refuses a node of another build or scenario.
-    fn check_program(&self, join: &JoinRequest) -> Result<(), JoinRefusal> {
+    fn check_build_and_scenario(&self, join: &JoinRequest) -> Result<(), JoinRefusal> {
         if join.build != self.config.build {
             let cause = format!(
                 "the server is of sidestep {}, this node of {}",
@@ -109,13 +109,13 @@ impl FleetServer<'_> {
     }
 
     /// Refuses a node whose agent has another one, or cannot get one again.
-    fn check_entry(
+    fn check_agent_free(
         &self,
         entry: &NodeEntry,
         incarnation: Incarnation,
         join: &JoinRequest,
     ) -> Result<(), JoinRefusal> {
-        let who = self.run.agent_label(join.agent);
+        let who = self.run.agent_display_name(join.agent);
         if entry.incarnation().is_some_and(|present| present != incarnation) {
             let cause = format!("{who} has a node already (process {})", entry.process);
             let noun = self.run.world().name(join.agent).noun;

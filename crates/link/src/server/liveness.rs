@@ -2,7 +2,7 @@
 
 use super::{FleetError, FleetServer, POLL_INTERVAL};
 use crate::protocol::{ClockMode, Incarnation, JoinError, Message};
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ pub const SILENCE_TIMEOUT: Duration = Duration::from_secs(1);
 impl FleetServer<'_> {
     /// Returns whether a node that has joined was not heard for longer than some time.
     pub(super) fn is_silent(&self, agent: EntityId, time: Duration) -> bool {
-        self.messenger.silent_for(Peer::Node(agent)).is_some_and(|silent| silent > time)
+        self.messenger.silent_for(PeerId::Node(agent)).is_some_and(|silent| silent > time)
     }
 
     /// Returns whether an agent has no node, because none has joined or it is lost.
@@ -41,8 +41,8 @@ impl FleetServer<'_> {
             return Ok(());
         };
         node.is_lost = true;
-        self.messenger.disconnect(Peer::Node(agent));
-        let who = self.run.agent_label(agent);
+        self.messenger.disconnect(PeerId::Node(agent));
+        let who = self.run.agent_display_name(agent);
         let cycle = self.run.cycle();
         tracing::warn!(agent, who, cycle, reason, "a node is gone");
         if self.has_begun && !self.allows_rejoin() {
@@ -62,7 +62,7 @@ impl FleetServer<'_> {
                     .into(),
                 remedy: "start it again".into(),
             };
-            self.messenger.reply(Peer::Node(agent), incarnation, Message::Refused(error));
+            self.messenger.reply(PeerId::Node(agent), incarnation, Message::Refused(error));
         }
     }
 
@@ -70,7 +70,7 @@ impl FleetServer<'_> {
     ///
     /// # Errors
     /// When the fleet is asked to end.
-    pub(super) fn wait_for_all(&mut self) -> Result<(), FleetError> {
+    pub(super) fn wait_until_all_ready(&mut self) -> Result<(), FleetError> {
         while !self.nodes.values().all(|node| node.is_ready && !node.is_lost) {
             self.receive(POLL_INTERVAL)?;
         }
@@ -89,7 +89,7 @@ impl FleetServer<'_> {
             }
         }
         for &agent in waits_for.iter().filter(|agent| !self.waits_for.contains(agent)) {
-            let who = self.run.agent_label(agent);
+            let who = self.run.agent_display_name(agent);
             let cycle = self.run.cycle();
             tracing::warn!(agent, who, cycle, "all wait for a node that is not heard");
         }

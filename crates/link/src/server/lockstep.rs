@@ -11,13 +11,13 @@ impl FleetServer<'_> {
     /// When a node that the fleet needs is lost, the world cannot advance, or the fleet is asked to end.
     pub(super) fn run_lockstep_cycle(&mut self) -> Result<(), FleetError> {
         // No cycle starts while a node is missing: only the one under way at its loss is computed without it.
-        self.wait_for_all()?;
+        self.wait_until_all_ready()?;
         let started = Instant::now();
         loop {
             let groups = self.send_percepts();
             let is_last = groups.is_empty() || self.run.max_further_rounds(groups.len()) == 0;
             if self.config.has_faults {
-                self.run_ticks(&groups)?;
+                self.run_group_conversations(&groups)?;
             }
             while !groups.iter().all(|group| self.has_decided(group)) {
                 self.receive(POLL_INTERVAL)?;

@@ -24,7 +24,7 @@ use crate::messenger::{Messenger, ReceivedMessage};
 use crate::protocol::{
     AdvanceDone, ClockMode, Message, PacketRecord, ScenarioFingerprint, Welcome,
 };
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use histogram::Histogram;
 pub use liveness::SILENCE_TIMEOUT;
 pub use node_entry::NodeEntry;
@@ -77,7 +77,7 @@ pub enum FleetError {
 }
 
 /// The state of the fleet, as its [`ServerHooks`] see it.
-pub struct FleetView<'a> {
+pub struct FleetContext<'a> {
     /// The nodes, by their agents.
     pub nodes: &'a BTreeMap<EntityId, NodeEntry>,
     /// The counts of the server.
@@ -98,7 +98,7 @@ pub trait ServerHooks {
     ///
     /// # Errors
     /// When the fleet is to end.
-    fn on_poll(&mut self, fleet: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError>;
+    fn on_poll(&mut self, fleet: &FleetContext<'_>) -> Result<Vec<(EntityId, String)>, FleetError>;
 
     /// Receives the records of packets that nodes have sent, where all are recorded: those of the cycles before the
     /// present one, each with its sender.
@@ -110,10 +110,10 @@ pub trait ServerHooks {
     }
 
     /// Receives a frame that a viewer waits for.
-    fn on_frame(&mut self, _: Frame) {}
+    fn on_view_frame(&mut self, _: Frame) {}
 
     /// Inspects the fleet when all nodes have said goodbye.
-    fn on_end(&mut self, _: &FleetView<'_>) {}
+    fn on_end(&mut self, _: &FleetContext<'_>) {}
 }
 
 /// Counts of a server.
@@ -219,7 +219,7 @@ impl<'a> FleetServer<'a> {
         self.hooks.on_packets(std::mem::take(&mut self.packets));
         self.waits_for.clear();
         self.publish_frame();
-        let (hooks, view) = self.hooks_and_view();
+        let (hooks, view) = self.hooks_and_context();
         hooks.on_end(&view);
     }
 
@@ -228,9 +228,9 @@ impl<'a> FleetServer<'a> {
         self.nodes.iter().filter(|(_, node)| node.incarnation().is_some()).map(|(&agent, _)| agent)
     }
 
-    fn send_to_joined(&mut self, send: impl Fn(&mut Messenger, Peer)) {
+    fn send_to_joined(&mut self, send: impl Fn(&mut Messenger, PeerId)) {
         let joined: Vec<EntityId> = self.joined_agents().collect();
-        joined.into_iter().for_each(|agent| send(&mut self.messenger, Peer::Node(agent)));
+        joined.into_iter().for_each(|agent| send(&mut self.messenger, PeerId::Node(agent)));
     }
 
     /// Receives the messages that arrive within some time, at most until the next poll.
@@ -249,12 +249,12 @@ impl<'a> FleetServer<'a> {
                 self.on_message(received);
             }
             self.poll_at = now + POLL_INTERVAL;
-            self.poll(now)?;
+            self.run_periodic_tasks(now)?;
         }
         Ok(())
     }
 
-    fn poll(&mut self, now: Instant) -> Result<(), FleetError> {
+    fn run_periodic_tasks(&mut self, now: Instant) -> Result<(), FleetError> {
         if now >= self.heartbeat_at {
             self.heartbeat_at = now + HEARTBEAT_INTERVAL;
             self.send_to_joined(|messenger, node| {
@@ -262,7 +262,7 @@ impl<'a> FleetServer<'a> {
             });
         }
         self.publish_frame();
-        let (hooks, view) = self.hooks_and_view();
+        let (hooks, view) = self.hooks_and_context();
         let mut lost = hooks.on_poll(&view)?;
         let lease = self.config.lease;
         for agent in self.joined_agents().filter(|&agent| self.is_silent(agent, lease)) {
@@ -276,8 +276,8 @@ impl<'a> FleetServer<'a> {
     }
 
     /// Returns the hooks, and the state of the fleet that is shown to them.
-    fn hooks_and_view(&mut self) -> (&mut dyn ServerHooks, FleetView<'_>) {
-        let view = FleetView {
+    fn hooks_and_context(&mut self) -> (&mut dyn ServerHooks, FleetContext<'_>) {
+        let view = FleetContext {
             nodes: &self.nodes,
             metrics: &self.metrics,
             messenger: &self.messenger,
@@ -291,12 +291,12 @@ impl<'a> FleetServer<'a> {
     /// Gives viewers a frame if they wait for one.
     fn publish_frame(&mut self) {
         if self.hooks.wants_frame(self.run.cycle()) {
-            self.hooks.on_frame(self.run.frame());
+            self.hooks.on_view_frame(self.run.frame());
         }
     }
 
     fn on_message(&mut self, ReceivedMessage { from, incarnation, message }: ReceivedMessage) {
-        let Peer::Node(agent) = from else { return };
+        let PeerId::Node(agent) = from else { return };
         if let Message::Join(join) = message {
             self.on_join(agent, incarnation, join);
             return;

@@ -1,6 +1,6 @@
 //! What the server knows of the node of an agent.
 
-use crate::protocol::{FleetMember, Incarnation, Status};
+use crate::protocol::{FleetMember, Incarnation, NodeStatusReport};
 
 /// The entry of an agent in the server's list of nodes.
 #[derive(Debug, Default)]
@@ -12,7 +12,7 @@ pub struct NodeEntry {
     /// Whether all other nodes have acknowledged the node's `Hello`.
     pub is_ready: bool,
     /// The last status reported by the node.
-    pub status: Status,
+    pub status: NodeStatusReport,
     /// Whether the node is lost: it has ended, or was not heard for too long.
     pub is_lost: bool,
     /// Whether the node has said goodbye.
@@ -38,7 +38,7 @@ impl NodeEntry {
 
     /// Records that a node has joined, in place of any other. The same node may join more than once, because its first
     /// answer may be lost.
-    pub fn assign(&mut self, member: FleetMember, process: u32) {
+    pub fn record_join(&mut self, member: FleetMember, process: u32) {
         let is_new =
             self.member.as_ref().is_none_or(|known| known.incarnation != member.incarnation);
         // A new process has received no `Hello` yet. One that only repeats its request stays as ready as it was.

@@ -66,7 +66,7 @@ impl FleetServer<'_> {
         groups: &[DecisionGroup],
         until: Instant,
     ) -> Result<bool, FleetError> {
-        while self.is_any_missing(groups) {
+        while self.is_any_control_missing(groups) {
             let remaining = until.saturating_duration_since(Instant::now());
             if remaining.is_zero() {
                 return Ok(false);
@@ -77,7 +77,7 @@ impl FleetServer<'_> {
     }
 
     /// Returns whether the control of an agent that has a node is missing.
-    fn is_any_missing(&self, groups: &[DecisionGroup]) -> bool {
+    fn is_any_control_missing(&self, groups: &[DecisionGroup]) -> bool {
         let mut agents = groups.iter().flatten();
         agents.any(|&agent| !self.has_no_node(agent) && !self.has_control(agent))
     }

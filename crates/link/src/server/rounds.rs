@@ -4,7 +4,7 @@
 use super::{FleetError, FleetServer};
 use crate::agent::{AgentPercept, InvalidControl, SerializedControls};
 use crate::protocol::{Control, Message};
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use sidestep::kernel::EntityId;
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ impl FleetServer<'_> {
         self.nodes.values_mut().for_each(|node| node.control = None);
         let mut groups = Vec::new();
         for AgentPercept { agent, group, start } in self.run.percepts() {
-            self.messenger.send_reliable(Peer::Node(agent), Message::CycleStart(start));
+            self.messenger.send_reliable(PeerId::Node(agent), Message::CycleStart(start));
             // Each member has the whole group: it is taken from the first one.
             if group.first() == Some(&agent) {
                 groups.push(group);
@@ -58,7 +58,7 @@ impl FleetServer<'_> {
 
     /// Takes the control of an agent, if there is one that counts.
     fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
-        let counts = !self.has_no_node(agent) || self.run.world().keeps_controls_of_lost_nodes();
+        let counts = !self.has_no_node(agent) || self.run.world().accepts_controls_of_lost_nodes();
         let node = self.nodes.get_mut(&agent)?;
         let control = node.control.take().filter(|_| counts)?;
         node.carried_out += 1;
@@ -67,7 +67,7 @@ impl FleetServer<'_> {
 
     fn record_late(&mut self, agent: EntityId) {
         let Some(node) = self.nodes.get_mut(&agent) else { return };
-        let who = self.run.agent_label(agent);
+        let who = self.run.agent_display_name(agent);
         let cycle = self.run.cycle();
         tracing::info!(agent, who, cycle, talk = &*node.status.activity, "a control is late");
         node.late += 1;
@@ -93,7 +93,7 @@ impl FleetServer<'_> {
     /// Counts controls that [`FleetServer::take_control`] has counted as carried out, and were not.
     fn record_invalid(&mut self, invalid: Vec<InvalidControl>) {
         for InvalidControl { agent, reason } in invalid {
-            let who = self.run.agent_label(agent);
+            let who = self.run.agent_display_name(agent);
             let cycle = self.run.cycle();
             tracing::warn!(agent, who, cycle, reason, "an invalid control");
             self.metrics.invalid_controls += 1;
@@ -111,7 +111,7 @@ mod tests {
     use crate::hosted_run::HostedRun;
     use crate::messenger::Messenger;
     use crate::protocol::{ClockMode, FleetMember, Incarnation, Topology, Welcome};
-    use crate::server::{FleetView, ServerConfig, ServerHooks};
+    use crate::server::{FleetContext, ServerConfig, ServerHooks};
     use crate::wire::memory::MemoryHub;
     use crate::worlds::distributed_world;
     use sidestep::scenario::Source;
@@ -131,7 +131,7 @@ mod tests {
     struct NoHooks;
 
     impl ServerHooks for NoHooks {
-        fn on_poll(&mut self, _: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
+        fn on_poll(&mut self, _: &FleetContext<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
             Ok(Vec::new())
         }
     }
@@ -191,13 +191,15 @@ mod tests {
         let percepts = run.percepts();
         let controls = decide(run, &percepts);
         let mut hooks = NoHooks;
-        let messenger =
-            Messenger::new(Peer::Server, Box::new(MemoryHub::default().peer_wire(Peer::Server)));
+        let messenger = Messenger::new(
+            PeerId::Server,
+            Box::new(MemoryHub::default().open_wire(PeerId::Server)),
+        );
         let mut server = FleetServer::new(messenger, run, &mut hooks, config());
         server.has_begun = true;
         for agent in 0..3 {
             let member = FleetMember { agent, incarnation: Incarnation(1), listens: Vec::new() };
-            server.nodes.get_mut(&agent).expect("an entry").assign(member, 0);
+            server.nodes.get_mut(&agent).expect("an entry").record_join(member, 0);
         }
         let groups = server.send_percepts();
         for (agent, control) in controls {

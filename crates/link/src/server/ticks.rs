@@ -9,13 +9,13 @@
 use super::rounds::DecisionGroup;
 use super::{FleetError, FleetServer, POLL_INTERVAL};
 use crate::protocol::{AdvanceDone, AdvanceGrant, Message};
-use crate::wire::Peer;
+use crate::wire::PeerId;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 
 /// A node's time in a cycle, as far as the server knows it.
 #[derive(Debug, Default)]
-struct NodeClock {
+struct NodeTickState {
     /// The tick of its next timer, by its last report.
     next_timer: Option<u64>,
     /// Number of packets that will arrive at it, by tick.
@@ -27,7 +27,7 @@ struct NodeClock {
     is_advancing: bool,
 }
 
-impl NodeClock {
+impl NodeTickState {
     /// Returns the next tick in which something happens.
     fn next_tick(&self) -> Option<u64> {
         let next_arrival = self.arrivals.keys().next().copied();
@@ -46,17 +46,17 @@ impl NodeClock {
 
 /// The clocks of the nodes of one group. Groups do not talk to each other, so each has ticks of its own.
 #[derive(Debug, Default)]
-struct GroupClock {
-    nodes: BTreeMap<EntityId, NodeClock>,
+struct GroupTickScheduler {
+    nodes: BTreeMap<EntityId, NodeTickState>,
     is_over: bool,
 }
 
-impl GroupClock {
+impl GroupTickScheduler {
     fn new(group: &[EntityId]) -> Self {
         let mut nodes = BTreeMap::new();
         for &agent in group {
             // Nodes do their first tick without a grant.
-            nodes.insert(agent, NodeClock { is_advancing: true, ..NodeClock::default() });
+            nodes.insert(agent, NodeTickState { is_advancing: true, ..NodeTickState::default() });
         }
         Self { nodes, is_over: false }
     }
@@ -81,7 +81,7 @@ impl GroupClock {
         if self.is_over || self.nodes.values().any(|node| node.is_advancing) {
             return Vec::new();
         }
-        let next = self.nodes.values().filter_map(NodeClock::next_tick).min();
+        let next = self.nodes.values().filter_map(NodeTickState::next_tick).min();
         // A timer that never ends is in the last tick there is.
         let next = next.filter(|&tick| tick < u64::MAX);
         let is_done = self.nodes.values().all(|node| node.is_done);
@@ -105,10 +105,13 @@ impl FleetServer<'_> {
     ///
     /// # Errors
     /// When a node that the fleet needs is lost, or the fleet is asked to end.
-    pub(super) fn run_ticks(&mut self, groups: &[DecisionGroup]) -> Result<(), FleetError> {
+    pub(super) fn run_group_conversations(
+        &mut self,
+        groups: &[DecisionGroup],
+    ) -> Result<(), FleetError> {
         let cycle = self.run.cycle();
-        let mut clocks: Vec<GroupClock> =
-            groups.iter().map(|group| GroupClock::new(group)).collect();
+        let mut clocks: Vec<GroupTickScheduler> =
+            groups.iter().map(|group| GroupTickScheduler::new(group)).collect();
         while clocks.iter().any(|clock| !clock.is_over) {
             self.receive(POLL_INTERVAL)?;
             for clock in &mut clocks {
@@ -130,14 +133,14 @@ impl FleetServer<'_> {
         Ok(())
     }
 
-    fn send_grants(&mut self, clock: &mut GroupClock) {
+    fn send_grants(&mut self, clock: &mut GroupTickScheduler) {
         let cycle = self.run.cycle();
         for (agent, grant) in clock.advance(cycle) {
-            self.messenger.send_reliable(Peer::Node(agent), Message::Grant(grant));
+            self.messenger.send_reliable(PeerId::Node(agent), Message::Grant(grant));
         }
         if clock.is_over {
             for &agent in clock.nodes.keys() {
-                self.messenger.send_reliable(Peer::Node(agent), Message::Close(cycle));
+                self.messenger.send_reliable(PeerId::Node(agent), Message::Close(cycle));
             }
         }
     }

@@ -4,7 +4,7 @@ use std::net::{TcpListener, ToSocketAddrs};
 
 /// The reason why there is no wire.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum WireError {
+pub enum WireSetupError {
     /// An address cannot be bound.
     #[error("cannot listen at {endpoint}: {reason}")]
     Taken {
@@ -38,8 +38,8 @@ pub enum WireError {
 ///
 /// # Errors
 /// When the text is no endpoint.
-pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireError> {
-    parse_endpoint(endpoint).ok_or_else(|| WireError::NoEndpoint(endpoint.into()))
+pub fn host_and_port(endpoint: &str) -> Result<(&str, u16), WireSetupError> {
+    parse_endpoint(endpoint).ok_or_else(|| WireSetupError::NoEndpoint(endpoint.into()))
 }
 
 fn parse_endpoint(endpoint: &str) -> Option<(&str, u16)> {
@@ -70,7 +70,7 @@ const PORT_COUNT: u16 = 12_000;
 ///
 /// # Errors
 /// When it cannot be bound, or the text is no endpoint.
-pub fn reserve_port(endpoint: &str) -> Result<PortReservation, WireError> {
+pub fn reserve_port(endpoint: &str) -> Result<PortReservation, WireSetupError> {
     let (host, port) = host_and_port(endpoint)?;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     if port > 0 {
@@ -106,10 +106,10 @@ pub fn with_port(endpoint: &str, port: u16) -> String {
 }
 
 /// Checks that an endpoint can be bound.
-pub(super) fn check_vacant(endpoint: &str) -> Result<(), WireError> {
+pub(super) fn check_vacant(endpoint: &str) -> Result<(), WireSetupError> {
     reserve_port(endpoint).map(drop)
 }
 
-pub(super) fn endpoint_in_use(endpoints: &[String], reason: String) -> WireError {
-    WireError::Taken { endpoint: endpoints.join(", "), reason }
+pub(super) fn endpoint_in_use(endpoints: &[String], reason: String) -> WireSetupError {
+    WireSetupError::Taken { endpoint: endpoints.join(", "), reason }
 }

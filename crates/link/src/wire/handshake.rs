@@ -31,7 +31,7 @@ pub(super) fn certificate_problem(endpoint: &str, tls: &Tls) -> Option<String> {
     // The other end checks this one's certificate last, after this one's handshake is complete: an alert with its verdict
     // arrives only as the first thing that is read. A timeout means that it has accepted.
     let read = Stream::new(&mut connection, &mut stream).read(&mut [0]);
-    describe_error(read.err()?, tls)
+    describe_certificate_error(read.err()?, tls)
 }
 
 fn tls_client_config(tls: &Tls) -> Result<ClientConfig, Error> {
@@ -57,7 +57,7 @@ fn pem_error(error: pem::Error) -> Error {
 }
 
 /// Describes the failure of a handshake, if certificates are the reason.
-fn describe_error(error: io::Error, tls: &Tls) -> Option<String> {
+fn describe_certificate_error(error: io::Error, tls: &Tls) -> Option<String> {
     match error.get_ref()?.downcast_ref::<Error>()? {
         Error::AlertReceived(alert) => {
             let own = tls.certificate.display();

@@ -16,7 +16,7 @@ const MAX_REQUEST_BYTES: usize = 4096;
 ///
 /// # Errors
 /// When the address cannot be bound.
-pub fn serve(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
+pub fn serve_http_text(address: &str, text: Arc<Mutex<String>>) -> io::Result<()> {
     let listener = TcpListener::bind(address)?;
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {

@@ -18,16 +18,16 @@ pub mod memory;
 pub mod view_server;
 pub mod zenoh;
 
-pub use crate::peer::Peer;
+pub use crate::peer::PeerId;
 use crate::protocol::FleetMember;
-pub use endpoint::WireError;
+pub use endpoint::WireSetupError;
 use sidestep::kernel::EntityId;
 use std::time::Duration;
 
 /// A carrier of frames between peers. A frame may be lost without notice.
 pub trait Wire: Send {
     /// Sends a frame to other peers, without waiting for them. Further peers may receive it, too.
-    fn send(&mut self, to: &[Peer], frame: &[u8]);
+    fn send(&mut self, to: &[PeerId], frame: &[u8]);
 
     /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none arrives.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
@@ -36,7 +36,11 @@ pub trait Wire: Send {
     ///
     /// # Errors
     /// When an endpoint cannot be bound.
-    fn connect_mesh(&mut self, _me: EntityId, _members: &[FleetMember]) -> Result<(), WireError> {
+    fn connect_mesh(
+        &mut self,
+        _me: EntityId,
+        _members: &[FleetMember],
+    ) -> Result<(), WireSetupError> {
         Ok(())
     }
 
@@ -50,13 +54,13 @@ pub trait Wire: Send {
     ///
     /// # Errors
     /// When an endpoint cannot be bound again: there are no direct links then, and the call can be repeated.
-    fn reopen_links(&mut self) -> Result<(), WireError> {
+    fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         Ok(())
     }
 }
 
 impl<W: Wire + ?Sized> Wire for Box<W> {
-    fn send(&mut self, to: &[Peer], frame: &[u8]) {
+    fn send(&mut self, to: &[PeerId], frame: &[u8]) {
         (**self).send(to, frame);
     }
 
@@ -64,7 +68,11 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
         (**self).receive(within)
     }
 
-    fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
+    fn connect_mesh(
+        &mut self,
+        me: EntityId,
+        members: &[FleetMember],
+    ) -> Result<(), WireSetupError> {
         (**self).connect_mesh(me, members)
     }
 
@@ -72,7 +80,7 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
         (**self).is_half_open(member, within)
     }
 
-    fn reopen_links(&mut self) -> Result<(), WireError> {
+    fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         (**self).reopen_links()
     }
 }

@@ -3,7 +3,7 @@
 //! Nothing is pushed, and each viewer has at most one query in flight: so a viewer that is slow, or has stopped, gets fewer
 //! views and slows nobody. Views are made only while there are queries.
 
-use super::endpoint::WireError;
+use super::endpoint::WireSetupError;
 use super::zenoh::{ZenohWire, open_query_session};
 use sidestep_session::fleet::Tls;
 use std::fmt;
@@ -41,7 +41,7 @@ struct LatestView {
 
 impl LatestView {
     /// Returns the view if it is newer than the one that the viewer has, else an empty text.
-    fn fetch(&mut self, after: u64) -> String {
+    fn fetch_if_newer(&mut self, after: u64) -> String {
         self.last_query = Some(Instant::now());
         if self.number <= after {
             return String::new();
@@ -73,7 +73,7 @@ impl ViewServer {
     ///
     /// # Errors
     /// When the wire is closed.
-    pub fn open(wire: &ZenohWire, scene: String) -> Result<Self, WireError> {
+    pub fn start(wire: &ZenohWire, scene: String) -> Result<Self, WireSetupError> {
         let session = wire.server_session().clone();
         let latest = Arc::new(Mutex::new(LatestView::default()));
         let scenes = session
@@ -86,7 +86,7 @@ impl ViewServer {
             .declare_queryable(VIEW_KEY)
             .callback(move |query| {
                 let after = query.parameters().get("after").and_then(|number| number.parse().ok());
-                let text = lock(&queried).fetch(after.unwrap_or(0));
+                let text = lock(&queried).fetch_if_newer(after.unwrap_or(0));
                 reply(&query, text);
             })
             .wait()
@@ -120,8 +120,8 @@ impl ViewServer {
     }
 }
 
-fn closed_wire_error(error: &zenoh::Error) -> WireError {
-    WireError::Taken { endpoint: VIEW_KEY.into(), reason: error.to_string() }
+fn closed_wire_error(error: &zenoh::Error) -> WireSetupError {
+    WireSetupError::Taken { endpoint: VIEW_KEY.into(), reason: error.to_string() }
 }
 
 fn reply(query: &Query, text: String) {
@@ -143,7 +143,11 @@ impl ViewClient {
     ///
     /// # Errors
     /// When none of them answers within some time.
-    pub fn new(connect: &[String], tls: Option<&Tls>, within: Duration) -> Result<Self, WireError> {
+    pub fn new(
+        connect: &[String],
+        tls: Option<&Tls>,
+        within: Duration,
+    ) -> Result<Self, WireSetupError> {
         open_query_session(connect, tls, within).map(Self)
     }
 

@@ -6,8 +6,10 @@
 
 mod echo;
 
-use super::endpoint::{PortReservation, WireError, check_vacant, endpoint_in_use, host_and_port};
-use super::{Peer, Wire, handshake};
+use super::endpoint::{
+    PortReservation, WireSetupError, check_vacant, endpoint_in_use, host_and_port,
+};
+use super::{PeerId, Wire, handshake};
 use crate::protocol::FleetMember;
 use echo::EchoProbes;
 use sidestep::kernel::EntityId;
@@ -51,7 +53,7 @@ struct ZenohConfig<'a> {
 impl ZenohConfig<'_> {
     /// Returns the keys of Zenoh's configuration, as JSON. Its queues by priority stay, although each link has eight
     /// of them with buffers: without them (`transport/unicast/qos/enabled`) links become half-open now and then.
-    fn keys(&self) -> Vec<(&'static str, String)> {
+    fn json_entries(&self) -> Vec<(&'static str, String)> {
         let connected = self.connected_within.map_or(-1, |within| within.as_millis() as i64);
         let mut keys = vec![
             ("mode", format!("{:?}", self.mode)),
@@ -101,7 +103,7 @@ impl ZenohConfig<'_> {
 
     fn open(&self) -> Result<Session, String> {
         let mut config = Config::default();
-        for (key, value) in self.keys() {
+        for (key, value) in self.json_entries() {
             config.insert_json5(key, &value).map_err(|e| format!("{key} = {value}: {e}"))?;
         }
         zenoh::open(config).wait().map_err(|e| e.to_string())
@@ -110,7 +112,7 @@ impl ZenohConfig<'_> {
 
 /// A wire over one or two Zenoh sessions.
 pub struct ZenohWire {
-    me: Peer,
+    me: PeerId,
     /// Frames that have arrived, over any session.
     frames: Receiver<Vec<u8>>,
     frame_sender: Sender<Vec<u8>>,
@@ -124,7 +126,7 @@ pub struct ZenohWire {
     ports: Vec<PortReservation>,
     tls: Option<Tls>,
     /// All other nodes, in ascending order.
-    other_nodes: Vec<Peer>,
+    other_nodes: Vec<PeerId>,
     /// The endpoints of the mesh to which this node opens links.
     connect: Vec<String>,
     /// The id of this node in the mesh, which all its sessions there share; 0 before the first.
@@ -137,7 +139,7 @@ pub struct ZenohWire {
 
 /// A session, and the keys of the peers reached over it.
 struct ZenohLink {
-    keys: BTreeMap<Peer, KeyExpr<'static>>,
+    keys: BTreeMap<PeerId, KeyExpr<'static>>,
     _subscribers: Vec<Subscriber<()>>,
     session: Session,
 }
@@ -160,7 +162,7 @@ impl fmt::Debug for ZenohWire {
 }
 
 /// The key under which frames for a peer are published.
-fn peer_key(to: Peer) -> String {
+fn peer_key(to: PeerId) -> String {
     format!("sidestep/{to}")
 }
 
@@ -168,14 +170,14 @@ fn peer_key(to: Peer) -> String {
 fn subscribe(
     session: &Session,
     key: &str,
-    me: Peer,
+    me: PeerId,
     frames: &Sender<Vec<u8>>,
     echoes: &EchoProbes,
 ) -> Result<Subscriber<()>, String> {
     let frames = frames.clone();
     let is_echo = match me {
-        Peer::Node(agent) => Some(echoes.handler(agent, session.clone())),
-        Peer::Server => None,
+        PeerId::Node(agent) => Some(echoes.handler(agent, session.clone())),
+        PeerId::Server => None,
     };
     let subscriber = session.declare_subscriber(key).callback(move |sample: Sample| {
         if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
@@ -189,25 +191,25 @@ fn subscribe(
 impl ZenohLink {
     fn new(
         session: Session,
-        me: Peer,
+        me: PeerId,
         frames: &Sender<Vec<u8>>,
         echoes: &EchoProbes,
     ) -> Result<Self, String> {
         let mut subscribers = Vec::new();
         // Other sessions learn of the subscriptions in this order: so one that can reach this peer by its own key reaches it
         // with broadcasts, too. Broadcasts are for nodes only.
-        if me != Peer::Server {
+        if me != PeerId::Server {
             subscribers.push(subscribe(&session, BROADCAST_KEY, me, frames, echoes)?);
         }
         subscribers.push(subscribe(&session, &peer_key(me), me, frames, echoes)?);
         Ok(Self { keys: BTreeMap::new(), _subscribers: subscribers, session })
     }
 
-    fn send(&mut self, to: Peer, frame: &[u8]) {
+    fn send(&mut self, to: PeerId, frame: &[u8]) {
         let key = self.keys.entry(to).or_insert_with(|| {
             KeyExpr::try_from(peer_key(to)).expect("a path of letters and digits is a key")
         });
-        put_frame(&self.session, key, frame, None);
+        publish_to_key(&self.session, key, frame, None);
     }
 
     /// Returns whether there is a link to another node that shows signs of life, even if nothing else arrives through it.
@@ -220,12 +222,12 @@ impl ZenohLink {
     /// Sends a frame to all nodes that this session reaches, except itself.
     fn broadcast(&self, frame: &[u8]) {
         let key = KeyExpr::try_from(BROADCAST_KEY).expect("a path of letters is a key");
-        put_frame(&self.session, &key, frame, None);
+        publish_to_key(&self.session, &key, frame, None);
     }
 }
 
 /// Publishes a frame, or with an attachment a probe.
-fn put_frame(
+fn publish_to_key(
     session: &Session,
     key: &KeyExpr<'_>,
     frame: &[u8],
@@ -242,12 +244,11 @@ impl ZenohWire {
     ///
     /// # Errors
     /// When one of them cannot be bound.
-    pub fn server_wire(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireError> {
+    pub fn server_wire(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireSetupError> {
         // Zenoh's own error names no endpoint.
         listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
         let config = ZenohConfig { mode: "router", listen, tls, ..ZenohConfig::default() };
-        Self::with_one_session(Peer::Server, &config)
-            .map_err(|reason| endpoint_in_use(listen, reason))
+        Self::from_config(PeerId::Server, &config).map_err(|reason| endpoint_in_use(listen, reason))
     }
 
     /// Returns the wire of a node to its server, at one of some endpoints.
@@ -255,21 +256,21 @@ impl ZenohWire {
     /// # Errors
     /// When none of them answers within some time, or a certificate is rejected.
     pub fn node_wire(
-        me: Peer,
+        me: PeerId,
         connect: &[String],
         tls: Option<&Tls>,
         within: Duration,
-    ) -> Result<Self, WireError> {
+    ) -> Result<Self, WireSetupError> {
         check_trust(connect, tls)?;
         let config = client_config(connect, tls, within);
-        Self::with_one_session(me, &config).map_err(|reason| {
+        Self::from_config(me, &config).map_err(|reason| {
             // At the first check the other end may not have listened yet.
             let endpoint = connect.join(", ");
-            check_trust(connect, tls).err().unwrap_or(WireError::NoAnswer { endpoint, reason })
+            check_trust(connect, tls).err().unwrap_or(WireSetupError::NoAnswer { endpoint, reason })
         })
     }
 
-    fn with_one_session(me: Peer, config: &ZenohConfig<'_>) -> Result<Self, String> {
+    fn from_config(me: PeerId, config: &ZenohConfig<'_>) -> Result<Self, String> {
         let (frame_sender, frames) = channel();
         let echoes = EchoProbes::default();
         let hub = ZenohLink::new(config.open()?, me, &frame_sender, &echoes)?;
@@ -296,7 +297,7 @@ impl ZenohWire {
         Self { listens, ports, ..self }
     }
 
-    fn open_mesh(&mut self) -> Result<(), WireError> {
+    fn open_mesh(&mut self) -> Result<(), WireSetupError> {
         // Reserved until now, so that no other program gets them.
         self.ports.clear();
         // An id of its own each time: others may not have noticed yet that the session before is closed, and reject a second
@@ -350,19 +351,19 @@ pub(super) fn open_query_session(
     connect: &[String],
     tls: Option<&Tls>,
     within: Duration,
-) -> Result<Session, WireError> {
+) -> Result<Session, WireSetupError> {
     for endpoint in connect {
         host_and_port(endpoint)?;
     }
     client_config(connect, tls, within)
         .open()
-        .map_err(|reason| WireError::NoAnswer { endpoint: connect.join(", "), reason })
+        .map_err(|reason| WireSetupError::NoAnswer { endpoint: connect.join(", "), reason })
 }
 
 impl Wire for ZenohWire {
-    fn send(&mut self, to: &[Peer], frame: &[u8]) {
+    fn send(&mut self, to: &[PeerId], frame: &[u8]) {
         let link = match &mut self.mesh {
-            Some(mesh) if !to.contains(&Peer::Server) => mesh,
+            Some(mesh) if !to.contains(&PeerId::Server) => mesh,
             _ => &mut self.hub,
         };
         // To more than half of the nodes one broadcast is cheaper than a frame for each, although some nodes receive it in
@@ -379,8 +380,12 @@ impl Wire for ZenohWire {
         self.frames.recv_timeout(within).ok()
     }
 
-    fn connect_mesh(&mut self, me: EntityId, members: &[FleetMember]) -> Result<(), WireError> {
-        let others = members.iter().map(|member| Peer::Node(member.agent));
+    fn connect_mesh(
+        &mut self,
+        me: EntityId,
+        members: &[FleetMember],
+    ) -> Result<(), WireSetupError> {
+        let others = members.iter().map(|member| PeerId::Node(member.agent));
         self.other_nodes = others.filter(|&peer| peer != self.me).collect();
         self.other_nodes.sort_unstable();
         // An open session reconnects to returning nodes by itself.
@@ -395,11 +400,12 @@ impl Wire for ZenohWire {
     }
 
     fn is_half_open(&mut self, member: &FleetMember, within: Duration) -> bool {
-        let (Some(mesh), Peer::Node(me)) = (&self.mesh, self.me) else { return false };
-        mesh.is_open_to(member) && self.echoes.probe(&mesh.session, me, member.agent, within)
+        let (Some(mesh), PeerId::Node(me)) = (&self.mesh, self.me) else { return false };
+        mesh.is_open_to(member)
+            && self.echoes.probe_and_check_timeout(&mesh.session, me, member.agent, within)
     }
 
-    fn reopen_links(&mut self) -> Result<(), WireError> {
+    fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         if let Some(mesh) = self.mesh.take() {
             // Unsent frames are lost, like frames in transit.
             let _ = mesh.session.close().wait();
@@ -422,7 +428,7 @@ impl Wire for ZenohWire {
 ///
 /// # Errors
 /// With the problem of the first endpoint, if certificates are rejected at every one.
-fn check_trust(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
+fn check_trust(connect: &[String], tls: Option<&Tls>) -> Result<(), WireSetupError> {
     let Some(tls) = tls else { return Ok(()) };
     let mut first_problem = None;
     for endpoint in connect {
@@ -430,7 +436,7 @@ fn check_trust(connect: &[String], tls: Option<&Tls>) -> Result<(), WireError> {
             // One endpoint that can be reached is enough.
             return Ok(());
         };
-        let problem = WireError::Distrust { endpoint: endpoint.clone(), reason };
+        let problem = WireSetupError::Distrust { endpoint: endpoint.clone(), reason };
         first_problem.get_or_insert(problem);
     }
     first_problem.map_or(Ok(()), Err)

@@ -9,11 +9,11 @@ use sidestep_link::distributed::DistributedWorld;
 use sidestep_link::hosted_run::HostedRun;
 use sidestep_link::messenger::Messenger;
 use sidestep_link::node::{JoinConfig, Node, NodeError, join};
-use sidestep_link::protocol::{ClockMode, JoinRequest, Status, Topology, Welcome};
+use sidestep_link::protocol::{ClockMode, JoinRequest, NodeStatusReport, Topology, Welcome};
 use sidestep_link::server::{
-    FleetError, FleetServer, FleetView, ServerConfig, ServerHooks, ServerMetrics,
+    FleetContext, FleetError, FleetServer, ServerConfig, ServerHooks, ServerMetrics,
 };
-use sidestep_link::wire::{Peer, Wire};
+use sidestep_link::wire::{PeerId, Wire};
 use sidestep_link::worlds::{distributed_world, fingerprint};
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths};
 use std::sync::Arc;
@@ -104,7 +104,7 @@ pub(crate) fn run_in_one_process(text: &str) -> RunResult {
 pub(crate) struct NoHooks;
 
 impl ServerHooks for NoHooks {
-    fn on_poll(&mut self, _: &FleetView<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
+    fn on_poll(&mut self, _: &FleetContext<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
         Ok(Vec::new())
     }
 }
@@ -115,7 +115,7 @@ pub(crate) struct FleetSetup<'a> {
     pub(crate) topology: Topology,
     pub(crate) lease: Duration,
     /// The wire of each peer.
-    pub(crate) wire: &'a dyn Fn(Peer) -> Box<dyn Wire>,
+    pub(crate) wire: &'a dyn Fn(PeerId) -> Box<dyn Wire>,
     /// Endpoints at which a node is reached.
     pub(crate) listens: &'a dyn Fn(EntityId) -> Vec<String>,
     pub(crate) hooks: &'a mut dyn ServerHooks,
@@ -192,10 +192,11 @@ pub(crate) fn run_in_threads(
     let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
     let mut run = HostedRun::new(run, world.clone(), &NoWatcher);
-    let messenger = Messenger::new(Peer::Server, (setup.wire)(Peer::Server));
-    let nodes: Vec<JoinHandle<Result<Status, NodeError>>> = (0..world.count() as EntityId)
+    let messenger = Messenger::new(PeerId::Server, (setup.wire)(PeerId::Server));
+    let nodes: Vec<JoinHandle<Result<NodeStatusReport, NodeError>>> = (0..world.agent_count()
+        as EntityId)
         .map(|agent| {
-            let messenger = Messenger::new(Peer::Node(agent), (setup.wire)(Peer::Node(agent)));
+            let messenger = Messenger::new(PeerId::Node(agent), (setup.wire)(PeerId::Node(agent)));
             let join = JoinRequest {
                 agent,
                 scenario: scenario.clone(),
@@ -226,12 +227,12 @@ fn run_node(
     world: Arc<dyn DistributedWorld>,
     lease: Duration,
     is_liar: bool,
-) -> Result<Status, NodeError> {
+) -> Result<NodeStatusReport, NodeError> {
     let agent = request.agent;
     let welcome = join(&mut messenger, &JoinConfig { join: request, timeout: TEST_TIMEOUT })?;
     let program = world.program(agent, "test");
     let program: Box<dyn AgentProgram> =
         if is_liar { Box::new(FaultyProgram(program)) } else { program };
     let node = Node::new(agent, messenger, program, world.channel(agent), &welcome);
-    node.with_lease(lease).run()
+    node.with_server_timeout(lease).run()
 }

@@ -8,7 +8,7 @@ use sidestep_link::protocol::{ClockMode, Topology};
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::memory::MemoryHub;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Peer, Wire};
+use sidestep_link::wire::{PeerId, Wire};
 use std::time::Duration;
 
 /// Deployments in which each airplane has a program of its own.
@@ -26,7 +26,7 @@ pub(crate) fn run_over_memory(text: &str) -> crate::support::RunResult {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
-        wire: &|me| Box::new(exchange.peer_wire(me)),
+        wire: &|me| Box::new(exchange.open_wire(me)),
         listens: &|_| Vec::new(),
         hooks: &mut NoHooks,
         liar: None,
@@ -87,9 +87,9 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
         drop(held);
         let server = ports.remove(0);
         let listens = |agent: EntityId| ports.get(agent as usize).cloned().into_iter().collect();
-        let wire = |me: Peer| -> Box<dyn Wire> {
+        let wire = |me: PeerId| -> Box<dyn Wire> {
             let at = std::slice::from_ref(&server);
-            let Peer::Node(agent) = me else {
+            let PeerId::Node(agent) = me else {
                 return Box::new(ZenohWire::server_wire(at, None).expect("a server"));
             };
             let wire =
@@ -123,7 +123,7 @@ fn a_node_that_says_nonsense_is_counted_and_harms_nobody() {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
-        wire: &|me| Box::new(exchange.peer_wire(me)),
+        wire: &|me| Box::new(exchange.open_wire(me)),
         listens: &|_| Vec::new(),
         hooks: &mut NoHooks,
         liar: Some(1),

@@ -4,7 +4,7 @@ use crate::processes::{LinkProcess, folder, job};
 use crate::support::{run_in_one_process, superconflict};
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::ZenohWire;
-use sidestep_link::wire::{Peer, WireError};
+use sidestep_link::wire::{PeerId, WireSetupError};
 use sidestep_session::fleet::{
     AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Tls, Topology,
 };
@@ -142,9 +142,9 @@ fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
     let at = [reserve_port("tls/127.0.0.1:0").expect("a free port").endpoint];
     let _server = ZenohWire::server_wire(&at, Some(&ours)).expect("a server");
     let node =
-        |tls: &Tls| ZenohWire::node_wire(Peer::Node(0), &at, Some(tls), Duration::from_secs(30));
+        |tls: &Tls| ZenohWire::node_wire(PeerId::Node(0), &at, Some(tls), Duration::from_secs(30));
     match node(&old).map(drop) {
-        Err(WireError::Distrust { endpoint, reason }) => {
+        Err(WireSetupError::Distrust { endpoint, reason }) => {
             assert_eq!(endpoint, at[0]);
             assert!(reason.contains("old.pem") && reason.contains("Expired"), "{reason}");
         }

@@ -181,7 +181,7 @@ pub(super) type Track = Vec<(u32, u32, u8)>;
 fn record(simulation: &mut RobotsRun, cycles: u64) -> Vec<Track> {
     simulation.start_recording();
     let schemas = simulation.schemas();
-    let mut tracks = vec![Track::with_capacity(cycles as usize); simulation.agents()];
+    let mut tracks = vec![Track::with_capacity(cycles as usize); simulation.agent_count()];
     let mut done = 0;
     while done < cycles {
         done += simulation.advance(cycles - done);
@@ -226,7 +226,7 @@ fn run_measures(simulation: &RobotsRun, tracks: &[Track]) -> RunMeasures {
         trips: Some(total.trips as f64 / tracks.len() as f64),
         straightness: straightness(tracks),
         lateral_moves: per_1000(lateral_moves, total.actions),
-        lawful: total.actions == simulation.cycle() * simulation.agents() as u64
+        lawful: total.actions == simulation.cycle() * simulation.agent_count() as u64
             && find_violation(simulation.world(), &simulation.snapshot()).is_none(),
     }
 }

@@ -86,7 +86,7 @@ fn target(arm: &SerialChain, draws: &mut Draws) -> Point<3> {
     let skeleton = arm.skeleton();
     loop {
         let values = joint_values_at_random(arm, draws);
-        let places = arm.connectors(&skeleton, &arm.forward_kinematics(&values));
+        let places = arm.connector_positions(&skeleton, &arm.forward_kinematics(&values));
         let is_above = places.iter().all(|p| p[2] > MIN_PILLAR_DISTANCE_M);
         if is_above && is_apart(&places) && places.windows(2).all(is_clear_of_pillars) {
             return places[places.len() - 1];

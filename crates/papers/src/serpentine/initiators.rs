@@ -89,7 +89,10 @@ fn chain<const D: usize>(draws: &mut Draws, max_bend_rad: f64) -> Result<Chain<D
         points.push(add_scaled(points[i - 1], u, 0.5));
     }
     let connector = Connector { max_bend_rad, ..Connector::free(0.05) };
-    let rods = points.windows(2).map(|ends| Rod::fixed(distance(ends[0], ends[1]), 0.02)).collect();
+    let rods = points
+        .windows(2)
+        .map(|ends| Rod::with_fixed_length(distance(ends[0], ends[1]), 0.02))
+        .collect();
     Chain::new(points, vec![connector; CONNECTORS], rods)
 }
 
@@ -107,7 +110,7 @@ fn propagate(chain: &mut Chain<3>, k: usize, to: Point<3>) -> Result<MotionOutco
     Propagator::default().propagate(
         chain,
         &Obstacles::default(),
-        &MotionRequest::operator_request(k, to),
+        &MotionRequest::from_operator(k, to),
     )
 }
 
@@ -131,7 +134,7 @@ fn count_motions(seed: u64) -> Result<InitiatorCounts, InputError> {
         }
         for other in (0..CONNECTORS).filter(|&other| other != k) {
             let mut failing = free.clone();
-            failing.set_failed(other, true);
+            failing.set_connector_failed(other, true);
             let expected = ExpectedVeto { by: other, reason: VetoReason::Failed };
             let objected = is_vetoed_as_expected(&mut failing, k, to, expected, &mut seen)?;
             seen.failed_objected.push(objected);
@@ -207,7 +210,7 @@ fn wander<const D: usize>(limit_rad: f64, seed: u64) -> Result<BendLimitRun, Inp
         let k = draws.uniform_below(CONNECTORS as u32) as usize;
         let to = add_scaled(chain.points()[k], u, STEP_M);
         let outcome =
-            propagator.propagate(&mut chain, &nothing, &MotionRequest::operator_request(k, to))?;
+            propagator.propagate(&mut chain, &nothing, &MotionRequest::from_operator(k, to))?;
         came.moved.push(outcome.motion().is_some());
         let is_other = outcome.veto().is_some_and(|veto| veto.reason != VetoReason::BendLimit);
         came.other_vetoes += u64::from(is_other);

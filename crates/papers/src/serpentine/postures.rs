@@ -147,7 +147,7 @@ fn chain(case: &PostureCase, draws: &mut Draws) -> Result<Chain<3>, InputError> 
 fn rod(slack: f64, ends: &[Point<3>]) -> Rod {
     if slack == 0.0 {
         // Rods of fixed length take exactly the lengths that the points gave, to the bit.
-        Rod::fixed(distance(ends[0], ends[1]), 0.01)
+        Rod::with_fixed_length(distance(ends[0], ends[1]), 0.01)
     } else {
         Rod { min_m: 1.0 - slack, max_m: 1.0 + slack, radius_m: 0.01 }
     }
@@ -185,7 +185,7 @@ fn solve(case: &PostureCase, seed: u64) -> Result<Json, InputError> {
 }
 
 fn pull(chain: &mut Chain<3>, tip: usize, target: Point<3>) -> Result<Json, InputError> {
-    let request = MotionRequest::operator_request(tip, target);
+    let request = MotionRequest::from_operator(tip, target);
     let began = ThreadTime::now();
     let outcome = Propagator::default().propagate(chain, &Obstacles::default(), &request)?;
     let us = 1e6 * began.elapsed().as_secs_f64();

@@ -130,7 +130,7 @@ fn push(case: &Variant, seed: u64) -> Result<Json, InputError> {
         let to =
             add_scaled(add_scaled(start, [-1.0, 0.0], way_m), [0.0, 1.0], NOISE_M * normal(draws));
         if let MotionOutcome::Vetoed(veto) =
-            propagator.propagate(&mut chain, &obstacles, &MotionRequest::operator_request(k, to))?
+            propagator.propagate(&mut chain, &obstacles, &MotionRequest::from_operator(k, to))?
         {
             reason = Some(veto.reason.name());
             break;

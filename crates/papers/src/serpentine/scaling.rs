@@ -106,7 +106,7 @@ fn lead(
     let began = ThreadTime::now();
     for k in motions {
         let outcome =
-            propagator.propagate(chain, obstacles, &MotionRequest::operator_request(0, head(k)))?;
+            propagator.propagate(chain, obstacles, &MotionRequest::from_operator(0, head(k)))?;
         moved += outcome.motion().map_or(0, |m| m.touched.len());
     }
     Ok((1e6 * began.elapsed().as_secs_f64() / count, moved as f64 / count))

@@ -36,7 +36,7 @@ fn trace_ends<const D: usize>(
     cycles: u64,
 ) -> Result<TracedRun, InputError> {
     let mut run = chain_run(&source(text, settings)?, 1)?;
-    let last = run.agents() as u32 - 1;
+    let last = run.agent_count() as u32 - 1;
     let mut trails = vec![empty_trail(0), empty_trail(last)];
     while run.cycle() < cycles && !run.is_over() {
         if run.cycle().is_multiple_of(TRAIL_INTERVAL_CYCLES) {

@@ -103,7 +103,7 @@ impl ColumnEncoder {
         let flags: Vec<u32> = range.clone().map(|row| u32::from(!values.is_missing(row))).collect();
         levels.extend(&flags);
         let present: Vec<usize> = range.filter(|&row| !values.is_missing(row)).collect();
-        self.encoder.extend(&values.pick(&present), 0..present.len());
+        self.encoder.extend(&values.gather_rows(&present), 0..present.len());
     }
 
     fn end_page(&mut self) -> Result<()> {

@@ -263,7 +263,7 @@ pub(super) fn poses_by_kind(frame: &Frame) -> BTreeMap<BodyKind, PosesInFrame> {
 
 /// Returns a scan with evenly spaced beams, as the schema requires.
 pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
-    let (start_angle, end_angle, ranges) = scan.evenly_spaced(f64::INFINITY);
+    let (start_angle, end_angle, ranges) = scan.resample_evenly(f64::INFINITY);
     LaserScan {
         timestamp: timestamp(now_ns),
         frame_id: WORLD.into(),

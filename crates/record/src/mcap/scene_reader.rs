@@ -10,7 +10,7 @@ use ::mcap::sans_io::indexed_reader::{
 use foxglove::Decode;
 use foxglove::messages::{Log, SceneEntity, SceneUpdate, log};
 use sidestep_kernel::view::{
-    Body, BodyId, Kinds, LogEvent, LogEventKind, Pose, Role, Severity, Shape,
+    Body, BodyId, BodyRole, Kinds, LogEvent, LogEventKind, Pose, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, InputError};
 
@@ -128,7 +128,7 @@ fn bodies(entity: &SceneEntity, kinds: &Kinds) -> Vec<Body> {
     };
     let mut bodies = Vec::new();
     for (k, (pose, shape)) in (0u32..).zip(shapes(entity)) {
-        let part = (kind.role() == Role::PartOfBody).then_some(k);
+        let part = (kind.role() == BodyRole::PartOfBody).then_some(k);
         bodies.push(Body { part, ..Body::new(kind, number, pose, shape) });
     }
     bodies

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::ports::{RecordError, RoleColumn};
+use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 use sidestep_kernel::{Digest, InputError};
 
 use crate::disk;
@@ -75,7 +75,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         path: &Path,
         program_version: &str,
         build: &str,
-        fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<RoleColumn<R>>), E>,
+        fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<ColumnWithRole<R>>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
             let remedy =

@@ -293,7 +293,7 @@ mod tests {
         let changed = std::fs::read_to_string(&path).unwrap().replace(" 1\n", " 7\n");
         std::fs::write(&path, changed).unwrap();
         let error = refused(&path, OF);
-        assert_eq!(error.position(), Some((3, 1)), "{error}");
+        assert_eq!(error.line_and_column(), Some((3, 1)), "{error}");
     }
 
     #[test]

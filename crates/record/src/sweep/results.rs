@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{RecordError, RoleColumn};
+use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use crate::run_table::{self, LoadedTable, TableStream};
@@ -28,8 +28,8 @@ impl ResultsWriter {
     /// Columns other than those it was started with; an I/O error.
     pub fn append<R>(
         &mut self,
-        results: &[&RoleColumn<R>],
-        timings: &[&RoleColumn<R>],
+        results: &[&ColumnWithRole<R>],
+        timings: &[&ColumnWithRole<R>],
     ) -> Result<(), RecordError> {
         self.results.append(results)?;
         self.timings.append(timings)
@@ -52,8 +52,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// An I/O error.
     pub fn results_writer<R: Serialize>(
         &self,
-        results: &[&RoleColumn<R>],
-        timings: &[&RoleColumn<R>],
+        results: &[&ColumnWithRole<R>],
+        timings: &[&ColumnWithRole<R>],
     ) -> Result<ResultsWriter, RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path().display(), e))?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{RecordError, RoleColumn};
+use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use super::journal::{Journal, SweepIdentity, is_locked, read_journal};
@@ -49,7 +49,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         &self,
         share: Share,
         journal: Journal,
-        runs: &[&RoleColumn<R>],
+        runs: &[&ColumnWithRole<R>],
     ) -> Result<(), RecordError> {
         let version = &self.manifest().program_version;
         let extra = [(FINGERPRINT, self.fingerprint())];

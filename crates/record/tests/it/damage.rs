@@ -87,7 +87,7 @@ fn a_full_disk_is_an_error_that_names_the_file_and_lasts() {
         assert!(error.place.contains("part-000000000000000.parquet.partial"), "{error}");
         assert!(error.cause.contains("No space left"), "{error}");
     };
-    check(recorder.seal(10).unwrap_err());
+    check(recorder.make_durable(10).unwrap_err());
     check(recorder.append(0, &rows(10, 20)).unwrap_err());
     check(recorder.finish().unwrap_err());
     assert!(!folder.path().join("trajectories").exists());

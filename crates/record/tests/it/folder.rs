@@ -26,7 +26,7 @@ fn a_run_from_its_creation_to_its_end() {
     assert_eq!(names(path.parent().unwrap()), ["a"], "nothing else is left beside it");
     let mut recorder = folder.recorder(&[trajectories()], 0).unwrap();
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(10).unwrap();
+    recorder.make_durable(10).unwrap();
     folder.save_checkpoint(10, b"state").unwrap();
     assert_eq!(RunReader::open(&path).unwrap().manifest.last_checkpoint, Some(10));
     recorder.append(0, &rows(10, 100)).unwrap();
@@ -53,7 +53,7 @@ fn a_killed_run_goes_on_at_its_checkpoint() {
     let mut folder = create(&path);
     let mut recorder = folder.recorder(&[trajectories()], 0).unwrap();
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(10).unwrap();
+    recorder.make_durable(10).unwrap();
     folder.save_checkpoint(10, b"state at 10").unwrap();
     recorder.append(0, &rows(10, 13)).unwrap();
     drop((recorder, folder));
@@ -181,7 +181,7 @@ fn a_run_on_a_full_disk_keeps_its_checkpoint_and_goes_on_when_there_is_room() {
     let mut folder = create(&path);
     let mut recorder = folder.recorder(&[trajectories()], 0).unwrap();
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(10).unwrap();
+    recorder.make_durable(10).unwrap();
     folder.save_checkpoint(10, b"state").unwrap();
     let ballast = parent.path().join("ballast");
     let _ = fs::write(&ballast, vec![0; 1 << 20]);
@@ -189,7 +189,7 @@ fn a_run_on_a_full_disk_keeps_its_checkpoint_and_goes_on_when_there_is_room() {
     let error = folder.save_checkpoint(11, &[1; 1 << 16]).unwrap_err();
     assert!(error.place.contains("checkpoint.bin") && error.cause.contains("No space"), "{error}");
     recorder.append(0, &rows(10, 2000)).unwrap();
-    let error = recorder.seal(2000).unwrap_err();
+    let error = recorder.make_durable(2000).unwrap_err();
     assert!(error.place.contains("part-000000000000010.parquet.partial"), "{error}");
     drop((recorder, folder));
 

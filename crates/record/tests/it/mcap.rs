@@ -6,7 +6,7 @@ use sidestep_robots::kinds::ROBOT;
 use std::path::Path;
 
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Condition, Frame, Isometry2, LogEvent, LogEventKind, Occupancy,
+    Body, BodyCondition, BodyId, BodyKind, Frame, Isometry2, LogEvent, LogEventKind, Occupancy,
     OccupancyGrid, Pose, Scan, Scenery, Severity, Shape,
 };
 use sidestep_record::{
@@ -55,7 +55,7 @@ fn frame(cycle: u64) -> Frame {
         body(ROBOT, 0, Shape::Cuboid { size_m: [0.5, 0.5, 0.2] }),
         body(CONNECTOR, 0, Shape::Sphere { radius_m: 0.1 }).with_part(0),
         body(ZONE, 0, Shape::Cylinder { radius_m: 5.0, height_m: 0.1 })
-            .with_state_if(true, Condition::Touching),
+            .with_condition_if(true, BodyCondition::Touching),
     ];
     if cycle <= 4 {
         bodies.push(body(AIRPLANE, 0, Shape::Dart { length_m: 2.0, width_m: 1.0 }));

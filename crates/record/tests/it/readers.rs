@@ -28,7 +28,7 @@ fn pyarrow_reads_a_folder_of_parts_as_one_table() {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 500)).unwrap();
-    recorder.seal(500).unwrap();
+    recorder.make_durable(500).unwrap();
     recorder.append(0, &rows(500, 1000)).unwrap();
     recorder.finish().unwrap();
     let table = folder.path().join("trajectories");

@@ -1,7 +1,7 @@
 //! Rows come back as they were recorded, in one go or resumed.
 
 use proptest::prelude::*;
-use sidestep_kernel::ports::recorder::{conformance, conformance_schemas};
+use sidestep_kernel::ports::recorder::{check_conformance, conformance_test_schemas};
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};
 use sidestep_record::{ParquetRecorder, read_table};
 
@@ -10,9 +10,9 @@ use crate::support::{column, joined, names, origin, recorder, rows, trajectories
 #[test]
 fn the_parquet_recorder_conforms() {
     let folder = tempfile::tempdir().unwrap();
-    let schemas = conformance_schemas();
+    let schemas = conformance_test_schemas();
     let recorder = ParquetRecorder::create(folder.path(), &schemas, &origin()).unwrap();
-    conformance(recorder, |_| {
+    check_conformance(recorder, |_| {
         let read = |s: &TableSchema| read_table(folder.path(), &s.name, ..).unwrap().columns;
         let tables: Vec<_> = schemas.iter().map(read).collect();
         Box::new(move |table, column| tables[table][column].clone())
@@ -48,7 +48,7 @@ fn rows_are_chosen_by_cycle_across_parts_and_row_groups() {
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 600_000)).unwrap();
     recorder.append(0, &rows(600_000, 600_100)).unwrap();
-    recorder.seal(600_100).unwrap();
+    recorder.make_durable(600_100).unwrap();
     recorder.append(0, &rows(600_100, 600_200)).unwrap();
     recorder.finish().unwrap();
     let read = |from, to| read_table(folder.path(), "trajectories", from..to).unwrap().columns;
@@ -90,7 +90,7 @@ fn a_killed_recording_shows_its_sealed_rows_as_incomplete() {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(10).unwrap();
+    recorder.make_durable(10).unwrap();
     recorder.append(0, &rows(10, 15)).unwrap();
     drop(recorder);
     let table = read_table(folder.path(), "trajectories", ..).unwrap();
@@ -102,16 +102,16 @@ fn a_resumed_recording_has_the_rows_of_one_in_one_go() {
     let folder = tempfile::tempdir().unwrap();
     let mut first = recorder(folder.path());
     first.append(0, &rows(0, 10)).unwrap();
-    first.seal(10).unwrap();
+    first.make_durable(10).unwrap();
     first.append(0, &rows(10, 20)).unwrap();
     // Sealed, but killed before the checkpoint at 20 was stored: back to 10.
-    first.seal(20).unwrap();
+    first.make_durable(20).unwrap();
     first.append(0, &rows(20, 25)).unwrap();
     drop(first);
     let mut second =
         ParquetRecorder::resume(folder.path(), &[trajectories()], &origin(), 10).unwrap();
     second.append(0, &rows(10, 20)).unwrap();
-    second.seal(20).unwrap();
+    second.make_durable(20).unwrap();
     second.append(0, &rows(20, 30)).unwrap();
     second.finish().unwrap();
     let table = read_table(folder.path(), "trajectories", ..).unwrap();
@@ -124,7 +124,7 @@ fn a_run_killed_while_its_tables_were_finished_can_be_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let mut first = recorder(folder.path());
     first.append(0, &rows(0, 10)).unwrap();
-    first.seal(10).unwrap();
+    first.make_durable(10).unwrap();
     first.append(0, &rows(10, 20)).unwrap();
     first.finish().unwrap();
     let mut second =
@@ -141,9 +141,9 @@ fn resuming_where_nothing_was_sealed_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut first = recorder(folder.path());
     first.append(0, &rows(0, 20)).unwrap();
-    first.seal(20).unwrap();
+    first.make_durable(20).unwrap();
     first.append(0, &rows(20, 30)).unwrap();
-    first.seal(30).unwrap();
+    first.make_durable(30).unwrap();
     drop(first);
     let resume =
         |cycle| ParquetRecorder::resume(folder.path(), &[trajectories()], &origin(), cycle);
@@ -167,16 +167,16 @@ fn rows_after_the_end_and_cycles_sealed_twice_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(10).unwrap();
+    recorder.make_durable(10).unwrap();
     recorder.finish().unwrap();
     assert!(recorder.append(0, &rows(10, 20)).is_err());
 
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = crate::support::recorder(folder.path());
     recorder.append(0, &rows(0, 10)).unwrap();
-    recorder.seal(0).unwrap();
+    recorder.make_durable(0).unwrap();
     recorder.append(0, &rows(10, 20)).unwrap();
-    assert!(recorder.seal(20).unwrap_err().to_string().contains("sealed at this cycle"));
+    assert!(recorder.make_durable(20).unwrap_err().to_string().contains("sealed at this cycle"));
     assert!(recorder.finish().unwrap_err().to_string().contains("stopped earlier"));
 }
 

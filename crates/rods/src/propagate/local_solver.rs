@@ -2,12 +2,12 @@
 //! propagates motions through whole chains. Its inputs are messages from its neighbors and its own
 //! surroundings, and nothing else (slide E4), so that it can run as an agent aboard a robot.
 
-use super::{DrivenConnectors, check, count_sub_steps, project};
-use crate::candidates::{CandidateScratch, follow_guide_line};
+use super::{InitiatingConnectors, check, count_sub_steps, project};
+use crate::candidates::{CandidateScratch, guide_line_position};
 use crate::chain::{Chain, Rod};
 use crate::geometry::{Point, distance};
 use crate::motion_context::{
-    MotionContext, PendingVeto, SlaveStep, TentativePositions, is_length_allowed,
+    IncompleteVeto, MotionContext, SlaveStep, TentativePositions, is_length_allowed,
 };
 use crate::obstacle::Obstacles;
 use crate::reaction::Reaction;
@@ -24,7 +24,7 @@ const MASTER_INDEX: usize = 1;
 
 /// A connector by itself.
 #[derive(Debug, Clone)]
-pub struct LocalSolver<const D: usize> {
+pub struct ConnectorReactionSolver<const D: usize> {
     /// A chain of this connector only. It has the least move and the step length of the whole one,
     /// so that the connector decides as it would inside it.
     chain: Chain<D>,
@@ -79,7 +79,7 @@ pub struct SlaveReaction<const D: usize> {
     pub has_turned: bool,
 }
 
-impl<const D: usize> LocalSolver<D> {
+impl<const D: usize> ConnectorReactionSolver<D> {
     /// Returns connector `k` of a chain, which reacts by the chain's rules, except that it does not
     /// check for collisions of the chain with itself: it does not know where the other parts are.
     pub fn new(chain: &Chain<D>, k: usize, rules: &ReactionRules) -> Self {
@@ -119,7 +119,7 @@ impl<const D: usize> LocalSolver<D> {
     }
 
     /// Returns whether a sweep that ended in a veto is to be repeated with all lengths, if rods have turned.
-    pub fn should_repeat(&self) -> bool {
+    pub fn should_repeat_sweep(&self) -> bool {
         self.rules.rotation == RotationRule::Union
     }
 
@@ -132,7 +132,7 @@ impl<const D: usize> LocalSolver<D> {
         slave: &SlavePosition<D>,
         obstacles: &Obstacles<D>,
         pull: &MasterMotion<D>,
-    ) -> Result<SlaveReaction<D>, PendingVeto> {
+    ) -> Result<SlaveReaction<D>, IncompleteVeto> {
         if pull.is_open && self.reaction.is_none() {
             return Ok(self.free_reaction(slave, pull));
         }
@@ -184,7 +184,7 @@ impl<const D: usize> LocalSolver<D> {
     /// Returns its reaction where nothing can object.
     fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> SlaveReaction<D> {
         let SlavePosition { so, rod, next } = *slave;
-        let at = follow_guide_line([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
+        let at = guide_line_position([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
         let is_next_allowed =
             next.is_none_or(|(beyond, rod)| is_length_allowed(rod, distance(so, beyond)));
         let ends = at == so && is_next_allowed;
@@ -204,7 +204,7 @@ impl<const D: usize> LocalSolver<D> {
     ) -> Result<usize, InputError> {
         check(
             &self.chain,
-            &DrivenConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to }),
+            &InitiatingConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to }),
         )?;
         count_sub_steps(&self.rules, self.chain.step_m(), is_empty, distance(from, to))
     }
@@ -213,10 +213,10 @@ impl<const D: usize> LocalSolver<D> {
     ///
     /// # Errors
     /// The constraint because of which it objects.
-    pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), PendingVeto> {
+    pub fn may_lead(&mut self, from: Point<D>, to: Point<D>) -> Result<(), IncompleteVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
         let mut driven =
-            DrivenConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to });
+            InitiatingConnectors::from_motion(&RequestedMotion::Connector { k: SELF_INDEX, to });
         project(&self.chain, &mut driven, VetoEffect::Exact).map_err(|(_, objection)| objection)
     }
 
@@ -234,7 +234,7 @@ impl<const D: usize> LocalSolver<D> {
         from: Point<D>,
         to: Point<D>,
         obstacles: &Obstacles<D>,
-    ) -> Result<(), PendingVeto> {
+    ) -> Result<(), IncompleteVeto> {
         self.chain.points_mut()[SELF_INDEX] = from;
         let Self { chain, rules, tentative, own_rods, .. } = &*self;
         let reaction = self.reaction.as_deref();

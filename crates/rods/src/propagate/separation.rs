@@ -1,13 +1,13 @@
 //! Motions with self-collision in which no part of the chain comes near another.
 //!
 //! Most motions are like that. They are made without a test of each pair of parts, and
-//! [`MotionBounds`] proves afterwards that no test could have objected; where the proof fails, the
+//! [`SeparationBounds`] proves afterwards that no test could have objected; where the proof fails, the
 //! motion is taken back and made with all tests. The result is the same bits either way.
 
-use super::{DrivenConnectors, MotionTally, Propagator, is_open};
+use super::{InitiatingConnectors, MotionEffects, Propagator, is_obstacle_free};
 use crate::chain::Chain;
 use crate::geometry::distance;
-use crate::motion_bounds::MotionBounds;
+use crate::motion_bounds::SeparationBounds;
 use crate::obstacle::Obstacles;
 use crate::open::{self, StayRule};
 use std::ops::Range;
@@ -51,21 +51,27 @@ impl SeparationProofSchedule {
 impl<const D: usize> Propagator<D> {
     /// Makes a sub-step without obstacles if no part comes near another in it: then nothing can object,
     /// and the chain moves as it does without self-collision. Returns whether it was made.
-    pub(super) fn pull_if_separated(
+    pub(super) fn pull_if_parts_separated(
         &mut self,
         chain: &mut Chain<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
         is_last: bool,
     ) -> bool {
-        if !MotionBounds::is_long_enough(chain) {
+        if !SeparationBounds::is_chain_long_enough(chain) {
             return false;
         }
         self.motion_bounds.record(chain);
-        let mut tally = MotionTally::start(driven.first);
+        let mut tally = MotionEffects::start(driven.first);
         let head_m = distance(chain.points()[driven.first], driven.to[0]);
-        open::pull_connector(chain, driven.first, driven.to[0], StayRule::Nearly, &mut tally);
+        open::pull_chain_by_connector(
+            chain,
+            driven.first,
+            driven.to[0],
+            StayRule::Nearly,
+            &mut tally,
+        );
         let travel_m = head_m.max(tally.max_slave_step_m);
-        let holds = self.is_proven(chain, &tally, travel_m);
+        let holds = self.prove_or_revert(chain, &tally, travel_m);
         if holds {
             // A later sub-step may end in a veto, which takes back the whole request.
             if !is_last {
@@ -80,17 +86,17 @@ impl<const D: usize> Propagator<D> {
     /// Makes all sub-steps of a request in one batch, if no part comes near another in any of them.
     /// Every part is then where the sub-steps one after the other would have brought it. Returns
     /// whether they were made.
-    pub(super) fn pull_all_if_separated(
+    pub(super) fn try_batch_pull(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
         n: usize,
     ) -> bool {
         let is_eligible = self.rules.self_collision
             && (2..=open::MAX_BATCH).contains(&n)
-            && is_open(chain, obstacles, driven)
-            && MotionBounds::is_long_enough(chain);
+            && is_obstacle_free(chain, obstacles, driven)
+            && SeparationBounds::is_chain_long_enough(chain);
         let k = driven.first;
         let from = driven.positions(chain);
         // Sub-steps below the least move are skipped one by one, and must not be in a batch.
@@ -99,13 +105,13 @@ impl<const D: usize> Propagator<D> {
             return false;
         }
         self.motion_bounds.record(chain);
-        let mut tally = MotionTally::start(k);
+        let mut tally = MotionEffects::start(k);
         let mut to = [driven.to[0]; open::MAX_BATCH];
         for (j, to) in to[..n].iter_mut().enumerate() {
             *to = driven.positions_at(from, [j + 1, n])[0];
         }
-        let travel_m = open::pull_batch(chain, k, &to[..n], &mut tally);
-        let holds = self.is_proven(chain, &tally, travel_m);
+        let travel_m = open::pull_through_targets(chain, k, &to[..n], &mut tally);
+        let holds = self.prove_or_revert(chain, &tally, travel_m);
         if holds {
             self.tally.add(&tally);
             self.motion_bounds.accept(chain);
@@ -116,7 +122,12 @@ impl<const D: usize> Propagator<D> {
 
     /// Returns whether a motion from the recorded places, in which connectors moved by at most
     /// `travel_m`, is proven to be allowed; otherwise it is taken back.
-    fn is_proven(&mut self, chain: &mut Chain<D>, tally: &MotionTally, travel_m: f64) -> bool {
+    fn prove_or_revert(
+        &mut self,
+        chain: &mut Chain<D>,
+        tally: &MotionEffects,
+        travel_m: f64,
+    ) -> bool {
         let holds = tally.max_slave_step_m <= self.rules.slave_step_max_m
             && self.motion_bounds.allows(chain, travel_m);
         if !holds {
@@ -131,18 +142,18 @@ impl<const D: usize> Propagator<D> {
     /// Makes a sub-step among obstacles without tests of the chain against itself, if no rod turns and
     /// no part comes near another in it: then those tests would have changed nothing. Returns whether
     /// it was made.
-    pub(super) fn sweep_if_separated(
+    pub(super) fn sweep_if_parts_separated(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: &DrivenConnectors<D>,
+        driven: &InitiatingConnectors<D>,
     ) -> bool {
-        if !MotionBounds::is_long_enough(chain) || !self.proofs.is_due() {
+        if !SeparationBounds::is_chain_long_enough(chain) || !self.proofs.is_due() {
             return false;
         }
         let rotated = self.tally.rotated;
         self.rules.self_collision = false;
-        let followed = self.sweep_from(chain, obstacles, driven);
+        let followed = self.propagate_from_driven(chain, obstacles, driven);
         self.rules.self_collision = true;
         // A rod that turns past an obstacle may have to turn past a part as well.
         let holds = followed.is_ok() && self.tally.rotated == rotated && self.are_separated(chain);

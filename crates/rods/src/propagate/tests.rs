@@ -52,9 +52,7 @@ fn go<const D: usize>(
     k: usize,
     to: Point<D>,
 ) -> MotionOutcome<D> {
-    Propagator::default()
-        .propagate(chain, obstacles, &MotionRequest::operator_request(k, to))
-        .unwrap()
+    Propagator::default().propagate(chain, obstacles, &MotionRequest::from_operator(k, to)).unwrap()
 }
 
 /// A random walk of rods within limits.
@@ -86,7 +84,7 @@ fn wander<const D: usize>(seed: u64, rules: ReactionRules, steps: usize, max_ben
         let before = bits(&chain);
         let to = walk.next(chain.points()[0], 0.03);
         match propagator
-            .propagate(&mut chain, &obstacles, &MotionRequest::operator_request(0, to))
+            .propagate(&mut chain, &obstacles, &MotionRequest::from_operator(0, to))
             .unwrap()
         {
             MotionOutcome::Vetoed(_) => {
@@ -157,12 +155,12 @@ fn a_rod_within_its_limits_only_changes_its_length() {
 
 #[test]
 fn fixed_and_failed_connectors_object_and_stay() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     for (fail, reason) in [(false, VetoReason::Fixed), (true, VetoReason::Failed)] {
         let mut chain =
             Chain::straight([0.0; 3], [1.0, 0.0, 0.0], 4, rod, Connector::free(0.0)).unwrap();
         if fail {
-            chain.set_failed(0, true);
+            chain.set_connector_failed(0, true);
         } else {
             chain.set_mobility(0, Mobility::Fixed).unwrap();
         }
@@ -177,7 +175,7 @@ fn fixed_and_failed_connectors_object_and_stay() {
         let own = go(&mut chain, &Obstacles::default(), 0, [0.0, 1.0, 0.0]);
         assert_eq!(own.veto().unwrap().reason, reason);
         // The constraint that was named is the one that mattered.
-        chain.set_failed(0, false);
+        chain.set_connector_failed(0, false);
         chain.set_mobility(0, Mobility::Free).unwrap();
         assert!(go(&mut chain, &Obstacles::default(), 4, [4.5, 1.0, 0.0]).motion().is_some());
     }
@@ -185,7 +183,7 @@ fn fixed_and_failed_connectors_object_and_stay() {
 
 #[test]
 fn slaves_stay_on_their_line_and_plane() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     let mut chain =
         Chain::straight([0.0; 3], [1.0, 0.0, 0.0], 1, rod, Connector::free(0.0)).unwrap();
     let line = Mobility::OnSegment([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]);
@@ -206,7 +204,7 @@ fn as_far_as_possible_stops_at_the_obstacle_and_says_why() {
     let rod = Rod { min_m: 0.5, max_m: 1.0, radius_m: 0.0 };
     let mut chain = Chain::straight([0.0, 0.0], [-1.0, 0.0], 3, rod, Connector::free(0.1)).unwrap();
     let obstacles = Obstacles::new(vec![Obstacle::ball(9, [2.0, 0.0], 0.5)], 1.0).unwrap();
-    let exact = MotionRequest::operator_request(0, [2.0, 0.0]);
+    let exact = MotionRequest::from_operator(0, [2.0, 0.0]);
     let before = bits(&chain);
     let mut propagator = Propagator::default();
     let vetoed = propagator.propagate(&mut chain, &obstacles, &exact).unwrap();
@@ -239,7 +237,7 @@ fn a_rod_as_initiator_moves_rigidly() {
 
 #[test]
 fn a_bend_limit_stops_what_would_fold() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     let mut connector = Connector::free(0.0);
     connector.max_bend_rad = 1.0;
     let mut chain = Chain::straight([0.0; 2], [1.0, 0.0], 6, rod, connector).unwrap();

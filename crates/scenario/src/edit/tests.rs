@@ -301,7 +301,7 @@ fn an_edit_that_does_not_fit_says_so_and_changes_nothing() {
         assert_eq!(error.key(), Some(edit.key()));
     }
     let error = Source::new("s.toml", "a = = 1", "").edited(&[remove("a")]).expect_err("no TOML");
-    assert_eq!((error.position(), error.remedy()), (Some((1, 5)), "write valid TOML"));
+    assert_eq!((error.line_and_column(), error.remedy()), (Some((1, 5)), "write valid TOML"));
     let many = vec![set("seed", json!(1)); 1001];
     assert!(source.edited(&many).is_err());
     assert_eq!(source.edited(&[]).map(|s| s.text), Ok(TEXT.into()));

@@ -67,11 +67,11 @@ impl BodySet {
     /// Returns whether the given bodies are its own, in their order, with the same shapes.
     pub(super) fn matches(&self, bodies: &[Body]) -> bool {
         self.members.len() == bodies.len()
-            && self.members.iter().zip(bodies).all(|(member, body)| self.is_same(member, body))
+            && self.members.iter().zip(bodies).all(|(member, body)| self.is_same_body(member, body))
     }
 
     /// Returns whether a body has the identity and the shape of a member: if all do, the page's table still holds.
-    fn is_same(&self, member: &BodyIdentity, body: &Body) -> bool {
+    fn is_same_body(&self, member: &BodyIdentity, body: &Body) -> bool {
         member.kind == body.kind
             && member.number == body.number
             && member.part == body.part
@@ -95,7 +95,8 @@ impl BodySet {
         for group in &groups {
             // All bodies of a group look alike, so the first one stands for them.
             let first = self.members.iter().position(|member| member.appearance_group() == *group);
-            group_appearances.extend(first.map(|k| appearances(&bodies[k], dimensions)));
+            group_appearances
+                .extend(first.map(|k| appearances_by_condition(&bodies[k], dimensions)));
         }
         let mut own_names = Vec::new();
         for (index, member) in (0..).zip(&self.members) {
@@ -136,7 +137,7 @@ fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec
 }
 
 /// Returns the appearance of a body in each condition, because conditions change from frame to frame.
-fn appearances(body: &Body, dimensions: u8) -> [Appearance; 5] {
+fn appearances_by_condition(body: &Body, dimensions: u8) -> [Appearance; 5] {
     CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
 }
 

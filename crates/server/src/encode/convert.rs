@@ -118,8 +118,8 @@ pub(crate) fn requested_body(id: &BodyId, kinds: &Kinds) -> Option<view::BodyId>
 
 /// Returns an error of the program's own.
 pub(crate) fn problem(error: &InputError) -> Problem {
-    let (line, column) = error.position().unzip();
-    let (end_line, end_column) = error.end().unzip();
+    let (line, column) = error.line_and_column().unzip();
+    let (end_line, end_column) = error.end_line_and_column().unzip();
     Problem {
         place: error.place().into(),
         line: position_to_u32(line),

@@ -7,7 +7,7 @@ pub(crate) use convert::{event, problem, requested_body, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
-use sidestep_kernel::view::{Body, BodyKind, Condition, Frame, Pose, Scenery, Shape};
+use sidestep_kernel::view::{Body, BodyCondition, BodyKind, Frame, Pose, Scenery, Shape};
 use std::collections::BTreeMap;
 
 /// First bytes of a frame: `SSTF`, least significant byte first.
@@ -61,12 +61,12 @@ impl FrameEncoder {
         });
         // Text made of numbers and strings only: serializing cannot fail.
         let text = serde_json::to_vec(text).unwrap_or_default();
-        (table, self.bytes(frame, &text, left_out))
+        (table, self.frame_bytes(frame, &text, left_out))
     }
 
-    fn bytes(&self, frame: &Frame, text: &[u8], left_out: u32) -> Vec<u8> {
+    fn frame_bytes(&self, frame: &Frame, text: &[u8], left_out: u32) -> Vec<u8> {
         let bodies = &frame.bodies;
-        let lines: Vec<&[[f64; 3]]> = bodies.iter().filter_map(points).collect();
+        let lines: Vec<&[[f64; 3]]> = bodies.iter().filter_map(line_points).collect();
         let count: usize = lines.iter().map(|points| points.len()).sum();
         let d = usize::from(self.dimensions);
         let floats = (d + if d == 2 { 1 } else { 4 }) * bodies.len() + d * count;
@@ -74,7 +74,7 @@ impl FrameEncoder {
         let size = HEADER_BYTES + 4 * (floats + lines.len() + 1) + flags + text.len();
         let mut out = Vec::with_capacity(size);
         let counts = [bodies.len(), lines.len(), count, text.len()];
-        self.header(&mut out, frame, counts.map(|n| n as u32), left_out);
+        self.put_header(&mut out, frame, counts.map(|n| n as u32), left_out);
         put_column(&mut out, bodies.iter().flat_map(|body| body.pose.at_m.into_iter().take(d)));
         match d {
             2 => put_column(&mut out, bodies.iter().map(|body| heading_rad(&body.pose))),
@@ -92,7 +92,7 @@ impl FrameEncoder {
         out
     }
 
-    fn header(&self, out: &mut Vec<u8>, frame: &Frame, counts: [u32; 4], left_out: u32) {
+    fn put_header(&self, out: &mut Vec<u8>, frame: &Frame, counts: [u32; 4], left_out: u32) {
         out.extend(MAGIC.to_le_bytes());
         out.extend((VERSION as u16).to_le_bytes());
         out.extend([self.dimensions, 0]);
@@ -104,7 +104,7 @@ impl FrameEncoder {
     }
 }
 
-fn points(body: &Body) -> Option<&[[f64; 3]]> {
+fn line_points(body: &Body) -> Option<&[[f64; 3]]> {
     match &body.shape {
         Shape::Line { points_m, .. } => Some(points_m),
         _ => None,
@@ -132,19 +132,24 @@ fn heading_rad(pose: &Pose) -> f64 {
     f64::from(2.0 * (z as f32).atan2(w as f32))
 }
 
-fn condition_code(condition: Condition) -> u8 {
+fn condition_code(condition: BodyCondition) -> u8 {
     match condition {
-        Condition::Plain => 0,
-        Condition::Leading => 1,
-        Condition::Open => 2,
-        Condition::Touching => 3,
-        Condition::Failed => 4,
+        BodyCondition::Plain => 0,
+        BodyCondition::Leading => 1,
+        BodyCondition::Open => 2,
+        BodyCondition::Touching => 3,
+        BodyCondition::Failed => 4,
     }
 }
 
 /// The conditions of a body, at the index that [`condition_code`] gives each; the page numbers them alike.
-const CONDITIONS: [Condition; 5] =
-    [Condition::Plain, Condition::Leading, Condition::Open, Condition::Touching, Condition::Failed];
+const CONDITIONS: [BodyCondition; 5] = [
+    BodyCondition::Plain,
+    BodyCondition::Leading,
+    BodyCondition::Open,
+    BodyCondition::Touching,
+    BodyCondition::Failed,
+];
 
 #[cfg(test)]
 mod tests;

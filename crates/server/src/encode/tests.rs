@@ -58,7 +58,7 @@ impl Reader<'_> {
 
 #[test]
 fn a_frame_of_a_plane_has_the_documented_layout() {
-    let touching = robot(1, [3.0, 4.0, 0.5], 1.0).with_state_if(true, Condition::Touching);
+    let touching = robot(1, [3.0, 4.0, 0.5], 1.0).with_condition_if(true, BodyCondition::Touching);
     let bodies = vec![robot(0, [1.0, 2.0, 0.5], -2.0), touching];
     let mut encoder = FrameEncoder::new(9, &scenery(2));
     let (table, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);

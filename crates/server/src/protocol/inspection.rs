@@ -37,7 +37,7 @@ fn declared_shape(shape: &MarkShape) -> &'static str {
     }
 }
 
-fn body() -> BodyId {
+fn example_body_id() -> BodyId {
     BodyId::new(CONNECTOR, 3, Some(1))
 }
 
@@ -47,7 +47,10 @@ fn every_value_is_declared_as_it_is_serialized() {
         (FactValue::number(1.5, "m"), json!({ "number": { "value": 1.5, "unit": "m" } })),
         (FactValue::Share(0.5), json!({ "share": 0.5 })),
         (FactValue::text("left"), json!({ "text": "left" })),
-        (body().into(), json!({ "body": { "kind": "connector", "number": 3, "part": 1 } })),
+        (
+            example_body_id().into(),
+            json!({ "body": { "kind": "connector", "number": 3, "part": 1 } }),
+        ),
         (FactValue::Place([1.0, 2.0, 3.0]), json!({ "place": [1.0, 2.0, 3.0] })),
         (FactValue::Flag(true), json!({ "flag": true })),
         (FactValue::None, json!("none")),
@@ -81,8 +84,8 @@ fn every_shape_and_role_of_a_mark_is_declared_as_it_is_serialized() {
 #[test]
 fn an_inspection_has_the_declared_fields() {
     let mut table = FactTable::new(["other"]);
-    table.push_row([body().into()]);
-    let mut inspection = Inspection::new(body(), 7, "head");
+    table.push_row([example_body_id().into()]);
+    let mut inspection = Inspection::new(example_body_id(), 7, "head");
     inspection.add_section(FactSection::new("sees").fact("near", true).table(table));
     inspection.add_mark(MarkRole::Wish, "ahead", MarkShape::Point { at_m: [0.0; 3] });
     let id = json!({ "kind": "connector", "number": 3, "part": 1 });

@@ -1,7 +1,7 @@
 //! Exports of recorded runs, by the exporters of the command, to a file that the browser saves.
 
-use super::ResultError;
-use super::job_queue::{CancelToken, result_error};
+use super::HttpError;
+use super::job_queue::{CancelToken, http_error};
 use super::query::QueryFields;
 use crate::protocol::Problem;
 use crate::state::AppState;
@@ -30,15 +30,15 @@ pub(crate) async fn answer(
     }
     export_response(&state, &QueryFields::from_query(uri.query()))
         .await
-        .unwrap_or_else(ResultError::into_response)
+        .unwrap_or_else(HttpError::into_response)
 }
 
-async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Response, ResultError> {
+async fn export_response(state: &AppState, fields: &QueryFields) -> Result<Response, HttpError> {
     let path = state.deps.files.resolve(fields.require("path")?)?;
     let spec = ExportSpec::from_fields(fields)?;
     let worlds = state.deps.worlds.clone();
     let workers = state.deps.workers;
-    let name = spec.file_name(&path);
+    let name = spec.download_name(&path);
     let media = spec.media;
     let export = state
         .jobs
@@ -63,7 +63,7 @@ struct ExportSpec {
 }
 
 impl ExportSpec {
-    fn from_fields(fields: &QueryFields) -> Result<Self, ResultError> {
+    fn from_fields(fields: &QueryFields) -> Result<Self, HttpError> {
         let (format, media) = match fields.require("as")? {
             "csv" => {
                 let table = fields.require("table")?.to_string();
@@ -95,11 +95,11 @@ impl ExportSpec {
     }
 
     /// Returns the name under which the browser saves the export: that of the run, with a suffix and the ending.
-    fn file_name(&self, path: &Path) -> String {
+    fn download_name(&self, path: &Path) -> String {
         // `.` has no name of its own.
         let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let stem = if whole.is_file() { whole.file_stem() } else { whole.file_name() };
-        plain_file_name(&(stem.unwrap_or_default().to_string_lossy() + self.suffix.as_str()))
+        sanitize_file_name(&(stem.unwrap_or_default().to_string_lossy() + self.suffix.as_str()))
     }
 }
 
@@ -108,7 +108,7 @@ fn invalid_cycle_number(text: &str) -> Problem {
 }
 
 /// Returns a name of a file that needs no quoting anywhere.
-pub(super) fn plain_file_name(name: &str) -> String {
+pub(super) fn sanitize_file_name(name: &str) -> String {
     let name = name.replace(|c: char| !c.is_ascii_alphanumeric() && !"-_.".contains(c), "-");
     if name.starts_with('.') || name.is_empty() { format!("run{name}") } else { name }
 }
@@ -120,10 +120,10 @@ fn write_export(
     spec: &ExportSpec,
     workers: usize,
     cancel: &CancelToken,
-) -> Result<Vec<u8>, ResultError> {
-    let recorded = RecordedRun::open(worlds, path).map_err(|e| result_error(&e))?;
+) -> Result<Vec<u8>, HttpError> {
+    let recorded = RecordedRun::open(worlds, path).map_err(|e| http_error(&e))?;
     let folder = tempfile::tempdir()
-        .map_err(|e| result_error(&Error::cannot_write(&std::env::temp_dir(), &e)))?;
+        .map_err(|e| http_error(&Error::cannot_write(&std::env::temp_dir(), &e)))?;
     let out = folder.path().join("export");
     // The page gives the cycle on display: a picture shows it, everything else ends there.
     let is_picture = matches!(spec.format, Format::Svg | Format::Png { .. });
@@ -142,14 +142,14 @@ fn write_export(
     if watcher.is_too_large() {
         return Err(too_large());
     }
-    exported.map_err(|error| result_error(&error))?;
-    std::fs::read(&out).map_err(|e| result_error(&Error::cannot_write(&out, &e)))
+    exported.map_err(|error| http_error(&error))?;
+    std::fs::read(&out).map_err(|e| http_error(&Error::cannot_write(&out, &e)))
 }
 
-fn too_large() -> ResultError {
+fn too_large() -> HttpError {
     let cause = format!("it would have more than {} MiB", MAX_EXPORT_BYTES >> 20);
     let remedy = "use the command, which has no such bound: sidestep export";
-    ResultError::new(StatusCode::PAYLOAD_TOO_LARGE, Problem::new("export", cause, remedy))
+    HttpError::new(StatusCode::PAYLOAD_TOO_LARGE, Problem::new("export", cause, remedy))
 }
 
 /// A watcher that stops an export that becomes too large.
@@ -182,15 +182,15 @@ mod tests {
 
     #[test]
     fn names_of_files_are_plain_whatever_the_folder_is_called() {
-        assert_eq!(plain_file_name("office 2\"\r\n; é.csv"), "office-2------.csv");
-        assert_eq!([plain_file_name(""), plain_file_name(".svg")], ["run", "run.svg"]);
+        assert_eq!(sanitize_file_name("office 2\"\r\n; é.csv"), "office-2------.csv");
+        assert_eq!([sanitize_file_name(""), sanitize_file_name(".svg")], ["run", "run.svg"]);
     }
 
     #[test]
     fn what_is_wanted_is_read_or_refused_in_words() {
         let of = |query: &str| ExportSpec::from_fields(&QueryFields::from_query(Some(query)));
         let spec = of("as=csv&table=events").unwrap_or_else(|_| panic!("a table"));
-        assert_eq!(spec.file_name(Path::new("/no/office")), "office-events.csv");
+        assert_eq!(spec.download_name(Path::new("/no/office")), "office-events.csv");
         for query in ["as=csv", "as=exe", "", "as=svg&cycle=-1", "as=png&cycle=x"] {
             assert!(of(query).is_err(), "{query}");
         }

@@ -1,6 +1,6 @@
 //! Jobs for browsers that wait for the results: one at a time, and cancelled when the browser disconnects.
 
-use super::ResultError;
+use super::HttpError;
 use crate::protocol::Problem;
 use axum::http::StatusCode;
 use sidestep_kernel::Interrupt;
@@ -71,8 +71,8 @@ impl JobQueue {
     /// Those of the job; a bug in it.
     pub(super) async fn run<T: Send + 'static>(
         &self,
-        job: impl FnOnce(&CancelToken) -> Result<T, ResultError> + Send + 'static,
-    ) -> Result<T, ResultError> {
+        job: impl FnOnce(&CancelToken) -> Result<T, HttpError> + Send + 'static,
+    ) -> Result<T, HttpError> {
         // The semaphore is never closed.
         let _turn = self.turn.acquire().await.map_err(|_| internal_error())?;
         let guard = CancelOnDrop(CancelToken::default());
@@ -96,11 +96,11 @@ impl JobQueue {
     }
 }
 
-fn internal_error() -> ResultError {
+fn internal_error() -> HttpError {
     let problem = Problem::new("result", "internal error (a bug in Sidestep)", "please report it");
-    ResultError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
+    HttpError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
 }
 
-pub(super) fn result_error(error: &Error) -> ResultError {
+pub(super) fn http_error(error: &Error) -> HttpError {
     crate::session::problem_of(error).into()
 }

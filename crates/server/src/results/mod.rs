@@ -25,21 +25,21 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
 /// The reason why there is no result: the status for the browser, and the problem that the page shows.
-pub(super) struct ResultError(StatusCode, Problem);
+pub(super) struct HttpError(StatusCode, Problem);
 
-impl ResultError {
+impl HttpError {
     fn new(status: StatusCode, problem: Problem) -> Self {
         Self(status, problem)
     }
 }
 
-impl From<Problem> for ResultError {
+impl From<Problem> for HttpError {
     fn from(problem: Problem) -> Self {
         Self(StatusCode::UNPROCESSABLE_ENTITY, problem)
     }
 }
 
-impl IntoResponse for ResultError {
+impl IntoResponse for HttpError {
     fn into_response(self) -> Response {
         let Self(status, Problem { place, cause, remedy, .. }) = self;
         (status, format!("{place}: {cause}\nhelp: {remedy}\n")).into_response()

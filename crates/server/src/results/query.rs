@@ -1,6 +1,6 @@
 //! The fields of a query string.
 
-use super::ResultError;
+use super::HttpError;
 use crate::protocol::Problem;
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ impl QueryFields {
     ///
     /// # Errors
     /// When it is missing.
-    pub(super) fn require(&self, name: &str) -> Result<&str, ResultError> {
+    pub(super) fn require(&self, name: &str) -> Result<&str, HttpError> {
         self.get(name).ok_or_else(|| {
             let remedy = format!("add it to the address: ?{name}=...");
             Problem::new("address", format!("it has no `{name}`"), remedy).into()

@@ -1,7 +1,7 @@
 //! Reports: the page of `sidestep report` in a frame, and its parts as files.
 
-use super::ResultError;
-use super::job_queue::{CancelToken, result_error};
+use super::HttpError;
+use super::job_queue::{CancelToken, http_error};
 use super::query::QueryFields;
 use crate::compress;
 use crate::protocol::Problem;
@@ -36,14 +36,14 @@ pub(crate) async fn answer(
     }
     let fields = QueryFields::from_query(uri.query());
     let accepts_gzip = compress::accepts_gzip(&headers);
-    report_response(&state, &fields, accepts_gzip).await.unwrap_or_else(ResultError::into_response)
+    report_response(&state, &fields, accepts_gzip).await.unwrap_or_else(HttpError::into_response)
 }
 
 async fn report_response(
     state: &AppState,
     fields: &QueryFields,
     is_zipped: bool,
-) -> Result<Response, ResultError> {
+) -> Result<Response, HttpError> {
     let path = state.deps.files.resolve(fields.require("path")?)?;
     let part = fields.get("as").map(String::from);
     let worlds = state.deps.worlds.clone();
@@ -67,9 +67,9 @@ fn render_report(
     worlds: &Worlds,
     folder: &Path,
     cancel: &CancelToken,
-) -> Result<RenderedReport, ResultError> {
-    let document = document(worlds, folder, cancel).map_err(|e| result_error(&e))?;
-    render(&document, "figures").map_err(|e| result_error(&e.into()))
+) -> Result<RenderedReport, HttpError> {
+    let document = document(worlds, folder, cancel).map_err(|e| http_error(&e))?;
+    render(&document, "figures").map_err(|e| http_error(&e.into()))
 }
 
 /// A part of a report that is sent.
@@ -87,7 +87,7 @@ impl ReportPart {
         path: &Path,
         part: Option<&str>,
         is_zipped: bool,
-    ) -> Result<Self, ResultError> {
+    ) -> Result<Self, HttpError> {
         let name = folder_name(path);
         let (media, file, text) = match part {
             None => ("text/html; charset=utf-8", None, report.html.clone()),
@@ -98,7 +98,7 @@ impl ReportPart {
                 let file = Some(format!("{name}.md"));
                 ("text/markdown; charset=utf-8", file, report.markdown.clone())
             }
-            Some("figures") => ("application/json", None, figures_json(report)),
+            Some("figures") => ("application/json", None, figure_names_json(report)),
             Some(stem) => {
                 let found = report.pictures.iter().find(|picture| picture.stem == stem);
                 let SvgFile { stem, svg } = found.ok_or_else(|| no_such_figure(stem))?;
@@ -111,7 +111,7 @@ impl ReportPart {
 }
 
 /// Returns the names of all figures as JSON, by which the page asks for each.
-fn figures_json(report: &RenderedReport) -> String {
+fn figure_names_json(report: &RenderedReport) -> String {
     let stems: Vec<&str> = report.pictures.iter().map(|picture| picture.stem.as_str()).collect();
     serde_json::json!(stems).to_string()
 }
@@ -124,7 +124,7 @@ fn no_such_figure(stem: &str) -> Problem {
 /// Returns the name of a folder as part of a file name, in plain characters only.
 fn folder_name(path: &Path) -> String {
     let whole: PathBuf = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    super::export::plain_file_name(&whole.file_stem().unwrap_or_default().to_string_lossy())
+    super::export::sanitize_file_name(&whole.file_stem().unwrap_or_default().to_string_lossy())
 }
 
 impl IntoResponse for ReportPart {

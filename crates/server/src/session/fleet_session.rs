@@ -1,6 +1,6 @@
 //! A session that watches a fleet: it shows the views that arrive, and controls nothing.
 
-use super::page_view::PageView;
+use super::page_publisher::PagePublisher;
 use super::{SessionExit, SessionWorker};
 use crate::encode::scene;
 use crate::event_store::EventStore;
@@ -33,7 +33,7 @@ pub(super) struct FleetSession {
     feed: Arc<FleetFeed>,
     /// The unchanging part of the fleet that is watched; another fleet may start at the endpoint later.
     fleet_scene: Arc<FleetScene>,
-    page_view: PageView,
+    publisher: PagePublisher,
     log: EventStore,
     /// The newest frame.
     frame: Frame,
@@ -46,13 +46,13 @@ pub(super) struct FleetSession {
 impl FleetSession {
     pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, feed: Arc<FleetFeed>) -> Self {
         let fleet_scene = feed.snapshot().scene;
-        let page_view = PageView::new(session, outbox.clone(), &fleet_scene.scenery);
+        let publisher = PagePublisher::new(session, outbox.clone(), &fleet_scene.scenery);
         Self {
             session,
             outbox,
             feed,
             fleet_scene,
-            page_view,
+            publisher,
             log: EventStore::default(),
             frame: Frame::default(),
             number: 0,
@@ -62,7 +62,7 @@ impl FleetSession {
 
     /// Answers requests and shows the views that arrive, until the page leaves or no more views will arrive.
     pub(super) fn run(&mut self, worker: &SessionWorker, id: u32) {
-        self.take_view();
+        self.update_from_feed();
         match worker.catch_panic(|| self.run_until_closed(worker, id)) {
             Ok(()) | Err(SessionExit::Interrupted) => {}
             Err(SessionExit::Bug(message)) => self.report_failure(super::internal_error(&message)),
@@ -70,25 +70,25 @@ impl FleetSession {
     }
 
     fn run_until_closed(&mut self, worker: &SessionWorker, id: u32) {
-        self.reply(id, Ok(self.opened_reply()));
+        self.send_reply(id, Ok(self.opened_reply()));
         loop {
             match worker.requests.recv_timeout(POLL_INTERVAL) {
                 Ok((id, call)) => {
                     let answer = self.answer(call);
-                    self.reply(id, answer);
+                    self.send_reply(id, answer);
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            let snapshot = self.take_view();
+            let snapshot = self.update_from_feed();
             if !Arc::ptr_eq(&snapshot.scene, &self.fleet_scene) {
                 return self.report_failure(self.fleet_was_replaced());
             }
             let now = Instant::now();
             if self.number > 0 {
-                self.page_view.forward_frame(&self.frame, &mut self.log, now);
+                self.publisher.forward_frame(&self.frame, &mut self.log, now);
             }
-            self.page_view.report_status(self.status(&snapshot), now);
+            self.publisher.report_status(self.status(&snapshot), now);
             if let Some(problem) = snapshot.lost {
                 return self.report_failure(problem);
             }
@@ -96,7 +96,7 @@ impl FleetSession {
     }
 
     /// Takes the view of the feed, if it is new.
-    fn take_view(&mut self) -> FeedSnapshot {
+    fn update_from_feed(&mut self) -> FeedSnapshot {
         let snapshot = self.feed.snapshot();
         let is_same_fleet = Arc::ptr_eq(&snapshot.scene, &self.fleet_scene);
         let Some(view) = &snapshot.view else { return snapshot };
@@ -106,7 +106,7 @@ impl FleetSession {
         self.number = view.number;
         // Where only the state of nodes has changed, the page needs no frame.
         if self.frame.cycle != view.frame.cycle || self.frame.bodies.is_empty() {
-            self.page_view.mark_moved();
+            self.publisher.mark_cycle_changed();
         }
         self.frame = view.frame.clone();
         // The log of a view has the last events of the run, many of which came with an earlier view.
@@ -116,7 +116,7 @@ impl FleetSession {
         snapshot
     }
 
-    fn reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
+    fn send_reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
         let result = result.map_or_else(ReplyResult::Problem, ReplyResult::Answer);
         self.outbox.send_reply(&Reply { id, result });
     }
@@ -138,7 +138,7 @@ impl FleetSession {
     fn answer(&mut self, call: RunMethod) -> Result<ReplyBody, Problem> {
         match call {
             RunMethod::Credit { frames } => {
-                self.page_view.add_credit(frames);
+                self.publisher.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
             // A fleet has no scans, but the page selects bodies of every session.
@@ -192,7 +192,7 @@ impl FleetSession {
 
     /// Reports that no more views will arrive.
     fn report_failure(&mut self, problem: Problem) {
-        if let Some(last) = self.page_view.last_reported() {
+        if let Some(last) = self.publisher.last_reported() {
             let status = SessionStatus { state: SessionState::Failed, ..last };
             self.outbox.send_status(self.session, &ServerNotification::Status(status));
         }

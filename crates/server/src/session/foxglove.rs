@@ -85,7 +85,7 @@ impl FoxgloveLease {
     }
 
     /// Sends the run to its viewers, and returns their request, if there is one.
-    pub(super) fn update(
+    pub(super) fn update_viewers(
         &mut self,
         run: &mut dyn Simulation,
         log: &mut EventStore,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The history of one run. Each cycle is recorded by the computation that gets there first: the played one, or the
-/// [`AheadRun`](super::prefetcher::AheadRun).
+/// [`AheadRun`](super::ahead_run::AheadRun).
 pub(super) struct RunHistory {
     pub(super) keyframes: Keyframes,
     pub(super) samples: MetricSamples,
@@ -46,8 +46,8 @@ impl RunHistory {
     }
 
     /// Records the cycle at which a run pauses, so that its metrics are those on display.
-    pub(super) fn record_pause(&mut self, run: &dyn Simulation) {
-        if self.samples.is_new(run.cycle()) {
+    pub(super) fn record_pause_sample(&mut self, run: &dyn Simulation) {
+        if self.samples.is_new_cycle(run.cycle()) {
             self.add_sample(run);
         }
     }

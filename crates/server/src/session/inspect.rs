@@ -18,7 +18,7 @@ pub(super) fn inspection(
     inspection.ok_or_else(|| {
         let part = of.part.map(|part| format!("/{part}")).unwrap_or_default();
         let place = format!("{}/{}{part}", of.kind, of.number);
-        let remedy = format!("choose a {} of this run", run.agent());
+        let remedy = format!("choose a {} of this run", run.agent_noun());
         Problem::new(place, "no information about this body", remedy)
     })
 }

@@ -3,6 +3,7 @@
 //! No socket waits for another one, and no result depends on any: the session's thread alone controls the computation, and
 //! its frames go to an [`Outbox`], which never makes it wait.
 
+mod ahead_run;
 mod edit;
 mod fleet_session;
 mod foxglove;
@@ -10,9 +11,8 @@ mod history;
 mod inspect;
 mod open_run;
 mod pace;
-mod page_view;
+mod page_publisher;
 mod player;
-mod prefetcher;
 mod save;
 
 pub(crate) use edit::{apply_edits, text_values_reply};
@@ -96,7 +96,7 @@ impl Session {
     }
 
     /// Returns its scenario, once it is open: in the file in which it was saved last.
-    pub(crate) fn source(&self) -> Option<Source> {
+    pub(crate) fn scenario_source(&self) -> Option<Source> {
         self.source.get()
     }
 
@@ -142,7 +142,9 @@ impl SessionWorker {
                 self.run_player(session, id, source, || OpenRun::from_file(deps, &path, seed));
             }
             OpenTarget::New { world } => {
-                self.run_player(session, id, source, || OpenRun::from_default(deps, &world, seed));
+                self.run_player(session, id, source, || {
+                    OpenRun::from_default_scenario(deps, &world, seed)
+                });
             }
             OpenTarget::Recording { path } => {
                 self.run_player(session, id, source, || OpenRun::from_recording(deps, &path, seed));
@@ -190,7 +192,7 @@ impl SessionWorker {
 
     fn play_until_closed(&self, player: &mut Player) {
         loop {
-            let wait = player.poll().unwrap_or(MAX_WAIT);
+            let wait = player.run_due_work().unwrap_or(MAX_WAIT);
             match self.requests.recv_timeout(wait) {
                 Ok((id, call)) => player.on_request(id, call),
                 Err(RecvTimeoutError::Timeout) => {}

@@ -2,7 +2,7 @@
 
 use super::foxglove::FoxgloveHost;
 use super::save::{
-    SaveOptions, SessionFile, SharedSource, check_writable, session_path, write_scenario,
+    SaveOptions, SessionFile, SharedSource, check_savable_text, session_path, write_scenario,
 };
 use crate::encode::problem;
 use crate::files::AllowedFiles;
@@ -87,7 +87,7 @@ impl OpenRun {
     ///
     /// # Errors
     /// When there is no such world.
-    pub(crate) fn from_default(
+    pub(crate) fn from_default_scenario(
         deps: SessionDeps,
         world: &str,
         seed: Option<u64>,
@@ -220,7 +220,7 @@ impl OpenRun {
         let target = self.deps.files.write_target(&path)?;
         let folder = target.path.parent().map(Path::to_path_buf).unwrap_or_default();
         let source = Source::new(path, text, folder);
-        check_writable(&self.deps.files, &self.deps.worlds, &source)?;
+        check_savable_text(&self.deps.files, &self.deps.worlds, &source)?;
         let Source { text, folder, .. } = source;
         let reply = write_scenario(&target, self.file.as_ref(), &text, &options)?;
         if let ReplyBody::Saved { place } = &reply {
@@ -233,7 +233,7 @@ impl OpenRun {
     }
 
     /// Starts a recording once more, to be computed ahead; none if the run is no recording.
-    pub(crate) fn restart_recorded_run(&self) -> Option<Box<dyn Simulation>> {
+    pub(crate) fn start_second_replay(&self) -> Option<Box<dyn Simulation>> {
         // It could be started before. If it cannot now, because its file was deleted for instance, nothing is computed ahead.
         self.recorded.as_ref()?.start_for_viewing(self.deps.workers).ok()
     }
@@ -266,7 +266,7 @@ impl OpenRun {
     }
 
     /// Returns whether its states are computed, so that they have digests.
-    pub(crate) fn is_computed(&self) -> bool {
+    pub(crate) fn is_simulated(&self) -> bool {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_build().is_none())
     }
 
@@ -285,7 +285,7 @@ impl OpenRun {
 
     /// Returns the descriptions of the world's metrics.
     pub(crate) fn metric_infos(&self) -> &'static [MetricInfo] {
-        let world_type = self.deps.worlds.find(self.run.world());
+        let world_type = self.deps.worlds.find(self.run.world_name());
         world_type.map_or(&[], |world_type| world_type.metric_infos())
     }
 
@@ -293,7 +293,7 @@ impl OpenRun {
     ///
     /// # Errors
     /// When the folder can no longer be read.
-    pub(crate) fn tables(&self) -> Result<Vec<String>, Problem> {
+    pub(crate) fn table_names(&self) -> Result<Vec<String>, Problem> {
         let recorded = self.recorded.as_ref();
         recorded.map_or(Ok(Vec::new()), |recorded| recorded.tables().map_err(|e| problem(&e)))
     }
@@ -353,7 +353,7 @@ pub(super) fn source_with_text(
         return Err(Problem::new(source.place.as_str(), "texts are not taken here", remedy));
     }
     let source = Source { text, ..source.clone() };
-    deps.files.check_text(&source)?;
+    deps.files.check_referenced_files(&source)?;
     Ok(source)
 }
 
@@ -362,7 +362,7 @@ pub(super) fn source_with_text(
 /// # Errors
 /// With the file.
 fn check_references(deps: &SessionDeps, source: &Source) -> Result<(), Problem> {
-    if deps.read_only { Ok(()) } else { deps.files.check_text(source) }
+    if deps.read_only { Ok(()) } else { deps.files.check_referenced_files(source) }
 }
 
 fn start_run(

@@ -3,13 +3,13 @@
 mod seek;
 mod viewers;
 
+use super::ahead_run::AheadRun;
 use super::foxglove::FoxgloveLease;
 use super::history::RunHistory;
 use super::inspect::inspection;
 use super::open_run::OpenRun;
 use super::pace::{CycleRate, CyclesPerSlice};
-use super::page_view::{MAX_SCANNED_BODIES, PageView};
-use super::prefetcher::AheadRun;
+use super::page_publisher::{MAX_SCANNED_BODIES, PagePublisher};
 use super::save::SaveOptions;
 use crate::SPEED_RANGE;
 use crate::encode::{requested_body, scene};
@@ -35,7 +35,7 @@ pub(super) struct Player {
     interrupt: Interrupt,
     pub(super) open_run: OpenRun,
     scenery: Scenery,
-    page_view: PageView,
+    publisher: PagePublisher,
     foxglove: FoxgloveLease,
     history: RunHistory,
     /// The second computation of a recording, until it is at its end.
@@ -65,7 +65,7 @@ impl Player {
         let scenery = open_run.run.scenery();
         let mut player = Self {
             session,
-            page_view: PageView::new(session, outbox.clone(), &scenery),
+            publisher: PagePublisher::new(session, outbox.clone(), &scenery),
             foxglove: FoxgloveLease::new(open_run.foxglove_host(), session),
             outbox,
             interrupt,
@@ -87,21 +87,21 @@ impl Player {
             open_run,
             scenery,
         };
-        player.prepare_run();
+        player.attach_run();
         player.restart_viewers()?;
         Ok(player)
     }
 
     /// Prepares a run that is at its start.
-    fn prepare_run(&mut self) {
+    fn attach_run(&mut self) {
         self.open_run.run.set_interrupt(self.interrupt.clone());
         self.open_run.run.enable_events();
         if self.foxglove.is_enabled() {
-            self.history.log.enable_viewers();
+            self.history.log.enable_viewer_events();
         }
         self.prefetcher = self
             .open_run
-            .restart_recorded_run()
+            .start_second_replay()
             .map(|run| AheadRun::new(run, self.open_run.until, self.interrupt.clone()));
         self.pause();
     }
@@ -110,7 +110,7 @@ impl Player {
         let is_new_scenario = text.is_some();
         self.open_run.restart(seed, text)?;
         self.scenery = self.open_run.run.scenery();
-        self.page_view.restart(&self.scenery);
+        self.publisher.restart(&self.scenery);
         self.history = RunHistory::from_run(
             self.open_run.run.as_ref(),
             self.open_run.metric_infos(),
@@ -119,7 +119,7 @@ impl Player {
         self.digest = None;
         self.slice = CyclesPerSlice::default();
         self.rate = CycleRate::default();
-        self.prepare_run();
+        self.attach_run();
         // A server for viewers serves one scenario, at any of its cycles.
         if is_new_scenario {
             self.restart_viewers()?;
@@ -131,7 +131,7 @@ impl Player {
     pub(super) fn opened_reply(&mut self) -> ReplyBody {
         let run = &self.open_run.run;
         let is_recording = self.open_run.recorded.is_some();
-        let scene = scene(run.world(), run.agent(), &self.scenery, is_recording);
+        let scene = scene(run.world_name(), run.agent_noun(), &self.scenery, is_recording);
         ReplyBody::Opened { session: self.session, scene, status: self.status(Instant::now()) }
     }
 
@@ -147,12 +147,12 @@ impl Player {
     pub(super) fn on_request(&mut self, id: u32, call: RunMethod) {
         self.request_in_progress = Some(id);
         if let Some(result) = self.answer(id, call) {
-            self.reply(id, result);
+            self.send_reply(id, result);
         }
         self.request_in_progress = None;
     }
 
-    fn reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
+    fn send_reply(&self, id: u32, result: Result<ReplyBody, Problem>) {
         let result = result.map_or_else(ReplyResult::Problem, ReplyResult::Answer);
         self.outbox.send_reply(&Reply { id, result });
     }
@@ -184,7 +184,7 @@ impl Player {
             }
             RunMethod::SelectScans { bodies } => self.select_scans(bodies),
             RunMethod::Credit { frames } => {
-                self.page_view.add_credit(frames);
+                self.publisher.add_credit(frames);
                 Ok(ReplyBody::Done)
             }
             RunMethod::Inspect { body } => {
@@ -194,19 +194,21 @@ impl Player {
             RunMethod::Metrics { from } => Ok(self.history.samples.samples_reply(from)),
             RunMethod::Events { from, until, skip, limit } => {
                 let run = self.open_run.run.as_mut();
-                self.page_view.take_events(run, &mut self.history.log, Instant::now());
+                self.publisher.record_events(run, &mut self.history.log, Instant::now());
                 let limit = limit.min(MAX_EVENTS);
                 Ok(self.history.log.events_reply(from..until, skip.unwrap_or(0), limit))
             }
-            RunMethod::Source {} => Ok(self.source()),
-            RunMethod::Tables {} => self.open_run.tables().map(|names| ReplyBody::Tables { names }),
+            RunMethod::Source {} => Ok(self.source_reply()),
+            RunMethod::Tables {} => {
+                self.open_run.table_names().map(|names| ReplyBody::Tables { names })
+            }
             RunMethod::Save { text, to, base, overwrite } => {
                 self.open_run.save(text, to, SaveOptions { base, overwrite })
             }
         })
     }
 
-    fn source(&self) -> ReplyBody {
+    fn source_reply(&self) -> ReplyBody {
         let source = &self.open_run.source;
         ReplyBody::Source {
             place: source.place.clone(),
@@ -222,7 +224,7 @@ impl Player {
         }
         let kinds = self.open_run.kinds();
         let known = bodies.iter().filter_map(|of| requested_body(of, &kinds)).collect();
-        self.page_view.set_scanned_bodies(known);
+        self.publisher.set_scanned_bodies(known);
         Ok(ReplyBody::Done)
     }
 
@@ -255,9 +257,9 @@ impl Player {
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
         self.seek = None;
         self.rate = CycleRate::default();
-        self.page_view.request_frame();
+        self.publisher.request_frame();
         let cycle = self.cycle();
-        self.history.record_pause(self.open_run.run.as_ref());
+        self.history.record_pause_sample(self.open_run.run.as_ref());
         if self.digest.as_ref().is_none_or(|(digest_cycle, _)| *digest_cycle != cycle) {
             self.digest = Some((cycle, self.open_run.run.digest().to_string()));
         }
@@ -267,7 +269,7 @@ impl Player {
 
     /// Does the work that is due, for some milliseconds at most. Returns the time until there is more, unless a
     /// request comes; `None` for forever.
-    pub(super) fn poll(&mut self) -> Option<Duration> {
+    pub(super) fn run_due_work(&mut self) -> Option<Duration> {
         let now = Instant::now();
         // Each time, because another session may have started since, and wants its share.
         self.history.keyframes.shrink_to_budget();
@@ -283,18 +285,18 @@ impl Player {
         }
         self.stop_at_target();
         let now = Instant::now();
-        self.page_view.send_due_frame(self.open_run.run.as_mut(), &mut self.history.log, now);
+        self.publisher.send_due_frame(self.open_run.run.as_mut(), &mut self.history.log, now);
         let status = self.status(now);
-        self.page_view.report_status(status.clone(), now);
+        self.publisher.report_status(status.clone(), now);
         self.update_viewers(now);
-        let is_idle = self.work_due(now).is_none_or(|due| due > now);
+        let is_idle = self.next_work_due(now).is_none_or(|due| due > now);
         if is_idle && self.compute_ahead() {
             return Some(Duration::ZERO);
         }
         let status_due = self.status_due(&status);
         let due = [
-            self.work_due(now),
-            self.page_view.frame_due(),
+            self.next_work_due(now),
+            self.publisher.frame_due(),
             status_due,
             self.foxglove.next_update(),
         ];
@@ -302,7 +304,7 @@ impl Player {
         Some(next.saturating_duration_since(Instant::now()))
     }
 
-    fn work_due(&self, now: Instant) -> Option<Instant> {
+    fn next_work_due(&self, now: Instant) -> Option<Instant> {
         match (self.state, &self.pacer) {
             (SessionState::Playing, Some(pacer)) => Some(pacer.next_due(self.cycle())),
             (SessionState::Playing | SessionState::Seeking, _) => Some(now),
@@ -311,7 +313,7 @@ impl Player {
     }
 
     fn status_due(&self, status: &SessionStatus) -> Option<Instant> {
-        self.page_view.needs_report(status).then(|| self.page_view.status_due())
+        self.publisher.is_new_status(status).then(|| self.publisher.status_due())
     }
 
     /// Pauses where the seek or the run ends.
@@ -325,7 +327,7 @@ impl Player {
         self.pause();
         let Some(Seek { id, then, .. }) = seek else { return };
         if let Some(id) = id {
-            self.reply(id, Ok(ReplyBody::Done));
+            self.send_reply(id, Ok(ReplyBody::Done));
         }
         if let Some(speed) = then {
             // Only viewers continue after a seek, and their speeds are in range.
@@ -344,7 +346,7 @@ impl Player {
         let computing_time = started.elapsed();
         self.slice.adapt(done, computing_time);
         self.rate.record(Instant::now(), done);
-        self.page_view.mark_moved();
+        self.publisher.mark_cycle_changed();
         self.digest = None;
         self.history.record(self.open_run.run.as_ref(), computing_time);
     }
@@ -362,7 +364,7 @@ impl Player {
     fn status(&mut self, now: Instant) -> SessionStatus {
         let cycle = self.cycle();
         let is_paused = matches!(self.state, SessionState::Paused | SessionState::Over);
-        let has_digest = is_paused && self.open_run.is_computed();
+        let has_digest = is_paused && self.open_run.is_simulated();
         let digest = self.digest.as_ref().filter(|(of, _)| has_digest && *of == cycle);
         let banner = self.open_run.recorded.as_ref().map(|_| {
             self.verdict
@@ -391,9 +393,9 @@ impl Player {
         // The request that ran into the bug waits for a reply, too, unless it is the seek.
         let request = self.request_in_progress.take();
         if let Some(id) = request.filter(|id| Some(*id) != seek_request) {
-            self.reply(id, Err(problem.clone()));
+            self.send_reply(id, Err(problem.clone()));
         }
-        if let Some(last) = self.page_view.last_reported() {
+        if let Some(last) = self.publisher.last_reported() {
             self.outbox.send_status(
                 self.session,
                 &ServerNotification::Status(SessionStatus { state: SessionState::Failed, ..last }),

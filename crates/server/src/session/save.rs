@@ -61,13 +61,13 @@ pub(super) struct SaveOptions {
 ///
 /// # Errors
 /// With the file to which it refers, or the kind of text that it has to be.
-pub(super) fn check_writable(
+pub(super) fn check_savable_text(
     files: &AllowedFiles,
     worlds: &Worlds,
     source: &Source,
 ) -> Result<(), Problem> {
     let Ok(values) = source.parse::<Value>() else { return Ok(()) };
-    files.check_text(source)?;
+    files.check_referenced_files(source)?;
     // A scenario may not be replaced by anything else, either: in two saves, a page could otherwise make any file out of it.
     if values["world"].is_null() {
         let worlds = worlds.names().join(", ");

@@ -7,7 +7,7 @@ use sidestep_draw::{AnimationFrame, AnimationRenderer as View, bodies_with_trail
 use sidestep_kernel::Simulation;
 use sidestep_kernel::text::group_thousands;
 use sidestep_kernel::view::{
-    Body, BodyId, Frame, FrameOptions, Isometry2, Scenery, Trail, Vec3, corner,
+    Body, BodyId, Frame, FrameOptions, Isometry2, Scenery, Trail, Vec3, corner_of_move,
 };
 use sidestep_kernel::{Cycle, InputError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -157,7 +157,7 @@ fn corner_before_slip(scenery: &Scenery, body: &Body, from: Vec3, quarters: u32)
     // In meters: rounding of the turn into the floor's frame moves a place less, and any motion of a body more.
     let has_moved_x = (from[0] - to[0]).abs() > 1e-9;
     let has_moved_y = (from[1] - to[1]).abs() > 1e-9;
-    let [x, y, z] = corner(from, quarters, to);
+    let [x, y, z] = corner_of_move(from, quarters, to);
     let [x, y] = plane.transform_point([x, y]);
     (has_moved_x && has_moved_y).then_some([x, y, z])
 }

@@ -143,7 +143,7 @@ impl FrameSink for BagSink {
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
         let frame = run.frame(FRAME_OPTIONS);
         if frame.odometry.is_empty() {
-            let cause = format!("the world {} has no robots with odometry", run.world());
+            let cause = format!("the world {} has no robots with odometry", run.world_name());
             let remedy = "export a run of the world robots, or use --to mcap";
             return Err(InputError::new("--to rosbag", cause, remedy).into());
         }
@@ -217,7 +217,7 @@ fn yaw_rad(pose: &Pose) -> f64 {
 
 /// Returns a scan; directions without a beam have no number.
 fn laser_scan(time_s: f64, scan: &Scan) -> LaserScan {
-    let (first_rad, last_rad, ranges_m) = scan.evenly_spaced(f64::NAN);
+    let (first_rad, last_rad, ranges_m) = scan.resample_evenly(f64::NAN);
     let steps = ranges_m.len().max(2) - 1;
     LaserScan {
         header: header(time_s, scan_frame(scan)),

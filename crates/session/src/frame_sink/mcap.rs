@@ -50,7 +50,7 @@ impl McapSink {
         let mut files = resolved.files;
         files.sort();
         let about = McapProvenance {
-            world: run.world().into(),
+            world: run.world_name().into(),
             build: build.into(),
             origin: Provenance {
                 program_version: VERSION.into(),

@@ -4,7 +4,7 @@ use super::FrameSink;
 use crate::Error;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Table, TableSchema, Values};
-use sidestep_kernel::view::{Body, Condition, Frame, FrameOptions, Kinds};
+use sidestep_kernel::view::{Body, BodyCondition, Frame, FrameOptions, Kinds};
 use sidestep_kernel::{Cycle, Simulation};
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ impl FrameRows {
     pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
         let table = frames_table(&self.kinds);
         let rows = std::mem::take(&mut self.rows);
-        (table.schema(), table.block(&rows))
+        (table.schema(), table.block_from_rows(&rows))
     }
 
     /// Keeps only the frames of these cycles: the run is back at their end.
@@ -79,7 +79,7 @@ impl FrameSink for FrameRows {
 pub(crate) fn frame_rows(run: &mut dyn Simulation, kinds: &Kinds) -> (TableSchema, Vec<Values>) {
     let table = frames_table(kinds);
     let rows: Vec<Row> = body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect();
-    (table.schema(), table.block(&rows))
+    (table.schema(), table.block_from_rows(&rows))
 }
 
 fn body_rows(frame: Frame) -> impl Iterator<Item = Row> {
@@ -112,7 +112,7 @@ fn frames_table(kinds: &Kinds) -> Table<Row> {
         })
         .f64("velocity_y_m_s", "the same, north", |row| row.body.velocity_m_s[1])
         .f64("velocity_z_m_s", "the same, up", |row| row.body.velocity_m_s[2])
-        .label("condition", "its condition", Condition::ALL.map(Condition::name), |row| {
-            label_index(&Condition::ALL, &row.body.state)
+        .label("condition", "its condition", BodyCondition::ALL.map(BodyCondition::name), |row| {
+            label_index(&BodyCondition::ALL, &row.body.state)
         })
 }

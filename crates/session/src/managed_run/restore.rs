@@ -3,7 +3,7 @@
 use super::ManagedRun;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::checkpoint::{CheckpointError, decode_header};
-use sidestep_kernel::control::{OrderError, Orders};
+use sidestep_kernel::control::{MultiAgentOrder, OrderError};
 use sidestep_kernel::ports::RecordError;
 
 /// The reason why a run cannot continue from a checkpoint.
@@ -48,7 +48,7 @@ impl ManagedRun {
     ///
     /// # Errors
     /// An order that cannot be obeyed; nothing is ordered then.
-    pub fn order(&mut self, orders: &Orders<'_>) -> Result<(), OrderError> {
+    pub fn order(&mut self, orders: &MultiAgentOrder<'_>) -> Result<(), OrderError> {
         self.run.order(orders)?;
         self.ordered_at = Some(self.run.cycle());
         Ok(())
@@ -92,7 +92,7 @@ impl ManagedRun {
                 return Ok(self.record_checkpoint(checkpoint)?);
             }
             let header = decode_header(checkpoint)?;
-            header.check_origin(&decode_header(&present)?)?;
+            header.check_compatibility(&decode_header(&present)?)?;
             self.check_not_stored(header.cycle)?;
             self.check_history(checkpoint, header.cycle)?;
         }

@@ -5,7 +5,8 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, LogEvent, LogEventKind, PositionTableColumns, Quantity, Role, Severity,
+    Body, BodyId, BodyKind, BodyRole, LogEvent, LogEventKind, PositionTableColumns, Quantity,
+    Severity,
 };
 use sidestep_record::{Table, read_table};
 use std::ops::Range;
@@ -71,7 +72,7 @@ impl EventRows<'_> {
     /// Returns the kind of a body, by its number, which counts on through all kinds.
     fn kind_of(&self, number: u32) -> BodyKind {
         let agents = self.place.kind;
-        let among = [Role::MovesAmong(agents), Role::StandsAmong(agents)];
+        let among = [BodyRole::MovesAmong(agents), BodyRole::StandsAmong(agents)];
         let other = self
             .first
             .iter()

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::text::{KeyValues, StateReport};
 use sidestep_kernel::view::{
     Body, BodyId, Frame, FrameOptions, Inspection, Kinds, LogEvent, PositionTableColumns, Scenery,
 };
@@ -106,12 +106,12 @@ impl RecordedPlayback {
 }
 
 impl Simulation for RecordedPlayback {
-    fn world(&self) -> &'static str {
-        self.start.world()
+    fn world_name(&self) -> &'static str {
+        self.start.world_name()
     }
 
-    fn agent(&self) -> &'static str {
-        self.start.agent()
+    fn agent_noun(&self) -> &'static str {
+        self.start.agent_noun()
     }
 
     fn decision_mode(&self) -> DecisionMode {
@@ -126,8 +126,8 @@ impl Simulation for RecordedPlayback {
         self.cycle
     }
 
-    fn agents(&self) -> usize {
-        self.start.agents()
+    fn agent_count(&self) -> usize {
+        self.start.agent_count()
     }
 
     fn is_over(&self) -> bool {
@@ -211,8 +211,8 @@ impl Simulation for RecordedPlayback {
         KeyValues::new()
     }
 
-    fn poses(&self) -> StateDescription {
-        StateDescription { json: json!([]), text: String::new() }
+    fn poses(&self) -> StateReport {
+        StateReport { json: json!([]), text: String::new() }
     }
 
     fn phase_times(&self) -> PhaseTimes {

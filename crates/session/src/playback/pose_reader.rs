@@ -3,7 +3,8 @@
 use crate::run_tables::has_rows;
 use sidestep_kernel::ports::Values;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Frame, Pose, PositionTableColumns, Role, Scenery, Shape, Trail, Vec3,
+    Body, BodyId, BodyKind, BodyRole, Frame, Pose, PositionTableColumns, Scenery, Shape, Trail,
+    Vec3,
 };
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, read_table};
@@ -130,11 +131,11 @@ impl PoseReader {
             let recorded_id = self.recorded_id(body);
             let moved = match body.kind.role() {
                 // Rods have no rows of their own: they are lines through the connectors' places.
-                Role::LineThroughParts(kind) => {
+                BodyRole::LineThroughParts(kind) => {
                     let joint = joints.entry(body.number).or_default();
                     line_through_parts(body, kind, poses, joint)
                 }
-                Role::AroundAgent(kind) => poses
+                BodyRole::AroundAgent(kind) => poses
                     .get(&BodyId::new(kind, body.number, None))
                     .map(|pose| Body { pose: Pose::from_position(pose.at_m), ..body.clone() }),
                 _ => recorded_id.and_then(|id| poses.get(&id)).map(|pose| {
@@ -145,7 +146,7 @@ impl PoseReader {
             // What has no rows in any table does not move, such as a door or an obstacle. Agents without rows do: robots
             // on the joints of a chain.
             let is_carried =
-                body.kind.is_of_agent() || matches!(body.kind.role(), Role::AroundAgent(_));
+                body.kind.is_of_agent() || matches!(body.kind.role(), BodyRole::AroundAgent(_));
             let stays = recorded_id.is_none() && !is_carried;
             match moved {
                 Some(moved) => bodies.push(moved),
@@ -195,7 +196,7 @@ fn last_pose(
 
 /// Returns whether a body may have rows.
 fn has_rows_in(rows: &PositionTableColumns, body: &Body) -> bool {
-    let is_kind = body.kind == rows.kind || body.kind.role() == Role::MovesAmong(rows.kind);
+    let is_kind = body.kind == rows.kind || body.kind.role() == BodyRole::MovesAmong(rows.kind);
     is_kind && body.part.is_some() == rows.part.is_some()
 }
 

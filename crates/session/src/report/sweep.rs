@@ -119,7 +119,7 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
     }
     let mut runs = vec![0u64; plan.variants.len()];
     if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
-        for variant in of.options().flatten() {
+        for variant in of.iter_options().flatten() {
             // A damaged table may have numbers of no variant.
             if let Some(runs) = usize::try_from(*variant).ok().and_then(|v| runs.get_mut(v)) {
                 *runs += 1;

@@ -2,7 +2,7 @@
 //! of their controls are missing.
 
 use crate::support::SHIPPED_WORLDS;
-use sidestep_airspace::pilot::{Control, Percept, Pilot};
+use sidestep_airspace::pilot::{AirplaneControl, Percept, Pilot};
 use sidestep_airspace::{AirspaceRun, RemotePilotRun};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
@@ -21,7 +21,7 @@ fn airspace(journey: &mut ManagedRun) -> &mut AirspaceRun {
 }
 
 /// Lets pilots decide a cycle: all packets arrive, one after the other.
-fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<Control> {
+fn decide_cycle(pilots: &mut [Pilot], sights: Vec<Percept>) -> Vec<AirplaneControl> {
     let ids: Vec<EntityId> = sights.iter().map(|sight| sight.own.id).collect();
     let mut due = Vec::new();
     for sight in sights {

@@ -14,7 +14,7 @@ fn sent<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -> T {
     let line = serde_json::to_string(value).expect("JSON");
     assert!(!line.contains('\n'));
     let kinds = Kinds::new([FROG, BodyKind::OBSTACLE]);
-    kinds.while_reading(|| serde_json::from_str(&line)).expect("the same type")
+    kinds.resolve_names_in(|| serde_json::from_str(&line)).expect("the same type")
 }
 
 #[test]
@@ -50,8 +50,8 @@ fn watchers_get_scene_and_frames_of_any_world() {
     let simulation = run.simulation_mut();
     let scene = LinkMessage::Scene(Box::new(FleetScene {
         build: "b".into(),
-        world: simulation.world().into(),
-        agent: simulation.agent().into(),
+        world: simulation.world_name().into(),
+        agent: simulation.agent_noun().into(),
         seed: 1,
         scenery: simulation.scenery(),
     }));
@@ -65,7 +65,7 @@ fn watchers_get_scene_and_frames_of_any_world() {
     });
     let fleet = FleetStatus {
         cycle: frame.cycle,
-        noun: simulation.agent().into(),
+        noun: simulation.agent_noun().into(),
         nodes: nodes.collect(),
         ..FleetStatus::default()
     };

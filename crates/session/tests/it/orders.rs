@@ -1,7 +1,7 @@
 //! Promise D1, D2: a run that was decided from outside is computed again from its orders.
 
 use crate::support::SHIPPED_WORLDS;
-use sidestep_kernel::control::Orders;
+use sidestep_kernel::control::MultiAgentOrder;
 use sidestep_kernel::ports::Values;
 use sidestep_scenario::Source;
 use sidestep_session::{
@@ -27,7 +27,7 @@ fn record_run(folder: &Path, until: u64) -> String {
     while journey.cycle() < until {
         let now = journey.cycle();
         let values = [0, 1, 2, 3].map(|k| ((now / 3 + k * k) % 3) as f64);
-        let orders = Orders { order: "action", agents: &[0, 1, 2, 3], values: &values };
+        let orders = MultiAgentOrder { order: "action", agents: &[0, 1, 2, 3], values: &values };
         journey.simulation_mut().order(&orders).expect("right");
         journey.advance_to(now + 1, &NoWatcher).expect("there is room");
     }
@@ -86,7 +86,7 @@ fn rows_in_memory_never_tell_of_two_pasts_and_have_no_hole() {
     advance(&mut journey, 33);
     let at_33 = journey.checkpoint().expect("saved");
     journey.restore(&at_20).expect("its own");
-    let turn = Orders { order: "action", agents: &[0], values: &[1.0] };
+    let turn = MultiAgentOrder { order: "action", agents: &[0], values: &[1.0] };
     journey.order(&turn).expect("right");
     advance(&mut journey, 25);
     let digest = journey.simulation().digest();

@@ -6,7 +6,7 @@
 use super::{read, root};
 use serde_json::Value;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::control::Space;
+use sidestep::kernel::control::ValueSpace;
 use sidestep::kernel::ports::{ColumnSpec, TableSchema};
 use sidestep::scenario::{MetricInfo, Source, metric_label};
 use sidestep::worlds::WORLDS;
@@ -94,7 +94,7 @@ fn rendered(schemas: &[TableSchema]) -> String {
 }
 
 /// Returns spaces as a table, a row each, in the order in which arrays have them.
-fn rendered_spaces(spaces: &[Space]) -> String {
+fn rendered_spaces(spaces: &[ValueSpace]) -> String {
     let mut text = "\n| | name | shape | unit | values | meaning |\n".to_string();
     text += "| --- | --- | --- | --- | --- | --- |\n";
     for (k, space) in spaces.iter().enumerate() {
@@ -191,7 +191,7 @@ fn the_chapter_of_columns_has_the_tables_that_a_run_declares() {
 fn the_chapter_of_columns_has_what_agents_observe_and_take() {
     for (world, scenario) in EXTERNAL {
         let run = started(world, scenario);
-        let team = &run.teams()[0];
+        let team = &run.agent_teams()[0];
         compare(&format!("observed of {world}"), &rendered_spaces(&team.observation_spaces));
         compare(&format!("ordered of {world}"), &rendered_spaces(&team.action_spaces));
     }

@@ -257,7 +257,7 @@ fn no_cycle_of_many_airplanes_works_long_without_a_look_at_the_interrupt() {
         let interrupt = Interrupt::default();
         run.set_interrupt(interrupt.clone());
         run.advance(1);
-        interrupt.check_count()
+        interrupt.total_checks()
     };
     let team = "deployment = \"compact-team\"";
     for more in ["", "shield = \"off\"", team, "preset = \"paper\""] {
@@ -279,8 +279,8 @@ fn starting_up_takes_nearly_linear_work() {
         let heeded = interrupt.attach();
         let started = run(&Source::new("s", text, ""), 1);
         drop(heeded);
-        assert_eq!(started.agents(), n as usize);
-        interrupt.check_count() as f64
+        assert_eq!(started.agent_count(), n as usize);
+        interrupt.total_checks() as f64
     };
     // Four times as many may take eight times the work; the square would be sixteen.
     let ratio = looks(1600) / looks(400);

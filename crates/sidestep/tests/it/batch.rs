@@ -4,7 +4,7 @@
 use crate::chain::SEVERAL;
 use crate::common::CROWD;
 use sidestep::kernel::batch::{Batch, BatchError, SimulationFactory};
-use sidestep::kernel::control::{BufferMut, OrderError, Orders};
+use sidestep::kernel::control::{BufferMut, MultiAgentOrder, OrderError};
 use sidestep::kernel::stream::Draws;
 use sidestep::kernel::{Digest, InputError, Simulation};
 use sidestep::scenario::{CompiledScenario, Source};
@@ -40,7 +40,7 @@ fn compiled(source: &Source) -> Box<dyn CompiledScenario> {
 /// Returns all that depends on a seed: the digest after some cycles, the teams, and the texts about the scenario.
 fn seed_dependent_output(compiled: &dyn CompiledScenario, source: &Source) -> (Digest, String) {
     let mut run = compiled.start(source, 1);
-    let mut told = format!("{:?}", run.teams());
+    let mut told = format!("{:?}", run.agent_teams());
     write!(told, "{:?}{:?}", compiled.contents(source), compiled.plan()).expect("text");
     run.advance(40);
     write!(told, "{:?}", run.metrics()["arrived"]).expect("text");
@@ -121,7 +121,7 @@ fn action(seed: u64, agent: usize, cycle: u64) -> f64 {
 fn batch_digests(workers: usize) -> (Vec<Digest>, Vec<i64>) {
     let seeds: Vec<u64> = (10..43).collect();
     let mut batch = Batch::new(start(source("robots", ORDERED, 1)), &seeds, workers).expect("room");
-    let team = batch.teams()[0].clone();
+    let team = batch.agent_teams()[0].clone();
     let mut seen = Vec::new();
     for cycle in 0..30 {
         let worlds = batch.seeds().into_iter().zip(batch.cycles().expect("whole"));
@@ -133,7 +133,7 @@ fn batch_digests(workers: usize) -> (Vec<Digest>, Vec<i64>) {
             let some = (0..seeds.len() as u64).map(|k| (k % 5 == 2).then_some(100 + k));
             batch.restart(&some.collect::<Vec<_>>()).expect("room");
         }
-        let room = |space: &sidestep::kernel::control::Space| {
+        let room = |space: &sidestep::kernel::control::ValueSpace| {
             vec![-7; seeds.len() * 6 * space.value_count()]
         };
         let mut rooms: Vec<Vec<i64>> = team.observation_spaces.iter().map(room).collect();
@@ -159,8 +159,9 @@ fn a_batch_has_the_bits_of_runs_alone_on_any_number_of_workers() {
             if cycle != 20 || k % 2 == 0 {
                 let values: Vec<f64> =
                     (0..6).map(|agent| action(seed, agent, run.cycle())).collect();
-                let agents = &run.teams()[0].agents.clone();
-                run.order(&Orders { order: "action", agents, values: &values }).expect("right");
+                let agents = &run.agent_teams()[0].agents.clone();
+                run.order(&MultiAgentOrder { order: "action", agents, values: &values })
+                    .expect("right");
                 run.advance(1);
             }
         }

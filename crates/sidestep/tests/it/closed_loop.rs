@@ -79,7 +79,7 @@ fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
         .map(|c| (c, recorder.column(&schema.name, &c.name).expect("a column of the schema")))
         .collect();
     let line = |row| columns.iter().map(|(c, v)| c.text(v, row)).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = (0..recorder.rows(&schema.name)).map(line).collect();
+    let rows: Vec<String> = (0..recorder.row_count(&schema.name)).map(line).collect();
     format!("{}\n{}\n", names.join(","), rows.join("\n"))
 }
 

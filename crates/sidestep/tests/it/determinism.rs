@@ -108,7 +108,11 @@ fn recording_changes_nothing_and_rows_do_not_depend_on_workers_or_storage() {
     let plain = digest_after(simulation(&source, 1), CYCLES);
     let (digest, rows) = recorded(simulation(&source, 1), CYCLES, 100);
     assert_eq!(digest, plain);
-    assert!(rows.rows("trajectories") > 0 && rows.rows("events") > 0 && rows.rows("readings") > 0);
+    assert!(
+        rows.row_count("trajectories") > 0
+            && rows.row_count("events") > 0
+            && rows.row_count("readings") > 0
+    );
     for (workers, order) in [(3, StorageOrder::Spatial), (2, StorageOrder::Shuffled(3))] {
         let (digest, same) = recorded(stored(&source, workers, order), CYCLES, 100);
         assert_eq!(digest, plain);

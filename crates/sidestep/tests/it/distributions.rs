@@ -88,7 +88,7 @@ fn reports(source: &Source, cycles: u64) -> BTreeMap<Report, BTreeMap<Report, u6
     let recorder = recorded(source, cycles);
     let [truth, class, reported, reported_class] =
         ["true", "true_class", "reported", "reported_class"].map(|c| labels(&recorder, c));
-    for row in 0..recorder.0.rows("readings") {
+    for row in 0..recorder.0.row_count("readings") {
         let truth = (truth[row].clone(), class[row].clone());
         let report = (reported[row].clone(), reported_class[row].clone());
         *counts.entry(truth).or_insert_with(BTreeMap::new).entry(report).or_insert(0) += 1;

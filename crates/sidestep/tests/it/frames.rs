@@ -50,14 +50,14 @@ fn looking_changes_no_result_whoever_computes_it() {
         while plain.cycle() < watched.cycle() {
             plain.advance(watched.cycle() - plain.cycle());
         }
-        assert_eq!(plain.digest(), watched.digest(), "{}", plain.world());
-        assert_eq!(plain.checkpoint(), watched.checkpoint(), "{}", plain.world());
+        assert_eq!(plain.digest(), watched.digest(), "{}", plain.world_name());
+        assert_eq!(plain.checkpoint(), watched.checkpoint(), "{}", plain.world_name());
         let again = plain.frame(LOOK);
         let now = watched.frame(LOOK);
-        assert_eq!((again.bodies, again.scans), (now.bodies, now.scans), "{}", plain.world());
+        assert_eq!((again.bodies, again.scans), (now.bodies, now.scans), "{}", plain.world_name());
         assert!(again.log.is_empty(), "nobody watched");
         let told: Vec<u64> = frames.iter().flat_map(|f| &f.log).map(|e| e.cycle).collect();
-        assert!(told.is_sorted(), "{}", plain.world());
+        assert!(told.is_sorted(), "{}", plain.world_name());
         assert!(frames.iter().all(|f| f.log.iter().all(|e| e.cycle < f.cycle)));
     }
 }
@@ -83,7 +83,7 @@ fn events_reach_the_log_and_the_table_alike() {
         tables.push(recorder);
     }
     assert!(told > 100);
-    assert_eq!(told, tables[0].rows("events"));
+    assert_eq!(told, tables[0].row_count("events"));
     assert_eq!(tables[0], tables[1], "watching changes no row");
 }
 
@@ -94,17 +94,17 @@ fn bodies_keep_their_names_and_are_where_the_world_has_them() {
         let mut unique = first.clone();
         unique.sort();
         unique.dedup();
-        assert_eq!(unique.len(), first.len(), "{}", run.world());
+        assert_eq!(unique.len(), first.len(), "{}", run.world_name());
         run.advance(5);
         let later: Vec<String> = run.frame(LOOK).bodies.iter().map(|b| b.name()).collect();
-        assert_eq!(first, later, "{}", run.world());
+        assert_eq!(first, later, "{}", run.world_name());
         let scenery = run.scenery();
         assert!(scenery.cycle_s > 0.0 && scenery.dimensions == 2);
         let frame = run.frame(LOOK);
         assert_eq!((frame.cycle, frame.time_s), (5, 5.0 * scenery.cycle_s));
     }
     let agents = robots(1).frame(LOOK).bodies.iter().filter(|b| b.kind == ROBOT).count();
-    assert_eq!(agents, robots(1).agents());
+    assert_eq!(agents, robots(1).agent_count());
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn airplanes_that_are_too_near_are_marked_until_they_are_apart() {
         run.advance(1);
         let frame = run.frame(LOOK);
         let is_marked = |b: &&sidestep::kernel::view::Body| {
-            b.kind == ZONE && b.state == sidestep::kernel::view::Condition::Touching
+            b.kind == ZONE && b.state == sidestep::kernel::view::BodyCondition::Touching
         };
         marked += frame.bodies.iter().filter(is_marked).count();
         losses += frame.log.iter().filter(|e| e.words.contains("loses separation")).count();

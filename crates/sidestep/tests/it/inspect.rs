@@ -68,9 +68,9 @@ fn asking_changes_no_result_whoever_computes_it_and_wherever_it_was_resumed() {
                     told += inspect_all(&mut **run).len();
                     run.advance((18 - run.cycle()).min(4));
                 }
-                assert!(told >= 3 * run.agents(), "{}: {told} answers", run.world());
-                assert_eq!(run.digest(), plain.digest(), "{}, {workers} workers", run.world());
-                assert_eq!(run.checkpoint(), plain.checkpoint(), "{}", run.world());
+                assert!(told >= 3 * run.agent_count(), "{}: {told} answers", run.world_name());
+                assert_eq!(run.digest(), plain.digest(), "{}, {workers} workers", run.world_name());
+                assert_eq!(run.checkpoint(), plain.checkpoint(), "{}", run.world_name());
             }
         }
     }
@@ -86,7 +86,7 @@ fn what_is_told_of_a_body_is_what_then_comes() {
             run.advance(1);
             let after = places(&mut *run);
             for told in &all {
-                let next = told.value("Outcome", "next place");
+                let next = told.fact_value("Outcome", "next place");
                 let Some(now) = after.get(&told.body) else {
                     assert_eq!(next, Some(&FactValue::None), "{} is gone", told.title);
                     continue;
@@ -105,7 +105,11 @@ fn what_is_told_of_a_body_is_what_then_comes() {
             }
             run.advance(3);
         }
-        assert!(compared > 10 * run.agents() && moved > 0, "{}: {compared}, {moved}", run.world());
+        assert!(
+            compared > 10 * run.agent_count() && moved > 0,
+            "{}: {compared}, {moved}",
+            run.world_name()
+        );
     }
 }
 

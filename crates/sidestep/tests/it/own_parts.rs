@@ -12,7 +12,7 @@ use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::Airspace;
 use sidestep::worlds::airspace::method::{Method, MethodPercept, Steering};
 use sidestep::worlds::chain::{
-    Chains, Driver, DriverMemory, DriverPercept, MasterMove, Proposal, Reaction,
+    Chains, Driver, DriverAction, DriverMemory, DriverPercept, MasterMove, Reaction,
 };
 use sidestep::worlds::robots::Robots;
 use sidestep::worlds::robots::decide::{self, Behaviour, Decision};
@@ -86,14 +86,14 @@ impl Driver for Dice {
         percept: &DriverPercept<'_>,
         memory: &mut DriverMemory,
         draws: &mut Draws,
-    ) -> Proposal {
+    ) -> DriverAction {
         memory.words[0] += 1;
         let at = percept.connectors_m[percept.connector];
         let [x, y, _] = percept.ahead;
         let turn = if memory.words[0].is_multiple_of(5) { draws.uniform() - 0.5 } else { 0.0 };
         let near = percept.obstacles.first().map_or([0.0; 3], |one| one.to_surface_m);
         let ahead = [x - turn * y - 0.1 * near[0], y + turn * x - 0.1 * near[1], 0.0];
-        Proposal::GoTo(add(at, ahead))
+        DriverAction::GoTo(add(at, ahead))
     }
 }
 
@@ -214,7 +214,7 @@ fn an_unknown_name_is_an_error_with_a_remedy() {
         let problems = Scenario::parse(&worlds(), &text).check().expect_err("refused");
         let problem = &problems.0[0];
         assert_eq!((problem.cause(), problem.remedy()), (cause, remedy));
-        let (line, column) = problem.position().expect("a position");
+        let (line, column) = problem.line_and_column().expect("a position");
         let at = text.lines().nth(line - 1).expect("a line");
         assert!(at[column - 1..].starts_with(&format!("\"{wrong}\"")), "{at}, column {column}");
     }

@@ -76,7 +76,7 @@ fn recorded(name: &str) -> CsvTable {
 fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
     let names: Vec<&str> = schema.columns.iter().map(|column| column.name.as_str()).collect();
     let mut csv = names.join(",") + "\n";
-    for row in 0..recorder.rows(&schema.name) {
+    for row in 0..recorder.row_count(&schema.name) {
         let values = |column: &ColumnSpec| recorder.column(&schema.name, &column.name).unwrap();
         let field = |column: &ColumnSpec| column.text(values(column), row);
         let fields: Vec<String> = schema.columns.iter().map(field).collect();

@@ -157,7 +157,7 @@ impl Tiles {
     /// Counts of the robots' places, seen from their tile, and the kinds they touched.
     pub(crate) fn outcomes(&self, simulation: &RobotsRun) -> BTreeMap<ActionOutcome, u64> {
         let (width, height) = self.pitch();
-        let robots = simulation.agents();
+        let robots = simulation.agent_count();
         let mut counts = BTreeMap::new();
         for body in &simulation.snapshot().bodies[..robots] {
             let at = ((body.at.0 % width) as i32, (body.at.1 % height) as i32);

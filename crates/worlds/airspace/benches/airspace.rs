@@ -7,9 +7,9 @@ use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
     Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourLegs, FlightLevelRange, Point,
-    Pose2, StepTiming, WaypointRule, actions,
+    Pose2, TimeDiscretization, WaypointRule, actions,
 };
-use sidestep_airspace::objective::{ActionPredictions, Objective, group_game};
+use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
     Choice, Estimator, Game, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility, optimize,
 };
@@ -18,7 +18,7 @@ use sidestep_kernel::{Seed, Simulation};
 use sidestep_scenario::Source;
 use std::time::Instant;
 
-const TIMING: StepTiming = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
+const TIMING: TimeDiscretization = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 125 };
 
 /// Airplanes on a circle around the conflict, near enough for every pair to matter.
 struct Conflict {
@@ -26,7 +26,7 @@ struct Conflict {
     poses: Vec<Pose2>,
     goals: Vec<[Point; 1]>,
     actions: Vec<Action>,
-    timing: StepTiming,
+    timing: TimeDiscretization,
     objective: Objective,
 }
 
@@ -49,7 +49,7 @@ impl Conflict {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),
             actions: actions(&model, TIMING.dt_s, &[], legs),
-            timing: StepTiming { horizon, ..TIMING },
+            timing: TimeDiscretization { horizon, ..TIMING },
             model,
             objective,
         }
@@ -154,8 +154,8 @@ fn exact() {
         let conflict = Conflict::new(10, horizon, &legs, objective);
         let predict_s = best_s(20, || drop(conflict.action_predictions()));
         let options = conflict.action_predictions();
-        let tables_s = best_s(20, || drop(group_game(&objective, &options)));
-        let built = group_game(&objective, &options);
+        let tables_s = best_s(20, || drop(build_group_game(&objective, &options)));
+        let built = build_group_game(&objective, &options);
         let settings = settings(Estimator::Exact, cooling, 200);
         let rounds_s = best_s(20, || drop(optimize(&built, &settings, uniform)));
         let rounds = optimize(&built, &settings, uniform).rounds;
@@ -175,7 +175,7 @@ fn sampled() {
     let conflict = Conflict::new(10, 125, &DetourLegs::default(), objective);
     let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {
-        let built = group_game(&objective, &conflict.action_predictions());
+        let built = build_group_game(&objective, &conflict.action_predictions());
         drop(optimize(&built, &settings, uniform));
     });
     let strategies = vec![conflict.actions.len(); 10];

@@ -21,20 +21,20 @@ mod step;
 
 use super::decide::{ManeuverCandidates, straight_profile};
 use super::deploy;
-use super::join::ControlledGroup;
+use super::join::CooperativeGroup;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{known_aircraft, non_cooperative_aircraft, ownship_state};
-use super::pilot::{Control, OwnshipState};
+use super::pilot::{AirplaneControl, OwnshipState};
 use super::scratch::PhaseContext;
 use super::settings::Deployment;
 use super::shield::TurnProfile;
 use super::trace::GroupDecisions;
 use controls::apply_controls;
-use flight::{AircraftMotion, FlownPath};
-use sidestep_kernel::Slot;
+use flight::{AircraftCycleMotion, FlightPathSource};
+use sidestep_kernel::EntitySlot;
 
 /// Lets a group decide, the shield filter, and all fly, together with those on recorded tracks.
-pub(super) fn act(context: &mut PhaseContext<'_>, group: &[Slot]) {
+pub(super) fn act(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     let mut flying = std::mem::take(&mut context.scratch.flying);
     flying.clear();
@@ -54,33 +54,40 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[Slot]) {
 }
 
 /// Flies a group for one `dt`; `group` are the airplanes in the air, by id.
-fn fly(context: &mut PhaseContext<'_>, group: &[Slot]) {
+fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     let flown = prepare_decisions(context, group);
     let non_cooperative = non_cooperative_aircraft(context, group);
-    let mut profiles = turn_profiles(context, &flown, &non_cooperative).into_iter();
+    let mut profiles = decide_turn_profiles(context, &flown, &non_cooperative).into_iter();
     let flights = group.iter().map(|&slot| {
         let maneuver = match &world.airplanes[slot as usize].track {
-            Some(track) if world.is_replayed(slot, now) => FlownPath::Track(track),
+            Some(track) if world.is_replayed(slot, now) => FlightPathSource::Track(track),
             _ if world.is_non_cooperative(slot, now) => {
                 let known = known_aircraft(world, state, now, slot);
-                FlownPath::Profile(straight_profile(world, known), state.segment(world, slot))
+                FlightPathSource::Profile(
+                    straight_profile(world, known),
+                    state.segment(world, slot),
+                )
             }
-            _ => {
-                FlownPath::Profile(profiles.next().unwrap_or_default(), state.segment(world, slot))
-            }
+            _ => FlightPathSource::Profile(
+                profiles.next().unwrap_or_default(),
+                state.segment(world, slot),
+            ),
         };
-        AircraftMotion::new(context, slot, maneuver)
+        AircraftCycleMotion::new(context, slot, maneuver)
     });
     let flights = flights.collect();
-    step::step_all(context, flights);
+    step::fly_sub_steps(context, flights);
 }
 
 /// Prepares the decisions: airplanes enter, exemptions of pairs begin and end, and orders that are due are executed.
 /// Returns the airplanes of a group that the method flies; `group` are those in the air, by id.
-pub(super) fn prepare_decisions(context: &mut PhaseContext<'_>, group: &[Slot]) -> ControlledGroup {
+pub(super) fn prepare_decisions(
+    context: &mut PhaseContext<'_>,
+    group: &[EntitySlot],
+) -> CooperativeGroup {
     // Nearness is that at the time when the group was formed, because orders change levels.
-    let flown = ControlledGroup::from_group(context, group);
+    let flown = CooperativeGroup::from_group(context, group);
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
         entry::assign_fallbacks(context, &flown.ids);
@@ -92,16 +99,16 @@ pub(super) fn prepare_decisions(context: &mut PhaseContext<'_>, group: &[Slot]) 
 
 /// Returns the turn profiles of the airplanes that the method flies: as those aboard decide, or as given by pilots
 /// outside of the run.
-fn turn_profiles(
+fn decide_turn_profiles(
     context: &mut PhaseContext<'_>,
-    flown: &ControlledGroup,
+    flown: &CooperativeGroup,
     non_cooperative: &[NonCooperativeAircraft],
 ) -> Vec<TurnProfile> {
     let PhaseContext { world, state, now, .. } = *context;
     let own: Vec<OwnshipState> =
         flown.ids.iter().map(|&slot| ownship_state(context, slot)).collect();
     let contacts = context.scratch.trace.as_ref().map(|trace| state.traffic_picture(trace.slot));
-    let (controls, considered): (Vec<Option<Control>>, Vec<ManeuverCandidates>) =
+    let (controls, considered): (Vec<Option<AirplaneControl>>, Vec<ManeuverCandidates>) =
         if state.has_controls(now) {
             (state.take_controls(&flown.ids), vec![ManeuverCandidates::default(); own.len()])
         } else {

@@ -72,13 +72,13 @@ impl<'a> NonCooperativeAvoidance<'a> {
         &'b self,
         profile: &'b TurnProfile,
     ) -> impl Iterator<Item = &'a NonCooperativeAircraft> + 'b {
-        let poses = self.poses(profile);
+        let poses = self.poses_along(profile);
         self.others.iter().copied().filter(move |one| !self.is_clear(&poses, profile, one))
     }
 
     fn clearance(&self, profile: &TurnProfile) -> PathClearance {
-        let poses = self.poses(profile);
-        let margins_m = self.others.iter().map(|one| self.margin_m(&poses, one));
+        let poses = self.poses_along(profile);
+        let margins_m = self.others.iter().map(|one| self.clearance_margin_m(&poses, one));
         PathClearance {
             is_clear: self.others.iter().all(|one| self.is_clear(&poses, profile, one)),
             margin_m: margins_m.fold(0.0, f64::min),
@@ -86,7 +86,7 @@ impl<'a> NonCooperativeAvoidance<'a> {
     }
 
     /// Returns its poses at the start of each step of a profile, and at the end.
-    fn poses(&self, profile: &TurnProfile) -> Vec<Pose2> {
+    fn poses_along(&self, profile: &TurnProfile) -> Vec<Pose2> {
         let mut poses = vec![self.aircraft.pose];
         for &omega in &profile.omegas_rad_s {
             poses.push(poses[poses.len() - 1].step(self.aircraft.v_m_s, omega, self.dtau_s));
@@ -95,7 +95,7 @@ impl<'a> NonCooperativeAvoidance<'a> {
     }
 
     /// Returns the distance in meters that it has to keep from another one, as both are seen.
-    fn gap_m(&self, one: &NonCooperativeAircraft) -> f64 {
+    fn required_gap_m(&self, one: &NonCooperativeAircraft) -> f64 {
         self.aircraft.separation_m.max(one.separation_m) + self.aircraft.error_m + one.error_m
     }
 
@@ -112,15 +112,20 @@ impl<'a> NonCooperativeAvoidance<'a> {
             let distance_left_m = |t_s: f64| {
                 distance_m(pose.step(v_m_s, omega, t_s).at, one.at) - one.top_m_s * (step_s + t_s)
             };
-            stays_apart_for(&distance_left_m, self.dtau_s, v_m_s + one.top_m_s, self.gap_m(one))
+            stays_apart_for(
+                &distance_left_m,
+                self.dtau_s,
+                v_m_s + one.top_m_s,
+                self.required_gap_m(one),
+            )
         })
     }
 
     /// Returns the meters beyond the desired distance if it flew straight on after a path, and the other all the
     /// time; at most 0.
-    fn margin_m(&self, poses: &[Pose2], one: &NonCooperativeAircraft) -> f64 {
+    fn clearance_margin_m(&self, poses: &[Pose2], one: &NonCooperativeAircraft) -> f64 {
         let steps = poses.len() - 1;
-        let desired_m = self.gap_m(one) + one.top_m_s * one.dt_s;
+        let desired_m = self.required_gap_m(one) + one.top_m_s * one.dt_s;
         let during_m = (1..steps)
             .map(|k| distance_m(poses[k].at, one.position_after(k as f64 * self.dtau_s)))
             .fold(f64::INFINITY, f64::min);

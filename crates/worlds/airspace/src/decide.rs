@@ -12,11 +12,11 @@ use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
-use super::objective::{ActionPredictions, group_game};
+use super::objective::{ActionPredictions, build_group_game};
 use super::purpose;
 use super::shield::TurnProfile;
 use super::world::AirspaceWorld;
-pub(super) use group_memory::max_group_bytes;
+pub(super) use group_memory::max_group_memory_bytes;
 use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::optimize;
@@ -78,7 +78,7 @@ pub(super) struct ManeuverCandidates {
 impl ManeuverCandidates {
     fn from_actions(world: &AirspaceWorld, known: KnownAircraft, actions: Vec<Action>) -> Self {
         Self {
-            profiles: preferences::turn_profiles(world, known, &actions),
+            profiles: preferences::profiles_from_actions(world, known, &actions),
             actions,
             decided: None,
         }
@@ -109,7 +109,7 @@ impl DecisionStrategy {
         match world.method {
             _ if Self::is_reactive(world) => Self::Reactive,
             MethodKind::Pc if is_alone => Self::Independent,
-            MethodKind::Pc if max_group_bytes(world, group) > world.group_bytes => {
+            MethodKind::Pc if max_group_memory_bytes(world, group) > world.group_bytes => {
                 Self::GroupTooLarge
             }
             MethodKind::Pc => Self::Joint,
@@ -130,14 +130,16 @@ pub(super) fn candidates_alone(
     external_action: Option<&ExternalAction>,
 ) -> ManeuverCandidates {
     match world.method {
-        MethodKind::External => external::candidates_by_action(world, known, external_action),
+        MethodKind::External => {
+            external::candidates_by_external_action(world, known, external_action)
+        }
         _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
 }
 
 /// Returns the candidates of an airplane by probability collectives: the chosen action first, then the others by the
 /// cost that the optimizer expects of them.
-pub(super) fn candidates_by_choice(
+pub(super) fn candidates_from_choice(
     world: &AirspaceWorld,
     known: KnownAircraft,
     decided: Option<ActionChoice>,
@@ -165,13 +167,13 @@ pub(super) fn candidates_by_velocity(
 
 /// Returns all the different turn profiles of the next `dt` that the actions of an airplane have.
 pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
-    preferences::turn_profiles(world, known, world.actions(known.slot))
+    preferences::profiles_from_actions(world, known, world.actions(known.slot))
 }
 
 /// Returns the turn profile straight to the next way-point, for an airplane that avoids nobody.
 pub(super) fn straight_profile(world: &AirspaceWorld, known: KnownAircraft) -> TurnProfile {
     let actions = rank_straight_first(world, known);
-    preferences::turn_profiles(world, known, &actions[..1]).swap_remove(0)
+    preferences::profiles_from_actions(world, known, &actions[..1]).swap_remove(0)
 }
 
 /// Decides for all airplanes of a group in one process.
@@ -183,7 +185,7 @@ pub(super) fn decide_centrally(
 ) -> Vec<Option<ActionChoice>> {
     let options: Vec<ActionPredictions> =
         group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
-    let game = group_game(&world.objective, &options);
+    let game = build_group_game(&world.objective, &options);
     let outcome = optimize(&game, &world.settings, |player: usize, k: u64| {
         purpose::sample(&world.streams, group[player].slot, now, k)
     });

@@ -61,7 +61,7 @@ impl EventQuantity {
 
 impl EventKind {
     /// Returns the quantity that its value measures; `None` for kinds without one.
-    pub(super) fn value_quantity(self) -> Option<EventQuantity> {
+    pub(super) fn measured_quantity(self) -> Option<EventQuantity> {
         match self {
             Self::LossOfSeparation | Self::Intruder => Some(EventQuantity::Distance),
             Self::Arrival => Some(EventQuantity::Delay),
@@ -144,8 +144,8 @@ impl Event {
     }
 
     /// Returns the value, if it is measured so.
-    pub(super) fn value_in(&self, measure: EventQuantity) -> Option<f64> {
-        (self.kind.value_quantity() == Some(measure)).then_some(self.value)
+    pub(super) fn value_of_quantity(&self, measure: EventQuantity) -> Option<f64> {
+        (self.kind.measured_quantity() == Some(measure)).then_some(self.value)
     }
 
     /// Returns an event of one airplane, without a value.
@@ -154,7 +154,12 @@ impl Event {
     }
 
     /// Returns an event of two airplanes without a value; it is recorded for the first of them.
-    pub fn new_pair(cycle: Cycle, kind: EventKind, airplane: EntityId, other: EntityId) -> Self {
+    pub fn new_for_pair(
+        cycle: Cycle,
+        kind: EventKind,
+        airplane: EntityId,
+        other: EntityId,
+    ) -> Self {
         Self { other, ..Self::new(cycle, kind, airplane) }
     }
 

@@ -6,7 +6,7 @@ mod tests;
 
 use super::external_action::ExternalAction;
 use super::flight::KnownAircraft;
-use super::join::ControlledGroup;
+use super::join::CooperativeGroup;
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{known_aircraft, non_cooperative_aircraft};
@@ -14,16 +14,16 @@ use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{act, join};
-use observation::{Observation, VisibleAircraft};
-use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
+use observation::{AgentObservation, VisibleAircraft};
+use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
 use sidestep_kernel::ports::ManualClock;
-use sidestep_kernel::{Cycle, EntityId, Slot, World};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, World};
 use std::collections::BTreeMap;
 
 impl AirspaceWorld {
     /// Returns the teams: airplanes that decide, with the same actions, because all agents of a team have the same
     /// spaces. Non-cooperative airplanes are in none.
-    pub(super) fn find_teams(&self) -> Teams {
+    pub(super) fn teams_by_actions(&self) -> AgentTeams {
         let mut team_by_turns: BTreeMap<(usize, u64), usize> = BTreeMap::new();
         let mut members: Vec<Vec<EntityId>> = Vec::new();
         for i in (0..self.airplanes.len()).filter(|&i| self.is_controlled(i)) {
@@ -35,24 +35,24 @@ impl AirspaceWorld {
             }
             members[team].push(i as EntityId);
         }
-        let teams = members.into_iter().enumerate().map(|(k, agents)| self.team(k, agents));
-        Teams::new(teams.collect(), Self::AGENT)
+        let teams = members.into_iter().enumerate().map(|(k, agents)| self.build_team(k, agents));
+        AgentTeams::new(teams.collect(), Self::AGENT)
     }
 
     /// Returns team `k`, the first of which is named like an airplane, because most worlds have no other.
-    fn team(&self, k: usize, agents: Vec<EntityId>) -> Team {
+    fn build_team(&self, k: usize, agents: Vec<EntityId>) -> AgentTeam {
         let name = if k == 0 { Self::AGENT.into() } else { format!("{} {}", Self::AGENT, k + 1) };
         let action_spaces = if matches!(self.method, MethodKind::External) {
-            self.order_spaces(agents[0] as usize)
+            self.action_spaces(agents[0] as usize)
         } else {
             Vec::new()
         };
         let observation_spaces = observation::observation_spaces(self, &agents);
-        Team { name, agents, observation_spaces, action_spaces }
+        AgentTeam { name, agents, observation_spaces, action_spaces }
     }
 
     /// Returns the spaces of the orders that an airplane may be given.
-    fn order_spaces(&self, i: usize) -> Vec<Space> {
+    fn action_spaces(&self, i: usize) -> Vec<ValueSpace> {
         let actions = &self.actions[i];
         let numbered = actions.iter().enumerate().map(|(k, action)| format!("{k} {action}"));
         let meaning = format!(
@@ -60,16 +60,16 @@ impl AirspaceWorld {
             numbered.collect::<Vec<_>>().join("; ")
         );
         let high = self.airplanes[i].model.omega_max_rad_s;
-        let free = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
-        let ranks = SpaceKind::Integer { low: 0, high: actions.len() as i64 - 1 };
+        let free = ValueDomain::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
+        let ranks = ValueDomain::Integer { low: 0, high: actions.len() as i64 - 1 };
         vec![
-            Space::new(ExternalAction::RANKING, ranks, meaning).with_shape([actions.len()]),
-            Space::new(
+            ValueSpace::new(ExternalAction::RANKING, ranks, meaning).with_shape([actions.len()]),
+            ValueSpace::new(
                 ExternalAction::TURN_RATE,
-                SpaceKind::Real { low: -high, high },
+                ValueDomain::Real { low: -high, high },
                 "the turn rate that it keeps until it decides again, positive to the left",
             ),
-            Space::new(
+            ValueSpace::new(
                 ExternalAction::VELOCITY,
                 free,
                 "the velocity through the air, east and north, to which it turns as fast as it can; its \
@@ -81,14 +81,14 @@ impl AirspaceWorld {
 
     /// Returns the action that is ordered.
     pub(super) fn external_action(&self, order: &Order<'_>) -> Option<ExternalAction> {
-        let space = &self.teams.all()[order.team].action_spaces[order.space];
+        let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
         ExternalAction::from_order(&space.name, order.values)
     }
 
     /// Records an order until its airplane decides. After the end of its flight an airplane never does.
     pub(super) fn store_order(&self, state: &AirspaceState, order: &Order<'_>) {
         if let Some(action) = self.external_action(order)
-            && state.airplanes[order.agent as usize].is_flying()
+            && state.airplanes[order.agent as usize].is_unfinished()
         {
             state.set_external_action(order.agent, action);
         }
@@ -102,9 +102,9 @@ impl AirspaceWorld {
         team: usize,
         buffers: &mut [BufferMut<'_>],
     ) {
-        let agents = &self.teams.all()[team].agents;
+        let agents = &self.teams.as_slice()[team].agents;
         // Airplanes that decide in no group of this cycle keep this padding.
-        let padding = Observation::default();
+        let padding = AgentObservation::default();
         (0..agents.len()).for_each(|row| padding.write(self, row, buffers));
         self.for_each_group(state, now, |context, group, non_cooperative| {
             if group.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
@@ -118,7 +118,7 @@ impl AirspaceWorld {
             let all = VisibleAircraft::from_group(context, &members, non_cooperative);
             for own in &members {
                 if let Ok(row) = agents.binary_search(&own.slot) {
-                    Observation::new(context, own, &all).write(self, row, buffers);
+                    AgentObservation::new(context, own, &all).write(self, row, buffers);
                 }
             }
         });
@@ -131,7 +131,7 @@ impl AirspaceWorld {
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut visit: impl FnMut(&PhaseContext<'_>, &ControlledGroup, &[NonCooperativeAircraft]),
+        mut visit: impl FnMut(&PhaseContext<'_>, &CooperativeGroup, &[NonCooperativeAircraft]),
     ) {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
         let clock = ManualClock::default();
@@ -145,7 +145,8 @@ impl AirspaceWorld {
         };
         let groups = join::form_groups(context);
         let mut group = Vec::new();
-        for leader in (0..self.airplanes.len() as Slot).filter(|&slot| groups.is_leader(slot)) {
+        for leader in (0..self.airplanes.len() as EntitySlot).filter(|&slot| groups.is_leader(slot))
+        {
             groups.members(leader, &mut group);
             group.retain(|&slot| copy.is_active(self, slot, now));
             group.sort_unstable();

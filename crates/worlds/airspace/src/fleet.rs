@@ -3,7 +3,7 @@
 use crate::decide::possible_profiles;
 use crate::events::EventKind;
 use crate::method::MethodKind;
-use crate::pilot::{Control, Maneuver, Percept};
+use crate::pilot::{AirplaneControl, Maneuver, Percept};
 use crate::settings::Deployment;
 use crate::shield::TurnProfile;
 use crate::state::AirspaceState;
@@ -26,14 +26,14 @@ pub trait RemotePilotRun {
     /// # Errors
     /// When one of them is of another airplane or cycle, or cannot be flown; none is accepted then. When the run is
     /// recorded without its controls, or one process decides for all.
-    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError>;
+    fn submit(&mut self, controls: Vec<AirplaneControl>) -> Result<(), OrderError>;
 
     /// Returns the controls, each serialized, that cannot be flown in the cycle to come, with the reasons.
-    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
+    fn find_invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)>;
 
     /// Returns, of each airplane that decides in the cycle to come, the others of its group that its radio does
     /// not reach, both by rising id.
-    fn out_of_radio_range(&self) -> Vec<(EntityId, Vec<EntityId>)>;
+    fn unreachable_members(&self) -> Vec<(EntityId, Vec<EntityId>)>;
 }
 
 impl RemotePilotRun for AirspaceRun {
@@ -41,7 +41,7 @@ impl RemotePilotRun for AirspaceRun {
         self.world().percepts(self.state(), self.cycle())
     }
 
-    fn submit(&mut self, controls: Vec<Control>) -> Result<(), OrderError> {
+    fn submit(&mut self, controls: Vec<AirplaneControl>) -> Result<(), OrderError> {
         let mut serialized = Vec::with_capacity(controls.len());
         for control in &controls {
             let bytes = postcard::to_stdvec(control).expect("controls are plain data");
@@ -50,7 +50,7 @@ impl RemotePilotRun for AirspaceRun {
         self.submit_controls(&serialized)
     }
 
-    fn invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
+    fn find_invalid_controls(&self, controls: &[(EntityId, Vec<u8>)]) -> Vec<(EntityId, String)> {
         let percepts = self.percepts();
         let mut invalid = Vec::new();
         for (id, bytes) in controls {
@@ -62,8 +62,8 @@ impl RemotePilotRun for AirspaceRun {
         invalid
     }
 
-    fn out_of_radio_range(&self) -> Vec<(EntityId, Vec<EntityId>)> {
-        self.world().out_of_range(self.state(), self.cycle())
+    fn unreachable_members(&self) -> Vec<(EntityId, Vec<EntityId>)> {
+        self.world().unreachable_members(self.state(), self.cycle())
     }
 }
 
@@ -79,7 +79,11 @@ impl AirspaceWorld {
     }
 
     /// Returns the others of its group that each airplane does not reach in cycle `now`.
-    fn out_of_range(&self, state: &AirspaceState, now: Cycle) -> Vec<(EntityId, Vec<EntityId>)> {
+    fn unreachable_members(
+        &self,
+        state: &AirspaceState,
+        now: Cycle,
+    ) -> Vec<(EntityId, Vec<EntityId>)> {
         let range_m = self.network.as_ref().map_or(f64::INFINITY, |network| network.range_m);
         let mut all = Vec::new();
         if range_m == f64::INFINITY {
@@ -137,13 +141,13 @@ impl AirspaceWorld {
         id: EntityId,
         bytes: &[u8],
         percept: Option<&Percept>,
-    ) -> Result<Control, String> {
+    ) -> Result<AirplaneControl, String> {
         let Some(percept) = percept else {
             let cause =
                 "it does not decide in this cycle; give controls for those of `percepts` only";
             return Err(cause.into());
         };
-        let read = postcard::take_from_bytes::<Control>(bytes);
+        let read = postcard::take_from_bytes::<AirplaneControl>(bytes);
         let Some((control, _)) = read.ok().filter(|(_, rest)| rest.is_empty()) else {
             return Err("its bytes are no control of this build".into());
         };
@@ -184,7 +188,7 @@ impl AirspaceWorld {
             MethodKind::Mvp | MethodKind::Orca | MethodKind::External | MethodKind::Own(_) => {
                 return Ok(());
             }
-            MethodKind::Pc | MethodKind::None => possible_profiles(self, own.known_aircraft()),
+            MethodKind::Pc | MethodKind::None => possible_profiles(self, own.as_known_aircraft()),
         };
         let is_known = profiles.iter().any(|profile| profile.omegas_rad_s == *omegas_rad_s);
         if is_known && (*candidate as usize) < profiles.len() {
@@ -194,7 +198,7 @@ impl AirspaceWorld {
     }
 
     /// Checks the parts of a control beside the maneuver.
-    fn check_control(&self, control: &Control) -> Result<(), String> {
+    fn check_control(&self, control: &AirplaneControl) -> Result<(), String> {
         let n = self.airplanes.len();
         let are_events_valid = control.events.iter().all(|event| {
             let is_own = (event.airplane, event.cycle) == (control.id, control.cycle);

@@ -67,7 +67,7 @@ struct OrderSection {
 }
 
 /// Orders in their order, and when the airplane is removed: infinity for never.
-type OrdersAndRemoval = (Vec<FlightOrder>, f64);
+type OrdersAndRemovalTime = (Vec<FlightOrder>, f64);
 
 fn points_m(given: Option<&Vec<BoundedPoint>>) -> Vec<[f64; 2]> {
     given.into_iter().flatten().map(|place| place.get()).collect()
@@ -136,7 +136,7 @@ impl AirplaneSection {
     }
 
     /// Returns its orders, and the time at which it is removed.
-    pub(super) fn orders(&self, source: &Source) -> Result<OrdersAndRemoval, InputError> {
+    pub(super) fn orders(&self, source: &Source) -> Result<OrdersAndRemovalTime, InputError> {
         let mut orders = Vec::new();
         let mut leaves_s = f64::INFINITY;
         let mut last_s = 0.0;

@@ -1,6 +1,8 @@
 //! Traffic in other programs' files, read as scenarios.
 
-use super::traffic::{bluesky_settings, from_bluesky, from_tracks, has_length, omitted_commands};
+use super::traffic::{
+    from_bluesky, from_tracks, has_enough_samples, omitted_commands, settings_from_bluesky,
+};
 use serde_json::{Value, json};
 use sidestep_import::bluesky::{self, ScnFile, UnresolvedPosition};
 use sidestep_import::traffic::{self, RecordedTraffic};
@@ -17,7 +19,7 @@ enum TrafficFileFormat {
     Other,
 }
 
-fn file_format(file: &Path) -> TrafficFileFormat {
+fn traffic_file_format(file: &Path) -> TrafficFileFormat {
     let name = file.to_string_lossy().to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     if name.ends_with(".scn") {
@@ -35,16 +37,16 @@ fn file_format(file: &Path) -> TrafficFileFormat {
 /// When the file cannot be read.
 pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (scenario, (mut json, lines)) = match file_format(file) {
+    let (scenario, (mut json, lines)) = match traffic_file_format(file) {
         TrafficFileFormat::Other => return Ok(None),
         TrafficFileFormat::Bluesky => {
             let scn = bluesky::read(file)?;
-            let rules = bluesky_settings(&file.display().to_string(), &scn);
+            let rules = settings_from_bluesky(&file.display().to_string(), &scn);
             (from_bluesky(&name, &scn), bluesky_report(&scn, &rules.refused))
         }
         TrafficFileFormat::Tracks => {
             let tracks = traffic::read(file)?;
-            (from_tracks(&name, &tracks), track_report(&tracks))
+            (from_tracks(&name, &tracks), track_import_report(&tracks))
         }
     };
     if scenario.is_none() {
@@ -72,15 +74,15 @@ fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues)
         "not_flown": omitted_commands(scn),
         "ignored": scn.ignored,
         "unresolved_places": scn.unresolved_places.len(),
-        "unresolved_names": unresolved_places(scn).keys().collect::<Vec<_>>(),
-        "unresolved": unresolved_places(scn).into_values().flatten().map(use_as_json).collect::<Vec<_>>(),
-        "aircraft_without_place": aircraft_without_place(scn),
+        "unresolved_names": unresolved_destinations(scn).keys().collect::<Vec<_>>(),
+        "unresolved": unresolved_destinations(scn).into_values().flatten().map(unresolved_place_json).collect::<Vec<_>>(),
+        "aircraft_without_place": aircraft_at_unknown_places(scn),
     });
     let mut lines = vec![("command lines".to_string(), group_thousands(scn.command_lines))];
     lines.extend(count_line("not acted on", &scn.not_understood));
     lines.extend(count_line("not flown", &omitted_commands(scn)));
     lines.extend(count_line("display only", &scn.ignored));
-    lines.extend(first_names_line("left out, place unknown", &aircraft_without_place(scn)));
+    lines.extend(first_names_line("left out, place unknown", &aircraft_at_unknown_places(scn)));
     lines.extend(first_names_line("unknown way-points", &unresolved_uses(scn)));
     lines.extend(error_lines("unparsed", &scn.unparsed));
     lines.extend(error_lines("not carried out", &refused));
@@ -89,13 +91,13 @@ fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues)
 
 /// Returns the aircraft that start at places known only to a navigation database, with the names of
 /// these places.
-fn aircraft_without_place(scn: &ScnFile) -> Vec<String> {
+fn aircraft_at_unknown_places(scn: &ScnFile) -> Vec<String> {
     let unplaced = scn.traffic.unplaced.iter();
     unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
 }
 
 /// Returns the places to fly to that the file does not define, by name, each with its uses.
-fn unresolved_places(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPosition>> {
+fn unresolved_destinations(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPosition>> {
     let mut by_name: BTreeMap<&str, Vec<&UnresolvedPosition>> = BTreeMap::new();
     for used in &scn.unresolved_places {
         // Aircraft that are created at unknown places have a list of their own.
@@ -106,7 +108,7 @@ fn unresolved_places(scn: &ScnFile) -> BTreeMap<&str, Vec<&UnresolvedPosition>> 
     by_name
 }
 
-fn use_as_json(used: &UnresolvedPosition) -> Value {
+fn unresolved_place_json(used: &UnresolvedPosition) -> Value {
     json!({
         "name": used.name,
         "command": used.command,
@@ -118,7 +120,7 @@ fn use_as_json(used: &UnresolvedPosition) -> Value {
 /// Returns each unknown place in words, with the command, the airplane and the line of its first use.
 fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
     let mut texts = Vec::new();
-    for (name, uses) in unresolved_places(scn) {
+    for (name, uses) in unresolved_destinations(scn) {
         let UnresolvedPosition { command, aircraft, line, .. } = uses[0];
         let owner = aircraft.as_ref().map_or(String::new(), |id| format!(" of {id}"));
         let more = match uses.len() - 1 {
@@ -130,10 +132,10 @@ fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
     texts
 }
 
-fn track_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
+fn track_import_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
     let rows = recorded.rows as u64;
     let repeated = recorded.repeated_rows as u64;
-    let single = recorded.tracks.iter().filter(|track| !has_length(track)).count() as u64;
+    let single = recorded.tracks.iter().filter(|track| !has_enough_samples(track)).count() as u64;
     let json = json!({
         "rows": rows,
         "aircraft": recorded.tracks.len(),

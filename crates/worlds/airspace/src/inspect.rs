@@ -18,7 +18,7 @@ use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
     self, BodyId, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
 };
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 
 impl AirspaceWorld {
     /// Returns the report on an airplane in cycle `now`; `None` for one that is not in the air.
@@ -36,7 +36,7 @@ impl AirspaceWorld {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
         let trace = Box::new(InspectionTrace { slot: id, ..InspectionTrace::default() });
         let mut scratch = Scratch { trace: Some(trace), ..Scratch::default() };
-        let group = self.try_cycle(&copy, now, id, &mut scratch);
+        let group = self.run_group_cycle(&copy, now, id, &mut scratch);
         let mut trace = *scratch.trace.take()?;
         trace.events = scratch.events;
         trace.events.retain(|event| event.airplane == id || event.other == id);
@@ -47,13 +47,13 @@ impl AirspaceWorld {
     }
 
     /// Runs a cycle of the group of one airplane; returns the group, by id.
-    pub(super) fn try_cycle(
+    pub(super) fn run_group_cycle(
         &self,
         state: &AirspaceState,
         now: Cycle,
         id: EntityId,
         scratch: &mut Scratch,
-    ) -> Vec<Slot> {
+    ) -> Vec<EntitySlot> {
         let clock = &ManualClock::default();
         let context = &mut PhaseContext { world: self, state, now, clock, scratch };
         let groups = join::form_groups(context);
@@ -73,18 +73,18 @@ struct Inspector<'a> {
     now: Cycle,
     id: EntityId,
     /// Its conflict group, by id.
-    group: Vec<Slot>,
+    group: Vec<EntitySlot>,
     trace: InspectionTrace,
 }
 
 impl Inspector<'_> {
     fn inspect(self, mut inspection: Inspection) -> Inspection {
-        self.add_present(&mut inspection);
+        self.add_state_section(&mut inspection);
         self.add_group(&mut inspection);
-        self.add_knowledge(&mut inspection);
+        self.add_knowledge_section(&mut inspection);
         self.add_decision(&mut inspection);
-        self.add_shield(&mut inspection);
-        self.add_messages(&mut inspection);
+        self.add_shield_section(&mut inspection);
+        self.add_messages_section(&mut inspection);
         self.add_outcome(&mut inspection);
         inspection
     }
@@ -100,7 +100,7 @@ impl Inspector<'_> {
         [x_m, y_m, self.before.airplanes[self.id as usize].altitude_m.get()]
     }
 
-    fn add_present(&self, inspection: &mut Inspection) {
+    fn add_state_section(&self, inspection: &mut Inspection) {
         let current = &self.before.airplanes[self.id as usize];
         let segment = self.before.segment(self.world, self.id);
         let avoids = if self.world.is_replayed(self.id, self.now) {
@@ -159,7 +159,7 @@ impl Inspector<'_> {
     }
 
     /// Adds its knowledge of others where messages get lost, and the cycles in which they were heard.
-    fn add_knowledge(&self, inspection: &mut Inspection) {
+    fn add_knowledge_section(&self, inspection: &mut Inspection) {
         let mut table = FactTable::new([
             "airplane",
             "heard or first seen in cycle",

@@ -6,25 +6,25 @@ use super::perceive::{claim, ownship_state, surveillance_report};
 use super::pilot::{Percept, SurveillanceReport};
 use super::scratch::PhaseContext;
 use super::settings::Grouping;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::conflict::ConflictGroups;
 use std::ops::Range;
 
 /// The airplanes of a group that the method flies, and which of the group are near each other.
 #[derive(Debug, Default)]
-pub(super) struct ControlledGroup {
+pub(super) struct CooperativeGroup {
     /// Their ids, rising.
-    pub(super) ids: Vec<Slot>,
+    pub(super) ids: Vec<EntitySlot>,
     /// Slots near each airplane, rising, itself and non-cooperative ones among them; empty where groups are announced,
     /// and all see all.
-    near: Vec<Vec<Slot>>,
+    near: Vec<Vec<EntitySlot>>,
 }
 
-impl ControlledGroup {
+impl CooperativeGroup {
     /// Returns the airplanes of a group that the method flies; `group` are all in the air, by id.
-    pub(super) fn from_group(context: &PhaseContext<'_>, group: &[Slot]) -> Self {
+    pub(super) fn from_group(context: &PhaseContext<'_>, group: &[EntitySlot]) -> Self {
         let PhaseContext { world, now, .. } = *context;
-        let ids: Vec<Slot> =
+        let ids: Vec<EntitySlot> =
             group.iter().copied().filter(|&slot| !world.is_non_cooperative(slot, now)).collect();
         let near = match world.groups {
             Grouping::Announced => Vec::new(),
@@ -58,14 +58,14 @@ impl ControlledGroup {
     }
 
     /// Returns whether the `k`-th of them sees another airplane of the group.
-    fn can_see(&self, k: usize, other: Slot) -> bool {
+    fn can_see(&self, k: usize, other: EntitySlot) -> bool {
         self.near.get(k).is_none_or(|near| near.binary_search(&other).is_ok())
     }
 }
 
 /// Returns those of a group that are near an airplane, itself among them, by id. An airplane near the same
 /// non-cooperative one is near, too: it has to expect the maneuver by which the other avoids that one.
-fn nearby(context: &PhaseContext<'_>, group: &[Slot], own: Slot) -> Vec<Slot> {
+fn nearby(context: &PhaseContext<'_>, group: &[EntitySlot], own: EntitySlot) -> Vec<EntitySlot> {
     let PhaseContext { world, now, .. } = *context;
     let mut near = vec![own];
     let mut due = vec![own];
@@ -96,7 +96,7 @@ pub(super) fn form_groups(context: &mut PhaseContext<'_>) -> ConflictGroups {
 /// Joins each of `bodies` with those before it that it has to avoid.
 pub(super) fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups: &ConflictGroups) {
     let PhaseContext { world, state, now, .. } = *context;
-    for slot in bodies.map(|slot| slot as Slot) {
+    for slot in bodies.map(|slot| slot as EntitySlot) {
         if !state.is_active(world, slot, now) {
             continue;
         }
@@ -110,7 +110,7 @@ pub(super) fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups:
 }
 
 /// Returns whether two airplanes have to avoid each other.
-fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: Slot, b: Slot) -> bool {
+fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: EntitySlot, b: EntitySlot) -> bool {
     let PhaseContext { world, state, .. } = context;
     let at_a = state.airplanes[a as usize].pose().at;
     let at_b = state.airplanes[b as usize].pose().at;
@@ -119,7 +119,7 @@ fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: Slot, b: Slot) -> boo
 }
 
 /// Returns all levels that an airplane is on, or has been ordered to change to by now.
-fn levels(context: &PhaseContext<'_>, slot: Slot) -> FlightLevelRange {
+fn levels(context: &PhaseContext<'_>, slot: EntitySlot) -> FlightLevelRange {
     let PhaseContext { world, state, now, .. } = context;
     if world.is_replayed(slot, *now) {
         return FlightLevelRange::ALL;

@@ -1,6 +1,8 @@
 //! The kinds of bodies in an airspace.
 
-use sidestep_kernel::view::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+use sidestep_kernel::view::{
+    BodyKind, BodyRole, KindSpec, LegendTexts, Outline, Paint, TrailStyle,
+};
 
 /// All kinds of bodies in this world.
 pub(crate) const ALL: &[BodyKind] = &[AIRPLANE, ZONE, START, BodyKind::GOAL];
@@ -10,11 +12,11 @@ pub const AIRPLANE: BodyKind = BodyKind::new(&KindSpec {
     name: "airplane",
     noun: "airplane",
     rank: 5,
-    role: Role::Agent(TrailStyle::Lines),
+    role: BodyRole::Agent(TrailStyle::Lines),
     layer: 5,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::White,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: false,
 });
 
@@ -23,14 +25,14 @@ pub const ZONE: BodyKind = BodyKind::new(&KindSpec {
     name: "zone",
     noun: "zone",
     rank: 6,
-    role: Role::AroundAgent(AIRPLANE),
+    role: BodyRole::AroundAgent(AIRPLANE),
     layer: 3,
     paint: Paint::Veil,
     outline: Outline::Pale,
-    legend: Legend {
+    legend: LegendTexts {
         touching: "separation lost",
         failed: "zone of separation",
-        ..Legend::new("zone of separation")
+        ..LegendTexts::new("zone of separation")
     },
     shows_heading: false,
 });
@@ -40,10 +42,10 @@ pub const START: BodyKind = BodyKind::new(&KindSpec {
     name: "start",
     noun: "start",
     rank: 9,
-    role: Role::StartOf(AIRPLANE),
+    role: BodyRole::StartOf(AIRPLANE),
     layer: 2,
     paint: Paint::ByNumber { opacity: 0.1 },
     outline: Outline::Dashed,
-    legend: Legend::new("start, as wide as its zone of separation"),
+    legend: LegendTexts::new("start, as wide as its zone of separation"),
     shows_heading: false,
 });

@@ -64,7 +64,7 @@ use scratch::PhaseContext;
 pub use scratch::Scratch;
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::world::DecisionMode;
-use sidestep_kernel::{Phases, Slot};
+use sidestep_kernel::{EntitySlot, Phases};
 use state::AirspaceState;
 use std::ops::Range;
 pub use world::AirspaceWorld;
@@ -77,11 +77,11 @@ impl Phases for AirspaceWorld {
     type State = AirspaceState;
     type Scratch = Scratch;
 
-    fn scratch(&self) -> Scratch {
+    fn new_scratch(&self) -> Scratch {
         Scratch::default()
     }
 
-    fn bodies(&self, _: &AirspaceState) -> usize {
+    fn body_count(&self, _: &AirspaceState) -> usize {
         self.airplanes.len()
     }
 
@@ -93,7 +93,7 @@ impl Phases for AirspaceWorld {
         join::join(context, bodies, groups);
     }
 
-    fn act(context: &mut PhaseContext<'_>, group: &mut [Slot]) {
+    fn act(context: &mut PhaseContext<'_>, group: &mut [EntitySlot]) {
         act::act(context, group);
     }
 }

@@ -32,7 +32,7 @@ impl Counters {
 
     /// Counts a pair as one for which the shield promises nothing. It stays one pair, from the first cycle on,
     /// when it is named again.
-    pub(super) fn add_too_close(&mut self, now: Cycle, (a, b): (EntityId, EntityId)) {
+    pub(super) fn add_too_close_pair(&mut self, now: Cycle, (a, b): (EntityId, EntityId)) {
         let first = self.too_close.entry((a.min(b), a.max(b))).or_insert(now);
         *first = now.min(*first);
     }
@@ -44,7 +44,7 @@ impl Counters {
         }
     }
 
-    fn count(&self, kind: EventKind) -> u64 {
+    fn event_count(&self, kind: EventKind) -> u64 {
         self.events.get(&kind).copied().unwrap_or(0)
     }
 }
@@ -215,7 +215,7 @@ pub fn airplane_metrics(
     let alone_s = world.alone_s[id as usize];
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let arrived_s = airplane.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
-    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_always_replayed(world, id));
+    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_end(world, id));
     AirplaneMetrics {
         airplane: id,
         callsign: world.callsign(id),
@@ -234,7 +234,7 @@ pub fn airplane_metrics(
     }
 }
 
-fn is_always_replayed(world: &AirspaceWorld, id: EntityId) -> bool {
+fn is_replayed_to_end(world: &AirspaceWorld, id: EntityId) -> bool {
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let track = &world.airplanes[id as usize].track;
     track.as_ref().is_some_and(|track| track.end_s() <= joined_s)
@@ -259,7 +259,7 @@ pub fn pair_metrics(world: &AirspaceWorld, counters: &Counters) -> Vec<PairMetri
     pairs
 }
 
-fn count(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
+fn count_airplanes(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
     state.airplanes.iter().filter(|airplane| is(airplane)).count() as u64
 }
 
@@ -267,7 +267,7 @@ fn count(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
 fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     let all = (0..).zip(&state.airplanes);
     let ended = all.filter(|(_, airplane)| airplane.arrived_step().is_some());
-    ended.filter(|(id, _)| is_always_replayed(world, *id)).count() as u64
+    ended.filter(|(id, _)| is_replayed_to_end(world, *id)).count() as u64
 }
 
 fn mean(sum: f64, n: usize) -> Option<f64> {
@@ -278,7 +278,7 @@ fn mean(sum: f64, n: usize) -> Option<f64> {
 fn not_appeared_count(world: &AirspaceWorld, now: Cycle) -> u64 {
     // At the very start, the airplanes that start with the run are there.
     let cycle = now.max(1);
-    (0..world.airplanes.len()).filter(|&i| world.first_cycle(i) >= cycle).count() as u64
+    (0..world.airplanes.len()).filter(|&i| world.appearance_cycle(i) >= cycle).count() as u64
 }
 
 /// Returns the metrics of a run until a cycle; `decide_s` is the time spent deciding, in seconds.
@@ -298,7 +298,7 @@ pub(crate) fn metrics(
         min_separation_m: counters.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
         losses_of_separation: counters.pairs.values().map(|r| u64::from(r.losses)).sum(),
         lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
-        arrived: count(state, |airplane| airplane.arrived_step().is_some()),
+        arrived: count_airplanes(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
         messages: traffic.messages,
@@ -316,17 +316,17 @@ pub(crate) fn metrics(
         optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
-        shield_held_back: counters.count(EventKind::HeldBack),
-        contacts_lost: counters.count(EventKind::Unheard),
-        deadlines_missed: counters.count(EventKind::Deadline),
-        groups_too_large: counters.count(EventKind::GroupTooLarge),
+        shield_held_back: counters.event_count(EventKind::HeldBack),
+        contacts_lost: counters.event_count(EventKind::Unheard),
+        deadlines_missed: counters.event_count(EventKind::Deadline),
+        groups_too_large: counters.event_count(EventKind::GroupTooLarge),
         not_appeared: not_appeared_count(world, now),
-        left: count(state, AirplaneState::has_left),
+        left: count_airplanes(state, AirplaneState::has_left),
         replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
-        too_close: too_close(world, counters),
-        beyond_bound: beyond_bound(world, counters),
+        too_close: unprotected_pairs(world, counters),
+        beyond_bound: error_bound_violations(world, counters),
     }
 }
 
@@ -336,7 +336,7 @@ fn network_s(world: &AirspaceWorld, ticks: u64) -> Option<f64> {
 }
 
 /// Returns the airplanes whose errors exceeded the shield's bounds, by ids.
-fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<ErrorBoundViolation> {
+fn error_bound_violations(world: &AirspaceWorld, counters: &Counters) -> Vec<ErrorBoundViolation> {
     counters
         .beyond_bound
         .iter()
@@ -349,7 +349,7 @@ fn beyond_bound(world: &AirspaceWorld, counters: &Counters) -> Vec<ErrorBoundVio
 }
 
 /// Returns the pairs whose separation the shield does not guarantee, by the time when that began.
-fn too_close(world: &AirspaceWorld, counters: &Counters) -> Vec<UnprotectedPair> {
+fn unprotected_pairs(world: &AirspaceWorld, counters: &Counters) -> Vec<UnprotectedPair> {
     let mut pairs: Vec<_> =
         counters.too_close.iter().map(|(&pair, &cycle)| (cycle, pair)).collect();
     pairs.sort_unstable();
@@ -365,7 +365,7 @@ fn too_close(world: &AirspaceWorld, counters: &Counters) -> Vec<UnprotectedPair>
 
 /// Returns whether all airplanes have arrived or left by now.
 pub fn have_all_ended(state: &AirspaceState) -> bool {
-    state.airplanes.iter().all(|airplane| !airplane.is_flying())
+    state.airplanes.iter().all(|airplane| !airplane.is_unfinished())
 }
 
 #[cfg(test)]
@@ -417,7 +417,7 @@ mod tests {
         }
         let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
         run.advance(run.config().cycles);
-        let events = run.collector().counters.count(super::EventKind::Intruder);
+        let events = run.collector().counters.event_count(super::EventKind::Intruder);
         let too_close = run.metrics().too_close;
         let mut pairs: Vec<_> = too_close.iter().map(|one| one.airplanes).collect();
         pairs.sort_unstable();

@@ -7,7 +7,7 @@
 use crate::flight::{FlightLevelRange, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_import::traffic::MAX_SPEED_M_S;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 
 /// Meters beyond which squares of distances lose all sense.
 const MAX_COORDINATE_M: f64 = 1e15;
@@ -19,7 +19,7 @@ const MAX_DT_S: f64 = 1e4;
 /// A non-cooperative airplane as all of a group see it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NonCooperativeAircraft {
-    pub(crate) slot: Slot,
+    pub(crate) slot: EntitySlot,
     /// Its position as all see it, with the error of the cycle.
     pub(crate) at: Point,
     /// Its velocity through the air, in meters per second.
@@ -38,7 +38,7 @@ pub struct NonCooperativeAircraft {
 impl NonCooperativeAircraft {
     /// Returns the distance in meters to keep from where it would be if it flew straight on: the
     /// separation, and as far as it gets within `dt`.
-    pub(crate) fn clearance_m(&self, separation_m: f64) -> f64 {
+    pub(crate) fn required_clearance_m(&self, separation_m: f64) -> f64 {
         self.separation_m.max(separation_m) + self.top_m_s * self.dt_s
     }
 
@@ -47,9 +47,9 @@ impl NonCooperativeAircraft {
         let Self { velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = *self;
         let [x_m, y_m] = self.at;
         let [vx, vy] = velocity_m_s;
-        are_within([x_m, y_m, separation_m, error_m], MAX_COORDINATE_M)
-            && are_within([vx, vy, top_m_s], MAX_GROUND_SPEED_M_S)
-            && are_within([dt_s], MAX_DT_S)
+        are_bounded_by([x_m, y_m, separation_m, error_m], MAX_COORDINATE_M)
+            && are_bounded_by([vx, vy, top_m_s], MAX_GROUND_SPEED_M_S)
+            && are_bounded_by([dt_s], MAX_DT_S)
             && [top_m_s, separation_m, error_m, dt_s].iter().all(|size| *size >= 0.0)
             // Those of a recorded airplane are infinite.
             && levels.low_m <= levels.high_m
@@ -64,6 +64,6 @@ impl NonCooperativeAircraft {
 }
 
 /// Returns whether numbers are at most so large; comparisons with NaN are false.
-fn are_within<const N: usize>(numbers: [f64; N], max: f64) -> bool {
+fn are_bounded_by<const N: usize>(numbers: [f64; N], max: f64) -> bool {
     numbers.iter().all(|number| number.abs() <= max)
 }

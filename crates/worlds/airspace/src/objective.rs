@@ -40,7 +40,8 @@ impl Objective {
         let points: Vec<Point> =
             (1..=prediction.points.len()).map(|k| one.position_after(k as f64 * dtau_s)).collect();
         let straight = Prediction { counted: points.len(), points };
-        self.collision_costs(prediction, &straight, [one.clearance_m(separation_m), 0.0])[0]
+        self.collision_costs(prediction, &straight, [one.required_clearance_m(separation_m), 0.0])
+            [0]
     }
 
     /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
@@ -52,10 +53,10 @@ impl Objective {
         let mut weight = 1.0;
         let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
         for (of_a, of_b) in slices {
-            let parts = self.slice_collision(of_a, of_b, weight, r);
+            let parts = self.slice_collision_costs(of_a, of_b, weight, r);
             sums[0] += parts[0];
             sums[1] += parts[1];
-            weight = self.decay(weight);
+            weight = self.next_slice_weight(weight);
         }
         sums
     }
@@ -65,7 +66,13 @@ impl Objective {
     }
 
     /// Returns the same over the points of one slice, of which the first has the weight `weight`.
-    fn slice_collision(&self, a: &[Point], b: &[Point], mut weight: f64, r: [f64; 2]) -> [f64; 2] {
+    fn slice_collision_costs(
+        &self,
+        a: &[Point],
+        b: &[Point],
+        mut weight: f64,
+        r: [f64; 2],
+    ) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
         let max_square_m2 = ra.max(rb) * ra.max(rb);
         let mut sums = [0.0; 2];
@@ -88,7 +95,7 @@ impl Objective {
 
     /// Returns the weight of a slice's first point if that of the slice before has the weight
     /// `weight`. It is multiplied step by step, as within a slice, and not by a power, which rounds differently.
-    fn decay(&self, weight: f64) -> f64 {
+    fn next_slice_weight(&self, weight: f64) -> f64 {
         (0..SLICE).fold(weight, |weight, _| weight * self.beta)
     }
 
@@ -162,7 +169,7 @@ impl ActionPredictions {
         self
     }
 
-    fn piece(&self, piece: &SharedPoints, from: usize, mask: bool) -> &[Point] {
+    fn piece_points(&self, piece: &SharedPredictionPoints, from: usize, mask: bool) -> &[Point] {
         let points = &self.predictions[piece.actions[0]].points;
         let end = if mask { piece.counted } else { points.len().min(from + SLICE) };
         &points[from.min(end)..end]
@@ -172,14 +179,14 @@ impl ActionPredictions {
 /// The paths of all actions of an airplane in one slice of time.
 #[derive(Debug, Clone)]
 struct TimeSlice {
-    pieces: Vec<SharedPoints>,
+    pieces: Vec<SharedPredictionPoints>,
     /// Bounds around all of them.
     all: BoundingBox,
 }
 
 /// Points of a slice that some actions share: actions with the same turn differ only later.
 #[derive(Debug, Clone)]
-struct SharedPoints {
+struct SharedPredictionPoints {
     /// The actions, at least one.
     actions: Vec<usize>,
     /// Point of the prediction at which the counted part of the slice ends.
@@ -189,7 +196,7 @@ struct SharedPoints {
 
 impl TimeSlice {
     fn new(predictions: &[Prediction], from: usize) -> Self {
-        let mut pieces: Vec<SharedPoints> = Vec::new();
+        let mut pieces: Vec<SharedPredictionPoints> = Vec::new();
         for (action, prediction) in predictions.iter().enumerate() {
             let points = slice_points(prediction, from);
             let end = prediction.points.len().min(from + SLICE);
@@ -203,7 +210,7 @@ impl TimeSlice {
                 Some(piece) => piece.actions.push(action),
                 None => {
                     let bounds = BoundingBox::from_points(points);
-                    pieces.push(SharedPoints { actions: vec![action], counted, bounds });
+                    pieces.push(SharedPredictionPoints { actions: vec![action], counted, bounds });
                 }
             }
         }
@@ -235,7 +242,7 @@ impl BoundingBox {
         })
     }
 
-    fn is_within(&self, other: &Self, gap_m: f64) -> bool {
+    fn is_nearer_than(&self, other: &Self, gap_m: f64) -> bool {
         (0..2).all(|k| self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k])
     }
 }
@@ -244,7 +251,7 @@ impl BoundingBox {
 /// `G = sum own + sum pairs` with `own_i = alpha Gdev_i` and `pair_ij = Gcol_i + Gcol_j`.
 ///
 /// Everything that does not change during an optimization is computed here, once.
-pub fn group_game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
+pub fn build_group_game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
     let own = group.iter().map(|options| own_costs(objective, options)).collect();
     let mut game = PairwiseGame::new(own);
     for (i, a) in group.iter().enumerate() {
@@ -298,28 +305,28 @@ fn pair_costs(
     let mut costs = None;
     let mut weight = 1.0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
-        let is_near = of_a.all.is_within(&of_b.all, gap_m);
+        let is_near = of_a.all.is_nearer_than(&of_b.all, gap_m);
         let rows = of_a.pieces.iter().filter(|_| is_near);
-        for p in rows.filter(|p| p.bounds.is_within(&of_b.all, gap_m)) {
-            let of_p = a.piece(p, k * SLICE, objective.mask);
-            for q in of_b.pieces.iter().filter(|q| p.bounds.is_within(&q.bounds, gap_m)) {
-                let of_q = b.piece(q, k * SLICE, objective.mask);
-                let parts = objective.slice_collision(of_p, of_q, weight, r);
+        for p in rows.filter(|p| p.bounds.is_nearer_than(&of_b.all, gap_m)) {
+            let of_p = a.piece_points(p, k * SLICE, objective.mask);
+            for q in of_b.pieces.iter().filter(|q| p.bounds.is_nearer_than(&q.bounds, gap_m)) {
+                let of_q = b.piece_points(q, k * SLICE, objective.mask);
+                let parts = objective.slice_collision_costs(of_p, of_q, weight, r);
                 if parts != [0.0; 2] {
                     // Most pairs never need the table, which is large.
                     let costs =
                         costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
-                    add_to_all(costs, columns, [&p.actions, &q.actions], parts);
+                    add_to_action_pairs(costs, columns, [&p.actions, &q.actions], parts);
                 }
             }
         }
-        weight = objective.decay(weight);
+        weight = objective.next_slice_weight(weight);
     }
     costs
 }
 
 /// Adds `parts` for every two of some actions.
-fn add_to_all(
+fn add_to_action_pairs(
     costs: &mut [[f64; 2]],
     columns: usize,
     [actions_a, actions_b]: [&[usize]; 2],
@@ -337,7 +344,8 @@ fn add_to_all(
 #[cfg(test)]
 mod tests {
     use super::super::flight::{
-        Action, AfterLastWaypoint, AircraftModel, Autopilot, Pose2, StepTiming, WaypointRule,
+        Action, AfterLastWaypoint, AircraftModel, Autopilot, Pose2, TimeDiscretization,
+        WaypointRule,
     };
     use super::*;
     use serde_json::Value;
@@ -371,7 +379,7 @@ mod tests {
         let name = case["name"].as_str().expect("a name");
         let params = &case["params"];
         let number = |key: &str| params[key].as_f64().expect("a number");
-        let timing = StepTiming {
+        let timing = TimeDiscretization {
             dt_s: number("dt"),
             dtau_s: number("dtau"),
             horizon: number("kmax") as usize,
@@ -450,7 +458,7 @@ mod tests {
                 )
             })
             .collect();
-        let game = group_game(&objective, &options);
+        let game = build_group_game(&objective, &options);
         near(game.cost(&vec![0; options.len()]), &expected["G"], name);
     }
 
@@ -460,7 +468,7 @@ mod tests {
         use super::super::flight::{DetourLegs, actions};
         let model =
             AircraftModel { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
-        let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
+        let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = WaypointRule { tolerance_m: 100.0, passes: true };
         let all = [DetourLegs::default(), DetourLegs::default_preset()]
             .map(|legs| actions(&model, 5.0, &[], &legs));

@@ -8,16 +8,16 @@ use super::scratch::PhaseContext;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::distr::normal;
-use sidestep_kernel::{Cycle, Slot, math};
+use sidestep_kernel::{Cycle, EntitySlot, math};
 use std::ops::Range;
 
 /// Enters those of `bodies` that are in the air into the spatial index.
 pub(super) fn claim(context: &mut PhaseContext<'_>, bodies: Range<usize>) {
     let PhaseContext { world, state, now, .. } = *context;
     for slot in bodies {
-        if state.is_active(world, slot as Slot, now) {
+        if state.is_active(world, slot as EntitySlot, now) {
             let at = state.airplanes[slot].pose().at;
-            state.neighborhood.insert(slot as Slot, at, now);
+            state.neighborhood.insert(slot as EntitySlot, at, now);
         }
     }
 }
@@ -25,7 +25,7 @@ pub(super) fn claim(context: &mut PhaseContext<'_>, bodies: Range<usize>) {
 /// Returns a pose of an airplane as all see it in a cycle: with the error of that cycle.
 pub(super) fn observed_pose(
     world: &AirspaceWorld,
-    slot: Slot,
+    slot: EntitySlot,
     now: Cycle,
     mut pose: Pose2,
 ) -> Pose2 {
@@ -43,7 +43,7 @@ pub(super) fn known_aircraft(
     world: &AirspaceWorld,
     state: &AirspaceState,
     now: Cycle,
-    slot: Slot,
+    slot: EntitySlot,
 ) -> KnownAircraft {
     let current = &state.airplanes[slot as usize];
     KnownAircraft {
@@ -56,7 +56,7 @@ pub(super) fn known_aircraft(
 }
 
 /// Returns an airplane as those aboard know it.
-pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: Slot) -> OwnshipState {
+pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: EntitySlot) -> OwnshipState {
     let PhaseContext { world, state, now, .. } = *context;
     let current = &state.airplanes[slot as usize];
     let pose = current.pose();
@@ -72,13 +72,16 @@ pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: Slot) -> OwnshipSt
         orders: current.orders.get().into(),
         fallback: current.fallback.get(),
         refusals: current.overrides.get(),
-        exempt: state.exempt_with(slot).to_vec(),
+        exempt: state.exempt_ids(slot).to_vec(),
         external_action: state.external_action(slot),
     }
 }
 
 /// Returns an airplane as others see it.
-pub(super) fn surveillance_report(context: &PhaseContext<'_>, slot: Slot) -> SurveillanceReport {
+pub(super) fn surveillance_report(
+    context: &PhaseContext<'_>,
+    slot: EntitySlot,
+) -> SurveillanceReport {
     let PhaseContext { world, state, now, .. } = *context;
     let current = &state.airplanes[slot as usize];
     SurveillanceReport {
@@ -92,7 +95,7 @@ pub(super) fn surveillance_report(context: &PhaseContext<'_>, slot: Slot) -> Sur
 /// Returns the non-cooperative airplanes of a group, by id.
 pub(super) fn non_cooperative_aircraft(
     context: &PhaseContext<'_>,
-    group: &[Slot],
+    group: &[EntitySlot],
 ) -> Vec<NonCooperativeAircraft> {
     group
         .iter()
@@ -101,7 +104,7 @@ pub(super) fn non_cooperative_aircraft(
         .collect()
 }
 
-fn non_cooperative_at(context: &PhaseContext<'_>, slot: Slot) -> NonCooperativeAircraft {
+fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooperativeAircraft {
     let PhaseContext { world, state, now, .. } = *context;
     let airplane = &world.airplanes[slot as usize];
     let current = &state.airplanes[slot as usize];

@@ -2,7 +2,7 @@
 
 use sidestep_kernel::network::FaultStreams;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// Starts and goals of generated airplanes.
 pub(crate) const PLACE: Purpose = Purpose(1);
@@ -27,7 +27,7 @@ pub(crate) fn network_fault_streams(streams: Streams) -> FaultStreams {
 }
 
 /// Returns the `k`-th uniform number in [0, 1) of an airplane's samples in a cycle.
-pub(crate) fn sample(streams: &Streams, slot: Slot, now: Cycle, k: u64) -> f64 {
+pub(crate) fn sample(streams: &Streams, slot: EntitySlot, now: Cycle, k: u64) -> f64 {
     // A block of the stream has four words of 32 bits.
     let words = streams.block(slot, now, SAMPLE, (k / 4) as u16);
     f64::from(words[(k % 4) as usize]) / 4_294_967_296.0

@@ -2,11 +2,11 @@
 
 use super::decide::OptimizationRecord;
 use super::events::{Event, EventKind, EventQuantity};
-use super::flight::Leg;
+use super::flight::ConstantRateLeg;
 use super::settings::RecordSection;
 use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_index;
-use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
+use sidestep_kernel::ports::{Table, TableBuffer, TableBuffers, TableRowsBuffer};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// A leg that an airplane has flown in a cycle; at the end of its flight one that takes no time.
@@ -14,7 +14,7 @@ use sidestep_kernel::{Cycle, EntityId};
 pub(super) struct FlownLeg {
     pub(super) cycle: Cycle,
     pub(super) airplane: EntityId,
-    pub(super) leg: Leg,
+    pub(super) leg: ConstantRateLeg,
 }
 
 impl FlownLeg {
@@ -65,11 +65,11 @@ fn events_table(callsigns: Vec<Option<String>>) -> Table<Event> {
             callsigns.get(e.airplane as usize).cloned().flatten()
         })
         .u32("other", "the other airplane", Event::other_airplane)
-        .f64("distance_m", "how near they were", |e| e.value_in(EventQuantity::Distance))
+        .f64("distance_m", "how near they were", |e| e.value_of_quantity(EventQuantity::Distance))
         .f64("delay_s", "time beyond that of the flight alone", |e| {
-            e.value_in(EventQuantity::Delay)
+            e.value_of_quantity(EventQuantity::Delay)
         })
-        .f64("number", "a number, by event", |e| e.value_in(EventQuantity::Number))
+        .f64("number", "a number, by event", |e| e.value_of_quantity(EventQuantity::Number))
 }
 
 fn optimizations_table() -> Table<OptimizationRecord> {
@@ -93,9 +93,9 @@ fn callsigns(world: &AirspaceWorld) -> Vec<Option<String>> {
 #[derive(Debug, Default)]
 pub(super) struct RecordBuffers {
     record: RecordSection,
-    flown: RowBuffer<FlownLeg>,
-    events: RowBuffer<Event>,
-    optimizations: RowBuffer<OptimizationRecord>,
+    flown: TableRowsBuffer<FlownLeg>,
+    events: TableRowsBuffer<Event>,
+    optimizations: TableRowsBuffer<OptimizationRecord>,
 }
 
 impl RecordBuffers {
@@ -105,18 +105,19 @@ impl RecordBuffers {
     }
 
     /// Returns whether controls from outside of the run are to be kept.
-    pub(super) fn has_controls(&self) -> bool {
+    pub(super) fn is_recording_controls(&self) -> bool {
         self.record.controls
     }
 
     /// Starts to keep rows of the tables that the scenario asks for; before this call none are kept.
     pub(super) fn start(&mut self, world: &AirspaceWorld) {
-        self.flown.start(self.record.trajectories.then(|| trajectories_table(&callsigns(world))));
-        self.events.start(self.record.events.then(|| events_table(callsigns(world))));
-        self.optimizations.start(self.record.optimizations.then(optimizations_table));
+        self.flown
+            .set_table(self.record.trajectories.then(|| trajectories_table(&callsigns(world))));
+        self.events.set_table(self.record.events.then(|| events_table(callsigns(world))));
+        self.optimizations.set_table(self.record.optimizations.then(optimizations_table));
     }
 
-    pub(super) fn push_leg(&mut self, flown: FlownLeg) {
+    pub(super) fn push_flown_leg(&mut self, flown: FlownLeg) {
         self.flown.push(flown);
     }
 
@@ -129,12 +130,12 @@ impl RecordBuffers {
     }
 }
 
-impl Buffers for RecordBuffers {
-    fn buffers(&self) -> Vec<&dyn Buffer> {
+impl TableBuffers for RecordBuffers {
+    fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
         vec![&self.flown, &self.events, &self.optimizations]
     }
 
-    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+    fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
         vec![&mut self.flown, &mut self.events, &mut self.optimizations]
     }
 }

@@ -6,7 +6,7 @@ mod network;
 mod optimizer;
 mod start_groups;
 
-use super::flight::Airplane;
+use super::flight::AirplaneConfig;
 use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
@@ -14,7 +14,7 @@ use super::settings::{
     Inflation, LevelGap, LookAhead, RecordSection, RoundCount, Step, Tolerance, Weight,
 };
 use super::shield::OrbitSide;
-use super::state::{AirplaneRecord, PackedFlightEnd, Snapshot};
+use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
@@ -90,7 +90,7 @@ struct AirspaceSection {
     max_rounds: Option<RoundCount>,
     choice: Option<Choice>,
     vertical_m: Option<Number<LevelGap>>,
-    replay_until_s: Option<Number<ReplayEndRule>>,
+    replay_until_s: Option<Number<ReplayUntilRange>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
     /// Latitude and longitude of the origin.
@@ -112,9 +112,9 @@ pub(super) fn sections_schema(own: &Methods) -> Value {
 
 /// The times until which tracks may be replayed, infinity included.
 #[derive(Debug, Clone, Copy)]
-struct ReplayEndRule;
+struct ReplayUntilRange;
 
-impl Rule for ReplayEndRule {
+impl Rule for ReplayUntilRange {
     fn allows(number: f64) -> bool {
         number >= 0.0
     }
@@ -148,12 +148,12 @@ pub struct CompiledAirspace {
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
     /// The text that it was compiled from.
-    recipe: Arc<ScenarioSource>,
+    recipe: Arc<ParsedScenario>,
 }
 
 /// The text of a scenario and its sections, so that another seed reads nothing again.
 #[derive(Debug)]
-struct ScenarioSource {
+struct ParsedScenario {
     source: Source,
     head: Head,
     file: AirspaceFile,
@@ -176,7 +176,7 @@ impl CompiledAirspace {
     /// The same.
     pub fn with_methods(source: &Source, own: &Methods) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
-        let recipe = ScenarioSource { source: source.clone(), head, file, own: own.clone() };
+        let recipe = ParsedScenario { source: source.clone(), head, file, own: own.clone() };
         Compiler::new(&Arc::new(recipe)).compile()
     }
 
@@ -204,7 +204,7 @@ impl CompiledAirspace {
             .airplanes
             .iter()
             .zip(&*self.fallbacks)
-            .map(|(airplane, &fallback)| start_record(airplane, fallback))
+            .map(|(airplane, &fallback)| initial_airplane_record(airplane, fallback))
             .collect();
         Snapshot {
             cycle: 0,
@@ -220,8 +220,8 @@ impl CompiledAirspace {
 }
 
 /// Returns the state of an airplane at the start of its flight.
-fn start_record(airplane: &Airplane, fallback: OrbitSide) -> AirplaneRecord {
-    AirplaneRecord {
+fn initial_airplane_record(airplane: &AirplaneConfig, fallback: OrbitSide) -> AirplaneSnapshot {
+    AirplaneSnapshot {
         pose: airplane.start,
         ended: PackedFlightEnd::NONE,
         counts: [0; 4],

@@ -7,7 +7,7 @@ use crate::rows::FlownLeg;
 use crate::state::PairRecord;
 use crate::trace::InspectionTrace;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 use std::collections::BTreeMap;
 
 /// A worker's turn in one phase of one cycle.
@@ -17,7 +17,7 @@ pub(crate) type PhaseContext<'a> = sidestep_kernel::PhaseContext<'a, AirspaceWor
 #[derive(Debug, Default)]
 pub struct Scratch {
     /// Pairs that came near each other.
-    pub(crate) pairs: BTreeMap<(Slot, Slot), PairRecord>,
+    pub(crate) pairs: BTreeMap<(EntitySlot, EntitySlot), PairRecord>,
     pub(crate) optimizations: Vec<OptimizationRecord>,
     /// Beacons by which airplanes have found their groups.
     pub(crate) grouped: NetworkTraffic,
@@ -26,11 +26,11 @@ pub struct Scratch {
     pub(crate) events: Vec<Event>,
     pub(crate) flown: Vec<FlownLeg>,
     /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
-    pub(crate) too_close: Vec<(Cycle, Slot, Slot)>,
+    pub(crate) too_close: Vec<(Cycle, EntitySlot, EntitySlot)>,
     /// Processor time spent deciding, in nanoseconds: reported beside the results, never part of
     /// them.
     pub(crate) decide_ns: u64,
-    pub(crate) flying: Vec<Slot>,
+    pub(crate) flying: Vec<EntitySlot>,
     /// Notes for an inspection of an airplane; none in a run.
     pub(crate) trace: Option<Box<InspectionTrace>>,
 }

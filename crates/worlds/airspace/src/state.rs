@@ -7,16 +7,16 @@ mod snapshot;
 use super::agents::traffic_state::TrafficPicture;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
-use super::flight::{FlightSegment, Pose2};
+use super::flight::{InterOrderSegment, Pose2};
 use super::method::MethodKind;
-use super::pilot::{Control, PilotMemory};
+use super::pilot::{AirplaneControl, PilotMemory};
 use super::shield::{ExemptIds, OrbitSide};
 use super::world::AirspaceWorld;
 pub use end::{FlightEnd, PackedFlightEnd};
 use neighborhood::SpatialIndex;
 use sidestep_kernel::column::AtomicCell;
-use sidestep_kernel::{Cycle, EntityId, Slot, math};
-pub use snapshot::{AirplaneRecord, PairRecord, Snapshot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, math};
+pub use snapshot::{AirplaneSnapshot, PairRecord, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -41,7 +41,7 @@ pub struct AirspaceState {
     /// The cycle for which controls were submitted, or [`NEVER`].
     controls_cycle: AtomicCell<u64>,
     /// The controls of that cycle, until their groups take them out.
-    controls: Mutex<BTreeMap<EntityId, Control>>,
+    controls: Mutex<BTreeMap<EntityId, AirplaneControl>>,
 }
 
 /// Stands for no cycle.
@@ -99,7 +99,7 @@ impl AirplaneState {
         self.heading_rad.set(pose.heading_rad);
     }
 
-    fn restore(&self, record: &AirplaneRecord) {
+    fn restore(&self, record: &AirplaneSnapshot) {
         self.set_pose(record.pose);
         self.end.set(record.ended);
         let [next, overrides, orbits, orbiting] = record.counts;
@@ -114,8 +114,8 @@ impl AirplaneState {
         self.waits.set(waits);
     }
 
-    fn record(&self, turn_rate_rad_s: f64) -> AirplaneRecord {
-        AirplaneRecord {
+    fn to_snapshot(&self, turn_rate_rad_s: f64) -> AirplaneSnapshot {
+        AirplaneSnapshot {
             pose: self.pose(),
             ended: self.end.get(),
             counts: [self.next.get(), self.overrides.get(), self.orbits.get(), self.orbiting.get()],
@@ -127,7 +127,7 @@ impl AirplaneState {
     }
 
     /// Returns whether it has not arrived yet.
-    pub fn is_flying(&self) -> bool {
+    pub fn is_unfinished(&self) -> bool {
         self.end.get() == PackedFlightEnd::NONE
     }
 
@@ -161,7 +161,7 @@ fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 /// Takes out the memories of the airplanes of a group; nothing where airplanes have no memory. No two groups share an
 /// airplane, so no other worker asks for the same.
-fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
+fn take<T: Default>(all: &[Mutex<T>], group: &[EntitySlot]) -> Vec<T> {
     group
         .iter()
         .map(|&slot| match all.get(slot as usize) {
@@ -172,7 +172,7 @@ fn take<T: Default>(all: &[Mutex<T>], group: &[Slot]) -> Vec<T> {
 }
 
 /// Puts back what [`take`] has taken out; nothing where airplanes have no memory.
-fn put_memories<T>(all: &[Mutex<T>], group: &[Slot], memories: Vec<T>) {
+fn put_memories<T>(all: &[Mutex<T>], group: &[EntitySlot], memories: Vec<T>) {
     for (&slot, memory) in group.iter().zip(memories) {
         if let Some(one) = all.get(slot as usize) {
             *lock(one) = memory;
@@ -204,7 +204,7 @@ impl AirspaceState {
         }
         // What no airplane needs with these settings takes no memory, and is in no checkpoint.
         let with_contacts = if world.network.is_some() { n } else { 0 };
-        let with_resolutions = if world.has_resolutions() { n } else { 0 };
+        let with_resolutions = if world.has_resolution_memory() { n } else { 0 };
         let has_gusts = world.shield && world.disturbance.heading_rad > 0.0;
         let with_orbit_poses = if has_gusts { n } else { 0 };
         let with_external_actions =
@@ -233,7 +233,7 @@ impl AirspaceState {
         for (i, record) in snapshot.airplanes.iter().enumerate() {
             // A snapshot without gusts has no orbit poses.
             let pose = snapshot.orbit_poses.get(i).copied().unwrap_or(record.pose);
-            state.set_orbit_pose(i as Slot, pose);
+            state.set_orbit_pose(i as EntitySlot, pose);
         }
         for &(a, b) in &snapshot.exempt {
             state.exempt_pair(a, b);
@@ -242,7 +242,7 @@ impl AirspaceState {
     }
 
     /// Returns the pose that an airplane has on its stored orbit, if no gust has taken it off that.
-    pub(super) fn orbit_pose(&self, slot: Slot) -> Pose2 {
+    pub(super) fn orbit_pose(&self, slot: EntitySlot) -> Pose2 {
         match self.orbit_poses.get(slot as usize) {
             Some(orbit_pose) => Pose2 {
                 at: [orbit_pose.x_m.get(), orbit_pose.y_m.get()],
@@ -253,7 +253,7 @@ impl AirspaceState {
     }
 
     /// Stores the pose that an airplane has on its orbit.
-    pub(super) fn set_orbit_pose(&self, slot: Slot, pose: Pose2) {
+    pub(super) fn set_orbit_pose(&self, slot: EntitySlot, pose: Pose2) {
         if let Some(orbit_pose) = self.orbit_poses.get(slot as usize) {
             orbit_pose.x_m.set(pose.at[0]);
             orbit_pose.y_m.set(pose.at[1]);
@@ -262,12 +262,12 @@ impl AirspaceState {
     }
 
     /// Returns the others with which an airplane is an exempt pair.
-    pub(super) fn exempt_with(&self, slot: Slot) -> ExemptIds {
+    pub(super) fn exempt_ids(&self, slot: EntitySlot) -> ExemptIds {
         lock(&self.exempt[slot as usize]).clone()
     }
 
     /// Exempts two airplanes of a group: from now on the shield does not guarantee separation of this pair.
-    pub(super) fn exempt_pair(&self, a: Slot, b: Slot) {
+    pub(super) fn exempt_pair(&self, a: EntitySlot, b: EntitySlot) {
         for (one, other) in [(a, b), (b, a)] {
             let mut exempt = lock(&self.exempt[one as usize]);
             if let Err(place) = exempt.binary_search(&other) {
@@ -278,30 +278,34 @@ impl AirspaceState {
     }
 
     /// Keeps only those exempt pairs of an airplane that are to stay.
-    pub(super) fn retain_exempt(&self, slot: Slot, stays: impl Fn(EntityId) -> bool) {
+    pub(super) fn retain_exempt(&self, slot: EntitySlot, stays: impl Fn(EntityId) -> bool) {
         let mut exempt = lock(&self.exempt[slot as usize]);
         *exempt = exempt.iter().copied().filter(|&other| stays(other)).collect();
     }
 
     /// Takes out the memories of the airplanes of a group.
-    pub(super) fn take_memories(&self, group: &[Slot]) -> Vec<PilotMemory> {
+    pub(super) fn take_memories(&self, group: &[EntitySlot]) -> Vec<PilotMemory> {
         let both = take(&self.contacts, group).into_iter().zip(take(&self.resolving, group));
         both.map(|(contacts, resolving)| PilotMemory { contacts, resolving }).collect()
     }
 
     /// Puts back the memory of an airplane.
-    pub(super) fn put_memory(&self, slot: Slot, PilotMemory { contacts, resolving }: PilotMemory) {
+    pub(super) fn put_memory(
+        &self,
+        slot: EntitySlot,
+        PilotMemory { contacts, resolving }: PilotMemory,
+    ) {
         put_memories(&self.contacts, &[slot], vec![contacts]);
         put_memories(&self.resolving, &[slot], vec![resolving]);
     }
 
     /// Returns the knowledge that an airplane has of others.
-    pub(super) fn traffic_picture(&self, slot: Slot) -> TrafficPicture {
+    pub(super) fn traffic_picture(&self, slot: EntitySlot) -> TrafficPicture {
         self.contacts.get(slot as usize).map(|all| lock(all).clone()).unwrap_or_default()
     }
 
     /// Stores the controls for a cycle of airplanes that have decided outside of the run.
-    pub(super) fn set_controls(&self, cycle: Cycle, controls: Vec<Control>) {
+    pub(super) fn set_controls(&self, cycle: Cycle, controls: Vec<AirplaneControl>) {
         *lock(&self.controls) = controls.into_iter().map(|one| (one.id, one)).collect();
         self.controls_cycle.set(cycle);
     }
@@ -312,33 +316,33 @@ impl AirspaceState {
     }
 
     /// Takes out the controls that were submitted for the airplanes of a group.
-    pub(super) fn take_controls(&self, group: &[Slot]) -> Vec<Option<Control>> {
+    pub(super) fn take_controls(&self, group: &[EntitySlot]) -> Vec<Option<AirplaneControl>> {
         let mut controls = lock(&self.controls);
         group.iter().map(|slot| controls.remove(slot)).collect()
     }
 
     /// Returns the action that was ordered for an airplane, if there is one.
-    pub(super) fn external_action(&self, slot: Slot) -> Option<ExternalAction> {
+    pub(super) fn external_action(&self, slot: EntitySlot) -> Option<ExternalAction> {
         self.external_actions.get(slot as usize).and_then(|action| lock(action).clone())
     }
 
     /// Drops the actions that were ordered for the airplanes of a group: they have decided.
-    pub(super) fn drop_external_actions(&self, group: &[Slot]) {
+    pub(super) fn drop_external_actions(&self, group: &[EntitySlot]) {
         take(&self.external_actions, group);
     }
 
     /// Stores the action that was ordered for an airplane, in place of any other.
-    pub(super) fn set_external_action(&self, slot: Slot, action: ExternalAction) {
+    pub(super) fn set_external_action(&self, slot: EntitySlot, action: ExternalAction) {
         put_memories(&self.external_actions, &[slot], vec![Some(action)]);
     }
 
     /// Returns the turn rate of an airplane in the step that it flew last, in radians per second.
-    pub(super) fn turn_rate_rad_s(&self, slot: Slot) -> f64 {
+    pub(super) fn turn_rate_rad_s(&self, slot: EntitySlot) -> f64 {
         self.turn_rates_rad_s[slot as usize].get()
     }
 
     /// Stores the turn rate of the step that an airplane flew last.
-    pub(super) fn set_turn_rate_rad_s(&self, slot: Slot, omega_rad_s: f64) {
+    pub(super) fn set_turn_rate_rad_s(&self, slot: EntitySlot, omega_rad_s: f64) {
         self.turn_rates_rad_s[slot as usize].set(omega_rad_s);
     }
 
@@ -350,14 +354,14 @@ impl AirspaceState {
         }
         let controls =
             self.has_controls(cycle).then(|| lock(&self.controls).values().cloned().collect());
-        let orbits = 0..self.orbit_poses.len() as Slot;
+        let orbits = 0..self.orbit_poses.len() as EntitySlot;
         Snapshot {
             cycle,
             airplanes: self
                 .airplanes
                 .iter()
                 .zip(&self.turn_rates_rad_s)
-                .map(|(airplane, turn_rate_rad_s)| airplane.record(turn_rate_rad_s.get()))
+                .map(|(airplane, turn_rate_rad_s)| airplane.to_snapshot(turn_rate_rad_s.get()))
                 .collect(),
             contacts: self.contacts.iter().map(|one| lock(one).clone()).collect(),
             resolving: self.resolving.iter().map(|one| lock(one).clone()).collect(),
@@ -369,12 +373,17 @@ impl AirspaceState {
     }
 
     /// Returns whether an airplane is there in a cycle: it has appeared and has not arrived.
-    pub(super) fn is_active(&self, world: &AirspaceWorld, slot: Slot, now: Cycle) -> bool {
-        self.airplanes[slot as usize].is_flying() && world.first_cycle(slot as usize) <= now
+    pub(super) fn is_active(&self, world: &AirspaceWorld, slot: EntitySlot, now: Cycle) -> bool {
+        self.airplanes[slot as usize].is_unfinished()
+            && world.appearance_cycle(slot as usize) <= now
     }
 
     /// Returns the part of a flight that an airplane is on now.
-    pub(super) fn segment<'a>(&self, world: &'a AirspaceWorld, slot: Slot) -> FlightSegment<'a> {
+    pub(super) fn segment<'a>(
+        &self,
+        world: &'a AirspaceWorld,
+        slot: EntitySlot,
+    ) -> InterOrderSegment<'a> {
         world.segment(slot, self.airplanes[slot as usize].orders.get().into())
     }
 }

@@ -6,11 +6,11 @@ use super::state::Snapshot;
 use super::world::AirspaceWorld;
 use serde_json::json;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::text::{KeyValues, StateDescription, align_pairs, group_thousands, key_value};
+use sidestep_kernel::text::{KeyValues, StateReport, align_pairs, group_thousands, key_value_pair};
 use std::fmt::Write;
 
 /// Returns what is known of a scenario before it runs.
-pub(super) fn contents(compiled: &CompiledAirspace) -> StateDescription {
+pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> StateReport {
     let world = &*compiled.world;
     let shield = if world.shield { "on" } else { "off" };
     let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
@@ -36,33 +36,34 @@ pub(super) fn contents(compiled: &CompiledAirspace) -> StateDescription {
         "recorded": recorded,
         "replay_until_s": (recorded > 0).then_some(until_s),
     });
-    let mut lines = vec![key_value("airplanes", group_thousands(world.airplanes.len() as u64))];
+    let mut lines =
+        vec![key_value_pair("airplanes", group_thousands(world.airplanes.len() as u64))];
     if non_cooperative > 0 {
-        lines.push(key_value("intruders", group_thousands(non_cooperative)));
+        lines.push(key_value_pair("intruders", group_thousands(non_cooperative)));
     }
     lines.extend(abilities_text(world));
     if recorded > 0 {
         let until = if until_s.is_finite() { format!("until {until_s} s") } else { "all".into() };
-        lines.push(key_value(
+        lines.push(key_value_pair(
             "recorded",
             format!("{}, replayed {until}", group_thousands(recorded)),
         ));
     }
-    lines.extend(times_text(compiled));
-    lines.extend(origin_text(world));
-    lines.extend(too_close(world, &compiled.too_close));
-    StateDescription { json, text: align_pairs(&lines) }
+    lines.extend(timing_text(compiled));
+    lines.extend(geographic_origin_text(world));
+    lines.extend(too_close_warning(world, &compiled.too_close));
+    StateReport { json, text: align_pairs(&lines) }
 }
 
 /// Returns how often the airplanes decide, and for how long they fly.
-fn times_text(compiled: &CompiledAirspace) -> KeyValues {
+fn timing_text(compiled: &CompiledAirspace) -> KeyValues {
     let dt_s = compiled.world.timing.dt_s;
     let cycles = group_thousands(compiled.cycles);
     let duration_s = compiled.cycles as f64 * dt_s;
     let look_ahead_s = compiled.world.reactive_settings().look_ahead_s;
     vec![
-        key_value("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
-        key_value(
+        key_value_pair("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
+        key_value_pair(
             "run",
             format!("at most {cycles} cycles ({duration_s} s), seed {}", compiled.seed),
         ),
@@ -70,9 +71,9 @@ fn times_text(compiled: &CompiledAirspace) -> KeyValues {
 }
 
 /// Returns the position of the origin on earth, if it has one.
-fn origin_text(world: &AirspaceWorld) -> Option<(String, String)> {
+fn geographic_origin_text(world: &AirspaceWorld) -> Option<(String, String)> {
     let [lat, lon] = world.origin_deg?;
-    Some(key_value("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
+    Some(key_value_pair("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
@@ -83,19 +84,19 @@ fn abilities_text(world: &AirspaceWorld) -> KeyValues {
     let deployment = world.deployment.name();
     let shield = if world.shield { "on" } else { "off" };
     vec![
-        key_value(
+        key_value_pair(
             "separation",
             format!(
                 "{} m, or {height_m} m of height",
                 range_text(models().map(|m| m.separation_m))
             ),
         ),
-        key_value("speed", format!("{} m/s", range_text(models().map(|m| m.v_m_s)))),
-        key_value(
+        key_value_pair("speed", format!("{} m/s", range_text(models().map(|m| m.v_m_s)))),
+        key_value_pair(
             "turn rate",
             format!("{} deg/s", range_text(models().map(|m| m.omega_max_rad_s.to_degrees()))),
         ),
-        key_value("method", format!("{method}, {deployment}, shield {shield}")),
+        key_value_pair("method", format!("{method}, {deployment}, shield {shield}")),
     ]
 }
 
@@ -118,17 +119,17 @@ fn round_to_tenth(number: f64) -> f64 {
 
 /// Returns the outcome of a run; parts of which there is nothing to say have no line.
 pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
-    let mut lines = flights_text(metrics);
-    lines.extend(not_appeared(metrics));
+    let mut lines = flight_metrics_text(metrics);
+    lines.extend(not_appeared_warning(metrics));
     lines.extend(network(metrics));
-    lines.extend(orders_and_tracks(metrics));
+    lines.extend(orders_and_tracks_text(metrics));
     lines.extend(unprotected_pairs_warning(&metrics.too_close));
-    lines.extend(beyond_bound(&metrics.beyond_bound));
+    lines.extend(beyond_bound_warning(&metrics.beyond_bound));
     lines
 }
 
 /// Returns the pose of every airplane, by entity id.
-pub(super) fn poses(snapshot: &Snapshot) -> StateDescription {
+pub(super) fn poses(snapshot: &Snapshot) -> StateReport {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
     let mut text = "  airplane       x_m         y_m    heading_deg\n".to_string();
     for (id, airplane) in snapshot.airplanes.iter().enumerate() {
@@ -137,15 +138,15 @@ pub(super) fn poses(snapshot: &Snapshot) -> StateDescription {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}");
     }
-    StateDescription { json, text }
+    StateReport { json, text }
 }
 
 /// Returns the first pairs with first fallbacks that are not apart, and the number of others.
-fn too_close(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
+fn too_close_warning(world: &AirspaceWorld, pairs: &[(u32, u32)]) -> Option<(String, String)> {
     let names = first_names(pairs, |&(a, b)| {
         format!("{} and {}", world.display_name(a), world.display_name(b))
     })?;
-    Some(key_value("warning", format!("start too close for the shield: {names}")))
+    Some(key_value_pair("warning", format!("start too close for the shield: {names}")))
 }
 
 /// Returns the traffic on the network, and its faults.
@@ -154,12 +155,12 @@ fn network(m: &Metrics) -> KeyValues {
     if m.beacons > 0 {
         let sent =
             format!("{}, {} bytes", group_thousands(m.beacons), group_thousands(m.beacon_bytes));
-        lines.push(key_value("beacons", sent));
+        lines.push(key_value_pair("beacons", sent));
     }
     if m.messages > 0 {
         let sent = format!("{}, {} bytes", group_thousands(m.messages), group_thousands(m.bytes));
         let took = m.network_s.map_or(String::new(), |s| format!(", {s:.1} s on the network"));
-        lines.push(key_value("messages", sent + &took));
+        lines.push(key_value_pair("messages", sent + &took));
     }
     let counts = [
         (m.contacts_lost, "contacts lost"),
@@ -173,33 +174,36 @@ fn network(m: &Metrics) -> KeyValues {
         .map(|(n, what)| format!("{} {what}", group_thousands(*n)))
         .collect();
     if !faults.is_empty() {
-        lines.push(key_value("trouble", faults.join(", ")));
+        lines.push(key_value_pair("trouble", faults.join(", ")));
     }
     lines
 }
 
 /// Returns the warning that a run was too short for some airplanes to be seen at all: they count among those
 /// that have not arrived.
-fn not_appeared(m: &Metrics) -> Option<(String, String)> {
+fn not_appeared_warning(m: &Metrics) -> Option<(String, String)> {
     let many = match m.not_appeared {
         0 => return None,
         1 => "1 airplane has".into(),
         n => format!("{} airplanes have", group_thousands(n)),
     };
-    Some(key_value("WARNING", format!("{many} not appeared by now: more cycles would show them")))
+    Some(key_value_pair(
+        "WARNING",
+        format!("{many} not appeared by now: more cycles would show them"),
+    ))
 }
 
 /// Returns lines on recorded tracks, orders and removals; none where there were none.
-fn orders_and_tracks(m: &Metrics) -> KeyValues {
+fn orders_and_tracks_text(m: &Metrics) -> KeyValues {
     let mut lines = Vec::new();
     if m.replayed > 0 {
-        lines.push(key_value(
+        lines.push(key_value_pair(
             "replayed",
             format!("{} to the end of their tracks", group_thousands(m.replayed)),
         ));
     }
     if m.left > 0 {
-        lines.push(key_value(
+        lines.push(key_value_pair(
             "left",
             format!("{} before they had arrived", group_thousands(m.left)),
         ));
@@ -207,7 +211,7 @@ fn orders_and_tracks(m: &Metrics) -> KeyValues {
     if m.orders + m.orders_delayed > 0 {
         let done = group_thousands(m.orders);
         let waits = group_thousands(m.orders_delayed);
-        lines.push(key_value(
+        lines.push(key_value_pair(
             "orders",
             format!("{done} carried out, delayed {waits} times by one dt"),
         ));
@@ -228,12 +232,12 @@ fn first_names<T>(all: &[T], words: impl Fn(&T) -> String) -> Option<String> {
 }
 
 /// Returns the first airplanes with errors beyond the shield's bounds, and the number of others.
-fn beyond_bound(all: &[ErrorBoundViolation]) -> Option<(String, String)> {
+fn beyond_bound_warning(all: &[ErrorBoundViolation]) -> Option<(String, String)> {
     let names = first_names(all, |one| {
         let name = one.callsign.clone().unwrap_or_else(|| one.airplane.to_string());
         format!("{name} at {} s", one.at_s)
     })?;
-    Some(key_value("WARNING", format!("errors beyond the bound: {names}")))
+    Some(key_value_pair("WARNING", format!("errors beyond the bound: {names}")))
 }
 
 /// Returns the first pairs whose separation the shield does not guarantee, and the number of others.
@@ -242,10 +246,10 @@ fn unprotected_pairs_warning(too_close: &[UnprotectedPair]) -> Option<(String, S
         let [a, b] = callsigns.clone().unwrap_or_else(|| airplanes.map(|id| id.to_string()));
         if *at_s > 0.0 { format!("{a} and {b} at {at_s} s") } else { format!("{a} and {b}") }
     })?;
-    Some(key_value("WARNING", format!("too close for the shield: {names}")))
+    Some(key_value_pair("WARNING", format!("too close for the shield: {names}")))
 }
 
-fn flights_text(m: &Metrics) -> KeyValues {
+fn flight_metrics_text(m: &Metrics) -> KeyValues {
     let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),
@@ -254,15 +258,15 @@ fn flights_text(m: &Metrics) -> KeyValues {
     let delay = m.mean_delay_percent.map_or("-".into(), |d| format!("{d:.1} % on average"));
     let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
     vec![
-        key_value(
+        key_value_pair(
             "arrived",
             format!("{} of {}", group_thousands(m.arrived), group_thousands(m.airplanes)),
         ),
-        key_value("nearest approach", nearest),
-        key_value("losses of separation", lost),
-        key_value("delay", delay),
-        key_value("optimizations", format!("{}{rounds}", group_thousands(m.optimizations))),
-        key_value(
+        key_value_pair("nearest approach", nearest),
+        key_value_pair("losses of separation", lost),
+        key_value_pair("delay", delay),
+        key_value_pair("optimizations", format!("{}{rounds}", group_thousands(m.optimizations))),
+        key_value_pair(
             "shield",
             format!(
                 "{} decisions changed, {} of them to orbits",
@@ -275,7 +279,7 @@ fn flights_text(m: &Metrics) -> KeyValues {
 
 #[cfg(test)]
 mod tests {
-    use super::contents;
+    use super::describe_scenario;
     use crate::airspace_run;
     use crate::scenario::CompiledAirspace;
     use sidestep_kernel::{Simulation, WorldMetrics};
@@ -295,7 +299,7 @@ mod tests {
         let compiled = CompiledAirspace::new(&heap("")).expect("a scenario");
         let pairs = compiled.too_close.len();
         assert!(pairs > 50, "{pairs}");
-        let contents_text = contents(&compiled).text;
+        let contents_text = describe_scenario(&compiled).text;
         let words = contents_text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(words.matches("too close for the shield").count(), 1, "{contents_text}");
         assert!(words.contains(&format!(", and {} more", pairs - 5)), "{contents_text}");
@@ -306,7 +310,7 @@ mod tests {
         let source = heap("shield = \"off\"");
         let compiled = CompiledAirspace::new(&source).expect("a scenario");
         assert_eq!(compiled.too_close, []);
-        assert!(!contents(&compiled).text.contains("too close"));
+        assert!(!describe_scenario(&compiled).text.contains("too close"));
         let mut run = compiled.start(&source, 1);
         run.advance(3);
         assert_eq!(run.metrics().too_close, []);

@@ -7,16 +7,16 @@ use crate::decide::ManeuverCandidates;
 use crate::events::Event;
 use crate::flight::{Action, KnownAircraft};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::pilot::{Control, Maneuver, OwnshipState};
+use crate::pilot::{AirplaneControl, Maneuver, OwnshipState};
 use crate::shield::{OrbitSide, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{EntityId, Slot};
+use sidestep_kernel::{EntityId, EntitySlot};
 
 /// Records for an inspection; no run makes any.
 #[derive(Debug, Default)]
 pub(crate) struct InspectionTrace {
     /// The airplane that is inspected.
-    pub(crate) slot: Slot,
+    pub(crate) slot: EntitySlot,
     /// The airplanes of its group that the method flies, as all see them.
     pub(crate) group: Vec<KnownAircraft>,
     /// The non-cooperative ones of the group.
@@ -53,7 +53,7 @@ pub(crate) struct GroupDecisions<'a> {
     pub(crate) own: &'a [OwnshipState],
     pub(crate) non_cooperative: &'a [NonCooperativeAircraft],
     /// `None` for an airplane whose pilot has not decided in time.
-    pub(crate) controls: &'a [Option<Control>],
+    pub(crate) controls: &'a [Option<AirplaneControl>],
     pub(crate) considered: &'a [ManeuverCandidates],
 }
 
@@ -61,17 +61,17 @@ impl InspectionTrace {
     /// Records the knowledge, the considerations and the decisions of a group.
     pub(crate) fn record_decisions(&mut self, world: &AirspaceWorld, decided: &GroupDecisions<'_>) {
         let &GroupDecisions { own, non_cooperative, controls, considered } = decided;
-        let Some(me) = self.place(own.iter().map(|own| own.id)) else { return };
-        self.group = own.iter().map(OwnshipState::known_aircraft).collect();
+        let Some(me) = self.place_in_group(own.iter().map(|own| own.id)) else { return };
+        self.group = own.iter().map(OwnshipState::as_known_aircraft).collect();
         self.non_cooperative = non_cooperative.to_vec();
         let candidates = considered[me].clone();
         self.actions = candidates.actions;
         self.profiles = candidates.profiles;
         self.choice = candidates.decided;
         for control in controls.iter().flatten() {
-            self.beacons.merge_participant(control.grouping);
-            self.optimization.merge_participant(control.deciding);
-            self.exchange.merge_participant(control.shielding);
+            self.beacons.add_participant_counts(control.grouping);
+            self.optimization.add_participant_counts(control.deciding);
+            self.exchange.add_participant_counts(control.shielding);
         }
         if world.shield {
             let group: Vec<ShieldedAircraft> =
@@ -79,7 +79,7 @@ impl InspectionTrace {
             let mut decisions = Vec::with_capacity(group.len());
             for (aircraft, control) in group.iter().zip(controls) {
                 let maneuver = control.as_ref().map_or(&Maneuver::Orbit, |one| &one.maneuver);
-                decisions.push(maneuver.shield_decision(aircraft.fallback));
+                decisions.push(maneuver.to_shield_decision(aircraft.fallback));
             }
             self.aircraft = Some(group[me].clone());
             self.decision = Some(decisions[me]);
@@ -94,13 +94,13 @@ impl InspectionTrace {
     }
 
     /// Returns its place in a group; `None` in one of others.
-    fn place(&self, mut group: impl Iterator<Item = Slot>) -> Option<usize> {
+    fn place_in_group(&self, mut group: impl Iterator<Item = EntitySlot>) -> Option<usize> {
         group.position(|slot| slot == self.slot)
     }
 
     /// Returns the part of it among those of its group.
     pub(crate) fn own_part<'a, T>(&self, of_all: &'a [T]) -> Option<&'a T> {
-        of_all.get(self.place(self.group.iter().map(|known| known.slot))?)
+        of_all.get(self.place_in_group(self.group.iter().map(|known| known.slot))?)
     }
 }
 

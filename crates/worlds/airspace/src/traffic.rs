@@ -17,7 +17,7 @@ mod import_settings;
 
 use super::flight::{Point, SeparationMinima};
 use super::flight_plan::CLIMB_M_S;
-use import_settings::{ImportSettings, import_settings};
+use import_settings::{ImportedScenarioSettings, import_settings};
 use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_import::traffic::{RecordedTraffic, Track};
@@ -45,9 +45,9 @@ const MIN_SPEED_M_S: f64 = 1.0;
 /// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let traffic = &file.traffic;
-    let rules = &bluesky_settings(name, file);
-    let aircraft: Vec<MovingAircraft> =
-        traffic.aircraft.iter().filter_map(moving_aircraft).collect();
+    let rules = &settings_from_bluesky(name, file);
+    let aircraft: Vec<FlyableScnAircraft> =
+        traffic.aircraft.iter().filter_map(flyable_aircraft).collect();
     let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
     let zone = SeparationMinima {
         gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
@@ -63,9 +63,9 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
 
 /// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
 /// fly among them.
-pub(crate) fn bluesky_settings(place: &str, file: &ScnFile) -> ImportSettings {
+pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScenarioSettings {
     let mut rules = import_settings(place, file, DT_S);
-    let never_moving = file.traffic.aircraft.iter().filter(|one| moving_aircraft(one).is_none());
+    let never_moving = file.traffic.aircraft.iter().filter(|one| flyable_aircraft(one).is_none());
     for ScnAircraft { id, .. } in never_moving {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
         let error =
@@ -77,13 +77,13 @@ pub(crate) fn bluesky_settings(place: &str, file: &ScnFile) -> ImportSettings {
 
 /// An aircraft from the time when it starts to move.
 #[derive(Debug, Clone, PartialEq)]
-struct MovingAircraft(ScnAircraft);
+struct FlyableScnAircraft(ScnAircraft);
 
-impl MovingAircraft {
+impl FlyableScnAircraft {
     /// Returns the smallest speed that it has or is given.
     fn min_speed_m_s(&self) -> f64 {
         let mut min_m_s = self.0.speed.true_airspeed_mps(self.0.altitude_ft);
-        for (_, command) in change_commands(&self.0, false) {
+        for (_, command) in commands_from_changes(&self.0, false) {
             if let FlightCommand::Speed(v_m_s) = command {
                 min_m_s = min_m_s.min(v_m_s);
             }
@@ -94,10 +94,10 @@ impl MovingAircraft {
 
 /// Returns an aircraft as it is when it gets a speed: at its creation, or later, then with the
 /// heading and level that it was given until then. `None` for one that never gets a speed.
-fn moving_aircraft(aircraft: &ScnAircraft) -> Option<MovingAircraft> {
+fn flyable_aircraft(aircraft: &ScnAircraft) -> Option<FlyableScnAircraft> {
     let mut one = aircraft.clone();
     if is_flying_speed(one.speed, one.altitude_ft) {
-        return Some(MovingAircraft(one));
+        return Some(FlyableScnAircraft(one));
     }
     for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
         match change {
@@ -110,7 +110,7 @@ fn moving_aircraft(aircraft: &ScnAircraft) -> Option<MovingAircraft> {
                 return one
                     .deleted_s
                     .is_none_or(|end_s| end_s > at_s)
-                    .then_some(MovingAircraft(one));
+                    .then_some(FlyableScnAircraft(one));
             }
             _ => {}
         }
@@ -138,7 +138,7 @@ fn callsign(name: &str) -> String {
 }
 
 /// Returns the settings of a scenario that follow from rules.
-fn settings_text(rules: &ImportSettings) -> String {
+fn settings_text(rules: &ImportedScenarioSettings) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     if let Some(method) = rules.method {
@@ -252,14 +252,14 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
 /// Returns the commands to an aircraft in flight, by rising time.
 fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
     let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
-    let mut routed_s: Vec<f64> = route_times_s(aircraft);
+    let mut routed_s: Vec<f64> = route_command_times_s(aircraft);
     if has_route && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + DT_S) {
         orders.push((aircraft.created_s, FlightCommand::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
     // An aircraft that gets a way-point flies there, regardless of earlier headings.
     orders.extend(routed_s.into_iter().map(|at_s| (at_s, FlightCommand::Proceed)));
-    orders.extend(change_commands(aircraft, has_route));
+    orders.extend(commands_from_changes(aircraft, has_route));
     orders.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut keeps_heading = false;
     // Proceeding changes nothing for an airplane that is already doing so.
@@ -281,7 +281,7 @@ fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightC
 }
 
 /// Returns the times of an aircraft's commands about where to go, rising.
-fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
+fn route_command_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     let known = aircraft.way_points.iter().filter(|p| p.place.position().is_some());
     let destination = aircraft.destination.as_ref().filter(|place| place.position().is_some());
     let destination_s = destination.and(aircraft.destination_s);
@@ -290,7 +290,7 @@ fn route_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     all
 }
 
-fn change_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
+fn commands_from_changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
     let mut altitude_ft = aircraft.altitude_ft;
     let mut climb_m_s = CLIMB_M_S;
     let mut commands: Vec<(f64, FlightCommand)> = Vec::new();
@@ -334,7 +334,8 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
                   replay_until_s = inf\n";
     let more = format!("{replay}start_utc_s = {start_s:?}\n{}", origin(&plane));
     let mut text = header_text(name, ZONE, None, &more);
-    let tracks: Vec<&Track> = traffic.tracks.iter().filter(|track| has_length(track)).collect();
+    let tracks: Vec<&Track> =
+        traffic.tracks.iter().filter(|track| has_enough_samples(track)).collect();
     for track in &tracks {
         write_track(&mut text, track, &plane, start_s);
     }
@@ -342,7 +343,7 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
 }
 
 /// Returns whether a track has the two samples that it needs at least to lead anywhere.
-pub fn has_length(track: &Track) -> bool {
+pub fn has_enough_samples(track: &Track) -> bool {
     track.samples.len() >= 2
 }
 
@@ -404,7 +405,7 @@ mod tests {
         );
         let text = from_bluesky("two", &file).expect("it has aircraft");
         let mut run = airspace_run(&Source::new("two", text, ""), 1).expect("valid");
-        assert_eq!(run.agents(), 3);
+        assert_eq!(run.agent_count(), 3);
         run.advance(200);
         let metrics = run.metrics();
         assert_eq!(metrics.losses_of_separation, 0);
@@ -431,7 +432,7 @@ mod tests {
             let compiled = compiled(&format!("{flights}{settings}"));
             assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
             assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
-            let contents = crate::text::contents(&compiled).text;
+            let contents = crate::text::describe_scenario(&compiled).text;
             assert!(
                 contents.contains(&format!("decides every 10 s, looks {s} s ahead")),
                 "{contents}"
@@ -470,7 +471,7 @@ mod tests {
         let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
         let compiled = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario");
-        let contents = crate::text::contents(&compiled).text;
+        let contents = crate::text::describe_scenario(&compiled).text;
         assert!(contents.contains("looks 45 s ahead"), "{contents}");
     }
 
@@ -483,7 +484,7 @@ mod tests {
              00:00:00.00>CRE B2,B744,1,0.4,270,FL200,250\n\
              00:00:00.00>CRE C3,B744,2,0.4,270,FL200,0\n",
         );
-        let rules = bluesky_settings("late.scn", &file);
+        let rules = settings_from_bluesky("late.scn", &file);
         let [stands] = &rules.refused[..] else { panic!("{:?}", rules.refused) };
         assert!(stands.cause().contains("C3 is never given a speed"), "{stands}");
         let text = from_bluesky("late", &file).expect("two fly");

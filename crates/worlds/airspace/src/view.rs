@@ -6,10 +6,10 @@ use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use crate::kinds;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
+    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
     Quantity, Scenery, Severity, Shape,
 };
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// Length of a drawn airplane, as a fraction of its zone's radius: large enough to be seen, and small
 /// enough that airplanes with touching zones are drawn apart.
@@ -42,12 +42,12 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         cycle_s: world.timing.dt_s,
         floor: None,
         bodies,
-        names: names(world),
+        names: body_names(world),
     }
 }
 
 /// Returns the call signs as names of bodies; an airplane without one has no name.
-fn names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
+fn body_names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
     (0..)
         .zip(world.airplanes.iter())
         .filter_map(|(id, airplane)| Some((kinds::AIRPLANE, id, airplane.callsign.clone()?)))
@@ -80,12 +80,12 @@ fn is_single_level_world(world: &AirspaceWorld) -> bool {
 }
 
 /// Returns half the separation in meters: airplanes are apart when their zones do not meet.
-fn zone_radius_m(world: &AirspaceWorld, slot: Slot) -> f64 {
+fn zone_radius_m(world: &AirspaceWorld, slot: EntitySlot) -> f64 {
     0.5 * world.airplanes[slot as usize].model.separation_m
 }
 
 /// Returns the disc that stands for an airplane's zone.
-fn zone_shape(world: &AirspaceWorld, slot: Slot) -> Shape {
+fn zone_shape(world: &AirspaceWorld, slot: EntitySlot) -> Shape {
     let radius_m = zone_radius_m(world, slot);
     Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m }
 }
@@ -96,17 +96,17 @@ pub(super) fn visible_bodies(
     state: &AirspaceState,
     now: Cycle,
 ) -> Vec<Body> {
-    let ids = 0..world.airplanes.len() as Slot;
-    let active: Vec<Slot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
-    let too_near = too_close(world, state, &active);
+    let ids = 0..world.airplanes.len() as EntitySlot;
+    let active: Vec<EntitySlot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
+    let too_near = too_close_aircraft(world, state, &active);
     active.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
 }
 
 fn airplane_and_zone(
     world: &AirspaceWorld,
     state: &AirspaceState,
-    id: Slot,
-    too_near: &[Slot],
+    id: EntitySlot,
+    too_near: &[EntitySlot],
 ) -> [Body; 2] {
     let current = &state.airplanes[id as usize];
     let [x_m, y_m] = current.pose().at;
@@ -117,15 +117,21 @@ fn airplane_and_zone(
         Body::new(kinds::AIRPLANE, id, pose, dart),
         Body::new(kinds::ZONE, id, pose, zone_shape(world, id)),
     ];
-    bodies.map(|body| body.with_state_if(too_near.binary_search(&id).is_ok(), Condition::Touching))
+    bodies.map(|body| {
+        body.with_condition_if(too_near.binary_search(&id).is_ok(), BodyCondition::Touching)
+    })
 }
 
 /// Returns the airplanes that are nearer to another than allowed, by id.
-fn too_close(world: &AirspaceWorld, state: &AirspaceState, active: &[Slot]) -> Vec<Slot> {
-    let at = |slot: Slot| state.airplanes[slot as usize].pose().at;
+fn too_close_aircraft(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    active: &[EntitySlot],
+) -> Vec<EntitySlot> {
+    let at = |slot: EntitySlot| state.airplanes[slot as usize].pose().at;
     let max_gap_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
     // Sorted from west to east, so that only neighbors have to be compared.
-    let mut by_x: Vec<(Point, Slot)> = active.iter().map(|&slot| (at(slot), slot)).collect();
+    let mut by_x: Vec<(Point, EntitySlot)> = active.iter().map(|&slot| (at(slot), slot)).collect();
     by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
     let mut near = Vec::new();
     for (k, &(p, a)) in by_x.iter().enumerate() {
@@ -142,14 +148,19 @@ fn too_close(world: &AirspaceWorld, state: &AirspaceState, active: &[Slot]) -> V
     near
 }
 
-fn are_on_one_level(world: &AirspaceWorld, state: &AirspaceState, a: Slot, b: Slot) -> bool {
+fn are_on_one_level(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    a: EntitySlot,
+    b: EntitySlot,
+) -> bool {
     let altitude_a_m = state.airplanes[a as usize].altitude_m.get();
     let altitude_b_m = state.airplanes[b as usize].altitude_m.get();
     (altitude_a_m - altitude_b_m).abs() < world.vertical_m
 }
 
 /// Returns an event in words.
-pub(super) fn log_event(event: &Event) -> LogEvent {
+pub(super) fn to_log_event(event: &Event) -> LogEvent {
     let value = event.value;
     let other = event.other;
     let (level, words) = match event.kind {
@@ -187,7 +198,7 @@ pub(super) fn log_event(event: &Event) -> LogEvent {
         who: airplane(event.airplane),
         with: event.other_airplane().map(airplane),
         at_m: event.at_m,
-        value: event.kind.value_quantity().map(|measure| Quantity::new(value, measure.unit())),
+        value: event.kind.measured_quantity().map(|measure| Quantity::new(value, measure.unit())),
         words,
     }
 }

@@ -5,29 +5,29 @@ mod solo_flight;
 mod tests;
 
 use super::flight::{
-    Action, Air, Airplane, DetourLegs, FlightLevelRange, FlightSegment, FlightTask, KnownAircraft,
-    Point, RoutePosition, SegmentAfterOrder, StepTiming, Track, WaypointRule, actions,
-    segments_after_orders,
+    Action, AirplaneConfig, DetourLegs, FlightEnvironment, FlightLevelRange, FlightTask,
+    InterOrderSegment, KnownAircraft, Point, RoutePosition, SegmentAfterOrder, TimeDiscretization,
+    Track, WaypointRule, actions, segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
-use super::shield::{ErrorBounds, OrbitSide, common_rates};
+use super::shield::{ErrorBounds, OrbitSide, common_orbit_rates};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
-use sidestep_kernel::control::Teams;
+use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use std::sync::Arc;
 
 /// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
 pub struct AirspaceWorld {
     /// The airplanes by id.
-    pub airplanes: Arc<Vec<Airplane>>,
+    pub airplanes: Arc<Vec<AirplaneConfig>>,
     /// Lengths of a cycle, of the steps in it, and of the horizon.
-    pub timing: StepTiming,
+    pub timing: TimeDiscretization,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The objective that is minimized.
@@ -87,7 +87,7 @@ pub struct AirspaceWorld {
     /// Sides of the first fallbacks.
     pub(crate) first_fallbacks: Arc<Vec<OrbitSide>>,
     /// The airplanes that decide, by the orders that they may be given.
-    pub(crate) teams: Arc<Teams>,
+    pub(crate) teams: Arc<AgentTeams>,
 }
 
 impl AirspaceWorld {
@@ -123,21 +123,21 @@ impl AirspaceWorld {
                     .collect(),
             );
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
-            self.top_m_s = Arc::new(self.per_airplane(Self::max_speed_m_s));
+            self.top_m_s = Arc::new(self.map_airplanes(Self::max_speed_m_s));
         }
-        self.alone_s = Arc::new(self.per_airplane(Self::solo_s));
+        self.alone_s = Arc::new(self.map_airplanes(Self::solo_s));
         self
     }
 
     /// Returns a number of each airplane.
-    fn per_airplane(&self, number: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
+    fn map_airplanes(&self, number: impl Fn(&Self, usize) -> f64) -> Vec<f64> {
         (0..self.airplanes.len()).map(|i| number(self, i)).collect()
     }
 
     /// Returns the turn rates at which airplanes orbit under the shield.
     fn orbits_rad_s(&self) -> Vec<f64> {
         let mut rates: Vec<f64> = Vec::with_capacity(self.airplanes.len());
-        for Airplane { model, .. } in &*self.airplanes {
+        for AirplaneConfig { model, .. } in &*self.airplanes {
             let max_rad_s = self.bounds.max_orbit_rate_rad_s(model, self.timing.dt_s);
             rates.push(max_rad_s.filter(|_| self.shield).unwrap_or(model.omega_max_rad_s));
         }
@@ -145,7 +145,7 @@ impl AirspaceWorld {
         let orbiting: Vec<usize> =
             (0..rates.len()).filter(|&i| self.shield && self.is_controlled(i)).collect();
         let max_rates: Vec<f64> = orbiting.iter().map(|&i| rates[i]).collect();
-        for (&i, rate) in orbiting.iter().zip(common_rates(&max_rates)) {
+        for (&i, rate) in orbiting.iter().zip(common_orbit_rates(&max_rates)) {
             rates[i] = rate;
         }
         rates
@@ -167,8 +167,8 @@ impl AirspaceWorld {
     }
 
     /// Returns the properties of the air, which are the same for all airplanes.
-    pub fn air(&self) -> Air {
-        Air { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
+    pub fn flight_environment(&self) -> FlightEnvironment {
+        FlightEnvironment { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
     }
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of
@@ -189,7 +189,7 @@ impl AirspaceWorld {
     }
 
     /// Returns whether airplanes remember the conflicts that they resolve.
-    pub(crate) fn has_resolutions(&self) -> bool {
+    pub(crate) fn has_resolution_memory(&self) -> bool {
         matches!(self.method, MethodKind::Mvp)
     }
 
@@ -199,7 +199,7 @@ impl AirspaceWorld {
     }
 
     /// Returns the cycle in which an airplane appears: at the start of the cycle, or within it on a recorded track.
-    pub fn first_cycle(&self, i: usize) -> Cycle {
+    pub fn appearance_cycle(&self, i: usize) -> Cycle {
         let airplane = &self.airplanes[i];
         let cycles = airplane.appears_s / self.timing.dt_s;
         let is_on_track = airplane.track.is_some()
@@ -210,27 +210,27 @@ impl AirspaceWorld {
     /// Returns the cycle from which the method flies an airplane.
     pub fn first_controlled_cycle(&self, i: usize) -> Cycle {
         let recorded = match &self.airplanes[i] {
-            Airplane { track: None, .. } => 0,
-            Airplane { is_non_cooperative: true, .. } => Cycle::MAX,
+            AirplaneConfig { track: None, .. } => 0,
+            AirplaneConfig { is_non_cooperative: true, .. } => Cycle::MAX,
             _ => self.replay_cycles,
         };
-        self.first_cycle(i).max(recorded)
+        self.appearance_cycle(i).max(recorded)
     }
 
     /// Returns whether an airplane is non-cooperative in a cycle: it follows its track, or the scenario says so.
     /// It avoids nobody, and all that the method flies avoid it.
-    pub fn is_non_cooperative(&self, slot: Slot, now: Cycle) -> bool {
+    pub fn is_non_cooperative(&self, slot: EntitySlot, now: Cycle) -> bool {
         self.airplanes[slot as usize].is_non_cooperative || self.is_replayed(slot, now)
     }
 
     /// Returns whether the method ever flies an airplane, unless its track ends before.
     pub(crate) fn is_controlled(&self, i: usize) -> bool {
         // An airplane that is never cooperative never decides, and never orbits.
-        !self.is_non_cooperative(i as Slot, Cycle::MAX - 1)
+        !self.is_non_cooperative(i as EntitySlot, Cycle::MAX - 1)
     }
 
     /// Returns whether an airplane follows its track in a cycle.
-    pub fn is_replayed(&self, slot: Slot, now: Cycle) -> bool {
+    pub fn is_replayed(&self, slot: EntitySlot, now: Cycle) -> bool {
         self.airplanes[slot as usize].track.is_some()
             && now < self.first_controlled_cycle(slot as usize)
     }
@@ -272,19 +272,20 @@ impl AirspaceWorld {
     }
 
     /// Returns the stage of an airplane that has carried out this number of orders.
-    pub(crate) fn segment(&self, slot: Slot, orders: u32) -> FlightSegment<'_> {
+    pub(crate) fn segment(&self, slot: EntitySlot, orders: u32) -> InterOrderSegment<'_> {
         match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
             Some(later) => later.segment(),
             None => {
-                let Airplane { model, mission, altitude_m, .. } = &self.airplanes[slot as usize];
-                FlightSegment { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
+                let AirplaneConfig { model, mission, altitude_m, .. } =
+                    &self.airplanes[slot as usize];
+                InterOrderSegment { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
             }
         }
     }
 
     /// Returns the orders and way-points done with after those that are due at a time, if none
     /// waits.
-    pub(crate) fn after_orders(
+    pub(crate) fn progress_after_orders(
         &self,
         slot: usize,
         orders: u32,
@@ -301,7 +302,7 @@ impl AirspaceWorld {
     }
 
     /// Returns the actions of an airplane, for others that know its model.
-    pub(crate) fn actions(&self, slot: Slot) -> &[Action] {
+    pub(crate) fn actions(&self, slot: EntitySlot) -> &[Action] {
         &self.actions[slot as usize]
     }
 
@@ -319,10 +320,10 @@ impl AirspaceWorld {
         known: KnownAircraft,
         non_cooperative: &[NonCooperativeAircraft],
     ) -> ActionPredictions {
-        let FlightSegment { model, mission, .. } = self.segment(known.slot, known.orders);
+        let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.actions(known.slot);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
-        let predictions = self.air().predictions(model, actions, route);
+        let predictions = self.flight_environment().predictions(model, actions, route);
         ActionPredictions::new(predictions, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
     }

@@ -11,15 +11,15 @@ use super::world::AirspaceWorld;
 use super::{text, view};
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
-use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
+use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
+use sidestep_kernel::text::{KeyValues, StateReport};
 use sidestep_kernel::view::{
     BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
-    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, World,
-    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
+    Run, RunConfig, RunSetup, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -41,11 +41,11 @@ impl CompiledAirspace {
     pub fn start(self, source: &Source, workers: usize) -> AirspaceRun {
         let state = AirspaceState::restore(&self.world, &self.start_snapshot());
         let mut counters = Counters::default();
-        self.too_close.iter().for_each(|&pair| counters.add_too_close(0, pair));
+        self.too_close.iter().for_each(|&pair| counters.add_too_close_pair(0, pair));
         let collector =
             Collector { counters, rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunStart { config: plan, state, collector };
+        let start = RunSetup { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -90,7 +90,7 @@ impl World for AirspaceWorld {
 
     type Collector = Collector;
 
-    fn agents(&self) -> usize {
+    fn agent_count(&self) -> usize {
         self.airplanes.len()
     }
 
@@ -110,7 +110,7 @@ impl World for AirspaceWorld {
         counters.effort.beacons.add(std::mem::take(&mut scratch.grouped));
         counters.effort.traffic.add(std::mem::take(&mut scratch.exchanged));
         for (now, a, b) in std::mem::take(&mut scratch.too_close) {
-            counters.add_too_close(now, (a, b));
+            counters.add_too_close_pair(now, (a, b));
         }
         collector.decide_ns += std::mem::take(&mut scratch.decide_ns);
         collector.pending.events.append(&mut scratch.events);
@@ -118,7 +118,7 @@ impl World for AirspaceWorld {
         collector.pending.flown.append(&mut scratch.flown);
     }
 
-    fn commit(&self, collector: &mut Collector) {
+    fn commit_results(&self, collector: &mut Collector) {
         let WorkerRows { mut events, mut optimizations, mut flown } =
             std::mem::take(&mut collector.pending);
         // Stable, because a pair may lose separation more than once in a cycle.
@@ -126,7 +126,7 @@ impl World for AirspaceWorld {
         optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
         // Stable, because an airplane may fly several legs in a cycle.
         flown.sort_by_key(FlownLeg::key);
-        flown.into_iter().for_each(|leg| collector.rows.push_leg(leg));
+        flown.into_iter().for_each(|leg| collector.rows.push_flown_leg(leg));
         for event in events {
             collector.counters.add_event(&event);
             collector.log.push(event);
@@ -139,7 +139,7 @@ impl World for AirspaceWorld {
     }
 }
 
-impl WorldRecording for AirspaceWorld {
+impl RecordableWorld for AirspaceWorld {
     fn start_recording(&self, _: &mut AirspaceState, collector: &mut Collector, _: Cycle) {
         collector.rows.start(self);
     }
@@ -167,7 +167,7 @@ impl WorldRecording for AirspaceWorld {
     }
 }
 
-impl WorldCheckpoint for AirspaceWorld {
+impl CheckpointableWorld for AirspaceWorld {
     type Snapshot = (Snapshot, Counters);
 
     fn digest(&self, state: &AirspaceState, now: Cycle) -> Digest {
@@ -216,7 +216,7 @@ impl WorldView for AirspaceWorld {
             bodies: view::visible_bodies(self, state, now),
             scans: Vec::new(),
             odometry: Vec::new(),
-            log: events.iter().map(view::log_event).collect(),
+            log: events.iter().map(view::to_log_event).collect(),
             log_left_out,
         }
     }
@@ -232,8 +232,8 @@ impl WorldView for AirspaceWorld {
     }
 }
 
-impl WorldControl for AirspaceWorld {
-    fn teams(&self) -> Arc<Teams> {
+impl ControllableWorld for AirspaceWorld {
+    fn agent_teams(&self) -> Arc<AgentTeams> {
         self.teams.clone()
     }
 
@@ -255,7 +255,7 @@ impl WorldControl for AirspaceWorld {
     }
 
     fn records_controls(&self, collector: &Collector) -> bool {
-        collector.rows.has_controls()
+        collector.rows.is_recording_controls()
     }
 
     fn observe(
@@ -297,7 +297,7 @@ impl WorldMetrics for AirspaceWorld {
         text::outcome(metrics)
     }
 
-    fn poses(&self, state: &AirspaceState, now: Cycle) -> StateDescription {
+    fn poses(&self, state: &AirspaceState, now: Cycle) -> StateReport {
         text::poses(&state.snapshot(now))
     }
 }

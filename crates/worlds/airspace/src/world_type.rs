@@ -3,7 +3,7 @@
 use super::method::{Method, Methods};
 use super::scenario::CompiledAirspace;
 use super::{AirspaceWorld, bundle, import, text};
-use sidestep_kernel::text::StateDescription;
+use sidestep_kernel::text::StateReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
@@ -76,7 +76,7 @@ impl WorldType for Airspace {
         super::facts::editing_tools()
     }
 
-    fn translate(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    fn import_scenario(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
         import::import_file(file)
     }
 
@@ -98,8 +98,8 @@ impl AnyCompiled for CompiledAirspace {
         self.world.airplanes.len()
     }
 
-    fn contents(&self, _: &Source) -> StateDescription {
-        text::contents(self)
+    fn contents(&self, _: &Source) -> StateReport {
+        text::describe_scenario(self)
     }
 
     fn seed_effect(&self) -> SeedEffect {

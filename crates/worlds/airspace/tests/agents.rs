@@ -2,7 +2,7 @@
 //! decide as one process does for all.
 
 use sidestep_airspace::agents::traffic_state::TrafficPicture;
-use sidestep_airspace::pilot::{Control, Percept, Pilot};
+use sidestep_airspace::pilot::{AirplaneControl, Percept, Pilot};
 use sidestep_airspace::world::AirspaceWorld;
 use sidestep_airspace::{RemotePilotRun, airspace_run};
 use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
@@ -26,7 +26,7 @@ fn fly(
     mut pilot: Pilot,
     told: Receiver<PilotMessage>,
     others: Vec<Sender<PilotMessage>>,
-    done: Sender<Control>,
+    done: Sender<AirplaneControl>,
 ) {
     let mut is_told = true;
     for message in told {

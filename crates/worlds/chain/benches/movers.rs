@@ -119,7 +119,7 @@ fn reflect(obstacles: &mut Obstacles<2>) {
             }
         }
     }
-    obstacles.set_moving(&discs).expect("discs are finite");
+    obstacles.replace_moving(&discs).expect("discs are finite");
 }
 
 /// Turns two discs away from each other if they come nearer than [`MIN_GAP_M`].
@@ -142,7 +142,7 @@ fn keep_apart(obstacles: &mut Obstacles<2>) {
             }
         }
     }
-    obstacles.set_moving(&discs).expect("discs are finite");
+    obstacles.replace_moving(&discs).expect("discs are finite");
 }
 
 fn center(disc: &Obstacle<2>) -> Point<2> {
@@ -195,7 +195,7 @@ fn run(cell: &Cell, seed: u64, tally: &mut Tally) -> Result<(), InputError> {
             let came = propagator.propagate(
                 &mut chain,
                 &obstacles,
-                &MotionRequest::operator_request(0, to),
+                &MotionRequest::from_operator(0, to),
             )?;
             tally.steps += 1;
             if let MotionOutcome::Vetoed(_) = came {

@@ -26,28 +26,32 @@ pub(crate) fn resolve_scenario<const D: usize>(
     let file: Value = source.parse()?;
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
     // Scripts and arms are keys of chains alone.
-    add_plain(&mut bundle, &file["chains"], "chains")?;
+    add_files_under_key(&mut bundle, &file["chains"], "chains")?;
     if let Some(path) = file["ground"]["map"].as_str() {
-        add_map(&mut bundle, &rosmap::load(&source.path(Path::new(path)))?);
+        add_map_files(&mut bundle, &rosmap::load(&source.path(Path::new(path)))?);
     }
     if let Some(path) = file["ground"]["stage"].as_str() {
-        add_stage(&mut bundle, &stage::load(&source.path(Path::new(path)))?);
+        add_stage_world(&mut bundle, &stage::load(&source.path(Path::new(path)))?);
     }
     bundle.finish()
 }
 
 /// Adds all files that are named under a key.
-fn add_plain(bundle: &mut Bundle<'_>, value: &Value, key: &str) -> Result<(), InputError> {
+fn add_files_under_key(
+    bundle: &mut Bundle<'_>,
+    value: &Value,
+    key: &str,
+) -> Result<(), InputError> {
     match value {
         Value::Array(items) => items
             .iter()
             .enumerate()
-            .try_for_each(|(k, item)| add_plain(bundle, item, &format!("{key}.{k}"))),
+            .try_for_each(|(k, item)| add_files_under_key(bundle, item, &format!("{key}.{k}"))),
         Value::Object(table) => table.iter().try_for_each(|(name, item)| {
             let key = format!("{key}.{name}");
             match item.as_str().filter(|_| PLAIN_FILE_KEYS.contains(&name.as_str())) {
                 Some(path) => copy_into_bundle(bundle, &key, path),
-                None => add_plain(bundle, item, &key),
+                None => add_files_under_key(bundle, item, &key),
             }
         }),
         _ => Ok(()),
@@ -62,7 +66,7 @@ fn copy_into_bundle(bundle: &mut Bundle<'_>, key: &str, path: &str) -> Result<()
     Ok(())
 }
 
-fn add_map(bundle: &mut Bundle<'_>, map: &PixelMap) {
+fn add_map_files(bundle: &mut Bundle<'_>, map: &PixelMap) {
     let size = [map.width(), map.height()];
     let [yaml, image] = map_files(size, map.resolution_m(), map.plane(), map.pixels());
     let path = bundle.add(yaml.0, yaml.1);
@@ -70,11 +74,11 @@ fn add_map(bundle: &mut Bundle<'_>, map: &PixelMap) {
     bundle.set("ground.map", format_args!("{path:?}"));
 }
 
-fn add_stage(bundle: &mut Bundle<'_>, world: &stage::World) {
+fn add_stage_world(bundle: &mut Bundle<'_>, world: &stage::World) {
     let mut text = String::from("# The world as the simulation saw it.\n");
     for (k, plan) in world.floor_plans.iter().enumerate() {
         let bitmap = format!("floor-{k}.pgm");
-        text.push_str(&floor_plan_text(plan, &bitmap));
+        text.push_str(&stage_model_text(plan, &bitmap));
         // Black marks solid pixels.
         let grays = plan.solid.iter().map(|solid| if *solid { 0 } else { 255 });
         bundle.add(&bitmap, pgm(plan.width, plan.height, grays));
@@ -89,7 +93,7 @@ fn pose_text(pose: &Pose2) -> String {
     format!("[{:?} {:?} 0.0 {:?}]", pose.x_m, pose.y_m, pose.yaw_rad.to_degrees())
 }
 
-fn floor_plan_text(plan: &FloorPlan, bitmap: &str) -> String {
+fn stage_model_text(plan: &FloorPlan, bitmap: &str) -> String {
     let [width_m, height_m] = plan.size_m;
     format!(
         "model\n(\n  bitmap \"{bitmap}\"\n  size [{width_m:?} {height_m:?} 1.0]\n  pose {}\n  \

@@ -4,15 +4,19 @@
 use super::perceive::Perceiver;
 use super::state::ChainBodyState;
 use super::world::{ChainSpec, ChainWorld};
-use sidestep_kernel::{Cycle, PhaseContext, Slot};
-use sidestep_rods::geometry::{Aabb, with_dimensions};
+use sidestep_kernel::{Cycle, EntitySlot, PhaseContext};
+use sidestep_rods::geometry::{Aabb, convert_dimensions};
 
 /// Claims the box of one chain, and keeps its navigator's decision, which is made before anything
 /// moves.
-pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
+pub(crate) fn claim_box_and_decide<const D: usize>(
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
+    slot: usize,
+) {
     claim_box(phase, slot);
     let &mut PhaseContext { world, state, now, .. } = phase;
-    let decision = Perceiver { world, state, now, scratch: phase.scratch }.decide(slot as Slot);
+    let decision =
+        Perceiver { world, state, now, scratch: phase.scratch }.decide(slot as EntitySlot);
     state.set_decision(slot, decision);
 }
 
@@ -20,13 +24,13 @@ pub(crate) fn claim<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>,
 pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
     let &mut PhaseContext { world, state, now, .. } = phase;
     // A chain alone is in no other's way, wherever it goes; and to read it would make a copy of it.
-    if !world.is_unobstructed() {
-        state.set_claim(slot, reach_box(world, &world.chains[slot], &state.body(slot), now));
+    if !world.is_collision_impossible() {
+        state.set_claim(slot, cycle_reach_box(world, &world.chains[slot], &state.body(slot), now));
     }
 }
 
 /// Returns the box that a chain may enter during one cycle; no part of the chain leaves that box.
-fn reach_box<const D: usize>(
+fn cycle_reach_box<const D: usize>(
     world: &ChainWorld<D>,
     spec: &ChainSpec<D>,
     body: &ChainBodyState<D>,
@@ -47,7 +51,7 @@ fn reach_box<const D: usize>(
         }
     };
     // Changes take effect in the cycle that follows the claim.
-    let thrown_m = spec.changes.iter().map(|change| change.max_throw_m(now)).fold(0.0, f64::max);
+    let thrown_m = spec.changes.iter().map(|change| change.max_scatter_m(now)).fold(0.0, f64::max);
     let gathering_m_s = body.scattered.as_ref().map_or(0.0, |scattered| scattered.speed_m_s);
     let changes = spec.changes.iter();
     let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
@@ -63,7 +67,7 @@ fn robots_reach_box<const D: usize>(
     dt_s: f64,
 ) -> Aabb<D> {
     let Some(robots) = &spec.robots else { return Aabb::empty() };
-    let reach_m = robots.follower.reach_m(dt_s);
-    let places = body.robots.iter().map(|robot| with_dimensions(robot.pose.at));
+    let reach_m = robots.follower.reach_within_m(dt_s);
+    let places = body.robots.iter().map(|robot| convert_dimensions(robot.pose.at));
     places.fold(Aabb::empty(), |all, at| all.joined(&Aabb::from_points(&[at]).grown(reach_m)))
 }

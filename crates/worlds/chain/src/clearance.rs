@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn gaps_are_told_of_each_connector_and_each_rod_with_the_way_to_what_is_there() {
-        let rod = Rod::fixed(2.0, 0.05);
+        let rod = Rod::with_fixed_length(2.0, 0.05);
         let chain = Chain::straight([0.0, 0.0], [1.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
         let disc = Obstacle::ball(0, [1.0, 0.5], 0.2);
         let wall = Obstacle::capsule(1, [[-0.5, -1.0], [-0.5, 1.0]], 0.0);

@@ -33,8 +33,8 @@ impl<const D: usize> DeferredMotions<D> {
     }
 
     /// Lets the chain follow all deferred motions, and adds their measures to the tally.
-    pub(crate) fn catch_up(&mut self, chain: &mut Chain<D>, tally: &mut ChainTally) {
-        let Some(measures) = self.motions.catch_up(chain) else { return };
+    pub(crate) fn apply_to_chain(&mut self, chain: &mut Chain<D>, tally: &mut ChainTally) {
+        let Some(measures) = self.motions.apply_to_chain(chain) else { return };
         tally.moved += measures.changed;
         tally.max_slave_step_m = tally.max_slave_step_m.max(measures.longest_m);
         tally.max_speed_m_s = tally.max_speed_m_s.max(measures.longest_m / self.dt_s);

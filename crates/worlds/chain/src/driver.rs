@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, InputError, math};
-use sidestep_rods::geometry::{Aabb, Point, normalized, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, convert_dimensions, normalized};
 use sidestep_rods::{RequestSource, VetoReason};
 use std::sync::Arc;
 
@@ -91,7 +91,7 @@ pub(crate) struct Targets<const D: usize> {
 }
 
 impl<const D: usize> Task<D> {
-    pub(crate) fn source(&self) -> RequestSource {
+    pub(crate) fn request_source(&self) -> RequestSource {
         // A script is obeyed to the letter; all others may find another way after a veto.
         match self.driver {
             TaskKind::Script(_) => RequestSource::Operator,
@@ -192,7 +192,7 @@ impl TaskProgress {
     }
 
     /// Goes on to the next motion or target.
-    pub fn advance_part(&mut self) {
+    pub fn start_next_subtask(&mut self) {
         self.next += 1;
         self.rested = 0;
         self.idle = 0;
@@ -212,7 +212,7 @@ impl TaskProgress {
     ///
     /// # Errors
     /// When the script contains an entry that is no motion, or too many motions.
-    pub fn motions(&self, script: &Script) -> Result<Vec<ScriptMotion>, InputError> {
+    pub fn script_motions(&self, script: &Script) -> Result<Vec<ScriptMotion>, InputError> {
         let motions = script.motions(self.start);
         let motions: Vec<ScriptMotion> = motions.take(MAX_MOTIONS + 1).collect::<Result<_, _>>()?;
         if motions.len() > MAX_MOTIONS {
@@ -228,12 +228,12 @@ fn initial_turtle<const D: usize>(agent: usize, points: &[Point<D>]) -> Turtle {
     let at = points[agent];
     let behind = if agent == 0 { points.get(1) } else { points.get(agent - 1) };
     let ahead = behind.and_then(|b| normalized(std::array::from_fn::<f64, D, _>(|i| at[i] - b[i])));
-    let ahead = ahead.map_or([1.0, 0.0, 0.0], with_dimensions);
+    let ahead = ahead.map_or([1.0, 0.0, 0.0], convert_dimensions);
     // Left is level: across the upward axis, or along y if the turtle faces straight up or down.
     let across = math::hypot(ahead[0], ahead[1]);
     let left =
         if across > 1e-9 { [-ahead[1] / across, ahead[0] / across, 0.0] } else { [0.0, 1.0, 0.0] };
-    Turtle { position_m: with_dimensions(at), ahead, left }
+    Turtle { position_m: convert_dimensions(at), ahead, left }
 }
 
 /// Returns the direction of a wandering initiator's next step.

@@ -5,10 +5,10 @@ use super::clearance::part_clearance;
 use super::driver::external::{OrderOutcome, Orders};
 use super::driver::{Task, TaskKind, VetoRecord};
 use super::scratch::Scratch;
-use super::state::{ChainBodyState, ChainState};
+use super::state::{ChainBodyState, ChainWorldState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
-use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use sidestep_rods::geometry::{Aabb as Box, Point, distance};
 use sidestep_rods::{MAX_COORDINATE_M, Obstacles, VetoReason, is_length_allowed};
 
@@ -21,7 +21,7 @@ const CAUSES: [&str; 3] = ["none", "obstacle", "chain"];
 
 impl<const D: usize> ChainSpec<D> {
     /// Returns whether some task of it takes orders.
-    fn is_external(&self) -> bool {
+    fn has_external_task(&self) -> bool {
         self.tasks.iter().any(takes_orders)
     }
 }
@@ -30,7 +30,7 @@ impl<const D: usize> ChainSpec<D> {
 fn is_same_team<const D: usize>(one: &ChainSpec<D>, other: &ChainSpec<D>) -> bool {
     one.name == other.name
         && one.start.points().len() == other.start.points().len()
-        && one.is_external() == other.is_external()
+        && one.has_external_task() == other.has_external_task()
 }
 
 fn takes_orders<const D: usize>(task: &Task<D>) -> bool {
@@ -39,7 +39,7 @@ fn takes_orders<const D: usize>(task: &Task<D>) -> bool {
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the teams: chains of one name and one number of connectors, that take orders or do not.
-    pub(super) fn find_teams(&self) -> Teams {
+    pub(super) fn find_teams(&self) -> AgentTeams {
         let mut alike: Vec<(&ChainSpec<D>, Vec<EntityId>)> = Vec::new();
         for (id, spec) in (0..).zip(self.chains.iter()) {
             // From the last team on: chains that are alike mostly come from one section.
@@ -49,51 +49,56 @@ impl<const D: usize> ChainWorld<D> {
             }
         }
         let teams = alike.into_iter().map(|(spec, agents)| self.team(spec, agents));
-        Teams::new(teams.collect(), CHAIN)
+        AgentTeams::new(teams.collect(), CHAIN)
     }
 
     /// Returns the team of chains like `spec`.
-    fn team(&self, spec: &ChainSpec<D>, agents: Vec<EntityId>) -> Team {
+    fn team(&self, spec: &ChainSpec<D>, agents: Vec<EntityId>) -> AgentTeam {
         let n = spec.start.points().len();
         let mut observation_spaces = self.observation_spaces(n);
         let mut action_spaces = Vec::new();
-        if spec.is_external() {
+        if spec.has_external_task() {
             observation_spaces.extend(order_result_spaces::<D>());
-            action_spaces = order_spaces::<D>(n);
+            action_spaces = order_action_spaces::<D>(n);
         }
         let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
-        Team { name, agents, observation_spaces, action_spaces }
+        AgentTeam { name, agents, observation_spaces, action_spaces }
     }
 
-    /// Returns the spaces of the perception of a chain of `n` connectors, in the order of [`Self::observe`].
-    fn observation_spaces(&self, n: usize) -> Vec<Space> {
+    /// Returns the spaces of the perception of a chain of `n` connectors, in the order of [`Self::write_observations`].
+    fn observation_spaces(&self, n: usize) -> Vec<ValueSpace> {
         let look_m = self.look_m;
-        let up_to_look = SpaceKind::Real { low: f64::NEG_INFINITY, high: look_m };
-        let part = SpaceKind::Integer { low: -1, high: n as i64 - 1 };
+        let up_to_look = ValueDomain::Real { low: f64::NEG_INFINITY, high: look_m };
+        let part = ValueDomain::Integer { low: -1, high: n as i64 - 1 };
         let reasons = std::iter::once("none").chain(VetoReason::ALL.iter().map(|r| r.name()));
         let gap = format!(
             "gap between each connector and the nearest obstacle or other chain, below 0 inside it; {look_m} \
              where nothing is as near"
         );
         vec![
-            Space::new("joints_m", coordinate_space(), "places of its connectors")
+            ValueSpace::new("joints_m", unbounded_real_space(), "places of its connectors")
                 .with_shape([n, D]),
-            Space::new("gap_m", up_to_look.clone(), gap).with_shape([n]),
-            Space::new(
+            ValueSpace::new("gap_m", up_to_look.clone(), gap).with_shape([n]),
+            ValueSpace::new(
                 "nearest_m",
-                coordinate_space(),
+                unbounded_real_space(),
                 "way from each connector's middle to the surface of that; 0 where nothing is near",
             )
             .with_shape([n, D]),
-            Space::new("rod_gap_m", up_to_look, "the same gap of each rod").with_shape([n - 1]),
-            Space::new("leads", part.clone(), "connector that leads; -1 where none does"),
-            Space::new("is_broken", choice_space(["no", "yes"]), "whether its parts are scattered"),
-            Space::new(
+            ValueSpace::new("rod_gap_m", up_to_look, "the same gap of each rod")
+                .with_shape([n - 1]),
+            ValueSpace::new("leads", part.clone(), "connector that leads; -1 where none does"),
+            ValueSpace::new(
+                "is_broken",
+                choice_space(["no", "yes"]),
+                "whether its parts are scattered",
+            ),
+            ValueSpace::new(
                 "veto",
                 choice_space(reasons),
                 "reason of the last objection to what it wanted",
             ),
-            Space::new("veto_part", part, "connector that objected; -1 where none did"),
+            ValueSpace::new("veto_part", part, "connector that objected; -1 where none did"),
         ]
     }
 
@@ -119,35 +124,35 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     fn order_name(&self, order: &Order<'_>) -> &str {
-        &self.teams.all()[order.team].action_spaces[order.space].name
+        &self.teams.as_slice()[order.team].action_spaces[order.space].name
     }
 
     /// Records an order in the state of its chain.
-    pub(super) fn record_order(&self, state: &ChainState<D>, order: &Order<'_>) {
+    pub(super) fn record_order(&self, state: &ChainWorldState<D>, order: &Order<'_>) {
         let external = &mut state.body_mut(order.agent as usize).external;
         external.orders.record(self.order_name(order), order.values);
     }
 
     /// Writes a row for each agent of a team, in the order of its spaces.
-    pub(super) fn observe(
+    pub(super) fn write_observations(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         now: Cycle,
         team: usize,
         room: &mut [BufferMut<'_>],
     ) {
-        let Team { agents, action_spaces: ordered, .. } = &self.teams.all()[team];
+        let AgentTeam { agents, action_spaces: ordered, .. } = &self.teams.as_slice()[team];
         let scratch = &mut Scratch::new(self);
         let boxes: Vec<Box<D>> =
             (0..state.len()).map(|slot| self.bounding_box(&state.body(slot))).collect();
         for (row, &id) in agents.iter().enumerate() {
             let look = boxes[id as usize].grown(self.look_m);
-            let others = (0..state.len() as Slot).filter(|slot| *slot != id);
-            let near = others.filter(|slot| boxes[*slot as usize].meets(&look));
+            let others = (0..state.len() as EntitySlot).filter(|slot| *slot != id);
+            let near = others.filter(|slot| boxes[*slot as usize].intersects(&look));
             scratch.nearby.gather(self, state, now, near);
             let body = &state.body(id as usize);
             let mut row = ObservationRow { row, rooms: room.iter_mut() };
-            self.observe_body(id, body, &scratch.nearby.all, &mut row);
+            self.write_chain_observation(id, body, &scratch.nearby.all, &mut row);
             if !ordered.is_empty() {
                 self.observe_order_result(id, body, &mut row);
             }
@@ -164,7 +169,7 @@ impl<const D: usize> ChainWorld<D> {
         self.chains[id as usize].tasks.get(body.driving.task as usize)
     }
 
-    fn observe_body(
+    fn write_chain_observation(
         &self,
         id: EntityId,
         body: &ChainBodyState<D>,
@@ -184,7 +189,7 @@ impl<const D: usize> ChainWorld<D> {
             self.current_task(id, body).filter(|task| !matches!(task.driver, TaskKind::Rest));
         row.push_integer(leads.map_or(-1, |task| task.agent as i64));
         row.push_integer(i64::from(!is_whole));
-        let veto = if self.chains[id as usize].is_external() {
+        let veto = if self.chains[id as usize].has_external_task() {
             body.external.answer.veto
         } else {
             body.driving.objection
@@ -218,49 +223,49 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Returns the spaces of the answers to a chain that takes orders.
-fn order_result_spaces<const D: usize>() -> Vec<Space> {
-    let number = SpaceKind::Integer { low: -1, high: i64::from(u32::MAX) };
-    let share = SpaceKind::Real { low: 0.0, high: 1.0 };
+fn order_result_spaces<const D: usize>() -> Vec<ValueSpace> {
+    let number = ValueDomain::Integer { low: -1, high: i64::from(u32::MAX) };
+    let share = ValueDomain::Real { low: 0.0, high: 1.0 };
     vec![
-        Space::new("veto_cause", choice_space(CAUSES), "sort of thing because of which it objected"),
-        Space::new("veto_cause_id", number, "number of that obstacle or chain; -1 for none"),
-        Space::new("heeds", choice_space(["no", "yes"]), "whether it takes orders in this cycle"),
-        Space::new("answer", choice_space(OrderOutcome::NAMES), "what came of the orders in the last cycle"),
-        Space::new(
+        ValueSpace::new("veto_cause", choice_space(CAUSES), "sort of thing because of which it objected"),
+        ValueSpace::new("veto_cause_id", number, "number of that obstacle or chain; -1 for none"),
+        ValueSpace::new("heeds", choice_space(["no", "yes"]), "whether it takes orders in this cycle"),
+        ValueSpace::new("answer", choice_space(OrderOutcome::NAMES), "what came of the orders in the last cycle"),
+        ValueSpace::new(
             "wish_m",
-            coordinate_space(),
+            unbounded_real_space(),
             "places that both ends of the rod, or twice that the connector, should have reached in the \
              last cycle; 0 where there was no errand",
         )
         .with_shape([2, D]),
-        Space::new(
+        ValueSpace::new(
             "reached_m",
-            coordinate_space(),
+            unbounded_real_space(),
             "place that the first of them has reached or, vetoed, could have reached; 0 where there was \
              no errand",
         )
         .with_shape([D]),
-        Space::new("done_share", share, "part of the last cycle's way that was done"),
+        ValueSpace::new("done_share", share, "part of the last cycle's way that was done"),
     ]
 }
 
 /// Returns the spaces of the orders for a chain of `n` connectors.
-fn order_spaces<const D: usize>(n: usize) -> Vec<Space> {
-    let place = SpaceKind::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
+fn order_action_spaces<const D: usize>(n: usize) -> Vec<ValueSpace> {
+    let place = ValueDomain::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
     let mut spaces = vec![
-        Space::new(
+        ValueSpace::new(
             Orders::TO,
             place.clone(),
             "place toward which a connector goes, at its task's speed; without `to_m` and `rod_to_m` nothing \
              moves, and the last of them counts",
         )
         .with_shape([D]),
-        Space::new(
+        ValueSpace::new(
             Orders::CONNECTOR,
-            SpaceKind::Integer { low: 0, high: n as i64 - 1 },
+            ValueDomain::Integer { low: 0, high: n as i64 - 1 },
             "that connector, from 0; the one that leads where this is not ordered",
         ),
-        Space::new(
+        ValueSpace::new(
             Orders::REACH,
             choice_space(["exact", "as-far-as-it-goes"]),
             "what comes of a cycle's way that cannot all be gone: nothing, or as much as goes; exact where \
@@ -269,28 +274,28 @@ fn order_spaces<const D: usize>(n: usize) -> Vec<Space> {
     ];
     if n > 1 {
         spaces.push(
-            Space::new(
+            ValueSpace::new(
                 Orders::ROD_TO,
                 place,
                 "places toward which the ends of a rod go, none faster than its task's speed",
             )
             .with_shape([2, D]),
         );
-        spaces.push(Space::new(
+        spaces.push(ValueSpace::new(
             Orders::ROD,
-            SpaceKind::Integer { low: 0, high: n as i64 - 2 },
+            ValueDomain::Integer { low: 0, high: n as i64 - 2 },
             "that rod, from 0; the one behind the leading connector where this is not ordered",
         ));
     }
     spaces
 }
 
-fn coordinate_space() -> SpaceKind {
-    SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY }
+fn unbounded_real_space() -> ValueDomain {
+    ValueDomain::Real { low: f64::NEG_INFINITY, high: f64::INFINITY }
 }
 
-fn choice_space<'a>(names: impl IntoIterator<Item = &'a str>) -> SpaceKind {
-    SpaceKind::Discrete(names.into_iter().map(String::from).collect())
+fn choice_space<'a>(names: impl IntoIterator<Item = &'a str>) -> ValueDomain {
+    ValueDomain::Discrete(names.into_iter().map(String::from).collect())
 }
 
 /// One agent's row in the rooms of its team, filled room by room.

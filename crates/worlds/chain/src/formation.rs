@@ -8,7 +8,7 @@ use sidestep_rods::geometry::Point;
 
 /// The robots of a swarm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Robots {
+pub(crate) struct RobotSwarmConfig {
     /// Behavior of each robot.
     pub(crate) follower: Follower,
     /// Distance between a robot and its connector at which a leader on wheels stops to wait,
@@ -27,12 +27,12 @@ pub struct Robot {
 
 /// A round solid body in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Solid {
+pub(crate) struct SolidDisc {
     pub(crate) at: Point<2>,
     pub(crate) radius_m: f64,
 }
 
-impl Solid {
+impl SolidDisc {
     /// Returns the body as lasers and bumpers see it.
     pub(crate) fn robot_body(&self) -> RobotBody {
         RobotBody::disc(self.at, self.radius_m)

@@ -8,7 +8,7 @@ mod tests;
 use super::driver::{Task, TaskKind};
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
-use super::state::{ChainBodyState, ChainState};
+use super::state::{ChainBodyState, ChainWorldState};
 use super::trace::InspectionTrace;
 use super::view::obstacle_body_id;
 use super::world::ChainWorld;
@@ -19,16 +19,16 @@ use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::view::{
     BodyId, BodyKind, FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape,
 };
-use sidestep_kernel::{Cycle, PhaseContext, Slot};
+use sidestep_kernel::{Cycle, EntitySlot, PhaseContext};
 use sidestep_rods::Veto;
-use sidestep_rods::geometry::{Point, distance, with_dimensions};
+use sidestep_rods::geometry::{Point, convert_dimensions, distance};
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the inspection of a connector, or of its robot, in cycle `now`; `None` for one that does
     /// not exist.
     pub(crate) fn inspect(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         now: Cycle,
         who: BodyId,
     ) -> Option<Inspection> {
@@ -69,7 +69,7 @@ impl<const D: usize> ChainWorld<D> {
             trace,
             scratch,
         };
-        asked.add_all(&mut inspection, &group);
+        asked.add_all_sections(&mut inspection, &group);
         Some(inspection)
     }
 
@@ -86,22 +86,22 @@ impl<const D: usize> ChainWorld<D> {
     fn try_cycle(
         &self,
         phase: &mut PhaseContext<'_, Self>,
-        slot: Slot,
+        slot: EntitySlot,
         inspection: &mut Inspection,
-    ) -> (ChainBodyState<D>, Vec<Slot>) {
+    ) -> (ChainBodyState<D>, Vec<EntitySlot>) {
         let &mut PhaseContext { state, now, .. } = phase;
         let groups = ConflictGroups::new(state.len());
         for slot in 0..state.len() {
             claim::claim_box(phase, slot);
         }
-        join::join(phase, 0..state.len(), &groups);
+        join::join_conflict_groups(phase, 0..state.len(), &groups);
         let mut group = Vec::new();
         groups.members(groups.leader(slot), &mut group);
         group.sort_unstable();
         for &member in &group {
             let mut perceiver = Perceiver { world: self, state, now, scratch: phase.scratch };
             if member == slot {
-                add_navigation(&mut perceiver, slot, inspection);
+                add_navigator_percept(&mut perceiver, slot, inspection);
             }
             let decision = perceiver.decide(member);
             state.set_decision(member as usize, decision);
@@ -118,9 +118,9 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Adds the perception of a leader on wheels, and the layer that acts.
-fn add_navigation<const D: usize>(
+fn add_navigator_percept<const D: usize>(
     perceiver: &mut Perceiver<'_, D>,
-    slot: Slot,
+    slot: EntitySlot,
     inspection: &mut Inspection,
 ) {
     let Some(sight) = perceiver.percept(slot) else { return };
@@ -151,7 +151,7 @@ fn add_navigation<const D: usize>(
 /// A look at one connector, or its robot, before and after a cycle.
 struct ConnectorInspection<'a, const D: usize> {
     world: &'a ChainWorld<D>,
-    slot: Slot,
+    slot: EntitySlot,
     kind: BodyKind,
     k: usize,
     before: ChainBodyState<D>,
@@ -161,15 +161,15 @@ struct ConnectorInspection<'a, const D: usize> {
 }
 
 impl<const D: usize> ConnectorInspection<'_, D> {
-    fn add_all(&self, inspection: &mut Inspection, group: &[Slot]) {
-        self.add_state(inspection);
-        self.add_group(inspection, group);
+    fn add_all_sections(&self, inspection: &mut Inspection, group: &[EntitySlot]) {
+        self.add_connector_state(inspection);
+        self.add_group_table(inspection, group);
         self.add_intention(inspection);
-        self.add_vetoes(inspection);
-        self.add_recovery(inspection);
-        self.add_moves(inspection);
-        self.add_lags(inspection);
-        self.add_outcome(inspection);
+        self.add_veto_table(inspection);
+        self.add_recovery_rung(inspection);
+        self.add_moved_connectors(inspection);
+        self.add_robot_lags(inspection);
+        self.add_outcome_section(inspection);
     }
 
     /// Returns its present task; none after the last.
@@ -177,20 +177,20 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         self.world.chains[self.slot as usize].tasks.get(self.before.driving.task as usize)
     }
 
-    fn connector(&self, k: usize) -> BodyId {
+    fn connector_body_id(&self, k: usize) -> BodyId {
         BodyId::new(kinds::CONNECTOR, self.slot, Some(k as u32))
     }
 
     /// Returns the place of the connector or robot in a state of the chain.
     fn position(&self, body: &ChainBodyState<D>) -> [f64; 3] {
         if self.kind == kinds::ROBOT {
-            with_dimensions(body.robots[self.k].pose.at)
+            convert_dimensions(body.robots[self.k].pose.at)
         } else {
-            with_dimensions(body.chain.points()[self.k])
+            convert_dimensions(body.chain.points()[self.k])
         }
     }
 
-    fn add_state(&self, inspection: &mut Inspection) {
+    fn add_connector_state(&self, inspection: &mut Inspection) {
         let connector = &self.before.chain.connectors()[self.k];
         let task = self.task();
         let leader =
@@ -201,7 +201,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             FactSection::new("Now")
                 .fact("place", self.position(&self.before))
                 .fact("leads", leader == Some(self.k))
-                .fact("initiator", leader.map(|k| self.connector(k)))
+                .fact("initiator", leader.map(|k| self.connector_body_id(k)))
                 .fact("task", task.map_or("all are done", |task| task.driver.name()))
                 .fact("task number", format!("{number} of {tasks}"))
                 .fact("cycles without progress", FactValue::count(self.before.driving.idle))
@@ -210,7 +210,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         );
     }
 
-    fn add_group(&self, inspection: &mut Inspection, group: &[Slot]) {
+    fn add_group_table(&self, inspection: &mut Inspection, group: &[EntitySlot]) {
         let mut table = FactTable::new(["turn", "chain"]);
         for (turn, &slot) in group.iter().enumerate().filter(|_| group.len() > 1) {
             table.push_row([
@@ -238,56 +238,56 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         };
         inspection.add_section(
             FactSection::new("Wish")
-                .fact("of", self.connector(intended.connector))
+                .fact("of", self.connector_body_id(intended.connector))
                 .fact("what", intended.words)
-                .fact("to", intended.to.map(with_dimensions::<D, 3>))
+                .fact("to", intended.to.map(convert_dimensions::<D, 3>))
                 .fact("way", intended.to.map(|to| FactValue::meters(distance(at, to))))
-                .fact_if("target", target.map(|target| with_dimensions::<D, 3>(*target)))
+                .fact_if("target", target.map(|target| convert_dimensions::<D, 3>(*target)))
                 .fact_if("way to the target", target.map(|t| FactValue::meters(distance(at, *t)))),
         );
         if let Some(to) = intended.to {
-            inspection.add_mark(MarkRole::Wish, intended.words, line(&[at, to]));
+            inspection.add_mark(MarkRole::Wish, intended.words, line_mark(&[at, to]));
         }
         if let Some(target) = target {
             inspection.add_mark(
                 MarkRole::Target,
                 "target",
-                MarkShape::Point { at_m: with_dimensions(*target) },
+                MarkShape::Point { at_m: convert_dimensions(*target) },
             );
         }
     }
 
     /// Adds the objecting connector, its reason, the obstacle, and how far the initiator could have gone.
-    fn add_vetoes(&self, inspection: &mut Inspection) {
+    fn add_veto_table(&self, inspection: &mut Inspection) {
         let before = self.before.chain.points();
         let mut table = FactTable::new(["by", "reason", "because of", "could go"]);
         for veto in self.vetoes() {
             let because = veto.obstacle.map(obstacle_body_id);
-            let by = self.connector(veto.by).into();
+            let by = self.connector_body_id(veto.by).into();
             table.push_row([
                 by,
                 veto.reason.name().into(),
                 because.into(),
                 FactValue::meters(distance(veto.reached, before[veto.from])),
             ]);
-            let at_m = with_dimensions(before[veto.by]);
+            let at_m = convert_dimensions(before[veto.by]);
             inspection.add_mark(
                 MarkRole::Refused,
                 veto.reason.to_string(),
                 MarkShape::Point { at_m },
             );
-            let way = line(&[before[veto.from], veto.reached]);
+            let way = line_mark(&[before[veto.from], veto.reached]);
             inspection.add_mark(MarkRole::Refused, "as far as it could go", way);
         }
         let Some(first) = self.vetoes().next() else { return };
         inspection.add_section(
             FactSection::new("Veto")
-                .fact("by", self.connector(first.by))
+                .fact("by", self.connector_body_id(first.by))
                 .fact("reason", first.reason.name())
                 .fact("why", first.reason.to_string())
                 .fact("because of", first.obstacle.map(obstacle_body_id))
                 .fact("could go", FactValue::meters(distance(first.reached, before[first.from])))
-                .fact("as far as", with_dimensions::<D, 3>(first.reached))
+                .fact("as far as", convert_dimensions::<D, 3>(first.reached))
                 .table(table),
         );
     }
@@ -304,6 +304,6 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 }
 
-fn line<const D: usize>(points: &[Point<D>]) -> MarkShape {
-    MarkShape::Line { points_m: points.iter().map(|at| with_dimensions(*at)).collect() }
+fn line_mark<const D: usize>(points: &[Point<D>]) -> MarkShape {
+    MarkShape::Line { points_m: points.iter().map(|at| convert_dimensions(*at)).collect() }
 }

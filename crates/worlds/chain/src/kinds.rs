@@ -1,6 +1,8 @@
 //! The kinds of bodies of chains.
 
-use sidestep_kernel::view::{BodyKind, KindSpec, Legend, Outline, Paint, Role, TrailStyle};
+use sidestep_kernel::view::{
+    BodyKind, BodyRole, KindSpec, LegendTexts, Outline, Paint, TrailStyle,
+};
 
 /// All kinds of bodies in this world.
 pub(crate) const ALL: &[BodyKind] = &[ROBOT, CONNECTOR, RODS, BodyKind::OBSTACLE, BodyKind::GOAL];
@@ -10,11 +12,11 @@ pub const ROBOT: BodyKind = BodyKind::new(&KindSpec {
     name: "robot",
     noun: "robot",
     rank: 0,
-    role: Role::Agent(TrailStyle::OnePerColor),
+    role: BodyRole::Agent(TrailStyle::OnePerColor),
     layer: 5,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::Dark,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: true,
 });
 
@@ -23,11 +25,11 @@ pub const CONNECTOR: BodyKind = BodyKind::new(&KindSpec {
     name: "connector",
     noun: "chain",
     rank: 3,
-    role: Role::PartOfBody,
+    role: BodyRole::PartOfBody,
     layer: 5,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::Seam,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: false,
 });
 
@@ -36,10 +38,10 @@ pub const RODS: BodyKind = BodyKind::new(&KindSpec {
     name: "rods",
     noun: "rods",
     rank: 4,
-    role: Role::LineThroughParts(CONNECTOR),
+    role: BodyRole::LineThroughParts(CONNECTOR),
     layer: 4,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::None,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: false,
 });

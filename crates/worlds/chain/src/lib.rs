@@ -60,7 +60,7 @@ mod world_type;
 pub use deploy::Deployment;
 pub use driver::VetoRecord;
 pub use driver::own_driver::{
-    Driver, DriverMemory, DriverPercept, Drivers, NearbyObstacle, Proposal,
+    Driver, DriverAction, DriverMemory, DriverPercept, DriverRegistry, NearbyObstacle,
 };
 pub use motion::escape::{
     EscapeMethod, EscapePlan, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules,
@@ -69,9 +69,9 @@ pub use motion::escape::{
 pub use motion::recovery::{
     DirectMover, InitiatorSituation, RecoveryLadder, RecoveryLimits, RecoveryOutcome,
 };
-pub use own_parts::{OwnParts, Reactions};
+pub use own_parts::{CustomBehaviors, ReactionRegistry};
 pub use sidestep_rods::{MasterMove, Reaction};
-pub use state::{ChainBodyState, ChainBodyStateRef, ChainState};
+pub use state::{ChainBodyState, ChainBodyStateRef, ChainWorldState};
 pub use world::ChainWorld;
 pub use world_impl::{ChainRun, chain_run};
 pub use world_type::Chains;
@@ -79,32 +79,32 @@ pub use world_type::Chains;
 use scratch::Scratch;
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::world::DecisionMode;
-use sidestep_kernel::{PhaseContext, Phases, Slot};
+use sidestep_kernel::{EntitySlot, PhaseContext, Phases};
 use std::ops::Range;
 
 impl<const D: usize> Phases for ChainWorld<D> {
     const DECISION_MODE: DecisionMode = DecisionMode::Joint;
 
-    type State = ChainState<D>;
+    type State = ChainWorldState<D>;
     type Scratch = Scratch<D>;
 
-    fn scratch(&self) -> Scratch<D> {
+    fn new_scratch(&self) -> Scratch<D> {
         Scratch::new(self)
     }
 
-    fn bodies(&self, state: &ChainState<D>) -> usize {
+    fn body_count(&self, state: &ChainWorldState<D>) -> usize {
         state.len()
     }
 
     fn claim(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
-        bodies.for_each(|slot| claim::claim(phase, slot));
+        bodies.for_each(|slot| claim::claim_box_and_decide(phase, slot));
     }
 
     fn join(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
-        join::join(phase, bodies, groups);
+        join::join_conflict_groups(phase, bodies, groups);
     }
 
-    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [EntitySlot]) {
         act::act(phase, group);
     }
 }

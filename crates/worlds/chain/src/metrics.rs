@@ -49,7 +49,7 @@ pub struct ChainTally {
     /// Tasks done, targets reached.
     pub done: u64,
     /// Tasks and targets that were given up.
-    pub given_up: Vec<AbandonedTaskPart>,
+    pub given_up: Vec<AbandonedSubtask>,
     /// Number of times that broken parts were joined again,
     pub reformed: u64,
     /// and that they could not be.
@@ -224,7 +224,7 @@ impl ChainTally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
-    pub(crate) fn add_traffic(&mut self, traffic: NetworkTraffic) {
+    pub(crate) fn add_network_traffic(&mut self, traffic: NetworkTraffic) {
         self.messages += traffic.messages;
         self.bytes += traffic.bytes;
         self.dropped += traffic.dropped;
@@ -283,7 +283,7 @@ impl Default for ChainTally {
 
 /// A motion or target that an initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AbandonedTaskPart {
+pub struct AbandonedSubtask {
     /// Number of the task, from 0.
     pub task: u32,
     /// The motion of its script, or the target.
@@ -340,7 +340,7 @@ metrics! {
         /// Greatest number of parts that were missing when parts could not be joined. Of each chain the most, summed.
         pub missing_parts: u64 => "missing parts",
         /// Motions and targets that were given up, by chain, with who objected and why.
-        pub given_up: Vec<ChainAbandonedTaskPart> => "tasks given up",
+        pub given_up: Vec<ChainAbandonedSubtask> => "tasks given up",
         /// Rungs by which initiators continued after vetoes.
         pub rungs: RungTally,
         /// Counts of parts that got out of the way.
@@ -401,12 +401,12 @@ impl RobotMetrics {
 
 /// A motion or target that a chain's initiator gave up.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChainAbandonedTaskPart {
+pub struct ChainAbandonedSubtask {
     /// Id of the chain.
     pub chain: EntityId,
     /// What it gave up, and why.
     #[serde(flatten)]
-    pub what: AbandonedTaskPart,
+    pub what: AbandonedSubtask,
 }
 
 /// What a run reports about one chain.
@@ -460,7 +460,7 @@ impl Metrics {
             reformed: sum_over_chains(tallies, |t| t.reformed),
             not_reformed: sum_over_chains(tallies, |t| t.not_reformed),
             missing_parts: sum_over_chains(tallies, |t| t.missing_parts),
-            given_up: abandoned_parts(tallies),
+            given_up: abandoned_task_parts(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.sum_with(&t.escapes)),
             messages: sum_over_chains(tallies, |t| t.messages),
@@ -474,11 +474,11 @@ impl Metrics {
     }
 }
 
-fn abandoned_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedTaskPart> {
+fn abandoned_task_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedSubtask> {
     let mut parts = Vec::new();
     for (chain, tally) in (0..).zip(tallies) {
         for what in tally.given_up.iter().cloned() {
-            parts.push(ChainAbandonedTaskPart { chain, what });
+            parts.push(ChainAbandonedSubtask { chain, what });
         }
     }
     parts

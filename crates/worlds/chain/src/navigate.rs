@@ -1,7 +1,7 @@
 //! An initiator on wheels that navigates with a laser, and its goal (slides N1 to N6).
 
 use super::swarm::drive::DifferentialDrive;
-use super::swarm::leader::{Leader, TurnMode};
+use super::swarm::leader::{LeaderController, TurnMode};
 use sidestep_rods::geometry::{Point, distance};
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const LOOKAHEAD_POINTS: usize = 10;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Navigator {
-    pub(crate) leader: Leader,
+    pub(crate) leader: LeaderController,
     pub(crate) drive: DifferentialDrive,
     /// Its destination; without one it never stops.
     pub(crate) goal: Option<NavigationGoal>,
@@ -56,10 +56,10 @@ impl NavigationGoal {
 
     /// Returns the point of the line at which a navigator at `at` begins: the first one beside which it is in the
     /// corridor, because a corridor may come back to where it was; the nearest one if it is outside.
-    pub(crate) fn start_index(&self, at: Point<2>) -> usize {
+    pub(crate) fn start_waypoint_index(&self, at: Point<2>) -> usize {
         let Self::EndOf { line, width_m } = self else { return 0 };
         match line.iter().position(|&p| distance(p, at) <= 0.5 * width_m) {
-            Some(first) => last_nearing(line, first, at),
+            Some(first) => last_approaching_index(line, first, at),
             None => nearest(line, 0..line.len(), at).unwrap_or(0),
         }
     }
@@ -69,7 +69,7 @@ impl NavigationGoal {
     pub(crate) fn reached_index(&self, at: Point<2>, mut index: usize) -> usize {
         let Self::EndOf { line, .. } = self else { return index };
         loop {
-            let here = last_nearing(line, index, at);
+            let here = last_approaching_index(line, index, at);
             let ahead = here..(here + 1 + LOOKAHEAD_POINTS).min(line.len());
             match nearest(line, ahead, at).filter(|&i| i > here) {
                 Some(further) => index = further,
@@ -100,7 +100,7 @@ impl NavigationGoal {
             }
             Self::Target { .. } => 0.0,
             Self::EndOf { line, .. } => {
-                let first = self.start_index(start);
+                let first = self.start_waypoint_index(start);
                 let left = (line.len() - 1).saturating_sub(first);
                 index.saturating_sub(first) as f64 / left.max(1) as f64
             }
@@ -109,7 +109,7 @@ impl NavigationGoal {
 }
 
 /// Returns the last point of a line up to which all from `index` on come nearer.
-fn last_nearing(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
+fn last_approaching_index(line: &[Point<2>], index: usize, at: Point<2>) -> usize {
     let last = line.len() - 1;
     let farther = (index..last).find(|&i| {
         let is_nearing = distance(line[i + 1], at) <= distance(line[i], at);
@@ -165,7 +165,7 @@ mod tests {
         let straight = CorridorLeg::Straight { length_m: 10.0 };
         let round = middle(&[straight, turn(180.0), straight, turn(180.0)]);
         for at in [[-0.2, 0.0], [0.0, 0.0], [0.03, 0.4]] {
-            let begins = round.start_index(at);
+            let begins = round.start_waypoint_index(at);
             assert_eq!(begins, 0, "{at:?}");
             assert!(!round.is_reached(at, begins), "{at:?}");
         }
@@ -175,7 +175,7 @@ mod tests {
             let NavigationGoal::EndOf { line, .. } = &laps else { panic!("a line") };
             let lap = (line.len() - 1) as f64 * 360.0 / turn_deg.abs();
             for &at in &line[..lap as usize - 12] {
-                let begins = laps.start_index(at) as f64;
+                let begins = laps.start_waypoint_index(at) as f64;
                 assert!(begins < lap, "{turn_deg} deg, {at:?}: {begins} of {lap}");
             }
             assert!(passes_all(&laps, 0) > line.len() - 10, "{turn_deg} deg");
@@ -186,7 +186,7 @@ mod tests {
     fn progress_along_a_line_counts_from_where_it_began() {
         let goal = middle(&[CorridorLeg::Straight { length_m: 20.0 }]);
         let start = [10.0, 0.3];
-        let begins = goal.start_index(start);
+        let begins = goal.start_waypoint_index(start);
         assert_eq!(begins, 100);
         let progress = |index| goal.progress(index, start, f64::INFINITY);
         assert_eq!([begins, 150, 200].map(progress), [0.0, 0.5, 1.0]);
@@ -195,11 +195,11 @@ mod tests {
     #[test]
     fn a_navigator_begins_at_the_nearest_point_of_its_line_and_goes_on_from_there() {
         let line = hairpin();
-        let begins = line.start_index([3.0, 3.8]);
+        let begins = line.start_waypoint_index([3.0, 3.8]);
         assert_eq!(begins, 50 + 40 + 20);
         let passed = line.reached_index([0.2, 4.0], begins);
         assert!(line.is_reached([0.2, 4.0], passed), "{passed}");
-        assert_eq!(line.start_index([-1.0, 0.1]), 0);
+        assert_eq!(line.start_waypoint_index([-1.0, 0.1]), 0);
         // From the first leg the second one is not taken for passed.
         assert_eq!(line.reached_index([3.0, 1.9], 25), 30);
     }

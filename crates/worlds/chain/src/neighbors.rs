@@ -1,6 +1,6 @@
 //! Claims of many chains by where they begin, so that a chain is compared with its neighbors only.
 
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_rods::geometry::Aabb;
 
 /// The claims of one cycle along the axis on which they are spread farthest.
@@ -10,7 +10,7 @@ pub(crate) struct ClaimIndex<const D: usize> {
     made: u64,
     axis: usize,
     /// The claims by their lower end.
-    sorted: Vec<(Aabb<D>, Slot)>,
+    sorted: Vec<(Aabb<D>, EntitySlot)>,
     /// The place of each slot among them.
     places: Vec<u32>,
 }
@@ -32,7 +32,7 @@ impl<const D: usize> ClaimIndex<D> {
         self.made = made;
         self.sorted.clear();
         self.sorted.extend(claims.zip(0..));
-        self.axis = widest(&self.sorted);
+        self.axis = widest_axis(&self.sorted);
         let axis = self.axis;
         self.sorted
             .sort_unstable_by(|(a, i), (b, j)| a.lo[axis].total_cmp(&b.lo[axis]).then(i.cmp(j)));
@@ -43,14 +43,14 @@ impl<const D: usize> ClaimIndex<D> {
     }
 
     /// Visits those whose claims meet that of a slot and begin after it: of two that meet, one visits the other.
-    pub(crate) fn visit(&self, slot: usize, mut look: impl FnMut(Slot)) {
+    pub(crate) fn visit(&self, slot: usize, mut look: impl FnMut(EntitySlot)) {
         let place = self.places[slot] as usize;
         let claim = &self.sorted[place].0;
         let behind = self.sorted[place + 1..].iter();
         for (other, at) in
             behind.take_while(|(other, _)| other.lo[self.axis] <= claim.hi[self.axis])
         {
-            if other.meets(claim) {
+            if other.intersects(claim) {
                 look(*at);
             }
         }
@@ -58,7 +58,7 @@ impl<const D: usize> ClaimIndex<D> {
 }
 
 /// Returns the axis on which the lower ends of boxes are spread farthest.
-fn widest<const D: usize>(boxes: &[(Aabb<D>, Slot)]) -> usize {
+fn widest_axis<const D: usize>(boxes: &[(Aabb<D>, EntitySlot)]) -> usize {
     let mut widest = 0;
     let mut widest_m = spread_m(boxes, 0);
     for axis in 1..D {
@@ -72,7 +72,7 @@ fn widest<const D: usize>(boxes: &[(Aabb<D>, Slot)]) -> usize {
 }
 
 /// Returns the distance on an axis from the least lower end of a box to the greatest.
-fn spread_m<const D: usize>(boxes: &[(Aabb<D>, Slot)], axis: usize) -> f64 {
+fn spread_m<const D: usize>(boxes: &[(Aabb<D>, EntitySlot)], axis: usize) -> f64 {
     let mut lo = f64::INFINITY;
     let mut hi = f64::NEG_INFINITY;
     for (claim, _) in boxes {
@@ -110,7 +110,7 @@ mod tests {
             }
             found.sort_unstable();
             let pairs = (0..claims.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-            let mut expected: Vec<_> = pairs.filter(|(a, b)| claims[*a].meets(&claims[*b])).collect();
+            let mut expected: Vec<_> = pairs.filter(|(a, b)| claims[*a].intersects(&claims[*b])).collect();
             expected.sort_unstable();
             prop_assert_eq!(found, expected);
         }

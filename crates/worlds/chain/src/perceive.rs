@@ -4,10 +4,10 @@
 use super::driver::TaskKind;
 use super::navigate::{NavigationGoal, Navigator};
 use super::scratch::Scratch;
-use super::state::ChainState;
-use super::swarm::leader::{LeaderDecision, LeaderPercept, LeaderState, LeaderSurroundings};
+use super::state::ChainWorldState;
+use super::swarm::leader::{LeaderDecision, LeaderState, LeaderSurroundings, WallAndTargetPercept};
 use super::world::{ChainWorld, purpose};
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 use sidestep_rods::geometry::distance;
 
 /// Time for which a navigator stands for a body that moves ahead before it treats that as a wall, s. Without a limit
@@ -17,7 +17,7 @@ const STAND_TIMEOUT_S: f64 = 10.0;
 /// A worker that perceives for navigators; the state does not change meanwhile.
 pub(crate) struct Perceiver<'a, const D: usize> {
     pub(crate) world: &'a ChainWorld<D>,
-    pub(crate) state: &'a ChainState<D>,
+    pub(crate) state: &'a ChainWorldState<D>,
     pub(crate) now: Cycle,
     pub(crate) scratch: &'a mut Scratch<D>,
 }
@@ -27,20 +27,20 @@ pub(crate) struct NavigatorPercept<'a> {
     pub(crate) navigator: &'a Navigator,
     pub(crate) agent: usize,
     pub(crate) leader: LeaderState,
-    pub(crate) percept: LeaderPercept,
+    pub(crate) percept: WallAndTargetPercept,
 }
 
 impl<'a, const D: usize> Perceiver<'a, D> {
     /// Returns a navigator's decision; none for other drivers.
-    pub(crate) fn decide(&mut self, slot: Slot) -> Option<LeaderDecision> {
+    pub(crate) fn decide(&mut self, slot: EntitySlot) -> Option<LeaderDecision> {
         let own = self.percept(slot)?;
         Some(own.navigator.leader.decide(own.leader.followed, &own.percept))
     }
 
     /// Returns a navigator's perception; its laser's ranges are in the scratch.
-    pub(crate) fn percept(&mut self, slot: Slot) -> Option<NavigatorPercept<'a>> {
+    pub(crate) fn percept(&mut self, slot: EntitySlot) -> Option<NavigatorPercept<'a>> {
         let Self { world, state, now, .. } = *self;
-        let body = state.deferred_body(slot as usize);
+        let body = state.body_with_deferred_motions(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let TaskKind::Navigate(navigator) = &task.driver else { return None };
         let leader = body.leader_state(task);
@@ -52,9 +52,9 @@ impl<'a, const D: usize> Perceiver<'a, D> {
         let noise = &mut world.streams.draws(slot, now, purpose::LASER);
         let Scratch { nearby, scan, robot_bodies, .. } = &mut *self.scratch;
         let target = navigator.goal.as_ref().and_then(NavigationGoal::target);
-        let obstacles = nearby.all.in_plane()?;
+        let obstacles = nearby.all.as_planar()?;
         let around = LeaderSurroundings { obstacles, bodies: robot_bodies, target };
-        let is_patient = world.start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
+        let is_patient = world.cycle_start_time_s(u64::from(stood)) < STAND_TIMEOUT_S;
         navigator.leader.scan(&leader.pose, &around, noise, scan);
         let percept = navigator.leader.perceive(&leader.pose, &around, scan, is_patient);
         Some(NavigatorPercept { navigator, agent: task.agent, leader, percept })
@@ -63,7 +63,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
     /// Gathers all parts of chains that a navigator may see, its own chain included, except itself.
     fn gather_others(
         &mut self,
-        slot: Slot,
+        slot: EntitySlot,
         agent: usize,
         navigator: &Navigator,
         leader: &LeaderState,
@@ -99,7 +99,7 @@ mod tests {
     const RANGE_M: f64 = 1.5;
 
     /// Chains of two connectors, and as many on wheels, each with a navigator.
-    fn crowd(count: usize) -> (ChainWorld<2>, ChainState<2>) {
+    fn crowd(count: usize) -> (ChainWorld<2>, ChainWorldState<2>) {
         let chains = |at: &str, more: &str| {
             format!(
                 "[[chains]]\nconnectors = 2\ncount = {count}\nat_m = {at}\napart_m = [0.0, 2.0]\nrod_m = 1.0\n{more}\n\
@@ -109,12 +109,12 @@ mod tests {
         let [bare, wheels] = [chains("[0.0, 0.0]", ""), chains("[9.0, 0.0]", "robots = {}")];
         let text = format!("format = 1\nworld = \"chain\"\n{bare}{wheels}");
         let compiled = ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
-        let state = ChainState::new(&compiled.world).expect("valid");
+        let state = ChainWorldState::new(&compiled.world).expect("valid");
         ((*compiled.world).clone(), state)
     }
 
     /// Puts the ends of all chains, and their robots, elsewhere.
-    fn put(state: &ChainState<2>, places: &[[Point<2>; 2]]) {
+    fn put(state: &ChainWorldState<2>, places: &[[Point<2>; 2]]) {
         for (slot, ends) in (0..state.len()).zip(places.iter().cycle()) {
             let mut body = state.body_mut(slot);
             body.chain.points_mut().copy_from_slice(ends);
@@ -123,7 +123,7 @@ mod tests {
     }
 
     /// Returns the parts of all chains that the first connector of one of them sees by a look at each.
-    fn seen_of_all(state: &ChainState<2>, slot: usize) -> Vec<RobotBody> {
+    fn seen_of_all(state: &ChainWorldState<2>, slot: usize) -> Vec<RobotBody> {
         let at = state.body(slot).chain.points()[0];
         let mut seen = Vec::new();
         for other in 0..state.len() {
@@ -136,11 +136,11 @@ mod tests {
         seen
     }
 
-    fn assert_all_is_seen(world: &ChainWorld<2>, state: &ChainState<2>) {
+    fn assert_all_is_seen(world: &ChainWorld<2>, state: &ChainWorldState<2>) {
         let mut scratch = Scratch::new(world);
         let mut perceiver = Perceiver { world, state, now: 0, scratch: &mut scratch };
         for slot in 0..state.len() {
-            perceiver.percept(slot as Slot).expect("it navigates");
+            perceiver.percept(slot as EntitySlot).expect("it navigates");
             assert_eq!(perceiver.scratch.robot_bodies, seen_of_all(state, slot), "chain {slot}");
         }
     }
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(near, [900]);
     }
 
-    fn put_far_away(state: &ChainState<2>, slot: usize) {
+    fn put_far_away(state: &ChainWorldState<2>, slot: usize) {
         state.body_mut(slot).chain.points_mut().iter_mut().for_each(|at| at[0] -= 90.0);
     }
 }

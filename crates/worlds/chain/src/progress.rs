@@ -1,9 +1,9 @@
 //! Progress of a chain through its tasks.
 
 use super::driver::{Task, TaskKind};
-use super::state::{ChainBodyState, ChainState};
+use super::state::{ChainBodyState, ChainWorldState};
 use super::world::ChainWorld;
-use sidestep_rods::geometry::with_dimensions;
+use sidestep_rods::geometry::convert_dimensions;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the part of its tasks that a chain has done, from 0 to 1. Several tasks have equal
@@ -22,7 +22,9 @@ impl<const D: usize> ChainWorld<D> {
     /// program's own the part of the run.
     pub(crate) fn fraction_done(&self, body: &ChainBodyState<D>, task: &Task<D>) -> f64 {
         let part = match &task.driver {
-            _ if task.lasts_s.is_finite() => self.start_time_s(body.driving.cycles) / task.lasts_s,
+            _ if task.lasts_s.is_finite() => {
+                self.cycle_start_time_s(body.driving.cycles) / task.lasts_s
+            }
             TaskKind::Rest | TaskKind::External | TaskKind::Own(_) => {
                 body.driving.cycles as f64 / self.cycles.max(1) as f64
             }
@@ -33,7 +35,7 @@ impl<const D: usize> ChainWorld<D> {
             }
             TaskKind::Navigate(navigator) => match &navigator.goal {
                 Some(goal) => {
-                    let start = with_dimensions(body.driving.start.position_m);
+                    let start = convert_dimensions(body.driving.start.position_m);
                     goal.progress(body.driving.next as usize, start, body.driving.nearest_m)
                 }
                 None => self.path_fraction(body, task),
@@ -43,13 +45,13 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     fn path_fraction(&self, body: &ChainBodyState<D>, task: &Task<D>) -> f64 {
-        body.driving.way_m.gone / (task.speed_m_s * self.start_time_s(self.cycles.max(1)))
+        body.driving.way_m.gone / (task.speed_m_s * self.cycle_start_time_s(self.cycles.max(1)))
     }
 
     /// Returns whether all tasks of all chains are done and everything is whole.
-    pub(crate) fn is_all_done(&self, state: &ChainState<D>) -> bool {
+    pub(crate) fn is_all_done(&self, state: &ChainWorldState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
-            let body = state.deferred_body(slot);
+            let body = state.body_with_deferred_motions(slot);
             let is_done = body.driving.task as usize >= spec.tasks.len();
             is_done && body.scattered.is_none()
         })

@@ -2,16 +2,16 @@
 
 use super::scenario::ChainScenario;
 use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
-use sidestep_arms::kinematics::JointMotion;
+use sidestep_arms::kinematics::JointMotionKind;
 use sidestep_rods::Mobility;
 use sidestep_scenario::Remark;
 
 /// Returns remarks on joints, then on the network, then on rules without effect.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
     let mut chains = compiled.world.chains.iter().enumerate();
-    let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds(k, spec));
+    let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds_remark(k, spec));
     // One of them is enough: all chains talk over the same network.
-    let slow = chains.find_map(|(k, spec)| slow_network(&compiled.world, k, spec));
+    let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
     unlimited.chain(slow).chain(unused_rules(compiled)).collect()
 }
 
@@ -19,7 +19,7 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
 fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<Item = Remark> {
     let world = &compiled.world;
     let moves = !world.movers.is_empty();
-    let holds = world.chains.iter().any(is_held);
+    let holds = world.chains.iter().any(is_ever_held);
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
     let idle = given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds });
     idle.map(|(key, of_movers)| {
@@ -36,7 +36,7 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
 }
 
 /// Returns whether some connector of a chain is, or comes to be, unable to go anywhere.
-fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
+fn is_ever_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
     let mut connectors = spec.start.connectors().iter();
     let mut changes = spec.changes.iter();
     connectors.any(|c| c.mobility != Mobility::Free || c.failed)
@@ -46,7 +46,7 @@ fn is_held<const D: usize>(spec: &ChainSpec<D>) -> bool {
 }
 
 /// Returns a warning on a chain whose agents talk too slowly to move all of it in a cycle.
-fn slow_network<const D: usize>(
+fn slow_network_remark<const D: usize>(
     world: &ChainWorld<D>,
     k: usize,
     spec: &ChainSpec<D>,
@@ -75,12 +75,12 @@ fn slow_network<const D: usize>(
 }
 
 /// Returns a note on joints for whose speed the model gives no limit.
-fn unlimited_speeds<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
     let mut taken = Vec::new();
-    for (joint, speed) in arm.serial.variables.iter().zip(arm.follower.speeds()) {
+    for (joint, speed) in arm.serial.variables.iter().zip(arm.follower.max_speeds()) {
         if joint.max_speed.is_none() {
-            let unit = if joint.motion == JointMotion::Turn { "rad/s" } else { "m/s" };
+            let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
             taken.push(format!("`{}` {speed:.4} {unit}", joint.name));
         }
     }

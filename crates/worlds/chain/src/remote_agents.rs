@@ -1,6 +1,6 @@
 //! The agents of a chain elsewhere: their perception in a cycle, and the decisions that a world takes from them.
 //!
-//! A caller that runs agents in processes of their own asks for [`ChainWorld::percepts_at`], sends each
+//! A caller that runs agents in processes of their own asks for [`ChainWorld::percepts_in_cycle`], sends each
 //! connector's sight to its agent, hands the decisions over ([`ChainWorld::submit_controls`]), and repeats
 //! that until no sights are left: chains that may meet move one after the other. Then it advances the
 //! run by a cycle. A chain for which nothing was handed over talks in memory.
@@ -9,24 +9,28 @@
 //! ([`sidestep_kernel::Simulation::submit_controls`]): in such a cycle no chain talks in memory, and one whose connectors
 //! said nothing stands.
 
-use super::agents::{ChainControls, ChainPercepts, ConnectorControl};
+use super::agents::{ChainAgentControls, ChainPercepts, ConnectorControl};
 use super::deploy::Deployment;
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
-use super::state::ChainState;
+use super::state::ChainWorldState;
 use super::world::ChainWorld;
 use super::{act, claim, join};
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::control::OrderError;
 use sidestep_kernel::ports::ManualClock;
-use sidestep_kernel::{Cycle, EntityId, InputError, PhaseContext, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, InputError, PhaseContext};
 use std::collections::BTreeSet;
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the perception of chains' connectors in the cycle to come, `now`: of those chains whose
     /// turn it is, because those before them have handed over their decisions. Nothing changes. Where no
     /// team is deployed there is no perception.
-    pub fn percepts_at(&self, state: &ChainState<D>, now: Cycle) -> Vec<ChainPercepts<D>> {
+    pub fn percepts_in_cycle(
+        &self,
+        state: &ChainWorldState<D>,
+        now: Cycle,
+    ) -> Vec<ChainPercepts<D>> {
         let state = &state.trial_copy();
         let clock = &ManualClock::default();
         let mut scratch = Scratch::new(self);
@@ -34,13 +38,13 @@ impl<const D: usize> ChainWorld<D> {
         let phase = &mut PhaseContext { world: self, state, now, clock, scratch: &mut scratch };
         let groups = ConflictGroups::new(state.len());
         (0..state.len()).for_each(|slot| claim::claim_box(phase, slot));
-        join::join(phase, 0..state.len(), &groups);
+        join::join_conflict_groups(phase, 0..state.len(), &groups);
         for slot in 0..state.len() {
             let mut perceiver = Perceiver { world: self, state, now, scratch: phase.scratch };
-            let decision = perceiver.decide(slot as Slot);
+            let decision = perceiver.decide(slot as EntitySlot);
             state.set_decision(slot, decision);
         }
-        for slot in (0..state.len() as Slot).filter(|&slot| groups.leader(slot) == slot) {
+        for slot in (0..state.len() as EntitySlot).filter(|&slot| groups.leader(slot) == slot) {
             let mut group = Vec::new();
             groups.members(slot, &mut group);
             group.sort_unstable();
@@ -63,9 +67,9 @@ impl<const D: usize> ChainWorld<D> {
     /// When the chain does not exist, or a decision is not that of its connector in this cycle.
     pub fn submit_controls(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         chain: EntityId,
-        handed: ChainControls<D>,
+        handed: ChainAgentControls<D>,
     ) -> Result<(), InputError> {
         let place = format!("decisions of chain {chain}");
         let Some(spec) = self.chains.get(chain as usize) else {
@@ -80,7 +84,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Reads the decision of a connector for cycle `now`, by its id on the network; none if its agent is gone
-    /// ([`ChainControls::ABSENT_CONTROL`]).
+    /// ([`ChainAgentControls::ABSENT_CONTROL`]).
     ///
     /// # Errors
     /// With the cause, when it is no decision, or none of this connector in this cycle.
@@ -93,7 +97,7 @@ impl<const D: usize> ChainWorld<D> {
         let Some((chain, connector)) = self.find_connector(id) else {
             return Err("there is no such connector; give ids of connectors".into());
         };
-        if bytes == ChainControls::<D>::ABSENT_CONTROL {
+        if bytes == ChainAgentControls::<D>::ABSENT_CONTROL {
             return Ok(None);
         }
         let read = postcard::take_from_bytes::<ConnectorControl<D>>(bytes).ok();
@@ -101,7 +105,7 @@ impl<const D: usize> ChainWorld<D> {
             return Err("its bytes are none of a decision of this build".into());
         };
         let n = self.connector_count(chain);
-        let mut alone = ChainControls::empty(now, n as usize);
+        let mut alone = ChainAgentControls::empty(now, n as usize);
         alone.controls[connector as usize] = Some(control);
         alone.check(n as usize).map_err(|(cause, _)| cause)?;
         Ok(alone.controls.swap_remove(connector as usize))
@@ -111,13 +115,13 @@ impl<const D: usize> ChainWorld<D> {
     ///
     /// # Errors
     /// When one of them is none of its connector in this cycle.
-    pub fn read_controls(
+    pub fn decode_agent_controls(
         &self,
         now: Cycle,
         controls: &[(EntityId, Vec<u8>)],
-    ) -> Result<Vec<ChainControls<D>>, OrderError> {
+    ) -> Result<Vec<ChainAgentControls<D>>, OrderError> {
         let lengths = self.chains.iter().map(|spec| spec.start.points().len());
-        let mut all: Vec<_> = lengths.map(|n| ChainControls::empty(now, n)).collect();
+        let mut all: Vec<_> = lengths.map(|n| ChainAgentControls::empty(now, n)).collect();
         let mut known = BTreeSet::new();
         for (id, bytes) in controls {
             let control = self.read_control(now, *id, bytes);
@@ -146,7 +150,7 @@ impl<const D: usize> ChainWorld<D> {
     /// When the chains are not deployed as teams, or a decision is none of its connector; nothing is recorded then.
     pub(crate) fn record_controls(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         now: Cycle,
         controls: &[(EntityId, Vec<u8>)],
     ) -> Result<(), OrderError> {
@@ -155,7 +159,7 @@ impl<const D: usize> ChainWorld<D> {
                 "one process moves the chains (deployment = \"direct\"); set deployment = \"team\"";
             return Err(OrderError::NoExternalAgents { cause: cause.into() });
         }
-        for (chain, handed) in self.read_controls(now, controls)?.into_iter().enumerate() {
+        for (chain, handed) in self.decode_agent_controls(now, controls)?.into_iter().enumerate() {
             state.body_mut(chain).submitted = Some(handed);
         }
         Ok(())
@@ -168,7 +172,8 @@ impl<const D: usize> ChainWorld<D> {
 
     /// Returns the id on the network of a connector of a chain, if there is one.
     pub fn connector_id(&self, chain: EntityId, connector: u32) -> Option<EntityId> {
-        (connector < self.connector_count(chain)).then(|| self.first_id(chain) + connector)
+        (connector < self.connector_count(chain))
+            .then(|| self.first_connector_id(chain) + connector)
     }
 
     /// Returns the chain of a connector and its number there, by its id on the network.

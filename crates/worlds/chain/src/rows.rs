@@ -2,14 +2,14 @@
 
 use super::events::{Event, EventKind};
 use super::scenario::RecordSection;
-use super::state::ChainState;
+use super::state::ChainWorldState;
 use super::swarm::drive::Pose2;
 use super::world::ChainWorld;
 use sidestep_kernel::ports::table::label_index;
-use sidestep_kernel::ports::{Buffer, Buffers, RowBuffer, Table};
+use sidestep_kernel::ports::{Table, TableBuffer, TableBuffers, TableRowsBuffer};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::VetoReason;
-use sidestep_rods::geometry::{ConvexCore, Point, with_dimensions};
+use sidestep_rods::geometry::{ConvexCore, Point, convert_dimensions};
 
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ struct JointRow {
 }
 
 /// Adds as many columns as there are dimensions, from x on.
-fn add_axis_columns(table: Table<PositionRow>, dimensions: usize) -> Table<PositionRow> {
+fn add_position_columns(table: Table<PositionRow>, dimensions: usize) -> Table<PositionRow> {
     let axes = ["x_m", "y_m", "z_m"].into_iter().take(dimensions).enumerate();
     axes.fold(table, |table, (i, axis)| table.f64(axis, "position", move |p| p.at[i]))
 }
@@ -48,7 +48,7 @@ fn trajectories_table(dimensions: usize) -> Table<PositionRow> {
         "its index",
         |p| p.id,
     );
-    add_axis_columns(table, dimensions)
+    add_position_columns(table, dimensions)
 }
 
 fn robots_table() -> Table<PositionRow> {
@@ -69,7 +69,10 @@ fn joints_table() -> Table<JointRow> {
 }
 
 fn movers_table(dimensions: usize) -> Table<PositionRow> {
-    add_axis_columns(position_table("movers").u32("obstacle", "its number", |p| p.id), dimensions)
+    add_position_columns(
+        position_table("movers").u32("obstacle", "its number", |p| p.id),
+        dimensions,
+    )
 }
 
 fn events_table() -> Table<Event> {
@@ -93,11 +96,11 @@ fn events_table() -> Table<Event> {
 #[derive(Debug, Default)]
 pub(super) struct RecordBuffers {
     record: RecordSection,
-    trajectories: RowBuffer<PositionRow>,
-    joints: RowBuffer<JointRow>,
-    robots: RowBuffer<PositionRow>,
-    movers: RowBuffer<PositionRow>,
-    events: RowBuffer<Event>,
+    trajectories: TableRowsBuffer<PositionRow>,
+    joints: TableRowsBuffer<JointRow>,
+    robots: TableRowsBuffer<PositionRow>,
+    movers: TableRowsBuffer<PositionRow>,
+    events: TableRowsBuffer<Event>,
 }
 
 impl RecordBuffers {
@@ -112,7 +115,7 @@ impl RecordBuffers {
     }
 
     /// Returns whether controls from outside of the run are to be kept.
-    pub(super) fn keeps_controls(&self) -> bool {
+    pub(super) fn records_controls(&self) -> bool {
         self.record.controls
     }
 
@@ -122,18 +125,18 @@ impl RecordBuffers {
         let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
         let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
-        self.trajectories.start(record.trajectories.then(|| trajectories_table(D)));
-        self.joints.start((record.joints && has_arms).then(joints_table));
-        self.robots.start((record.robots && has_robots).then(robots_table));
-        self.movers.start((record.movers && has_movers).then(|| movers_table(D)));
-        self.events.start(record.events.then(events_table));
+        self.trajectories.set_table(record.trajectories.then(|| trajectories_table(D)));
+        self.joints.set_table((record.joints && has_arms).then(joints_table));
+        self.robots.set_table((record.robots && has_robots).then(robots_table));
+        self.movers.set_table((record.movers && has_movers).then(|| movers_table(D)));
+        self.events.set_table(record.events.then(events_table));
     }
 
     /// Keeps the positions of everything at the start of cycle `now`.
     pub(super) fn record_positions<const D: usize>(
         &mut self,
         world: &ChainWorld<D>,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         now: Cycle,
     ) {
         if !now.is_multiple_of(self.record.every) {
@@ -141,9 +144,13 @@ impl RecordBuffers {
         }
         if self.trajectories.is_enabled() {
             // Positions are read in each cycle that is recorded.
-            state.catch_up();
+            state.apply_deferred_motions();
             for slot in 0..state.len() {
-                self.trajectories.extend(connectors(now, slot, state.body(slot).chain.points()));
+                self.trajectories.extend(connector_rows(
+                    now,
+                    slot,
+                    state.body(slot).chain.points(),
+                ));
             }
         }
         if self.joints.is_enabled() {
@@ -165,8 +172,8 @@ impl RecordBuffers {
             }
         }
         if self.movers.is_enabled() {
-            for mover in world.movers.at(world.start_time_s(now)) {
-                let at = with_dimensions(middle(&mover.core));
+            for mover in world.movers.at(world.cycle_start_time_s(now)) {
+                let at = convert_dimensions(middle(&mover.core));
                 self.movers.push(PositionRow { cycle: now, chain: 0, id: mover.id, at });
             }
         }
@@ -177,7 +184,7 @@ impl RecordBuffers {
     }
 }
 
-fn connectors<const D: usize>(
+fn connector_rows<const D: usize>(
     cycle: Cycle,
     slot: usize,
     points: &[Point<D>],
@@ -187,7 +194,7 @@ fn connectors<const D: usize>(
         cycle,
         chain,
         id,
-        at: with_dimensions(*at),
+        at: convert_dimensions(*at),
     })
 }
 
@@ -200,12 +207,12 @@ fn middle<const D: usize>(core: &ConvexCore<D>) -> [f64; D] {
     }
 }
 
-impl Buffers for RecordBuffers {
-    fn buffers(&self) -> Vec<&dyn Buffer> {
+impl TableBuffers for RecordBuffers {
+    fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
         vec![&self.trajectories, &self.joints, &self.robots, &self.movers, &self.events]
     }
 
-    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+    fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
         vec![
             &mut self.trajectories,
             &mut self.joints,

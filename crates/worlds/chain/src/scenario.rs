@@ -16,14 +16,14 @@ mod tasks;
 mod tests;
 
 use super::deploy::deployment::Deployment;
-use super::ground::{MovingObstacles, Site};
+use super::ground::{GroundMap, MovingObstacles};
 use super::motion::escape::{EscapeMethod, ObstacleEscapeRules};
 use super::motion::recovery::RecoveryLimits;
-use super::own_parts::OwnParts;
+use super::own_parts::CustomBehaviors;
 use super::world::{ChainSpec, ChainWorld};
 use chains::ChainSection;
 use network::NetworkSection;
-use obstacles::{FieldSection, GroundObstacles, GroundSection, ObstacleSection, to_dimensions};
+use obstacles::{FieldSection, GroundSection, ObstacleSection, ScenarioObstacles, to_dimensions};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -69,13 +69,13 @@ const FAST_FACTOR: f64 = 2.0;
 /// A length, time or speed.
 type PositiveNumber = Number<LeftOpen<0, 1_000_000>>;
 /// A place or a direction.
-type PointValue<const D: usize> = sidestep_scenario::Point<D, CoordinateRule>;
+type PointValue<const D: usize> = sidestep_scenario::Point<D, CoordinateRangeRule>;
 
 /// Coordinates that a world accepts.
 #[derive(Debug, Clone, Copy)]
-struct CoordinateRule;
+struct CoordinateRangeRule;
 
-impl Rule for CoordinateRule {
+impl Rule for CoordinateRangeRule {
     fn allows(number: f64) -> bool {
         number.abs() <= MAX_VALUE
     }
@@ -113,9 +113,9 @@ impl Rule for PositiveRule {
 
 /// Numbers above 0 up to 1e6.
 #[derive(Debug, Clone, Copy)]
-struct StepLimitRule;
+struct StepLimitValueRule;
 
-impl Rule for StepLimitRule {
+impl Rule for StepLimitValueRule {
     fn allows(number: f64) -> bool {
         number > 0.0 && (number <= MAX_VALUE || number == f64::INFINITY)
     }
@@ -164,7 +164,7 @@ impl<const D: usize> JsonSchema for BoxSection<D> {
 
 impl<const D: usize> BoxSection<D> {
     /// Returns the floor of the box.
-    fn floor(&self) -> Aabb<2> {
+    fn footprint(&self) -> Aabb<2> {
         Aabb { lo: to_dimensions(self.0.lo), hi: to_dimensions(self.0.hi) }
     }
 }
@@ -184,7 +184,7 @@ struct ShapeSection {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "ChainFile")]
-struct ChainFile<const D: usize> {
+struct ChainScenarioFile<const D: usize> {
     #[serde(default)]
     chain: RulesSection,
     #[serde(default)]
@@ -202,9 +202,9 @@ struct ChainFile<const D: usize> {
 
 /// Returns the JSON Schema of a scenario's sections, with places in the plane and in space; `own` are drivers and
 /// reactions beside the built-in ones.
-pub(super) fn sections_schema(own: &OwnParts) -> Value {
-    let plane = schema::for_type::<ChainFile<2>>();
-    let mut sections = schema::widened(&plane, &schema::for_type::<ChainFile<3>>());
+pub(super) fn sections_schema(own: &CustomBehaviors) -> Value {
+    let plane = schema::for_type::<ChainScenarioFile<2>>();
+    let mut sections = schema::widened(&plane, &schema::for_type::<ChainScenarioFile<3>>());
     schema::add_names(&mut sections, "Kind", own.drivers.keys().map(String::as_str));
     schema::add_names(&mut sections, "RotationWord", own.reactions.keys().map(String::as_str));
     sections
@@ -229,7 +229,7 @@ struct RulesSection {
     dt_s: Option<PositiveNumber>,
     rotation: ByName<RotationWord>,
     self_collision: Option<bool>,
-    slave_step_max_m: Option<Number<StepLimitRule>>,
+    slave_step_max_m: Option<Number<StepLimitValueRule>>,
     joint_speed_m_s: Option<Number<PositiveRule>>,
     step_m: Option<PositiveNumber>,
     backtracks: Option<usize>,
@@ -327,14 +327,17 @@ impl AnyChainScenario {
     /// # Errors
     /// With place, line, column, cause and remedy for anything that is wrong in the scenario.
     pub fn new(source: &Source) -> Result<Self, InputError> {
-        Self::with_parts(source, &OwnParts::default())
+        Self::with_custom_behaviors(source, &CustomBehaviors::default())
     }
 
     /// Compiles a scenario that may name drivers and reactions beside the built-in ones.
     ///
     /// # Errors
     /// The same.
-    pub fn with_parts(source: &Source, own: &OwnParts) -> Result<Self, InputError> {
+    pub fn with_custom_behaviors(
+        source: &Source,
+        own: &CustomBehaviors,
+    ) -> Result<Self, InputError> {
         let dimensions = source.parse::<Shape>()?.chain.dimensions;
         match dimensions.as_ref().map_or(2, |n| *n.get_ref()) {
             2 => compile_scenario(source, own).map(Self::Plane),
@@ -349,7 +352,7 @@ impl AnyChainScenario {
 
 fn compile_scenario<const D: usize>(
     source: &Source,
-    own: &OwnParts,
+    own: &CustomBehaviors,
 ) -> Result<ChainScenario<D>, InputError> {
     let (head, file) = source.parse_world()?;
     ScenarioSpec::new(source, head, file, own)?.compile()
@@ -367,22 +370,22 @@ impl<const D: usize> ChainScenario<D> {
             let cause = format!("the scenario has {dimensions} dimensions");
             return Err(source.error(None, cause, format!("set chain.dimensions to {D}")));
         }
-        compile_scenario(source, &OwnParts::default())
+        compile_scenario(source, &CustomBehaviors::default())
     }
 }
 
-struct Compiler<'a, const D: usize> {
+struct ChainScenarioCompiler<'a, const D: usize> {
     source: &'a Source,
     head: &'a Head,
-    file: &'a ChainFile<D>,
-    site: Option<&'a Site>,
+    file: &'a ChainScenarioFile<D>,
+    site: Option<&'a GroundMap>,
     /// The same world with another seed, if there is one already.
     known: Option<&'a ChainWorld<D>>,
     /// Drivers and reactions beside the built-in ones.
-    own: &'a OwnParts,
+    own: &'a CustomBehaviors,
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     fn compile(&self) -> Result<ChainScenario<D>, InputError> {
         self.check_escape_keys()?;
         let cycles = self.head.cycles.unwrap_or(DEFAULT_CYCLES);
@@ -406,7 +409,7 @@ impl<const D: usize> Compiler<'_, D> {
             Some(known) => Arc::clone(&known.chains),
             None => Arc::new(self.chains(dt_s, self.site)?),
         };
-        let ground = self.ground(self.site, &chains)?;
+        let ground = self.compile_ground(self.site, &chains)?;
         self.check_starts(&chains, &ground)?;
         let connectors = chains.iter().flat_map(|spec| spec.start.connectors());
         let largest_m = connectors.map(|c| c.radius_m).fold(MIN_LOOK_RADIUS_M, f64::max);
@@ -416,7 +419,7 @@ impl<const D: usize> Compiler<'_, D> {
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let rules = ReactionRules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
         let network = self.network(dt_s, &chains)?;
-        self.check_local(&chains, &rules, escape.is_some())?;
+        self.check_local_knowledge(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {
             chains,
             cycles,
@@ -443,7 +446,7 @@ impl<const D: usize> Compiler<'_, D> {
 
     /// Runs the scripts once, so that they cannot fail during a run.
     fn check_scripts(&self, compiled: &ChainScenario<D>) -> Result<(), InputError> {
-        super::state::ChainState::new(&compiled.world).map(drop)
+        super::state::ChainWorldState::new(&compiled.world).map(drop)
     }
 
     /// Returns the rule by which chains escape; none if nothing moves. By default chains escape at
@@ -500,7 +503,7 @@ impl<const D: usize> Compiler<'_, D> {
     fn slave_step_max_m(
         &self,
         chains: &[ChainSpec<D>],
-        ground: &GroundObstacles<D>,
+        ground: &ScenarioObstacles<D>,
         escape: Option<&ObstacleEscapeRules>,
         dt_s: f64,
     ) -> f64 {

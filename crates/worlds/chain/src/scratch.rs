@@ -3,12 +3,12 @@
 use super::agents::percept::ChainPercepts;
 use super::events::Event;
 use super::motion::escape::ObstacleEscaper;
-use super::state::{ChainBodyState, ChainState};
+use super::state::{ChainBodyState, ChainWorldState};
 use super::swarm::laser::{LaserScan, RobotBody};
 use super::trace::InspectionTrace;
-use super::world::{ChainWorld, OTHER_CHAIN, push_parts};
-use sidestep_kernel::{Cycle, Slot};
-use sidestep_rods::geometry::{Point, with_dimensions};
+use super::world::{ChainWorld, OTHER_CHAIN, push_part_obstacles};
+use sidestep_kernel::{Cycle, EntitySlot};
+use sidestep_rods::geometry::{Point, convert_dimensions};
 use sidestep_rods::{Obstacle, Obstacles, Propagator, RodBvh};
 
 /// A worker's buffers, kept between tasks.
@@ -21,7 +21,7 @@ pub struct Scratch<const D: usize> {
     /// Robots that another robot can perceive.
     pub(crate) robot_bodies: Vec<RobotBody>,
     /// Chains near a robot.
-    pub(crate) near: Vec<Slot>,
+    pub(crate) near: Vec<EntitySlot>,
     pub(crate) scan: LaserScan,
     /// Boxes around a chain's rods.
     pub(crate) own_rods: RodBvh<D>,
@@ -94,9 +94,9 @@ impl<const D: usize> NearbyObstacles<D> {
     pub(crate) fn gather(
         &mut self,
         world: &ChainWorld<D>,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         moment: Cycle,
-        others: impl Iterator<Item = Slot>,
+        others: impl Iterator<Item = EntitySlot>,
     ) {
         const CHECKED: &str = "movers and chains were checked when the scenario was compiled";
         let mut others = others.peekable();
@@ -106,25 +106,25 @@ impl<const D: usize> NearbyObstacles<D> {
             return;
         }
         self.movers.clear();
-        let movers = world.movers.at(world.start_time_s(moment));
+        let movers = world.movers.at(world.cycle_start_time_s(moment));
         self.movers.extend(movers.filter(Obstacle::is_in_range));
         let mover_count = self.movers.len();
-        let others: Vec<Slot> = others.collect();
+        let others: Vec<EntitySlot> = others.collect();
         if has_others {
-            others.iter().for_each(|&slot| push_robots(&mut self.movers, slot, state));
-            self.solid.set_moving(&self.movers).expect(CHECKED);
+            others.iter().for_each(|&slot| push_solid_parts(&mut self.movers, slot, state));
+            self.solid.replace_moving(&self.movers).expect(CHECKED);
             self.movers.truncate(mover_count);
         }
         for slot in others {
-            push_parts(&mut self.movers, slot, &state.body(slot as usize).chain);
+            push_part_obstacles(&mut self.movers, slot, &state.body(slot as usize).chain);
         }
-        self.all.set_moving(&self.movers).expect(CHECKED);
+        self.all.replace_moving(&self.movers).expect(CHECKED);
         self.moment = Some(moment);
         self.has_others = has_others;
     }
 
     /// Returns the obstacles that are solid to robots: of other chains the robots, not the rods.
-    pub(crate) fn solid(&self) -> &Obstacles<D> {
+    pub(crate) fn solid_to_robots(&self) -> &Obstacles<D> {
         if self.has_others { &self.solid } else { &self.all }
     }
 }
@@ -148,12 +148,16 @@ impl<const D: usize> PositionBuffer<D> {
 
 /// Adds the parts of a chain that robots can touch: its robots, or its connectors and rods if it
 /// has none.
-fn push_robots<const D: usize>(parts: &mut Vec<Obstacle<D>>, slot: Slot, state: &ChainState<D>) {
+fn push_solid_parts<const D: usize>(
+    parts: &mut Vec<Obstacle<D>>,
+    slot: EntitySlot,
+    state: &ChainWorldState<D>,
+) {
     let body = state.body(slot as usize);
     if body.robots.is_empty() {
-        return push_parts(parts, slot, &body.chain);
+        return push_part_obstacles(parts, slot, &body.chain);
     }
     parts.extend(body.solids().map(|(_, robot)| {
-        Obstacle::ball(OTHER_CHAIN + slot, with_dimensions(robot.at), robot.radius_m)
+        Obstacle::ball(OTHER_CHAIN + slot, convert_dimensions(robot.at), robot.radius_m)
     }));
 }

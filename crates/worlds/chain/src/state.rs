@@ -4,7 +4,9 @@ mod body;
 mod snapshot;
 
 pub use body::ChainBodyState;
-pub(crate) use body::{MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten};
+pub(crate) use body::{
+    MissingNeighbors, MotionPlan, ScatteredPartState, Standstill, flatten, unflatten,
+};
 pub(crate) use snapshot::Snapshot;
 
 use super::metrics::ChainTally;
@@ -12,7 +14,7 @@ use super::neighbors::ClaimIndex;
 use super::swarm::leader::LeaderDecision;
 use super::world::ChainWorld;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::{Cycle, EntityId, InputError, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, InputError};
 use sidestep_rods::geometry::{Aabb, Point};
 use sidestep_rods::{SpatialGrid, bounds_around};
 use snapshot::{SnapshotComponent, SnapshotComponentRecords};
@@ -27,8 +29,8 @@ const ROUNDING_M: f64 = 1e-6;
 
 /// State of a world of chains; slots are ids.
 #[derive(Debug)]
-pub struct ChainState<const D: usize> {
-    cells: Box<[ChainEntry<D>]>,
+pub struct ChainWorldState<const D: usize> {
+    cells: Box<[ChainStateCell<D>]>,
     /// Number of claims ever made, by which workers see whether sorted claims are out of date.
     claims: AtomicU64,
     /// The claims of this cycle, sorted by the first worker that needs them.
@@ -42,7 +44,7 @@ pub struct ChainState<const D: usize> {
 /// One chain's share of the state. No worker ever waits for one of its locks: in the first phase all workers
 /// only read the bodies, and in the last phase only the one worker that has a group writes its bodies.
 #[derive(Debug)]
-struct ChainEntry<const D: usize> {
+struct ChainStateCell<const D: usize> {
     body: RwLock<ChainBodyState<D>>,
     /// The box that the chain may enter during this cycle.
     claim: Mutex<Aabb<D>>,
@@ -50,7 +52,7 @@ struct ChainEntry<const D: usize> {
     decision: Mutex<Option<LeaderDecision>>,
 }
 
-impl<const D: usize> ChainEntry<D> {
+impl<const D: usize> ChainStateCell<D> {
     fn new(body: ChainBodyState<D>) -> Self {
         Self {
             body: RwLock::new(body),
@@ -80,10 +82,10 @@ impl<const D: usize> Deref for ChainBodyStateRef<'_, D> {
     }
 }
 
-impl<const D: usize> ChainState<D> {
+impl<const D: usize> ChainWorldState<D> {
     fn from_bodies(bodies: impl Iterator<Item = ChainBodyState<D>>) -> Self {
         Self {
-            cells: bodies.map(ChainEntry::new).collect(),
+            cells: bodies.map(ChainStateCell::new).collect(),
             claims: AtomicU64::new(0),
             neighbors: RwLock::default(),
             has_changed: AtomicBool::new(true),
@@ -138,33 +140,36 @@ impl<const D: usize> ChainState<D> {
 
     /// Returns one chain, for reading: it is as if it had followed its deferred motions, and keeps them.
     pub fn body(&self, slot: usize) -> ChainBodyStateRef<'_, D> {
-        let body = self.deferred_body(slot);
+        let body = self.body_with_deferred_motions(slot);
         if body.deferred.is_empty() {
             return ChainBodyStateRef::Locked(body);
         }
         let mut followed = Box::new(body.clone());
-        followed.catch_up();
+        followed.apply_deferred_motions();
         ChainBodyStateRef::Followed(followed)
     }
 
     /// Lets all chains follow their deferred motions. A caller that reads them in each cycle does this first,
     /// because otherwise each read makes a copy that follows them.
-    pub(crate) fn catch_up(&self) {
+    pub(crate) fn apply_deferred_motions(&self) {
         for slot in 0..self.len() {
-            if !self.deferred_body(slot).deferred.is_empty() {
-                self.body_mut(slot).catch_up();
+            if !self.body_with_deferred_motions(slot).deferred.is_empty() {
+                self.body_mut(slot).apply_deferred_motions();
             }
         }
     }
 
     /// Locks one chain for reading as it is: all connectors except the initiator may have motions still to follow.
-    pub(crate) fn deferred_body(&self, slot: usize) -> RwLockReadGuard<'_, ChainBodyState<D>> {
+    pub(crate) fn body_with_deferred_motions(
+        &self,
+        slot: usize,
+    ) -> RwLockReadGuard<'_, ChainBodyState<D>> {
         self.cells[slot].body.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns whether the decisions of a chain's agents for a cycle were submitted, and are not carried out yet.
     pub fn has_submitted_controls(&self, slot: usize, cycle: Cycle) -> bool {
-        let body = self.deferred_body(slot);
+        let body = self.body_with_deferred_motions(slot);
         body.submitted.as_ref().is_some_and(|submitted| submitted.cycle == cycle)
     }
 
@@ -183,7 +188,7 @@ impl<const D: usize> ChainState<D> {
     }
 
     /// Returns the claims by their lower ends; valid while no chain claims anything.
-    pub(crate) fn neighbors(&self) -> RwLockReadGuard<'_, ClaimIndex<D>> {
+    pub(crate) fn claim_index(&self) -> RwLockReadGuard<'_, ClaimIndex<D>> {
         let made = self.claims.load(Relaxed);
         refresh_if_stale(
             &self.neighbors,
@@ -194,10 +199,10 @@ impl<const D: usize> ChainState<D> {
 
     /// Lists, in order, all chains with a solid part within a distance of a point, and perhaps some others nearby;
     /// valid while no body changes.
-    pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<Slot>) {
+    pub(crate) fn list_near(&self, at: Point<2>, range_m: f64, slots: &mut Vec<EntitySlot>) {
         slots.clear();
         if self.len() <= MAX_LINEAR_SCAN {
-            return slots.extend(0..self.len() as Slot);
+            return slots.extend(0..self.len() as EntitySlot);
         }
         let crowd = refresh_if_stale(
             &self.crowd,
@@ -208,7 +213,9 @@ impl<const D: usize> ChainState<D> {
                 self.has_changed.store(false, Relaxed);
             },
         );
-        crowd.visit(&bounds_around(at, range_m).grown(ROUNDING_M), |slot| slots.push(slot as Slot));
+        crowd.visit(&bounds_around(at, range_m).grown(ROUNDING_M), |slot| {
+            slots.push(slot as EntitySlot)
+        });
         slots.sort_unstable();
     }
 
@@ -255,7 +262,7 @@ impl<const D: usize> ChainState<D> {
         for slot in 0..self.len() {
             // Deferred motions change places and sums, and no component.
             // Deferred motions change the chain alone, no component, so the body is not copied to follow them.
-            if let Some(record) = component(&self.deferred_body(slot)).save(cycle) {
+            if let Some(record) = component(&self.body_with_deferred_motions(slot)).save(cycle) {
                 records.push((slot as EntityId, record));
             }
         }

@@ -1,21 +1,24 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
 use super::deploy::deployment::Deployment;
-use super::metrics::{ChainAbandonedTaskPart, Metrics, RobotMetrics};
+use super::metrics::{ChainAbandonedSubtask, Metrics, RobotMetrics};
 use super::scenario::ChainScenario;
 use super::state::Snapshot;
 use serde_json::{Value, json};
 use sidestep_kernel::World;
 use sidestep_kernel::text::{
-    KeyValues, StateDescription, align_pairs, format_fixed, group_thousands, key_value,
+    KeyValues, StateReport, align_pairs, format_fixed, group_thousands, key_value_pair,
 };
 
 /// Returns what a scenario has and how long it lasts, before it runs.
-pub(super) fn contents<const D: usize>(compiled: &ChainScenario<D>) -> StateDescription {
-    StateDescription { json: contents_json(compiled), text: align_pairs(&contents_lines(compiled)) }
+pub(super) fn describe_scenario<const D: usize>(compiled: &ChainScenario<D>) -> StateReport {
+    StateReport {
+        json: scenario_contents_json(compiled),
+        text: align_pairs(&scenario_contents_lines(compiled)),
+    }
 }
 
-fn contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
+fn scenario_contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
     let world = &compiled.world;
     let rods: usize = world.chains.iter().map(|spec| spec.start.rods().len()).sum();
     let plan = compiled.plan();
@@ -24,7 +27,7 @@ fn contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
         "seed": plan.seed,
         "cycles": plan.cycles,
         "chains": world.chains.len(),
-        "connectors": world.agents(),
+        "connectors": world.agent_count(),
         "rods": rods,
         "obstacles": world.obstacles.still().len(),
         "movers": world.movers.len(),
@@ -34,20 +37,23 @@ fn contents_json<const D: usize>(compiled: &ChainScenario<D>) -> Value {
     })
 }
 
-fn contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
+fn scenario_contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
     let world = &compiled.world;
     let plan = compiled.plan();
     let chains = group_thousands(world.chains.len() as u64);
-    let parts = group_thousands(world.agents() as u64);
+    let parts = group_thousands(world.agent_count() as u64);
     let still = group_thousands(world.obstacles.still().len() as u64);
     let moving = group_thousands(world.movers.len() as u64);
     let cycles = group_thousands(plan.cycles);
     let dt_s = world.dt_s;
     let lasts_s = plan.cycles as f64 * dt_s;
     let mut lines = vec![
-        key_value("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
-        key_value("obstacles", format!("{still}, and {moving} that move")),
-        key_value("run", format!("{cycles} cycles of {dt_s} s ({lasts_s} s), seed {}", plan.seed)),
+        key_value_pair("chains", format!("{chains}, of {parts} connectors in {D} dimensions")),
+        key_value_pair("obstacles", format!("{still}, and {moving} that move")),
+        key_value_pair(
+            "run",
+            format!("{cycles} cycles of {dt_s} s ({lasts_s} s), seed {}", plan.seed),
+        ),
     ];
     if world.deployment == Deployment::Team {
         let network = match &world.network {
@@ -60,12 +66,12 @@ fn contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyValues {
             ),
         };
         let words = format!("an agent per connector; the network: {network}");
-        lines.push(key_value("deployment", words));
+        lines.push(key_value_pair("deployment", words));
     }
     lines
 }
 
-pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> StateDescription {
+pub(super) fn describe_poses<const D: usize>(snapshot: &Snapshot) -> StateReport {
     let mut rows = Vec::new();
     let axes: String =
         ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
@@ -77,25 +83,25 @@ pub(super) fn poses<const D: usize>(snapshot: &Snapshot) -> StateDescription {
             text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
         }
     }
-    StateDescription { json: Value::Array(rows), text }
+    StateReport { json: Value::Array(rows), text }
 }
 
 /// Returns the outcome of a run; what did not occur is mostly left out.
 pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
-    let mut lines = motion(m);
+    let mut lines = motion_lines(m);
     lines.extend(m.robots.as_ref().map(robots));
     lines.extend(recovery_text(m));
     lines.extend(network(m));
     if m.reformed > 0 {
-        lines.push(key_value("re-formed", format!("{} times", group_thousands(m.reformed))));
+        lines.push(key_value_pair("re-formed", format!("{} times", group_thousands(m.reformed))));
     }
     if m.not_reformed > 0 {
-        lines.push(key_value("NOT re-formed", not_reformed_text(m)));
+        lines.push(key_value_pair("NOT re-formed", not_reformed_text(m)));
     }
-    lines.extend(m.given_up.iter().take(MAX_LISTED_PARTS).map(abandoned_part_text));
+    lines.extend(m.given_up.iter().take(MAX_LISTED_PARTS).map(abandoned_task_text));
     if m.given_up.len() > MAX_LISTED_PARTS {
         let more = group_thousands((m.given_up.len() - MAX_LISTED_PARTS) as u64);
-        lines.push(key_value("given up", format!("and {more} more")));
+        lines.push(key_value_pair("given up", format!("and {more} more")));
     }
     lines
 }
@@ -103,7 +109,7 @@ pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
 /// Length below which a rod out of its limits is a matter of rounding, m.
 const ROUNDING_M: f64 = 1e-9;
 
-fn rods_text(violation_m: f64) -> String {
+fn rod_violation_text(violation_m: f64) -> String {
     if violation_m <= ROUNDING_M {
         "within their limits".into()
     } else {
@@ -112,7 +118,7 @@ fn rods_text(violation_m: f64) -> String {
 }
 
 /// Returns the chains' progress, its cost, and the limits that they kept.
-fn motion(m: &Metrics) -> KeyValues {
+fn motion_lines(m: &Metrics) -> KeyValues {
     let clearance = match m.min_clearance_m {
         None => "nothing came near".into(),
         Some(c) if c.abs() < TOUCH_M => "touched".into(),
@@ -131,20 +137,23 @@ fn motion(m: &Metrics) -> KeyValues {
     let moved = m.moved_per_step;
     let turned = group_thousands(m.rotations);
     let mut lines = vec![
-        key_value("progress", format!("{:.1} %", 100.0 * m.progress)),
-        key_value("vetoes", vetoes_text(m)),
-        key_value("penetrations", penetrations),
-        key_value("least clearance", clearance),
-        key_value("rods", rods_text(m.max_rod_violation_m)),
-        key_value("effort", format!("{moved:.1} connectors moved per step, {turned} rods turned")),
-        key_value("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
+        key_value_pair("progress", format!("{:.1} %", 100.0 * m.progress)),
+        key_value_pair("vetoes", vetoes_text(m)),
+        key_value_pair("penetrations", penetrations),
+        key_value_pair("least clearance", clearance),
+        key_value_pair("rods", rod_violation_text(m.max_rod_violation_m)),
+        key_value_pair(
+            "effort",
+            format!("{moved:.1} connectors moved per step, {turned} rods turned"),
+        ),
+        key_value_pair("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
     ];
-    lines.extend(m.min_own_gap_m.map(|gap_m| key_value("own parts", own_parts_text(gap_m))));
+    lines.extend(m.min_own_gap_m.map(|gap_m| key_value_pair("own parts", own_gap_text(gap_m))));
     lines
 }
 
 /// Returns how near the parts of a chain came to each other.
-fn own_parts_text(gap_m: f64) -> String {
+fn own_gap_text(gap_m: f64) -> String {
     match gap_m {
         overlap_m if overlap_m < -TOUCH_M => {
             format!("overlapped by up to {} m", format_fixed(-gap_m, 4))
@@ -162,7 +171,7 @@ fn robots(robots: &RobotMetrics) -> (String, String) {
     };
     let mean_m = robots.mean_lag_m;
     let max_m = robots.max_lag_m;
-    key_value(
+    key_value_pair(
         "robots",
         format!(
             "{bumpers}; behind their connectors by {mean_m:.2} m on average, {max_m:.2} m at most"
@@ -200,8 +209,8 @@ fn recovery_text(m: &Metrics) -> KeyValues {
         (escapes.capped, "of these too slow"),
     ]);
     let mut lines = KeyValues::new();
-    lines.extend(went_on.map(|counts| key_value("after vetoes", counts)));
-    lines.extend(escaped.map(|counts| key_value("escapes", counts)));
+    lines.extend(went_on.map(|counts| key_value_pair("after vetoes", counts)));
+    lines.extend(escaped.map(|counts| key_value_pair("escapes", counts)));
     lines
 }
 
@@ -218,7 +227,7 @@ fn network(m: &Metrics) -> KeyValues {
     let mut lines = KeyValues::new();
     if m.messages > 0 {
         let sent = format!("{}, {} bytes", group_thousands(m.messages), group_thousands(m.bytes));
-        lines.push(key_value("messages", sent));
+        lines.push(key_value_pair("messages", sent));
     }
     let faults = count_list(&[
         (m.contacts_lost, "contacts lost"),
@@ -226,7 +235,7 @@ fn network(m: &Metrics) -> KeyValues {
         (m.stood, "steps stood because of that"),
         (m.dropped, "messages that made no sense"),
     ]);
-    lines.extend(faults.map(|faults| key_value("network", faults)));
+    lines.extend(faults.map(|faults| key_value_pair("network", faults)));
     lines
 }
 
@@ -244,7 +253,7 @@ fn vetoes_text(m: &Metrics) -> String {
     format!("{}: {}", group_thousands(m.vetoes), reasons.collect::<Vec<_>>().join(", "))
 }
 
-fn abandoned_part_text(abandoned: &ChainAbandonedTaskPart) -> (String, String) {
+fn abandoned_task_text(abandoned: &ChainAbandonedSubtask) -> (String, String) {
     let what = &abandoned.what;
     let why = match (&what.by, &what.reason) {
         (Some(by), Some(reason)) => format!("connector {by} objected: {reason}"),
@@ -256,5 +265,5 @@ fn abandoned_part_text(abandoned: &ChainAbandonedTaskPart) -> (String, String) {
         String::new()
     };
     let who = format!("chain {}, task {}, part {}", abandoned.chain, what.task, what.part);
-    key_value("given up", format!("{who}{nearest}; {why}"))
+    key_value_pair("given up", format!("{who}{nearest}; {why}"))
 }

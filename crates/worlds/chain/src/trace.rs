@@ -1,7 +1,7 @@
 //! What an inspection records of a chain while it acts.
 
 use crate::motion::recovery::RecoveryOutcome;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_rods::Veto;
 use sidestep_rods::geometry::Point;
 
@@ -9,7 +9,7 @@ use sidestep_rods::geometry::Point;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct InspectionTrace<const D: usize> {
     /// The chain that is inspected; all others record nothing.
-    pub(crate) slot: Slot,
+    pub(crate) slot: EntitySlot,
     /// The move that its driver wanted.
     pub(crate) intended: Option<IntendedMove<D>>,
     /// The outcome of its initiator's recovery ladder.

@@ -5,15 +5,15 @@ use super::events::{Event, EventKind};
 use super::navigate::NavigationGoal;
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
-use super::state::{ChainBodyState as ChainBody, ChainState};
+use super::state::{ChainBodyState as ChainBody, ChainWorldState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use crate::kinds;
 use sidestep_kernel::view::{
-    Body, BodyId, BodyKind, Condition, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
+    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
     Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
 };
-use sidestep_kernel::{Cycle, EntityId, Slot};
-use sidestep_rods::geometry::{ConvexCore, Cuboid, cross, with_dimensions};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
+use sidestep_rods::geometry::{ConvexCore, Cuboid, convert_dimensions, cross};
 use sidestep_rods::{Chain, Obstacle};
 use std::ops::RangeInclusive;
 
@@ -66,21 +66,28 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Returns all chains by id, then the moving obstacles.
-    pub(crate) fn visible_bodies(&self, state: &ChainState<D>, now: Cycle) -> Vec<Body> {
+    pub(crate) fn view_bodies(&self, state: &ChainWorldState<D>, now: Cycle) -> Vec<Body> {
         let mut bodies = Vec::new();
         for (id, spec) in (0..).zip(self.chains.iter()) {
-            push_chain(&mut bodies, id, spec, &state.body(id as usize));
+            push_chain_bodies(&mut bodies, id, spec, &state.body(id as usize));
         }
-        bodies.extend(self.movers.at(self.start_time_s(now)).map(|mover| obstacle_body(&mover)));
+        bodies.extend(
+            self.movers.at(self.cycle_start_time_s(now)).map(|mover| obstacle_body(&mover)),
+        );
         bodies
     }
 
     /// Returns the laser scans that leaders on wheels are about to take.
-    pub(crate) fn scans(&self, state: &ChainState<D>, now: Cycle, of: &ScanSelection) -> Vec<Scan> {
+    pub(crate) fn scans(
+        &self,
+        state: &ChainWorldState<D>,
+        now: Cycle,
+        of: &ScanSelection,
+    ) -> Vec<Scan> {
         let scratch = &mut Scratch::new(self);
         scratch.scan.keeps_truth = true;
         let mut perceiver = Perceiver { world: self, state, now, scratch };
-        let slots = 0..state.len() as Slot;
+        let slots = 0..state.len() as EntitySlot;
         match of {
             ScanSelection::First(leaders) => {
                 let scans = slots.filter_map(|slot| leader_scan(&mut perceiver, slot));
@@ -99,7 +106,7 @@ impl<const D: usize> ChainWorld<D> {
 }
 
 /// Returns the scan that a leader on wheels is about to take; none for other chains.
-fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: Slot) -> Option<Scan> {
+fn leader_scan<const D: usize>(perceiver: &mut Perceiver<'_, D>, slot: EntitySlot) -> Option<Scan> {
     let percept = perceiver.percept(slot)?;
     let laser = &percept.navigator.leader.laser;
     let most_m = laser.range_m();
@@ -126,7 +133,7 @@ fn hit_range_m(range_m: f64, most_m: f64) -> f64 {
 }
 
 fn goals<const D: usize>(id: EntityId, spec: &ChainSpec<D>) -> Vec<Body> {
-    let least_m = point_radius_m(&spec.start);
+    let least_m = drawn_point_radius_m(&spec.start);
     let mut goals = Vec::new();
     for (part, (at_m, tolerance_m)) in (0..).zip(spec.tasks.iter().flat_map(task_goals)) {
         let ball = Shape::Sphere { radius_m: tolerance_m.max(least_m) };
@@ -141,7 +148,7 @@ fn task_goals<const D: usize>(task: &Task<D>) -> Vec<(Vec3, f64)> {
     match &task.driver {
         TaskKind::Targets(targets) => {
             let places = targets.places.iter();
-            places.map(|at| (with_dimensions(*at), targets.tolerance_m)).collect()
+            places.map(|at| (convert_dimensions(*at), targets.tolerance_m)).collect()
         }
         TaskKind::Navigate(navigator) => match &navigator.goal {
             Some(NavigationGoal::Target { at, tolerance_m }) => {
@@ -154,20 +161,20 @@ fn task_goals<const D: usize>(task: &Task<D>) -> Vec<(Vec3, f64)> {
 }
 
 /// Returns the drawn radius of a chain's points, meters.
-fn point_radius_m<const D: usize>(chain: &Chain<D>) -> f64 {
+fn drawn_point_radius_m<const D: usize>(chain: &Chain<D>) -> f64 {
     POINT_RADIUS_FRACTION * chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max)
 }
 
 /// Adds a chain: its rods, its connectors, and the robots that keep to them.
-fn push_chain<const D: usize>(
+fn push_chain_bodies<const D: usize>(
     bodies: &mut Vec<Body>,
     id: EntityId,
     spec: &ChainSpec<D>,
     body: &ChainBody<D>,
 ) {
     let chain = &body.chain;
-    let least_m = point_radius_m(&spec.start);
-    let points_m: Vec<Vec3> = chain.points().iter().map(|p| with_dimensions(*p)).collect();
+    let least_m = drawn_point_radius_m(&spec.start);
+    let points_m: Vec<Vec3> = chain.points().iter().map(|p| convert_dimensions(*p)).collect();
     let radius_m = chain.rods().iter().map(|rod| rod.radius_m).fold(0.0, f64::max);
     for (part, whole) in (0..).zip(whole_parts(chain)) {
         let points_m = points_m[whole].to_vec();
@@ -175,14 +182,14 @@ fn push_chain<const D: usize>(
         bodies
             .push(Body::new(kinds::RODS, id, Pose::from_position([0.0; 3]), line).with_part(part));
     }
-    let leader = leader(spec, body);
+    let leader = leading_connector(spec, body);
     let connectors = (0_u32..).zip(chain.connectors()).zip(&points_m);
     bodies.extend(connectors.map(|((part, connector), at_m)| {
         let radius_m = if connector.radius_m > 0.0 { connector.radius_m } else { least_m };
         Body::new(kinds::CONNECTOR, id, Pose::from_position(*at_m), Shape::Sphere { radius_m })
             .with_part(part)
-            .with_state_if(leader == Some(part as usize), Condition::Leading)
-            .with_state_if(connector.failed, Condition::Failed)
+            .with_condition_if(leader == Some(part as usize), BodyCondition::Leading)
+            .with_condition_if(connector.failed, BodyCondition::Failed)
     }));
     bodies.extend((0..).zip(&body.robots).map(|(part, robot)| {
         let [x_m, y_m] = robot.pose.at;
@@ -190,12 +197,12 @@ fn push_chain<const D: usize>(
         let disc = Shape::Cylinder { radius_m: body.robot_radius_m, height_m: HEIGHT_M };
         Body::new(kinds::ROBOT, id, pose, disc)
             .with_part(part)
-            .with_state_if(robot.is_bumped, Condition::Touching)
+            .with_condition_if(robot.is_bumped, BodyCondition::Touching)
     }));
 }
 
 /// Returns the connector that the present task moves, or moved if all are done; none where no connector leads.
-fn leader<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<usize> {
+fn leading_connector<const D: usize>(spec: &ChainSpec<D>, body: &ChainBody<D>) -> Option<usize> {
     let present = spec.tasks.get(body.driving.task as usize).or(spec.tasks.last())?;
     (!matches!(present.driver, TaskKind::Rest)).then_some(present.agent)
 }
@@ -220,21 +227,21 @@ fn obstacle_body<const D: usize>(obstacle: &Obstacle<D>) -> Body {
     let radius_m = obstacle.radius_m;
     let (pose, shape) = match &obstacle.core {
         ConvexCore::Point(at) if D == 2 => (
-            Pose::from_position(with_dimensions(*at)),
+            Pose::from_position(convert_dimensions(*at)),
             Shape::Cylinder { radius_m, height_m: HEIGHT_M },
         ),
         ConvexCore::Point(at) => {
-            (Pose::from_position(with_dimensions(*at)), Shape::Sphere { radius_m })
+            (Pose::from_position(convert_dimensions(*at)), Shape::Sphere { radius_m })
         }
         ConvexCore::Segment(ends) => {
-            let points_m = ends.iter().map(|p| with_dimensions(*p)).collect();
+            let points_m = ends.iter().map(|p| convert_dimensions(*p)).collect();
             let line = Shape::Line { points_m, thickness_m: 2.0 * radius_m };
             (Pose::from_position([0.0; 3]), line)
         }
         ConvexCore::Cuboid(cuboid) => (cuboid_pose(cuboid), cuboid_shape(cuboid, radius_m)),
     };
     Body::new(BodyKind::OBSTACLE, obstacle.id, pose, shape)
-        .with_velocity(with_dimensions(obstacle.velocity_m_s))
+        .with_velocity(convert_dimensions(obstacle.velocity_m_s))
 }
 
 fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
@@ -246,10 +253,10 @@ fn cuboid_shape<const D: usize>(cuboid: &Cuboid<D>, radius_m: f64) -> Shape {
 }
 
 fn cuboid_pose<const D: usize>(cuboid: &Cuboid<D>) -> Pose {
-    let x = with_dimensions(cuboid.axes[0]);
-    let y = with_dimensions(cuboid.axes[1]);
+    let x = convert_dimensions(cuboid.axes[0]);
+    let y = convert_dimensions(cuboid.axes[1]);
     // Two axes determine the third up to its sign, and a box is symmetric.
-    Pose::from_axes(with_dimensions(cuboid.center), [x, y, cross(x, y)])
+    Pose::from_axes(convert_dimensions(cuboid.center), [x, y, cross(x, y)])
 }
 
 /// Stands for the unit of events without a value.

@@ -2,19 +2,19 @@
 
 use super::deploy::deployment::Deployment;
 use super::driver::{Task, TaskKind, TaskProgress};
-use super::formation::{Robot, Robots};
+use super::formation::{Robot, RobotSwarmConfig};
 use super::ground::MovingObstacles;
 use super::motion::escape::ObstacleEscapeRules;
 use super::motion::recovery::RecoveryLimits;
 use super::script::ScriptMotion;
 use super::swarm::drive::Pose2;
 use sidestep_arms::Arm;
-use sidestep_kernel::control::Teams;
+use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, InputError, Slot};
-use sidestep_rods::geometry::{Point, norm, with_dimensions};
+use sidestep_kernel::{Cycle, EntitySlot, InputError};
+use sidestep_rods::geometry::{Point, convert_dimensions, norm};
 use sidestep_rods::rebuild::MovableEnd;
 use sidestep_rods::{Chain, Mobility, Obstacle, Obstacles, Reaction, ReactionRules};
 use std::ops::RangeInclusive;
@@ -76,7 +76,7 @@ pub struct ChainWorld<const D: usize> {
     pub look_m: f64,
     pub(crate) streams: Streams,
     /// Chains that observe, and may be ordered, alike.
-    pub(crate) teams: Arc<Teams>,
+    pub(crate) teams: Arc<AgentTeams>,
     /// Where the rules run: in one process, or in an agent for each connector.
     pub deployment: Deployment,
     /// The network that carries the agents' messages, if it is unreliable.
@@ -99,7 +99,7 @@ pub(crate) struct ChainSpec<const D: usize> {
     /// The arm that it represents, if any.
     pub(crate) arm: Option<Arc<Arm>>,
     /// Behavior of the robots that keep to its connectors, if it is a swarm on wheels.
-    pub(crate) robots: Option<Robots>,
+    pub(crate) robots: Option<RobotSwarmConfig>,
 }
 
 /// A change to a chain at the start of a cycle (slides R8, R10, F3).
@@ -151,7 +151,7 @@ pub(crate) enum ChainChangeKind<const D: usize> {
 
 impl<const D: usize> ChainChange<D> {
     /// Returns how far the change may throw parts in a cycle, meters.
-    pub(crate) fn max_throw_m(&self, now: Cycle) -> f64 {
+    pub(crate) fn max_scatter_m(&self, now: Cycle) -> f64 {
         match &self.what {
             ChainChangeKind::Scatter { by_m, apart_m, .. } if self.cycle == now => {
                 MAX_THROW_SIGMAS * by_m + norm(*apart_m)
@@ -169,10 +169,10 @@ impl<const D: usize> ChainChange<D> {
     }
 
     /// Puts new limits into the chain; breaking and joining change places, not limits.
-    pub(crate) fn apply_constraints(&self, chain: &mut Chain<D>) {
+    pub(crate) fn apply_limits(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
             ChainChangeKind::Failed { connector, failed } => {
-                chain.set_failed(*connector, *failed);
+                chain.set_connector_failed(*connector, *failed);
                 Ok(())
             }
             ChainChangeKind::Mobility { connector, mobility } => {
@@ -189,13 +189,17 @@ impl<const D: usize> ChainChange<D> {
 
 impl<const D: usize> ChainSpec<D> {
     /// Returns the robots of a swarm at their connectors, all facing ahead along their chain.
-    pub(crate) fn robots_at(&self, points: &[Point<D>], driving: &TaskProgress) -> Vec<Robot> {
+    pub(crate) fn robots_at_connectors(
+        &self,
+        points: &[Point<D>],
+        driving: &TaskProgress,
+    ) -> Vec<Robot> {
         let [x, y, _] = driving.ahead;
         let heading_rad = atan2(y, x);
         if self.robots.is_none() {
             return Vec::new();
         }
-        let poses = points.iter().map(|p| Pose2 { at: with_dimensions(*p), heading_rad });
+        let poses = points.iter().map(|p| Pose2 { at: convert_dimensions(*p), heading_rad });
         poses.map(|pose| Robot { pose, is_bumped: false }).collect()
     }
 
@@ -204,9 +208,12 @@ impl<const D: usize> ChainSpec<D> {
     }
 
     /// Returns the motions of the script that a driver is carrying out; empty if there is none.
-    pub(crate) fn motions(&self, driving: &TaskProgress) -> Result<Vec<ScriptMotion>, InputError> {
+    pub(crate) fn script_motions(
+        &self,
+        driving: &TaskProgress,
+    ) -> Result<Vec<ScriptMotion>, InputError> {
         match self.tasks.get(driving.task as usize).map(|task| &task.driver) {
-            Some(TaskKind::Script(script)) => driving.motions(script),
+            Some(TaskKind::Script(script)) => driving.script_motions(script),
             _ => Ok(Vec::new()),
         }
     }
@@ -214,21 +221,21 @@ impl<const D: usize> ChainSpec<D> {
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns whether nothing is in the way of the only chain, not even the chain itself.
-    pub(crate) fn is_unobstructed(&self) -> bool {
+    pub(crate) fn is_collision_impossible(&self) -> bool {
         let is_empty = self.obstacles.is_empty() && self.movers.is_empty();
         is_empty && self.chains.len() == 1 && !self.rules.self_collision
     }
 
     /// Returns the seconds from the start of the run to the start of a cycle.
-    pub fn start_time_s(&self, now: Cycle) -> f64 {
+    pub fn cycle_start_time_s(&self, now: Cycle) -> f64 {
         now as f64 * self.dt_s
     }
 }
 
 /// Adds the parts of a chain as obstacles to others.
-pub(crate) fn push_parts<const D: usize>(
+pub(crate) fn push_part_obstacles<const D: usize>(
     parts: &mut Vec<Obstacle<D>>,
-    slot: Slot,
+    slot: EntitySlot,
     chain: &Chain<D>,
 ) {
     let id = OTHER_CHAIN + slot;

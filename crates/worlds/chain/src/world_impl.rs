@@ -5,21 +5,21 @@ use super::metrics::{ChainMetrics, ChainTally, Metrics};
 use super::rows::RecordBuffers;
 use super::scenario::{AnyChainScenario, ChainScenario};
 use super::scratch::Scratch;
-use super::state::{ChainState, Snapshot};
+use super::state::{ChainWorldState, Snapshot};
 use super::text;
 use super::view::view_event;
 use super::world::ChainWorld;
 use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{BufferMut, Order, OrderError, Teams};
-use sidestep_kernel::ports::{Buffers, RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
+use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
+use sidestep_kernel::text::{KeyValues, StateReport};
 use sidestep_kernel::view::{
     BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
-    Cycle, Digest, EntityId, InputError, Run, RunConfig, RunStart, RunStats, Simulation, World,
-    WorldCheckpoint, WorldControl, WorldMetrics, WorldRecording, WorldView,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
+    Run, RunConfig, RunSetup, RunStats, Simulation, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -46,10 +46,11 @@ impl<const D: usize> ChainScenario<D> {
     /// # Panics
     /// Never, because scripts are tried out when they are compiled.
     pub fn start(self, source: &Source, workers: usize) -> ChainRun<D> {
-        let state = ChainState::new(&self.world).expect("scripts are tried when they are compiled");
+        let state =
+            ChainWorldState::new(&self.world).expect("scripts are tried when they are compiled");
         let collector = Collector { rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunStart { config: plan, state, collector };
+        let start = RunSetup { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -73,13 +74,13 @@ pub struct Collector {
     rows: RecordBuffers,
     /// Events that wait for the next frame.
     log: EventBuffer<Event>,
-    /// Events of a cycle in the order of the workers, until [`World::commit`] sorts them.
+    /// Events of a cycle in the order of the workers, until [`World::commit_results`] sorts them.
     gathered: Vec<Event>,
 }
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the counts of one chain so far, its progress, and the joint values of an arm.
-    pub fn chain_metrics(&self, state: &ChainState<D>, slot: usize) -> ChainMetrics {
+    pub fn chain_metrics(&self, state: &ChainWorldState<D>, slot: usize) -> ChainMetrics {
         let body = state.body(slot);
         let spec = &self.chains[slot];
         let mut joints = None;
@@ -105,20 +106,20 @@ impl<const D: usize> World for ChainWorld<D> {
 
     type Collector = Collector;
 
-    fn agents(&self) -> usize {
+    fn agent_count(&self) -> usize {
         self.chains.iter().map(|spec| spec.start.points().len()).sum()
     }
 
-    fn cycles_until_flush(&self, _: &ChainState<D>, collector: &Collector, _: Cycle) -> u64 {
+    fn cycles_until_flush(&self, _: &ChainWorldState<D>, collector: &Collector, _: Cycle) -> u64 {
         // How many rows a cycle makes is not known before, so the buffers are checked after each.
         if collector.rows.is_full() { 0 } else { u64::MAX }
     }
 
-    fn before_cycle(&self, state: &ChainState<D>, collector: &mut Collector, now: Cycle) {
+    fn before_cycle(&self, state: &ChainWorldState<D>, collector: &mut Collector, now: Cycle) {
         collector.rows.record_positions(self, state, now);
     }
 
-    fn is_over(&self, state: &ChainState<D>) -> bool {
+    fn is_over(&self, state: &ChainWorldState<D>) -> bool {
         self.is_all_done(state)
     }
 
@@ -126,7 +127,7 @@ impl<const D: usize> World for ChainWorld<D> {
         collector.gathered.append(&mut scratch.events);
     }
 
-    fn commit(&self, collector: &mut Collector) {
+    fn commit_results(&self, collector: &mut Collector) {
         // Events of one chain are already in order, so a stable sort by cycle and chain is enough.
         collector.gathered.sort_by_key(|event| (event.cycle, event.chain));
         for event in collector.gathered.drain(..) {
@@ -136,8 +137,8 @@ impl<const D: usize> World for ChainWorld<D> {
     }
 }
 
-impl<const D: usize> WorldRecording for ChainWorld<D> {
-    fn start_recording(&self, _: &mut ChainState<D>, collector: &mut Collector, _: Cycle) {
+impl<const D: usize> RecordableWorld for ChainWorld<D> {
+    fn start_recording(&self, _: &mut ChainWorldState<D>, collector: &mut Collector, _: Cycle) {
         collector.rows.start(self);
     }
 
@@ -151,7 +152,7 @@ impl<const D: usize> WorldRecording for ChainWorld<D> {
 
     fn record(
         &self,
-        _: &mut ChainState<D>,
+        _: &mut ChainWorldState<D>,
         collector: &mut Collector,
         _: Cycle,
         recorder: &mut dyn Recorder,
@@ -164,16 +165,16 @@ impl<const D: usize> WorldRecording for ChainWorld<D> {
     }
 }
 
-impl<const D: usize> WorldCheckpoint for ChainWorld<D> {
+impl<const D: usize> CheckpointableWorld for ChainWorld<D> {
     type Snapshot = (Snapshot, Vec<ChainTally>);
 
-    fn digest(&self, state: &ChainState<D>, now: Cycle) -> Digest {
+    fn digest(&self, state: &ChainWorldState<D>, now: Cycle) -> Digest {
         state.snapshot(now).digest()
     }
 
     fn save(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         _: &Collector,
         now: Cycle,
     ) -> (Snapshot, Vec<ChainTally>) {
@@ -184,9 +185,9 @@ impl<const D: usize> WorldCheckpoint for ChainWorld<D> {
         &self,
         (snapshot, tallies): (Snapshot, Vec<ChainTally>),
         collector: &mut Collector,
-    ) -> Result<ChainState<D>, CheckpointError> {
+    ) -> Result<ChainWorldState<D>, CheckpointError> {
         collector.steps_before = tallies.iter().map(|t| t.steps).sum();
-        ChainState::restore(self, &snapshot, tallies)
+        ChainWorldState::restore(self, &snapshot, tallies)
     }
 }
 
@@ -197,7 +198,7 @@ impl<const D: usize> WorldView for ChainWorld<D> {
 
     fn frame(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         collector: &mut Collector,
         now: Cycle,
         look: FrameOptions,
@@ -205,8 +206,8 @@ impl<const D: usize> WorldView for ChainWorld<D> {
         let (events, log_left_out) = collector.log.take();
         Frame {
             cycle: now,
-            time_s: self.start_time_s(now),
-            bodies: self.visible_bodies(state, now),
+            time_s: self.cycle_start_time_s(now),
+            bodies: self.view_bodies(state, now),
             scans: self.scans(state, now, &look.scans),
             odometry: Vec::new(),
             log: events.iter().map(view_event).collect(),
@@ -216,7 +217,7 @@ impl<const D: usize> WorldView for ChainWorld<D> {
 
     fn inspect(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         _: &Collector,
         now: Cycle,
         who: BodyId,
@@ -225,8 +226,8 @@ impl<const D: usize> WorldView for ChainWorld<D> {
     }
 }
 
-impl<const D: usize> WorldControl for ChainWorld<D> {
-    fn teams(&self) -> Arc<Teams> {
+impl<const D: usize> ControllableWorld for ChainWorld<D> {
+    fn agent_teams(&self) -> Arc<AgentTeams> {
         self.teams.clone()
     }
 
@@ -234,13 +235,13 @@ impl<const D: usize> WorldControl for ChainWorld<D> {
         self.check_possible(order)
     }
 
-    fn order(&self, state: &mut ChainState<D>, order: &Order<'_>) {
+    fn order(&self, state: &mut ChainWorldState<D>, order: &Order<'_>) {
         self.record_order(state, order);
     }
 
     fn submit_controls(
         &self,
-        state: &mut ChainState<D>,
+        state: &mut ChainWorldState<D>,
         now: Cycle,
         controls: &[(EntityId, Vec<u8>)],
     ) -> Result<(), OrderError> {
@@ -248,11 +249,17 @@ impl<const D: usize> WorldControl for ChainWorld<D> {
     }
 
     fn records_controls(&self, collector: &Collector) -> bool {
-        collector.rows.keeps_controls()
+        collector.rows.records_controls()
     }
 
-    fn observe(&self, state: &ChainState<D>, now: Cycle, team: usize, room: &mut [BufferMut<'_>]) {
-        ChainWorld::observe(self, state, now, team, room);
+    fn observe(
+        &self,
+        state: &ChainWorldState<D>,
+        now: Cycle,
+        team: usize,
+        room: &mut [BufferMut<'_>],
+    ) {
+        ChainWorld::write_observations(self, state, now, team, room);
     }
 }
 
@@ -261,7 +268,7 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
 
     fn metrics(
         &self,
-        state: &ChainState<D>,
+        state: &ChainWorldState<D>,
         collector: &Collector,
         _: Cycle,
         effort: &RunStats,
@@ -273,7 +280,7 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
         Metrics::from_tallies(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
     }
 
-    fn agent_metrics(&self, state: &ChainState<D>, _: &Collector, _: Cycle) -> Value {
+    fn agent_metrics(&self, state: &ChainWorldState<D>, _: &Collector, _: Cycle) -> Value {
         let chains = (0..state.len()).map(|slot| self.chain_metrics(state, slot));
         chains.map(|metrics| serde_json::to_value(metrics).unwrap_or_default()).collect()
     }
@@ -282,7 +289,7 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &ChainState<D>, now: Cycle) -> StateDescription {
-        text::poses::<D>(&state.snapshot(now))
+    fn poses(&self, state: &ChainWorldState<D>, now: Cycle) -> StateReport {
+        text::describe_poses::<D>(&state.snapshot(now))
     }
 }

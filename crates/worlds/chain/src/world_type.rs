@@ -1,10 +1,10 @@
 //! The world's entry in the list of worlds, for code that runs scenarios without knowing any world.
 
 use super::driver::own_driver::Driver;
-use super::own_parts::OwnParts;
+use super::own_parts::CustomBehaviors;
 use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
 use super::{bundle, remarks, text, world::ChainWorld};
-use sidestep_kernel::text::StateDescription;
+use sidestep_kernel::text::StateReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_rods::Reaction;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Chains of connectors and rods, in the plane or in space.
 #[derive(Debug, Clone, Default)]
 pub struct Chains {
-    own: OwnParts,
+    own: CustomBehaviors,
 }
 
 impl Chains {
@@ -88,7 +88,7 @@ impl WorldType for Chains {
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
-        Ok(match EitherCompiled::with_parts(source, &self.own)? {
+        Ok(match EitherCompiled::with_custom_behaviors(source, &self.own)? {
             EitherCompiled::Plane(compiled) => Box::new(compiled),
             EitherCompiled::Space(compiled) => Box::new(compiled),
         })
@@ -105,11 +105,11 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
     }
 
     fn body_count(&self) -> usize {
-        self.world.agents()
+        self.world.agent_count()
     }
 
-    fn contents(&self, _: &Source) -> StateDescription {
-        text::contents(self)
+    fn contents(&self, _: &Source) -> StateReport {
+        text::describe_scenario(self)
     }
 
     fn remarks(&self) -> Vec<Remark> {

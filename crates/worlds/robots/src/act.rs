@@ -7,7 +7,7 @@ use super::effector::{ObstacleRule, Side};
 use super::state::{BodyState, Facing, LastContact};
 use super::world::Role;
 use super::{Event, EventKind, MotionSample, Scratch};
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::distr::Categorical;
 use sidestep_kernel::space::OccupantWord;
 
@@ -27,20 +27,20 @@ pub(super) struct Blocker {
     /// Side of the body that touches it.
     pub(super) side: Side,
     /// The body that stands there; none for a wall.
-    pub(super) by: Option<Slot>,
+    pub(super) by: Option<EntitySlot>,
 }
 
 impl<T: OccupantWord> CycleContext<'_, T> {
     /// Lets one body act with the draw of its own stream.
     #[inline]
-    pub(super) fn act_with_draw(&self, slot: Slot, scratch: &mut Scratch) {
+    pub(super) fn act_with_draw(&self, slot: EntitySlot, scratch: &mut Scratch) {
         let [word, _] = self.act_words(self.body(slot).id);
         self.act(slot, word, scratch);
     }
 
     /// Lets one body act on the state left by those before it; `word` is its draw.
     #[inline]
-    pub(super) fn act(&self, slot: Slot, word: u32, scratch: &mut Scratch) {
+    pub(super) fn act(&self, slot: EntitySlot, word: u32, scratch: &mut Scratch) {
         let body = self.body(slot);
         if body.intent.get().is_idle() {
             return;
@@ -64,7 +64,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Returns the number of the transition in which an action ends; `word` is the body's draw.
     #[inline(always)]
-    pub(super) fn draw_transition(&self, action: &Action, slot: Slot, word: u32) -> usize {
+    pub(super) fn draw_transition(&self, action: &Action, slot: EntitySlot, word: u32) -> usize {
         match self.world.obstacle_rule {
             // Here obstacles change the effect of a transition, not its probability.
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
@@ -78,7 +78,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Makes a whole walk that meets no obstacle. It writes only the boxes that differ at its end, and not
     /// those that steps enter and leave again, because nearly all walks are made whole.
     #[inline]
-    fn execute_whole(&self, walk: &StepPath, slot: Slot) {
+    fn execute_whole(&self, walk: &StepPath, slot: EntitySlot) {
         let floor = self.floor;
         let body = self.body(slot);
         let base = self.base(body);
@@ -95,7 +95,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             .fill
             .iter()
             .for_each(|&offset| floor.set(box_index(base, offset), T::from_body(slot)));
-        body.anchor.set(body.position().offset(whole.delta.0, whole.delta.1).word());
+        body.anchor.set(body.position().translate(whole.delta.0, whole.delta.1).word());
         body.moves.set(body.moves.get() + walk.steps.len() as u32);
         if self.type_of(body).marks {
             let mut first_visits = 0;
@@ -107,7 +107,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     /// Makes a walk that an obstacle may cut short.
-    fn execute_blocked(&self, walk: &StepPath, slot: Slot, scratch: &mut Scratch) {
+    fn execute_blocked(&self, walk: &StepPath, slot: EntitySlot, scratch: &mut Scratch) {
         let body = self.body(slot);
         let result = self.walk_result(walk, slot);
         let is_mover = matches!(self.type_of(body).role, Role::Mover(_));
@@ -155,7 +155,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Returns how far a walk gets: to the first step that enters a box that is not free.
     #[inline]
-    pub(super) fn walk_result(&self, walk: &StepPath, slot: Slot) -> WalkResult {
+    pub(super) fn walk_result(&self, walk: &StepPath, slot: EntitySlot) -> WalkResult {
         let base = self.base(self.body(slot));
         for (steps, step) in walk.steps.iter().enumerate() {
             for &offset in &step.enter {
@@ -176,7 +176,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Makes a walk up to its contact, step by step, so that a path over its own boxes ends right.
     #[inline]
-    fn execute_steps(&self, walk: &StepPath, steps: usize, slot: Slot) {
+    fn execute_steps(&self, walk: &StepPath, steps: usize, slot: EntitySlot) {
         if steps == 0 {
             return;
         }
@@ -193,7 +193,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
                 floor.set(index, T::from_body(slot));
                 first_visits += u32::from(marks && self.state.visited.insert(index));
             }
-            moved = moved.offset(step.delta.0, step.delta.1);
+            moved = moved.translate(step.delta.0, step.delta.1);
         }
         body.anchor.set(moved.word());
         body.moves.set(body.moves.get() + steps as u32);
@@ -203,7 +203,11 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Returns the distribution over the walks that are not blocked here (the paper's update of the
     /// distribution in the presence of a conflict: an occurrence is allowed or denied), or, when none is
     /// left, the first blocked one as an error: the action then ends in its contact.
-    fn unblocked_distribution(&self, action: &Action, slot: Slot) -> Result<Categorical, usize> {
+    fn unblocked_distribution(
+        &self,
+        action: &Action,
+        slot: EntitySlot,
+    ) -> Result<Categorical, usize> {
         let walks = action.probabilities.iter().zip(&action.walks);
         let mut row: Vec<f64> = walks
             .map(|(&p, walk)| {
@@ -220,7 +224,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     /// Opens a door, or closes it when no body stands in it; otherwise closing waits.
-    fn toggle(&self, slot: Slot, scratch: &mut Scratch) {
+    fn toggle(&self, slot: EntitySlot, scratch: &mut Scratch) {
         let floor = self.floor;
         let body = self.body(slot);
         let base = self.base(body);

@@ -1,7 +1,7 @@
 //! The readings of a sensor, ready to be drawn.
 
 use super::sensor::{NOTHING, Reading, SensorModel};
-use sidestep_kernel::distr::{DistributionError, check_row};
+use sidestep_kernel::distr::{DistributionError, check_probability_row};
 
 /// Stands for the class of a sector in which nothing is reported; greater than any class.
 pub const UNSEEN: u8 = u8::MAX;
@@ -71,7 +71,7 @@ impl AliasTable {
         for observation in 0..observations as u8 {
             for class in 0..classes as u8 {
                 let row = sensor.reading_row(Reading { observation, class }, reliable);
-                check_row(&row.iter().map(|r| r.1).collect::<Vec<_>>())?;
+                check_probability_row(&row.iter().map(|r| r.1).collect::<Vec<_>>())?;
                 columns.extend(alias_columns(row, 1 << bits));
             }
         }

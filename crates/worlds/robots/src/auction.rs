@@ -6,26 +6,26 @@
 
 use super::cycle_context::{CycleContext, box_index, with_cycle};
 use super::world::RobotsWorld;
-use sidestep_kernel::space::{OccupantWord, Position};
+use sidestep_kernel::space::{GridPosition, OccupantWord};
 use sidestep_kernel::world::Auction;
-use sidestep_kernel::{PhaseContext, Slot};
+use sidestep_kernel::{EntitySlot, PhaseContext};
 use std::sync::atomic::Ordering::Relaxed;
 
 /// A body's bid of one round.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bid {
-    pub(super) slot: Slot,
+    pub(super) slot: EntitySlot,
     /// The body's draw of its action's outcome.
     pub(super) word: u32,
     /// Position of the body when it bid: its bids are there, also after it has moved.
-    at: Position,
+    at: GridPosition,
     /// Value of the bid: the higher one acts first. Never 0, and unique per body.
     value: u64,
 }
 
 impl<T: OccupantWord> CycleContext<'_, T> {
     /// Bids for all boxes that a body covers or may come to cover.
-    fn bid(&self, slot: Slot) -> Bid {
+    fn bid(&self, slot: EntitySlot) -> Bid {
         let body = self.body(slot);
         let [word, draw] = self.act_words(body.id);
         // Inverted, because the smallest (draw, id) acts first.
@@ -54,7 +54,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     fn for_each_box_of(&self, bid: Bid, mut each: impl FnMut(usize)) {
         let body = self.body(bid.slot);
         let ty = self.type_of(body);
-        let base = bid.at.index(self.world.stride);
+        let base = bid.at.row_major_index(self.world.stride);
         for &offset in &ty.own {
             each(box_index(base, offset));
         }
@@ -70,12 +70,12 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 }
 
 impl Auction<Self> for RobotsWorld {
-    fn bid(&self, phase: &mut PhaseContext<'_, Self>, slot: Slot) {
+    fn bid(&self, phase: &mut PhaseContext<'_, Self>, slot: EntitySlot) {
         let bid = with_cycle!(self, phase.state, phase.now, |cycle| cycle.bid(slot));
         phase.scratch.bids.push(bid);
     }
 
-    fn act_on_bids(&self, phase: &mut PhaseContext<'_, Self>, pending: &mut Vec<Slot>) {
+    fn act_on_bids(&self, phase: &mut PhaseContext<'_, Self>, pending: &mut Vec<EntitySlot>) {
         pending.clear();
         // Taken out, because acting borrows the whole scratch.
         let bids = std::mem::take(&mut phase.scratch.bids);

@@ -3,7 +3,7 @@
 use super::sensor::FREE;
 use super::state::RobotsState;
 use super::world::RobotsWorld;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::space::Occupant;
 
 impl RobotsWorld {
@@ -14,7 +14,7 @@ impl RobotsWorld {
     /// Returns a description of the first fault found; that is a bug, not an outcome.
     pub fn audit(&self, state: &RobotsState) -> Result<(), String> {
         let mut owner = vec![None; self.walls.len()];
-        for slot in 0..self.bodies.len() as Slot {
+        for slot in 0..self.bodies.len() as EntitySlot {
             if !state.is_open_door(self, slot) {
                 self.audit_body(state, slot, &mut owner)?;
             }
@@ -36,12 +36,12 @@ impl RobotsWorld {
     fn audit_body(
         &self,
         state: &RobotsState,
-        slot: Slot,
-        owner: &mut [Option<Slot>],
+        slot: EntitySlot,
+        owner: &mut [Option<EntitySlot>],
     ) -> Result<(), String> {
         let at = state.position(slot);
         for &offset in &state.body_type(self, slot).own {
-            let index = at.index(self.stride).wrapping_add_signed(offset) as usize;
+            let index = at.row_major_index(self.stride).wrapping_add_signed(offset) as usize;
             let is_wall = self.walls.get(index).is_none_or(|&kind| kind != FREE);
             if is_wall {
                 return Err(format!("body {slot} stands in a wall at box {index}"));

@@ -25,7 +25,7 @@ use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::workers::{self, Worker};
-use sidestep_kernel::{Cycle, EntityId, GroupSizeHistogram, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, GroupSizeHistogram};
 use sidestep_map::Cell;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -68,7 +68,7 @@ pub struct BaselineRun {
 struct BandWorker {
     scratch: Scratch,
     /// Bodies anchored in this worker's band.
-    own: Vec<Slot>,
+    own: Vec<EntitySlot>,
     /// Number of cycles of bodies that this worker did while all others waited.
     serial_acts: u64,
 }
@@ -79,9 +79,9 @@ struct HaloExchange {
     /// Columns of each band in the padded grid; the outer bands reach over the map's edge.
     bands: Vec<Range<u32>>,
     /// Bodies of this cycle that are not inside one band.
-    crossing: Mutex<Vec<Slot>>,
+    crossing: Mutex<Vec<EntitySlot>>,
     /// Bodies that have moved into each band.
-    inboxes: Vec<Mutex<Vec<Slot>>>,
+    inboxes: Vec<Mutex<Vec<EntitySlot>>>,
 }
 
 impl BaselineRun {
@@ -91,7 +91,7 @@ impl BaselineRun {
         let mut band_workers = Vec::new();
         band_workers.resize_with(workers.max(1), BandWorker::default);
         let bands = compiled.world.bands(band_workers.len());
-        for slot in 0..compiled.world.bodies.len() as Slot {
+        for slot in 0..compiled.world.bodies.len() as EntitySlot {
             let band = band_of(&bands, state.position(slot).col());
             band_workers[band].own.push(slot);
         }
@@ -135,11 +135,11 @@ impl BaselineRun {
                 worker.for_each_chunk(pool, world.bodies.len(), |bodies| {
                     with_cycle!(world, state, now, |cycle| for slot in bodies {
                         let _guard = lock(&world_lock);
-                        cycle.perceive(slot as Slot, &mut own.scratch);
-                        cycle.act_with_draw(slot as Slot, &mut own.scratch);
+                        cycle.perceive(slot as EntitySlot, &mut own.scratch);
+                        cycle.act_with_draw(slot as EntitySlot, &mut own.scratch);
                     });
                 });
-                worker.barrier();
+                worker.wait_at_barrier();
             }
         });
     }
@@ -168,7 +168,7 @@ fn partition_cycle<T: OccupantWord>(
 ) {
     let BandWorker { scratch, own, serial_acts } = band_worker;
     own.iter().for_each(|&slot| cycle.perceive(slot, scratch));
-    worker.barrier();
+    worker.wait_at_barrier();
     let band = &exchange.bands[worker.index()];
     own.retain(|&slot| {
         let inside = cycle.is_inside(slot, band);
@@ -179,7 +179,7 @@ fn partition_cycle<T: OccupantWord>(
         }
         inside
     });
-    worker.barrier();
+    worker.wait_at_barrier();
     if worker.index() == 0 {
         let mut crossing = std::mem::take(&mut *lock(&exchange.crossing));
         // The order in which workers arrive depends on scheduling; that of the slots does not.
@@ -190,7 +190,7 @@ fn partition_cycle<T: OccupantWord>(
             exchange.transfer(slot, cycle.body(slot).position().col());
         }
     }
-    worker.barrier();
+    worker.wait_at_barrier();
     own.append(&mut lock(&exchange.inboxes[worker.index()]));
 }
 
@@ -200,7 +200,7 @@ impl HaloExchange {
         Self { bands, crossing: Mutex::default(), inboxes }
     }
 
-    fn transfer(&self, slot: Slot, col: u32) {
+    fn transfer(&self, slot: EntitySlot, col: u32) {
         lock(&self.inboxes[band_of(&self.bands, col)]).push(slot);
     }
 }
@@ -234,7 +234,7 @@ impl RobotsWorld {
 
 impl<T: OccupantWord> CycleContext<'_, T> {
     /// Returns whether all boxes that a body covers, or may come to cover, lie in these columns.
-    fn is_inside(&self, slot: Slot, band: &Range<u32>) -> bool {
+    fn is_inside(&self, slot: EntitySlot, band: &Range<u32>) -> bool {
         let world = self.world;
         let body = self.body(slot);
         let col = body.position().col();
@@ -323,11 +323,13 @@ mod tests {
     #[test]
     fn bodies_of_a_partition_are_never_lost_and_change_bands() {
         let mut run = BaselineRun::new(crowd(), Strategy::SpatialPartition, 3);
-        let before: Vec<Vec<Slot>> = run.workers.iter().map(|hand| hand.own.clone()).collect();
+        let before: Vec<Vec<EntitySlot>> =
+            run.workers.iter().map(|hand| hand.own.clone()).collect();
         run.advance(300);
-        let mut all: Vec<Slot> = run.workers.iter().flat_map(|hand| hand.own.clone()).collect();
+        let mut all: Vec<EntitySlot> =
+            run.workers.iter().flat_map(|hand| hand.own.clone()).collect();
         all.sort_unstable();
-        assert_eq!(all, (0..121).collect::<Vec<Slot>>());
+        assert_eq!(all, (0..121).collect::<Vec<EntitySlot>>());
         assert!(run.workers.iter().zip(&before).any(|(hand, before)| hand.own != *before));
         assert!(run.serial_fraction() > 0.0 && run.serial_fraction() < 0.9);
     }

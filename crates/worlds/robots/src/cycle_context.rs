@@ -4,7 +4,7 @@ use super::RobotsState;
 use super::state::BodyState;
 use super::world::{BodyType, RobotsWorld};
 use sidestep_kernel::space::OccupantWord;
-use sidestep_kernel::{AtomicColumn, Cycle, EntityId, Slot};
+use sidestep_kernel::{AtomicColumn, Cycle, EntityId, EntitySlot};
 
 /// The world and its state in one cycle, as every phase sees them.
 #[derive(Debug)]
@@ -25,11 +25,11 @@ macro_rules! with_cycle {
         let state = $state;
         let now = $now;
         match &state.floor {
-            sidestep_kernel::space::Floor::Narrow(floor) => {
+            sidestep_kernel::space::OccupantGrid::Narrow(floor) => {
                 let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
-            sidestep_kernel::space::Floor::Wide(floor) => {
+            sidestep_kernel::space::OccupantGrid::Wide(floor) => {
                 let $cycle = &$crate::cycle_context::CycleContext { world, state, floor, now };
                 $value
             }
@@ -41,7 +41,7 @@ pub(super) use with_cycle;
 impl<'a, T: OccupantWord> CycleContext<'a, T> {
     /// Returns the changing part of a body.
     #[inline(always)]
-    pub(super) fn body(&self, slot: Slot) -> &'a BodyState {
+    pub(super) fn body(&self, slot: EntitySlot) -> &'a BodyState {
         &self.state.bodies[slot as usize]
     }
 
@@ -54,7 +54,7 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
     /// Returns the index of a body's lower-left box on the floor.
     #[inline(always)]
     pub(super) fn base(&self, body: &BodyState) -> u32 {
-        body.position().index(self.world.stride)
+        body.position().row_major_index(self.world.stride)
     }
 
     /// Returns the draws of a body's action: that of its outcome, and that of its priority.

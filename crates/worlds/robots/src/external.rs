@@ -7,7 +7,7 @@ use super::decide::External;
 use super::effector::{HEADING_NAMES, Side};
 use super::state::RobotsState;
 use super::world::{BodyType, RobotModel, RobotsWorld, Role};
-use sidestep_kernel::control::{BufferMut, Order, Space, SpaceKind, Team, Teams};
+use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::{Cycle, EntityId, Phases, World};
 use std::sync::Arc;
@@ -36,13 +36,13 @@ impl AlikeRobots<'_> {
 }
 
 /// Returns the numbers from 0 on, by these names.
-fn choice<S: Into<String>>(names: impl IntoIterator<Item = S>) -> SpaceKind {
-    SpaceKind::Discrete(names.into_iter().map(Into::into).collect())
+fn choice<S: Into<String>>(names: impl IntoIterator<Item = S>) -> ValueDomain {
+    ValueDomain::Discrete(names.into_iter().map(Into::into).collect())
 }
 
 impl RobotsWorld {
     /// Returns the teams: robots of one kind that have one body, and decide themselves or do not.
-    pub(super) fn find_teams(&self) -> Teams {
+    pub(super) fn find_teams(&self) -> AgentTeams {
         let mut alike: Vec<AlikeRobots<'_>> = Vec::new();
         for &id in &self.robots {
             let ty = self.type_of(id);
@@ -55,7 +55,7 @@ impl RobotsWorld {
         }
         let mut teams = Vec::with_capacity(alike.len());
         for AlikeRobots { ty, model, agents } in alike {
-            teams.push(Team {
+            teams.push(AgentTeam {
                 name: self.kinds[usize::from(ty.kind)].clone(),
                 agents,
                 observation_spaces: self.observation_spaces(model),
@@ -66,11 +66,11 @@ impl RobotsWorld {
                 },
             });
         }
-        Teams::new(teams, Self::AGENT)
+        AgentTeams::new(teams, Self::AGENT)
     }
 
     /// Returns the spaces of a robot's percept, in the order in which [`Self::observe`] writes them.
-    fn observation_spaces(&self, model: &RobotModel) -> Vec<Space> {
+    fn observation_spaces(&self, model: &RobotModel) -> Vec<ValueSpace> {
         let mut spaces = Vec::new();
         for (k, sensor) in model.body.sensors.iter().enumerate() {
             let model = &sensor.model;
@@ -79,14 +79,16 @@ impl RobotsWorld {
                 k => format!("{}_{}", model.name, k + 1),
             };
             let beams = [model.bearings_deg.len()];
-            let reports = SpaceKind::Discrete(model.observations.clone());
+            let reports = ValueDomain::Discrete(model.observations.clone());
             let meaning = format!("what each beam of sensor `{}` reports", model.name);
-            spaces.push(Space::new(format!("{name}_report"), reports, meaning).with_shape(beams));
+            spaces.push(
+                ValueSpace::new(format!("{name}_report"), reports, meaning).with_shape(beams),
+            );
             let beyond = std::iter::once("beyond".to_string());
             let classes = model.distance_classes.iter().cloned().chain(beyond).collect();
             let meaning = format!("the distance class that each beam of `{}` reports", model.name);
             spaces.push(
-                Space::new(format!("{name}_class"), SpaceKind::Discrete(classes), meaning)
+                ValueSpace::new(format!("{name}_class"), ValueDomain::Discrete(classes), meaning)
                     .with_shape(beams),
             );
         }
@@ -95,28 +97,29 @@ impl RobotsWorld {
     }
 
     /// Returns the spaces that robots perceive without sensors.
-    fn common_observation_spaces(&self) -> Vec<Space> {
+    fn common_observation_spaces(&self) -> Vec<ValueSpace> {
         let kinds = choice(["none"].into_iter().chain(self.kinds.iter().map(String::as_str)));
         let sides = choice(["none"].into_iter().chain(Side::ALL.iter().map(|side| side.name())));
         let longest_side = self.map.width().max(self.map.height());
-        let boxes = SpaceKind::Integer { low: 0, high: i64::from(longest_side) - 1 };
+        let boxes = ValueDomain::Integer { low: 0, high: i64::from(longest_side) - 1 };
         let mut spaces = vec![
-            Space::new("contact", kinds, "kind of what stopped its last action"),
-            Space::new("contact_side", sides, "its side that touched that"),
-            Space::new("at_boxes", boxes, "column and row of its lower-left box").with_shape([2]),
-            Space::new("heading", choice(HEADING_NAMES), "where it looks"),
-            Space::new("due", choice(["no", "yes"]), "whether it acts in the next cycle"),
+            ValueSpace::new("contact", kinds, "kind of what stopped its last action"),
+            ValueSpace::new("contact_side", sides, "its side that touched that"),
+            ValueSpace::new("at_boxes", boxes, "column and row of its lower-left box")
+                .with_shape([2]),
+            ValueSpace::new("heading", choice(HEADING_NAMES), "where it looks"),
+            ValueSpace::new("due", choice(["no", "yes"]), "whether it acts in the next cycle"),
         ];
         if self.radio.is_some() {
             let heard = [self.max_heard()];
             let max_id = self.bodies.len() as i64 - 1;
-            let from = SpaceKind::Integer { low: -1, high: max_id };
+            let from = ValueDomain::Integer { low: -1, high: max_id };
             let meaning = "ids of those whose word it hears, rising; -1 where there are no more";
-            spaces.push(Space::new("heard_from", from, meaning).with_shape(heard));
-            let word = SpaceKind::Integer { low: 0, high: i64::MAX };
+            spaces.push(ValueSpace::new("heard_from", from, meaning).with_shape(heard));
+            let word = ValueDomain::Integer { low: 0, high: i64::MAX };
             let meaning =
                 "the last word of each of them (its low 63 bits); 0 where there are no more";
-            spaces.push(Space::new("heard_word", word, meaning).with_shape(heard));
+            spaces.push(ValueSpace::new("heard_word", word, meaning).with_shape(heard));
         }
         spaces
     }
@@ -126,17 +129,17 @@ impl RobotsWorld {
     }
 
     /// Returns the spaces of a robot's orders.
-    fn action_spaces(&self, model: &RobotModel) -> Vec<Space> {
-        let actions = SpaceKind::Discrete(model.body.effector.actions.clone());
+    fn action_spaces(&self, model: &RobotModel) -> Vec<ValueSpace> {
+        let actions = ValueDomain::Discrete(model.body.effector.actions.clone());
         let trip = choice(["none", "begun", "done"]);
         let mut spaces = vec![
-            Space::new(External::ACTION, actions, "the action that it tries"),
-            Space::new(External::TRIP, trip, "a mark on its way: trips are counted and timed"),
+            ValueSpace::new(External::ACTION, actions, "the action that it tries"),
+            ValueSpace::new(External::TRIP, trip, "a mark on its way: trips are counted and timed"),
         ];
         if self.radio.is_some() {
-            let word = SpaceKind::Integer { low: 0, high: Space::MAX_INTEGER };
+            let word = ValueDomain::Integer { low: 0, high: ValueSpace::MAX_INTEGER };
             let meaning = "the word that others in range hear from the next cycle on";
-            spaces.push(Space::new(External::BROADCAST, word, meaning));
+            spaces.push(ValueSpace::new(External::BROADCAST, word, meaning));
         }
         spaces
     }
@@ -144,7 +147,7 @@ impl RobotsWorld {
     /// Records an order in the memory of its robot.
     pub(super) fn record_order(&self, state: &RobotsState, order: &Order<'_>) {
         let [value] = *order.values else { return };
-        let space = &self.teams.all()[order.team].action_spaces[order.space];
+        let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
         External::record_order(&state.body(order.agent).memory, &space.name, value as u64);
     }
 
@@ -156,9 +159,9 @@ impl RobotsWorld {
         team: usize,
         buffers: &mut [BufferMut<'_>],
     ) {
-        let scratch = &mut self.scratch();
+        let scratch = &mut self.new_scratch();
         with_cycle!(self, state, now, |cycle| {
-            for (row, &id) in self.teams.all()[team].agents.iter().enumerate() {
+            for (row, &id) in self.teams.as_slice()[team].agents.iter().enumerate() {
                 cycle.observe(id, row, scratch, buffers);
             }
         });

@@ -18,7 +18,7 @@ use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
     self, BodyId, FactSection, FactTable, FactValue, Inspection, MarkShape,
 };
-use sidestep_kernel::{Cycle, EntityId, Phases, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, Phases};
 use sidestep_map::Rect;
 
 /// Largest number of members of a conflict group that are listed: those that act just before and after the body.
@@ -54,19 +54,19 @@ impl RobotsWorld {
 /// An inspection of one body in the making, on a copy of the state.
 struct Inspector<'a, T: OccupantWord> {
     cycle: &'a CycleContext<'a, T>,
-    slot: Slot,
+    slot: EntitySlot,
     id: EntityId,
     inspection: Inspection,
 }
 
 impl<'a, T: OccupantWord> Inspector<'a, T> {
     fn inspect(mut self) -> Inspection {
-        let scratch = &mut self.cycle.world.scratch();
+        let scratch = &mut self.cycle.world.new_scratch();
         // Robots decided from outside perceive within a cycle only where readings are recorded.
         scratch.keep_readings = true;
         self.add_present();
         self.add_percept(scratch);
-        let bodies = 0..self.cycle.world.bodies.len() as Slot;
+        let bodies = 0..self.cycle.world.bodies.len() as EntitySlot;
         bodies.clone().for_each(|slot| self.cycle.perceive(slot, scratch));
         self.add_claims();
         // All bodies take part, because a group may reach over any of them.

@@ -11,7 +11,7 @@ use super::policy::ConflictPolicy;
 use super::purpose;
 use super::state::BodyState;
 use super::world::{BodyType, Role};
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::space::OccupantWord;
 
@@ -20,15 +20,15 @@ use sidestep_kernel::space::OccupantWord;
 pub(super) struct GroupMember {
     /// The body with the smaller key acts earlier, see [`CycleContext::priority`].
     pub(super) key: (u8, u32, u32),
-    pub(super) slot: Slot,
+    pub(super) slot: EntitySlot,
     /// The draw of its action's outcome.
     pub(super) word: u32,
 }
 
 /// Joins one body with those that it meets in boxes.
 struct NeighborJoiner<'a> {
-    slot: Slot,
-    last_met: Slot,
+    slot: EntitySlot,
+    last_met: EntitySlot,
     groups: &'a ConflictGroups,
 }
 
@@ -49,7 +49,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Joins a body with all bodies that have claims meeting its own: those named in a box that
     /// it may come to cover, because they stand there or may come there too.
     #[inline]
-    pub(super) fn join(&self, slot: Slot, groups: &ConflictGroups) {
+    pub(super) fn join(&self, slot: EntitySlot, groups: &ConflictGroups) {
         let body = self.body(slot);
         let intent = body.intent.get();
         if intent.is_idle() {
@@ -105,7 +105,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Hands a request to the body in a slot, if that takes part; of several it keeps the greatest word,
     /// in whatever order workers deliver them.
-    fn hear_request(&self, slot: Slot, word: u32) {
+    fn hear_request(&self, slot: EntitySlot, word: u32) {
         let body = self.body(slot);
         if has_requests(self.type_of(body)) {
             body.memory[HEARD_REQUEST_WORD].raise_to(word);
@@ -114,7 +114,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Fills `scratch.order` with a group in its order of acting, each body with the draw of its
     /// action's outcome, because one block of the stream holds that and the priority.
-    pub(super) fn order(&self, group: &[Slot], scratch: &mut Scratch) {
+    pub(super) fn order(&self, group: &[EntitySlot], scratch: &mut Scratch) {
         let has_right_of_way = self.world.policy == ConflictPolicy::RightOfWay;
         let first_heading = if has_right_of_way { self.first_heading(group) } else { 0 };
         let order = &mut scratch.order;
@@ -159,7 +159,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// heading `h + 1` (a quarter to the left), so a heading starts when the next one is absent.
     /// Among several such headings, and when all four are present, a fair draw decides: one per
     /// group, by its smallest id, because groups have nothing to do with each other.
-    fn first_heading(&self, group: &[Slot]) -> u8 {
+    fn first_heading(&self, group: &[EntitySlot]) -> u8 {
         let mut present = [false; 4];
         for heading in group.iter().filter_map(|&slot| self.heading_of(self.body(slot))) {
             present[usize::from(heading)] = true;

@@ -1,7 +1,7 @@
 //! The kinds of bodies in a building.
 
 use sidestep_kernel::view::{
-    BodyKind, DOOR_COLOR, KindSpec, Legend, MOBILE_COLOR, Outline, Paint, Role, TrailStyle,
+    BodyKind, BodyRole, DOOR_COLOR, KindSpec, LegendTexts, MOBILE_COLOR, Outline, Paint, TrailStyle,
 };
 
 /// All kinds of bodies in this world.
@@ -12,11 +12,11 @@ pub const ROBOT: BodyKind = BodyKind::new(&KindSpec {
     name: "robot",
     noun: "robot",
     rank: 0,
-    role: Role::Agent(TrailStyle::OnePerColor),
+    role: BodyRole::Agent(TrailStyle::OnePerColor),
     layer: 5,
     paint: Paint::ByNumber { opacity: 1.0 },
     outline: Outline::Dark,
-    legend: Legend::AGENT,
+    legend: LegendTexts::AGENT,
     shows_heading: true,
 });
 
@@ -25,11 +25,11 @@ pub const PERSON: BodyKind = BodyKind::new(&KindSpec {
     name: "person",
     noun: "person",
     rank: 1,
-    role: Role::MovesAmong(ROBOT),
+    role: BodyRole::MovesAmong(ROBOT),
     layer: 4,
     paint: Paint::Fixed { color: MOBILE_COLOR, open_opacity: 1.0 },
     outline: Outline::Shade,
-    legend: Legend::new("mobile object"),
+    legend: LegendTexts::new("mobile object"),
     shows_heading: false,
 });
 
@@ -38,10 +38,10 @@ pub const DOOR: BodyKind = BodyKind::new(&KindSpec {
     name: "door",
     noun: "door",
     rank: 2,
-    role: Role::StandsAmong(ROBOT),
+    role: BodyRole::StandsAmong(ROBOT),
     layer: 1,
     paint: Paint::Fixed { color: DOOR_COLOR, open_opacity: 0.25 },
     outline: Outline::Shade,
-    legend: Legend { open: "door, open", ..Legend::new("door, closed") },
+    legend: LegendTexts { open: "door, open", ..LegendTexts::new("door, closed") },
     shows_heading: false,
 });

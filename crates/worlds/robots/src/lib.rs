@@ -52,7 +52,7 @@ use sensor::Reading;
 pub use sidestep_error_models::{effector, sensor};
 use sidestep_kernel::conflict::ConflictGroups;
 use sidestep_kernel::world::Auction;
-use sidestep_kernel::{Cycle, EntityId, PhaseContext, Phases, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, PhaseContext, Phases};
 use state::RobotsState;
 use std::ops::Range;
 pub use world::RobotsWorld;
@@ -149,15 +149,15 @@ impl Phases for RobotsWorld {
     type State = RobotsState;
     type Scratch = Scratch;
 
-    fn scratch(&self) -> Scratch {
+    fn new_scratch(&self) -> Scratch {
         Scratch::default()
     }
 
-    fn bodies(&self, _: &RobotsState) -> usize {
+    fn body_count(&self, _: &RobotsState) -> usize {
         self.bodies.len()
     }
 
-    fn arrange(&self, state: &mut RobotsState) {
+    fn reorder_slots(&self, state: &mut RobotsState) {
         if self.storage == StorageOrder::Spatial {
             state.arrange(self);
         }
@@ -166,19 +166,19 @@ impl Phases for RobotsWorld {
     #[inline]
     fn claim(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>) {
         with_cycle!(phase.world, phase.state, phase.now, |cycle| {
-            bodies.for_each(|slot| cycle.perceive(slot as Slot, phase.scratch));
+            bodies.for_each(|slot| cycle.perceive(slot as EntitySlot, phase.scratch));
         });
     }
 
     #[inline]
     fn join(phase: &mut PhaseContext<'_, Self>, bodies: Range<usize>, groups: &ConflictGroups) {
         with_cycle!(phase.world, phase.state, phase.now, |cycle| {
-            bodies.for_each(|slot| cycle.join(slot as Slot, groups));
+            bodies.for_each(|slot| cycle.join(slot as EntitySlot, groups));
         });
     }
 
     #[inline]
-    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [Slot]) {
+    fn act(phase: &mut PhaseContext<'_, Self>, group: &mut [EntitySlot]) {
         with_cycle!(phase.world, phase.state, phase.now, |cycle| {
             // Most groups are one body, which needs no order.
             if let [alone] = *group {

@@ -11,12 +11,12 @@ use super::state::{BodyState, Facing, Intent, PackedPose};
 use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
 use super::{Scratch, SensorSample};
 use sidestep_kernel::space::OccupantWord;
-use sidestep_kernel::{AtomicColumn, Slot};
+use sidestep_kernel::{AtomicColumn, EntitySlot};
 
 impl<T: OccupantWord> CycleContext<'_, T> {
     /// Lets a body perceive and decide, and claims the boxes that it may come to cover.
     #[inline]
-    pub(super) fn perceive(&self, slot: Slot, scratch: &mut Scratch) {
+    pub(super) fn perceive(&self, slot: EntitySlot, scratch: &mut Scratch) {
         let world = self.world;
         let body = self.body(slot);
         if let Some(frames) = &self.state.frames {
@@ -40,7 +40,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     #[inline]
-    fn decide_robot(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> Intent {
+    fn decide_robot(&self, model: &RobotModel, slot: EntitySlot, scratch: &mut Scratch) -> Intent {
         let body = self.body(slot);
         let (decision, memory) = self.decision(model, slot, scratch);
         store_memory(body, memory);
@@ -57,7 +57,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     pub(super) fn decision(
         &self,
         model: &RobotModel,
-        slot: Slot,
+        slot: EntitySlot,
         scratch: &mut Scratch,
     ) -> (Decision, Memory) {
         let body = self.body(slot);
@@ -83,7 +83,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// class reported per sector. A robot decided from outside was observed before the cycle:
     /// perceiving again would show the same, and is left out unless readings are recorded.
     #[inline(always)]
-    fn fill_percept(&self, model: &RobotModel, slot: Slot, scratch: &mut Scratch) -> [u8; 4] {
+    fn fill_percept(&self, model: &RobotModel, slot: EntitySlot, scratch: &mut Scratch) -> [u8; 4] {
         scratch.heard.clear();
         if model.is_external && !scratch.keep_readings {
             scratch.readings.clear();
@@ -200,7 +200,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Of several bodies that claim a box at once one stays written in it; each of the others meets that one
     /// there when it joins, so that all are in one group.
     #[inline]
-    fn claim(&self, slot: Slot, intent: Intent) -> bool {
+    fn claim(&self, slot: EntitySlot, intent: Intent) -> bool {
         let floor = self.floor;
         let body = self.body(slot);
         let claim = T::from_claim(slot);
@@ -226,7 +226,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Calls `each` for every box that the body may come to cover, walls excepted, with the present
     /// content of the box: boxes outside the body, or a door's own boxes. The body must not be
     /// idle.
-    pub(super) fn for_each_claimed(&self, slot: Slot, mut each: impl FnMut(usize, T)) {
+    pub(super) fn for_each_claimed(&self, slot: EntitySlot, mut each: impl FnMut(usize, T)) {
         let floor = self.floor;
         let body = self.body(slot);
         let base = self.base(body);
@@ -242,7 +242,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
 
     /// Collects the last broadcasts of the robots in range, by sender; each reception may be lost.
     /// Robots that have said nothing yet are left out.
-    pub(super) fn listen(&self, radio: &Radio, slot: Slot, heard: &mut Vec<ReceivedMessage>) {
+    pub(super) fn listen(&self, radio: &Radio, slot: EntitySlot, heard: &mut Vec<ReceivedMessage>) {
         let world = self.world;
         let state = self.state;
         let id = self.body(slot).id;
@@ -253,14 +253,14 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             }
             let Some(word) = state.voices.last_broadcast(sender, self.now) else { continue };
             // Drawn per pair, because each listener loses a word or not by itself.
-            let draws = world.streams.pair_words(id, sender, self.now, purpose::RADIO, 0);
+            let draws = world.streams.words_for_pair(id, sender, self.now, purpose::RADIO, 0);
             if !radio.loss.sample(draws[0]) {
                 heard.push(ReceivedMessage { sender, word });
             }
         }
     }
 
-    fn in_radio_range(&self, radio: &Radio, a: Slot, b: Slot) -> bool {
+    fn in_radio_range(&self, radio: &Radio, a: EntitySlot, b: EntitySlot) -> bool {
         let (a_x, a_y) = self.center_half_boxes(a);
         let (b_x, b_y) = self.center_half_boxes(b);
         let (dx, dy) = (a_x - b_x, a_y - b_y);
@@ -268,7 +268,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     /// Returns the center of a body in halves of a box, which are whole numbers for every size.
-    fn center_half_boxes(&self, slot: Slot) -> (i64, i64) {
+    fn center_half_boxes(&self, slot: EntitySlot) -> (i64, i64) {
         let body = self.body(slot);
         let at = body.position();
         let (width, height) = self.type_of(body).size;

@@ -8,8 +8,8 @@ use super::state::{PoseBuffer, RobotsState};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
-    Buffer, Buffers, ColumnBlockBuffer, ColumnSpec, ColumnType, RecordError, Recorder, RowBuffer,
-    Table, TableSchema, Values,
+    ColumnBlockBuffer, ColumnSpec, ColumnType, RecordError, Recorder, Table, TableBuffer,
+    TableBuffers, TableRowsBuffer, TableSchema, Values,
 };
 use sidestep_kernel::view::{EventBuffer, Isometry2};
 use sidestep_kernel::{Cycle, EntityId};
@@ -135,17 +135,17 @@ fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
 #[derive(Debug, Default)]
 struct RowBuffers {
     trajectories: ColumnBlockBuffer,
-    events: RowBuffer<Event>,
-    readings: RowBuffer<ReadingRow>,
-    motions: RowBuffer<MotionSample>,
+    events: TableRowsBuffer<Event>,
+    readings: TableRowsBuffer<ReadingRow>,
+    motions: TableRowsBuffer<MotionSample>,
 }
 
-impl Buffers for RowBuffers {
-    fn buffers(&self) -> Vec<&dyn Buffer> {
+impl TableBuffers for RowBuffers {
+    fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
         vec![&self.trajectories, &self.events, &self.readings, &self.motions]
     }
 
-    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+    fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
         vec![&mut self.trajectories, &mut self.events, &mut self.readings, &mut self.motions]
     }
 }
@@ -177,12 +177,12 @@ impl Collector {
     /// Keeps rows from cycle `now` on; poses only where trajectories are recorded.
     pub(super) fn start(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         let record = &self.record;
-        self.rows.trajectories.start(record.trajectories.then(|| trajectory_table(world)));
-        self.rows.events.start(record.events.then(|| event_table(world)));
-        self.rows.readings.start(
+        self.rows.trajectories.set_schema(record.trajectories.then(|| trajectory_table(world)));
+        self.rows.events.set_table(record.events.then(|| event_table(world)));
+        self.rows.readings.set_table(
             record.calibration.then(|| reading_table(world, ReadingLabels::from_world(world))),
         );
-        self.rows.motions.start(record.calibration.then(|| motion_table(world)));
+        self.rows.motions.set_table(record.calibration.then(|| motion_table(world)));
         if record.trajectories {
             let bodies = world.bodies.len();
             let target = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);

@@ -11,8 +11,8 @@ pub(crate) use packed::{Intent, PackedPose};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::{AtomicCell, Packed};
 use sidestep_kernel::digest::Hasher;
-use sidestep_kernel::space::{AtomicBitSet, Floor, OccupantWord, Position};
-use sidestep_kernel::{AtomicColumn, Cycle, Digest, EntityId, Slot};
+use sidestep_kernel::space::{AtomicBitSet, GridPosition, OccupantGrid, OccupantWord};
+use sidestep_kernel::{AtomicColumn, Cycle, Digest, EntityId, EntitySlot};
 use std::sync::atomic::AtomicU64;
 
 /// Rows of the map that are stored together, see [`RobotsState::arrange`]. One row would leave neighbors above
@@ -23,7 +23,7 @@ const ROWS_PER_BAND: u32 = 8;
 #[derive(Debug)]
 pub struct RobotsState {
     /// The body that stands in, or claims, each box of the padded grid.
-    pub(crate) floor: Floor,
+    pub(crate) floor: OccupantGrid,
     /// Boxes that a robot has ever covered.
     pub(crate) visited: AtomicBitSet,
     /// The changing part of each body, by slot.
@@ -31,7 +31,7 @@ pub struct RobotsState {
     /// Kind of each body, by slot; apart from `bodies`, because beams read it of many bodies and nothing else.
     pub(crate) kinds: Box<[u8]>,
     /// Slot of each entity, by id; [`Self::arrange`] rewrites it.
-    pub(crate) slot_of_id: Box<[Slot]>,
+    pub(crate) slot_of_id: Box<[EntitySlot]>,
     /// Number of contacts of each body by kind touched, at `id * kinds + kind`; apart from `bodies`, because
     /// contacts are rare and the number of kinds is the scenario's.
     pub(crate) contacts: AtomicColumn<u32>,
@@ -48,7 +48,7 @@ pub struct RobotsState {
 #[derive(Debug, Clone, Default)]
 #[repr(align(64))]
 pub struct BodyState {
-    /// Lower-left box, as a [`Position`] word.
+    /// Lower-left box, as a [`GridPosition`] word.
     pub(crate) anchor: AtomicCell<u32>,
     /// Heading; of a door, whether it is open.
     pub facing: AtomicCell<Facing>,
@@ -86,8 +86,8 @@ impl BodyState {
 
     /// Returns the position of the lower-left box.
     #[inline(always)]
-    pub fn position(&self) -> Position {
-        Position::from_word(self.anchor.get())
+    pub fn position(&self) -> GridPosition {
+        GridPosition::from_word(self.anchor.get())
     }
 }
 
@@ -150,12 +150,12 @@ impl RobotsState {
     pub(super) fn empty(world: &RobotsWorld) -> Self {
         let n = world.bodies.len();
         let ids = world.storage.ids(world);
-        let mut slot_of_id: Box<[Slot]> = vec![0; n].into();
+        let mut slot_of_id: Box<[EntitySlot]> = vec![0; n].into();
         (0..).zip(&ids).for_each(|(slot, &id)| slot_of_id[id as usize] = slot);
         let in_rounds = world.policy == ConflictPolicy::Rounds;
         let bids = if in_rounds { world.walls.len() } else { 0 };
         Self {
-            floor: Floor::new(world.walls.iter().map(|&kind| kind == WALL), n),
+            floor: OccupantGrid::new(world.walls.iter().map(|&kind| kind == WALL), n),
             visited: AtomicBitSet::empty(world.walls.len()),
             kinds: ids.iter().map(|&id| world.type_of(id).kind).collect(),
             bodies: ids
@@ -203,13 +203,13 @@ impl RobotsState {
 
     /// Returns the anchor of the body in a slot.
     #[inline(always)]
-    pub fn position(&self, slot: Slot) -> Position {
+    pub fn position(&self, slot: EntitySlot) -> GridPosition {
         self.bodies[slot as usize].position()
     }
 
     /// As [`RobotsWorld::type_of`], for a slot instead of an id.
     #[inline]
-    pub(crate) fn body_type<'a>(&self, world: &'a RobotsWorld, slot: Slot) -> &'a BodyType {
+    pub(crate) fn body_type<'a>(&self, world: &'a RobotsWorld, slot: EntitySlot) -> &'a BodyType {
         &world.types[usize::from(self.bodies[slot as usize].ty)]
     }
 
@@ -223,15 +223,15 @@ impl RobotsState {
         for slot in 0..self.bodies.len() {
             let body = &self.bodies[slot];
             self.kinds[slot] = world.types[usize::from(body.ty)].kind;
-            self.slot_of_id[body.id as usize] = slot as Slot;
-            if !self.is_open_door(world, slot as Slot) {
-                self.occupy(world, slot as Slot);
+            self.slot_of_id[body.id as usize] = slot as EntitySlot;
+            if !self.is_open_door(world, slot as EntitySlot) {
+                self.occupy(world, slot as EntitySlot);
             }
         }
     }
 
     /// An open door covers no box, unlike every other body.
-    pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: Slot) -> bool {
+    pub(super) fn is_open_door(&self, world: &RobotsWorld, slot: EntitySlot) -> bool {
         let body = &self.bodies[slot as usize];
         world.is_door(body.id) && body.facing.get().is_open()
     }
@@ -242,7 +242,7 @@ impl RobotsState {
         Snapshot { cycle, bodies: bodies.collect(), visited: self.visited_bits(world) }
     }
 
-    fn body_record(&self, world: &RobotsWorld, slot: Slot, cycle: Cycle) -> BodyRecord {
+    fn body_record(&self, world: &RobotsWorld, slot: EntitySlot, cycle: Cycle) -> BodyRecord {
         let body = &self.bodies[slot as usize];
         let kinds = world.kinds.len();
         let first_contact = body.id as usize * kinds;
@@ -282,7 +282,7 @@ impl RobotsState {
         state
     }
 
-    fn restore_body(&self, world: &RobotsWorld, slot: Slot, record: &BodyRecord) {
+    fn restore_body(&self, world: &RobotsWorld, slot: EntitySlot, record: &BodyRecord) {
         let body = &self.bodies[slot as usize];
         body.facing.set(record.facing);
         body.contact.set(record.contact);
@@ -307,9 +307,9 @@ impl RobotsState {
     }
 
     /// Writes a body into the boxes it covers.
-    pub(super) fn occupy(&self, world: &RobotsWorld, slot: Slot) {
+    pub(super) fn occupy(&self, world: &RobotsWorld, slot: EntitySlot) {
         let body = self.body_type(world, slot);
-        let base = self.position(slot).index(world.stride);
+        let base = self.position(slot).row_major_index(world.stride);
         for &offset in &body.own {
             let index = base.wrapping_add_signed(offset) as usize;
             self.floor.place(index, slot);

@@ -7,21 +7,21 @@ use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
 use super::world::{RobotsWorld, Role};
 use serde_json::{Value, json};
-use sidestep_kernel::text::{KeyValues, StateDescription, align_pairs, group_thousands, key_value};
+use sidestep_kernel::text::{KeyValues, StateReport, align_pairs, group_thousands, key_value_pair};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
 pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     let total = &metrics.total;
     let mut lines = vec![
-        key_value("contacts", contacts(metrics)),
-        key_value("trips", trips(total.trips, total.trip_cycles_mean)),
-        key_value("distance", distance(total.distance_m)),
-        key_value("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
+        key_value_pair("contacts", contacts(metrics)),
+        key_value_pair("trips", trips(total.trips, total.trip_cycles_mean)),
+        key_value_pair("distance", distance(total.distance_m)),
+        key_value_pair("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
     // Nothing to report where no two bodies ever met.
     if metrics.largest_group > 0 {
-        lines.push(key_value("conflict groups", groups(metrics)));
+        lines.push(key_value_pair("conflict groups", groups(metrics)));
     }
     lines
 }
@@ -61,7 +61,7 @@ fn groups(metrics: &Metrics) -> String {
 }
 
 /// Returns every body by entity id.
-pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateDescription {
+pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateReport {
     let bodies: Vec<BodyText<'_>> = snapshot
         .bodies
         .iter()
@@ -70,7 +70,7 @@ pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateDescriptio
         .collect();
     let heading = "  body  kind        col_boxes  row_boxes  heading\n".to_string();
     let text = bodies.iter().fold(heading, |text, body| text + &body.row());
-    StateDescription { json: bodies.iter().map(BodyText::json).collect(), text }
+    StateReport { json: bodies.iter().map(BodyText::json).collect(), text }
 }
 
 struct BodyText<'a> {
@@ -126,7 +126,7 @@ impl BodyText<'_> {
 }
 
 /// Returns map, bodies, sensors and effectors of a scenario.
-pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateDescription {
+pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateReport {
     let file: Value = source.parse().unwrap_or_default();
     let world = &*compiled.world;
     let json = json!({
@@ -144,7 +144,7 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateDescription
         "effectors": effectors(world),
     });
     let text = text(&json);
-    StateDescription { json, text }
+    StateReport { json, text }
 }
 
 fn map(world: &RobotsWorld) -> Value {
@@ -235,26 +235,26 @@ fn effector_entry(effector: &EffectorModel) -> Value {
 /// Returns the contents in words; made of their JSON, so that both say the same.
 fn text(contents: &Value) -> String {
     let mut lines = vec![
-        key_value("map", map_text(&contents["map"])),
-        key_value("bodies", bodies_text(&contents["bodies"])),
+        key_value_pair("map", map_text(&contents["map"])),
+        key_value_pair("bodies", bodies_text(&contents["bodies"])),
     ];
     for robots in items(contents, "robots") {
-        lines.push(key_value(&unquoted(&robots["name"]), robots_text(robots)));
+        lines.push(key_value_pair(&unquoted(&robots["name"]), robots_text(robots)));
     }
     for sensor in items(contents, "sensors") {
-        lines.push(key_value("sensor", sensor_text(sensor)));
+        lines.push(key_value_pair("sensor", sensor_text(sensor)));
     }
     for effector in items(contents, "effectors") {
-        lines.push(key_value("effector", effector_text(effector)));
+        lines.push(key_value_pair("effector", effector_text(effector)));
     }
     let obstacle_rule = unquoted(&contents["obstacle_rule"]);
     let conflict_policy = unquoted(&contents["conflict_policy"]);
     let cycles = number(&contents["cycles"]);
     let seed = unquoted(&contents["seed"]);
     lines.extend([
-        key_value("regime", unquoted(&contents["regime"])),
-        key_value("laws", format!("obstacles {obstacle_rule}, conflicts {conflict_policy}")),
-        key_value("run", format!("{cycles} cycles, seed {seed}")),
+        key_value_pair("regime", unquoted(&contents["regime"])),
+        key_value_pair("laws", format!("obstacles {obstacle_rule}, conflicts {conflict_policy}")),
+        key_value_pair("run", format!("{cycles} cycles, seed {seed}")),
     ]);
     align_pairs(&lines)
 }

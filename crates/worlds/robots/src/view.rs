@@ -11,8 +11,8 @@ use crate::kinds;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
-    self, Body, BodyId, BodyKind, CachedIsometry2, Condition, LogEvent, LogEventKind, Pose, Scan,
-    ScanSelection, Severity, Shape,
+    self, Body, BodyCondition, BodyId, BodyKind, CachedIsometry2, LogEvent, LogEventKind, Pose,
+    Scan, ScanSelection, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, EntityId, Phases};
 use sidestep_map::Rect;
@@ -106,7 +106,7 @@ impl RobotsWorld {
                 ids.filter(|&id| (id as usize) < self.bodies.len()).collect()
             }
         };
-        let mut scratch = self.scratch();
+        let mut scratch = self.new_scratch();
         ids.into_iter().flat_map(|id| self.scans_of(state, now, id, &mut scratch)).collect()
     }
 
@@ -223,8 +223,8 @@ impl<'a> BodyViewBuilder<'a> {
         };
         let size_m = [f64::from(width) * box_m, f64::from(height) * box_m, height_m];
         Body::new(kind, id, self.pose(ty, body, 0.5 * height_m), Shape::Cuboid { size_m })
-            .with_state_if(body.contact.get() != LastContact::NONE, Condition::Touching)
-            .with_state_if(is_open, Condition::Open)
+            .with_condition_if(body.contact.get() != LastContact::NONE, BodyCondition::Touching)
+            .with_condition_if(is_open, BodyCondition::Open)
     }
 
     fn pose(&self, ty: &BodyType, body: &BodyState, z_m: f64) -> Pose {

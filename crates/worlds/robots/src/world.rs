@@ -10,9 +10,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_error_models::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use sidestep_kernel::Cycle;
-use sidestep_kernel::control::Teams;
+use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::distr::{Bernoulli, DistributionError};
-use sidestep_kernel::space::Position;
+use sidestep_kernel::space::GridPosition;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::{GridMap, Rect};
@@ -106,7 +106,7 @@ pub struct RobotsWorld {
     pub(super) kind_rank: Vec<u8>,
     pub(super) radio: Option<Radio>,
     /// The robots as a caller sees them.
-    pub(super) teams: Arc<Teams>,
+    pub(super) teams: Arc<AgentTeams>,
     pub(super) robots: Vec<EntityId>,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_requests: bool,
@@ -414,13 +414,13 @@ impl RobotsWorld {
 
     /// Returns the map column and row of a position in the padded grid.
     #[inline]
-    pub(super) fn map_position(&self, at: Position) -> (u32, u32) {
+    pub(super) fn map_position(&self, at: GridPosition) -> (u32, u32) {
         (at.col() - self.border, at.row() - self.border)
     }
 
     /// Returns the position in the padded grid of a map column and row.
-    pub(super) fn grid_position(&self, col: u32, row: u32) -> Position {
-        Position::new(col + self.border, row + self.border)
+    pub(super) fn grid_position(&self, col: u32, row: u32) -> GridPosition {
+        GridPosition::new(col + self.border, row + self.border)
     }
 
     /// Returns the number of boxes without those of the border.

@@ -9,15 +9,15 @@ use super::world::RobotsWorld;
 use super::{Scratch, text};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{BufferMut, Order, Teams};
+use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateDescription};
+use sidestep_kernel::text::{KeyValues, StateReport};
 use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
-    Cycle, Digest, InputError, Run, RunConfig, RunStart, RunStats, World, WorldCheckpoint,
-    WorldControl, WorldMetrics, WorldRecording, WorldView,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, InputError, RecordableWorld, Run,
+    RunConfig, RunSetup, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ impl Compiled {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let config = self.plan();
         let collector = Collector::new(self.record);
-        let start = RunStart { config, state, collector };
+        let start = RunSetup { config, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -82,7 +82,7 @@ impl World for RobotsWorld {
 
     type Collector = Collector;
 
-    fn agents(&self) -> usize {
+    fn agent_count(&self) -> usize {
         self.robots.len()
     }
 
@@ -94,12 +94,12 @@ impl World for RobotsWorld {
         collector.collect(scratch);
     }
 
-    fn commit(&self, collector: &mut Collector) {
+    fn commit_results(&self, collector: &mut Collector) {
         collector.commit(self);
     }
 }
 
-impl WorldRecording for RobotsWorld {
+impl RecordableWorld for RobotsWorld {
     fn start_recording(&self, state: &mut RobotsState, collector: &mut Collector, now: Cycle) {
         collector.start(self, state, now);
     }
@@ -112,7 +112,7 @@ impl WorldRecording for RobotsWorld {
         collector.watch_odometry(self);
     }
 
-    fn prepare(&self, collector: &Collector, scratch: &mut Scratch) {
+    fn prepare_scratch(&self, collector: &Collector, scratch: &mut Scratch) {
         collector.prepare(scratch);
     }
 
@@ -135,7 +135,7 @@ impl WorldRecording for RobotsWorld {
     }
 }
 
-impl WorldCheckpoint for RobotsWorld {
+impl CheckpointableWorld for RobotsWorld {
     type Snapshot = Snapshot;
 
     fn digest(&self, state: &RobotsState, now: Cycle) -> Digest {
@@ -197,8 +197,8 @@ impl WorldView for RobotsWorld {
     }
 }
 
-impl WorldControl for RobotsWorld {
-    fn teams(&self) -> Arc<Teams> {
+impl ControllableWorld for RobotsWorld {
+    fn agent_teams(&self) -> Arc<AgentTeams> {
         Arc::clone(&self.teams)
     }
 
@@ -227,7 +227,7 @@ impl WorldMetrics for RobotsWorld {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &RobotsState, now: Cycle) -> StateDescription {
+    fn poses(&self, state: &RobotsState, now: Cycle) -> StateReport {
         text::poses(self, &state.snapshot(self, now))
     }
 }

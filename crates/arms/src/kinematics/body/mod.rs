@@ -16,7 +16,7 @@ mod tests;
 
 use super::serial::{LinkFrames, SerialChain};
 use super::transform::{Transform, Vector};
-use mount::Mounts;
+use mount::LinkMounts;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
 use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
@@ -37,7 +37,7 @@ struct LinkShape {
     /// Name of its link, for reports.
     link: String,
     /// Where its center is, at any posture.
-    mount: mount::Mount,
+    mount: mount::LinkMount,
     core: ShapeCore,
     /// Radius of a ball about its center that holds it, in m.
     radius_m: f64,
@@ -78,7 +78,7 @@ impl ArmBody {
         solids: &[Solid],
         may_touch: &[(usize, usize)],
     ) -> Self {
-        let mounts = Mounts::new(model, chain);
+        let mounts = LinkMounts::new(model, chain);
         let mut parts = Vec::new();
         let mut links = Vec::new();
         for solid in solids {
@@ -87,7 +87,7 @@ impl ArmBody {
                 links.push(solid.link);
             }
         }
-        let pairs = pairs::collision_pairs(model, &mounts, &links, may_touch);
+        let pairs = pairs::collision_candidate_pairs(model, &mounts, &links, may_touch);
         Self { parts, pairs }
     }
 
@@ -107,7 +107,7 @@ impl ArmBody {
 
     /// Returns the depth in m of each pair of links that must not touch and overlaps at these joint
     /// values.
-    pub fn overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
+    pub fn link_overlaps(&self, chain: &SerialChain, values: &[f64]) -> Vec<(&str, &str, f64)> {
         let mut shapes = Vec::new();
         self.place_shapes(&chain.forward_kinematics(values), values, &mut shapes);
         let placed = PlacedBody { body: self, shapes: &shapes };
@@ -163,7 +163,7 @@ impl ArmBody {
         placed.clear();
         placed.extend(self.parts.iter().map(|part| {
             let pose = part.mount.transform(links, values);
-            let upright = part.core.upright(&pose);
+            let upright = part.core.parry_pose(&pose);
             PlacedShape { pose: upright, center_m: pose.origin_m }
         }));
     }
@@ -186,7 +186,7 @@ impl PlacedBody<'_> {
             return None;
         }
         let cores = [a, b].map(|part| parts[part].core.shape());
-        near(&shapes[a].pose, cores[0], &shapes[b].pose, cores[1], within_m)
+        proximity_within(&shapes[a].pose, cores[0], &shapes[b].pose, cores[1], within_m)
     }
 
     /// Returns the relation of a part to a ball, if they are nearer than `within_m`.
@@ -204,19 +204,19 @@ impl PlacedBody<'_> {
             return None;
         }
         let at = ParryPose::from_parts(vector(center_m), Rotation::IDENTITY);
-        near(&shape.pose, core.shape(), &at, &Ball::new(radius_m), within_m)
+        proximity_within(&shape.pose, core.shape(), &at, &Ball::new(radius_m), within_m)
     }
 }
 
 impl LinkShape {
     /// Returns a solid of a model as a part of an arm's body; `None` for shapes that are not among those of bodies.
-    fn new(model: &Model, mounts: &Mounts, solid: &Solid) -> Option<Self> {
-        let own = Transform::from_origin(&solid.origin);
+    fn new(model: &Model, mounts: &LinkMounts, solid: &Solid) -> Option<Self> {
+        let own = Transform::from_urdf_origin(&solid.origin);
         let center = Transform { origin_m: solid.center_m, ..Transform::IDENTITY };
         let core = core(&solid.shape)?;
         Some(Self {
             link: model.links[solid.link].clone(),
-            mount: mounts.in_link(solid.link, own.compose(&center)),
+            mount: mounts.mount_in_link(solid.link, own.compose(&center)),
             radius_m: core.radius_m(),
             core,
         })
@@ -242,7 +242,7 @@ impl ShapeCore {
 
     /// Returns the pose in which parry draws it: cylinders of models are along z, those of parry
     /// along y.
-    fn upright(&self, pose: &Transform) -> ParryPose {
+    fn parry_pose(&self, pose: &Transform) -> ParryPose {
         const UP: Transform = Transform {
             rotation: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
             origin_m: [0.0; 3],
@@ -265,7 +265,7 @@ fn core(shape: &Shape) -> Option<ShapeCore> {
     }
 }
 
-fn near(
+fn proximity_within(
     at: &ParryPose,
     shape: &dyn ParryShape,
     other_at: &ParryPose,

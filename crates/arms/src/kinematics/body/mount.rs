@@ -1,12 +1,12 @@
 //! The place of a link of a model, at a posture of an arm of it.
 
-use super::super::serial::{JointCoupling, JointMotion, SerialChain};
+use super::super::serial::{JointCoupling, JointMotionKind, SerialChain};
 use super::super::transform::Transform;
 use sidestep_import::urdf::Model;
 
 /// A frame that hangs on a link of the arm, at joints of its own where it is beside the arm.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mount {
+pub(super) struct LinkMount {
     /// The link of the arm, counted as its frames are.
     pub(super) link: usize,
     /// Joints that follow joints of the arm, from the link out.
@@ -19,12 +19,12 @@ pub(super) struct Mount {
 #[derive(Debug, Clone, PartialEq)]
 struct MimicJoint {
     before: Transform,
-    motion: JointMotion,
+    motion: JointMotionKind,
     axis: [f64; 3],
     drive: JointCoupling,
 }
 
-impl Mount {
+impl LinkMount {
     pub(super) fn transform(&self, links: &[Transform], values: &[f64]) -> Transform {
         let start = links[self.link];
         let at = self.steps.iter().fold(start, |at, step| {
@@ -46,38 +46,40 @@ impl Mount {
 }
 
 /// By the index of the link in the model.
-pub(super) struct Mounts(Vec<Mount>);
+pub(super) struct LinkMounts(Vec<LinkMount>);
 
-impl Mounts {
+impl LinkMounts {
     pub(super) fn new(model: &Model, chain: &SerialChain) -> Self {
-        let mut found: Vec<Option<Mount>> = vec![None; model.links.len()];
+        let mut found: Vec<Option<LinkMount>> = vec![None; model.links.len()];
         let base = link_index(model, &chain.base);
         let tip = link_index(model, &chain.tip);
-        found[base] = Some(Mount { link: 0, steps: Vec::new(), last: Transform::IDENTITY });
+        found[base] = Some(LinkMount { link: 0, steps: Vec::new(), last: Transform::IDENTITY });
         let mut link = 0;
         for joint in model.joint_path(base, tip).expect("an arm of this model") {
             let joint = &model.joints[joint];
-            let origin = Transform::from_origin(&joint.origin);
+            let origin = Transform::from_urdf_origin(&joint.origin);
             let before = found[joint.parent].clone().expect("the path goes out from the base");
             found[joint.child] = Some(if joint.kind.has_one_value() {
                 link += 1;
-                Mount { link, steps: Vec::new(), last: Transform::IDENTITY }
+                LinkMount { link, steps: Vec::new(), last: Transform::IDENTITY }
             } else {
                 before.compose(&origin)
             });
         }
         find_fixed_mounts(model, chain, base, &mut found);
         Self(
-            (0..model.links.len()).map(|link| find_mount(model, chain, link, &mut found)).collect(),
+            (0..model.links.len())
+                .map(|link| find_link_mount(model, chain, link, &mut found))
+                .collect(),
         )
     }
 
     /// Returns the mount of a frame in a link of the model.
-    pub(super) fn in_link(&self, link: usize, inside: Transform) -> Mount {
+    pub(super) fn mount_in_link(&self, link: usize, inside: Transform) -> LinkMount {
         self.0[link].compose(&inside)
     }
 
-    pub(super) fn link(&self, link: usize) -> &Mount {
+    pub(super) fn link(&self, link: usize) -> &LinkMount {
         &self.0[link]
     }
 }
@@ -87,7 +89,12 @@ fn link_index(model: &Model, name: &str) -> usize {
 }
 
 /// Finds the links from the base up to the root: they stand still with the base.
-fn find_fixed_mounts(model: &Model, chain: &SerialChain, base: usize, found: &mut [Option<Mount>]) {
+fn find_fixed_mounts(
+    model: &Model,
+    chain: &SerialChain,
+    base: usize,
+    found: &mut [Option<LinkMount>],
+) {
     let mut link = base;
     while let Some(joint) = model.parent_joint(link) {
         let below = found[link].clone().expect("found before");
@@ -98,12 +105,12 @@ fn find_fixed_mounts(model: &Model, chain: &SerialChain, base: usize, found: &mu
 }
 
 /// Finds the mount of a link from that of the link that carries it.
-fn find_mount(
+fn find_link_mount(
     model: &Model,
     chain: &SerialChain,
     link: usize,
-    found: &mut [Option<Mount>],
-) -> Mount {
+    found: &mut [Option<LinkMount>],
+) -> LinkMount {
     let mut out = Vec::new();
     let mut at = link;
     while found[at].is_none() {
@@ -117,10 +124,10 @@ fn find_mount(
             None => before.compose(&rest_transform(model, chain, joint)),
             Some((motion, drive)) => {
                 let moving = &model.joints[joint];
-                let before_it = before.last.compose(&Transform::from_origin(&moving.origin));
+                let before_it = before.last.compose(&Transform::from_urdf_origin(&moving.origin));
                 let step = MimicJoint { before: before_it, motion, axis: moving.axis, drive };
                 let steps = before.steps.into_iter().chain([step]).collect();
-                Mount { steps, last: Transform::IDENTITY, link: before.link }
+                LinkMount { steps, last: Transform::IDENTITY, link: before.link }
             }
         });
     }
@@ -132,17 +139,17 @@ fn mimic_motion(
     model: &Model,
     chain: &SerialChain,
     joint: usize,
-) -> Option<(JointMotion, JointCoupling)> {
-    let motion = JointMotion::from_kind(model.joints[joint].kind)?;
+) -> Option<(JointMotionKind, JointCoupling)> {
+    let motion = JointMotionKind::from_kind(model.joints[joint].kind)?;
     Some((motion, chain.coupling(model, joint)?))
 }
 
 /// Returns the child's frame in the parent's if a joint is at rest: at the value nearest to zero.
 fn rest_transform(model: &Model, chain: &SerialChain, joint: usize) -> Transform {
     let moving = &model.joints[joint];
-    let origin = Transform::from_origin(&moving.origin);
+    let origin = Transform::from_urdf_origin(&moving.origin);
     let rest = moving.limits.map_or(0.0, |l| 0f64.clamp(l.lower, l.upper));
-    match JointMotion::from_kind(moving.kind) {
+    match JointMotionKind::from_kind(moving.kind) {
         // A link that floats or slides in a plane is taken as drawn.
         None => origin,
         Some(motion) => {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::kinematics::{ArmGoal, ArmPart as HitPart, CollidesWith, IkFailure, ObstacleSphere};
+use crate::kinematics::{ArmBodyPart as HitPart, ArmGoal, CollidesWith, IkFailure, ObstacleSphere};
 use proptest::prelude::*;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_testing::robot_model as shared;
@@ -63,10 +63,10 @@ fn neighbors_rigid_links_and_masked_pairs_may_touch() {
 fn overlaps_are_as_deep_as_computed_by_hand() {
     let (model, chain) = bars("left");
     let body = body_of(&model, &chain, &[]);
-    assert!(body.overlaps(&chain, &[0.0, 0.3, 0.3, 0.0]).is_empty());
+    assert!(body.link_overlaps(&chain, &[0.0, 0.3, 0.3, 0.0]).is_empty());
     // An equilateral triangle: the ball of the last bar stands 0.1 m before the first joint.
     let turn = 2.0 * std::f64::consts::PI / 3.0;
-    let overlaps = body.overlaps(&chain, &[0.0, turn, turn, 0.0]);
+    let overlaps = body.link_overlaps(&chain, &[0.0, turn, turn, 0.0]);
     // Its center is 0.0866 m beside the axis of the first bar, which is 0.05 m thick, at 0.05 m:
     // 0.05 m before the bar's end at 0.1 m.
     let gap = norm([0.1 * 3f64.sqrt() / 2.0 - 0.05, 0.05]);
@@ -108,7 +108,7 @@ proptest! {
             let placed = PlacedBody { body: &body, shapes: &shapes };
             let ObstacleSphere { center_m, radius_m } = sphere;
             let mut parts = 0..body.len();
-            body.overlaps(&chain, values).is_empty()
+            body.link_overlaps(&chain, values).is_empty()
                 && !parts.any(|part| placed.ball_proximity(part, center_m, radius_m, 0.0).is_some())
         };
         let goal = ArmGoal {

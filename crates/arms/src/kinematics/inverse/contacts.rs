@@ -1,11 +1,11 @@
 //! Parts of an arm that are in another body, or nearly so.
 
 use super::super::body::{self, ArmBody, PlacedBody, Proximity};
-use super::super::skeleton::{Anchor, Skeleton};
+use super::super::skeleton::{LinkAnchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::LinkTransforms;
 use super::goal::{ArmGoal, ObstacleSphere};
-use super::result::{ArmPart, CollidesWith, Collision};
+use super::result::{ArmBodyPart, CollidesWith, Collision};
 use sidestep_kernel::geometry::{dot, norm, scaled, sub};
 use sidestep_rods::geometry::nearest_on_segment;
 
@@ -15,7 +15,7 @@ const MARGIN: f64 = 1e-4;
 
 /// The parts of an arm, and the bodies that they must not enter.
 pub(super) struct ContactFinder<'a> {
-    anchors: &'a [Anchor],
+    anchors: &'a [LinkAnchor],
     /// Indices of the rods that stand for links without shapes.
     rods: Vec<usize>,
     spheres: &'a [ObstacleSphere],
@@ -41,12 +41,12 @@ pub(super) struct Contact {
     /// The distance by which it must move, in m.
     pub(super) wanted_m: f64,
     /// The points that move it.
-    pub(super) pulls: [ContactPoint; 2],
+    pub(super) pulls: [LinkContactPoint; 2],
 }
 
 /// A point of a link, and its share in a contact's motion.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ContactPoint {
+pub(super) struct LinkContactPoint {
     pub(super) link: usize,
     pub(super) at_m: Vector,
     pub(super) share: f64,
@@ -57,7 +57,7 @@ impl ContactSet {
         &mut self,
         contact: Contact,
         depth_m: f64,
-        hit: impl FnOnce() -> (ArmPart, CollidesWith),
+        hit: impl FnOnce() -> (ArmBodyPart, CollidesWith),
     ) {
         self.contacts.push(contact);
         if depth_m > self.hit.as_ref().map_or(0.0, |hit| hit.depth_m) {
@@ -73,7 +73,7 @@ impl<'a> ContactFinder<'a> {
         let anchors = &skeleton.connectors;
         let mut rods = Vec::new();
         for (rod, ends) in anchors.windows(2).enumerate() {
-            let mut links = holder_links(&ends[0], &ends[1]);
+            let mut links = links_holding_rod(&ends[0], &ends[1]);
             if body.is_none_or(|body| !links.any(|link| body.has_shape(link))) {
                 rods.push(rod);
             }
@@ -93,7 +93,7 @@ impl<'a> ContactFinder<'a> {
         touched.contacts.clear();
         touched.hit = None;
         if !self.spheres.is_empty() {
-            self.rods.iter().for_each(|&rod| self.rod_in_spheres(rod, placed, touched));
+            self.rods.iter().for_each(|&rod| self.add_rod_contacts(rod, placed, touched));
         }
         let Some(body) = self.body.filter(|_| self.own_body || !self.spheres.is_empty()) else {
             return;
@@ -101,14 +101,14 @@ impl<'a> ContactFinder<'a> {
         let mut shapes = std::mem::take(&mut touched.parts);
         body.place_shapes_on(&placed.links, values, &mut shapes);
         let placed_body = PlacedBody { body, shapes: &shapes };
-        self.parts_in_spheres(placed_body, touched);
+        self.add_part_sphere_contacts(placed_body, touched);
         if self.own_body {
-            self.parts_in_parts(placed_body, touched);
+            self.find_link_contacts(placed_body, touched);
         }
         touched.parts = shapes;
     }
 
-    fn rod_in_spheres(&self, rod: usize, placed: &LinkTransforms, touched: &mut ContactSet) {
+    fn add_rod_contacts(&self, rod: usize, placed: &LinkTransforms, touched: &mut ContactSet) {
         let pair = [self.anchors[rod], self.anchors[rod + 1]];
         let ends = pair.map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m));
         for (sphere, &ObstacleSphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
@@ -127,15 +127,15 @@ impl<'a> ContactFinder<'a> {
             };
             let part = fraction_along(nearest, ends);
             let pulls = [
-                ContactPoint { link: pair[0].first, at_m: ends[0], share: 1.0 - part },
-                ContactPoint { link: pair[1].first, at_m: ends[1], share: part },
+                LinkContactPoint { link: pair[0].first, at_m: ends[0], share: 1.0 - part },
+                LinkContactPoint { link: pair[1].first, at_m: ends[1], share: part },
             ];
             let contact = Contact { away, wanted_m: depth_m + self.margin_m, pulls };
-            touched.add(contact, depth_m, || (ArmPart::Rod(rod), CollidesWith::Sphere(sphere)));
+            touched.add(contact, depth_m, || (ArmBodyPart::Rod(rod), CollidesWith::Sphere(sphere)));
         }
     }
 
-    fn parts_in_spheres(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
+    fn add_part_sphere_contacts(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
         let body = placed.body;
         for (sphere, &ObstacleSphere { center_m, radius_m }) in self.spheres.iter().enumerate() {
             for part in 0..body.len() {
@@ -143,20 +143,23 @@ impl<'a> ContactFinder<'a> {
                 if let Some(near) = near {
                     let contact = self.contact(&near, body.link(part), 0);
                     touched.add(contact, -near.apart_m, || {
-                        (ArmPart::Link(body.name(part).into()), CollidesWith::Sphere(sphere))
+                        (ArmBodyPart::Link(body.name(part).into()), CollidesWith::Sphere(sphere))
                     });
                 }
             }
         }
     }
 
-    fn parts_in_parts(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
+    fn find_link_contacts(&self, placed: PlacedBody<'_>, touched: &mut ContactSet) {
         let body = placed.body;
         for &(a, b) in body.own_pairs() {
             if let Some(near) = placed.proximity(a, b, self.margin_m) {
                 let contact = self.contact(&near, body.link(a), body.link(b));
                 touched.add(contact, -near.apart_m, || {
-                    (ArmPart::Link(body.name(b).into()), CollidesWith::Link(body.name(a).into()))
+                    (
+                        ArmBodyPart::Link(body.name(b).into()),
+                        CollidesWith::Link(body.name(a).into()),
+                    )
                 });
             }
         }
@@ -168,15 +171,15 @@ impl<'a> ContactFinder<'a> {
             away: near.away,
             wanted_m: self.margin_m - near.apart_m,
             pulls: [
-                ContactPoint { link, at_m: near.first_m, share: 1.0 },
-                ContactPoint { link: other, at_m: near.second_m, share: -1.0 },
+                LinkContactPoint { link, at_m: near.first_m, share: 1.0 },
+                LinkContactPoint { link: other, at_m: near.second_m, share: -1.0 },
             ],
         }
     }
 }
 
 /// Returns the links that hold the rod between two anchors, or on either side of its slide.
-fn holder_links(inner: &Anchor, outer: &Anchor) -> impl Iterator<Item = usize> {
+fn links_holding_rod(inner: &LinkAnchor, outer: &LinkAnchor) -> impl Iterator<Item = usize> {
     let first = outer.first.max(inner.first);
     let last = inner.last.min(outer.last);
     first.min(last)..=first.max(last)

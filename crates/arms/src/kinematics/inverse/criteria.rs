@@ -19,7 +19,7 @@ use sidestep_kernel::math::atan2;
 const RADIAN_LENGTH: f64 = 0.3;
 
 /// What a search measures at each posture.
-pub(super) struct IkCriteria<'a> {
+pub(super) struct PostureEvaluator<'a> {
     fast_fk: FastFk,
     goal: &'a ArmGoal,
     contacts: ContactFinder<'a>,
@@ -48,7 +48,7 @@ impl PostureEvaluation {
     }
 }
 
-impl<'a> IkCriteria<'a> {
+impl<'a> PostureEvaluator<'a> {
     pub(super) fn new(chain: &'a SerialChain, skeleton: &'a Skeleton, goal: &'a ArmGoal) -> Self {
         // If all axes count it does not matter which, and these cost no digits.
         let axes =
@@ -63,7 +63,7 @@ impl<'a> IkCriteria<'a> {
         }
     }
 
-    /// Returns an evaluation of no posture, as a buffer for [`IkCriteria::evaluate`].
+    /// Returns an evaluation of no posture, as a buffer for [`PostureEvaluator::evaluate`].
     pub(super) fn empty_evaluation(chain: &SerialChain) -> PostureEvaluation {
         PostureEvaluation {
             placed: LinkTransforms::from_chain(chain),
@@ -77,7 +77,7 @@ impl<'a> IkCriteria<'a> {
 
     /// Computes the links' poses and the errors at `values`; the Jacobian needs both.
     pub(super) fn evaluate(&self, values: &[f64], evaluation: &mut PostureEvaluation) {
-        self.fast_fk.compute(values, &mut evaluation.placed);
+        self.fast_fk.compute_link_poses(values, &mut evaluation.placed);
         let tip = evaluation.placed.tip;
         let missing = sub(self.goal.target.origin_m, tip.origin_m);
         evaluation.wanted.clear();
@@ -145,7 +145,7 @@ impl<'a> IkCriteria<'a> {
             }
         });
         let (of_turn, of_contacts) = others.split_at_mut(evaluation.about.len() * n);
-        self.fast_fk.for_each_turn(lines, |variable, turns| {
+        self.fast_fk.for_each_turning_joint(lines, |variable, turns| {
             for (row, about) in of_turn.chunks_exact_mut(n).zip(&evaluation.about) {
                 row[variable] += self.radian_m * dot(turns, *about);
             }

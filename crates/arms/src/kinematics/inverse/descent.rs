@@ -1,7 +1,7 @@
 //! Damped steps from one posture.
 
-use super::super::serial::{JointMotion, SerialChain};
-use super::criteria::{IkCriteria, PostureEvaluation};
+use super::super::serial::{JointMotionKind, SerialChain};
+use super::criteria::{PostureEvaluation, PostureEvaluator};
 use super::goal::ArmGoal;
 use super::step::{IkStepInput, IkStepper, JointRanges};
 use sidestep_kernel::math::wrap_angle;
@@ -44,7 +44,7 @@ pub(super) struct DescentResult {
 pub(super) struct Descender<'a> {
     pub(super) chain: &'a SerialChain,
     pub(super) goal: &'a ArmGoal,
-    pub(super) criteria: IkCriteria<'a>,
+    pub(super) criteria: PostureEvaluator<'a>,
     pub(super) bounds: JointRanges,
     pub(super) stepper: IkStepper,
 }
@@ -62,7 +62,7 @@ impl Descender<'_> {
     pub(super) fn descend(&mut self, mut values: Vec<f64>, limits: DescentLimits) -> DescentResult {
         self.bounds.clamp(&mut values);
         let n = values.len();
-        let mut evaluation = IkCriteria::empty_evaluation(self.chain);
+        let mut evaluation = PostureEvaluator::empty_evaluation(self.chain);
         self.criteria.evaluate(&values, &mut evaluation);
         let mut next = values.clone();
         let mut next_evaluation = evaluation.clone();
@@ -113,6 +113,6 @@ impl Descender<'_> {
     /// Returns whether a variable that is a full turn larger is the same posture.
     pub(super) fn is_periodic(&self, variable: usize) -> bool {
         let mut driven = self.chain.joints.iter().filter(|j| j.drive.variable == variable);
-        driven.all(|j| j.motion == JointMotion::Turn && j.drive.is_own())
+        driven.all(|j| j.motion == JointMotionKind::Turn && j.drive.is_identity())
     }
 }

@@ -1,8 +1,8 @@
 //! Forward kinematics of many postures of one arm: values independent of the posture are computed once,
 //! and nothing is allocated per posture.
 
-use super::super::serial::{JointCoupling, JointMotion, MovingJoint, SerialChain};
-use super::super::transform::{Line, Transform, Vector, multiply};
+use super::super::serial::{JointCoupling, JointMotionKind, MovingJoint, SerialChain};
+use super::super::transform::{Line, Transform, Vector, multiply_matrices};
 use sidestep_kernel::geometry::{add, add_scaled, dot, scaled};
 use sidestep_kernel::math::sin_cos;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -18,7 +18,7 @@ pub(super) struct FastFk {
 /// (Rodrigues' formula, with the constant origin multiplied in).
 #[derive(Debug)]
 struct FastFkJoint {
-    motion: JointMotion,
+    motion: JointMotionKind,
     drive: JointCoupling,
     /// The origin's rotation if the joint slides.
     still: [Vector; 3],
@@ -58,19 +58,19 @@ impl FastFk {
     }
 
     /// Computes the poses at `values` into `placed`, which is one of this arm's.
-    pub(super) fn compute(&self, values: &[f64], placed: &mut LinkTransforms) {
+    pub(super) fn compute_link_poses(&self, values: &[f64], placed: &mut LinkTransforms) {
         for (i, joint) in self.joints.iter().enumerate() {
             let q = joint.drive.value(values);
             let before = &placed.links[i];
             let axis = before.transform_direction(joint.axis);
             let through_m = before.transform_point(joint.origin_m);
             let pose = match joint.motion {
-                JointMotion::Turn => {
-                    let rotation = multiply(&before.rotation, &joint.rotation(q));
+                JointMotionKind::Turn => {
+                    let rotation = multiply_matrices(&before.rotation, &joint.rotation_at_angle(q));
                     Transform { rotation, origin_m: through_m }
                 }
-                JointMotion::Slide => Transform {
-                    rotation: multiply(&before.rotation, &joint.still),
+                JointMotionKind::Slide => Transform {
+                    rotation: multiply_matrices(&before.rotation, &joint.still),
                     origin_m: add_scaled(through_m, axis, q),
                 },
             };
@@ -92,8 +92,8 @@ impl FastFk {
     ) {
         for (joint, line) in self.joints[..link].iter().zip(lines) {
             let moves = match joint.motion {
-                JointMotion::Turn => line.velocity_at(p_m),
-                JointMotion::Slide => line.along,
+                JointMotionKind::Turn => line.velocity_at(p_m),
+                JointMotionKind::Slide => line.along,
             };
             visit(joint.drive.variable, scaled(moves, joint.drive.multiplier));
         }
@@ -102,9 +102,13 @@ impl FastFk {
     /// Calls a function with each joint and the angular velocity of the tip if the joint's variable
     /// changes by 1 per second.
     #[inline]
-    pub(super) fn for_each_turn(&self, lines: &[Line], mut visit: impl FnMut(usize, Vector)) {
+    pub(super) fn for_each_turning_joint(
+        &self,
+        lines: &[Line],
+        mut visit: impl FnMut(usize, Vector),
+    ) {
         for (joint, line) in self.joints.iter().zip(lines) {
-            if joint.motion == JointMotion::Turn {
+            if joint.motion == JointMotionKind::Turn {
                 visit(joint.drive.variable, scaled(line.along, joint.drive.multiplier));
             }
         }
@@ -116,29 +120,32 @@ impl FastFkJoint {
     fn new(joint: &MovingJoint) -> Self {
         let rotation = joint.origin.rotation;
         let still = match joint.motion {
-            JointMotion::Turn => halve(&add_all(&rotation_at(joint, 0.0), &rotation_at(joint, PI))),
-            JointMotion::Slide => rotation,
+            JointMotionKind::Turn => halve_matrix(&add_all(
+                &joint_rotation_at(joint, 0.0),
+                &joint_rotation_at(joint, PI),
+            )),
+            JointMotionKind::Slide => rotation,
         };
         let minus_still = still.map(|row| scaled(row, -1.0));
         Self {
             motion: joint.motion,
             drive: joint.drive,
             cosine: add_all(&rotation, &minus_still),
-            sine: add_all(&rotation_at(joint, FRAC_PI_2), &minus_still),
+            sine: add_all(&joint_rotation_at(joint, FRAC_PI_2), &minus_still),
             still,
             origin_m: joint.origin.origin_m,
             axis: joint.origin.transform_direction(joint.axis),
         }
     }
 
-    fn rotation(&self, angle_rad: f64) -> [Vector; 3] {
+    fn rotation_at_angle(&self, angle_rad: f64) -> [Vector; 3] {
         let (s, c) = sin_cos(angle_rad);
         [0, 1, 2].map(|i| add_scaled(add_scaled(self.still[i], self.cosine[i], c), self.sine[i], s))
     }
 }
 
 /// Returns the rotation of a joint's frame in the link before it, at an angle.
-fn rotation_at(joint: &MovingJoint, angle_rad: f64) -> [Vector; 3] {
+fn joint_rotation_at(joint: &MovingJoint, angle_rad: f64) -> [Vector; 3] {
     joint.origin.compose(&Transform::from_axis_angle(joint.axis, angle_rad)).rotation
 }
 
@@ -146,7 +153,7 @@ fn add_all(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
     [0, 1, 2].map(|i| add(a[i], b[i]))
 }
 
-fn halve(a: &[Vector; 3]) -> [Vector; 3] {
+fn halve_matrix(a: &[Vector; 3]) -> [Vector; 3] {
     a.map(|row| scaled(row, 0.5))
 }
 
@@ -164,13 +171,13 @@ pub(super) fn rotation_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
         return scaled(skew, 0.5);
     }
     if twice_cosine < 0.0 && twice_sine < 1e-4 {
-        return half_turn(&r, angle_rad, skew);
+        return half_turn_vector(&r, angle_rad, skew);
     }
     scaled(skew, angle_rad / twice_sine)
 }
 
 /// Returns a turn by nearly half a turn: its axis is the largest column of `R + R^T + (1 - tr) I`.
-fn half_turn(r: &[Vector; 3], angle_rad: f64, skew: Vector) -> Vector {
+fn half_turn_vector(r: &[Vector; 3], angle_rad: f64, skew: Vector) -> Vector {
     let trace = r[0][0] + r[1][1] + r[2][2];
     let columns = [0, 1, 2].map(|j| {
         [0, 1, 2].map(|i| {

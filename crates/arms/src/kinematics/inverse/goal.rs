@@ -27,7 +27,7 @@ impl ObstacleSphere {
 
 /// An axis of the tip's frame, as the column of its rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axis {
+pub enum FrameAxis {
     /// Column 0.
     X,
     /// Column 1.
@@ -36,7 +36,7 @@ pub enum Axis {
     Z,
 }
 
-impl Axis {
+impl FrameAxis {
     /// The three axes in their order.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 }
@@ -47,7 +47,7 @@ pub enum OrientationMask {
     /// Nothing: the tip may be turned in any way.
     Free,
     /// The direction of one axis: the tip may turn about it.
-    Axis(Axis),
+    Axis(FrameAxis),
     /// All three axes.
     Whole,
 }
@@ -77,8 +77,9 @@ impl PoseMask {
         along: [bool; 3],
         about: [bool; 3],
     ) -> Result<Self, InputError> {
-        let free = Axis::ALL.into_iter().zip(about).filter_map(|(axis, free)| free.then_some(axis));
-        let free: Vec<Axis> = free.collect();
+        let free =
+            FrameAxis::ALL.into_iter().zip(about).filter_map(|(axis, free)| free.then_some(axis));
+        let free: Vec<FrameAxis> = free.collect();
         if !is_turned && !free.is_empty() {
             let cause = "a turn is free, and none is asked for";
             return Err(InputError::new("--free", cause, "add --rpy or --quaternion"));
@@ -196,7 +197,7 @@ impl ArmGoal {
             let remedy = format!("give a number from 1 to {MAX_SOLUTIONS}");
             return Err(InputError::new("solutions", cause, remedy));
         }
-        self.check_spheres()
+        self.check_sphere_values()
     }
 
     /// Returns whether the search continues from posture to posture, instead of ending at the first that
@@ -205,7 +206,7 @@ impl ArmGoal {
         self.solutions > 1 || self.nearest
     }
 
-    fn check_spheres(&self) -> Result<(), InputError> {
+    fn check_sphere_values(&self) -> Result<(), InputError> {
         if let Some(i) = self.spheres.iter().position(|sphere| !sphere.is_in_range()) {
             let cause = format!("is {:?}", self.spheres[i]);
             let remedy = "give finite coordinates and a radius that is not negative";

@@ -21,13 +21,13 @@ const RESTARTS: usize = 20;
 /// Returns joint values inside the limits at which the connectors are at the places found by the chain
 /// engine; none if it does not reach the target, or points do not determine the joints. Also returns
 /// the number of iterations.
-pub(super) fn posture(
+pub(super) fn find_posture(
     arm: &SerialChain,
     skeleton: &Skeleton,
     goal: &ArmGoal,
     start: &[f64],
 ) -> Option<(Vec<f64>, usize)> {
-    let connectors = arm.connectors(skeleton, &arm.forward_kinematics(start));
+    let connectors = arm.connector_positions(skeleton, &arm.forward_kinematics(start));
     let (chain, before) = arm_chain(arm, skeleton, goal, &connectors).ok()?;
     let balls =
         goal.spheres.iter().zip(0..).map(|(s, id)| Obstacle::ball(id, s.center_m, s.radius_m));
@@ -79,7 +79,7 @@ fn arm_chain(
     let before = usize::from(skeleton.base_direction.is_some());
     if let Some(direction) = skeleton.base_direction {
         points.insert(0, add(points[0], scaled(direction, -1.0)));
-        rods.insert(0, Rod::fixed(1.0, 0.0));
+        rods.insert(0, Rod::with_fixed_length(1.0, 0.0));
         joints.insert(0, Connector { mobility: Mobility::Fixed, ..Connector::free(0.0) });
     }
     Ok((Chain::new(points, joints, rods)?, before))

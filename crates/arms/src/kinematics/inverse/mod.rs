@@ -35,9 +35,9 @@ mod step;
 mod tests;
 mod tracking;
 
-pub use goal::{ArmGoal, Axis, MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask};
-pub use result::{ArmPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
-pub use tracking::{ConnectorTarget, JointTracker};
+pub use goal::{ArmGoal, FrameAxis, MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask};
+pub use result::{ArmBodyPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
+pub use tracking::{ConnectorTarget, ConnectorTargetTracker};
 
 use super::serial::SerialChain;
 use search::IkSearch;
@@ -52,7 +52,7 @@ impl SerialChain {
     /// is no error.
     pub fn solve(&self, goal: &ArmGoal, start: &[f64]) -> Result<IkResult, InputError> {
         goal.check()?;
-        self.check_count("start", start)?;
+        self.check_joint_values("start", start)?;
         let skeleton = self.skeleton();
         Ok(IkSearch::new(self, &skeleton, goal).run(start))
     }

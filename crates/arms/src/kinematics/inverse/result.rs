@@ -46,7 +46,7 @@ pub struct IkSolution {
 #[error("{part} would be {depth_m:.6} m deep in {against}")]
 pub struct Collision {
     /// The part that is in another body; of two links of the arm the later one.
-    pub part: ArmPart,
+    pub part: ArmBodyPart,
     /// The body that it is in.
     pub against: CollidesWith,
     /// How far they overlap in m, above 0.
@@ -55,7 +55,7 @@ pub struct Collision {
 
 /// How a collision names a part: by its link, or by its rod where no link has a shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ArmPart {
+pub enum ArmBodyPart {
     /// The rod from the connector of this index (from 0) to the next.
     #[error("the rod from connector {}", .0 + 1)]
     Rod(usize),

@@ -1,8 +1,8 @@
 //! Descents from many postures, and the reason if none leads to the target.
 
-use super::super::serial::{JointMotion, SerialChain};
+use super::super::serial::{JointMotionKind, SerialChain};
 use super::super::skeleton::Skeleton;
-use super::criteria::IkCriteria;
+use super::criteria::PostureEvaluator;
 use super::descent::{Descender, DescentLimits, DescentResult};
 use super::goal::{ArmGoal, ObstacleSphere, OrientationMask, PoseMask};
 use super::guide;
@@ -46,7 +46,7 @@ impl<'a> IkSearch<'a> {
         } else {
             JointRanges::from_chain(chain)
         };
-        let criteria = IkCriteria::new(chain, skeleton, goal);
+        let criteria = PostureEvaluator::new(chain, skeleton, goal);
         let by = Descender { chain, goal, criteria, bounds, stepper: IkStepper::default() };
         Self { skeleton, by }
     }
@@ -68,7 +68,7 @@ impl<'a> IkSearch<'a> {
         // The connectors' solution was only the first of the starts.
         let engine = if best.starts == 1 { engine } else { IkEngine::Dls };
         let reason =
-            (!best.is_met).then(|| out_of_reach.unwrap_or_else(|| self.find_reason(&best)));
+            (!best.is_met).then(|| out_of_reach.unwrap_or_else(|| self.find_failure_reason(&best)));
         self.result(best, engine, reason)
     }
 
@@ -76,7 +76,7 @@ impl<'a> IkSearch<'a> {
     fn solve_by_guide(&self, start: &[f64]) -> Option<(Vec<f64>, usize)> {
         let Descender { chain, goal, .. } = &self.by;
         let is_asked = goal.engine == IkEngine::Chain && goal.asked.has_whole_position();
-        is_asked.then(|| guide::posture(chain, self.skeleton, goal, start)).flatten()
+        is_asked.then(|| guide::find_posture(chain, self.skeleton, goal, start)).flatten()
     }
 
     /// Descends from `first` and then from random postures, until the goal is met; in the end from
@@ -128,10 +128,15 @@ impl<'a> IkSearch<'a> {
         variables.map(|(v, &range)| self.draw_value(v.motion, range, &mut draws)).collect()
     }
 
-    fn draw_value(&self, motion: JointMotion, [lower, upper]: [f64; 2], draws: &mut Draws) -> f64 {
+    fn draw_value(
+        &self,
+        motion: JointMotionKind,
+        [lower, upper]: [f64; 2],
+        draws: &mut Draws,
+    ) -> f64 {
         let reach_m = self.skeleton.reach_m.max(f64::MIN_POSITIVE);
         // A range without ends becomes a full turn, or what the arm reaches to either side.
-        let half = if motion == JointMotion::Turn { PI } else { reach_m };
+        let half = if motion == JointMotionKind::Turn { PI } else { reach_m };
         let (lower, upper) = match (lower.is_finite(), upper.is_finite()) {
             (true, true) => (lower, upper),
             (true, false) => (lower, lower + 2.0 * half),
@@ -145,7 +150,7 @@ impl<'a> IkSearch<'a> {
     fn out_of_reach(&self, start: &[f64]) -> Option<IkFailure> {
         let Descender { chain, goal, .. } = &self.by;
         let rods = &self.skeleton.rods;
-        let connectors = chain.connectors(self.skeleton, &chain.forward_kinematics(start));
+        let connectors = chain.connector_positions(self.skeleton, &chain.forward_kinematics(start));
         let far_m = norm(sub(goal.target.origin_m, connectors[0]));
         let reach_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
         let longest_m = rods.iter().map(|rod| rod.min_m + rod.max_m).fold(0.0, f64::max);
@@ -163,7 +168,7 @@ impl<'a> IkSearch<'a> {
 
     /// Returns the constraint without which there would be a solution: the goal is solved again without
     /// each in turn, the most useful reason first.
-    fn find_reason(&self, best: &BestDescent) -> IkFailure {
+    fn find_failure_reason(&self, best: &BestDescent) -> IkFailure {
         let Descender { goal, .. } = &self.by;
         let evaluation = &best.descent.evaluation;
         let is_there =
@@ -172,10 +177,10 @@ impl<'a> IkSearch<'a> {
             return IkFailure::Blocked(hit);
         }
         let few = ArmGoal { restarts: goal.restarts.min(FEW_RESTARTS), ..(*goal).clone() };
-        if let Some(reason) = self.without_limits(&few, best) {
+        if let Some(reason) = self.find_limit_failure(&few, best) {
             return reason;
         }
-        if let Some(hit) = self.without_contacts(&few, best) {
+        if let Some(hit) = self.find_blocking_collision(&few, best) {
             return IkFailure::Blocked(hit);
         }
         let starts = best.starts;
@@ -184,37 +189,38 @@ impl<'a> IkSearch<'a> {
         let unturned = PoseMask { turn: OrientationMask::Free, ..goal.asked };
         let is_turn = goal.asked.turn != OrientationMask::Free
             && unturned.along != [false; 3]
-            && self.solve_other(&ArmGoal { asked: unturned, ..few }, best).is_some();
+            && self.solve_other_goal(&ArmGoal { asked: unturned, ..few }, best).is_some();
         if is_turn {
             return IkFailure::NotTurned { starts, error_m, error_rad };
         }
         IkFailure::NotFound { starts, error_m }
     }
 
-    fn without_limits(&self, few: &ArmGoal, best: &BestDescent) -> Option<IkFailure> {
+    fn find_limit_failure(&self, few: &ArmGoal, best: &BestDescent) -> Option<IkFailure> {
         if few.ignore_limits {
             return None;
         }
-        let values = self.solve_other(&ArmGoal { ignore_limits: true, ..few.clone() }, best)?;
+        let values =
+            self.solve_other_goal(&ArmGoal { ignore_limits: true, ..few.clone() }, best)?;
         let (joint, value, lower, upper) = self.by.bounds.first_outside(self.by.chain, &values)?;
         Some(IkFailure::OutsideLimits { joint, value, lower, upper })
     }
 
     /// Returns the hit in a posture that would meet the goal if there were no contacts.
-    fn without_contacts(&self, few: &ArmGoal, best: &BestDescent) -> Option<Collision> {
+    fn find_blocking_collision(&self, few: &ArmGoal, best: &BestDescent) -> Option<Collision> {
         if few.spheres.is_empty() && !few.own_body {
             return None;
         }
         let spheres: Vec<ObstacleSphere> = Vec::new();
         let bare = ArmGoal { spheres, body: None, own_body: false, ..few.clone() };
-        let values = self.solve_other(&bare, best)?;
-        let mut evaluation = IkCriteria::empty_evaluation(self.by.chain);
+        let values = self.solve_other_goal(&bare, best)?;
+        let mut evaluation = PostureEvaluator::empty_evaluation(self.by.chain);
         self.by.criteria.evaluate(&values, &mut evaluation);
         evaluation.touched.hit
     }
 
     /// Returns values that meet another goal, starting from the best posture.
-    fn solve_other(&self, goal: &ArmGoal, best: &BestDescent) -> Option<Vec<f64>> {
+    fn solve_other_goal(&self, goal: &ArmGoal, best: &BestDescent) -> Option<Vec<f64>> {
         let mut search = IkSearch::new(self.by.chain, self.skeleton, goal);
         let found = search.find_best(best.descent.values.clone(), goal.restarts);
         found.is_met.then_some(found.descent.values)

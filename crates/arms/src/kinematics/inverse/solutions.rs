@@ -1,6 +1,6 @@
 //! Several postures that reach a target, and the nearest of them to the start.
 
-use super::super::serial::JointMotion;
+use super::super::serial::JointMotionKind;
 use super::descent::{DescentLimits, DescentResult};
 use super::result::IkSolution;
 use super::search::{IkSearch, SolutionSet};
@@ -35,7 +35,7 @@ impl IkSearch<'_> {
             }
             self.unwind_toward(&mut result.values, start);
             if nearest {
-                result = self.approach_start(result, start, &mut steps);
+                result = self.approach_start_posture(result, start, &mut steps);
             }
             match found.iter().position(|other| !self.is_distinct(other, &result.values)) {
                 None => found.push(result.values),
@@ -68,7 +68,7 @@ impl IkSearch<'_> {
 
     /// Moves a posture toward the start, as far as the goal allows: each step goes a fraction of the
     /// distance, and then descends to the nearest posture that meets the goal.
-    fn approach_start(
+    fn approach_start_posture(
         &mut self,
         mut at: DescentResult,
         start: &[f64],
@@ -130,9 +130,9 @@ impl IkSearch<'_> {
         let reach_m = self.skeleton.reach_m.max(f64::MIN_POSITIVE);
         let variables = self.by.chain.variables.iter().enumerate();
         variables.map(move |(i, variable)| match variable.motion {
-            JointMotion::Turn if self.by.is_periodic(i) => turned(a[i] - b[i]),
-            JointMotion::Turn => a[i] - b[i],
-            JointMotion::Slide => (a[i] - b[i]) / reach_m,
+            JointMotionKind::Turn if self.by.is_periodic(i) => turned(a[i] - b[i]),
+            JointMotionKind::Turn => a[i] - b[i],
+            JointMotionKind::Slide => (a[i] - b[i]) / reach_m,
         })
     }
 }

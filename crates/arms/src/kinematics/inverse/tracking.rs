@@ -4,8 +4,8 @@
 //! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
 //! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
 
-use super::super::serial::{JointMotion, MovingJoint, SerialChain};
-use super::super::skeleton::{Anchor, Skeleton};
+use super::super::serial::{JointMotionKind, MovingJoint, SerialChain};
+use super::super::skeleton::{LinkAnchor, Skeleton};
 use super::super::transform::Vector;
 use super::fast_fk::{FastFk, LinkTransforms};
 use super::step::{IkStepInput, IkStepper, JointRanges};
@@ -38,9 +38,9 @@ const ARRIVAL_TOLERANCE: f64 = 1e-13;
 
 /// An arm whose joints follow the places of its connectors.
 #[derive(Debug)]
-pub struct JointTracker {
+pub struct ConnectorTargetTracker {
     fast_fk: FastFk,
-    anchors: Vec<Anchor>,
+    anchors: Vec<LinkAnchor>,
     limits: JointRanges,
     /// Highest speed of each variable, in rad/s or m/s.
     speeds: Vec<f64>,
@@ -60,14 +60,14 @@ pub struct ConnectorTarget {
     pub at_m: Vector,
 }
 
-impl JointTracker {
+impl ConnectorTargetTracker {
     /// Returns a tracker; `skeleton` must be that of `chain`.
     pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
         let anchors = skeleton.connectors.clone();
         Self {
             fast_fk: FastFk::new(chain),
             limits: JointRanges::from_chain(chain),
-            speeds: speeds(chain),
+            speeds: max_speeds(chain),
             levers_m: levers_m(chain, &anchors),
             reach_m: skeleton.reach_m,
             blank: LinkTransforms::from_chain(chain),
@@ -88,7 +88,7 @@ impl JointTracker {
     }
 
     /// Returns the highest speed of each variable, in rad/s or m/s.
-    pub fn speeds(&self) -> &[f64] {
+    pub fn max_speeds(&self) -> &[f64] {
         &self.speeds
     }
 
@@ -106,7 +106,7 @@ impl JointTracker {
     /// Returns the places of all connectors in m, in the base's frame.
     pub fn connector_positions(&self, values: &[f64]) -> Vec<Vector> {
         let mut placed = self.blank.clone();
-        self.fast_fk.compute(values, &mut placed);
+        self.fast_fk.compute_link_poses(values, &mut placed);
         self.anchors
             .iter()
             .map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m))
@@ -174,14 +174,14 @@ impl JointTracker {
 
 /// A descent of joint values toward targets of connectors.
 struct TrackingDescent<'a> {
-    arm: &'a JointTracker,
+    arm: &'a ConnectorTargetTracker,
     values: Vec<f64>,
     placed: LinkTransforms,
     stepper: IkStepper,
 }
 
 impl<'a> TrackingDescent<'a> {
-    fn new(arm: &'a JointTracker, start: &[f64]) -> Self {
+    fn new(arm: &'a ConnectorTargetTracker, start: &[f64]) -> Self {
         Self {
             arm,
             values: start.to_vec(),
@@ -238,7 +238,7 @@ impl<'a> TrackingDescent<'a> {
         placed: Option<&mut LinkTransforms>,
     ) -> Vec<f64> {
         let placed = placed.unwrap_or(&mut self.placed);
-        self.arm.fast_fk.compute(values, placed);
+        self.arm.fast_fk.compute_link_poses(values, placed);
         let mut residuals = Vec::with_capacity(3 * aims.len());
         for (aim, weight) in aims {
             let anchor = &self.arm.anchors[aim.connector];
@@ -272,7 +272,7 @@ fn merit(wanted: &[f64]) -> f64 {
 }
 
 /// Returns the highest speed of each variable: joints that mimic another narrow its own.
-fn speeds(chain: &SerialChain) -> Vec<f64> {
+fn max_speeds(chain: &SerialChain) -> Vec<f64> {
     let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(default_speed(v.motion)));
     let mut speeds: Vec<f64> = own.collect();
     for joint in &chain.joints {
@@ -287,16 +287,16 @@ fn speeds(chain: &SerialChain) -> Vec<f64> {
 }
 
 /// Returns the speed of joints without one in the model, in rad/s or m/s.
-fn default_speed(motion: JointMotion) -> f64 {
+fn default_speed(motion: JointMotionKind) -> f64 {
     match motion {
-        JointMotion::Turn => DEFAULT_SPEED_RAD_S,
-        JointMotion::Slide => DEFAULT_SPEED_M_S,
+        JointMotionKind::Turn => DEFAULT_SPEED_RAD_S,
+        JointMotionKind::Slide => DEFAULT_SPEED_M_S,
     }
 }
 
 /// Returns bounds on the travel of any connector per unit of each variable: the lengths of all links between its joints
 /// and the connector.
-fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
+fn levers_m(chain: &SerialChain, anchors: &[LinkAnchor]) -> Vec<f64> {
     let mut levers_m = vec![0.0; chain.variables.len()];
     for (i, joint) in chain.joints.iter().enumerate() {
         let beyond = anchors.iter().filter(|anchor| anchor.first > i);
@@ -307,22 +307,22 @@ fn levers_m(chain: &SerialChain, anchors: &[Anchor]) -> Vec<f64> {
 }
 
 /// Returns a bound on the travel of a connector beyond joint `i` per unit of the joint.
-fn lever_m(chain: &SerialChain, i: usize, anchor: &Anchor) -> f64 {
-    if chain.joints[i].motion == JointMotion::Slide {
+fn lever_m(chain: &SerialChain, i: usize, anchor: &LinkAnchor) -> f64 {
+    if chain.joints[i].motion == JointMotionKind::Slide {
         return 1.0;
     }
     let links = chain.joints[i + 1..anchor.first].iter();
-    let links_m = links.map(|link| norm(link.origin.origin_m) + max_slide_m(link));
+    let links_m = links.map(|link| norm(link.origin.origin_m) + max_joint_slide_m(link));
     norm(anchor.point_m) + links_m.sum::<f64>()
 }
 
 /// Returns the longest travel of a joint that slides; 1 m of one without limits, to keep bounds
 /// finite.
-fn max_slide_m(joint: &MovingJoint) -> f64 {
+fn max_joint_slide_m(joint: &MovingJoint) -> f64 {
     match (joint.motion, joint.limits) {
-        (JointMotion::Turn, _) => 0.0,
-        (JointMotion::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
-        (JointMotion::Slide, None) => 1.0,
+        (JointMotionKind::Turn, _) => 0.0,
+        (JointMotionKind::Slide, Some(limits)) => limits.lower.abs().max(limits.upper.abs()),
+        (JointMotionKind::Slide, None) => 1.0,
     }
 }
 
@@ -333,10 +333,10 @@ mod tests {
     use sidestep_kernel::geometry::add;
     use sidestep_testing::robot_model;
 
-    fn arm(model: &str) -> Option<(SerialChain, JointTracker)> {
+    fn arm(model: &str) -> Option<(SerialChain, ConnectorTargetTracker)> {
         let model = Model::load(&robot_model(model)?).expect("a model");
         let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
-        let follower = JointTracker::new(&chain, &chain.skeleton());
+        let follower = ConnectorTargetTracker::new(&chain, &chain.skeleton());
         Some((chain, follower))
     }
 
@@ -347,7 +347,8 @@ mod tests {
     fn places_are_those_of_forward_kinematics() {
         for (chain, follower) in ARMS.into_iter().filter_map(arm) {
             let values = chain.rest_values();
-            let expected = chain.connectors(&chain.skeleton(), &chain.forward_kinematics(&values));
+            let expected =
+                chain.connector_positions(&chain.skeleton(), &chain.forward_kinematics(&values));
             for (a, b) in follower.connector_positions(&values).into_iter().zip(expected) {
                 assert!(norm(sub(a, b)) < 1e-12, "{}", chain.tip);
             }

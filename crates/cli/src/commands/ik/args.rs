@@ -111,7 +111,7 @@ impl TipTarget {
     }
 
     pub(super) fn from_rpy(position_m: Vector, rpy_rad: Vector) -> Self {
-        let pose = Transform::from_origin(&Origin { xyz_m: position_m, rpy_rad });
+        let pose = Transform::from_urdf_origin(&Origin { xyz_m: position_m, rpy_rad });
         Self { pose, is_turned: true }
     }
 

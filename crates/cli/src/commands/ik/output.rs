@@ -1,7 +1,7 @@
 //! A result of `sidestep ik` as text and JSON.
 
 use super::super::arm::{Arm, ArmPositions, format_numbers, format_point};
-use crate::console::{LINE_COLS, align_pairs, wrap};
+use crate::console::{LINE_COLS, align_pairs, wrap_text};
 use serde::Serialize;
 use sidestep::arms::kinematics::{ArmGoal, IkResult, IkSolution, OrientationMask, Vector};
 
@@ -87,7 +87,7 @@ impl IkOutput {
                 let text = format!("The target is not reached: {reason}.");
                 format!(
                     "{}\nThe nearest posture found is shown.",
-                    wrap(&text, LINE_COLS).join("\n")
+                    wrap_text(&text, LINE_COLS).join("\n")
                 )
             }
         };

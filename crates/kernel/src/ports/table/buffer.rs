@@ -11,16 +11,16 @@ use std::fmt;
 const MAX_ROWS: usize = 1 << 20;
 
 /// The rows of one table that wait to be recorded.
-pub trait Buffer {
+pub trait TableBuffer {
     /// The table's schema; `None` for a table that is not recorded.
     fn schema(&self) -> Option<TableSchema>;
 
     /// Number of waiting rows.
-    fn rows(&self) -> usize;
+    fn row_count(&self) -> usize;
 
     /// Returns whether rows must be recorded before more should be kept.
     fn is_full(&self) -> bool {
-        self.rows() >= MAX_ROWS
+        self.row_count() >= MAX_ROWS
     }
 
     /// Moves all waiting rows out as one block. `None` for a table that is not recorded.
@@ -28,21 +28,21 @@ pub trait Buffer {
 }
 
 /// The tables of a run; the recorded ones are numbered in their order.
-pub trait Buffers {
+pub trait TableBuffers {
     /// Returns all tables, also those that are not recorded.
-    fn buffers(&self) -> Vec<&dyn Buffer>;
+    fn table_buffers(&self) -> Vec<&dyn TableBuffer>;
 
     /// Returns all tables, in the same order.
-    fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer>;
+    fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer>;
 
     /// Returns whether rows must be recorded before more can be kept.
     fn is_full(&self) -> bool {
-        self.buffers().iter().any(|buffer| buffer.is_full())
+        self.table_buffers().iter().any(|buffer| buffer.is_full())
     }
 
     /// Returns the schemas of the recorded tables; the index is a table's number in a recorder.
     fn schemas(&self) -> Vec<TableSchema> {
-        self.buffers().iter().filter_map(|buffer| buffer.schema()).collect()
+        self.table_buffers().iter().filter_map(|buffer| buffer.schema()).collect()
     }
 
     /// Appends all rows to a recorder of these [`schemas`](Self::schemas), and forgets them.
@@ -50,20 +50,20 @@ pub trait Buffers {
     /// # Errors
     /// When rows cannot be stored.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError> {
-        let blocks = self.buffers_mut().into_iter().filter_map(Buffer::take);
+        let blocks = self.table_buffers_mut().into_iter().filter_map(TableBuffer::take);
         blocks.enumerate().try_for_each(|(table, block)| recorder.append(table, &block))
     }
 }
 
 /// Rows that are kept one by one.
-pub struct RowBuffer<R> {
+pub struct TableRowsBuffer<R> {
     table: Option<Table<R>>,
     rows: Vec<R>,
 }
 
-impl<R> RowBuffer<R> {
+impl<R> TableRowsBuffer<R> {
     /// Keeps rows of `table` from now on; none without a table.
-    pub fn start(&mut self, table: Option<Table<R>>) {
+    pub fn set_table(&mut self, table: Option<Table<R>>) {
         self.table = table;
     }
 
@@ -80,7 +80,7 @@ impl<R> RowBuffer<R> {
     }
 }
 
-impl<R> Extend<R> for RowBuffer<R> {
+impl<R> Extend<R> for TableRowsBuffer<R> {
     fn extend<I: IntoIterator<Item = R>>(&mut self, rows: I) {
         if self.is_enabled() {
             self.rows.extend(rows);
@@ -88,31 +88,31 @@ impl<R> Extend<R> for RowBuffer<R> {
     }
 }
 
-impl<R> Default for RowBuffer<R> {
+impl<R> Default for TableRowsBuffer<R> {
     fn default() -> Self {
         Self { table: None, rows: Vec::new() }
     }
 }
 
-impl<R> fmt::Debug for RowBuffer<R> {
+impl<R> fmt::Debug for TableRowsBuffer<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rows = self.rows.len();
         f.debug_struct("RowBuffer").field("table", &self.table).field("rows", &rows).finish()
     }
 }
 
-impl<R> Buffer for RowBuffer<R> {
+impl<R> TableBuffer for TableRowsBuffer<R> {
     fn schema(&self) -> Option<TableSchema> {
         self.table.as_ref().map(Table::schema)
     }
 
-    fn rows(&self) -> usize {
+    fn row_count(&self) -> usize {
         self.rows.len()
     }
 
     fn take(&mut self) -> Option<Vec<Values>> {
         let rows = std::mem::take(&mut self.rows);
-        self.table.as_ref().map(|table| table.block(&rows))
+        self.table.as_ref().map(|table| table.block_from_rows(&rows))
     }
 }
 
@@ -125,7 +125,7 @@ pub struct ColumnBlockBuffer {
 
 impl ColumnBlockBuffer {
     /// Keeps a block of `schema` from now on; none without a schema.
-    pub fn start(&mut self, schema: Option<TableSchema>) {
+    pub fn set_schema(&mut self, schema: Option<TableSchema>) {
         self.schema = schema;
     }
 
@@ -140,12 +140,12 @@ impl ColumnBlockBuffer {
     }
 }
 
-impl Buffer for ColumnBlockBuffer {
+impl TableBuffer for ColumnBlockBuffer {
     fn schema(&self) -> Option<TableSchema> {
         self.schema.clone()
     }
 
-    fn rows(&self) -> usize {
+    fn row_count(&self) -> usize {
         self.block.as_ref().and_then(|block| block.first()).map_or(0, Values::len)
     }
 
@@ -163,17 +163,17 @@ mod tests {
 
     #[derive(Default)]
     struct Two {
-        kept: RowBuffer<u32>,
-        unwanted: RowBuffer<u32>,
+        kept: TableRowsBuffer<u32>,
+        unwanted: TableRowsBuffer<u32>,
         blocks: ColumnBlockBuffer,
     }
 
-    impl Buffers for Two {
-        fn buffers(&self) -> Vec<&dyn Buffer> {
+    impl TableBuffers for Two {
+        fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
             vec![&self.unwanted, &self.kept, &self.blocks]
         }
 
-        fn buffers_mut(&mut self) -> Vec<&mut dyn Buffer> {
+        fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
             vec![&mut self.unwanted, &mut self.kept, &mut self.blocks]
         }
     }
@@ -185,8 +185,8 @@ mod tests {
     #[test]
     fn rows_wait_until_they_are_recorded() {
         let mut tables = Two::default();
-        tables.kept.start(Some(table("kept")));
-        tables.blocks.start(Some(table("blocks").schema()));
+        tables.kept.set_table(Some(table("kept")));
+        tables.blocks.set_schema(Some(table("blocks").schema()));
         assert_eq!((tables.kept.is_enabled(), tables.unwanted.is_enabled()), (true, false));
         tables.kept.extend([1, 2]);
         tables.unwanted.push(3);
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn a_table_with_many_rows_is_full() {
         let mut tables = Two::default();
-        tables.kept.start(Some(table("kept")));
+        tables.kept.set_table(Some(table("kept")));
         tables.kept.extend(0..MAX_ROWS as u32 - 1);
         assert!(!tables.is_full());
         tables.kept.push(0);

@@ -9,7 +9,7 @@ struct ValidityMask(Option<Vec<bool>>);
 
 impl ValidityMask {
     /// Drops the mask where nothing is missing, so that equal cells have equal masks.
-    fn from_valid(valid: Vec<bool>) -> Self {
+    fn from_valid_flags(valid: Vec<bool>) -> Self {
         Self((!valid.iter().all(|valid| *valid)).then_some(valid))
     }
 
@@ -31,7 +31,7 @@ impl ValidityMask {
             self.extend(before, rows - before, false);
         } else if let Some(mut valid) = self.0.take() {
             valid.truncate(rows);
-            *self = Self::from_valid(valid);
+            *self = Self::from_valid_flags(valid);
         }
     }
 
@@ -46,13 +46,13 @@ impl ValidityMask {
     fn retain(&mut self, keep: &[bool]) {
         if let Some(mut valid) = self.0.take() {
             retain(&mut valid, keep);
-            *self = Self::from_valid(valid);
+            *self = Self::from_valid_flags(valid);
         }
     }
 
-    fn pick(&self, order: &[usize]) -> Self {
+    fn gather_rows(&self, order: &[usize]) -> Self {
         match &self.0 {
-            Some(valid) => Self::from_valid(order.iter().map(|&row| valid[row]).collect()),
+            Some(valid) => Self::from_valid_flags(order.iter().map(|&row| valid[row]).collect()),
             None => Self::default(),
         }
     }
@@ -80,7 +80,7 @@ impl<T> Cells<T> {
     }
 
     /// Iterates over all cells; `None` stands for a missing value.
-    pub fn options(&self) -> impl Iterator<Item = Option<&T>> {
+    pub fn iter_options(&self) -> impl Iterator<Item = Option<&T>> {
         (0..self.values.len()).map(|row| self.get(row))
     }
 
@@ -122,9 +122,9 @@ impl<T: Clone + Default> Cells<T> {
 
     /// Returns the cells of these rows, in this order; a row may occur several times.
     #[must_use]
-    pub fn pick(&self, order: &[usize]) -> Self {
+    pub fn gather_rows(&self, order: &[usize]) -> Self {
         let values = order.iter().map(|&row| self.values[row].clone()).collect();
-        Self { values, mask: self.mask.pick(order) }
+        Self { values, mask: self.mask.gather_rows(order) }
     }
 }
 
@@ -192,7 +192,7 @@ impl TextCells {
     }
 
     /// Iterates over all cells; `None` stands for a missing text.
-    pub fn options(&self) -> impl Iterator<Item = Option<&str>> {
+    pub fn iter_options(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
@@ -238,17 +238,22 @@ impl TextCells {
 
     /// Appends the cells of `more`; missing ones stay missing.
     pub fn append(&mut self, more: &Self) {
-        more.options().for_each(|text| self.push(text));
+        more.iter_options().for_each(|text| self.push(text));
     }
 
     /// Keeps the cells at which `keep` (of the same length) is true.
     pub fn retain_rows(&mut self, keep: &[bool]) {
-        *self = self.options().zip(keep).filter(|(_, keep)| **keep).map(|(text, _)| text).collect();
+        *self = self
+            .iter_options()
+            .zip(keep)
+            .filter(|(_, keep)| **keep)
+            .map(|(text, _)| text)
+            .collect();
     }
 
     /// Returns the cells of these rows, in this order; a row may occur several times.
     #[must_use]
-    pub fn pick(&self, order: &[usize]) -> Self {
+    pub fn gather_rows(&self, order: &[usize]) -> Self {
         order.iter().map(|&row| self.get(row)).collect()
     }
 }
@@ -297,11 +302,11 @@ mod tests {
 
             let order: Vec<usize> = (0..list.len()).rev().collect();
             list.reverse();
-            (cells, texts) = (cells.pick(&order), texts.pick(&order));
+            (cells, texts) = (cells.gather_rows(&order), texts.gather_rows(&order));
             retain(&mut list, &keep[..order.len()]);
             cells.retain_rows(&keep[..order.len()]);
             texts.retain_rows(&keep[..order.len()]);
-            prop_assert_eq!(cells.options().map(Option::<&i64>::copied).collect::<Vec<_>>(), list.clone());
+            prop_assert_eq!(cells.iter_options().map(Option::<&i64>::copied).collect::<Vec<_>>(), list.clone());
             prop_assert_eq!(cells.valid().is_some(), list.contains(&None));
             prop_assert_eq!(texts, words(&list));
         }
@@ -312,7 +317,7 @@ mod tests {
         let cells: Cells<u32> = [Some(1), None, Some(3)].into_iter().collect();
         assert_eq!((&cells[..], cells.valid()), (&[1, 0, 3][..], Some(&[true, false, true][..])));
         assert_eq!((cells.get(1), cells.get(2), cells.get(3)), (None, Some(&3), None));
-        assert_eq!(cells.pick(&[2, 0]), vec![3, 1].into());
+        assert_eq!(cells.gather_rows(&[2, 0]), vec![3, 1].into());
         assert_eq!([Some(1), Some(2)].into_iter().collect::<Cells<u32>>().valid(), None);
     }
 }

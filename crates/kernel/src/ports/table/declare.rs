@@ -17,7 +17,7 @@ use std::fmt;
 ///     .u64("cycle", "cycle in which it happened", |a: &Arrival| a.cycle)
 ///     .f64("delay_s", "its delay, where there was a plan", |a| a.delay_s);
 /// assert_eq!(table.schema().columns[1].unit(), Some("s"));
-/// let block = table.block(&[Arrival { cycle: 7, delay_s: None }]);
+/// let block = table.block_from_rows(&[Arrival { cycle: 7, delay_s: None }]);
 /// assert_eq!(block[0], Values::U64(vec![7].into()));
 /// ```
 pub struct Table<R> {
@@ -134,7 +134,7 @@ impl<R> Table<R> {
     }
 
     /// Returns the values of all columns in these rows.
-    pub fn block(&self, rows: &[R]) -> Vec<Values> {
+    pub fn block_from_rows(&self, rows: &[R]) -> Vec<Values> {
         self.columns.iter().map(|column| (column.values)(rows)).collect()
     }
 }
@@ -169,7 +169,7 @@ mod tests {
             .bool("f", "", |k| *k > 1)
             .label("g", "", ["no", "yes"], |k| *k % 2)
             .text("h", "", |k| (*k > 0).then(|| k.to_string()));
-        let block = table.block(&[0, 1, 2]);
+        let block = table.block_from_rows(&[0, 1, 2]);
         check_block(&table.schema(), &block).unwrap();
         assert_eq!(block[3], Values::I64([Some(0), None, Some(2)].into_iter().collect()));
         assert_eq!(block[6], Values::Label(vec![0, 1, 0].into()));

@@ -20,10 +20,10 @@ mod schema;
 mod unit;
 mod values;
 
-pub use buffer::{Buffer, Buffers, ColumnBlockBuffer, RowBuffer};
+pub use buffer::{ColumnBlockBuffer, TableBuffer, TableBuffers, TableRowsBuffer};
 pub use cells::{Cells, TextCells};
 pub use column_type::ColumnType;
 pub use declare::{Table, label_index};
 pub use schema::{ColumnSpec, TableSchema};
 pub use unit::split_unit;
-pub use values::{RoleColumn, Values};
+pub use values::{ColumnWithRole, Values};

@@ -120,16 +120,16 @@ impl Values {
 
     /// Returns the values of these rows, in this order; a row may occur several times.
     #[must_use]
-    pub fn pick(&self, order: &[usize]) -> Self {
+    pub fn gather_rows(&self, order: &[usize]) -> Self {
         match self {
-            Self::U32(cells) => Self::U32(cells.pick(order)),
-            Self::U64(cells) => Self::U64(cells.pick(order)),
-            Self::I32(cells) => Self::I32(cells.pick(order)),
-            Self::I64(cells) => Self::I64(cells.pick(order)),
-            Self::F64(cells) => Self::F64(cells.pick(order)),
-            Self::Bool(cells) => Self::Bool(cells.pick(order)),
-            Self::Label(cells) => Self::Label(cells.pick(order)),
-            Self::Text(cells) => Self::Text(cells.pick(order)),
+            Self::U32(cells) => Self::U32(cells.gather_rows(order)),
+            Self::U64(cells) => Self::U64(cells.gather_rows(order)),
+            Self::I32(cells) => Self::I32(cells.gather_rows(order)),
+            Self::I64(cells) => Self::I64(cells.gather_rows(order)),
+            Self::F64(cells) => Self::F64(cells.gather_rows(order)),
+            Self::Bool(cells) => Self::Bool(cells.gather_rows(order)),
+            Self::Label(cells) => Self::Label(cells.gather_rows(order)),
+            Self::Text(cells) => Self::Text(cells.gather_rows(order)),
         }
     }
 
@@ -192,7 +192,7 @@ impl Values {
 /// A column of a table that is whole in memory, with its role in the table, e.g. a parameter or a
 /// metric of runs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RoleColumn<R> {
+pub struct ColumnWithRole<R> {
     /// Its name, with its unit where the quantity has one.
     pub name: String,
     /// Its role, by which readers select, e.g. only parameters.
@@ -229,7 +229,7 @@ mod tests {
             values.resize(2);
             values.append(&values.clone());
             assert_eq!((values.len(), values.is_missing(3)), (4, true));
-            assert_eq!(values.pick(&[0, 3]).len(), 2);
+            assert_eq!(values.gather_rows(&[0, 3]).len(), 2);
             values.retain_rows(&[true, false, false, false]);
             assert_eq!(values.len(), 1);
         }

@@ -1,7 +1,7 @@
 //! Probes of the other end of a link. Its Zenoh session replies in a thread of its own, however busy its node is: a link
 //! without replies is half-open.
 
-use super::put_frame;
+use super::publish_to_key;
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -60,14 +60,14 @@ impl EchoProbes {
     }
 
     /// Probes another node, and returns whether it has left all probes unanswered for some time.
-    pub(super) fn probe(
+    pub(super) fn probe_and_check_timeout(
         &mut self,
         session: &Session,
         me: EntityId,
         of: EntityId,
         within: Duration,
     ) -> bool {
-        self.receive_replies();
+        self.drain_replies();
         let now = Instant::now();
         let (first, last) = self.unanswered.entry(of).or_insert((now, now));
         if now.duration_since(*last) > PROBE_TIMEOUT {
@@ -84,7 +84,7 @@ impl EchoProbes {
     }
 
     /// Processes the replies that have arrived. Returns whether no probe is unanswered.
-    pub(super) fn receive_replies(&mut self) -> bool {
+    pub(super) fn drain_replies(&mut self) -> bool {
         for from in self.replies.try_iter() {
             self.unanswered.remove(&from);
         }
@@ -93,7 +93,7 @@ impl EchoProbes {
 }
 
 fn send(session: &Session, me: EntityId, to: EntityId, mark: &'static [u8]) {
-    let key = KeyExpr::try_from(super::peer_key(super::Peer::Node(to)));
+    let key = KeyExpr::try_from(super::peer_key(super::PeerId::Node(to)));
     let key = key.expect("a path of letters and digits is a key");
-    put_frame(session, &key, &me.to_le_bytes(), Some(mark));
+    publish_to_key(session, &key, &me.to_le_bytes(), Some(mark));
 }

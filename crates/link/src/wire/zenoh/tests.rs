@@ -15,14 +15,18 @@ const TEST_TIMEOUT: Duration = Duration::from_secs(30);
 /// A hundred times the time that a frame on loopback takes.
 const SHORT_WAIT: Duration = Duration::from_millis(300);
 
-const A: Peer = Peer::Node(1);
-const B: Peer = Peer::Node(2);
+const A: PeerId = PeerId::Node(1);
+const B: PeerId = PeerId::Node(2);
 
 fn free() -> String {
     reserve_port("tcp/127.0.0.1:0").expect("a free port").endpoint
 }
 
-fn link(mode: &str, me: Peer, [listen, connect]: [&[String]; 2]) -> (ZenohLink, Receiver<Vec<u8>>) {
+fn link(
+    mode: &str,
+    me: PeerId,
+    [listen, connect]: [&[String]; 2],
+) -> (ZenohLink, Receiver<Vec<u8>>) {
     let connected_within = (mode == "client").then_some(TEST_TIMEOUT);
     let session = ZenohConfig { mode, listen, connect, connected_within, ..ZenohConfig::default() }
         .open()
@@ -32,7 +36,7 @@ fn link(mode: &str, me: Peer, [listen, connect]: [&[String]; 2]) -> (ZenohLink, 
 }
 
 /// Sends a frame again and again until it has come.
-fn reaches(from: &mut ZenohLink, to: Peer, frames: &Receiver<Vec<u8>>) {
+fn reaches(from: &mut ZenohLink, to: PeerId, frames: &Receiver<Vec<u8>>) {
     let until = Instant::now() + TEST_TIMEOUT;
     loop {
         from.send(to, b"frame");
@@ -49,11 +53,11 @@ fn reaches(from: &mut ZenohLink, to: Peer, frames: &Receiver<Vec<u8>>) {
 fn a_peer_does_not_relay_and_a_router_does() {
     for (hub, leaf, relays) in [("peer", "peer", false), ("router", "client", true)] {
         let at = [free()];
-        let (_hub, at_hub) = link(hub, Peer::Server, [&at, &[]]);
+        let (_hub, at_hub) = link(hub, PeerId::Server, [&at, &[]]);
         let (mut a, _at_a) = link(leaf, A, [&[], &at]);
         let (mut b, at_b) = link(leaf, B, [&[], &at]);
-        reaches(&mut a, Peer::Server, &at_hub);
-        reaches(&mut b, Peer::Server, &at_hub);
+        reaches(&mut a, PeerId::Server, &at_hub);
+        reaches(&mut b, PeerId::Server, &at_hub);
         if relays {
             reaches(&mut a, B, &at_b);
         } else {
@@ -84,7 +88,7 @@ fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
         .collect();
     let node = |(agent, held): (EntityId, PortReservation)| {
         let wire =
-            ZenohWire::node_wire(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+            ZenohWire::node_wire(PeerId::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
         let mut wire = if is_mesh { wire.with_listeners(vec![held]) } else { wire };
         wire.connect_mesh(agent, &members).expect("a mesh");
         wire
@@ -97,12 +101,12 @@ fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
 fn a_frame_for_all_others_comes_once_to_each_of_them_and_to_nobody_else() {
     for is_mesh in [true, false] {
         let (mut hub, mut nodes) = three(is_mesh);
-        let others = [0, 2].map(Peer::Node);
+        let others = [0, 2].map(PeerId::Node);
         for k in [0, 2] {
             let until = Instant::now() + TEST_TIMEOUT;
             while nodes[k].receive(Duration::from_millis(20)).is_none() {
                 assert!(Instant::now() < until, "no frame has come to {k}, mesh {is_mesh}");
-                nodes[1].send(&[Peer::Node(k as EntityId)], b"there");
+                nodes[1].send(&[PeerId::Node(k as EntityId)], b"there");
             }
         }
         for k in [0, 2] {
@@ -177,11 +181,11 @@ fn best_effort_messages_are_lost_in_a_partition_and_reliable_ones_are_not() {
     let server = free();
     let cable = Cable::to(&server, false);
     let wire = ZenohWire::server_wire(&[server], None).expect("a server");
-    let mut hub = Messenger::new(Peer::Server, Box::new(wire));
+    let mut hub = Messenger::new(PeerId::Server, Box::new(wire));
     let wire = ZenohWire::node_wire(A, std::slice::from_ref(&cable.endpoint), None, TEST_TIMEOUT)
         .expect("it answers");
     let mut node = Messenger::new(A, Box::new(wire));
-    node.connect(Peer::Server, hub.incarnation());
+    node.connect(PeerId::Server, hub.incarnation());
     hub.connect(A, node.incarnation());
     let mut receives = |node: &mut Messenger, message: Message, within: Duration| {
         let until = Instant::now() + within;
@@ -194,11 +198,11 @@ fn best_effort_messages_are_lost_in_a_partition_and_reliable_ones_are_not() {
         }
         false
     };
-    node.send_reliable(Peer::Server, Message::Close(1));
+    node.send_reliable(PeerId::Server, Message::Close(1));
     assert!(receives(&mut node, Message::Close(1), TEST_TIMEOUT));
     cable.cut(true);
-    node.send_best_effort(Peer::Server, Message::Hello);
-    node.send_reliable(Peer::Server, Message::Close(2));
+    node.send_best_effort(PeerId::Server, Message::Hello);
+    node.send_reliable(PeerId::Server, Message::Close(2));
     assert!(
         !receives(&mut node, Message::Close(2), 2 * Duration::from_millis(LEASE_MS)),
         "it is cut"
@@ -272,7 +276,7 @@ fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<FleetMem
         .collect();
     let node = |(agent, held)| {
         let wire =
-            ZenohWire::node_wire(Peer::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
+            ZenohWire::node_wire(PeerId::Node(agent), &at, None, TEST_TIMEOUT).expect("it answers");
         let mut wire = wire.with_listeners(vec![held]);
         wire.connect_mesh(agent, &members).expect("a mesh");
         wire
@@ -304,7 +308,7 @@ fn a_half_open_link_is_detected_and_opened_again() {
     // Rarely, because a sender gives no other sign of life.
     let mut comes = |second: &mut ZenohWire, times: u32| {
         (0..times).any(|_| {
-            second.send(&[Peer::Node(0)], b"frame");
+            second.send(&[PeerId::Node(0)], b"frame");
             first.receive(Duration::from_millis(LEASE_MS / 3)).is_some()
         })
     };
@@ -329,9 +333,9 @@ fn a_link_of_a_node_that_receives_nothing_is_not_half_open() {
     let ([_hub, mut first, mut second], members) = two_in_a_mesh(ToString::to_string);
     for _ in 0..3 {
         assert!(!second.is_half_open(&members[0], TEST_TIMEOUT));
-        until(|| second.echoes.receive_replies());
+        until(|| second.echoes.drain_replies());
     }
-    second.send(&[Peer::Node(0)], b"frame");
+    second.send(&[PeerId::Node(0)], b"frame");
     assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]), "a probe is no frame");
 }
 
@@ -351,7 +355,7 @@ fn links_that_could_not_be_opened_are_opened_at_another_time() {
     drop(other);
     until(|| second.reopen_links().is_ok());
     until(|| is_open(&second, &members[0]));
-    second.send(&[Peer::Node(0)], b"frame");
+    second.send(&[PeerId::Node(0)], b"frame");
     assert_eq!(first.receive(TEST_TIMEOUT).as_deref(), Some(&b"frame"[..]));
 }
 
@@ -381,16 +385,16 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
     let held = reserve_port("tcp/127.0.0.1:0").expect("a free port");
     let again = reserve_port(&held.endpoint).expect_err("it is held");
     assert!(
-        matches!(again, WireError::Taken { ref endpoint, .. } if *endpoint == held.endpoint),
+        matches!(again, WireSetupError::Taken { ref endpoint, .. } if *endpoint == held.endpoint),
         "{again}"
     );
     let server = ZenohWire::server_wire(std::slice::from_ref(&held.endpoint), None);
-    assert!(matches!(server, Err(WireError::Taken { .. })));
+    assert!(matches!(server, Err(WireSetupError::Taken { .. })));
     for wrong in ["127.0.0.1:7600", "udp/127.0.0.1:1", "tcp/127.0.0.1", "tcp/:1", "tcp/a:99999", ""]
     {
         assert_eq!(
             reserve_port(wrong).map(drop),
-            Err(WireError::NoEndpoint(wrong.into())),
+            Err(WireSetupError::NoEndpoint(wrong.into())),
             "{wrong}"
         );
     }
@@ -401,6 +405,6 @@ fn nobody_who_answers_is_an_error_in_time() {
     let at = [free()];
     let began = Instant::now();
     let found = ZenohWire::node_wire(A, &at, None, SHORT_WAIT);
-    assert!(matches!(found, Err(WireError::NoAnswer { .. })));
+    assert!(matches!(found, Err(WireSetupError::NoAnswer { .. })));
     assert!(began.elapsed() < Duration::from_secs(8));
 }

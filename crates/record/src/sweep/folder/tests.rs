@@ -23,9 +23,9 @@ impl From<RecordError> for Failed {
     }
 }
 
-fn cells() -> Vec<RoleColumn<String>> {
+fn cells() -> Vec<ColumnWithRole<String>> {
     let values = Values::I64(vec![0, 1].into());
-    vec![RoleColumn { name: "cell".into(), role: "cell".into(), values }]
+    vec![ColumnWithRole { name: "cell".into(), role: "cell".into(), values }]
 }
 
 fn create(path: &Path) -> Result<Folder, Failed> {

@@ -36,7 +36,7 @@ fn led_both_ways<const D: usize>(
         let to = walk.next(apart.points()[k], numbers.uniform(0.0, 0.6));
         let mode =
             if numbers.unit() < 0.5 { VetoEffect::Exact } else { VetoEffect::AsFarAsPossible };
-        let request = MotionRequest { mode, ..MotionRequest::operator_request(k, to) };
+        let request = MotionRequest { mode, ..MotionRequest::from_operator(k, to) };
         let outcome = propagator.propagate(&mut apart, here, &request).unwrap();
         assert_eq!(outcome, looking.propagate(&mut looked, there, &request).unwrap(), "{seed}");
         assert_eq!(bits(&apart), bits(&looked), "{seed}");

@@ -4,14 +4,14 @@ use super::*;
 
 #[test]
 fn wrong_requests_are_errors_and_a_target_reached_is_no_motion() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     let mut chain = Chain::straight([0.0; 2], [1.0, 0.0], 1, rod, Connector::free(0.0)).unwrap();
     let mut propagator = Propagator::default();
     let mut ask = |k, to| {
         propagator.propagate(
             &mut chain,
             &Obstacles::default(),
-            &MotionRequest::operator_request(k, to),
+            &MotionRequest::from_operator(k, to),
         )
     };
     assert!(ask(0, [f64::NAN, 0.0]).is_err());
@@ -45,7 +45,7 @@ fn one_connector_alone_goes_where_nothing_is_in_the_way() {
 
 #[test]
 fn one_rod_follows_from_both_ends_and_turns_on_the_spot_of_its_slave() {
-    let rod = Rod::fixed(1.0, 0.05);
+    let rod = Rod::with_fixed_length(1.0, 0.05);
     for k in [0, 1] {
         let mut chain =
             Chain::straight([0.0; 3], [1.0, 0.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
@@ -80,12 +80,12 @@ fn a_base_inside_an_obstacle_objects_and_never_moves() {
 
 #[test]
 fn requests_that_are_absurd_are_errors_and_change_nothing() {
-    let rod = Rod::fixed(1.0, 0.05);
+    let rod = Rod::with_fixed_length(1.0, 0.05);
     let mut chain = Chain::straight([0.0; 2], [1.0, 0.0], 3, rod, Connector::free(0.1)).unwrap();
     let obstacles = Obstacles::new(vec![Obstacle::ball(2, [0.0, 3.0], 0.4)], 1.0).unwrap();
     let before = bits(&chain);
     for to in [[f64::INFINITY, 0.0], [0.0, f64::NAN], [1e300, 0.0], [-1e9, 0.0]] {
-        let request = MotionRequest::operator_request(0, to);
+        let request = MotionRequest::from_operator(0, to);
         assert!(
             Propagator::default().propagate(&mut chain, &obstacles, &request).is_err(),
             "{to:?}"
@@ -96,7 +96,7 @@ fn requests_that_are_absurd_are_errors_and_change_nothing() {
 
 #[test]
 fn rods_keep_their_lengths_as_far_out_as_a_chain_may_be() {
-    let rod = Rod::fixed(1.0, 0.0);
+    let rod = Rod::with_fixed_length(1.0, 0.0);
     let start = [999_000.0, -999_000.0, 999_000.0];
     let u = [0.6, 0.0, 0.8];
     let mut chain = Chain::straight(start, u, 20, rod, Connector::free(0.0)).unwrap();
@@ -109,7 +109,7 @@ fn rods_keep_their_lengths_as_far_out_as_a_chain_may_be() {
     let error = Propagator::default().propagate(
         &mut chain,
         &Obstacles::default(),
-        &MotionRequest::operator_request(0, [1.1e6, 0.0, 0.0]),
+        &MotionRequest::from_operator(0, [1.1e6, 0.0, 0.0]),
     );
     assert_eq!(error.unwrap_err().place(), "target");
 }

@@ -85,7 +85,7 @@ fn without<const D: usize>(world: &AnyWorld<D>, veto: &Veto<D>) -> AnyWorld<D> {
     let mut chain = world.chain.clone();
     match veto.reason {
         VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility => {
-            chain.set_failed(veto.by, false);
+            chain.set_connector_failed(veto.by, false);
             chain.set_mobility(veto.by, Mobility::Free).unwrap();
         }
         VetoReason::BendLimit => {
@@ -166,7 +166,7 @@ fn goes_no_deeper<const D: usize>(seed: u64) -> usize {
         };
         let before = depths(&world.chain);
         let to = add(world.chain.points()[0], numbers.point(0.1));
-        let request = MotionRequest::operator_request(0, to);
+        let request = MotionRequest::from_operator(0, to);
         let mut chain = world.chain.clone();
         let outcome = propagator.propagate(&mut chain, &world.obstacles, &request).unwrap();
         moves += usize::from(outcome.motion().is_some());
@@ -258,7 +258,7 @@ fn a_chain_that_is_pushed_never_runs_into_itself() {
         let (mut propagator, mut numbers) = (Propagator::new(own()), TestRng::new(seed));
         for _ in 0..200 {
             let by = [-0.05, numbers.uniform(-0.02, 0.02)];
-            let request = MotionRequest::operator_request(0, add(chain.points()[0], by));
+            let request = MotionRequest::from_operator(0, add(chain.points()[0], by));
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             blocked += usize::from(outcome.veto().is_some());
             assert!(own_clearance_m(&chain) >= -TOLERANCE);

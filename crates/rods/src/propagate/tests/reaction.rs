@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::fixtures::AnyWorld;
-use crate::geometry::with_dimensions;
+use crate::geometry::convert_dimensions;
 use crate::reaction::{MasterMove, Reaction};
 
 /// Goes where it is pushed or pulled to.
@@ -70,7 +70,7 @@ fn a_veto_or_a_place_that_breaks_a_law_leaves_every_bit() {
     let rod = Rod { min_m: 0.8, max_m: 1.0, radius_m: 0.02 };
     let start = Chain::straight([0.0, 0.0], [-1.0, 0.0], 4, rod, Connector::free(0.1)).unwrap();
     let wall = Obstacles::new(vec![Obstacle::ball(3, [-0.8, 0.5], 0.2)], 1.0).unwrap();
-    let request = MotionRequest::operator_request(0, [0.1, 0.0]);
+    let request = MotionRequest::from_operator(0, [0.1, 0.0]);
     for (answer, reason, obstacle) in [
         (Err(VetoReason::Limit), VetoReason::Limit, None),
         (Ok([-5.0, 0.0, 0.0]), VetoReason::Mobility, None),
@@ -110,9 +110,9 @@ fn a_reaction_perceives_its_master_and_what_is_in_the_way() {
             Chain::straight([0.0, 0.0], [-1.0, 0.0], 1, rod, Connector::free(0.1)).unwrap();
         let mut propagator =
             own(ReactionRules { step_m: Some(1.0), ..ReactionRules::default() }, Aside);
-        let request = MotionRequest::operator_request(0, [0.1, 0.0]);
+        let request = MotionRequest::from_operator(0, [0.1, 0.0]);
         propagator.propagate(&mut chain, &obstacles, &request).unwrap();
-        let at: Point<3> = with_dimensions(chain.points()[1]);
+        let at: Point<3> = convert_dimensions(chain.points()[1]);
         assert!((at[1] - y_m).abs() < 1e-12, "{at:?}");
     }
 }

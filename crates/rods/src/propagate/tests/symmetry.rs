@@ -2,14 +2,14 @@
 
 use super::*;
 use crate::fixtures::apart_m;
-use crate::geometry::first_axis;
+use crate::geometry::unit_x;
 
 /// Returns the places that a chain reaches among balls, with other balls far away and cells of any size.
 fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> {
     let field = ball_field::<D>(5, 2.5, 0.15, 0.2, 0.06);
     let obstacles = Obstacles::new(field.iter().chain(far).copied().collect(), reach_m).unwrap();
     let rod = Rod { min_m: 0.25, max_m: 0.3, radius_m: 0.02 };
-    let back = scaled(first_axis(), -1.0);
+    let back = scaled(unit_x(), -1.0);
     let mut chain = Chain::straight([0.0; D], back, 12, rod, Connector::free(0.05)).unwrap();
     let mut walk = Wanderer::new(5);
     for _ in 0..100 {
@@ -22,7 +22,7 @@ fn wandered<const D: usize>(far: &[Obstacle<D>], reach_m: f64) -> Vec<[u64; D]> 
 }
 
 fn is_the_same_among_far_obstacles<const D: usize>() {
-    let at = |k: u32| scaled(first_axis(), 50.0 + f64::from(k));
+    let at = |k: u32| scaled(unit_x(), 50.0 + f64::from(k));
     let far: Vec<_> = (0..50).map(|k| Obstacle::<D>::ball(900 + k, at(k), 2.0)).collect();
     assert_eq!(wandered(&[], 0.4), wandered(&far, 0.4));
     assert_eq!(wandered::<D>(&[], 0.4), wandered(&[], 3.0));
@@ -137,7 +137,7 @@ proptest! {
 
     #[test]
     fn a_pull_and_a_base_pass_are_one_fabrik_iteration(seed in 0u64..1000, to in prop::array::uniform3(-3.0..3.0f64)) {
-        let rod = Rod::fixed(1.0, 0.0);
+        let rod = Rod::with_fixed_length(1.0, 0.0);
         let mut chain = crooked::<3>(seed, 6, rod, 0.0);
         let mut fabrik = chain.points().to_vec();
         let base = fabrik[0];

@@ -28,7 +28,7 @@ fn nobody_passes_a_thin_wall() {
             let before = chain.points().to_vec();
             let to = walk.next(before[0], 0.119);
             let outcome = propagator
-                .propagate(&mut chain, &obstacles, &MotionRequest::operator_request(0, to))
+                .propagate(&mut chain, &obstacles, &MotionRequest::from_operator(0, to))
                 .unwrap();
             if outcome.veto().is_some() {
                 walk.turn_anywhere();
@@ -69,7 +69,7 @@ fn nobody_passes_a_thin_plate() {
             })
             .collect();
         let all =
-            (0..).zip(&plates).map(|(id, p)| Obstacle::still(id, ConvexCore::Cuboid(*p), 0.0));
+            (0..).zip(&plates).map(|(id, p)| Obstacle::new_static(id, ConvexCore::Cuboid(*p), 0.0));
         let obstacles = Obstacles::new(all.collect(), 0.8).unwrap();
         let rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.002 };
         let mut chain =
@@ -80,7 +80,7 @@ fn nobody_passes_a_thin_plate() {
         for _ in 0..150 {
             let before = chain.points().to_vec();
             let to = walk.next(before[0], 0.119);
-            let request = MotionRequest::operator_request(0, to);
+            let request = MotionRequest::from_operator(0, to);
             let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
             if outcome.veto().is_some() {
                 jams += 1;

@@ -20,7 +20,7 @@ impl Player {
     pub(in super::super) fn cancel_seek(&mut self, cause: &str) {
         if let Some(Seek { id: Some(id), target, .. }) = self.seek.take() {
             let place = format!("cycle {target}");
-            self.reply(id, Err(Problem::new(place, cause, "ask again to go there")));
+            self.send_reply(id, Err(Problem::new(place, cause, "ask again to go there")));
         }
     }
 
@@ -29,7 +29,7 @@ impl Player {
     pub(super) fn step(&mut self, id: u32, cycles: u32) {
         let from = self.seek.map_or(self.cycle(), |seek| seek.target);
         if let Some(Seek { id: Some(earlier), .. }) = self.seek.take() {
-            self.reply(earlier, Ok(ReplyBody::Done));
+            self.send_reply(earlier, Ok(ReplyBody::Done));
         }
         self.start_seek(Some(id), from.saturating_add(u64::from(cycles)), None);
     }
@@ -44,11 +44,11 @@ impl Player {
         let Some((at, checkpoint)) = self.history.keyframes.latest_until(target) else { return };
         if target < present || at > present {
             let run = self.open_run.run.as_mut();
-            self.page_view.take_events(run, &mut self.history.log, Instant::now());
+            self.publisher.record_events(run, &mut self.history.log, Instant::now());
             // A keyframe that cannot be restored is a bug: the panic ends the session, with its message.
             run.restore(checkpoint).unwrap_or_else(|error| panic!("a keyframe: {error}"));
             self.digest = None;
-            self.page_view.mark_moved();
+            self.publisher.mark_cycle_changed();
         }
     }
 }

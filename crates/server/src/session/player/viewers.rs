@@ -20,7 +20,7 @@ impl Player {
     pub(super) fn update_viewers(&mut self, now: Instant) {
         let playback = self.playback_status();
         let run = self.open_run.run.as_mut();
-        let request = self.foxglove.update(run, &mut self.history.log, playback, now);
+        let request = self.foxglove.update_viewers(run, &mut self.history.log, playback, now);
         let Some(PlaybackRequest { play, speed, seek_s }) = request else { return };
         let speed = play.then_some(Speed::Times(speed));
         match (seek_s, speed) {

@@ -70,8 +70,8 @@ fn flight() -> Box<dyn Simulation> {
 fn staged(run: &dyn Simulation) -> FleetScene {
     FleetScene {
         build: "b".into(),
-        world: run.world().into(),
-        agent: run.agent().into(),
+        world: run.world_name().into(),
+        agent: run.agent_noun().into(),
         seed: 7,
         scenery: run.scenery(),
     }
@@ -127,7 +127,7 @@ fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
         let cause = page.wait(id)["problem"]["cause"].clone();
         assert_eq!(cause, "a fleet is only watched here", "{call}");
     }
-    elsewhere.screen.mark_lost("it was not heard", "watch it again");
+    elsewhere.screen.mark_disconnected("it was not heard", "watch it again");
     assert_eq!(ended(&mut page)["problem"]["cause"], "it was not heard");
     status(&mut page, |status| status["state"] == "failed");
 }
@@ -136,7 +136,7 @@ fn what_would_steer_a_fleet_is_refused_and_its_loss_ends_the_session() {
 fn a_fleet_that_is_lost_cannot_be_opened_and_the_one_that_flies_there_next_can() {
     let mut elsewhere = RemoteFlight::start();
     elsewhere.publish(1, false);
-    elsewhere.screen.mark_lost("it was not heard", "watch it again");
+    elsewhere.screen.mark_disconnected("it was not heard", "watch it again");
     let folder = tempfile::tempdir().expect("a folder");
     let deps = SessionDeps { fleets: vec![elsewhere.screen.clone()], ..deps(folder.path(), 1) };
     let (mut page, refused) =
@@ -155,7 +155,7 @@ fn a_fleet_that_is_over_stays_to_be_seen_until_another_one_flies_there() {
     elsewhere.publish(2, true);
     let mut page = elsewhere.page();
     status(&mut page, |status| status["state"] == "over");
-    elsewhere.screen.mark_lost("nobody answers", "watch it again");
+    elsewhere.screen.mark_disconnected("nobody answers", "watch it again");
     // A second one finds it, too.
     drop(elsewhere.page());
     elsewhere.restart();

@@ -70,8 +70,8 @@ fn its_fleet_is_watched() {
     let mut run = worlds().compile(&source).expect("valid").start(&source, 1);
     let scene = FleetScene {
         build: "b".into(),
-        world: run.world().into(),
-        agent: run.agent().into(),
+        world: run.world_name().into(),
+        agent: run.agent_noun().into(),
         seed: 1,
         scenery: run.scenery(),
     };
@@ -81,7 +81,7 @@ fn its_fleet_is_watched() {
     let node = |agent| NodeStatus { agent, number: agent, ..NodeStatus::default() };
     let fleet = FleetStatus {
         cycle: 9,
-        noun: run.agent().into(),
+        noun: run.agent_noun().into(),
         nodes: (0..12).map(node).collect(),
         ..FleetStatus::default()
     };

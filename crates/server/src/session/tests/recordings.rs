@@ -66,7 +66,7 @@ fn a_recording_of_another_build_shows_everybody_where_they_were() {
                 shown.frame(FrameOptions::WITHOUT_SCANS),
             );
             assert!(!places(&one).is_empty());
-            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
+            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world_name());
             assert_eq!(one.time_s, other.time_s);
         }
         let back = shown.checkpoint();
@@ -86,7 +86,7 @@ fn filmed_by_another(text: &str, cycles: u64, path: &std::path::Path) {
     let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
     run.enable_events();
     let origin = McapProvenance {
-        world: run.world().into(),
+        world: run.world_name().into(),
         build: "0.0.9+abc".into(),
         origin: Provenance {
             program_version: "0.0.9".into(),
@@ -127,7 +127,7 @@ fn a_film_of_another_build_shows_everybody_where_they_were_and_says_so() {
                 shown.frame(FrameOptions::WITHOUT_SCANS),
             );
             assert!(!places(&one).is_empty());
-            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world());
+            assert_eq!(places(&one), places(&other), "{} at {cycle}", again.world_name());
             assert_eq!(one.bodies.len(), other.bodies.len());
         }
         let (_page, told) = opened(folder);

@@ -6,7 +6,7 @@ use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
 use sidestep::scenario::Source;
 use sidestep::worlds::chain::metrics::{ChainMetrics, Metrics};
-use sidestep::worlds::chain::{ChainRun, ChainState, ChainWorld, chain_run};
+use sidestep::worlds::chain::{ChainRun, ChainWorld, ChainWorldState, chain_run};
 use sidestep_kernel::math::hypot;
 use std::any::Any;
 use std::ops::{Deref, DerefMut};
@@ -294,7 +294,7 @@ pub(crate) fn source(seed: u64, text: &str) -> Source {
 struct TestRun<const D: usize>(Box<dyn Simulation>);
 
 impl<const D: usize> TestRun<D> {
-    fn state(&self) -> &ChainState<D> {
+    fn state(&self) -> &ChainWorldState<D> {
         self.chains().state()
     }
 

@@ -62,7 +62,7 @@ fn clearance<const D: usize>(run: &TestRun<D>, slot: usize, balls: &[([f64; D], 
 pub(super) fn balls<const D: usize>(run: &TestRun<D>, cycle: u64) -> Vec<([f64; D], f64)> {
     use sidestep::rods::geometry::ConvexCore;
     let world = run.world();
-    let moving: Vec<_> = world.movers.at(world.start_time_s(cycle)).collect();
+    let moving: Vec<_> = world.movers.at(world.cycle_start_time_s(cycle)).collect();
     let all = world.obstacles.still().iter().chain(&moving);
     let ball = |core: &ConvexCore<D>, radius_m: f64| match core {
         ConvexCore::Point(at) => (*at, radius_m),

@@ -234,7 +234,7 @@ fn what_moves_comes_back_in_the_table_of_movers() {
         }
     }
     assert_eq!(who[..14], who[14..28]);
-    assert_eq!(rows.rows("robots"), 0, "nothing is on wheels");
+    assert_eq!(rows.row_count("robots"), 0, "nothing is on wheels");
     let (_, swarm) = recorded::<2>(&source(2, SWARM), 1, 20);
-    assert_eq!((swarm.rows("robots"), swarm.rows("movers")), (20 * 5, 20));
+    assert_eq!((swarm.row_count("robots"), swarm.row_count("movers")), (20 * 5, 20));
 }

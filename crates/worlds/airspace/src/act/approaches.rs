@@ -1,6 +1,6 @@
 //! Closest approaches of pairs of airplanes, whether the method flies them or not.
 
-use super::flight::{AircraftMotion, SubStep};
+use super::flight::{AircraftCycleMotion, SubStep};
 use crate::events::{Event, EventKind};
 use crate::flight::{PairApproach, SeparationMinima, distance_m, is_separation_lost};
 use crate::scratch::Scratch;
@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-6;
 /// Records the distances of all pairs during a step.
 pub(super) fn record_distances(
     world: &AirspaceWorld,
-    flights: &[AircraftMotion<'_>],
+    flights: &[AircraftCycleMotion<'_>],
     moment: SubStep,
     scratch: &mut Scratch,
 ) {
@@ -29,7 +29,7 @@ pub(super) fn record_distances(
             // Flights are sorted by id, and so are the two of a pair.
             let a = &flights[i.min(j)];
             let b = &flights[i.max(j)];
-            if is_recorded(world, a, b) {
+            if can_come_near(world, a, b) {
                 record_pair(a, b, closest_approach(world, a, b, moment), moment, scratch);
             }
         }
@@ -38,8 +38,8 @@ pub(super) fn record_distances(
 
 /// Stores the record of a pair in one step.
 fn record_pair(
-    a: &AircraftMotion<'_>,
-    b: &AircraftMotion<'_>,
+    a: &AircraftCycleMotion<'_>,
+    b: &AircraftCycleMotion<'_>,
     record: PairRecord,
     moment: SubStep,
     scratch: &mut Scratch,
@@ -49,14 +49,14 @@ fn record_pair(
         return;
     }
     if record.losses > 0 {
-        let event = Event::new_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
+        let event = Event::new_for_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
         scratch.events.push(event.with_value(record.nearest_m));
     }
     scratch.pairs.entry((a.slot, b.slot)).and_modify(|r| r.add(record)).or_insert(record);
 }
 
 /// Returns a distance in meters beyond which no two airplanes are worth noting.
-fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftMotion<'_>]) -> f64 {
+fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftCycleMotion<'_>]) -> f64 {
     let mut max_gap_m: f64 = 0.0;
     let mut max_speed_m_s: f64 = 0.0;
     for flight in flights {
@@ -69,7 +69,11 @@ fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftMotion<'_>]) -> f64 
 }
 
 /// Returns whether two airplanes may come so near within a step that it is to be recorded.
-fn is_recorded(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> bool {
+fn can_come_near(
+    world: &AirspaceWorld,
+    a: &AircraftCycleMotion<'_>,
+    b: &AircraftCycleMotion<'_>,
+) -> bool {
     let dtau_s = world.timing.dtau_s;
     let step_m = (world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize]) * dtau_s;
     distance_m(a.pose.at, b.pose.at)
@@ -78,7 +82,11 @@ fn is_recorded(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion
 }
 
 /// Returns the separation of a pair in meters.
-fn pair_separation_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &AircraftMotion<'_>) -> f64 {
+fn pair_separation_m(
+    world: &AirspaceWorld,
+    a: &AircraftCycleMotion<'_>,
+    b: &AircraftCycleMotion<'_>,
+) -> f64 {
     let separation_a_m = world.airplanes[a.slot as usize].model.separation_m;
     let separation_b_m = world.airplanes[b.slot as usize].model.separation_m;
     separation_a_m.max(separation_b_m)
@@ -87,8 +95,8 @@ fn pair_separation_m(world: &AirspaceWorld, a: &AircraftMotion<'_>, b: &Aircraft
 /// Returns the record of a pair in one step.
 fn closest_approach(
     world: &AirspaceWorld,
-    a: &AircraftMotion<'_>,
-    b: &AircraftMotion<'_>,
+    a: &AircraftCycleMotion<'_>,
+    b: &AircraftCycleMotion<'_>,
     moment: SubStep,
 ) -> PairRecord {
     let zone =

@@ -5,7 +5,7 @@ use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::OptimizationRecord;
 use crate::events::{Event, EventKind};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::pilot::{Control, Maneuver, OptimizerStats, OwnshipState};
+use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState};
 use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use sidestep_kernel::EntityId;
@@ -16,7 +16,7 @@ pub(super) fn apply_controls(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
-    mut controls: Vec<Option<Control>>,
+    mut controls: Vec<Option<AirplaneControl>>,
 ) -> Vec<TurnProfile> {
     let PhaseContext { world, state, .. } = *context;
     record_outcomes(context, own, &controls);
@@ -30,7 +30,7 @@ pub(super) fn apply_controls(
     let mut profiles = Vec::with_capacity(own.len());
     for (own, control) in own.iter().zip(controls) {
         let maneuver = match control {
-            Some(Control { maneuver, memory, .. }) => {
+            Some(AirplaneControl { maneuver, memory, .. }) => {
                 state.put_memory(own.id, memory);
                 maneuver
             }
@@ -53,7 +53,7 @@ pub(super) fn apply_controls(
 fn record_outcomes(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    controls: &[Option<Control>],
+    controls: &[Option<AirplaneControl>],
 ) {
     let now = context.now;
     let scratch = &mut *context.scratch;
@@ -66,11 +66,11 @@ fn record_outcomes(
     let mut grouping = NetworkTraffic::default();
     let mut deciding = NetworkTraffic::default();
     let mut shielding = NetworkTraffic::default();
-    let mut optimized: Vec<OptimizerStats> = Vec::new();
+    let mut optimized: Vec<OptimizationStatus> = Vec::new();
     for control in controls.iter().flatten() {
-        grouping.merge_participant(control.grouping);
-        deciding.merge_participant(control.deciding);
-        shielding.merge_participant(control.shielding);
+        grouping.add_participant_counts(control.grouping);
+        deciding.add_participant_counts(control.deciding);
+        shielding.add_participant_counts(control.shielding);
         optimized.extend(control.optimized);
     }
     scratch.grouped.add(grouping);

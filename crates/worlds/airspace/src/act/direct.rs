@@ -2,24 +2,24 @@
 
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{
-    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_choice,
-    candidates_by_velocity, decide_centrally,
+    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
+    candidates_from_choice, decide_centrally,
 };
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::pilot::{Control, Maneuver, OptimizerStats, OwnshipState, PilotMemory};
+use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState, PilotMemory};
 use crate::scratch::PhaseContext;
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter_maneuvers};
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// Decides for the airplanes of a group. Returns the control of each, and what it has considered.
 pub(super) fn decide(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
-) -> Vec<(Control, ManeuverCandidates)> {
+) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
     let mut all = find_candidates(context, own, non_cooperative);
@@ -40,16 +40,18 @@ fn find_candidates(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
-) -> Vec<(Control, ManeuverCandidates)> {
+) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, state, now, .. } = *context;
-    let slots: Vec<Slot> = own.iter().map(|own| own.id).collect();
-    let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::known_aircraft).collect();
+    let slots: Vec<EntitySlot> = own.iter().map(|own| own.id).collect();
+    let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::as_known_aircraft).collect();
     let mut memories = state.take_memories(&slots);
     let strategy = DecisionStrategy::for_group(world, &group, non_cooperative.len());
     let considered: Vec<ManeuverCandidates> = match strategy {
         DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => own
             .iter()
-            .map(|own| candidates_alone(world, own.known_aircraft(), own.external_action.as_ref()))
+            .map(|own| {
+                candidates_alone(world, own.as_known_aircraft(), own.external_action.as_ref())
+            })
             .collect(),
         DecisionStrategy::Reactive => {
             decide_reactively(world, &group, non_cooperative, &mut memories, now)
@@ -57,17 +59,17 @@ fn find_candidates(
         DecisionStrategy::Joint => {
             let decided = decide_centrally(world, &group, non_cooperative, now);
             let all = group.iter().zip(decided);
-            all.map(|(known, decided)| candidates_by_choice(world, *known, decided)).collect()
+            all.map(|(known, decided)| candidates_from_choice(world, *known, decided)).collect()
         }
     };
-    let mut controls: Vec<Control> = slots
+    let mut controls: Vec<AirplaneControl> = slots
         .into_iter()
         .zip(memories)
-        .map(|(slot, memory)| Control::stay_on_orbit(slot, now, memory))
+        .map(|(slot, memory)| AirplaneControl::stay_on_orbit(slot, now, memory))
         .collect();
     if strategy == DecisionStrategy::Joint {
         for (control, considered) in controls.iter_mut().zip(&considered) {
-            control.optimized = Some(OptimizerStats::from_choice(considered.decided.as_ref()));
+            control.optimized = Some(OptimizationStatus::from_choice(considered.decided.as_ref()));
         }
     }
     if strategy == DecisionStrategy::GroupTooLarge
@@ -107,7 +109,7 @@ fn shielded_maneuvers(
     world: &AirspaceWorld,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
-    all: &[(Control, ManeuverCandidates)],
+    all: &[(AirplaneControl, ManeuverCandidates)],
 ) -> Vec<Maneuver> {
     let group: Vec<ShieldedAircraft> = own.iter().map(|own| own.shielded_aircraft(world)).collect();
     let dtau_s = world.timing.dtau_s;

@@ -9,17 +9,17 @@
 use super::protect::shielded_aircraft;
 use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, entry_fallbacks};
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 
 /// Ends the exemption of pairs that are safe by now. `flown` are the group's airplanes that the method
 /// flies, by id.
 ///
 /// Two airplanes that are not in one group are too far from each other to meet on their orbits, or
 /// on levels that do not meet.
-pub(super) fn release_exempt(context: &PhaseContext<'_>, flown: &[Slot]) {
+pub(super) fn release_exempt(context: &PhaseContext<'_>, flown: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     for &slot in flown {
-        let exempt = state.exempt_with(slot);
+        let exempt = state.exempt_ids(slot);
         if exempt.is_empty() {
             continue;
         }
@@ -28,7 +28,7 @@ pub(super) fn release_exempt(context: &PhaseContext<'_>, flown: &[Slot]) {
             // Pairs with non-cooperative aircraft are checked anew in each `dt`, in `protect.rs`.
             world.is_non_cooperative(other, now)
                 || flown.binary_search(&other).is_ok()
-                    && state.exempt_with(other).contains(&slot)
+                    && state.exempt_ids(other).contains(&slot)
                     && !own.is_safe_with(&shielded_aircraft(context, other))
         });
     }
@@ -38,7 +38,7 @@ pub(super) fn release_exempt(context: &PhaseContext<'_>, flown: &[Slot]) {
 /// Pairs without such fallbacks become exempt. `flown` are the group's airplanes that the method flies, by id.
 ///
 /// Airplanes that could be too near one that enters are in its group, so none is missed.
-pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[Slot]) {
+pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     // At the start, the first fallbacks are those of the compiled scenario.
     if now == 0 {

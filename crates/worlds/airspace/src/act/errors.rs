@@ -7,12 +7,12 @@ use crate::events::{Event, EventKind};
 use crate::flight::{Pose2, distance_m};
 use crate::perceive::observed_pose;
 use crate::scratch::PhaseContext;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::math::wrap_angle;
 
 /// Reports the airplanes of `flown` that are farther from where all see them, or from the orbit that
 /// they hold, than the bounds allow.
-pub(super) fn report_beyond_bound(context: &mut PhaseContext<'_>, flown: &[Slot]) {
+pub(super) fn report_beyond_bound(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {
     let world = context.world;
     if world.disturbance == Default::default() {
         return;
@@ -27,7 +27,7 @@ pub(super) fn report_beyond_bound(context: &mut PhaseContext<'_>, flown: &[Slot]
 }
 
 /// Returns the largest error of an airplane, as a multiple of its bound.
-fn error_ratio(context: &PhaseContext<'_>, slot: Slot) -> f64 {
+fn error_ratio(context: &PhaseContext<'_>, slot: EntitySlot) -> f64 {
     let PhaseContext { world, state, now, .. } = *context;
     let pose = state.airplanes[slot as usize].pose();
     let v_m_s = world.top_m_s[slot as usize];

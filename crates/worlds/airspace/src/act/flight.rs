@@ -1,10 +1,10 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::flight::{FlightLevelRange, FlightSegment, Leg, Point, Pose2, Track};
+use crate::flight::{ConstantRateLeg, FlightLevelRange, InterOrderSegment, Point, Pose2, Track};
 use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use crate::state::FlightEnd;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// One step of `dtau`.
 #[derive(Debug, Clone, Copy)]
@@ -19,38 +19,42 @@ pub(super) struct SubStep {
 }
 
 /// One airplane in this `dt`.
-pub(super) struct AircraftMotion<'a> {
-    pub(super) slot: Slot,
-    pub(super) path: FlownPath<'a>,
+pub(super) struct AircraftCycleMotion<'a> {
+    pub(super) slot: EntitySlot,
+    pub(super) path: FlightPathSource<'a>,
     pub(super) pose: Pose2,
     pub(super) altitude_m: f64,
     /// Time at which it came into the air, in seconds after the start of the run.
     pub(super) since_s: f64,
     pub(super) next: usize,
     /// Legs of the present step, with times after its start.
-    pub(super) legs: Vec<Leg>,
+    pub(super) legs: Vec<ConstantRateLeg>,
     /// Legs flown in this `dt`, with times after the start of the run.
-    pub(super) flown: Vec<Leg>,
+    pub(super) flown: Vec<ConstantRateLeg>,
     /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
     pub(super) end: Option<FlightEnd>,
 }
 
 /// The path of an airplane, decided for this `dt` or recorded.
-pub(super) enum FlownPath<'a> {
+pub(super) enum FlightPathSource<'a> {
     /// The turn rates that were decided, and the segment of the flight.
-    Profile(TurnProfile, FlightSegment<'a>),
+    Profile(TurnProfile, InterOrderSegment<'a>),
     /// A recorded track, flown as it is.
     Track(&'a Track),
 }
 
-impl<'a> AircraftMotion<'a> {
+impl<'a> AircraftCycleMotion<'a> {
     /// Returns an airplane as it is at the start of the cycle.
-    pub(super) fn new(context: &PhaseContext<'_>, slot: Slot, path: FlownPath<'a>) -> Self {
+    pub(super) fn new(
+        context: &PhaseContext<'_>,
+        slot: EntitySlot,
+        path: FlightPathSource<'a>,
+    ) -> Self {
         let PhaseContext { world, state, .. } = context;
         let current = &state.airplanes[slot as usize];
         let track = &world.airplanes[slot as usize].track;
         let recorded_s = track.as_ref().map_or(0.0, Track::start_s);
-        let since_s = world.cycle_start_s(world.first_cycle(slot as usize)).max(recorded_s);
+        let since_s = world.cycle_start_s(world.appearance_cycle(slot as usize)).max(recorded_s);
         Self {
             slot,
             path,
@@ -65,18 +69,19 @@ impl<'a> AircraftMotion<'a> {
     }
 
     /// Returns its altitude in meters some seconds after `altitude_m`, on a decided path.
-    pub(super) fn altitude_after_m(&self, segment: &FlightSegment<'_>, seconds: f64) -> f64 {
+    pub(super) fn altitude_after_m(&self, segment: &InterOrderSegment<'_>, seconds: f64) -> f64 {
         let max_climb_m = segment.climb_m_s * seconds;
         self.altitude_m + (segment.altitude_m - self.altitude_m).clamp(-max_climb_m, max_climb_m)
     }
 
     /// Finds the legs that it flies in one step.
-    pub(super) fn start_step(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
+    pub(super) fn find_step_legs(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
         match &self.path {
-            FlownPath::Profile(profile, segment) => {
+            FlightPathSource::Profile(profile, segment) => {
                 let omega = profile.omegas_rad_s[moment.k];
-                let whole = Leg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
+                let whole =
+                    ConstantRateLeg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
                 let to_climb_m = segment.altitude_m - self.altitude_m;
                 // A level that is reached within the step splits it into two legs.
                 let climbs_s = if segment.climb_m_s > 0.0 && to_climb_m != 0.0 {
@@ -92,8 +97,8 @@ impl<'a> AircraftMotion<'a> {
                 }
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
-            FlownPath::Track(track) => {
-                track.add_legs(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
+            FlightPathSource::Track(track) => {
+                track.add_legs_between(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
             }
         }
         self.record_legs(moment.step_s);
@@ -113,11 +118,11 @@ impl<'a> AircraftMotion<'a> {
     /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> FlightLevelRange {
         match &self.path {
-            FlownPath::Profile(_, segment) => {
+            FlightPathSource::Profile(_, segment) => {
                 FlightLevelRange::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
             }
             // Within a step a track may leave the levels of its ends.
-            FlownPath::Track(_) => FlightLevelRange::ALL,
+            FlightPathSource::Track(_) => FlightLevelRange::ALL,
         }
     }
 }

@@ -7,12 +7,16 @@
 use super::protect::shielded_aircraft;
 use crate::flight::{FlightLevelRange, FlightOrder, FlightTask};
 use crate::scratch::PhaseContext;
-use crate::shield::{OrbitSide, ShieldedAircraft, safe_side};
-use sidestep_kernel::Slot;
+use crate::shield::{OrbitSide, ShieldedAircraft, safe_orbit_side};
+use sidestep_kernel::EntitySlot;
 
 /// Executes the orders of a group that are due and, with the shield, safe; the others wait. `flown` are the group's
 /// airplanes that the method flies, by id.
-pub(super) fn execute_due_orders(context: &PhaseContext<'_>, group: &[Slot], flown: &[Slot]) {
+pub(super) fn execute_due_orders(
+    context: &PhaseContext<'_>,
+    group: &[EntitySlot],
+    flown: &[EntitySlot],
+) {
     let PhaseContext { world, state, now, .. } = context;
     for &slot in group.iter().filter(|&&slot| !world.is_replayed(slot, *now)) {
         let airplane = &world.airplanes[slot as usize];
@@ -20,7 +24,7 @@ pub(super) fn execute_due_orders(context: &PhaseContext<'_>, group: &[Slot], flo
         while let Some(order) =
             airplane.due_order(current.orders.get().into(), world.cycle_start_s(*now))
         {
-            let Some(side) = fallback_after(context, flown, slot, order) else {
+            let Some(side) = fallback_after_order(context, flown, slot, order) else {
                 current.waits.set(current.waits.get().saturating_add(1));
                 break;
             };
@@ -33,10 +37,10 @@ pub(super) fn execute_due_orders(context: &PhaseContext<'_>, group: &[Slot], flo
 }
 
 /// Returns the fallback that an airplane has when it executes its next order, if it may.
-fn fallback_after(
+fn fallback_after_order(
     context: &PhaseContext<'_>,
-    flown: &[Slot],
-    slot: Slot,
+    flown: &[EntitySlot],
+    slot: EntitySlot,
     order: &FlightOrder,
 ) -> Option<OrbitSide> {
     let PhaseContext { world, state, now, .. } = context;
@@ -55,5 +59,5 @@ fn fallback_after(
         .iter()
         .filter(|&&other| other != slot)
         .map(|&other| shielded_aircraft(context, other));
-    safe_side(&changed, others)
+    safe_orbit_side(&changed, others)
 }

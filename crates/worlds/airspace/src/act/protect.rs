@@ -8,11 +8,11 @@ use crate::perceive::ownship_state;
 use crate::pilot::{Maneuver, OwnshipState};
 use crate::scratch::PhaseContext;
 use crate::shield::{ShieldedAircraft, TurnProfile};
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::math::wrap_angle;
 
 /// Returns an airplane as the shield knows it: where all see it.
-pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: Slot) -> ShieldedAircraft {
+pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: EntitySlot) -> ShieldedAircraft {
     ownship_state(context, slot).shielded_aircraft(context.world)
 }
 
@@ -25,7 +25,7 @@ pub(super) fn exempt_non_cooperative(
     profile: &TurnProfile,
 ) {
     let slot = own.id;
-    let exempt = context.state.exempt_with(slot);
+    let exempt = context.state.exempt_ids(slot);
     if all.is_empty() && exempt.is_empty() {
         return;
     }
@@ -33,7 +33,7 @@ pub(super) fn exempt_non_cooperative(
     let aircraft = own.shielded_aircraft(world);
     let avoidance = NonCooperativeAvoidance::new(&aircraft, all, world.timing.dtau_s);
     let threats: Vec<&NonCooperativeAircraft> = avoidance.threats(profile).collect();
-    let is_threat = |other: Slot| threats.iter().any(|one| one.slot == other);
+    let is_threat = |other: EntitySlot| threats.iter().any(|one| one.slot == other);
     state.retain_exempt(slot, |other| !world.is_non_cooperative(other, now) || is_threat(other));
     for one in all.iter().filter(|one| !is_threat(one.slot)) {
         state.retain_exempt(one.slot, |other| other != slot);
@@ -42,13 +42,17 @@ pub(super) fn exempt_non_cooperative(
         state.exempt_pair(slot, one.slot);
         scratch.too_close.push((now, slot, one.slot));
         let apart_m = distance_m(state.airplanes[slot as usize].pose().at, one.at);
-        let event = Event::new_pair(now, EventKind::Intruder, slot, one.slot);
+        let event = Event::new_for_pair(now, EventKind::Intruder, slot, one.slot);
         scratch.events.push(event.with_value(apart_m));
     }
 }
 
 /// Stores the maneuver of an airplane, and records an event where it is not the preferred one.
-pub(super) fn store_maneuver(context: &mut PhaseContext<'_>, slot: Slot, maneuver: &Maneuver) {
+pub(super) fn store_maneuver(
+    context: &mut PhaseContext<'_>,
+    slot: EntitySlot,
+    maneuver: &Maneuver,
+) {
     if *maneuver == Maneuver::Orbit {
         advance_orbit_pose(context, slot);
     }
@@ -74,15 +78,18 @@ pub(super) fn store_maneuver(context: &mut PhaseContext<'_>, slot: Slot, maneuve
 }
 
 /// Moves the stored pose of an airplane along its orbit for one `dt`.
-fn advance_orbit_pose(context: &PhaseContext<'_>, slot: Slot) {
+fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
     let PhaseContext { world, state, .. } = context;
     let side = state.airplanes[slot as usize].fallback.get();
     let v_m_s = state.segment(world, slot).model.v_m_s;
     let omega = side.sign() * world.orbit_rad_s[slot as usize];
     let mut orbit_pose = state.orbit_pose(slot);
     for _ in 0..world.timing.points_per_dt() {
-        orbit_pose =
-            world.air().after_wind_step(orbit_pose.step(v_m_s, omega, world.timing.dtau_s));
+        orbit_pose = world.flight_environment().after_wind_step(orbit_pose.step(
+            v_m_s,
+            omega,
+            world.timing.dtau_s,
+        ));
     }
     state.set_orbit_pose(
         slot,

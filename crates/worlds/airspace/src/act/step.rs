@@ -1,9 +1,9 @@
 //! The steps of one `dt`: all airplanes fly, and the results are stored.
 
 use super::approaches;
-use super::flight::{AircraftMotion, FlownPath, SubStep};
+use super::flight::{AircraftCycleMotion, FlightPathSource, SubStep};
 use crate::events::{Event, EventKind};
-use crate::flight::{Leg, Pose2};
+use crate::flight::{ConstantRateLeg, Pose2};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
@@ -16,7 +16,10 @@ use sidestep_kernel::interrupt;
 use sidestep_kernel::math::wrap_angle;
 
 /// Flies all steps of this `dt`.
-pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<AircraftMotion<'_>>) {
+pub(super) fn fly_sub_steps(
+    context: &mut PhaseContext<'_>,
+    mut flights: Vec<AircraftCycleMotion<'_>>,
+) {
     let PhaseContext { world, now, .. } = *context;
     let steps = world.timing.points_per_dt();
     for k in 0..steps {
@@ -28,7 +31,7 @@ pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<Aircraft
             flight.end = (leaves_s <= moment.step_s).then_some(FlightEnd::Left(step));
         }
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
-            flight.start_step(world.wind_m_s, moment, world.timing.dtau_s);
+            flight.find_step_legs(world.wind_m_s, moment, world.timing.dtau_s);
         }
         // Distances are those during the step: the legs of all are known, and nobody has flown yet.
         approaches::record_distances(world, &flights, moment, context.scratch);
@@ -39,11 +42,15 @@ pub(super) fn step_all(context: &mut PhaseContext<'_>, mut flights: Vec<Aircraft
     flights.into_iter().for_each(|flight| store_flight(context, flight));
 }
 
-fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step, .. }: SubStep) {
-    let air = world.air();
+fn fly(
+    world: &AirspaceWorld,
+    flight: &mut AircraftCycleMotion<'_>,
+    SubStep { k, step, .. }: SubStep,
+) {
+    let air = world.flight_environment();
     let dtau_s = world.timing.dtau_s;
     let is_at_end = match &flight.path {
-        FlownPath::Profile(profile, segment) => {
+        FlightPathSource::Profile(profile, segment) => {
             let omega = profile.omegas_rad_s[k];
             let altitude_m = flight.altitude_after_m(segment, dtau_s);
             flight.altitude_m = altitude_m;
@@ -53,7 +60,7 @@ fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step
             flight.next = autopilot.next_way_point((before, flight.pose), flight.next);
             flight.next == segment.mission.len()
         }
-        FlownPath::Track(track) => {
+        FlightPathSource::Track(track) => {
             let after_s = (step + 1) as f64 * dtau_s;
             flight.pose = track.pose_at(after_s);
             flight.altitude_m = track.altitude_at_m(after_s);
@@ -64,27 +71,34 @@ fn fly(world: &AirspaceWorld, flight: &mut AircraftMotion<'_>, SubStep { k, step
 }
 
 /// Returns the rows of an airplane: its legs, and the position where its flight ended.
-fn leg_rows(world: &AirspaceWorld, cycle: Cycle, flight: &AircraftMotion<'_>) -> Vec<FlownLeg> {
+fn leg_rows(
+    world: &AirspaceWorld,
+    cycle: Cycle,
+    flight: &AircraftCycleMotion<'_>,
+) -> Vec<FlownLeg> {
     let airplane = flight.slot;
     let mut rows: Vec<FlownLeg> =
         flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
     if let Some(FlightEnd::Arrived(step) | FlightEnd::Left(step)) = flight.end {
         let at_s = step as f64 * world.timing.dtau_s;
-        let end = Leg::new(at_s, at_s, flight.pose, 0.0, 0.0).with_climb(flight.altitude_m, 0.0);
+        let end = ConstantRateLeg::new(at_s, at_s, flight.pose, 0.0, 0.0)
+            .with_climb(flight.altitude_m, 0.0);
         rows.push(FlownLeg { cycle, airplane, leg: end });
     }
     rows
 }
 
-fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftMotion<'_>) {
+fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftCycleMotion<'_>) {
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[flight.slot as usize];
     let mut pose = flight.pose;
     scratch.flown.extend(leg_rows(world, now, &flight));
-    let is_disturbed = matches!(flight.path, FlownPath::Profile(..));
+    let is_disturbed = matches!(flight.path, FlightPathSource::Profile(..));
     let turn_rate_rad_s = match &flight.path {
-        FlownPath::Profile(profile, _) => profile.omegas_rad_s.last().copied().unwrap_or_default(),
-        FlownPath::Track(_) => 0.0,
+        FlightPathSource::Profile(profile, _) => {
+            profile.omegas_rad_s.last().copied().unwrap_or_default()
+        }
+        FlightPathSource::Track(_) => 0.0,
     };
     state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
     // While it orbits, `store_maneuver` has moved the pose along already, without the errors of the flight.

@@ -3,7 +3,7 @@
 use super::network_traffic::NetworkTraffic;
 use super::packet::{ConversationId, PacketHeader};
 use super::participant::{
-    ConversationEnd, ConversationProgress, OutgoingMessage, Participant, WithOutcome,
+    ConversationEnd, ConversationProgress, OutgoingMessage, Participant, ParticipantWithOutcome,
 };
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{DropReason, OutgoingPacket};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// The identity, participants and times of a conversation.
 #[derive(Debug, Clone)]
-pub struct ConversationInfo {
+pub struct ConversationSetup {
     /// Cycle, subject and members, by which packets find their conversation.
     pub id: ConversationId,
     /// Ids of all participants, rising.
@@ -30,7 +30,7 @@ pub struct ConversationInfo {
 
 /// A conversation, with the participant that is aboard.
 pub struct Conversation<P: ?Sized> {
-    info: ConversationInfo,
+    info: ConversationSetup,
     others: Arc<[EntityId]>,
     /// Number of packets sent so far.
     sent: u32,
@@ -40,13 +40,13 @@ pub struct Conversation<P: ?Sized> {
 
 impl<P: Participant + ?Sized> Conversation<P> {
     /// Returns a conversation in which nothing has been said yet.
-    pub fn new(info: ConversationInfo, participant: Box<P>) -> Self {
+    pub fn new(info: ConversationSetup, participant: Box<P>) -> Self {
         let others = info.members.iter().copied().filter(|&id| id != info.me).collect();
         Self { info, others, sent: 0, traffic: NetworkTraffic::default(), participant }
     }
 
     /// Its identity, members and times.
-    pub fn info(&self) -> &ConversationInfo {
+    pub fn info(&self) -> &ConversationSetup {
         &self.info
     }
 
@@ -56,7 +56,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Returns the counts of the packets sent by this airplane so far.
-    pub fn traffic(&self) -> NetworkTraffic {
+    pub fn network_traffic(&self) -> NetworkTraffic {
         self.traffic
     }
 
@@ -106,7 +106,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
 
     /// Seals all that the participant has to send, and counts it.
     fn send(&mut self, out: &mut Vec<OutgoingPacket>) {
-        let ConversationInfo { id, me, fingerprint, is_silent, .. } = self.info;
+        let ConversationSetup { id, me, fingerprint, is_silent, .. } = self.info;
         for OutgoingMessage { to, message } in self.participant.take_messages() {
             let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
             if is_silent || to.is_empty() {
@@ -115,21 +115,21 @@ impl<P: Participant + ?Sized> Conversation<P> {
             let sequence = self.sent;
             let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
             let payload = message.into_packet(&header);
-            self.traffic.count(to.len(), payload.len());
+            self.traffic.record_message(to.len(), payload.len());
             out.push(OutgoingPacket { to, sequence, payload });
             self.sent += 1;
         }
     }
 }
 
-impl<P: WithOutcome + ?Sized> Conversation<P> {
+impl<P: ParticipantWithOutcome + ?Sized> Conversation<P> {
     /// Returns the end of the conversation; a participant that is not done ends because time is up.
     pub fn finish(&mut self) -> ConversationEnd<P::Outcome> {
         self.participant.finish()
     }
 }
 
-impl<O> Conversation<dyn WithOutcome<Outcome = O>> {
+impl<O> Conversation<dyn ParticipantWithOutcome<Outcome = O>> {
     /// Returns the conversation as it remains for others once it has ended here: it answers their questions.
     pub fn into_ended(self) -> Conversation<dyn Participant> {
         let Self { info, others, sent, traffic, participant } = self;

@@ -13,7 +13,7 @@
 //!    was not heard counts as being on any orbit it may be on. Each sends its own *plan*.
 //! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
 //!    and sends the list of those it accepts.
-//! 4. Of two airplanes one *goes first* (`ExchangeSetup::has_priority`). An airplane flies its plan if all
+//! 4. Of two airplanes one *goes first* (`ShieldExchangeSetup::has_priority`). An airplane flies its plan if all
 //!    those that go before it have accepted it, else its fallback. It does not ask those that it
 //!    goes before, nor those from which its plan keeps apart in any case.
 //!
@@ -49,7 +49,7 @@ mod setup;
 use super::link::{self, MessageLimits};
 use super::participant::InvalidMessage;
 use super::traffic_state::{
-    OrbitState, PlanEnd, StateBeacon, TrafficPicture, TrafficState, record_beacon,
+    LastKnownState, OrbitState, PlanEnd, StateBeacon, TrafficPicture, record_beacon,
 };
 use crate::flight::Pose2;
 use crate::shield::{
@@ -57,13 +57,13 @@ use crate::shield::{
     TurnProfile, filter_maneuvers,
 };
 use serde::{Deserialize, Serialize};
-pub use setup::{ExchangeSetup, ObservedAircraft};
+pub use setup::{ObservedAircraft, ShieldExchangeSetup};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
 /// Messages between airplanes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub enum ExchangeMessage {
+pub enum ShieldExchangeMessage {
     /// Position of the sender, and the profiles it would fly.
     Proposal(Proposal),
     /// The profile that it will fly if all agree, and the side to which it turns then; `None` for its
@@ -101,7 +101,7 @@ impl Proposal {
 
 /// Another member of the group.
 #[derive(Debug, Default)]
-struct ExchangeMember {
+struct ShieldExchangeMember {
     proposal: Option<Proposal>,
     /// Its plan, when it is known; `Some(None)` stands for its fallback.
     plan: Option<Option<(TurnProfile, OrbitSide)>>,
@@ -109,7 +109,7 @@ struct ExchangeMember {
     gone: bool,
 }
 
-impl ExchangeMember {
+impl ShieldExchangeMember {
     fn new(observed: &ObservedAircraft) -> Self {
         Self { gone: !observed.takes_part, ..Self::default() }
     }
@@ -117,7 +117,7 @@ impl ExchangeMember {
 
 /// Outcome of the exchange for one airplane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ExchangeResult {
+pub struct ShieldExchangeResult {
     /// What it flies: its plan if all that were asked have agreed, or else its fallback.
     pub decision: ShieldDecision,
     /// Whether it would have flown another plan if all had agreed.
@@ -128,7 +128,7 @@ pub struct ExchangeResult {
 
 /// The messages that an agent waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ExchangePhase {
+enum ShieldExchangePhase {
     Proposals,
     Plans,
     Consent,
@@ -137,24 +137,24 @@ enum ExchangePhase {
 
 /// The shield's agent of one airplane.
 #[derive(Debug)]
-pub struct ExchangeAgent {
-    setup: Arc<ExchangeSetup>,
+pub struct ShieldExchangeAgent {
+    setup: Arc<ShieldExchangeSetup>,
     me: usize,
     aircraft: ShieldedAircraft,
     own: Proposal,
     contacts: TrafficPicture,
-    members: Vec<ExchangeMember>,
+    members: Vec<ShieldExchangeMember>,
     decision: Option<ShieldDecision>,
     /// Places of the members whose consent it needs to fly its plan.
     asked: Vec<usize>,
-    result: Option<ExchangeResult>,
+    result: Option<ShieldExchangeResult>,
 }
 
-impl ExchangeAgent {
+impl ShieldExchangeAgent {
     /// Returns an agent that has not sent anything yet, for the airplane at place `me`, which may
     /// fly `profiles`.
     pub fn new(
-        setup: Arc<ExchangeSetup>,
+        setup: Arc<ShieldExchangeSetup>,
         me: usize,
         profiles: &[TurnProfile],
         contacts: TrafficPicture,
@@ -165,7 +165,7 @@ impl ExchangeAgent {
             own: Proposal::new(&aircraft, profiles),
             aircraft,
             contacts,
-            members: setup.aircraft.iter().map(ExchangeMember::new).collect(),
+            members: setup.aircraft.iter().map(ShieldExchangeMember::new).collect(),
             setup,
             decision: None,
             asked: Vec::new(),
@@ -229,42 +229,42 @@ impl ExchangeAgent {
             .collect()
     }
 
-    fn phase(&self) -> ExchangePhase {
+    fn phase(&self) -> ShieldExchangePhase {
         match (&self.decision, &self.members[self.me].accepts, &self.result) {
-            (_, _, Some(_)) => ExchangePhase::Over,
-            (None, ..) => ExchangePhase::Proposals,
-            (Some(_), None, _) => ExchangePhase::Plans,
-            (Some(_), Some(_), None) => ExchangePhase::Consent,
+            (_, _, Some(_)) => ShieldExchangePhase::Over,
+            (None, ..) => ShieldExchangePhase::Proposals,
+            (Some(_), None, _) => ShieldExchangePhase::Plans,
+            (Some(_), Some(_), None) => ShieldExchangePhase::Consent,
         }
     }
 
     /// Continues as far as the messages heard allow.
-    fn advance(&mut self) -> Vec<ExchangeMessage> {
+    fn advance(&mut self) -> Vec<ShieldExchangeMessage> {
         let mut outgoing = Vec::new();
         while link::ProtocolAgent::awaited_members(self).is_empty() {
             match self.phase() {
-                ExchangePhase::Proposals if self.setup.certainty == PlanCertainty::Sure => {
-                    self.commit_plan()
+                ShieldExchangePhase::Proposals if self.setup.certainty == PlanCertainty::Sure => {
+                    self.decide_own_plan()
                 }
-                ExchangePhase::Proposals => outgoing.push(self.send_plan()),
-                ExchangePhase::Plans => outgoing.push(self.accept_plans()),
-                ExchangePhase::Consent => self.conclude(),
-                ExchangePhase::Over => break,
+                ShieldExchangePhase::Proposals => outgoing.push(self.send_plan()),
+                ShieldExchangePhase::Plans => outgoing.push(self.accept_plans()),
+                ShieldExchangePhase::Consent => self.conclude(),
+                ShieldExchangePhase::Over => break,
             }
         }
         outgoing
     }
 
     /// Computes plans for all, as all others do from the same proposals, and will fly its own.
-    fn commit_plan(&mut self) {
-        let decision = self.filter_plans();
+    fn decide_own_plan(&mut self) {
+        let decision = self.compute_own_decision();
         self.decision = Some(decision);
         let contacts = self.contacts.clone();
-        self.result = Some(ExchangeResult { decision, held_back: false, contacts });
+        self.result = Some(ShieldExchangeResult { decision, held_back: false, contacts });
     }
 
     /// Computes plans for all, and returns its own.
-    fn filter_plans(&self) -> ShieldDecision {
+    fn compute_own_decision(&self) -> ShieldDecision {
         let mut group = Vec::new();
         let mut candidates = Vec::new();
         let mut mine = 0;
@@ -279,7 +279,7 @@ impl ExchangeAgent {
             } else {
                 // An unheard airplane takes part on every orbit it may be on, without a choice.
                 let mut possible = self.possible_orbits(place);
-                let exempt = self.exempt_with(place);
+                let exempt = self.exempt_members(place);
                 for aircraft in &mut possible {
                     aircraft.exempt = exempt.clone();
                 }
@@ -297,7 +297,7 @@ impl ExchangeAgent {
     }
 
     /// Returns the members with which an unheard airplane is an exempt pair, as far as they say so themselves.
-    fn exempt_with(&self, place: usize) -> ExemptIds {
+    fn exempt_members(&self, place: usize) -> ExemptIds {
         let id = self.id(place);
         (0..self.group_size())
             .filter(|&other| {
@@ -312,8 +312,8 @@ impl ExchangeAgent {
     }
 
     /// Computes its plan, finds the members whose consent that needs, and returns it as a message.
-    fn send_plan(&mut self) -> ExchangeMessage {
-        let decision = self.filter_plans();
+    fn send_plan(&mut self) -> ShieldExchangeMessage {
+        let decision = self.compute_own_decision();
         self.decision = Some(decision);
         let plan = decision.candidate.map(|k| (self.own.profiles[k].clone(), decision.fallback));
         // Its fallback needs no consent, because all others keep apart from it anyway.
@@ -323,7 +323,7 @@ impl ExchangeAgent {
             Vec::new()
         };
         self.members[self.me].plan = Some(plan.clone());
-        ExchangeMessage::Plan(plan)
+        ShieldExchangeMessage::Plan(plan)
     }
 
     /// Returns the plan of a member, from its message.
@@ -339,13 +339,13 @@ impl ExchangeAgent {
     }
 
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
-    fn accept_plans(&mut self) -> ExchangeMessage {
+    fn accept_plans(&mut self) -> ShieldExchangeMessage {
         let own = self.members[self.me].plan.clone().flatten();
         let mine =
             [self.plan_of(self.aircraft.clone(), &own), self.fallback(self.aircraft.clone())];
         let mut accepts = Vec::new();
         for place in (0..self.group_size()).filter(|&place| place != self.me) {
-            let ExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
+            let ShieldExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
                 &self.members[place]
             else {
                 continue;
@@ -359,7 +359,7 @@ impl ExchangeAgent {
             }
         }
         self.members[self.me].accepts = Some(accepts.clone());
-        ExchangeMessage::Accepts(accepts)
+        ShieldExchangeMessage::Accepts(accepts)
     }
 
     /// Returns the members whose consent a plan of this airplane needs.
@@ -376,7 +376,7 @@ impl ExchangeAgent {
     }
 
     /// Returns whether a member has agreed to this airplane's plan.
-    fn has_agreed(&self, place: usize) -> bool {
+    fn has_accepted_own_plan(&self, place: usize) -> bool {
         let accepts = self.members[place].accepts.as_ref();
         accepts.is_some_and(|accepted| accepted.contains(&self.id(self.me)))
     }
@@ -392,8 +392,8 @@ impl ExchangeAgent {
     fn conclude(&mut self) {
         let fallback = ShieldDecision { candidate: None, fallback: self.aircraft.fallback };
         let preferred = self.decision.unwrap_or(fallback);
-        let all_agree = self.asked.iter().all(|&place| self.has_agreed(place));
-        self.result = Some(ExchangeResult {
+        let all_agree = self.asked.iter().all(|&place| self.has_accepted_own_plan(place));
+        self.result = Some(ShieldExchangeResult {
             decision: if all_agree { preferred } else { fallback },
             held_back: !all_agree,
             contacts: self.traffic_picture(),
@@ -416,44 +416,48 @@ impl ExchangeAgent {
             let contact = contacts.entry(id).or_insert_with(|| {
                 // It was never heard, but it is seen.
                 let observed = &self.setup.aircraft[place].aircraft;
-                TrafficState::from_beacon(StateBeacon::from_aircraft(observed), now)
+                LastKnownState::from_beacon(StateBeacon::from_aircraft(observed), now)
             });
             let is_heard = member.proposal.is_some();
             // If it is seen to fly a profile, it has flown the plan that it has sent.
             let planned = member.plan.as_ref().and_then(Option::as_ref);
             contact.planned = planned.map(|(_, side)| PlanEnd { as_of: now + 1, side: *side });
-            contact.presumed = Some(self.orbit_state(&self.fallback(aircraft)));
+            contact.presumed = Some(self.orbit_after_plan(&self.fallback(aircraft)));
             contact.unheard_in = (!is_heard).then_some(now);
         }
         contacts
     }
 
     /// Returns the orbit at the end of a plan, where the wind has carried it: plans are made in still air.
-    fn orbit_state(&self, plan: &SafeManeuver) -> OrbitState {
+    fn orbit_after_plan(&self, plan: &SafeManeuver) -> OrbitState {
         let [wx, wy] = self.setup.air.wind_m_s.map(|w| w * self.setup.air.timing.dt_s);
-        let mut pose = plan.end();
+        let mut pose = plan.end_pose();
         pose.at = [pose.at[0] + wx, pose.at[1] + wy];
         OrbitState { pose, as_of: self.setup.now + 1, side: plan.side() }
     }
 }
 
-impl link::ProtocolAgent for ExchangeAgent {
-    type Message = ExchangeMessage;
-    type Outcome = ExchangeResult;
+impl link::ProtocolAgent for ShieldExchangeAgent {
+    type Message = ShieldExchangeMessage;
+    type Outcome = ShieldExchangeResult;
 
-    fn start(&mut self) -> Vec<ExchangeMessage> {
-        let mut outgoing = vec![ExchangeMessage::Proposal(self.own.clone())];
+    fn start(&mut self) -> Vec<ShieldExchangeMessage> {
+        let mut outgoing = vec![ShieldExchangeMessage::Proposal(self.own.clone())];
         outgoing.extend(self.advance());
         outgoing
     }
 
-    fn check(&self, from: usize, message: &ExchangeMessage) -> Result<(), InvalidMessage> {
+    fn check_message(
+        &self,
+        from: usize,
+        message: &ShieldExchangeMessage,
+    ) -> Result<(), InvalidMessage> {
         match message {
-            ExchangeMessage::Proposal(proposal) => self.setup.check_proposal(from, proposal),
-            ExchangeMessage::Plan(plan) => {
+            ShieldExchangeMessage::Proposal(proposal) => self.setup.check_proposal(from, proposal),
+            ShieldExchangeMessage::Plan(plan) => {
                 plan.iter().try_for_each(|(profile, _)| self.setup.check_profile(from, profile))
             }
-            ExchangeMessage::Accepts(accepted) => self.setup.check_members(accepted),
+            ShieldExchangeMessage::Accepts(accepted) => self.setup.check_members(accepted),
         }
     }
 
@@ -462,15 +466,21 @@ impl link::ProtocolAgent for ExchangeAgent {
         MessageLimits { bytes: self.setup.max_message_bytes(), messages: 3 }
     }
 
-    fn on_message(&mut self, from: usize, message: ExchangeMessage) -> Vec<ExchangeMessage> {
+    fn on_message(
+        &mut self,
+        from: usize,
+        message: ShieldExchangeMessage,
+    ) -> Vec<ShieldExchangeMessage> {
         let has_planned = self.decision.is_some();
         let has_accepted = self.members[self.me].accepts.is_some();
         let member = &mut self.members[from];
         match message {
             // The proposal of a member that was given up is too late once plans are made.
-            ExchangeMessage::Proposal(proposal) if !has_planned => member.proposal = Some(proposal),
-            ExchangeMessage::Plan(plan) if !has_accepted => member.plan = Some(plan),
-            ExchangeMessage::Accepts(accepted) => member.accepts = Some(accepted),
+            ShieldExchangeMessage::Proposal(proposal) if !has_planned => {
+                member.proposal = Some(proposal)
+            }
+            ShieldExchangeMessage::Plan(plan) if !has_accepted => member.plan = Some(plan),
+            ShieldExchangeMessage::Accepts(accepted) => member.accepts = Some(accepted),
             _ => {}
         }
         self.advance()
@@ -487,12 +497,12 @@ impl link::ProtocolAgent for ExchangeAgent {
             .filter(|&place| {
                 let member = &self.members[place];
                 match phase {
-                    ExchangePhase::Proposals => member.proposal.is_none(),
-                    ExchangePhase::Plans => member.plan.is_none(),
-                    ExchangePhase::Consent => {
+                    ShieldExchangePhase::Proposals => member.proposal.is_none(),
+                    ShieldExchangePhase::Plans => member.plan.is_none(),
+                    ShieldExchangePhase::Consent => {
                         member.accepts.is_none() && self.asked.contains(&place)
                     }
-                    ExchangePhase::Over => false,
+                    ShieldExchangePhase::Over => false,
                 }
             })
             .collect()
@@ -501,14 +511,14 @@ impl link::ProtocolAgent for ExchangeAgent {
     fn wait_fraction(&self) -> f64 {
         match self.phase() {
             // Each phase leaves time for those after it. Proposals are the largest messages and get the largest part.
-            ExchangePhase::Proposals => 0.5,
-            ExchangePhase::Plans => 0.75,
+            ShieldExchangePhase::Proposals => 0.5,
+            ShieldExchangePhase::Plans => 0.75,
             // Some time is left for an orderly end.
-            ExchangePhase::Consent | ExchangePhase::Over => 0.95,
+            ShieldExchangePhase::Consent | ShieldExchangePhase::Over => 0.95,
         }
     }
 
-    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<ExchangeMessage> {
+    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<ShieldExchangeMessage> {
         self.members[other].gone = true;
         self.advance()
     }
@@ -525,7 +535,7 @@ impl link::ProtocolAgent for ExchangeAgent {
         self.result.is_some()
     }
 
-    fn outcome(&self) -> Option<ExchangeResult> {
+    fn outcome(&self) -> Option<ShieldExchangeResult> {
         self.result.clone()
     }
 }

@@ -16,7 +16,7 @@
 //!    it. So each item goes from one to the next over all links that work.
 //! 4. Two airplanes *hear each other* if both say so. The *group* of an airplane are all to which a chain of such
 //!    pairs leads from it. It has all that it needs when it knows both items of every airplane in the chain, and of
-//!    those that these have heard; all others of the chain find the same from the same items (`roster.rs`).
+//!    those that these have heard; all others of the chain find the same from the same items (`beacon_store.rs`).
 //!
 //! **Definition of a group.** Where all hear all that are near them, it is the group that the simulator would
 //! announce, because both use the same nearness. A partition, or a radio range that is too short, cuts it into parts
@@ -41,7 +41,7 @@
 //! ([`PlanCertainty::Sure`]) require.
 
 mod beacon;
-mod roster;
+mod beacon_store;
 #[cfg(test)]
 mod tests;
 
@@ -50,8 +50,8 @@ use super::participant::InvalidMessage;
 use crate::flight::distance_m;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::PlanCertainty;
-pub use beacon::{Beacon, SurveillanceItem, SurveillanceReport};
-use roster::BeaconStore;
+pub use beacon::{Beacon, GroupingMessageItem, SurveillanceReport};
+use beacon_store::BeaconStore;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
 
@@ -142,13 +142,13 @@ impl GroupingAgent {
     }
 
     /// Takes an item. Returns whether others may lack it now that did not before.
-    fn receive_item(&mut self, from: EntityId, item: SurveillanceItem) -> bool {
+    fn receive_item(&mut self, from: EntityId, item: GroupingMessageItem) -> bool {
         let id = item.subject_id();
         if id == self.id() {
             return false;
         }
         match item {
-            SurveillanceItem::Beacon(beacon) => {
+            GroupingMessageItem::Beacon(beacon) => {
                 let is_own = id == from;
                 let is_new = self.roster.add_beacon(beacon, is_own);
                 if is_new {
@@ -160,7 +160,7 @@ impl GroupingAgent {
                 self.has_news |= is_new | is_own;
                 false
             }
-            SurveillanceItem::Report { heard, .. } => {
+            GroupingMessageItem::Report { heard, .. } => {
                 let is_new = self.roster.add_report(id, heard);
                 if is_new {
                     self.unsent.insert((id, true));
@@ -172,27 +172,27 @@ impl GroupingAgent {
     }
 
     /// Returns whether another one near lacks the known items about an airplane.
-    fn is_missing_nearby(&self, about: EntityId) -> bool {
+    fn is_relay_needed(&self, about: EntityId) -> bool {
         self.nearby_others().any(|(_, id)| id != about && self.roster.is_missing(id, about))
     }
 
     /// Takes out the items that have to be relayed, of those `about` these airplanes.
-    fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<SurveillanceItem>> {
+    fn take_relay_items(&mut self, about: &BTreeSet<EntityId>) -> Vec<Vec<GroupingMessageItem>> {
         let mut items = Vec::new();
         for &id in about {
             let keys =
                 [(id, false), (id, true)].map(|key| self.unsent.contains(&key).then_some(key));
             // Most incoming items have come before, and are no longer kept. This is much cheaper to find out than
             // whether another one lacks them.
-            if keys == [None, None] || !self.roster.has_beacon(id) || !self.is_missing_nearby(id) {
+            if keys == [None, None] || !self.roster.has_beacon(id) || !self.is_relay_needed(id) {
                 continue;
             }
             for key in keys.into_iter().flatten() {
                 self.unsent.remove(&key);
-                items.extend(self.roster.item(key.0, key.1));
+                items.extend(self.roster.surveillance_item(key.0, key.1));
             }
         }
-        items.chunks(MAX_ITEMS).map(<[SurveillanceItem]>::to_vec).collect()
+        items.chunks(MAX_ITEMS).map(<[GroupingMessageItem]>::to_vec).collect()
     }
 
     /// Returns whether all near have been heard, or never will be.
@@ -202,13 +202,13 @@ impl GroupingAgent {
 
     /// Returns whether it has all on which its group depends, or as much as it ever will.
     fn has_all(&mut self) -> bool {
-        let present = self.present_others();
+        let present = self.responsive_others();
         self.places_with_missing_items(&present).is_empty()
-            && (present.is_empty() || self.roster.update_chain())
+            && (present.is_empty() || self.roster.advance_chain_search())
     }
 
     /// Returns the others near it from which something may come, with their places.
-    fn present_others(&self) -> Vec<(usize, EntityId)> {
+    fn responsive_others(&self) -> Vec<(usize, EntityId)> {
         self.nearby_others().filter(|&(place, _)| !self.is_gone[place]).collect()
     }
 
@@ -227,7 +227,7 @@ impl GroupingAgent {
     }
 
     /// Continues as far as the messages heard allow.
-    fn advance(&mut self) -> Vec<Vec<SurveillanceItem>> {
+    fn advance(&mut self) -> Vec<Vec<GroupingMessageItem>> {
         let mut outgoing = Vec::new();
         // To look at all items anew for each message that says nothing new would take most of the time.
         if !std::mem::take(&mut self.has_news) {
@@ -239,7 +239,7 @@ impl GroupingAgent {
             let heard: Vec<EntityId> = self.heard.iter().copied().collect();
             self.roster.add_report(about, heard.clone());
             // An agent that has heard no other one reports too, because those that hear it wait for the report.
-            outgoing.push(vec![SurveillanceItem::Report { about, heard }]);
+            outgoing.push(vec![GroupingMessageItem::Report { about, heard }]);
         }
         if self.result.is_none() && self.has_reported && self.has_all() {
             self.find_group();
@@ -266,24 +266,28 @@ impl GroupingAgent {
 }
 
 impl link::ProtocolAgent for GroupingAgent {
-    type Message = Vec<SurveillanceItem>;
+    type Message = Vec<GroupingMessageItem>;
     type Outcome = GroupingResult;
 
-    fn start(&mut self) -> Vec<Vec<SurveillanceItem>> {
-        let own = self.roster.item(self.id(), false);
-        let mut outgoing: Vec<Vec<SurveillanceItem>> =
+    fn start(&mut self) -> Vec<Vec<GroupingMessageItem>> {
+        let own = self.roster.surveillance_item(self.id(), false);
+        let mut outgoing: Vec<Vec<GroupingMessageItem>> =
             own.map(|item| vec![item]).into_iter().collect();
         outgoing.extend(self.advance());
         outgoing
     }
 
-    fn check(&self, _: usize, items: &Vec<SurveillanceItem>) -> Result<(), InvalidMessage> {
+    fn check_message(
+        &self,
+        _: usize,
+        items: &Vec<GroupingMessageItem>,
+    ) -> Result<(), InvalidMessage> {
         InvalidMessage::Length.ensure((1..=MAX_ITEMS).contains(&items.len()))?;
         items.iter().try_for_each(|item| {
             item.check(self.input.airplanes)?;
             let near = &self.input.near;
             let place = near.binary_search_by_key(&item.subject_id(), |one| one.id);
-            if let (SurveillanceItem::Beacon(beacon), Ok(k)) = (item, place) {
+            if let (GroupingMessageItem::Beacon(beacon), Ok(k)) = (item, place) {
                 // A beacon must say where all see its airplane; only of those farther away is it believed.
                 InvalidMessage::Plan.ensure(beacon.own == near[k])?;
             }
@@ -300,11 +304,11 @@ impl link::ProtocolAgent for GroupingAgent {
     fn on_message(
         &mut self,
         from: usize,
-        items: Vec<SurveillanceItem>,
-    ) -> Vec<Vec<SurveillanceItem>> {
+        items: Vec<GroupingMessageItem>,
+    ) -> Vec<Vec<GroupingMessageItem>> {
         let from = self.input.near[from].id;
         let mut about: BTreeSet<EntityId> =
-            items.iter().map(SurveillanceItem::subject_id).collect();
+            items.iter().map(GroupingMessageItem::subject_id).collect();
         let mut may_lack_more = false;
         for item in items {
             may_lack_more |= self.receive_item(from, item);
@@ -321,7 +325,7 @@ impl link::ProtocolAgent for GroupingAgent {
         if self.result.is_some() {
             return Vec::new();
         }
-        let present = self.present_others();
+        let present = self.responsive_others();
         let missing = self.places_with_missing_items(&present);
         if !missing.is_empty() || self.roster.is_complete(self.id()) {
             return missing;
@@ -339,7 +343,7 @@ impl link::ProtocolAgent for GroupingAgent {
         if self.has_reported { 0.95 } else { 0.5 }
     }
 
-    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<SurveillanceItem>> {
+    fn on_peer_gone(&mut self, other: usize, _: bool) -> Vec<Vec<GroupingMessageItem>> {
         self.is_gone[other] = true;
         self.has_news = true;
         self.advance()

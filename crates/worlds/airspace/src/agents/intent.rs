@@ -39,14 +39,14 @@ pub struct IntentInput {
 
 /// An agent that is done when all others were heard or given up.
 #[derive(Debug)]
-pub struct IntentAgent {
+pub struct IntentExchangeAgent {
     start: IntentInput,
     intents: Vec<Option<Intent>>,
     gone: Vec<bool>,
     is_over: bool,
 }
 
-impl IntentAgent {
+impl IntentExchangeAgent {
     /// Returns an agent that has not sent anything yet.
     pub fn new(start: IntentInput) -> Self {
         let mut intents = vec![None; start.filed.len()];
@@ -55,7 +55,7 @@ impl IntentAgent {
     }
 }
 
-impl link::ProtocolAgent for IntentAgent {
+impl link::ProtocolAgent for IntentExchangeAgent {
     type Message = Intent;
     /// Messages of the members, by place.
     type Outcome = Vec<Option<Intent>>;
@@ -64,7 +64,7 @@ impl link::ProtocolAgent for IntentAgent {
         vec![self.start.own.clone()]
     }
 
-    fn check(&self, from: usize, intent: &Intent) -> Result<(), InvalidMessage> {
+    fn check_message(&self, from: usize, intent: &Intent) -> Result<(), InvalidMessage> {
         let FiledFlight { max_way_points, orders, .. } = self.start.filed[from];
         let is_filed = intent.next as usize <= max_way_points && intent.orders as usize <= orders;
         InvalidMessage::Plan.ensure(is_filed)?;
@@ -116,7 +116,7 @@ impl ActiveResolutions {
     /// # Errors
     /// When there are no such airplanes, or no such heading.
     pub(crate) fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
-        let with: &[EntityId] = self.conflict_slots();
+        let with: &[EntityId] = self.conflicting_aircraft();
         let is_ascending = with.windows(2).all(|pair| pair[0] < pair[1]);
         let are_known = with.iter().all(|&id| (id as usize) < airplanes);
         InvalidMessage::Airplane.ensure(is_ascending && are_known)?;

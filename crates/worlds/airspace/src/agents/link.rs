@@ -12,7 +12,7 @@
 
 pub(crate) use super::participant::ConversationEnd;
 use super::participant::{
-    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, WithOutcome,
+    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, ParticipantWithOutcome,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,7 @@ pub trait ProtocolAgent {
     ///
     /// # Errors
     /// When its content is impossible.
-    fn check(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
+    fn check_message(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
     /// Returns the largest number of bytes of a message, and of messages of one agent in a conversation.
     fn message_limits(&self) -> MessageLimits;
@@ -154,7 +154,7 @@ struct PeerState {
 
 impl PeerState {
     /// Records the number of a message that has come. Returns whether it has not come before.
-    fn accept(&mut self, number: u32) -> bool {
+    fn record_message_number(&mut self, number: u32) -> bool {
         let is_new = number >= self.next && self.early.insert(number);
         while self.early.remove(&self.next) {
             self.next += 1;
@@ -192,7 +192,7 @@ impl<A: ProtocolAgent> ReliableEndpoint<A> {
     }
 
     fn send(&mut self, to: Option<EntityId>, message: PacketBuffer) {
-        self.retry.record_packet(message.len());
+        self.retry.record_packet_size(message.len());
         self.out.push(OutgoingMessage { to, message });
     }
 
@@ -215,7 +215,7 @@ impl<A: ProtocolAgent> ReliableEndpoint<A> {
         InvalidMessage::Form.ensure(rest.is_empty())?;
         if let WireMessage::Said(number, content) = &message {
             InvalidMessage::Round.ensure(*number < self.limits.messages)?;
-            self.agent.check(from, content)?;
+            self.agent.check_message(from, content)?;
         }
         Ok(message)
     }
@@ -244,7 +244,7 @@ impl<A: ProtocolAgent> ReliableEndpoint<A> {
     }
 
     /// Ends the conversation of an airplane that is not heard and hears no other.
-    fn end_unheard(&mut self) {
+    fn drop_all_peers(&mut self) {
         let me = self.config.me;
         for j in (0..self.others.len()).filter(|&j| j != me) {
             self.others[j].is_unheard = true;
@@ -265,7 +265,7 @@ impl<A: ProtocolAgent + Send> Participant for ReliableEndpoint<A> {
         let first = self.agent.start();
         self.broadcast(first);
         if self.config.is_silent {
-            self.end_unheard();
+            self.drop_all_peers();
         }
     }
 
@@ -281,9 +281,11 @@ impl<A: ProtocolAgent + Send> Participant for ReliableEndpoint<A> {
         self.others[place].unanswered = 0;
         self.others[place].is_there = true;
         // The header was cut off on receipt; a message that is sent already counts it.
-        self.retry.record_packet(HEADER_BYTES + bytes.len());
+        self.retry.record_packet_size(HEADER_BYTES + bytes.len());
         match message {
-            WireMessage::Said(number, content) if self.others[place].accept(number) => {
+            WireMessage::Said(number, content)
+                if self.others[place].record_message_number(number) =>
+            {
                 self.retry.restart(tick);
                 let outgoing = self.agent.on_message(place, content);
                 self.broadcast(outgoing);
@@ -338,7 +340,7 @@ impl<A: ProtocolAgent + Send> Participant for ReliableEndpoint<A> {
     }
 }
 
-impl<A: ProtocolAgent + Send> WithOutcome for ReliableEndpoint<A> {
+impl<A: ProtocolAgent + Send> ParticipantWithOutcome for ReliableEndpoint<A> {
     type Outcome = A::Outcome;
 
     fn finish(&mut self) -> ConversationEnd<A::Outcome> {

@@ -9,7 +9,7 @@
 //! | Module | Task |
 //! |---|---|
 //! | [`sampling`] | the paper's Algorithm 1: samples, predicts, and shares both |
-//! | [`informed`] | sends all its possible paths once, and then only samples or distributions |
+//! | [`prediction_sharing`] | sends all its possible paths once, and then only samples or distributions |
 //! | [`coordinator`] | migrates from airplane to airplane, and decides for all |
 //! | [`intent`] | sends hidden intentions once, for methods that find headings |
 //! | [`grouping`] | finds the airplanes that decide together, where groups are not announced |
@@ -22,7 +22,6 @@ mod conversation;
 pub mod coordinator;
 pub mod exchange;
 pub mod grouping;
-pub mod informed;
 pub mod intent;
 mod link;
 pub mod network_traffic;
@@ -30,16 +29,17 @@ mod optimizer;
 mod ownship;
 pub mod packet;
 mod participant;
+pub mod prediction_sharing;
 pub mod sampling;
 pub mod traffic_state;
 
-pub use conversation::{Conversation, ConversationInfo};
+pub use conversation::{Conversation, ConversationSetup};
 pub use link::{EndpointConfig, MessageLimits, ProtocolAgent, ReliableEndpoint};
 pub(crate) use optimizer::OptimizingAgent;
 pub use ownship::{CommonKnowledge, FiledFlight, Ownship};
 pub use participant::{
     ConversationEnd, ConversationProgress, InvalidMessage, OutgoingMessage, Participant,
-    WithOutcome,
+    ParticipantWithOutcome,
 };
 use serde::{Deserialize, Serialize};
 use traffic_state::StateBeacon;

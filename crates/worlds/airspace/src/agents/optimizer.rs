@@ -30,14 +30,14 @@ pub(crate) trait Optimizer {
     /// Returns the message with which it starts, before it has heard anything.
     fn first_message(&mut self) -> Self::Message;
 
-    /// Checks a message of the airplane at a place, see [`link::ProtocolAgent::check`].
+    /// Checks a message of the airplane at a place, see [`link::ProtocolAgent::check_message`].
     ///
     /// # Errors
     /// When its content is impossible.
     fn check_message(&self, from: usize, message: &Self::Message) -> Result<(), InvalidMessage>;
 
     /// Returns the bounds on the messages that it may be sent.
-    fn limits(&self) -> MessageLimits;
+    fn message_limits(&self) -> MessageLimits;
 
     /// Receives a message of the airplane at a place. Messages come in any order, each once.
     fn receive(&mut self, from: usize, message: Self::Message);
@@ -102,12 +102,12 @@ impl<O: Optimizer> link::ProtocolAgent for OptimizingAgent<O> {
         outgoing
     }
 
-    fn check(&self, from: usize, message: &O::Message) -> Result<(), InvalidMessage> {
+    fn check_message(&self, from: usize, message: &O::Message) -> Result<(), InvalidMessage> {
         self.optimizer.check_message(from, message)
     }
 
     fn message_limits(&self) -> MessageLimits {
-        self.optimizer.limits()
+        self.optimizer.message_limits()
     }
 
     fn on_message(&mut self, from: usize, message: O::Message) -> Vec<O::Message> {

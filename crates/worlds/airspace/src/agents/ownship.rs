@@ -2,9 +2,10 @@
 
 use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
-use super::traffic_state::{StateBeacon, TrafficPicture, TrafficState};
+use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
 use crate::flight::{
-    Action, Air, AircraftModel, KnownAircraft, Point, Pose2, Prediction, RoutePosition,
+    Action, AircraftModel, FlightEnvironment, KnownAircraft, Point, Pose2, Prediction,
+    RoutePosition,
 };
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::objective::{ActionPredictions, Objective};
@@ -26,7 +27,7 @@ pub struct CommonKnowledge {
     /// Poses at which all see the airplanes of the group, in the order of the ids.
     pub poses: Vec<Pose2>,
     /// The air that all fly through.
-    pub air: Air,
+    pub air: FlightEnvironment,
     /// The objective that is minimized.
     pub objective: Objective,
     /// Settings of the optimizer, from the scenario.
@@ -47,7 +48,7 @@ pub struct FiledFlight {
     /// Actions from which it may choose.
     pub actions: Vec<Action>,
     /// The knowledge that all others have of it before they have heard it.
-    pub contact: TrafficState,
+    pub contact: LastKnownState,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,
     /// Largest number of way-points that it is to reach under any orders.
@@ -224,10 +225,10 @@ impl Ownship {
 
     /// Returns the same for one that was heard a moment ago.
     pub(super) fn predictions_from_beacon(&self, beacon: &StateBeacon) -> ActionPredictions {
-        self.predictions_from_state(&TrafficState::from_beacon(beacon.clone(), self.common.now))
+        self.predictions_from_state(&LastKnownState::from_beacon(beacon.clone(), self.common.now))
     }
 
-    fn predictions_from_state(&self, contact: &TrafficState) -> ActionPredictions {
+    fn predictions_from_state(&self, contact: &LastKnownState) -> ActionPredictions {
         let CommonKnowledge { air, is_shielded, now, .. } = &*self.common;
         contact.presumed_predictions(air, *is_shielded, *now)
     }

@@ -14,12 +14,12 @@ pub enum Protocol {
     Shield,
 }
 
-impl network::Protocol for Protocol {
-    fn number(self) -> u8 {
+impl network::ConversationTopic for Protocol {
+    fn wire_number(self) -> u8 {
         self as u8
     }
 
-    fn from_number(number: u8) -> Option<Self> {
+    fn from_wire_number(number: u8) -> Option<Self> {
         match number {
             0 => Some(Self::Group),
             1 => Some(Self::Decision),

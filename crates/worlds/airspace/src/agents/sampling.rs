@@ -105,12 +105,12 @@ impl SamplingAgent {
         }
     }
 
-    fn sample_count(&self) -> u64 {
+    fn total_sample_count(&self) -> u64 {
         u64::from(self.round) * self.block as u64
     }
 
-    fn predictions(&mut self) -> SamplingMessage {
-        self.samples = self.own.samples(&self.player, self.sample_count(), self.block);
+    fn send_predictions(&mut self) -> SamplingMessage {
+        self.samples = self.own.samples(&self.player, self.total_sample_count(), self.block);
         let predictions = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
         SamplingMessage::Predictions {
             round: self.round,
@@ -171,7 +171,7 @@ impl SamplingAgent {
 
     /// Learns (lines 18 to 24). Costs are summed in the order of the airplanes, because then all
     /// agents compute the same bits.
-    fn learn(&mut self) {
+    fn learn_from_samples(&mut self) {
         let mut total = vec![0.0; self.block];
         for costs in self.members.iter().filter_map(|m| m.costs.get(&self.round)) {
             for (sum, cost) in total.iter_mut().zip(costs) {
@@ -192,7 +192,7 @@ impl Optimizer for SamplingAgent {
     type Message = SamplingMessage;
 
     fn first_message(&mut self) -> SamplingMessage {
-        self.predictions()
+        self.send_predictions()
     }
 
     fn round(&self) -> u32 {
@@ -216,7 +216,7 @@ impl Optimizer for SamplingAgent {
         }
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         let bytes = self.own.common.max_message_bytes(self.block) + 8 * self.block;
         // The predictions of its samples and their costs in each round.
         let rounds = self.own.settings().stop.max_rounds;
@@ -254,8 +254,8 @@ impl Optimizer for SamplingAgent {
 
     fn step(&mut self) -> OptimizerStep<SamplingMessage> {
         if self.has_sent_costs() {
-            self.learn();
-            OptimizerStep::Send(self.predictions())
+            self.learn_from_samples();
+            OptimizerStep::Send(self.send_predictions())
         } else if self.has_converged() {
             OptimizerStep::Conclude
         } else {

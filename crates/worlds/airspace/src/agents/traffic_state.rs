@@ -1,7 +1,7 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
 use super::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{Air, FlightLevelRange, Point, Pose2, Prediction, distance_m};
+use crate::flight::{FlightEnvironment, FlightLevelRange, Point, Pose2, Prediction, distance_m};
 use crate::objective::ActionPredictions;
 use crate::shield::{OrbitSide, ShieldedAircraft};
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ pub struct OrbitState {
 
 /// One airplane's knowledge of another one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TrafficState {
+pub struct LastKnownState {
     /// Cycle in which the other was last heard; that of its appearance if it never was.
     pub heard_in: Cycle,
     /// Its message in that cycle.
@@ -66,11 +66,11 @@ pub struct PlanEnd {
 }
 
 /// One airplane's knowledge of others, by id.
-pub type TrafficPicture = BTreeMap<EntityId, TrafficState>;
+pub type TrafficPicture = BTreeMap<EntityId, LastKnownState>;
 
 impl OrbitState {
     /// Returns its pose at the start of cycle `now`, carried by the wind since `as_of`.
-    fn pose(&self, air: &Air, beacon: &StateBeacon, now: Cycle) -> Pose2 {
+    fn pose(&self, air: &FlightEnvironment, beacon: &StateBeacon, now: Cycle) -> Pose2 {
         let elapsed_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
         let Pose2 { at: [x, y], heading_rad } =
@@ -112,7 +112,7 @@ impl StateBeacon {
     }
 }
 
-impl TrafficState {
+impl LastKnownState {
     /// Returns the knowledge of an airplane that has just been heard.
     pub(crate) fn from_beacon(beacon: StateBeacon, now: Cycle) -> Self {
         Self { heard_in: now, beacon, presumed: None, planned: None, unheard_in: None }
@@ -123,7 +123,7 @@ impl TrafficState {
     /// it.
     pub(crate) fn presumed_predictions(
         &self,
-        air: &Air,
+        air: &FlightEnvironment,
         is_shielded: bool,
         now: Cycle,
     ) -> ActionPredictions {
@@ -136,7 +136,12 @@ impl TrafficState {
         ActionPredictions::new(vec![prediction], separation_m, self.beacon.levels)
     }
 
-    fn orbit_points(&self, air: &Air, orbiting: &OrbitState, now: Cycle) -> Vec<Point> {
+    fn orbit_points(
+        &self,
+        air: &FlightEnvironment,
+        orbiting: &OrbitState,
+        now: Cycle,
+    ) -> Vec<Point> {
         let StateBeacon { v_m_s, orbit_rad_s, .. } = self.beacon;
         let pose = orbiting.pose(air, &self.beacon, now);
         let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
@@ -145,7 +150,7 @@ impl TrafficState {
             .collect()
     }
 
-    fn straight_points(&self, air: &Air, now: Cycle) -> Vec<Point> {
+    fn straight_points(&self, air: &FlightEnvironment, now: Cycle) -> Vec<Point> {
         let StateBeacon { pose: Pose2 { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
         let bearing_rad = match goal.map(|goal| air.aim_point(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
@@ -178,7 +183,7 @@ pub(crate) fn record_beacon(
             contact.heard_in = now;
         }
         None => {
-            contacts.insert(id, TrafficState::from_beacon(beacon, now));
+            contacts.insert(id, LastKnownState::from_beacon(beacon, now));
         }
     }
 }

@@ -6,13 +6,13 @@ pub(super) mod orca;
 
 use super::flight::{FlightLevelRange, Point};
 use super::settings::ReactiveSettings;
-use sidestep_kernel::{Slot, math};
+use sidestep_kernel::{EntitySlot, math};
 
 /// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AircraftState {
     /// The airplane, by its id.
-    pub slot: Slot,
+    pub slot: EntitySlot,
     /// Its position in meters, x east and y north.
     pub at: Point,
     /// Heading in radians, counterclockwise from east.
@@ -43,7 +43,7 @@ fn vector_length(a: Point) -> f64 {
 
 /// Returns an airplane at 35 m/s that wants to keep its heading, as tests of all methods have it.
 #[cfg(test)]
-fn moving(slot: Slot, at: Point, heading_rad: f64) -> AircraftState {
+fn moving_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> AircraftState {
     AircraftState {
         slot,
         at,

@@ -11,7 +11,7 @@ use crate::flight::Point;
 use crate::settings::ReactiveSettings;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
-use sidestep_kernel::{Slot, math};
+use sidestep_kernel::{EntitySlot, math};
 
 /// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
 /// left of the line of sight.
@@ -28,14 +28,14 @@ const MIN_SPEED_SQUARED: f64 = 1e-6;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActiveResolutions {
     /// The others, by slot.
-    with: Vec<Slot>,
+    with: Vec<EntitySlot>,
     /// The heading that resolves them, in radians.
     heading_rad: f64,
 }
 
 impl ActiveResolutions {
     /// The others, by rising slot.
-    pub(crate) fn conflict_slots(&self) -> &[Slot] {
+    pub(crate) fn conflicting_aircraft(&self) -> &[EntitySlot] {
         &self.with
     }
 
@@ -55,7 +55,7 @@ struct ClosestApproach {
 
 /// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
 /// `meets` says whether two are on one level.
-pub(crate) fn headings(
+pub(crate) fn resolution_headings(
     all: &[AircraftState],
     resolving: &mut [ActiveResolutions],
     settings: ReactiveSettings,
@@ -85,8 +85,8 @@ pub(crate) fn headings(
         memory.with.sort_unstable();
         memory.with.dedup();
         memory.with.retain(|&slot| {
-            find_slot(&by_slot, slot)
-                .is_some_and(|other| meets(own, other) && is_active(own, other, settings))
+            find_aircraft_by_slot(&by_slot, slot)
+                .is_some_and(|other| meets(own, other) && is_conflict_active(own, other, settings))
         });
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
@@ -101,7 +101,10 @@ fn sorted_by_slot(all: &[AircraftState]) -> Vec<&AircraftState> {
 }
 
 /// Returns the first airplane with a slot, if there is one.
-fn find_slot<'a>(by_slot: &[&'a AircraftState], slot: Slot) -> Option<&'a AircraftState> {
+fn find_aircraft_by_slot<'a>(
+    by_slot: &[&'a AircraftState],
+    slot: EntitySlot,
+) -> Option<&'a AircraftState> {
     let first = by_slot.partition_point(|one| one.slot < slot);
     by_slot.get(first).copied().filter(|one| one.slot == slot)
 }
@@ -140,7 +143,7 @@ fn resolution_heading_rad(
     }
     let [mut vx, mut vy] = own.velocity;
     for (j, closest) in conflicts {
-        let [change_x, change_y] = velocity_change(own, &all[*j], closest, settings);
+        let [change_x, change_y] = resolution_velocity_change(own, &all[*j], closest, settings);
         vx -= change_x;
         vy -= change_y;
     }
@@ -148,7 +151,7 @@ fn resolution_heading_rad(
 }
 
 /// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
-fn velocity_change(
+fn resolution_velocity_change(
     own: &AircraftState,
     other: &AircraftState,
     closest: &ClosestApproach,
@@ -176,7 +179,11 @@ fn velocity_change(
 }
 
 /// Returns whether a conflict that was found is still to be resolved.
-fn is_active(own: &AircraftState, other: &AircraftState, settings: ReactiveSettings) -> bool {
+fn is_conflict_active(
+    own: &AircraftState,
+    other: &AircraftState,
+    settings: ReactiveSettings,
+) -> bool {
     let apart = sub(other.at, own.at);
     let closing = sub(other.velocity, own.velocity);
     let distance_m = vector_length(apart);
@@ -190,13 +197,13 @@ fn is_active(own: &AircraftState, other: &AircraftState, settings: ReactiveSetti
 
 #[cfg(test)]
 mod tests {
-    use super::super::moving;
+    use super::super::moving_aircraft;
     use super::*;
 
     const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.0 };
 
     fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {
-        headings(all, memory, SETTINGS, |_, _| true)
+        resolution_headings(all, memory, SETTINGS, |_, _| true)
     }
 
     /// The headings that BlueSky 1.1.1 commands for the same poses after one look (`traf.cr.trk`, as
@@ -216,8 +223,9 @@ mod tests {
             (&[([0.0, 0.0], 0.0), ([100.0, -480.0], 10.0)], &[-1.0022, 9.2841]),
         ];
         for (poses, expected_deg) in cases {
-            let one =
-                |(slot, (at, deg)): (Slot, &(Point, f64))| moving(slot, *at, deg.to_radians());
+            let one = |(slot, (at, deg)): (EntitySlot, &(Point, f64))| {
+                moving_aircraft(slot, *at, deg.to_radians())
+            };
             let all: Vec<AircraftState> = (0..).zip(poses).map(one).collect();
             let found = looked(&all, &mut vec![ActiveResolutions::default(); all.len()]);
             for (found, expected) in found.iter().zip(expected_deg) {
@@ -229,41 +237,54 @@ mod tests {
 
     #[test]
     fn others_are_found_by_their_slots_in_whatever_order_they_come() {
-        let all = [7, 2, 9, 2, 4].map(|slot| moving(slot, [f64::from(slot), 0.0], 0.0));
+        let all = [7, 2, 9, 2, 4].map(|slot| moving_aircraft(slot, [f64::from(slot), 0.0], 0.0));
         let by_slot = sorted_by_slot(&all);
         for slot in 0..12 {
             assert_eq!(
-                find_slot(&by_slot, slot),
+                find_aircraft_by_slot(&by_slot, slot),
                 all.iter().find(|one| one.slot == slot),
                 "{slot}"
             );
         }
-        let first: *const AircraftState = find_slot(&by_slot, 2).expect("there are two");
+        let first: *const AircraftState =
+            find_aircraft_by_slot(&by_slot, 2).expect("there are two");
         assert!(std::ptr::eq(first, &all[1]));
     }
 
     #[test]
     fn a_conflict_is_minded_until_past_the_closest_point() {
         let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
-        let far = [moving(0, [0.0, 0.0], 0.0), moving(1, [4000.0, 0.0], std::f64::consts::PI)];
+        let far = [
+            moving_aircraft(0, [0.0, 0.0], 0.0),
+            moving_aircraft(1, [4000.0, 0.0], std::f64::consts::PI),
+        ];
         assert!(looked(&far, &mut memory).iter().all(Option::is_some));
         // Both have turned away, so no conflict is predicted any more.
-        let turned =
-            [moving(0, [1000.0, 0.0], 0.5), moving(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI)];
+        let turned = [
+            moving_aircraft(0, [1000.0, 0.0], 0.5),
+            moving_aircraft(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI),
+        ];
         let kept = looked(&turned, &mut memory);
         assert!(kept.iter().all(Option::is_some), "{kept:?}");
-        let past =
-            [moving(0, [2500.0, 400.0], 0.0), moving(1, [1500.0, -400.0], std::f64::consts::PI)];
+        let past = [
+            moving_aircraft(0, [2500.0, 400.0], 0.0),
+            moving_aircraft(1, [1500.0, -400.0], std::f64::consts::PI),
+        ];
         assert_eq!(looked(&past, &mut memory), [None, None]);
     }
 
     #[test]
     fn two_that_have_lost_separation_and_fly_apart_still_resolve() {
         let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
-        let inside = [moving(0, [0.0, 0.0], 0.0), moving(1, [-300.0, 50.0], std::f64::consts::PI)];
+        let inside = [
+            moving_aircraft(0, [0.0, 0.0], 0.0),
+            moving_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
+        ];
         assert!(looked(&inside, &mut memory).iter().all(Option::is_some));
-        let beyond =
-            [moving(0, [600.0, 0.0], 0.0), moving(1, [-300.0, 50.0], std::f64::consts::PI)];
+        let beyond = [
+            moving_aircraft(0, [600.0, 0.0], 0.0),
+            moving_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
+        ];
         assert_eq!(looked(&beyond, &mut memory), [None, None]);
     }
 }

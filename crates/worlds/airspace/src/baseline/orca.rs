@@ -38,13 +38,13 @@ pub(crate) fn heading_rad<'a>(
     let planes: Vec<HalfPlane> =
         others.map(|other| half_plane(own, other, settings, step_s)).collect();
     let v_m_s = vector_length(own.velocity);
-    if min_excess_m_s(&planes, own.preferred_rad, v_m_s) >= 0.0 {
+    if min_plane_margin_m_s(&planes, own.preferred_rad, v_m_s) >= 0.0 {
         return None;
     }
     let spacing_rad = std::f64::consts::TAU / f64::from(HEADINGS);
     let ranked = (0..HEADINGS).map(|k| {
         let turn_rad = math::wrap_angle(f64::from(k) * spacing_rad);
-        let excess_m_s = min_excess_m_s(&planes, own.preferred_rad + turn_rad, v_m_s);
+        let excess_m_s = min_plane_margin_m_s(&planes, own.preferred_rad + turn_rad, v_m_s);
         // Any allowed heading is better than all others; among equals the nearest one is.
         let is_allowed = excess_m_s >= 0.0;
         let score = excess_m_s.min(0.0) - TURN_WEIGHT_M_S * turn_rad.abs();
@@ -55,7 +55,7 @@ pub(crate) fn heading_rad<'a>(
 }
 
 /// Returns by how much the velocity of a heading is within the half-planes, at the one that it satisfies least.
-fn min_excess_m_s(planes: &[HalfPlane], heading_rad: f64, v_m_s: f64) -> f64 {
+fn min_plane_margin_m_s(planes: &[HalfPlane], heading_rad: f64, v_m_s: f64) -> f64 {
     let velocity = [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)];
     planes.iter().map(|p| dot(p.normal, velocity) - p.min_m_s).fold(f64::INFINITY, f64::min)
 }
@@ -100,7 +100,7 @@ fn half_plane(
 
 #[cfg(test)]
 mod tests {
-    use super::super::moving;
+    use super::super::moving_aircraft;
     use super::*;
     use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
     use proptest::prelude::*;
@@ -134,7 +134,7 @@ mod tests {
         fn the_half_planes_are_those_of_the_paper(
             x in -4000.0f64..4000.0, y in -4000.0f64..4000.0, heading_rad in -3.1f64..3.1,
         ) {
-            let (own, other) = (moving(0, [0.0, 0.0], 0.3), moving(1, [x, y], heading_rad));
+            let (own, other) = (moving_aircraft(0, [0.0, 0.0], 0.3), moving_aircraft(1, [x, y], heading_rad));
             let HalfPlane { normal, min_m_s } = half_plane(&own, &other, SETTINGS, 1.0);
             let lacks = (min_m_s - dot(normal, own.velocity)).max(0.0);
             let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
@@ -146,7 +146,7 @@ mod tests {
         /// Alone with one neighbor, both headings together keep the zone.
         #[test]
         fn a_heading_is_one_that_all_allow(x in 600.0f64..4000.0, y in -800.0f64..800.0) {
-            let (own, other) = (moving(0, [0.0, 0.0], 0.0), moving(1, [x, y], 3.1));
+            let (own, other) = (moving_aircraft(0, [0.0, 0.0], 0.0), moving_aircraft(1, [x, y], 3.1));
             let plane = half_plane(&own, &other, SETTINGS, 1.0);
             let excess = |rad: f64| {
                 dot(plane.normal, [35.0 * math::cos(rad), 35.0 * math::sin(rad)]) - plane.min_m_s

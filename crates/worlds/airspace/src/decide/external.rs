@@ -12,7 +12,7 @@ use sidestep_kernel::math;
 
 /// Returns the candidates of an airplane: the ordered one, and then the others by rank, or by how little they
 /// differ from it. Without an order it follows its flight plan.
-pub(super) fn candidates_by_action(
+pub(super) fn candidates_by_external_action(
     world: &AirspaceWorld,
     known: KnownAircraft,
     external_action: Option<&ExternalAction>,
@@ -27,7 +27,7 @@ pub(super) fn candidates_by_action(
             ))
         }
         Some(&ExternalAction::Velocity([vx, vy])) => {
-            let profile = turn_toward(world, known, math::atan2(vy, vx));
+            let profile = turn_profile_toward(world, known, math::atan2(vy, vx));
             ManeuverCandidates::from_profiles(rank_by_similarity(world, known, profile))
         }
         Some(ExternalAction::Ranking(order)) => {
@@ -40,7 +40,11 @@ pub(super) fn candidates_by_action(
 }
 
 /// Returns the turn profile of one `dt` with which an airplane turns to a heading as fast as it can.
-fn turn_toward(world: &AirspaceWorld, mut known: KnownAircraft, heading_rad: f64) -> TurnProfile {
+fn turn_profile_toward(
+    world: &AirspaceWorld,
+    mut known: KnownAircraft,
+    heading_rad: f64,
+) -> TurnProfile {
     let steps = 0..world.timing.points_per_dt();
     TurnProfile {
         omegas_rad_s: steps

@@ -8,9 +8,9 @@ use sidestep_kernel::interrupt;
 
 /// Returns the largest number of bytes that optimizing a group takes: tables of its pairs, and
 /// predictions, in all the copies that its deployment has of them.
-pub(crate) fn max_group_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
+pub(crate) fn max_group_memory_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
     let tables = table_bytes(world, group);
-    let predictions = prediction_bytes(world, group);
+    let predictions = predictions_memory_bytes(world, group);
     let members = group.len() as u64;
     match (world.deployment, world.settings.estimator) {
         (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
@@ -31,7 +31,7 @@ pub(crate) fn max_group_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) ->
 }
 
 /// Returns the bytes of one copy of the predictions of all actions of a group.
-fn prediction_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
+fn predictions_memory_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
     let count: u64 = group.iter().map(|known| world.actions(known.slot).len() as u64).sum();
     count * world.timing.horizon as u64 * size_of::<Point>() as u64
 }

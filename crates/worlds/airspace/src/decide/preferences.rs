@@ -1,16 +1,16 @@
 //! The actions of an airplane by preference, and their turn profiles.
 
 use crate::agents::ActionChoice;
-use crate::flight::{Action, FlightSegment, KnownAircraft};
+use crate::flight::{Action, InterOrderSegment, KnownAircraft};
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 
 /// Returns the action straight to the way-point, and then the others by how little they differ from
 /// it.
 pub(super) fn rank_straight_first(world: &AirspaceWorld, known: KnownAircraft) -> Vec<Action> {
-    let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
-    let air = world.air();
-    rank_by_turn_rate(
+    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let air = world.flight_environment();
+    rank_by_turn_difference(
         world,
         known,
         air.steer(&air.autopilot(model, mission), known.pose, known.next),
@@ -18,7 +18,7 @@ pub(super) fn rank_straight_first(world: &AirspaceWorld, known: KnownAircraft) -
 }
 
 /// Returns proceeding, and then the other actions by how little they differ from a turn rate.
-pub(super) fn rank_by_turn_rate(
+pub(super) fn rank_by_turn_difference(
     world: &AirspaceWorld,
     known: KnownAircraft,
     desired_rad_s: f64,
@@ -57,7 +57,7 @@ pub(super) fn rank_by_cost(
 }
 
 /// Returns the different motions of the next `dt` among some actions, in their order.
-pub(super) fn turn_profiles(
+pub(super) fn profiles_from_actions(
     world: &AirspaceWorld,
     known: KnownAircraft,
     actions: &[Action],
@@ -73,8 +73,8 @@ pub(super) fn turn_profiles(
 }
 
 fn turn_profile(world: &AirspaceWorld, known: KnownAircraft, action: Action) -> TurnProfile {
-    let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
-    let air = world.air();
+    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let air = world.flight_environment();
     let dtau_s = world.timing.dtau_s;
     let autopilot = air.autopilot(model, mission);
     let mut pose = known.pose;

@@ -4,9 +4,9 @@
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
 //! step by step, each airplane as the method says.
 
-use super::preferences::{rank_by_turn_rate, turn_profiles};
+use super::preferences::{profiles_from_actions, rank_by_turn_difference};
 use crate::baseline::{AircraftState, mvp, orca};
-use crate::flight::{FlightSegment, KnownAircraft, Point, Pose2};
+use crate::flight::{InterOrderSegment, KnownAircraft, Point, Pose2};
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;
@@ -48,7 +48,7 @@ pub(super) fn profiles_by_velocity(
 ) -> Vec<Vec<TurnProfile>> {
     let mut ahead = group.to_vec();
     let mut preferred = vec![TurnProfile::default(); group.len()];
-    let mut memory = MethodMemory { resolving, draws: own_draws(world, group, now) };
+    let mut memory = MethodMemory { resolving, draws: custom_method_draws(world, group, now) };
     for k in 0..world.timing.points_per_dt() {
         let elapsed_s = k as f64 * world.timing.dtau_s;
         let others: Vec<AircraftState> = non_cooperative
@@ -56,7 +56,7 @@ pub(super) fn profiles_by_velocity(
             .map(|one| non_cooperative_state(world, one, elapsed_s))
             .collect();
         let traffic = StepTraffic { now, elapsed_s, group: &ahead, others: &others };
-        let steering = steer_group(world, traffic, &mut memory);
+        let steering = decide_steering(world, traffic, &mut memory);
         for ((known, profile), steering) in ahead.iter_mut().zip(&mut preferred).zip(steering) {
             profile.omegas_rad_s.push(step(world, known, steering));
         }
@@ -69,7 +69,7 @@ pub(super) fn profiles_by_velocity(
 }
 
 /// Returns the random streams of a group's airplanes, if the method is one of the program's own.
-fn own_draws(world: &AirspaceWorld, group: &[KnownAircraft], now: Cycle) -> Vec<Draws> {
+fn custom_method_draws(world: &AirspaceWorld, group: &[KnownAircraft], now: Cycle) -> Vec<Draws> {
     if !matches!(world.method, MethodKind::Own(_)) {
         return Vec::new();
     }
@@ -83,13 +83,14 @@ pub(super) fn rank_by_similarity(
     profile: TurnProfile,
 ) -> Vec<TurnProfile> {
     let turn_rad_s = profile.omegas_rad_s.first().copied().unwrap_or_default();
-    let others = turn_profiles(world, known, &rank_by_turn_rate(world, known, turn_rad_s));
+    let others =
+        profiles_from_actions(world, known, &rank_by_turn_difference(world, known, turn_rad_s));
     let others: Vec<TurnProfile> = others.into_iter().filter(|other| *other != profile).collect();
     [vec![profile], others].concat()
 }
 
 /// Returns what the method gives each airplane of a group for one step; those that have arrived proceed.
-fn steer_group(
+fn decide_steering(
     world: &AirspaceWorld,
     traffic: StepTraffic<'_>,
     memory: &mut MethodMemory<'_>,
@@ -122,14 +123,14 @@ fn steer_group(
                     .filter(|other| other.slot != own.slot && is_on_level(own, other))
                     .copied()
                     .collect();
-                let one = OwnMethodCall { traffic, k, own, others: &others };
+                let one = CustomMethodContext { traffic, k, own, others: &others };
                 steering[k] = one.decide(world, method, &mut memory.draws[k]);
             }
         }
         MethodKind::Mvp => {
             let mut resolutions: Vec<mvp::ActiveResolutions> =
                 flying.iter().map(|&k| std::mem::take(&mut memory.resolving[k])).collect();
-            let found = mvp::headings(&all, &mut resolutions, world.mvp, is_on_level);
+            let found = mvp::resolution_headings(&all, &mut resolutions, world.mvp, is_on_level);
             for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
                 steering[k] = heading_rad.into();
                 memory.resolving[k] = resolution;
@@ -142,7 +143,7 @@ fn steer_group(
 }
 
 /// One airplane for which a method of the program's own decides.
-struct OwnMethodCall<'a> {
+struct CustomMethodContext<'a> {
     traffic: StepTraffic<'a>,
     /// Its place in the group.
     k: usize,
@@ -150,11 +151,11 @@ struct OwnMethodCall<'a> {
     others: &'a [AircraftState],
 }
 
-impl OwnMethodCall<'_> {
+impl CustomMethodContext<'_> {
     fn decide(&self, world: &AirspaceWorld, method: &OwnMethod, draws: &mut Draws) -> Steering {
         let StepTraffic { now, elapsed_s, group, .. } = self.traffic;
         let known = group[self.k];
-        let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+        let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
         let percept = MethodPercept {
             now,
             elapsed_s,
@@ -171,8 +172,8 @@ impl OwnMethodCall<'_> {
 
 /// Flies one step as steered, and returns its turn rate.
 pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: Steering) -> f64 {
-    let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
-    let air = world.air();
+    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let air = world.flight_environment();
     let pose = known.pose;
     let autopilot = air.autopilot(model, mission);
     let omega_max_rad_s = model.omega_max_rad_s;
@@ -217,18 +218,18 @@ fn non_cooperative_state(
         heading_rad,
         velocity: one.velocity_m_s,
         preferred_rad: heading_rad,
-        separation_m: one.clearance_m(0.0),
+        separation_m: one.required_clearance_m(0.0),
         levels: one.levels,
         yields: false,
     }
 }
 
 fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState {
-    let FlightSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
     let Pose2 { at, heading_rad } = known.pose;
     let v = model.v_m_s;
     let preferred_rad = mission.get(known.next).map_or(heading_rad, |&goal| {
-        let aim = world.air().aim_point(at, goal, v);
+        let aim = world.flight_environment().aim_point(at, goal, v);
         math::atan2(aim[1] - at[1], aim[0] - at[0])
     });
     AircraftState {

@@ -1,14 +1,14 @@
 //! Conversations of simple agents, over networks with faults.
 
 use crate::agents::{
-    Conversation, ConversationEnd, ConversationInfo, EndpointConfig, InvalidMessage, MessageLimits,
-    ProtocolAgent, ReliableEndpoint, WithOutcome,
+    Conversation, ConversationEnd, ConversationSetup, EndpointConfig, InvalidMessage,
+    MessageLimits, ParticipantWithOutcome, ProtocolAgent, ReliableEndpoint,
 };
 use crate::pilot::{ConversationId, ConversationSchedule, Protocol, retry_policy};
 use crate::purpose;
 use proptest::prelude::*;
 use sidestep_kernel::network::{
-    AgentLoop, FaultyTransport, Network, NetworkAgent, OutgoingPacket, RadioOutage, ReplyTiming,
+    AgentLoop, FaultyTransport, Network, NetworkAgent, OutgoingPacket, RadioOutage, ReplyBatching,
     TimeWindow, parse_packet,
 };
 use sidestep_kernel::stream::Streams;
@@ -58,7 +58,7 @@ impl ProtocolAgent for Adder {
         vec![(0, self.number())]
     }
 
-    fn check(&self, _: usize, (round, _): &Self::Message) -> Result<(), InvalidMessage> {
+    fn check_message(&self, _: usize, (round, _): &Self::Message) -> Result<(), InvalidMessage> {
         InvalidMessage::Round.ensure(*round < self.rounds)
     }
 
@@ -101,7 +101,7 @@ impl ProtocolAgent for Adder {
 
 /// An agent that sends until it is done.
 struct Alone {
-    conversation: Conversation<dyn WithOutcome<Outcome = u64>>,
+    conversation: Conversation<dyn ParticipantWithOutcome<Outcome = u64>>,
     out: Vec<OutgoingPacket>,
     ended: Option<ConversationEnd<u64>>,
 }
@@ -177,13 +177,13 @@ fn sums(
     let members: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
     let (schedule, streams) =
         (ConversationSchedule::for_cycle(3, network), Streams::new(Seed(seed)));
-    let (begins, ends) = schedule.conversation_ticks(Protocol::Decision, schedule.begins);
+    let (begins, ends) = schedule.conversation_tick_range(Protocol::Decision, schedule.begins);
     let station = |me: usize| {
         let id = members[me];
         let is_silent = network.is_some_and(|network| network.is_radio_off(id, 15.0));
         let (ticks, patience) = (ends - begins, retry_policy(network, Protocol::Decision));
         let config = EndpointConfig { group: members.clone(), me, patience, ticks, is_silent };
-        let info = ConversationInfo {
+        let info = ConversationSetup {
             id: ConversationId::new(3, Protocol::Decision, &members),
             members: members.clone(),
             me: id,
@@ -193,7 +193,7 @@ fn sums(
             is_silent,
         };
         let participant = Box::new(ReliableEndpoint::new(Adder::new(me, group, rounds), config));
-        let mut conversation: Conversation<dyn WithOutcome<Outcome = u64>> =
+        let mut conversation: Conversation<dyn ParticipantWithOutcome<Outcome = u64>> =
             Conversation::new(info, participant);
         let mut out = Vec::new();
         conversation.start(begins, &mut out);
@@ -204,7 +204,7 @@ fn sums(
     let draws = purpose::network_fault_streams(streams);
     let transport = FaultyTransport::in_memory(network, draws, None, &conversations);
     let mut network =
-        AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None };
+        AgentLoop { transport, replies: ReplyBatching::PerPacket, max_flight_ticks: None };
     network.run(&mut stations, begins, |station| station.ended.is_some());
     stations.into_iter().map(|station| station.ended.expect("all end")).collect()
 }

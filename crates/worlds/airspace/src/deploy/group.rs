@@ -1,31 +1,31 @@
 //! The pilots of a group, on a network in memory.
 
 use crate::decide::ManeuverCandidates;
-use crate::join::ControlledGroup;
+use crate::join::CooperativeGroup;
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::pilot::{Control, ConversationSchedule, Pilot, PilotMemory};
+use crate::pilot::{AirplaneControl, ConversationSchedule, Pilot, PilotMemory};
 use crate::purpose;
 use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::{
-    AgentDistances, AgentLoop, FaultInjector, FaultStreams, FaultyTransport, ReplyTiming,
+    AgentLoop, FaultInjector, FaultStreams, FaultyTransport, InterAgentDistances, ReplyBatching,
 };
 use sidestep_kernel::ports::MemoryTransport;
-use sidestep_kernel::{Cycle, EntityId, Slot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use std::sync::Arc;
 
 /// Lets the pilots of a group decide. Returns the control of each, and what it has considered.
 pub(crate) fn decide_group(
     context: &mut PhaseContext<'_>,
-    flown: &ControlledGroup,
+    flown: &CooperativeGroup,
     non_cooperative: &[NonCooperativeAircraft],
-) -> Vec<(Control, ManeuverCandidates)> {
+) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, state, now, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
     let schedule = ConversationSchedule::for_cycle(now, world.network.as_ref());
     let percepts = flown.percepts(context, non_cooperative);
-    let conversations = world.conversation_times_on(now, schedule);
+    let conversations = world.scheduled_conversation_times(now, schedule);
     let mut network = conversation_network(world, state, &conversations);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
     for (pilot, percept) in pilots.iter_mut().zip(percepts) {
@@ -34,12 +34,12 @@ pub(crate) fn decide_group(
     network.run(&mut pilots, schedule.begins, Pilot::has_decided);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     network.run(&mut pilots, schedule.begins, Pilot::is_done);
-    conversation_outcomes(pilots)
+    pilot_outcomes(pilots)
 }
 
 /// Returns the outcome of the conversations of a group. Where one waits for a message that never comes, all stay on
 /// their orbits, because plans that are sure are safe only if all fly them.
-fn conversation_outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates)> {
+fn pilot_outcomes(pilots: Vec<Pilot>) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     if pilots.iter().all(Pilot::is_done) {
         let outcomes = pilots.into_iter().map(Pilot::into_outcome);
         outcomes.map(|outcome| outcome.expect("it has come to an end")).collect()
@@ -50,13 +50,13 @@ fn conversation_outcomes(pilots: Vec<Pilot>) -> Vec<(Control, ManeuverCandidates
 
 /// Runs the conversations of pilots that have begun a cycle until all have ended.
 #[cfg(test)]
-pub(crate) fn run_pilots(
+pub(crate) fn run_pilot_conversations(
     world: &AirspaceWorld,
     state: &AirspaceState,
     (now, schedule): (Cycle, ConversationSchedule),
     pilots: &mut [Pilot],
 ) {
-    let conversations = world.conversation_times_on(now, schedule);
+    let conversations = world.scheduled_conversation_times(now, schedule);
     conversation_network(world, state, &conversations).run(pilots, schedule.begins, Pilot::is_done);
 }
 
@@ -72,10 +72,10 @@ fn conversation_network<'a>(
         Some(state),
         conversations,
     );
-    AgentLoop { transport, replies: ReplyTiming::PerPacket, max_flight_ticks: None }
+    AgentLoop { transport, replies: ReplyBatching::PerPacket, max_flight_ticks: None }
 }
 
-impl AgentDistances for AirspaceState {
+impl InterAgentDistances for AirspaceState {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         AirspaceState::distance_m(self, link)
     }
@@ -84,7 +84,11 @@ impl AgentDistances for AirspaceState {
 impl AirspaceWorld {
     /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run: the
     /// first conversation starts with the cycle, and the shield's exchange when that has to be over.
-    fn conversation_times_on(&self, now: Cycle, schedule: ConversationSchedule) -> [(u64, f64); 2] {
+    fn scheduled_conversation_times(
+        &self,
+        now: Cycle,
+        schedule: ConversationSchedule,
+    ) -> [(u64, f64); 2] {
         let starts_s = self.cycle_start_s(now);
         let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
         [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
@@ -98,7 +102,10 @@ impl AirspaceWorld {
 
     /// Returns the first tick of each conversation of a cycle, and its time in seconds after the start of the run.
     pub fn conversation_times(&self, now: Cycle) -> [(u64, f64); 2] {
-        self.conversation_times_on(now, ConversationSchedule::for_cycle(now, self.network.as_ref()))
+        self.scheduled_conversation_times(
+            now,
+            ConversationSchedule::for_cycle(now, self.network.as_ref()),
+        )
     }
 
     /// Returns the streams and purposes from which faults are drawn.
@@ -107,7 +114,7 @@ impl AirspaceWorld {
     }
 }
 
-fn pilots(world: &AirspaceWorld, flown: &[Slot], memories: Vec<PilotMemory>) -> Vec<Pilot> {
+fn pilots(world: &AirspaceWorld, flown: &[EntitySlot], memories: Vec<PilotMemory>) -> Vec<Pilot> {
     // Nearly all of a world is shared by its copies.
     let world = Arc::new(world.clone());
     flown
@@ -132,7 +139,7 @@ mod tests {
         let pilot = |percept: Percept| {
             let build = if percept.own.id == 0 { "another" } else { "this" };
             let pilot = Pilot::new(world.clone(), percept.own.id, Default::default());
-            let mut pilot = pilot.with_build(build);
+            let mut pilot = pilot.with_build_id(build);
             pilot.start_with_schedule(percept, ConversationSchedule::for_cycle(0, None));
             pilot
         };
@@ -145,14 +152,14 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 3000.0\n";
         let run = airspace_run(&Source::new("g", text, ""), 1).expect("a scenario");
         let mut pilots = begun(&run);
-        run_pilots(
+        run_pilot_conversations(
             run.world(),
             run.state(),
             (0, ConversationSchedule::for_cycle(0, None)),
             &mut pilots,
         );
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
-        for (control, _) in conversation_outcomes(pilots) {
+        for (control, _) in pilot_outcomes(pilots) {
             assert_eq!(control.maneuver, Maneuver::Orbit);
             let kinds: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
             assert_eq!(kinds, [EventKind::Deadline]);

@@ -25,7 +25,7 @@ mod outage_tests;
 
 pub(crate) use group::decide_group;
 #[cfg(test)]
-pub(crate) use group::run_pilots;
+pub(crate) use group::run_pilot_conversations;
 
 #[cfg(test)]
 mod tests {

@@ -1,13 +1,13 @@
 //! Observations: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
-use crate::flight::{FlightSegment, KnownAircraft, Point, distance_m};
+use crate::flight::{InterOrderSegment, KnownAircraft, Point, distance_m};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::control::{BufferMut, Space, SpaceKind};
+use sidestep_kernel::control::{BufferMut, ValueDomain, ValueSpace};
 use sidestep_kernel::geometry::sub;
 use sidestep_kernel::math::{atan2, hypot, wrap_angle};
-use sidestep_kernel::{EntityId, Slot};
+use sidestep_kernel::{EntityId, EntitySlot};
 use std::array::from_fn;
 use std::f64::consts::PI;
 
@@ -18,7 +18,7 @@ pub(super) const MAX_NEIGHBORS: usize = 16;
 /// An airplane as all of its group see it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct VisibleAircraft {
-    slot: Slot,
+    slot: EntitySlot,
     at: Point,
     altitude_m: f64,
     heading_rad: f64,
@@ -29,7 +29,7 @@ pub(super) struct VisibleAircraft {
 
 /// An airplane's knowledge of itself and of others; nothing for one that does not decide.
 #[derive(Debug, Default)]
-pub(super) struct Observation {
+pub(super) struct AgentObservation {
     is_due: bool,
     at: Point,
     altitude_m: f64,
@@ -92,7 +92,7 @@ impl VisibleAircraft {
     }
 }
 
-impl Observation {
+impl AgentObservation {
     /// Returns the observation of one of a group.
     pub(super) fn new(
         context: &PhaseContext<'_>,
@@ -100,7 +100,7 @@ impl Observation {
         all: &[VisibleAircraft],
     ) -> Self {
         let PhaseContext { world, state, .. } = context;
-        let FlightSegment { model, mission, .. } = world.segment(own.slot, own.orders);
+        let InterOrderSegment { model, mission, .. } = world.segment(own.slot, own.orders);
         let ahead = mission.get(own.next..).unwrap_or_default();
         Self {
             is_due: true,
@@ -118,7 +118,7 @@ impl Observation {
 
     /// Writes it into a row of each buffer, in the order of [`observation_spaces`].
     pub(super) fn write(&self, world: &AirspaceWorld, row: usize, buffers: &mut [BufferMut<'_>]) {
-        let mut row = ObservationRow { buffers: buffers.iter_mut(), row };
+        let mut row = ObservationRowWriter { buffers: buffers.iter_mut(), row };
         row.write_integers(&[i64::from(self.is_due)]);
         row.write_reals(&self.at);
         row.write_reals(&[self.altitude_m]);
@@ -149,12 +149,12 @@ impl Observation {
 }
 
 /// One airplane's row in buffers that are written one after the other.
-struct ObservationRow<'a, 'b> {
+struct ObservationRowWriter<'a, 'b> {
     buffers: std::slice::IterMut<'a, BufferMut<'b>>,
     row: usize,
 }
 
-impl ObservationRow<'_, '_> {
+impl ObservationRowWriter<'_, '_> {
     fn write_integers(&mut self, values: &[i64]) {
         let Some(buffer) = self.buffers.next() else { return };
         let first = self.row * values.len();
@@ -180,7 +180,7 @@ fn neighbors(
         others.map(|other| (distance_m(own.pose.at, other.at), other)).collect();
     nearest.sort_unstable_by(|(a_m, a), (b_m, b)| a_m.total_cmp(b_m).then(a.slot.cmp(&b.slot)));
     nearest.truncate(MAX_NEIGHBORS);
-    let exempt = state.exempt_with(own.slot);
+    let exempt = state.exempt_ids(own.slot);
     let contacts = state.traffic_picture(own.slot);
     let separation_m = world.segment(own.slot, own.orders).model.separation_m;
     nearest
@@ -210,12 +210,12 @@ fn delay_s(context: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> 
         return 0.0;
     }
     let flown_s = world.cycle_start_s(*now) - world.cycle_start_s(world.first_controlled_cycle(i));
-    let air = world.air();
+    let air = world.flight_environment();
     let v_m_s = world.segment(own.slot, own.orders).model.v_m_s;
     let mut from = own.pose.at;
     let mut left_s = 0.0;
     for &to in ahead {
-        left_s += air.straight_s(from, to, v_m_s);
+        left_s += air.straight_flight_time_s(from, to, v_m_s);
         from = to;
     }
     flown_s + left_s - alone_s
@@ -227,45 +227,45 @@ fn wrap_heading(heading_rad: f64) -> f64 {
 }
 
 /// Returns the spaces of the observations of a team's airplanes.
-pub(super) fn observation_spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<Space> {
+pub(super) fn observation_spaces(world: &AirspaceWorld, agents: &[EntityId]) -> Vec<ValueSpace> {
     let max_turn_rate_rad_s = world.airplanes[agents[0] as usize].model.omega_max_rad_s;
     let max_way_points =
         agents.iter().map(|&id| max_way_points(world, id)).max().unwrap_or(0) as i64;
     let mut spaces = vec![
-        Space::new(
+        ValueSpace::new(
             "due",
             yes_no_space(),
             "whether it decides in the next cycle; all else is padding if not",
         ),
-        Space::new("place_m", UNBOUNDED, "its place, east and north, as all see it")
+        ValueSpace::new("place_m", UNBOUNDED, "its place, east and north, as all see it")
             .with_shape([2]),
-        Space::new("altitude_m", UNBOUNDED, "its altitude"),
-        Space::new("heading_rad", ANGLE, "its heading, counterclockwise from east"),
-        Space::new("speed_m_s", POSITIVE, "its speed through the air"),
-        Space::new(
+        ValueSpace::new("altitude_m", UNBOUNDED, "its altitude"),
+        ValueSpace::new("heading_rad", ANGLE, "its heading, counterclockwise from east"),
+        ValueSpace::new("speed_m_s", POSITIVE, "its speed through the air"),
+        ValueSpace::new(
             "turn_rate_rad_s",
-            SpaceKind::Real { low: -max_turn_rate_rad_s, high: max_turn_rate_rad_s },
+            ValueDomain::Real { low: -max_turn_rate_rad_s, high: max_turn_rate_rad_s },
             "its turn rate in the last step, positive to the left; 0 before the first",
         ),
-        Space::new(
+        ValueSpace::new(
             "way_point_m",
             UNBOUNDED,
             "its next way-point, seen from it; 1e12 m ahead while it is to keep a heading",
         )
         .with_shape([2]),
-        Space::new(
+        ValueSpace::new(
             "way_points_left",
-            SpaceKind::Integer { low: 0, high: max_way_points },
+            ValueDomain::Integer { low: 0, high: max_way_points },
             "way-points that it is still to reach",
         ),
-        Space::new(
+        ValueSpace::new(
             "delay_s",
             UNBOUNDED,
             "how much later it arrives than alone if it flies straight to its way-points from now on; \
              0 if it keeps a heading, or never arrives",
         ),
     ];
-    spaces.extend(neighbor_spaces(world));
+    spaces.extend(neighbor_observation_spaces(world));
     spaces
 }
 
@@ -275,24 +275,24 @@ fn max_way_points(world: &AirspaceWorld, id: EntityId) -> usize {
     (0..=orders).map(|done| world.segment(id, done).mission.len()).max().unwrap_or(0)
 }
 
-fn yes_no_space() -> SpaceKind {
-    SpaceKind::Discrete(["no", "yes"].map(String::from).into())
+fn yes_no_space() -> ValueDomain {
+    ValueDomain::Discrete(["no", "yes"].map(String::from).into())
 }
 
-const UNBOUNDED: SpaceKind = SpaceKind::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
-const POSITIVE: SpaceKind = SpaceKind::Real { low: 0.0, high: f64::INFINITY };
-const ANGLE: SpaceKind = SpaceKind::Real { low: -PI, high: PI };
+const UNBOUNDED: ValueDomain = ValueDomain::Real { low: f64::NEG_INFINITY, high: f64::INFINITY };
+const POSITIVE: ValueDomain = ValueDomain::Real { low: 0.0, high: f64::INFINITY };
+const ANGLE: ValueDomain = ValueDomain::Real { low: -PI, high: PI };
 
-/// Returns the spaces of the neighbors in observations, in the order in which [`Observation::write`] fills them.
-fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
-    let ids = SpaceKind::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
-    let each = |name: &str, bounds: SpaceKind, meaning: &str| {
-        Space::new(name, bounds, meaning).with_shape([MAX_NEIGHBORS])
+/// Returns the spaces of the neighbors in observations, in the order in which [`AgentObservation::write`] fills them.
+fn neighbor_observation_spaces(world: &AirspaceWorld) -> Vec<ValueSpace> {
+    let ids = ValueDomain::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
+    let each = |name: &str, bounds: ValueDomain, meaning: &str| {
+        ValueSpace::new(name, bounds, meaning).with_shape([MAX_NEIGHBORS])
     };
     let mut spaces = vec![
-        Space::new(
+        ValueSpace::new(
             "neighbors",
-            SpaceKind::Integer { low: 0, high: MAX_NEIGHBORS as i64 },
+            ValueDomain::Integer { low: 0, high: MAX_NEIGHBORS as i64 },
             "others of its group that follow, the nearest first; values beyond them are padding, 0 \
              where nothing else is said",
         ),
@@ -315,7 +315,7 @@ fn neighbor_spaces(world: &AirspaceWorld) -> Vec<Space> {
         ),
     ];
     if world.network.is_some() {
-        let bounds = SpaceKind::Real { low: -1.0, high: f64::INFINITY };
+        let bounds = ValueDomain::Real { low: -1.0, high: f64::INFINITY };
         let meaning = "time since it heard them or first met them; -1 where it has not";
         spaces.push(each("neighbor_unheard_s", bounds, meaning));
     }

@@ -5,10 +5,10 @@ use crate::flight::{KnownAircraft, Pose2, distance_m};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::trace::InspectionTrace;
 use crate::{AirspaceRun, Scratch, airspace_run};
-use sidestep_kernel::control::{BufferMut, OrderLog, Orders, Team};
+use sidestep_kernel::control::{AgentTeam, BufferMut, MultiAgentOrder, OrderLog};
 use sidestep_kernel::math::cos;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
-use sidestep_kernel::{Cycle, Simulation, Slot};
+use sidestep_kernel::{Cycle, EntitySlot, Simulation};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
@@ -70,7 +70,7 @@ fn run(workers: usize) -> AirspaceRun {
 
 /// Returns the observations of a team: one vector per space, as real numbers.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
-    let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
+    let AgentTeam { agents, observation_spaces: observed, .. } = &run.agent_teams()[team];
     let width = |k: usize| observed[k].value_count() * agents.len();
     // Filled with something, because all of it must be written.
     let mut whole: Vec<_> = (0..observed.len()).map(|k| vec![77; width(k)]).collect();
@@ -96,7 +96,7 @@ fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
 
 /// A policy that depends on all it observes, and orders in all forms; an airplane that is alone gets no order.
 fn order_all(run: &mut AirspaceRun) {
-    for (k, team) in run.teams().to_vec().iter().enumerate() {
+    for (k, team) in run.agent_teams().to_vec().iter().enumerate() {
         let seen = observed(run, k);
         for (row, &agent) in team.agents.iter().enumerate() {
             let one = |name: &str, part: usize| {
@@ -115,7 +115,8 @@ fn order_all(run: &mut AirspaceRun) {
                 1 => (ExternalAction::TURN_RATE, vec![turn]),
                 _ => (ExternalAction::VELOCITY, vec![-x, y]),
             };
-            run.order(&Orders { order, agents: &[agent], values: &values }).expect("right");
+            run.order(&MultiAgentOrder { order, agents: &[agent], values: &values })
+                .expect("right");
         }
     }
 }
@@ -202,12 +203,15 @@ fn going_back_gives_the_same_orders_again() {
 
 /// Returns the knowledge of an airplane's group when it decides in the present cycle; nothing if
 /// the airplane does not.
-fn known_in(run: &AirspaceRun, id: Slot) -> (Vec<KnownAircraft>, Vec<NonCooperativeAircraft>) {
+fn known_in(
+    run: &AirspaceRun,
+    id: EntitySlot,
+) -> (Vec<KnownAircraft>, Vec<NonCooperativeAircraft>) {
     let (world, now) = (run.world(), run.cycle());
     let copy = crate::state::AirspaceState::restore(world, &run.state().snapshot(now));
     let notes = Some(Box::new(InspectionTrace { slot: id, ..InspectionTrace::default() }));
     let mut scratch = Scratch { trace: notes, ..Scratch::default() };
-    world.try_cycle(&copy, now, id, &mut scratch);
+    world.run_group_cycle(&copy, now, id, &mut scratch);
     let notes = *scratch.trace.take().expect("they were put there");
     (notes.group, notes.non_cooperative)
 }
@@ -256,8 +260,8 @@ fn what_is_observed_is_what_the_group_knows_when_it_decides() {
     let mut run = run(1);
     let (mut own, mut minding, mut minding_nobody) = (0, 0, 0);
     for _ in 0..CYCLES {
-        for team in 0..run.teams().len() {
-            let (seen, agents) = (observed(&run, team), run.teams()[team].agents.clone());
+        for team in 0..run.agent_teams().len() {
+            let (seen, agents) = (observed(&run, team), run.agent_teams()[team].agents.clone());
             for (row, &id) in agents.iter().enumerate() {
                 let (group, non_cooperative) = known_in(&run, id);
                 let width = |name: &str| seen[name].len() / agents.len();

@@ -5,7 +5,7 @@
 
 use super::action::Action;
 use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
-use super::motion::{AircraftModel, Point, Pose2, StepTiming, distance_m};
+use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 use sidestep_kernel::{interrupt, math};
 
 /// Difference of heading and bearing in radians below which an airplane no longer turns: in an hour at 250 m/s it
@@ -14,9 +14,9 @@ const ALIGNED_RAD: f64 = 1e-10;
 
 /// The air: everything that is the same for all airplanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Air {
+pub struct FlightEnvironment {
     /// Lengths of a cycle, of the steps in it, and of the horizon.
-    pub timing: StepTiming,
+    pub timing: TimeDiscretization,
     /// Rule by which way-points count as reached.
     pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
@@ -34,7 +34,7 @@ pub struct RoutePosition<'a> {
     pub pose: Pose2,
 }
 
-impl Air {
+impl FlightEnvironment {
     /// Returns how an airplane flies through still air.
     pub fn autopilot<'a>(&self, model: &'a AircraftModel, mission: &'a [Point]) -> Autopilot<'a> {
         Autopilot {
@@ -80,7 +80,12 @@ impl Air {
 
     /// Returns a number of steps in which an airplane certainly flies straight on to way-point `next`
     /// without reaching it: none while it still turns there, or is near.
-    pub fn straight_steps(&self, autopilot: &Autopilot<'_>, pose: Pose2, next: usize) -> usize {
+    pub fn straight_step_count(
+        &self,
+        autopilot: &Autopilot<'_>,
+        pose: Pose2,
+        next: usize,
+    ) -> usize {
         let Some(&goal) = autopilot.mission.get(next) else { return 0 };
         let model = autopilot.model;
         let [x, y] = self.aim_point(pose.at, goal, model.v_m_s);
@@ -127,13 +132,13 @@ impl Air {
     ) -> Vec<Prediction> {
         let RoutePosition { mission, next, pose } = route;
         interrupt::check();
-        let mission = self.mission_in_air(mission, pose.at, next, model.v_m_s);
+        let mission = self.wind_corrected_mission(mission, pose.at, next, model.v_m_s);
         let autopilot = self.autopilot(model, &mission);
         actions.iter().map(|action| autopilot.predict(*action, pose, next, &self.timing)).collect()
     }
 
     /// Returns the seconds of a straight flight over the ground to `goal`.
-    pub fn straight_s(&self, at: Point, goal: Point, v_m_s: f64) -> f64 {
+    pub fn straight_flight_time_s(&self, at: Point, goal: Point, v_m_s: f64) -> f64 {
         if self.is_windless() {
             return distance_m(at, goal) / v_m_s;
         }
@@ -147,7 +152,7 @@ impl Air {
 
     /// Returns the mission as seen from the moving air: each way-point at its place when the
     /// airplane reaches it.
-    fn mission_in_air(
+    fn wind_corrected_mission(
         &self,
         mission: &[Point],
         mut at: Point,
@@ -161,7 +166,7 @@ impl Air {
         let [wx, wy] = self.wind_m_s;
         let mut flown_s = 0.0;
         for goal in drifted.iter_mut().skip(next) {
-            flown_s += self.straight_s(at, *goal, v_m_s);
+            flown_s += self.straight_flight_time_s(at, *goal, v_m_s);
             at = *goal;
             *goal = [goal[0] - wx * flown_s, goal[1] - wy * flown_s];
         }

@@ -3,11 +3,11 @@
 use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
 use super::track::Track;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 
 /// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Airplane {
+pub struct AirplaneConfig {
     /// Its call sign; `None` where only its id identifies it.
     pub callsign: Option<String>,
     /// Its abilities, with the speed that it has until an order changes it.
@@ -30,7 +30,7 @@ pub struct Airplane {
     pub is_non_cooperative: bool,
 }
 
-impl Airplane {
+impl AirplaneConfig {
     /// Returns whether it keeps a heading, and flies to no way-point, after its first `done` orders.
     pub(crate) fn has_fixed_heading(&self, done: usize) -> bool {
         let last_direction = self.orders.iter().take(done).rev().find(|order| {
@@ -52,7 +52,7 @@ impl Airplane {
 #[derive(Debug, Clone, Copy)]
 pub struct KnownAircraft {
     /// Slot of the airplane, which is its id.
-    pub slot: Slot,
+    pub slot: EntitySlot,
     /// Its pose as all see it, with the error of the cycle.
     pub pose: Pose2,
     /// Number of way-points done with.

@@ -1,7 +1,7 @@
 //! Predictions: an autopilot flies actions and missions step by step, and returns the path.
 
 use super::action::Action;
-use super::motion::{AircraftModel, Point, Pose2, StepTiming, distance_m, sinc};
+use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
 
@@ -214,7 +214,7 @@ impl Autopilot<'_> {
         action: Action,
         pose: Pose2,
         next: usize,
-        timing: &StepTiming,
+        timing: &TimeDiscretization,
     ) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
         let mut flight = PredictionState::new(pose);
@@ -290,7 +290,7 @@ mod tests {
                 after: AfterLastWaypoint::Straight,
                 dtau_s: 1.0,
             };
-            let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
+            let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
             let some = DetourLegs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
             let held = actions(&model, 5.0, &[30.0], &DetourLegs::default());
             let all = [held, actions(&model, 5.0, &[], &some)].concat();
@@ -322,7 +322,7 @@ mod tests {
                 dtau_s: 1.0,
             };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
-            let timing = StepTiming { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
+            let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");
             // It ends within the tolerance, or where it was about as near as it ever was.
@@ -345,7 +345,7 @@ mod tests {
             let passing = WaypointRule { tolerance_m, passes: true };
             let pilot = Autopilot { model: &model, mission: &mission, passing, after: AfterLastWaypoint::Straight, dtau_s };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
-            let timing = StepTiming { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
+            let timing = TimeDiscretization { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
             let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < timing.horizon, "still flying to {mission:?}");
             let end = flown.points[flown.counted - 1];

@@ -34,7 +34,7 @@ const ROUNDING_M: f64 = 1e-6;
 
 /// A stretch of flight at one turn rate, airspeed and rate of climb.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Leg {
+pub struct ConstantRateLeg {
     /// Its start, in seconds.
     pub from_s: f64,
     /// Its end, in seconds.
@@ -70,7 +70,7 @@ struct KinematicState {
     acceleration: Point,
 }
 
-impl Leg {
+impl ConstantRateLeg {
     /// Returns a level leg in still air.
     pub fn new(from_s: f64, until_s: f64, pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Self {
         let omega_rad_s = if omega_rad_s.abs() < MIN_TURN_RAD_S { 0.0 } else { omega_rad_s };
@@ -193,7 +193,7 @@ impl PairApproach {
     }
 
     /// Adds the time that two legs have in common; it must not lie before times that were added already.
-    pub fn add(&mut self, a: &Leg, b: &Leg, zone: SeparationMinima) {
+    pub fn add(&mut self, a: &ConstantRateLeg, b: &ConstantRateLeg, zone: SeparationMinima) {
         let common = TimeSpan { from_s: a.from_s.max(b.from_s), until_s: a.until_s.min(b.until_s) };
         let Some(level) = common_level_span(a, b, common, zone.vertical_m) else { return };
         let pair = LegPair { a, b };
@@ -202,12 +202,17 @@ impl PairApproach {
         pair.find_extrema(level, &mut moments);
         moments.push(level.until_s);
         for ends in moments.windows(2) {
-            self.add_monotonic(pair, TimeSpan { from_s: ends[0], until_s: ends[1] }, zone);
+            self.add_monotonic_interval(pair, TimeSpan { from_s: ends[0], until_s: ends[1] }, zone);
         }
     }
 
     /// Adds an interval in which the distance only grows or only shrinks.
-    fn add_monotonic(&mut self, pair: LegPair<'_>, span: TimeSpan, zone: SeparationMinima) {
+    fn add_monotonic_interval(
+        &mut self,
+        pair: LegPair<'_>,
+        span: TimeSpan,
+        zone: SeparationMinima,
+    ) {
         let TimeSpan { from_s, until_s } = span;
         let gap_m = zone.gap_m - ROUNDING_M;
         let start_m = pair.distance_m(from_s);
@@ -232,13 +237,23 @@ impl PairApproach {
 }
 
 /// Returns whether two airplanes are too near each other at a time.
-pub fn is_separation_lost(a: &Leg, b: &Leg, t_s: f64, zone: SeparationMinima) -> bool {
+pub fn is_separation_lost(
+    a: &ConstantRateLeg,
+    b: &ConstantRateLeg,
+    t_s: f64,
+    zone: SeparationMinima,
+) -> bool {
     (a.altitude_at_m(t_s) - b.altitude_at_m(t_s)).abs() < zone.vertical_m
         && (LegPair { a, b }).distance_m(t_s) < zone.gap_m - ROUNDING_M
 }
 
 /// Returns the part of an interval in which two legs are on one level.
-fn common_level_span(a: &Leg, b: &Leg, within: TimeSpan, vertical_m: f64) -> Option<TimeSpan> {
+fn common_level_span(
+    a: &ConstantRateLeg,
+    b: &ConstantRateLeg,
+    within: TimeSpan,
+    vertical_m: f64,
+) -> Option<TimeSpan> {
     let TimeSpan { from_s, until_s } = within;
     let above_m = a.altitude_at_m(from_s) - b.altitude_at_m(from_s);
     let climb_m_s = a.climb_m_s - b.climb_m_s;
@@ -259,8 +274,8 @@ fn common_level_span(a: &Leg, b: &Leg, within: TimeSpan, vertical_m: f64) -> Opt
 /// Two legs, seen from the first.
 #[derive(Clone, Copy)]
 struct LegPair<'a> {
-    a: &'a Leg,
-    b: &'a Leg,
+    a: &'a ConstantRateLeg,
+    b: &'a ConstantRateLeg,
 }
 
 impl LegPair<'_> {
@@ -281,7 +296,7 @@ impl LegPair<'_> {
 
     /// Returns half of the first and half of the second derivative of the squared distance. The square has no root,
     /// whose derivative jumps where two airplanes meet in a point.
-    fn slope(&self, t_s: f64) -> (f64, f64) {
+    fn half_square_derivatives(&self, t_s: f64) -> (f64, f64) {
         let KinematicState { at, velocity, acceleration } = self.motion(t_s);
         (dot(at, velocity), dot(velocity, velocity) + dot(at, acceleration))
     }
@@ -293,8 +308,11 @@ impl LegPair<'_> {
             self.find_alignments(within, found);
             return 1;
         }
-        let ends = [self.slope(within.from_s).0, self.slope(within.until_s).0];
-        self.find_zeros(within, ends, self.max_bend(within), found)
+        let ends = [
+            self.half_square_derivatives(within.from_s).0,
+            self.half_square_derivatives(within.until_s).0,
+        ];
+        self.find_zeros(within, ends, self.max_third_derivative(within), found)
     }
 
     /// Returns whether both turn at one rate in the same air, so that one is on a circle as the other sees it.
@@ -333,10 +351,10 @@ impl LegPair<'_> {
     }
 
     /// Returns a bound on how fast half of the second derivative changes in an interval.
-    fn max_bend(&self, within: TimeSpan) -> f64 {
+    fn max_third_derivative(&self, within: TimeSpan) -> f64 {
         let TimeSpan { from_s, until_s } = within;
         let duration_s = until_s - from_s;
-        let [speed_m_s, acceleration_m_s2, jerk_m_s3] = self.max_relative_motion(within);
+        let [speed_m_s, acceleration_m_s2, jerk_m_s3] = self.relative_motion_bounds(within);
         let start = self.motion(from_s);
         let start_speed_m_s = math::hypot(start.velocity[0], start.velocity[1]);
         let speed_m_s = speed_m_s.min(start_speed_m_s + acceleration_m_s2 * duration_s);
@@ -348,7 +366,7 @@ impl LegPair<'_> {
     /// Returns bounds on the relative velocity, acceleration and jerk in an interval. These are differences of
     /// two turning vectors, which are small where the vectors have almost one length and direction, as those of
     /// airplanes that fly almost in formation.
-    fn max_relative_motion(&self, TimeSpan { from_s, until_s }: TimeSpan) -> [f64; 3] {
+    fn relative_motion_bounds(&self, TimeSpan { from_s, until_s }: TimeSpan) -> [f64; 3] {
         let LegPair { a, b } = self;
         let heading_a_rad = a.pose.heading_rad + a.omega_rad_s * (from_s - a.from_s);
         let heading_b_rad = b.pose.heading_rad + b.omega_rad_s * (from_s - b.from_s);
@@ -361,9 +379,9 @@ impl LegPair<'_> {
         let jerks =
             [a.v_m_s * a.omega_rad_s * a.omega_rad_s, b.v_m_s * b.omega_rad_s * b.omega_rad_s];
         [
-            wind_m_s + max_difference(speeds, angle_rad),
-            max_difference(accelerations, angle_rad),
-            max_difference(jerks, angle_rad),
+            wind_m_s + max_vector_difference(speeds, angle_rad),
+            max_vector_difference(accelerations, angle_rad),
+            max_vector_difference(jerks, angle_rad),
         ]
     }
 
@@ -375,11 +393,11 @@ impl LegPair<'_> {
             return 1;
         }
         let middle_s = from_s + half_s;
-        let (at_middle, change) = self.slope(middle_s);
+        let (at_middle, change) = self.half_square_derivatives(middle_s);
         if change.abs() >= bend * half_s {
             // The slope only rises or only falls, so it has at most one zero.
             if (ends[0] < 0.0) != (ends[1] < 0.0) {
-                found.push(zero_s(within, ends[0] < 0.0, |t_s| self.slope(t_s)));
+                found.push(zero_s(within, ends[0] < 0.0, |t_s| self.half_square_derivatives(t_s)));
             }
             return 1;
         }
@@ -410,7 +428,7 @@ impl LegPair<'_> {
 
 /// Returns a bound on the length of the difference of two vectors of these lengths, with at most this angle between
 /// them.
-fn max_difference([a, b]: [f64; 2], angle_rad: f64) -> f64 {
+fn max_vector_difference([a, b]: [f64; 2], angle_rad: f64) -> f64 {
     let shorter = a.abs().min(b.abs());
     (a.abs() + b.abs()).min((a - b).abs() + shorter * angle_rad)
 }
@@ -452,11 +470,11 @@ mod tests {
 
     const ZONE: SeparationMinima = SeparationMinima { gap_m: 500.0, vertical_m: 300.0 };
 
-    fn leg(at: Point, heading_rad: f64, v_m_s: f64, omega_rad_s: f64) -> Leg {
-        Leg::new(0.0, 60.0, Pose2 { at, heading_rad }, v_m_s, omega_rad_s)
+    fn leg(at: Point, heading_rad: f64, v_m_s: f64, omega_rad_s: f64) -> ConstantRateLeg {
+        ConstantRateLeg::new(0.0, 60.0, Pose2 { at, heading_rad }, v_m_s, omega_rad_s)
     }
 
-    fn approach(a: &Leg, b: &Leg, zone: SeparationMinima) -> PairApproach {
+    fn approach(a: &ConstantRateLeg, b: &ConstantRateLeg, zone: SeparationMinima) -> PairApproach {
         let mut approach = PairApproach::new(None);
         approach.add(a, b, zone);
         approach
@@ -479,7 +497,7 @@ mod tests {
         let mut found = PairApproach::new(None);
         let climbs = beside.with_climb(0.0, 10.0);
         for (from_s, until_s) in [(0.0, 10.0), (10.0, 60.0)] {
-            let part = |leg: &Leg| Leg { until_s, ..leg.remainder(from_s) };
+            let part = |leg: &ConstantRateLeg| ConstantRateLeg { until_s, ..leg.remainder(from_s) };
             found.add(&part(&still), &part(&climbs), ZONE);
         }
         assert_eq!((found.losses, found.nearest_m), (1, 100.0));

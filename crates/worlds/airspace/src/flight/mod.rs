@@ -20,12 +20,12 @@ mod segment;
 mod track;
 
 pub use action::{Action, DetourLegs, actions};
-pub use air::{Air, RoutePosition};
-pub use airplane::{Airplane, KnownAircraft};
+pub use air::{FlightEnvironment, RoutePosition};
+pub use airplane::{AirplaneConfig, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
-pub use leg::{Leg, PairApproach, SeparationMinima, is_separation_lost};
+pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
 pub use levels::FlightLevelRange;
-pub use motion::{AircraftModel, Point, Pose2, StepTiming, distance_m};
+pub use motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
-pub(crate) use segment::{FlightSegment, SegmentAfterOrder, segments_after_orders};
+pub(crate) use segment::{InterOrderSegment, SegmentAfterOrder, segments_after_orders};
 pub use track::{Track, TrackPoint};

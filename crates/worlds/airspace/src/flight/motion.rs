@@ -79,7 +79,7 @@ pub(super) fn sinc(a: f64) -> f64 {
 
 /// The times in which airplanes decide, fly a step, and look ahead.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct StepTiming {
+pub struct TimeDiscretization {
     /// Seconds between two optimizations.
     pub dt_s: f64,
     /// Seconds between two points of a prediction; divides `dt_s`.
@@ -88,7 +88,7 @@ pub struct StepTiming {
     pub horizon: usize,
 }
 
-impl StepTiming {
+impl TimeDiscretization {
     /// Returns the time that a prediction covers, in seconds.
     pub fn horizon_s(&self) -> f64 {
         self.horizon as f64 * self.dtau_s

@@ -1,6 +1,6 @@
 //! Segments of a flight: the flight between two orders.
 
-use super::airplane::Airplane;
+use super::airplane::AirplaneConfig;
 use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
 use sidestep_kernel::math;
@@ -13,7 +13,7 @@ const FAR_AHEAD_M: f64 = 1e12;
 
 /// The part of a flight between two orders.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FlightSegment<'a> {
+pub(crate) struct InterOrderSegment<'a> {
     pub(crate) model: &'a AircraftModel,
     pub(crate) mission: &'a [Point],
     /// Altitude in meters of the level that it keeps or changes to.
@@ -34,15 +34,15 @@ pub(crate) struct SegmentAfterOrder {
 }
 
 impl SegmentAfterOrder {
-    pub(crate) fn segment(&self) -> FlightSegment<'_> {
+    pub(crate) fn segment(&self) -> InterOrderSegment<'_> {
         let Self { model, mission, altitude_m, climb_m_s, .. } = self;
-        FlightSegment { model, mission, altitude_m: *altitude_m, climb_m_s: *climb_m_s }
+        InterOrderSegment { model, mission, altitude_m: *altitude_m, climb_m_s: *climb_m_s }
     }
 }
 
 /// Returns the segments of a flight after each of its orders. Segments along the same route share its way-points,
 /// because there may be ten thousand of each.
-pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrder> {
+pub(crate) fn segments_after_orders(airplane: &AirplaneConfig) -> Vec<SegmentAfterOrder> {
     let mut route: Arc<[Point]> = airplane.mission.as_slice().into();
     let mut straight_routes = BTreeMap::new();
     let mut segment = SegmentAfterOrder {
@@ -61,7 +61,7 @@ pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrde
                 let key = (heading_rad.to_bits(), route.len());
                 let straight = straight_routes
                     .entry(key)
-                    .or_insert_with(|| straight_route(*heading_rad, route.len()));
+                    .or_insert_with(|| route_along_heading(*heading_rad, route.len()));
                 segment.mission = Arc::clone(straight);
             }
             FlightTask::Speed(v_m_s) => segment.model.v_m_s = *v_m_s,
@@ -82,7 +82,7 @@ pub(crate) fn segments_after_orders(airplane: &Airplane) -> Vec<SegmentAfterOrde
 }
 
 /// Returns way-points that lead along a heading forever.
-fn straight_route(heading_rad: f64, way_points: usize) -> Arc<[Point]> {
+fn route_along_heading(heading_rad: f64, way_points: usize) -> Arc<[Point]> {
     let far = [FAR_AHEAD_M * math::cos(heading_rad), FAR_AHEAD_M * math::sin(heading_rad)];
     vec![far; way_points].into()
 }

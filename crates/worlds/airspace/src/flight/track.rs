@@ -1,6 +1,6 @@
 //! Recorded tracks: the position of an airplane at any time, and the rest of its route.
 
-use super::leg::Leg;
+use super::leg::ConstantRateLeg;
 use super::motion::{Point, Pose2, distance_m};
 use sidestep_kernel::math;
 
@@ -70,7 +70,12 @@ impl Track {
     }
 
     /// Adds the legs flown in an interval, with times after its start.
-    pub(crate) fn add_legs(&self, from_s: f64, until_s: f64, legs: &mut Vec<Leg>) {
+    pub(crate) fn add_legs_between(
+        &self,
+        from_s: f64,
+        until_s: f64,
+        legs: &mut Vec<ConstantRateLeg>,
+    ) {
         let first = self.points.partition_point(|p| p.t_s <= from_s).max(1) - 1;
         for (k, pair) in self.points.windows(2).enumerate().skip(first) {
             if pair[0].t_s >= until_s {
@@ -85,7 +90,7 @@ impl Track {
             let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / duration_s;
             let v_m_s = distance_m(pair[0].at, pair[1].at) / duration_s;
             let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(start_s) };
-            let leg = Leg::new(start_s - from_s, end_s - from_s, pose, v_m_s, 0.0);
+            let leg = ConstantRateLeg::new(start_s - from_s, end_s - from_s, pose, v_m_s, 0.0);
             legs.push(leg.with_climb(self.altitude_at_m(start_s), climb_m_s));
         }
     }

@@ -45,7 +45,7 @@ impl Inspector<'_> {
                 is_chosen.into(),
             ]);
             let ahead = options.predictions[k].points.iter().copied();
-            let shape = self.line(&[own.pose.at].into_iter().chain(ahead).collect::<Vec<_>>());
+            let shape = self.path_mark(&[own.pose.at].into_iter().chain(ahead).collect::<Vec<_>>());
             let role = if is_chosen { MarkRole::Chosen } else { MarkRole::Predicted };
             inspection.add_weighted_mark(
                 role,
@@ -80,7 +80,7 @@ impl Inspector<'_> {
     }
 
     /// Returns some points on the airplane's level as a line: all of the next `dt`, and then some.
-    fn line(&self, points: &[Point]) -> MarkShape {
+    fn path_mark(&self, points: &[Point]) -> MarkShape {
         let stride = points.len().div_ceil(MAX_POINTS).max(1);
         let next_dt = self.world.timing.points_per_dt();
         let mut points_m = Vec::new();
@@ -93,7 +93,7 @@ impl Inspector<'_> {
     }
 
     /// Adds the shield's decision on the preferred profile, and the others that it depends on.
-    pub(super) fn add_shield(&self, inspection: &mut Inspection) {
+    pub(super) fn add_shield_section(&self, inspection: &mut Inspection) {
         let (Some(decision), Some(aircraft)) = (self.trace.decision, &self.trace.aircraft) else {
             return;
         };
@@ -116,8 +116,8 @@ impl Inspector<'_> {
             FactSection::new("Shield")
                 .fact("lets it fly", flies)
                 .fact("because of", self.trace.blockers.first().map(|&other| airplane(other)))
-                .fact("stored orbit", side(aircraft.fallback))
-                .fact("orbit after that", side(decision.fallback))
+                .fact("stored orbit", side_text(aircraft.fallback))
+                .fact("orbit after that", side_text(decision.fallback))
                 .fact("radius of the orbit", FactValue::meters(orbit.radius_m))
                 .fact("named with", FactValue::count(aircraft.exempt.len()))
                 .fact_if("can be reached by", threat.map(|event| airplane(event.other)))
@@ -127,42 +127,45 @@ impl Inspector<'_> {
         let radius_m = orbit.radius_m;
         inspection.add_mark(
             MarkRole::Orbit,
-            side(aircraft.fallback),
+            side_text(aircraft.fallback),
             MarkShape::Circle { at_m, radius_m },
         );
         if decision.candidate != Some(0)
             && let Some(preferred) = self.trace.profiles.first()
         {
-            inspection.add_mark(MarkRole::Refused, "what it wanted", self.profile_line(preferred));
+            inspection.add_mark(MarkRole::Refused, "what it wanted", self.profile_mark(preferred));
         }
     }
 
     /// Returns the path of one `dt` as a line.
-    fn profile_line(&self, profile: &TurnProfile) -> MarkShape {
+    fn profile_mark(&self, profile: &TurnProfile) -> MarkShape {
         // Orders are carried out before anything is flown.
         let v_m_s = self.after.segment(self.world, self.id).model.v_m_s;
         let mut pose: Pose2 = self.before.airplanes[self.id as usize].pose();
         let mut points = vec![pose.at];
         for &omega in &profile.omegas_rad_s {
-            pose =
-                self.world.air().after_wind_step(pose.step(v_m_s, omega, self.world.timing.dtau_s));
+            pose = self.world.flight_environment().after_wind_step(pose.step(
+                v_m_s,
+                omega,
+                self.world.timing.dtau_s,
+            ));
             points.push(pose.at);
         }
-        self.line(&points)
+        self.path_mark(&points)
     }
 
     /// Adds the messages of its group; an airplane that is alone in one has sent none.
-    pub(super) fn add_messages(&self, inspection: &mut Inspection) {
+    pub(super) fn add_messages_section(&self, inspection: &mut Inspection) {
         if self.trace.group.len() < 2 {
             return;
         }
         let mut table =
             FactTable::new(["about", "messages", "bytes", "as multicasts", "bytes then"]);
         if self.trace.beacons != NetworkTraffic::default() {
-            table.push_row(traffic_row("the group", self.trace.beacons));
+            table.push_row(network_traffic_row("the group", self.trace.beacons));
         }
-        table.push_row(traffic_row("actions", self.trace.optimization));
-        table.push_row(traffic_row("the shield", self.trace.exchange));
+        table.push_row(network_traffic_row("actions", self.trace.optimization));
+        table.push_row(network_traffic_row("the shield", self.trace.exchange));
         let deployment = self.world.deployment.name();
         inspection.add_section(
             FactSection::new("Talk of the group").fact("deployment", deployment).table(table),
@@ -176,13 +179,14 @@ impl Inspector<'_> {
         let turn = profile.as_ref().and_then(|profile| profile.omegas_rad_s.first().copied());
         let [x_m, y_m] = current.pose().at;
         let next: Option<Vec3> =
-            current.is_flying().then_some([x_m, y_m, current.altitude_m.get()]);
-        let heading = current.is_flying().then(|| FactValue::degrees(current.pose().heading_rad));
+            current.is_unfinished().then_some([x_m, y_m, current.altitude_m.get()]);
+        let heading =
+            current.is_unfinished().then(|| FactValue::degrees(current.pose().heading_rad));
         let mut table = FactTable::new(["event", "with", "value"]);
         for event in &self.trace.events {
             let with = event.other_airplane().map(airplane);
             let value =
-                event.kind.value_quantity().map(|m| FactValue::number(event.value, m.unit()));
+                event.kind.measured_quantity().map(|m| FactValue::number(event.value, m.unit()));
             table.push_row([event.kind.name().into(), with.into(), value.into()]);
         }
         inspection.add_section(
@@ -197,12 +201,12 @@ impl Inspector<'_> {
                 .table(table),
         );
         if let Some(profile) = profile {
-            inspection.add_mark(MarkRole::Done, "what it flies", self.profile_line(profile));
+            inspection.add_mark(MarkRole::Done, "what it flies", self.profile_mark(profile));
         }
     }
 }
 
-fn traffic_row(about: &str, traffic: NetworkTraffic) -> [FactValue; 5] {
+fn network_traffic_row(about: &str, traffic: NetworkTraffic) -> [FactValue; 5] {
     [
         about.into(),
         FactValue::number(traffic.messages as f64, ""),
@@ -212,7 +216,7 @@ fn traffic_row(about: &str, traffic: NetworkTraffic) -> [FactValue; 5] {
     ]
 }
 
-fn side(side: OrbitSide) -> &'static str {
+fn side_text(side: OrbitSide) -> &'static str {
     match side {
         OrbitSide::Left => "to the left",
         OrbitSide::Right => "to the right",

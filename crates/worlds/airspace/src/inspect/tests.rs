@@ -56,7 +56,9 @@ fn probabilities_of_the_actions_sum_to_1_and_the_chosen_one_is_flown_unless_the_
                     let at = run.state().airplanes[id].pose().at;
                     // Chosen ways are drawn from where the airplane is, in steps of some seconds.
                     let gap_m = nearest_m(points_m, at);
-                    if inspection.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
+                    if inspection.fact_value("Shield", "lets it fly")
+                        == Some(&"what it wants".into())
+                    {
                         assert!(
                             gap_m < 1e-3,
                             "{deployment}, {preset}: {gap_m} m from the chosen way"
@@ -100,13 +102,13 @@ fn who_is_kept_from_its_action_is_shown_because_of_whom() {
                 1,
                 "its stored orbit is drawn"
             );
-            if inspection.value("Shield", "lets it fly") == Some(&"what it wants".into()) {
-                assert_eq!(inspection.value("Shield", "because of"), Some(&FactValue::None));
+            if inspection.fact_value("Shield", "lets it fly") == Some(&"what it wants".into()) {
+                assert_eq!(inspection.fact_value("Shield", "because of"), Some(&FactValue::None));
                 continue;
             }
             kept += 1;
             let Some(FactValue::Body(BodyId { kind, number: other, part: None })) =
-                inspection.value("Shield", "because of")
+                inspection.fact_value("Shield", "because of")
             else {
                 panic!("nobody is the reason: {inspection:?}")
             };

@@ -1,8 +1,8 @@
 //! The knowledge with which an airplane goes into a conversation: its perceptions, and the filed flights.
 
 use super::percept::{OwnshipState, Percept, SurveillanceReport};
-use crate::agents::exchange::{ExchangeSetup, ObservedAircraft};
-use crate::agents::traffic_state::{OrbitState, StateBeacon, TrafficPicture, TrafficState};
+use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
+use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
 use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
@@ -18,13 +18,13 @@ pub(super) fn common_knowledge(
     percept: &Percept,
     not_heard: &[SurveillanceReport],
 ) -> Arc<CommonKnowledge> {
-    let straight = not_heard.iter().map(|one| unheard_aircraft(world, one));
+    let straight = not_heard.iter().map(|one| unheard_as_non_cooperative(world, one));
     Arc::new(CommonKnowledge {
         now: percept.cycle,
         ids: percept.members().into(),
         filed: percept.group.iter().map(|one| filed_flight(world, one.id)).collect(),
         poses: percept.group.iter().map(|one| one.pose).collect(),
-        air: world.air(),
+        air: world.flight_environment(),
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
@@ -41,7 +41,7 @@ pub(super) fn ownship(
     contacts: &TrafficPicture,
 ) -> Ownship {
     let common = common_knowledge(world, percept, unheard);
-    let known = percept.own.known_aircraft();
+    let known = percept.own.as_known_aircraft();
     let beacon = beacon(world, known);
     let mission = world.segment(known.slot, known.orders).mission;
     let me = percept.own_place();
@@ -64,7 +64,7 @@ pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
     FiledFlight {
         model: world.airplanes[id as usize].model.clone(),
         actions: world.actions(id).to_vec(),
-        contact: presumed_state(world, id),
+        contact: state_from_flight_plan(world, id),
         max_speed_m_s: world.top_m_s[id as usize],
         max_way_points,
         orders,
@@ -86,16 +86,16 @@ fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
 }
 
 /// Returns the knowledge that all have of a flight before they have heard it: its filed plan.
-fn presumed_state(world: &AirspaceWorld, id: EntityId) -> TrafficState {
+fn state_from_flight_plan(world: &AirspaceWorld, id: EntityId) -> LastKnownState {
     let i = id as usize;
-    let heard_in = world.first_cycle(i);
+    let heard_in = world.appearance_cycle(i);
     let pose = world.airplanes[i].start;
     let orbiting = OrbitState { pose, as_of: heard_in, side: world.first_fallbacks[i] };
     let altitude_m = world.airplanes[i].altitude_m;
     let known = KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m };
-    TrafficState {
+    LastKnownState {
         presumed: Some(orbiting),
-        ..TrafficState::from_beacon(beacon(world, known), heard_in)
+        ..LastKnownState::from_beacon(beacon(world, known), heard_in)
     }
 }
 
@@ -109,11 +109,11 @@ pub(super) fn plan_certainty(world: &AirspaceWorld) -> PlanCertainty {
 
 /// Returns the setup of the shield's exchange, as an airplane sees it: its group, and those nearby that are
 /// `unheard`.
-pub(super) fn exchange_setup(
+pub(super) fn shield_exchange_setup(
     world: &AirspaceWorld,
     percept: &Percept,
     unheard: &[SurveillanceReport],
-) -> ExchangeSetup {
+) -> ShieldExchangeSetup {
     let present = percept.group.iter().map(|one| (one, true));
     let mut all: Vec<_> = present.chain(unheard.iter().map(|one| (one, false))).collect();
     all.sort_unstable_by_key(|(one, _)| one.id);
@@ -123,7 +123,7 @@ pub(super) fn exchange_setup(
             aircraft: if one.id == percept.own.id {
                 percept.own.shielded_aircraft(world)
             } else {
-                other_aircraft(world, &percept.own, one)
+                shielded_from_report(world, &percept.own, one)
             },
             is_on_orbit: one.orbit.is_some(),
             takes_part,
@@ -132,8 +132,8 @@ pub(super) fn exchange_setup(
             max_profiles: world.actions(one.id).len() + 1,
         });
     }
-    ExchangeSetup {
-        air: world.air(),
+    ShieldExchangeSetup {
+        air: world.flight_environment(),
         vertical_m: world.vertical_m,
         now: percept.cycle,
         certainty: plan_certainty(world),
@@ -144,7 +144,7 @@ pub(super) fn exchange_setup(
 
 /// Returns another airplane as the shield knows it from its visible state and its filed flight: where messages get
 /// lost, no order changes its speed or its level.
-fn other_aircraft(
+fn shielded_from_report(
     world: &AirspaceWorld,
     own: &OwnshipState,
     one: &SurveillanceReport,
@@ -172,7 +172,7 @@ fn other_aircraft(
 }
 
 /// Returns an airplane that was not heard as one that flies straight on, for methods that need no more than that.
-pub(super) fn unheard_aircraft(
+pub(super) fn unheard_as_non_cooperative(
     world: &AirspaceWorld,
     one: &SurveillanceReport,
 ) -> NonCooperativeAircraft {

@@ -12,7 +12,7 @@ use sidestep_kernel::{Cycle, EntityId};
 
 /// The motion of an airplane in a cycle, and everything else that its run keeps of the decision: one message.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Control {
+pub struct AirplaneControl {
     /// Id of the airplane that flies.
     pub id: EntityId,
     /// The cycle in which it flies so.
@@ -20,7 +20,7 @@ pub struct Control {
     /// What it flies in the cycle.
     pub maneuver: Maneuver,
     /// Outcome of the optimization; none where there was nothing to optimize.
-    pub optimized: Option<OptimizerStats>,
+    pub optimized: Option<OptimizationStatus>,
     /// Packets of the conversation that finds the group; none where groups are announced.
     pub grouping: NetworkTraffic,
     /// Packets of the conversation in which candidates are chosen.
@@ -51,7 +51,7 @@ pub enum Maneuver {
 
 /// Outcome of an optimization for an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct OptimizerStats {
+pub struct OptimizationStatus {
     /// Whether a decision has reached it.
     pub is_decided: bool,
     /// Number of rounds; 0 if no decision has reached it.
@@ -87,7 +87,7 @@ impl Maneuver {
     }
 
     /// Returns the maneuver as a decision of the shield; `fallback` is the side of the stored orbit.
-    pub(crate) fn shield_decision(&self, fallback: OrbitSide) -> ShieldDecision {
+    pub(crate) fn to_shield_decision(&self, fallback: OrbitSide) -> ShieldDecision {
         match *self {
             Self::Profile { candidate, side, .. } => {
                 ShieldDecision { candidate: Some(candidate as usize), fallback: side }
@@ -97,7 +97,7 @@ impl Maneuver {
     }
 }
 
-impl OptimizerStats {
+impl OptimizationStatus {
     /// Returns the outcome with a decision, or without one.
     pub(crate) fn from_choice(decided: Option<&ActionChoice>) -> Self {
         match decided {
@@ -109,7 +109,7 @@ impl OptimizerStats {
     }
 }
 
-impl Control {
+impl AirplaneControl {
     /// Returns a control by which an airplane stays on its orbit: what it flies unless something else is decided.
     pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: PilotMemory) -> Self {
         Self {

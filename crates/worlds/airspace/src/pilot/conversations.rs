@@ -1,16 +1,16 @@
 //! The conversations of a cycle: the participants of them, by deployment and method, and their outcomes.
 
-use super::common_knowledge::{exchange_setup, filed_flight, ownship, plan_certainty};
+use super::common_knowledge::{filed_flight, ownship, plan_certainty, shield_exchange_setup};
 use super::percept::Percept;
 use crate::agents::coordinator::CoordinatorHostParticipant;
-use crate::agents::exchange::{self, ExchangeResult};
+use crate::agents::exchange::{self, ShieldExchangeResult};
 use crate::agents::grouping::{self, GroupingResult, SurveillanceReport};
 use crate::agents::intent::{self, Intent};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{
     ConversationEnd, ConversationProgress, EndpointConfig, InvalidMessage, OptimizationResult,
-    OptimizingAgent, OutgoingMessage, Participant, ProtocolAgent, ReliableEndpoint, WithOutcome,
-    informed, sampling,
+    OptimizingAgent, OutgoingMessage, Participant, ParticipantWithOutcome, ProtocolAgent,
+    ReliableEndpoint, prediction_sharing, sampling,
 };
 use crate::baseline::mvp::ActiveResolutions;
 use crate::settings::Deployment;
@@ -29,7 +29,7 @@ pub(super) enum ConversationOutcome {
     /// The intentions of the group by place; `None` for one that was not heard.
     Intents(Vec<Option<Intent>>),
     /// The result of the shield's exchange.
-    Exchange(ExchangeResult),
+    Exchange(ShieldExchangeResult),
 }
 
 impl From<GroupingResult> for ConversationOutcome {
@@ -50,14 +50,14 @@ impl From<Vec<Option<Intent>>> for ConversationOutcome {
     }
 }
 
-impl From<ExchangeResult> for ConversationOutcome {
-    fn from(agreed: ExchangeResult) -> Self {
+impl From<ShieldExchangeResult> for ConversationOutcome {
+    fn from(agreed: ShieldExchangeResult) -> Self {
         Self::Exchange(agreed)
     }
 }
 
 /// A participant of any kind, so that a pilot can hold the present one.
-pub(super) type DynParticipant = dyn WithOutcome<Outcome = ConversationOutcome>;
+pub(super) type DynParticipant = dyn ParticipantWithOutcome<Outcome = ConversationOutcome>;
 
 /// A wrapper that turns the outcome of any participant into [`ConversationOutcome`].
 struct ErasedParticipant<P>(P);
@@ -101,7 +101,9 @@ impl<P: Participant> Participant for ErasedParticipant<P> {
     }
 }
 
-impl<P: WithOutcome<Outcome: Into<ConversationOutcome>>> WithOutcome for ErasedParticipant<P> {
+impl<P: ParticipantWithOutcome<Outcome: Into<ConversationOutcome>>> ParticipantWithOutcome
+    for ErasedParticipant<P>
+{
     type Outcome = ConversationOutcome;
 
     fn finish(&mut self) -> ConversationEnd<ConversationOutcome> {
@@ -121,7 +123,7 @@ pub(super) struct PilotKnowledge<'a> {
     pub(super) contacts: &'a TrafficPicture,
 }
 
-fn endpoint<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
+fn endpoint_participant<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
 where
     A: ProtocolAgent<Outcome: Into<ConversationOutcome>> + Send + 'static,
 {
@@ -145,7 +147,7 @@ pub(super) fn grouping_participant(
         range_m: network.map_or(f64::INFINITY, |network| network.range_m),
         certainty: plan_certainty(world),
     };
-    endpoint(grouping::GroupingAgent::new(start), config)
+    endpoint_participant(grouping::GroupingAgent::new(start), config)
 }
 
 /// Returns whether each one of a group was heard lately, or is met for the first time.
@@ -171,13 +173,16 @@ pub(super) fn optimization_participant(
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
             Box::new(ErasedParticipant(CoordinatorHostParticipant::new(own, is_hierarchy, config)))
         }
-        (Deployment::Team, Estimator::Sampled { block, ageing }) => {
-            endpoint(OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)), config)
-        }
+        (Deployment::Team, Estimator::Sampled { block, ageing }) => endpoint_participant(
+            OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)),
+            config,
+        ),
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint(
-                OptimizingAgent::new(informed::PredictionSharingAgent::new(own, by_model)),
+            endpoint_participant(
+                OptimizingAgent::new(prediction_sharing::PredictionSharingAgent::new(
+                    own, by_model,
+                )),
                 config,
             )
         }
@@ -205,16 +210,19 @@ pub(super) fn intent_participant(
         airplanes: world.airplanes.len(),
         expected: expected_members(percept, contacts),
     };
-    endpoint(intent::IntentAgent::new(start), config)
+    endpoint_participant(intent::IntentExchangeAgent::new(start), config)
 }
 
 /// Returns the participant of the shield's exchange for an airplane that may fly some profiles.
-pub(super) fn exchange_participant(
+pub(super) fn shield_exchange_participant(
     knowledge: PilotKnowledge<'_>,
     profiles: &[TurnProfile],
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
     let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
-    let scene = Arc::new(exchange_setup(world, percept, unheard));
-    endpoint(exchange::ExchangeAgent::new(scene, config.me, profiles, contacts.clone()), config)
+    let scene = Arc::new(shield_exchange_setup(world, percept, unheard));
+    endpoint_participant(
+        exchange::ShieldExchangeAgent::new(scene, config.me, profiles, contacts.clone()),
+        config,
+    )
 }

@@ -8,7 +8,7 @@
 //!
 //! A [`Pilot`] knows the filed flights (the world), perceives a [`Percept`], finds its group where that is not
 //! announced, agrees with the others of its group first on what each prefers to fly and then on whether that is safe,
-//! and ends with a [`Control`]. It is a state machine without a clock, a socket or a thread. The simulator runs
+//! and ends with a [`AirplaneControl`]. It is a state machine without a clock, a socket or a thread. The simulator runs
 //! a group of them over a network in memory (`deploy/`); a process on a network runs one.
 //!
 //! No process sees when all are done, so each ends by its own outcome or its deadline, and continues to answer the
@@ -34,7 +34,7 @@ mod schedule;
 mod tests;
 
 pub use crate::agents::packet::{ConversationId, Protocol};
-pub use control::{Control, Maneuver, OptimizerStats, PilotMemory};
+pub use control::{AirplaneControl, Maneuver, OptimizationStatus, PilotMemory};
 pub use percept::{OwnshipState, Percept, SurveillanceReport};
 pub use program::Pilot;
 pub(crate) use schedule::ConversationSchedule;

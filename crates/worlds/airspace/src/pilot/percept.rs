@@ -3,7 +3,7 @@
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
-use crate::flight::{FlightLevelRange, FlightSegment, KnownAircraft, Pose2, distance_m};
+use crate::flight::{FlightLevelRange, InterOrderSegment, KnownAircraft, Pose2, distance_m};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{OrbitSide, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
@@ -64,7 +64,7 @@ pub struct OwnshipState {
 
 impl OwnshipState {
     /// Returns the state that its group knows once it has sent it.
-    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
+    pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
         let &Self { id, seen, next, orders, altitude_m, .. } = self;
         KnownAircraft { slot: id, pose: seen, next: next as usize, orders, altitude_m }
     }
@@ -92,7 +92,7 @@ impl OwnshipState {
     /// Returns its rank. It is higher the nearer its goal is, so that it is soon gone, and the more
     /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
     /// lower half makes it unique.
-    fn priority_rank(&self, dt_s: f64, segment: &FlightSegment<'_>) -> u64 {
+    fn priority_rank(&self, dt_s: f64, segment: &InterOrderSegment<'_>) -> u64 {
         // A percept that came off a network may count more way-points than there are.
         let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
         // Along the whole route, from where its own instruments see it: others are sent its rank, and do not compute

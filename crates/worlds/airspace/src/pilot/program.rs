@@ -3,10 +3,10 @@
 mod conclude;
 mod cycle_state;
 
-use super::control::{Control, Maneuver, PilotMemory};
+use super::control::{AirplaneControl, Maneuver, PilotMemory};
 use super::conversations::{
-    DynParticipant, PilotKnowledge, exchange_participant, grouping_participant, intent_participant,
-    optimization_participant,
+    DynParticipant, PilotKnowledge, grouping_participant, intent_participant,
+    optimization_participant, shield_exchange_participant,
 };
 use super::early_packets::EarlyPackets;
 use super::percept::Percept;
@@ -15,17 +15,17 @@ use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::packet::{ConversationId, Protocol};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{
-    Conversation, ConversationInfo, ConversationProgress, EndpointConfig, Participant,
+    Conversation, ConversationProgress, ConversationSetup, EndpointConfig, Participant,
 };
 use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
 use crate::settings::Grouping;
 use crate::world::AirspaceWorld;
-use cycle_state::{ConversationTiming, PilotCyclePhase, PilotCycleState};
+use cycle_state::{PilotCyclePhase, PilotCycleState, RelativeConversationTiming};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
-    DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest, parse_packet,
+    DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest_pieces, parse_packet,
 };
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -79,8 +79,8 @@ impl Pilot {
 
     /// Returns the same pilot, which talks only with those of the same build.
     #[must_use]
-    pub fn with_build(self, build: &str) -> Self {
-        let fingerprint = digest([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
+    pub fn with_build_id(self, build: &str) -> Self {
+        let fingerprint = digest_pieces([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
     }
 
@@ -89,7 +89,7 @@ impl Pilot {
     /// # Panics
     /// When the percept is that of another airplane, or one that [`Percept::check`] refuses.
     pub fn start(&mut self, percept: Percept, tick: u64) {
-        let schedule = ConversationSchedule::from_tick(tick, self.world.network.as_ref());
+        let schedule = ConversationSchedule::from_start_tick(tick, self.world.network.as_ref());
         self.start_with_schedule(percept, schedule);
     }
 
@@ -112,7 +112,8 @@ impl Pilot {
         {
             self.keep_ended(conversation);
         }
-        let control = Control::stay_on_orbit(self.id, percept.cycle, PilotMemory::default());
+        let control =
+            AirplaneControl::stay_on_orbit(self.id, percept.cycle, PilotMemory::default());
         self.state = Some(PilotCycleState {
             members: percept.members().into(),
             unheard: Vec::new(),
@@ -135,7 +136,7 @@ impl Pilot {
     }
 
     /// Returns its control in the present cycle, once that is decided.
-    pub fn control(&self) -> Option<Control> {
+    pub fn control(&self) -> Option<AirplaneControl> {
         let state =
             self.state.as_ref().filter(|state| matches!(state.phase, PilotCyclePhase::Over))?;
         let mut control = state.control.clone();
@@ -148,7 +149,7 @@ impl Pilot {
                 Protocol::Decision => &mut control.deciding,
                 Protocol::Shield => &mut control.shielding,
             };
-            *traffic = NetworkTraffic { ticks: traffic.ticks, ..conversation.traffic() };
+            *traffic = NetworkTraffic { ticks: traffic.ticks, ..conversation.network_traffic() };
         }
         Some(control)
     }
@@ -173,7 +174,7 @@ impl Pilot {
     }
 
     /// Returns its control in the present cycle, and what it has considered; `None` before that is decided.
-    pub(crate) fn into_outcome(mut self) -> Option<(Control, ManeuverCandidates)> {
+    pub(crate) fn into_outcome(mut self) -> Option<(AirplaneControl, ManeuverCandidates)> {
         let control = self.control()?;
         Some((control, self.state.take()?.candidates))
     }
@@ -182,13 +183,13 @@ impl Pilot {
     ///
     /// # Panics
     /// When it has not begun a cycle.
-    pub(crate) fn into_fallback(mut self) -> (Control, ManeuverCandidates) {
+    pub(crate) fn into_fallback(mut self) -> (AirplaneControl, ManeuverCandidates) {
         let mut state = self.state.take().expect("it has begun a cycle");
         let is_over = matches!(state.phase, PilotCyclePhase::Over);
         let now = state.percept.cycle;
         state.record_traffic(0);
         let mut control =
-            Control { maneuver: Maneuver::Orbit, memory: self.memory, ..state.control };
+            AirplaneControl { maneuver: Maneuver::Orbit, memory: self.memory, ..state.control };
         if !is_over {
             control.events.push(Event::new(now, EventKind::Deadline, self.id));
         }
@@ -238,13 +239,13 @@ impl Pilot {
         {
             return conversation.receive(from, message, tick, out);
         }
-        match state.as_ref().map(|state| state.timing_of(&header.conversation)) {
-            None | Some(ConversationTiming::Later) => {
+        match state.as_ref().map(|state| state.conversation_timing(&header.conversation)) {
+            None | Some(RelativeConversationTiming::Later) => {
                 early.push(header.conversation, from, message)
             }
-            Some(ConversationTiming::OtherMembers) => Err(DropReason::OtherGroup),
-            Some(ConversationTiming::Past) => Err(DropReason::Stale),
-            Some(ConversationTiming::TooFarAhead) => Err(DropReason::NoRoom),
+            Some(RelativeConversationTiming::OtherMembers) => Err(DropReason::OtherGroup),
+            Some(RelativeConversationTiming::Past) => Err(DropReason::Stale),
+            Some(RelativeConversationTiming::TooFarAhead) => Err(DropReason::NoRoom),
         }
     }
 
@@ -280,9 +281,9 @@ impl Pilot {
     fn start_conversation(&mut self, topic: Protocol, tick: u64) {
         let Some(state) = &mut self.state else { return };
         let world = &*self.world;
-        let known = state.members_of(topic);
+        let known = state.topic_members(topic);
         let PilotCycleState { percept, schedule, members, unheard, candidates, .. } = state;
-        let (start_tick, end_tick) = schedule.conversation_ticks(topic, tick);
+        let (start_tick, end_tick) = schedule.conversation_tick_range(topic, tick);
         let id = match topic {
             // Its members are not known yet.
             Protocol::Group => ConversationId::new(percept.cycle, topic, &[]),
@@ -299,7 +300,7 @@ impl Pilot {
             ticks: end_tick.saturating_sub(start_tick),
             is_silent,
         };
-        let info = ConversationInfo {
+        let info = ConversationSetup {
             id,
             members: members.clone(),
             me: self.id,
@@ -315,7 +316,7 @@ impl Pilot {
                 let profiles: Vec<_> =
                     allowed.iter().map(|&k| candidates.profiles[k].clone()).collect();
                 let knowledge = PilotKnowledge { world, percept, unheard, contacts };
-                let participant = exchange_participant(knowledge, &profiles, config);
+                let participant = shield_exchange_participant(knowledge, &profiles, config);
                 PilotCyclePhase::Shielding(Conversation::new(info, participant), allowed)
             }
             Protocol::Group => PilotCyclePhase::Grouping(Conversation::new(

@@ -26,7 +26,7 @@ pub(crate) struct ConversationSchedule {
 impl ConversationSchedule {
     /// Returns the ticks of conversations that start in a tick: over a network that loses messages each has its time;
     /// over one that loses nothing the second follows on the first, and each takes as long as it takes.
-    pub(crate) fn from_tick(tick: u64, network: Option<&Network>) -> Self {
+    pub(crate) fn from_start_tick(tick: u64, network: Option<&Network>) -> Self {
         let Some(network) = network else {
             return Self {
                 begins: tick,
@@ -36,7 +36,7 @@ impl ConversationSchedule {
                 ends: u64::MAX,
             };
         };
-        let long = network.deadline_ticks();
+        let long = network.conversation_ticks();
         Self {
             begins: tick,
             // To find the group takes part of the time for decisions.
@@ -52,13 +52,13 @@ impl ConversationSchedule {
     pub(crate) fn for_cycle(cycle: Cycle, network: Option<&Network>) -> Self {
         let Some(network) = network else {
             // So late that the network gets there only when nothing else is due, which is when all have decided.
-            return Self { shield_from: u64::MAX / 2, ..Self::from_tick(0, None) };
+            return Self { shield_from: u64::MAX / 2, ..Self::from_start_tick(0, None) };
         };
-        Self::from_tick(2 * cycle * (network.deadline_ticks() + 1), Some(network))
+        Self::from_start_tick(2 * cycle * (network.conversation_ticks() + 1), Some(network))
     }
 
     /// Returns the first and the last tick of a conversation that starts in `tick`.
-    pub(crate) fn conversation_ticks(&self, topic: Protocol, tick: u64) -> (u64, u64) {
+    pub(crate) fn conversation_tick_range(&self, topic: Protocol, tick: u64) -> (u64, u64) {
         match topic {
             Protocol::Group => (tick, self.grouped_by),
             Protocol::Decision => (tick, self.decided_by),
@@ -70,7 +70,7 @@ impl ConversationSchedule {
 /// Returns how agents that do not answer are asked again.
 pub(crate) fn retry_policy(network: Option<&Network>, topic: Protocol) -> RetryPolicy {
     network.map_or(NO_TIMEOUT, |network| match topic {
-        Protocol::Group | Protocol::Decision => network.short_retry_policy(),
+        Protocol::Group | Protocol::Decision => network.multi_step_retry_policy(),
         Protocol::Shield => network.retry_policy(),
     })
 }

@@ -5,7 +5,7 @@ mod hostile;
 mod order;
 
 use super::*;
-use crate::deploy::run_pilots;
+use crate::deploy::run_pilot_conversations;
 use crate::world::AirspaceWorld;
 use crate::{AirspaceRun, RemotePilotRun, airspace_run};
 use sidestep_kernel::network::{Network, NetworkAgent, OutgoingPacket};
@@ -45,7 +45,7 @@ impl TestPilots {
     }
 
     /// Lets the pilots that perceive something decide, over the network of the scenario.
-    fn decide(&mut self, run: &AirspaceRun) -> Vec<Control> {
+    fn decide(&mut self, run: &AirspaceRun) -> Vec<AirplaneControl> {
         let network: Option<&Network> = self.world.network.as_ref();
         let (now, schedule) = (run.cycle(), ConversationSchedule::for_cycle(run.cycle(), network));
         // As they come off a network.
@@ -56,7 +56,7 @@ impl TestPilots {
         for (pilot, percept) in due.iter_mut().zip(percepts) {
             pilot.start_with_schedule(percept, schedule);
         }
-        run_pilots(&self.world, run.state(), (now, schedule), &mut due);
+        run_pilot_conversations(&self.world, run.state(), (now, schedule), &mut due);
         let controls = due.iter().map(|pilot| pilot.control().expect("all end")).collect();
         self.pilots = due.into_iter().chain(rest).collect();
         self.pilots.sort_unstable_by_key(Pilot::id);

@@ -1,10 +1,10 @@
 //! Compilation of a scenario's sections to an immutable world.
 
 use super::start_groups::largest_start_group;
-use super::{AirspaceFile, CompiledAirspace, Preset, ScenarioSource};
+use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
 use crate::flight::FlightLevelRange;
-use crate::flight::{Airplane, FlightTask};
-use crate::flight::{StepTiming, WaypointRule};
+use crate::flight::{AirplaneConfig, FlightTask};
+use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
 use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings};
@@ -44,7 +44,7 @@ const DEFAULT_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
-    recipe: &'a Arc<ScenarioSource>,
+    recipe: &'a Arc<ParsedScenario>,
     pub(super) source: &'a Source,
     pub(super) file: &'a AirspaceFile,
     seed: u64,
@@ -54,14 +54,14 @@ pub(super) struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     /// Returns the compiler of a scenario, with its own seed.
-    pub(super) fn new(recipe: &'a Arc<ScenarioSource>) -> Self {
-        let ScenarioSource { source, head, file, .. } = &**recipe;
+    pub(super) fn new(recipe: &'a Arc<ParsedScenario>) -> Self {
+        let ParsedScenario { source, head, file, .. } = &**recipe;
         Self { recipe, source, file, seed: head.seed, known: None }
     }
 
     /// Returns the compiler of a scenario with another seed than that of a known world.
     pub(super) fn with_seed(
-        recipe: &'a Arc<ScenarioSource>,
+        recipe: &'a Arc<ParsedScenario>,
         seed: u64,
         known: &'a AirspaceWorld,
     ) -> Self {
@@ -71,8 +71,8 @@ impl<'a> Compiler<'a> {
     pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
         let mut world = self.world()?;
         self.check_deployment(&world)?;
-        self.check_pair_steps(&world)?;
-        self.check_errors(&world)?;
+        self.check_action_limits(&world)?;
+        self.check_heading_noise(&world)?;
         let (fallbacks, too_close) = if world.shield {
             first_fallbacks_of(&world)
         } else {
@@ -93,7 +93,7 @@ impl<'a> Compiler<'a> {
             too_close,
             recipe: Arc::clone(self.recipe),
         };
-        self.check_memory(&compiled)?;
+        self.check_group_memory(&compiled)?;
         Ok(compiled)
     }
 
@@ -122,7 +122,7 @@ impl<'a> Compiler<'a> {
         let method = self.method()?;
         let streams = Streams::new(Seed(self.seed));
         let timing = self.timing()?;
-        let replay = self.replay(&timing);
+        let replay = self.replay_period(&timing);
         let airplanes = self.airplanes(&streams, replay)?;
         let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDING_M;
         let world = AirspaceWorld {
@@ -134,7 +134,7 @@ impl<'a> Compiler<'a> {
             objective: self.objective(vertical_m, timing.dtau_s),
             settings: self.settings()?,
             holds_s: section.holds_s.0.clone(),
-            legs: self.legs()?,
+            legs: self.detour_legs()?,
             method,
             mvp: section.mvp.or_default(MVP),
             orca: section.orca.or_default(ORCA),
@@ -162,7 +162,7 @@ impl<'a> Compiler<'a> {
         world.teams = match self.known {
             // Teams follow from models alone, which no seed draws.
             Some(known) => Arc::clone(&known.teams),
-            None => Arc::new(world.find_teams()),
+            None => Arc::new(world.teams_by_actions()),
         };
         Ok(world)
     }
@@ -179,7 +179,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
-    fn waypoint_rule(&self, airplanes: &[Airplane]) -> WaypointRule {
+    fn waypoint_rule(&self, airplanes: &[AirplaneConfig]) -> WaypointRule {
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let given = self.file.airspace.tolerance_m;
         // The 100 m that go with the paper's separation of 500 m.
@@ -203,7 +203,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Refuses errors of heading against which an airplane could not hold an orbit.
-    fn check_errors(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_heading_noise(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let gust_rad = world.bounds.heading_rad;
         if !world.shield || gust_rad == 0.0 {
             return Ok(());
@@ -231,10 +231,11 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the wind, if every airplane can fly against it.
-    fn wind_m_s(&self, airplanes: &[Airplane]) -> Result<[f64; 2], InputError> {
+    fn wind_m_s(&self, airplanes: &[AirplaneConfig]) -> Result<[f64; 2], InputError> {
         let given = self.file.airspace.wind_m_s.as_ref();
         let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
-        let min_speed_m_s = airplanes.iter().flat_map(speeds_m_s).fold(f64::INFINITY, f64::min);
+        let min_speed_m_s =
+            airplanes.iter().flat_map(planned_speeds_m_s).fold(f64::INFINITY, f64::min);
         let wind_speed_m_s = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
         if wind_speed_m_s < min_speed_m_s {
             return Ok(wind_m_s);
@@ -272,7 +273,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Refuses groups that need more memory at the start than allowed.
-    fn check_memory(&self, compiled: &CompiledAirspace) -> Result<(), InputError> {
+    fn check_group_memory(&self, compiled: &CompiledAirspace) -> Result<(), InputError> {
         let world = &compiled.world;
         if !matches!(world.method, MethodKind::Pc) {
             return Ok(());
@@ -298,7 +299,7 @@ impl<'a> Compiler<'a> {
         self.file.airspace.preset == Preset::Paper
     }
 
-    fn timing(&self) -> Result<StepTiming, InputError> {
+    fn timing(&self) -> Result<TimeDiscretization, InputError> {
         let section = &self.file.airspace;
         let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
@@ -316,7 +317,7 @@ impl<'a> Compiler<'a> {
                 format!("give up to {MAX_STEPS_PER_DT}: each is flown and watched by itself");
             return Err(self.source.error(span, cause, remedy));
         }
-        Ok(StepTiming { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
+        Ok(TimeDiscretization { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
     }
 
     /// Returns the number of points of a prediction, which reach as far as the scenario says.
@@ -349,7 +350,7 @@ impl<'a> Compiler<'a> {
 
     /// Refuses sets of actions that are too large for one pair of airplanes: a run checks after
     /// every pair whether it is to stop.
-    fn check_pair_steps(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_action_limits(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let actions = world.actions.iter().map(Vec::len).max().unwrap_or(0);
         let horizon = world.timing.horizon;
         if actions <= MAX_ACTIONS && actions * actions * horizon <= MAX_PAIR_STEPS {
@@ -380,7 +381,7 @@ fn cycle_limit(world: &AirspaceWorld) -> u64 {
 fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
     let airplane = &world.airplanes[i];
     let last_s = airplane.orders.last().map_or(0.0, |order| order.at_s);
-    last_s.max(world.cycle_start_s(world.first_cycle(i)))
+    last_s.max(world.cycle_start_s(world.appearance_cycle(i)))
 }
 
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
@@ -417,7 +418,7 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>
 }
 
 /// Returns the speed of an airplane's model and those of its orders.
-fn speeds_m_s(airplane: &Airplane) -> impl Iterator<Item = f64> {
+fn planned_speeds_m_s(airplane: &AirplaneConfig) -> impl Iterator<Item = f64> {
     let ordered = airplane.orders.iter().filter_map(|order| match order.task {
         FlightTask::Speed(v_m_s) => Some(v_m_s),
         _ => None,

@@ -1,7 +1,7 @@
 //! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
-use crate::flight::{Airplane, FlightTask, StepTiming};
+use crate::flight::{AirplaneConfig, FlightTask, TimeDiscretization};
 use crate::settings::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -11,7 +11,7 @@ use sidestep_scenario::network::{
     AgentNaming, SectionError, check_sides, check_unique, endless_s, time_window,
 };
 
-pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<AirplaneNaming>;
+pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<AirplaneIdRange>;
 
 /// A period in which an airplane's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
@@ -63,9 +63,9 @@ pub(super) struct UnidirectionalLinkSection {
 
 /// The airplanes of a scenario, so many, with ids from 0 on.
 #[derive(Debug)]
-pub(super) struct AirplaneNaming(usize);
+pub(super) struct AirplaneIdRange(usize);
 
-impl AirplaneNaming {
+impl AirplaneIdRange {
     /// Checks that airplanes exist.
     fn check(&self, ids: &[EntityId]) -> Result<(), SectionError> {
         match ids.iter().find(|&&id| id as usize >= self.0) {
@@ -78,7 +78,7 @@ impl AirplaneNaming {
     }
 }
 
-impl AgentNaming for AirplaneNaming {
+impl AgentNaming for AirplaneIdRange {
     type RadioOutage = RadioOutageSection;
     type Partition = PartitionSection;
     type UnidirectionalLink = UnidirectionalLinkSection;
@@ -117,8 +117,8 @@ impl Compiler<'_> {
     /// Returns the network, if the scenario has one.
     pub(super) fn network(
         &self,
-        timing: &StepTiming,
-        airplanes: &[Airplane],
+        timing: &TimeDiscretization,
+        airplanes: &[AirplaneConfig],
     ) -> Result<Option<Network>, InputError> {
         let Some(section) = &self.file.airspace.network else { return Ok(None) };
         let error =
@@ -140,7 +140,7 @@ impl Compiler<'_> {
                           [airspace.network], or set shield = \"off\"";
             return error(cause, remedy);
         }
-        let network = section.get_ref().network(timing.dt_s, &AirplaneNaming(airplanes.len()));
+        let network = section.get_ref().network(timing.dt_s, &AirplaneIdRange(airplanes.len()));
         network.map(Some).map_err(|SectionError { span, cause, remedy }| {
             self.source.error(span.unwrap_or_else(|| section.span()), cause, remedy)
         })

@@ -126,7 +126,7 @@ impl Compiler<'_> {
         let order = if is_paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
         Ok(OptimizerConfig {
             estimator,
-            update: self.update()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
+            update: self.update_rule()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: self.utility(estimator)?,
             cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.7 }, f64::from),
@@ -164,7 +164,7 @@ impl Compiler<'_> {
         Ok(*given.get_ref())
     }
 
-    fn update(&self) -> Result<Option<Update>, InputError> {
+    fn update_rule(&self) -> Result<Option<Update>, InputError> {
         let Some(given) = &self.file.airspace.update else { return Ok(None) };
         let (Update::NearestNewton { step } | Update::Brouwer { step }) = *given.get_ref();
         if step > 0.0 && step <= 1.0 {
@@ -174,7 +174,7 @@ impl Compiler<'_> {
         Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
     }
 
-    pub(super) fn legs(&self) -> Result<DetourLegs, InputError> {
+    pub(super) fn detour_legs(&self) -> Result<DetourLegs, InputError> {
         let Some(given) = &self.file.airspace.legs else {
             return Ok(if self.is_paper_preset() {
                 DetourLegs::default()

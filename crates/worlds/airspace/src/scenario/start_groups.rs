@@ -1,13 +1,13 @@
 //! The memory that the groups at the start of a run need.
 
-use crate::decide::max_group_bytes;
+use crate::decide::max_group_memory_bytes;
 use crate::flight::KnownAircraft;
 use crate::join::form_groups;
 use crate::perceive::known_aircraft;
 use crate::scratch::{PhaseContext, Scratch};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::ports::ManualClock;
 
 /// Returns the size of the group that needs most memory at the start of a run, and its bytes.
@@ -19,7 +19,7 @@ pub(super) fn largest_start_group(world: &AirspaceWorld, state: &AirspaceState) 
     let groups = form_groups(context);
     let mut members = Vec::new();
     let leaders =
-        (0..n as Slot).filter(|&slot| groups.is_leader(slot) && !groups.is_singleton(slot));
+        (0..n as EntitySlot).filter(|&slot| groups.is_leader(slot) && !groups.is_singleton(slot));
     leaders
         .map(|leader| {
             groups.members(leader, &mut members);
@@ -28,7 +28,7 @@ pub(super) fn largest_start_group(world: &AirspaceWorld, state: &AirspaceState) 
                 .filter(|&&slot| !world.is_replayed(slot, 0))
                 .map(|&slot| known_aircraft(world, state, 0, slot))
                 .collect();
-            (known.len(), max_group_bytes(world, &known))
+            (known.len(), max_group_memory_bytes(world, &known))
         })
         .max_by_key(|(_, bytes)| *bytes)
         .unwrap_or_default()

@@ -74,7 +74,7 @@ impl ErrorBounds {
 /// of one rate the distance of two airplanes has a closed form, and those that fly side by side stay
 /// so; on orbits of other rates they sooner or later come to be wherever their circles come
 /// nearest. So airplanes share the rate of the slowest of them, which all can fly.
-pub(crate) fn common_rates(max_rates_rad_s: &[f64]) -> Vec<f64> {
+pub(crate) fn common_orbit_rates(max_rates_rad_s: &[f64]) -> Vec<f64> {
     let mut rising = max_rates_rad_s.to_vec();
     rising.sort_unstable_by(f64::total_cmp);
     let mut shared: Vec<f64> = Vec::new();
@@ -148,9 +148,9 @@ mod tests {
 
     #[test]
     fn airplanes_that_turn_alike_share_the_rate_of_the_slowest() {
-        let rates = common_rates(&[1.0, 70.0, 1.3, 10.0, 2.0, 9.9]);
+        let rates = common_orbit_rates(&[1.0, 70.0, 1.3, 10.0, 2.0, 9.9]);
         assert_eq!(rates, [1.0, 10.0, 1.0, 10.0, 1.0, 1.0]);
-        assert_eq!(common_rates(&[0.3; 4]), [0.3; 4]);
+        assert_eq!(common_orbit_rates(&[0.3; 4]), [0.3; 4]);
     }
 
     proptest! {

@@ -20,7 +20,7 @@ pub(crate) fn entry_fallbacks(
     let near = neighbors(group);
     let mut sides: Vec<OrbitSide> = group.iter().map(|aircraft| aircraft.fallback).collect();
     let count_conflicts = |sides: &[OrbitSide], i: usize, side: OrbitSide| {
-        near[i].iter().filter(|&&j| !are_apart(group, (i, side), (j, sides[j]))).count()
+        near[i].iter().filter(|&&j| !orbits_stay_apart(group, (i, side), (j, sides[j]))).count()
     };
     // An airplane with fewer conflicts on the other side changes over. Conflicts only decrease, so this
     // ends.
@@ -41,7 +41,7 @@ pub(crate) fn entry_fallbacks(
     let mut too_close = Vec::new();
     for (i, others) in near.iter().enumerate() {
         for &j in others.iter().filter(|&&j| i < j && (enters(i) || enters(j))) {
-            if !are_apart(group, (i, sides[i]), (j, sides[j])) {
+            if !orbits_stay_apart(group, (i, sides[i]), (j, sides[j])) {
                 too_close.push((i, j));
             }
         }
@@ -50,17 +50,17 @@ pub(crate) fn entry_fallbacks(
 }
 
 /// Returns whether the orbits of two airplanes of a group, each to a side, stay apart.
-fn are_apart(
+fn orbits_stay_apart(
     group: &[ShieldedAircraft],
     (i, side_i): (usize, OrbitSide),
     (j, side_j): (usize, OrbitSide),
 ) -> bool {
-    group[i].orbit(side_i).stays_apart(&group[j].orbit(side_j), group[i].gap_m(&group[j]))
+    group[i].orbit(side_i).stays_apart(&group[j].orbit(side_j), group[i].required_gap_m(&group[j]))
 }
 
 /// Returns the side on which an airplane that is about to fly as `changed` has an orbit apart from
 /// the stored fallbacks of others, if there is one; preferably the stored side.
-pub(crate) fn safe_side(
+pub(crate) fn safe_orbit_side(
     changed: &ShieldedAircraft,
     others: impl Iterator<Item = ShieldedAircraft>,
 ) -> Option<OrbitSide> {
@@ -69,7 +69,9 @@ pub(crate) fn safe_side(
     let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changed.fallback);
     [changed.fallback].into_iter().chain(other_sides).find(|&side| {
         let orbit = changed.orbit(side);
-        others.iter().all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.gap_m(other)))
+        others
+            .iter()
+            .all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.required_gap_m(other)))
     })
 }
 

@@ -59,8 +59,8 @@ mod shielded_aircraft;
 mod tests;
 
 pub use errors::ErrorBounds;
-pub(crate) use errors::{OrbitTracker, common_rates};
-pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_side};
+pub(crate) use errors::{OrbitTracker, common_orbit_rates};
+pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_orbit_side};
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;

@@ -94,7 +94,7 @@ impl Orbit {
     }
 
     /// Returns whether all of it is at least `gap_m` from a point, which is not inside of it.
-    pub(crate) fn is_outside(&self, point: Point, gap_m: f64) -> bool {
+    pub(crate) fn is_clear_of_point(&self, point: Point, gap_m: f64) -> bool {
         distance_m(self.center, point) >= self.radius_m + gap_m
     }
 

@@ -59,7 +59,7 @@ impl SafeManeuver {
     /// Returns the same plan with an orbit to a side.
     pub(super) fn with_side(&self, side: OrbitSide) -> Self {
         let omega_rad_s = side.sign() * self.aircraft.orbit_rad_s;
-        let orbit = Orbit::from_pose(self.end(), self.aircraft.v_m_s, omega_rad_s);
+        let orbit = Orbit::from_pose(self.end_pose(), self.aircraft.v_m_s, omega_rad_s);
         Self { orbit, side, ..self.clone() }
     }
 
@@ -88,7 +88,7 @@ impl SafeManeuver {
     }
 
     /// Returns the pose at the end of `dt`, where the orbit begins.
-    pub(crate) fn end(&self) -> Pose2 {
+    pub(crate) fn end_pose(&self) -> Pose2 {
         self.poses[self.poses.len() - 1]
     }
 
@@ -104,7 +104,7 @@ impl SafeManeuver {
         {
             return true;
         }
-        let gap_m = self.aircraft.gap_m(&other.aircraft);
+        let gap_m = self.aircraft.required_gap_m(&other.aircraft);
         interrupt::check();
         self.orbit.stays_apart(&other.orbit, gap_m) && self.profiles_stay_apart(other, gap_m)
     }
@@ -131,12 +131,12 @@ impl SafeManeuver {
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
         let (centers, radius_m) = other.reach_discs(dt_s);
-        let gap_m = radius_m + self.aircraft.gap_m(other);
+        let gap_m = radius_m + self.aircraft.required_gap_m(other);
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
         centers.iter().all(|&center| {
             self.poses.iter().all(|pose| distance_m(pose.at, center) >= gap_m + half_step_m)
-                && self.orbit.is_outside(center, gap_m)
+                && self.orbit.is_clear_of_point(center, gap_m)
         })
     }
 

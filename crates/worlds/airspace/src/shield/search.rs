@@ -36,7 +36,7 @@ pub fn filter_maneuvers(
 ) -> Vec<ShieldDecision> {
     let mut search = ShieldSearch::new(group, candidates, steps, dtau_s, certainty);
     search.resolve_conflicts();
-    search.retry_fallbacks();
+    search.replan_from_fallback();
     search
         .plans
         .iter()
@@ -102,7 +102,7 @@ impl<'a> ShieldSearch<'a> {
 
     fn resolve_conflicts(&mut self) {
         let mut pairs = self.incompatible_pairs();
-        while let Some(loser) = self.lowest_rank(&pairs) {
+        while let Some(loser) = self.lowest_ranked_to_yield(&pairs) {
             let other = self.alternative_plan(loser);
             let present = self.plans[loser].candidate;
             // Another side of its candidate costs nothing. Before it takes another candidate, which costs delay, it
@@ -115,12 +115,12 @@ impl<'a> ShieldSearch<'a> {
             }
             self.plans[loser] = other.unwrap_or_else(|| self.fallbacks[loser].clone());
             pairs.retain(|&(i, j)| i != loser && j != loser);
-            pairs.extend(self.incompatible_with(loser));
+            pairs.extend(self.incompatible_pairs_with(loser));
         }
     }
 
     /// Returns the airplane of lowest rank that has to give way in some pair.
-    fn lowest_rank(&self, pairs: &[(usize, usize)]) -> Option<usize> {
+    fn lowest_ranked_to_yield(&self, pairs: &[(usize, usize)]) -> Option<usize> {
         self.by_rank.iter().copied().find(|&i| self.has_to_give_way(i, pairs))
     }
 
@@ -176,7 +176,7 @@ impl<'a> ShieldSearch<'a> {
         all.filter(|&(i, j)| !self.is_compatible(i, &self.plans[i], j)).collect()
     }
 
-    fn incompatible_with(&self, i: usize) -> Vec<(usize, usize)> {
+    fn incompatible_pairs_with(&self, i: usize) -> Vec<(usize, usize)> {
         let others = (0..self.plans.len()).filter(|&j| j != i);
         others.filter(|&j| !self.is_compatible(i, &self.plans[i], j)).map(|j| (i, j)).collect()
     }
@@ -206,7 +206,7 @@ impl<'a> ShieldSearch<'a> {
     }
 
     /// Lets those that have fallen back try once more, by falling rank, as long as that helps any.
-    fn retry_fallbacks(&mut self) {
+    fn replan_from_fallback(&mut self) {
         let mut has_changed = true;
         while has_changed {
             has_changed = false;

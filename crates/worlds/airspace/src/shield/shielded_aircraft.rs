@@ -55,8 +55,10 @@ impl ShieldedAircraft {
     /// Returns whether two airplanes are on levels that do not meet, or have fallbacks that stay
     /// apart: the pair need no longer be exempt.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
-        !self.is_on_level(other)
-            || self.fallback_orbit().stays_apart(&other.fallback_orbit(), self.gap_m(other))
+        !self.is_on_same_level(other)
+            || self
+                .fallback_orbit()
+                .stays_apart(&other.fallback_orbit(), self.required_gap_m(other))
     }
 
     pub(super) fn fallback_orbit(&self) -> Orbit {
@@ -70,7 +72,7 @@ impl ShieldedAircraft {
 
     /// Returns the distance in meters that two airplanes have to keep on new plans, as they are
     /// seen.
-    pub(super) fn gap_m(&self, other: &Self) -> f64 {
+    pub(super) fn required_gap_m(&self, other: &Self) -> f64 {
         self.separation_m.max(other.separation_m) + self.error_m + other.error_m + MARGIN_M
     }
 
@@ -78,7 +80,7 @@ impl ShieldedAircraft {
     /// too near each other.
     pub(super) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
         let apart_m = distance_m(self.pose.at, other.pose.at);
-        apart_m < self.gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s)
+        apart_m < self.required_gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s)
     }
 
     /// Returns how far it can get from where it is in `dt_s` seconds and on an orbit after them, in meters.
@@ -106,13 +108,13 @@ impl ShieldedAircraft {
     }
 
     /// Returns whether two different airplanes are on levels that meet.
-    pub(super) fn is_on_level(&self, other: &Self) -> bool {
+    pub(super) fn is_on_same_level(&self, other: &Self) -> bool {
         let vertical_m = self.vertical_m.max(other.vertical_m);
         self.id != other.id && self.levels.overlaps(&other.levels, vertical_m)
     }
 
     /// Returns whether the shield keeps two airplanes apart.
     pub(crate) fn is_protected_from(&self, other: &Self) -> bool {
-        self.is_on_level(other) && !self.is_exempt_with(other)
+        self.is_on_same_level(other) && !self.is_exempt_with(other)
     }
 }

@@ -203,7 +203,7 @@ fn a_change_is_refused_when_neither_orbit_is_apart() {
     let quick_turns = 6f64.to_radians();
     let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..aircraft(1500.0, -100.0, 0.0, 0) };
     let slow = aircraft(0.0, 0.0, 0.0, 1);
-    let beside = |changed: &ShieldedAircraft| safe_side(changed, [other.clone()].into_iter());
+    let beside = |changed: &ShieldedAircraft| safe_orbit_side(changed, [other.clone()].into_iter());
     let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
     assert_eq!((beside(&slow), beside(&fast)), (Some(OrbitSide::Left), None));
     let above = ShieldedAircraft { levels: FlightLevelRange::from_level(1000.0), ..fast.clone() };

@@ -1,7 +1,7 @@
 //! Airplanes near each other.
 
 use crate::flight::Point;
-use sidestep_kernel::{AtomicColumn, Cycle, Slot};
+use sidestep_kernel::{AtomicColumn, Cycle, EntitySlot};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 const NO_SLOT: u32 = u32::MAX;
@@ -28,7 +28,7 @@ impl SpatialIndex {
         }
     }
 
-    fn square(&self, at: Point) -> [i64; 2] {
+    fn grid_square(&self, at: Point) -> [i64; 2] {
         at.map(|v| (v / self.side_m).floor() as i64)
     }
 
@@ -40,17 +40,17 @@ impl SpatialIndex {
     }
 
     /// Lists an airplane for this cycle.
-    pub(crate) fn insert(&self, slot: Slot, at: Point, now: Cycle) {
+    pub(crate) fn insert(&self, slot: EntitySlot, at: Point, now: Cycle) {
         let stamp = u64::from(now as u32) << 32;
-        let before = self.bucket(self.square(at)).swap(stamp | u64::from(slot), Relaxed);
+        let before = self.bucket(self.grid_square(at)).swap(stamp | u64::from(slot), Relaxed);
         let listed = before >> 32 == stamp >> 32;
         self.next.set(slot as usize, if listed { before as u32 } else { NO_SLOT });
     }
 
     /// Calls `meet` for every airplane listed in this cycle in the squares around `at`, and
     /// possibly for others.
-    pub(crate) fn for_each_near(&self, at: Point, now: Cycle, mut meet: impl FnMut(Slot)) {
-        let [x, y] = self.square(at);
+    pub(crate) fn for_each_near(&self, at: Point, now: Cycle, mut meet: impl FnMut(EntitySlot)) {
+        let [x, y] = self.grid_square(at);
         for square in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy])) {
             let first = self.bucket(square).load(Relaxed);
             let mut slot =

@@ -5,7 +5,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::external_action::ExternalAction;
 use crate::flight::Pose2;
-use crate::pilot::Control;
+use crate::pilot::AirplaneControl;
 use crate::shield::OrbitSide;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
@@ -14,7 +14,7 @@ use sidestep_kernel::{Cycle, Digest, EntityId};
 
 /// One airplane in a snapshot, as checkpoints have it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct AirplaneRecord {
+pub struct AirplaneSnapshot {
     /// Pose at the start of the cycle.
     pub pose: Pose2,
     /// See [`super::AirplaneState::end`].
@@ -58,7 +58,7 @@ pub struct Snapshot {
     /// Number of cycles done.
     pub cycle: Cycle,
     /// The airplanes by id.
-    pub airplanes: Vec<AirplaneRecord>,
+    pub airplanes: Vec<AirplaneSnapshot>,
     /// Each airplane's knowledge of others; empty where the network is reliable.
     pub contacts: Vec<TrafficPicture>,
     /// The conflicts that each airplane resolves; empty unless the method is MVP.
@@ -70,7 +70,7 @@ pub struct Snapshot {
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     pub external_actions: Vec<Option<ExternalAction>>,
     /// Controls of airplanes for the next cycle, if pilots outside of the run have submitted them.
-    pub controls: Option<Vec<Control>>,
+    pub controls: Option<Vec<AirplaneControl>>,
 }
 
 impl Snapshot {

@@ -1,13 +1,13 @@
 //! The settings of a BlueSky file that hold for all its aircraft: those that are flown, and those
 //! that cannot be.
 
-use super::{KNOT_M_S, moving_aircraft};
+use super::{KNOT_M_S, flyable_aircraft};
 use sidestep_import::bluesky::{ResolutionMethod, ScnAircraft, ScnFile, Traffic, Wind};
 use sidestep_kernel::{InputError, math};
 
 /// Settings of a scenario; `None` leaves the scenario's own.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct ImportSettings {
+pub(crate) struct ImportedScenarioSettings {
     pub(super) method: Option<&'static str>,
     /// Whether conflicts are left as they are, by the shield too.
     pub(super) is_bare: bool,
@@ -20,8 +20,8 @@ pub(crate) struct ImportSettings {
 }
 
 /// Returns the rules of a file, which is `place` in errors; a decision is made every `dt_s`.
-pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportSettings {
-    let mut rules = ImportSettings::default();
+pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportedScenarioSettings {
+    let mut rules = ImportedScenarioSettings::default();
     let mut refuse = |command: &str, cause: String, remedy: &str| {
         let error = InputError::new(place, format!("{command}: {cause}"), remedy);
         let line = file.last_lines.get(command).copied().unwrap_or(1);
@@ -52,7 +52,7 @@ pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportS
     if look_ahead_s.is_none() && method == Some("mvp") {
         look_ahead_s = Some(Traffic::default().lookahead_s);
     }
-    ImportSettings { method, is_bare, look_ahead_s, wind_m_s, ..rules }
+    ImportedScenarioSettings { method, is_bare, look_ahead_s, wind_m_s, ..rules }
 }
 
 /// Longest look-ahead of a scenario in seconds.
@@ -92,7 +92,7 @@ fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
 
 /// Returns the smallest speed of an aircraft once it moves.
 fn min_speed_m_s(aircraft: &ScnAircraft) -> f64 {
-    moving_aircraft(aircraft).map_or(f64::INFINITY, |one| one.min_speed_m_s())
+    flyable_aircraft(aircraft).map_or(f64::INFINITY, |one| one.min_speed_m_s())
 }
 
 #[cfg(test)]
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use sidestep_import::bluesky::parse;
 
-    fn found(commands: &str) -> (ImportSettings, Vec<String>) {
+    fn found(commands: &str) -> (ImportedScenarioSettings, Vec<String>) {
         let text: String = std::iter::once("CRE A1,B744,0,-0.4,90,FL200,250")
             .chain(commands.lines())
             .map(|line| format!("00:00:00.00>{line}\n"))
@@ -142,7 +142,7 @@ mod tests {
             let (rules, refused) = found(commands);
             let [one] = &refused[..] else { panic!("{commands}: {refused:?}") };
             assert!(one.contains(&format!("{name}: ")), "{one}");
-            assert_eq!(rules.refused[0].position(), Some((line, 1)), "{commands}");
+            assert_eq!(rules.refused[0].line_and_column(), Some((line, 1)), "{commands}");
             assert_eq!((rules.look_ahead_s, rules.wind_m_s), (None, None), "{commands}");
         }
     }

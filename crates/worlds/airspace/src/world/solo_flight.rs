@@ -1,8 +1,8 @@
 //! Solo flights: how long each airplane would fly if there were no other.
 
 use super::AirspaceWorld;
-use crate::flight::{Airplane, FlightSegment, Pose2};
-use sidestep_kernel::{Slot, interrupt};
+use crate::flight::{AirplaneConfig, InterOrderSegment, Pose2};
+use sidestep_kernel::{EntitySlot, interrupt};
 
 /// Seconds, or steps where these are longer, after which a flight counts as endless: no flight of a scenario is as
 /// long as 11 days.
@@ -14,8 +14,8 @@ const MAX_COMPUTED_STEPS: usize = 10_000_000;
 /// An airplane on its flight alone.
 struct SoloFlight<'a> {
     world: &'a AirspaceWorld,
-    airplane: &'a Airplane,
-    slot: Slot,
+    airplane: &'a AirplaneConfig,
+    slot: EntitySlot,
     /// The time at which the method takes it over, in seconds after the start of the run.
     joins_s: f64,
     pose: Pose2,
@@ -37,7 +37,8 @@ impl SoloFlight<'_> {
         let Self { world, slot, orders, next, .. } = *self;
         if self.steps.is_multiple_of(world.timing.points_per_dt()) {
             let now_s = self.joins_s + self.elapsed_s();
-            (self.orders, self.next) = world.after_orders(slot as usize, orders, next, now_s);
+            (self.orders, self.next) =
+                world.progress_after_orders(slot as usize, orders, next, now_s);
         }
     }
 
@@ -58,13 +59,13 @@ impl SoloFlight<'_> {
     /// Flies a step, and all those before it in which it certainly flies straight on, at once.
     fn step(&mut self) {
         let world = self.world;
-        let air = world.air();
-        let FlightSegment { model, mission, .. } = world.segment(self.slot, self.orders);
+        let air = world.flight_environment();
+        let InterOrderSegment { model, mission, .. } = world.segment(self.slot, self.orders);
         let pilot = air.autopilot(model, mission);
         let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
         if has_no_orders {
-            let straight = air.straight_steps(&pilot, self.pose, self.next);
+            let straight = air.straight_step_count(&pilot, self.pose, self.next);
             self.pose = air.after_straight_steps(self.pose, model.v_m_s, straight);
             self.steps = self.steps.saturating_add(straight);
         }
@@ -93,7 +94,7 @@ impl AirspaceWorld {
         let mut flight = SoloFlight {
             world: self,
             airplane,
-            slot: i as Slot,
+            slot: i as EntitySlot,
             joins_s,
             pose: airplane.track.as_ref().map_or(airplane.start, |track| track.pose_at(joins_s)),
             orders: 0,

@@ -16,7 +16,7 @@ proptest! {
              at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
         );
         let world = CompiledAirspace::new(&Source::new("w", text, "")).expect("a scenario").world;
-        let air = world.air();
+        let air = world.flight_environment();
         let pilot = air.autopilot(&world.airplanes[0].model, &world.airplanes[0].mission);
         let (mut pose, mut next, mut steps) = (world.airplanes[0].start, 0, 0);
         while next < goals.len() {

@@ -1,12 +1,12 @@
 //! Escapes from approaching obstacles, and the return of a chain to its claim.
 
-use super::joints::ArmFollower;
-use super::{ActState, ChainContext};
+use super::joints::ArmJointSolver;
+use super::{ChainContext, ChainCycleState};
 use crate::events::{Event, EventKind};
 use crate::motion::escape::{ObstacleEscapeInput, ObstacleEscaper};
 use crate::scratch::PositionBuffer;
 use crate::state::ChainBodyState;
-use sidestep_rods::geometry::{Aabb, distance, with_dimensions};
+use sidestep_rods::geometry::{Aabb, convert_dimensions, distance};
 use sidestep_rods::{Veto, VetoReason};
 
 /// Relative tolerance for motions at exactly the maximum speed.
@@ -27,10 +27,10 @@ impl<const D: usize> EscapeContext<'_, D> {
     pub(super) fn escape(
         &mut self,
         context: ChainContext<'_, D>,
-        acting: &mut ActState<'_, D>,
+        acting: &mut ChainCycleState<'_, D>,
     ) -> bool {
         let Some(escaper) = &mut self.escaper else { return false };
-        let ActState { body, before, propagator, sink, .. } = acting;
+        let ChainCycleState { body, before, propagator, sink, .. } = acting;
         let tick = ObstacleEscapeInput {
             chain: &mut body.chain,
             obstacles: context.obstacles,
@@ -40,11 +40,11 @@ impl<const D: usize> EscapeContext<'_, D> {
         let escaped = escaper.escape(tick, &mut body.escape_plan);
         // Beyond the range of coordinates there is no escape.
         let Ok(escaped) = escaped else { return false };
-        if let Some(mut arm) = ArmFollower::from_body(context, before, body) {
+        if let Some(mut arm) = ArmJointSolver::from_body(context, before, body) {
             arm.escape();
         }
         body.tally.escapes.add(&escaped);
-        sink.record_trace(|trace| trace.escapes = escaped.moves);
+        sink.record_inspection(|trace| trace.escapes = escaped.moves);
         self.escaped.record(body);
         move_leader_robot(context, body);
         // Only the first of several cycles of escape in a row is an event.
@@ -81,7 +81,7 @@ impl<const D: usize> EscapeContext<'_, D> {
         };
         let mut moves = body.chain.points().iter().zip(&before.points);
         let by = moves.position(|(p, was)| {
-            distance(*p, *was) > most_m || !self.claim.meets(&Aabb::from_points(&[*p]))
+            distance(*p, *was) > most_m || !self.claim.intersects(&Aabb::from_points(&[*p]))
         })?;
         self.escaped.restore(body);
         // After the last task connector 0 stands for the chain.
@@ -98,7 +98,7 @@ fn move_leader_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut Ch
     let agent = context.task(body).map(|task| task.agent);
     let Some(leader) = &mut body.driving.leader else { return };
     let Some(agent) = agent else { return };
-    let at = with_dimensions(body.chain.points()[agent]);
+    let at = convert_dimensions(body.chain.points()[agent]);
     match body.robots.get(agent) {
         None => leader.pose.at = at,
         Some(robot) if leader.pose.at != at => leader.pose = robot.pose,

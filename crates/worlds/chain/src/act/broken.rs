@@ -4,7 +4,7 @@
 use super::ChainContext;
 use super::event_sink::EventSink;
 use crate::events::{Event, EventKind};
-use crate::state::{ChainBodyState, ScatterState, flatten};
+use crate::state::{ChainBodyState, ScatteredPartState, flatten};
 use crate::world::{ChainChange, ChainChangeKind, MAX_THROW_SIGMAS, purpose};
 use sidestep_kernel::distr::normal;
 use sidestep_rods::Chain;
@@ -34,10 +34,10 @@ fn apply_change<const D: usize>(
     body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
 ) {
-    body.catch_up();
+    body.apply_deferred_motions();
     // Its path was planned for the chain as it was.
     body.plan = None;
-    change.apply_constraints(&mut body.chain);
+    change.apply_limits(&mut body.chain);
     match &change.what {
         ChainChangeKind::Failed { connector, .. }
         | ChainChangeKind::Mobility { connector, .. }
@@ -66,7 +66,7 @@ fn scatter<const D: usize>(
     connectors: &RangeInclusive<usize>,
     by_m: f64,
 ) {
-    let draws = &mut context.draws(purpose::SCATTER);
+    let draws = &mut context.random_draws(purpose::SCATTER);
     let chain = &mut body.chain;
     for k in connectors.clone() {
         if chain.connectors()[k].is_still() {
@@ -85,7 +85,7 @@ fn scatter<const D: usize>(
             }
         }
     }
-    body.scattered = Some(ScatterState {
+    body.scattered = Some(ScatteredPartState {
         first: *connectors.start() as u32,
         last: *connectors.end() as u32,
         speed_m_s: 0.0,
@@ -113,7 +113,7 @@ fn start_reform<const D: usize>(
             (EventKind::Reforming, double_passes as f64)
         }
         ReformResult::GapTooLong { have_m, need_m, missing } => {
-            return report_gap(body, sink, first, need_m - have_m, missing);
+            return report_missing_parts(body, sink, first, need_m - have_m, missing);
         }
         ReformResult::NotReached { off_m } => (EventKind::NotReformed, off_m),
     };
@@ -122,7 +122,7 @@ fn start_reform<const D: usize>(
 }
 
 /// Reports the length and the number of parts that are missing.
-fn report_gap<const D: usize>(
+fn report_missing_parts<const D: usize>(
     body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     first: usize,

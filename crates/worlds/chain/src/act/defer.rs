@@ -18,7 +18,7 @@ pub(super) fn may_defer<const D: usize>(
     let Some(task) = context.task(body) else { return false };
     // Nothing can veto, a motion is a single sub-step of connector 0, and nothing else needs the
     // others' places.
-    world.is_unobstructed()
+    world.is_collision_impossible()
         && world.reaction.is_none()
         && world.rules.step_m.is_none()
         && context.spec.robots.is_none()
@@ -26,11 +26,11 @@ pub(super) fn may_defer<const D: usize>(
         && body.chain.is_plain()
         && body.tally.steps > 0
         && !body.driving.ladder.is_pulling_back()
-        && leads_in_range(task, &body.chain, world.dt_s)
+        && is_task_deferrable(task, &body.chain, world.dt_s)
 }
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
-fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
+fn is_task_deferrable<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -> bool {
     // Twice the step of a cycle, which leaves room for rounding.
     let most_m = MAX_COORDINATE_M - 2.0 * task.speed_m_s * dt_s;
     task.agent == 0
@@ -39,7 +39,7 @@ fn leads_in_range<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f64) -
         && chain.points()[0].iter().all(|x| x.abs() < most_m)
 }
 
-/// Moves connector 0; the others follow when [`ChainBodyState::catch_up`] is called.
+/// Moves connector 0; the others follow when [`ChainBodyState::apply_deferred_motions`] is called.
 pub(super) fn move_initiator_only<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
@@ -47,13 +47,13 @@ pub(super) fn move_initiator_only<const D: usize>(
 ) -> RecoveryOutcome<D> {
     let world = initiator.context.world;
     let goal_m = goal_distance_m(initiator.task, body);
-    body.driving.ladder.record_free_motion(initiator.task.source(), goal_m, &world.rungs);
+    body.driving.ladder.record_free_motion(initiator.task.request_source(), goal_m, &world.rungs);
     let step_m = distance(body.chain.points()[0], to);
     if step_m > body.chain.min_move_m() {
         let dt_s = world.dt_s;
         body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(step_m / dt_s);
         if body.deferred.move_initiator(&mut body.chain, to, dt_s) {
-            body.catch_up();
+            body.apply_deferred_motions();
         }
     }
     // What the chain moves is counted when it follows.

@@ -2,13 +2,13 @@
 
 use super::bounds::EscapeContext;
 use super::joints::arrival_tolerance_m;
-use super::orders::step_from_orders;
+use super::orders::motion_from_orders;
 use super::own_driver::ask_own_driver;
 use super::plan::plan_if_stuck;
-use super::wheels::{NavigatorContext, WheelStep};
-use super::{ActState, FollowMode, Initiator};
+use super::wheels::{NavigatedChain, WheelStep};
+use super::{ChainCycleState, ChainFollowMode, Initiator};
 use crate::driver::external::Orders;
-use crate::driver::own_driver::Proposal;
+use crate::driver::own_driver::DriverAction;
 use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::events::EventKind;
@@ -16,7 +16,7 @@ use crate::script::ScriptMotion;
 use crate::state::ChainBodyState;
 use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
-use sidestep_rods::geometry::{Point, add_scaled, distance, move_toward, with_dimensions};
+use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, move_toward};
 
 /// The move that a driver wants in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,7 @@ pub(super) struct CycleInputs {
 #[derive(Clone, Copy)]
 pub(super) struct InitiatorContext<'a, const D: usize> {
     pub(super) inputs: CycleInputs,
-    pub(super) follows: FollowMode,
+    pub(super) follows: ChainFollowMode,
     pub(super) escaping: &'a EscapeContext<'a, D>,
     /// Whether it waits, because parts of the chain escape from an obstacle.
     pub(super) is_pressed: bool,
@@ -61,26 +61,26 @@ pub(super) struct InitiatorContext<'a, const D: usize> {
 /// Returns where the initiator wants to be at the end of the cycle.
 pub(super) fn desired_move<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     lead_context: &InitiatorContext<'_, D>,
 ) -> DesiredMove<D> {
     let CycleInputs { decision, orders } = lead_context.inputs;
     match &initiator.task.driver {
         TaskKind::Rest => DesiredMove::Rest,
-        TaskKind::External => step_from_orders(initiator, &acting.body.chain, orders)
+        TaskKind::External => motion_from_orders(initiator, &acting.body.chain, orders)
             .map_or(DesiredMove::Rest, DesiredMove::Obey),
         TaskKind::Navigate(navigator) => {
             let has_fled = lead_context.escaping.has_escaped(initiator.task.agent, acting.before);
-            let wheeled = NavigatorContext { initiator, navigator, body: acting.body };
+            let wheeled = NavigatedChain { initiator, navigator, body: acting.body };
             navigator_move(wheeled, decision, has_fled)
         }
         TaskKind::Wander(rule) => wander_move(initiator, acting.body, rule),
         TaskKind::Own(driver) => match ask_own_driver(initiator, acting.body, driver) {
-            Proposal::Rest => DesiredMove::Rest,
-            Proposal::Done => DesiredMove::Done,
-            Proposal::GoTo(to) => {
+            DriverAction::Rest => DesiredMove::Rest,
+            DriverAction::Done => DesiredMove::Done,
+            DriverAction::GoTo(to) => {
                 let at = initiator.position(acting.body);
-                DesiredMove::Go(move_toward(at, with_dimensions(to), initiator.step_m()))
+                DesiredMove::Go(move_toward(at, convert_dimensions(to), initiator.step_m()))
             }
         },
         TaskKind::Script(_) => script_move(initiator, acting.body),
@@ -91,7 +91,7 @@ pub(super) fn desired_move<const D: usize>(
 /// After arrival comes what others have done to the connector or its robot; its own decision is
 /// last.
 fn navigator_move<const D: usize>(
-    mut wheeled: NavigatorContext<'_, D>,
+    mut wheeled: NavigatedChain<'_, D>,
     decision: Option<LeaderDecision>,
     has_fled: bool,
 ) -> DesiredMove<D> {
@@ -114,10 +114,10 @@ fn wander_move<const D: usize>(
 ) -> DesiredMove<D> {
     let at = initiator.position(body);
     let step_m = initiator.step_m();
-    let draws = &mut initiator.context.draws(purpose::WANDER);
-    let was = with_dimensions(body.driving.ahead);
+    let draws = &mut initiator.context.random_draws(purpose::WANDER);
+    let was = convert_dimensions(body.driving.ahead);
     let ahead = wander_direction(rule, at, was, step_m, draws);
-    body.driving.ahead = with_dimensions(ahead);
+    body.driving.ahead = convert_dimensions(ahead);
     DesiredMove::Go(add_scaled(at, ahead, step_m))
 }
 
@@ -125,7 +125,7 @@ fn wander_move<const D: usize>(
 /// rests.
 fn step_to_target<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     targets: &Targets<D>,
 ) -> DesiredMove<D> {
     let at = initiator.position(acting.body);
@@ -148,7 +148,7 @@ fn step_to_target<const D: usize>(
     let number = f64::from(body.driving.next);
     acting.sink.record(&body.chain, EventKind::Target, initiator.task.agent, number);
     body.tally.done += 1;
-    body.driving.advance_part();
+    body.driving.start_next_subtask();
     DesiredMove::Rest
 }
 
@@ -165,13 +165,15 @@ fn script_move<const D: usize>(
             None => return DesiredMove::Done,
             Some(ScriptMotion::Face { ahead }) => driving.ahead = *ahead,
             Some(ScriptMotion::Wait { duration_s }) => {
-                if initiator.context.world.start_time_s(u64::from(driving.rested)) < *duration_s {
+                if initiator.context.world.cycle_start_time_s(u64::from(driving.rested))
+                    < *duration_s
+                {
                     driving.rested += 1;
                     return DesiredMove::Rest;
                 }
             }
             Some(ScriptMotion::MoveTo { position_m }) => {
-                let to = with_dimensions(*position_m);
+                let to = convert_dimensions(*position_m);
                 let left_m = distance(at, to);
                 driving.nearest_m = driving.nearest_m.min(left_m);
                 if left_m > there_m {
@@ -179,6 +181,6 @@ fn script_move<const D: usize>(
                 }
             }
         }
-        driving.advance_part();
+        driving.start_next_subtask();
     }
 }

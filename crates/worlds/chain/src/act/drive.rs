@@ -3,44 +3,44 @@
 use super::desired_move::{DesiredMove, InitiatorContext, desired_move};
 use super::initiator::{move_initiator, wait_for_escape};
 use super::lookahead;
-use super::orders::{StepOptions, execute_step};
+use super::orders::{StepOptions, execute_ordered_motion};
 use super::plan::{follow_plan, next_waypoint};
-use super::tasks::{end_event, start_next_task};
+use super::tasks::{start_next_task, task_end_event};
 use super::wheels::{drive_on_wheels, turn_robot};
-use super::{ActState, ChainContext, Initiator};
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::step_motion::StepMotion;
 use crate::state::ChainBodyState;
 use crate::trace::IntendedMove;
-use sidestep_rods::geometry::with_dimensions;
+use sidestep_rods::geometry::convert_dimensions;
 
 /// What inspections show of a move that gives way to an escape.
 const WAIT: &str = "wait for what moves";
 
 /// The outcome of a chain's task in a cycle.
-pub(super) struct TaskOutcome<const D: usize> {
+pub(super) struct TaskCycleOutcome<const D: usize> {
     /// The motion that external orders asked for.
     pub(super) step: Option<StepMotion<D>>,
     /// Whether its initiator gave way to what comes near.
     pub(super) gives_way: bool,
 }
 
-pub(super) fn run_task<const D: usize>(
+pub(super) fn run_task_cycle<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     lead_context: &InitiatorContext<'_, D>,
-) -> TaskOutcome<D> {
-    let mut outcome = TaskOutcome { step: None, gives_way: lead_context.is_pressed };
+) -> TaskCycleOutcome<D> {
+    let mut outcome = TaskCycleOutcome { step: None, gives_way: lead_context.is_pressed };
     let Some(task) = context.task(acting.body) else { return outcome };
     let initiator = Initiator { context, task, follows: lead_context.follows };
     // Whether this cycle uses up the time of the task.
-    let is_late = context.world.start_time_s(acting.body.driving.cycles + 1) >= task.lasts_s;
+    let is_late = context.world.cycle_start_time_s(acting.body.driving.cycles + 1) >= task.lasts_s;
     acting.body.driving.cycles += 1;
     let present = acting.body.driving.task;
     let desired = desired_move(initiator, acting, lead_context);
     let escaper = lead_context.escaping.escaper.as_deref();
     outcome.gives_way |= lookahead::should_yield(initiator, acting.body, escaper, desired);
     let wanted = intended_move(initiator, acting.body, desired, outcome.gives_way);
-    acting.sink.record_trace(|trace| trace.intended = Some(wanted));
+    acting.sink.record_inspection(|trace| trace.intended = Some(wanted));
     let options =
         StepOptions { gives_way: outcome.gives_way, goes_far: lead_context.inputs.orders.goes_far };
     execute(initiator, acting, desired, options);
@@ -50,7 +50,7 @@ pub(super) fn run_task<const D: usize>(
     // A task that was given up in this cycle has ended already, and the next one has just begun.
     let is_over = is_late && acting.body.driving.task == present;
     if is_over || matches!(desired, DesiredMove::Done) {
-        let how = end_event(task, acting.body);
+        let how = task_end_event(task, acting.body);
         start_next_task(context, acting.body, &mut acting.sink, how);
     }
     outcome
@@ -59,7 +59,7 @@ pub(super) fn run_task<const D: usize>(
 /// Carries out the move that the initiator wants.
 fn execute<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     desired: DesiredMove<D>,
     options: StepOptions,
 ) {
@@ -82,7 +82,7 @@ fn execute<const D: usize>(
         }
         DesiredMove::Follow => follow_plan(initiator, acting.body, acting.before),
         DesiredMove::Steer(steered) => drive_on_wheels(initiator, acting, steered),
-        DesiredMove::Obey(step) => execute_step(initiator, acting, &step, options),
+        DesiredMove::Obey(step) => execute_ordered_motion(initiator, acting, &step, options),
     }
 }
 
@@ -105,7 +105,7 @@ fn intended_move<const D: usize>(
             (if gives_way { WAIT } else { "go, as ordered" }, Some(step.to[0]))
         }
         DesiredMove::Follow => ("follow its plan", next_waypoint(initiator, body)),
-        DesiredMove::Steer(steered) => ("steer", Some(with_dimensions(steered.pose.at))),
+        DesiredMove::Steer(steered) => ("steer", Some(convert_dimensions(steered.pose.at))),
         DesiredMove::Done => ("its task is done", None),
     };
     IntendedMove { connector, words, to }

@@ -2,13 +2,13 @@
 
 use crate::events::{Event, EventKind};
 use crate::trace::InspectionTrace;
-use sidestep_kernel::{Cycle, Slot};
+use sidestep_kernel::{Cycle, EntitySlot};
 use sidestep_rods::Chain;
-use sidestep_rods::geometry::with_dimensions;
+use sidestep_rods::geometry::convert_dimensions;
 
 /// The sink of what happens to a chain in a cycle.
 pub(super) struct EventSink<'a, const D: usize> {
-    pub(super) slot: Slot,
+    pub(super) slot: EntitySlot,
     pub(super) now: Cycle,
     pub(super) events: &'a mut Vec<Event>,
     /// The record of an inspection, if one of this chain is under way.
@@ -17,7 +17,7 @@ pub(super) struct EventSink<'a, const D: usize> {
 
 impl<const D: usize> EventSink<'_, D> {
     /// Records something if this chain is inspected.
-    pub(super) fn record_trace(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
+    pub(super) fn record_inspection(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
         if let Some(trace) = self.trace.as_deref_mut() {
             record(trace);
         }
@@ -36,7 +36,7 @@ impl<const D: usize> EventSink<'_, D> {
             chain: self.slot,
             kind,
             connector: connector as u32,
-            at_m: with_dimensions(chain.points()[connector]),
+            at_m: convert_dimensions(chain.points()[connector]),
             reason: None,
             obstacle: None,
             missing: 0,

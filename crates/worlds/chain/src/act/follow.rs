@@ -2,16 +2,16 @@
 //! followers and this world (slides E2, K5 to K7).
 
 use super::wheels::HEADING_TOLERANCE_RAD;
-use super::{ActState, ChainContext};
+use super::{ChainContext, ChainCycleState};
 use crate::events::EventKind;
-use crate::formation::{Robot, Robots};
+use crate::formation::{Robot, RobotSwarmConfig};
 use crate::state::ChainBodyState;
 use crate::swarm::drive::Pose2;
-use crate::swarm::follower::{Follower, TrackingTarget};
+use crate::swarm::follower::{Follower, FollowerTarget};
 use crate::swarm::laser::{NearbyBodies, RobotBody};
 use sidestep_kernel::math::{atan2, wrap_angle};
 use sidestep_rods::Obstacles;
-use sidestep_rods::geometry::{Point, distance, dot, scaled, sub, with_dimensions};
+use sidestep_rods::geometry::{Point, convert_dimensions, distance, dot, scaled, sub};
 
 /// The circumstances in which the robots of a chain follow.
 #[derive(Clone, Copy)]
@@ -26,57 +26,57 @@ struct FollowContext<'a, const D: usize> {
 
 /// Moves the robots of a swarm toward their connectors. All perceive each other as they were before the cycle, so
 /// that their order does not matter. Returns the least gap around a robot, meters; `robot_bodies` is a buffer.
-pub(super) fn follow<const D: usize>(
+pub(super) fn move_swarm_robots<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     solid: &Obstacles<D>,
     robot_bodies: &mut Vec<RobotBody>,
 ) -> f64 {
     let mut gap_m = f64::INFINITY;
-    let Some(Robots { follower, .. }) = &context.spec.robots else { return gap_m };
-    let leader = wheeled_leader(context, acting.body);
+    let Some(RobotSwarmConfig { follower, .. }) = &context.spec.robots else { return gap_m };
+    let leader = find_wheeled_leader(context, acting.body);
     robot_bodies.clear();
     robot_bodies.extend(acting.body.solids().map(|(_, solid)| solid.robot_body()));
     let following = FollowContext { context, follower, solid, robots: robot_bodies };
     for k in 0..acting.body.robots.len() {
         if Some(k) == leader {
-            place_robot(acting.body, k);
+            update_navigator_robot(acting.body, k);
         } else {
             gap_m = gap_m.min(following.follow(acting, k));
         }
     }
-    lead_from_robot(context, acting.body);
+    sync_leader_pose(context, acting.body);
     gap_m
 }
 
 /// Returns the connector of a navigator that its own wheels have moved, or that stands. Where anything else moves
 /// the connector, its robot follows like the others.
-fn wheeled_leader<const D: usize>(
+fn find_wheeled_leader<const D: usize>(
     context: ChainContext<'_, D>,
     body: &ChainBodyState<D>,
 ) -> Option<usize> {
     let agent = context.task(body)?.agent;
     let leader = body.driving.leader.as_ref()?;
-    (with_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
+    (convert_dimensions(body.chain.points()[agent]) == leader.pose.at).then_some(agent)
 }
 
 /// Lets a navigator whose robot follows its connector go on from where the robot is.
-fn lead_from_robot<const D: usize>(context: ChainContext<'_, D>, body: &mut ChainBodyState<D>) {
+fn sync_leader_pose<const D: usize>(context: ChainContext<'_, D>, body: &mut ChainBodyState<D>) {
     let Some(agent) = context.task(body).map(|task| task.agent) else { return };
     let at = body.chain.points()[agent];
     let robot = &body.robots[agent];
     if let Some(leader) = &mut body.driving.leader
-        && with_dimensions(at) != leader.pose.at
+        && convert_dimensions(at) != leader.pose.at
     {
         leader.pose = robot.pose;
     }
 }
 
 /// Moves the robot of a navigator to where its wheels have taken it.
-fn place_robot<const D: usize>(body: &mut ChainBodyState<D>, k: usize) {
+fn update_navigator_robot<const D: usize>(body: &mut ChainBodyState<D>, k: usize) {
     let Some(leader) = body.driving.leader else { return };
     let [x, y, _] = body.driving.ahead;
-    let at = with_dimensions(body.chain.points()[k]);
+    let at = convert_dimensions(body.chain.points()[k]);
     let ahead_rad = atan2(y, x);
     // They differ while the robot turns on the spot, and otherwise by rounding only.
     let turns = wrap_angle(ahead_rad - leader.pose.heading_rad).abs() > HEADING_TOLERANCE_RAD;
@@ -86,12 +86,12 @@ fn place_robot<const D: usize>(body: &mut ChainBodyState<D>, k: usize) {
 
 impl<const D: usize> FollowContext<'_, D> {
     /// Moves one robot; returns the gap around it, meters.
-    fn follow(self, acting: &mut ActState<'_, D>, k: usize) -> f64 {
-        let Some(solid) = self.solid.in_plane() else { return f64::INFINITY };
-        let ActState { body, before, sink, .. } = acting;
+    fn follow(self, acting: &mut ChainCycleState<'_, D>, k: usize) -> f64 {
+        let Some(solid) = self.solid.as_planar() else { return f64::INFINITY };
+        let ChainCycleState { body, before, sink, .. } = acting;
         let dt_s = self.context.world.dt_s;
-        let was: Point<2> = with_dimensions(before.points[k]);
-        let at: Point<2> = with_dimensions(body.chain.points()[k]);
+        let was: Point<2> = convert_dimensions(before.points[k]);
+        let at: Point<2> = convert_dimensions(body.chain.points()[k]);
         let mut velocity_m_s = scaled(sub(at, was), 1.0 / dt_s);
         let is_leader = self.context.task(body).is_some_and(|task| task.agent == k);
         if is_leader && dot(velocity_m_s, sub(at, body.robots[k].pose.at)) < 0.0 {
@@ -100,7 +100,7 @@ impl<const D: usize> FollowContext<'_, D> {
         }
         let others = self.robots.iter().enumerate().filter(move |(i, _)| *i != k).map(|(_, o)| *o);
         let around = NearbyBodies { obstacles: solid, robots: others };
-        let goal = TrackingTarget { at, velocity_m_s };
+        let goal = FollowerTarget { at, velocity_m_s };
         let followed = self.follower.follow(&body.robots[k].pose, &goal, around, dt_s);
         let lag_m = distance(followed.pose.at, at);
         body.tally.robots.record(&followed, lag_m);

@@ -78,7 +78,7 @@ fn wait_or_give_up<const D: usize>(
 ) {
     let Some(scattered) = &mut body.scattered else { return };
     scattered.waited = if attempt.has_moved { 0 } else { scattered.waited.saturating_add(1) };
-    if context.world.start_time_s(scattered.waited) <= GATHER_TIMEOUT_S {
+    if context.world.cycle_start_time_s(scattered.waited) <= GATHER_TIMEOUT_S {
         return;
     }
     scattered.speed_m_s = 0.0;
@@ -157,7 +157,7 @@ impl<const D: usize> ScatteredParts<'_, D> {
             let ends = [self.chain.points()[rod], self.chain.points()[rod + 1]];
             // A body that only touches the rod is not in it.
             let radius_m = self.chain.rods()[rod].radius_m - TOLERANCE_M;
-            self.obstacles.first_overlap(ends, radius_m)
+            self.obstacles.first_overlapping_id(ends, radius_m)
         })
     }
 }

@@ -1,8 +1,8 @@
 //! One motion of an initiator.
 
-use super::outcome::{MoveResult, record_result};
+use super::outcome::{MoveProgress, record_result};
 use super::situation::{out_of_range_veto, situation};
-use super::{ActState, FollowMode, Initiator, defer, joints, negotiation};
+use super::{ChainCycleState, ChainFollowMode, Initiator, defer, joints, negotiation};
 use crate::motion::recovery::{DirectMover, RecoveryLadder, RecoveryOutcome};
 use sidestep_rods::geometry::{Point, distance, norm, sub};
 use sidestep_rods::{MotionRequest, RequestedMotion, VetoEffect};
@@ -10,37 +10,38 @@ use sidestep_rods::{MotionRequest, RequestedMotion, VetoEffect};
 /// Moves the initiator where it wants to go, or as the recovery ladder allows.
 pub(super) fn move_initiator<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     to: Point<D>,
-) -> MoveResult {
+) -> MoveProgress {
     let at = initiator.position(acting.body);
     let climbed = match initiator.follows {
-        FollowMode::Deferred => Some(defer::move_initiator_only(initiator, acting.body, to)),
-        FollowMode::AsTeam => negotiation::negotiate_move(initiator, acting, to),
-        FollowMode::AtOnce => Some(request_motion(initiator, acting, to)),
+        ChainFollowMode::Deferred => Some(defer::move_initiator_only(initiator, acting.body, to)),
+        ChainFollowMode::AsTeam => negotiation::negotiate_move(initiator, acting, to),
+        ChainFollowMode::AtOnce => Some(request_motion(initiator, acting, to)),
     };
-    let climbed = climbed.map(|climbed| joints::follow_initiator(initiator, acting, to, climbed));
-    acting.sink.record_trace(|trace| trace.climbed.clone_from(&climbed));
+    let climbed =
+        climbed.map(|climbed| joints::move_joints_with_initiator(initiator, acting, to, climbed));
+    acting.sink.record_inspection(|trace| trace.climbed.clone_from(&climbed));
     let displacement = sub(initiator.position(acting.body), at);
     acting.body.driving.way_m.wanted += distance(at, to);
     acting.body.driving.way_m.gone += norm(displacement);
     acting.body.tally.way_m += norm(displacement);
     // A chain that stands because an agent is lost does not count that as time without progress.
-    let Some(climbed) = climbed else { return MoveResult::Nowhere };
+    let Some(climbed) = climbed else { return MoveProgress::Nowhere };
     record_result(initiator, acting, &climbed, displacement)
 }
 
 /// Requests a motion of the whole chain.
 fn request_motion<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     to: Point<D>,
 ) -> RecoveryOutcome<D> {
     let context = initiator.context;
     let k = initiator.task.agent;
     let request = MotionRequest {
         motion: RequestedMotion::Connector { k, to },
-        source: initiator.task.source(),
+        source: initiator.task.request_source(),
         mode: VetoEffect::Exact,
     };
     let situation = situation(initiator, acting.body);
@@ -64,7 +65,7 @@ fn request_motion<const D: usize>(
 /// Lets the initiator wait while the chain needs all its speed to escape.
 pub(super) fn wait_for_escape<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
 ) {
     acting.body.driving.way_m.wanted += initiator.step_m();
     let n = acting.body.driving.idle.saturating_add(1);

@@ -4,8 +4,8 @@
 #[cfg(test)]
 mod tests;
 
-use super::situation::is_held;
-use super::{ActState, ChainContext, Initiator};
+use super::situation::has_held_connector;
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::clearance::min_clearance;
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
@@ -48,13 +48,13 @@ struct ArmPosture<const D: usize> {
 }
 
 /// The motion that joints are to follow.
-struct ReferenceMotion<'b, const D: usize> {
+struct TrackingReference<'b, const D: usize> {
     from: &'b [Point<D>],
     guide: Option<&'b [Point<D>]>,
     led: &'b [LeadTarget<D>],
 }
 
-impl<const D: usize> ReferenceMotion<'_, D> {
+impl<const D: usize> TrackingReference<'_, D> {
     /// Returns where connector `k` is after a fraction of its way to `to`.
     fn position(&self, k: usize, to: Point<D>, fraction: f64) -> Point<D> {
         // An interpolation to the end would differ from it by rounding.
@@ -63,7 +63,7 @@ impl<const D: usize> ReferenceMotion<'_, D> {
 }
 
 /// An arm whose joints come along with its chain.
-pub(super) struct ArmFollower<'a, const D: usize> {
+pub(super) struct ArmJointSolver<'a, const D: usize> {
     context: ChainContext<'a, D>,
     before: &'a PositionBuffer<D>,
     arm: &'a Arm,
@@ -79,19 +79,19 @@ pub(super) fn arrival_tolerance_m<const D: usize>(
 ) -> f64 {
     match context.spec.arm.as_deref() {
         Some(arm) => arm.follower.arrival_tolerance_m(),
-        None if !chain.is_plain() && is_held(chain) => TOLERANCE_M,
+        None if !chain.is_plain() && has_held_connector(chain) => TOLERANCE_M,
         None => chain.min_move_m(),
     }
 }
 
 /// Lets the joints come along with an initiator's motion; what they cannot do is vetoed.
-pub(super) fn follow_initiator<const D: usize>(
+pub(super) fn move_joints_with_initiator<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     to: Point<D>,
     climbed: RecoveryOutcome<D>,
 ) -> RecoveryOutcome<D> {
-    let Some(mut arm) = ArmFollower::from_body(initiator.context, acting.before, acting.body)
+    let Some(mut arm) = ArmJointSolver::from_body(initiator.context, acting.before, acting.body)
     else {
         return climbed;
     };
@@ -106,7 +106,7 @@ pub(super) fn follow_initiator<const D: usize>(
     };
     let followed = arm.follow(&[LeadTarget { k, to: at }], MAX_TRIES).or_else(|veto| {
         // Planners and operators want exactly this place, not one near it.
-        let decides = initiator.task.source() == RequestSource::Autonomous;
+        let decides = initiator.task.request_source() == RequestSource::Autonomous;
         if decides && arm.approach(LeadTarget { k, to }) { Ok(()) } else { Err(veto) }
     });
     match followed {
@@ -119,7 +119,7 @@ pub(super) fn follow_initiator<const D: usize>(
     }
 }
 
-impl<'a, const D: usize> ArmFollower<'a, D> {
+impl<'a, const D: usize> ArmJointSolver<'a, D> {
     /// Returns the arm that a chain represents, if it does.
     pub(super) fn from_body(
         context: ChainContext<'a, D>,
@@ -138,7 +138,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         part: f64,
         outcome: MotionOutcome<D>,
     ) -> MotionOutcome<D> {
-        let followed = match step.motion(part) {
+        let followed = match step.partial_motion(part) {
             RequestedMotion::Connector { k, to } => self.follow(&[LeadTarget { k, to }], 1),
             RequestedMotion::Rod { i, to: [to, next] } => {
                 self.follow(&[LeadTarget { k: i, to }, LeadTarget { k: i + 1, to: next }], 1)
@@ -164,8 +164,8 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         let (from, guide) = self.reset_to_joints();
         // A chain that has not moved guides the joints nowhere.
         let guide = (guide != from).then_some(&guide[..]);
-        let guided = ReferenceMotion { from: &from, guide, led };
-        let free = ReferenceMotion { guide: None, ..guided };
+        let guided = TrackingReference { from: &from, guide, led };
+        let free = TrackingReference { guide: None, ..guided };
         let mut objection = None;
         let mut fraction = 1.0;
         for _ in 0..tries {
@@ -188,7 +188,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         let LeadTarget { k, to } = led;
         let (from, _) = self.reset_to_joints();
         let mut posed =
-            self.solve_posture(&ReferenceMotion { from: &from, guide: None, led: &[led] }, 1.0);
+            self.solve_posture(&TrackingReference { from: &from, guide: None, led: &[led] }, 1.0);
         let left_m = distance(posed.points[k], to);
         posed.led[0].to = posed.points[k];
         let comes = left_m <= (1.0 - MIN_APPROACH_FRACTION) * distance(from[k], to)
@@ -206,7 +206,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
         if guide == from {
             return;
         }
-        let wanted = ReferenceMotion { from: &from, guide: Some(&guide), led: &[] };
+        let wanted = TrackingReference { from: &from, guide: Some(&guide), led: &[] };
         let mut best: Option<ArmPosture<D>> = None;
         let mut least_m = self.clearance_m(&from);
         let mut part = 1.0;
@@ -237,7 +237,7 @@ impl<'a, const D: usize> ArmFollower<'a, D> {
     }
 
     /// Returns the posture in which the joints follow a part of a motion.
-    fn solve_posture(&self, wanted: &ReferenceMotion<'_, D>, part: f64) -> ArmPosture<D> {
+    fn solve_posture(&self, wanted: &TrackingReference<'_, D>, part: f64) -> ArmPosture<D> {
         let arm = self.arm;
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();

@@ -2,11 +2,11 @@
 
 use super::Initiator;
 use super::desired_move::DesiredMove;
-use super::situation::is_held;
+use super::situation::has_held_connector;
 use crate::driver::Task;
 use crate::motion::escape::{LeadMotion, ObstacleEscaper};
 use crate::state::ChainBodyState;
-use sidestep_rods::geometry::{sub, with_dimensions};
+use sidestep_rods::geometry::{convert_dimensions, sub};
 use sidestep_rods::{Chain, RequestSource};
 
 /// Returns whether an initiator rests for what approaches, because rollouts show that the chain is then inside it
@@ -25,7 +25,7 @@ pub(super) fn should_yield<const D: usize>(
         // By slot, so that not all chains make their rollouts in the same cycle.
         Some(lead) if (context.now + u64::from(context.slot)).is_multiple_of(every) => {
             let rules = &context.world.rules;
-            let rests = escaper.should_rest(&body.chain, context.obstacles, rules, &lead);
+            let rests = escaper.should_leader_rest(&body.chain, context.obstacles, rules, &lead);
             body.escape_plan.set_resting(rests);
         }
         // Between two choices the last one holds.
@@ -41,12 +41,12 @@ fn desired_lead<const D: usize>(
     chain: &Chain<D>,
     desired: DesiredMove<D>,
 ) -> Option<LeadMotion<D>> {
-    if task.source() != RequestSource::Autonomous || is_held(chain) {
+    if task.request_source() != RequestSource::Autonomous || has_held_connector(chain) {
         return None;
     }
     let to = match desired {
         DesiredMove::Go(to) => to,
-        DesiredMove::Steer(steered) => with_dimensions(steered.pose.at),
+        DesiredMove::Steer(steered) => convert_dimensions(steered.pose.at),
         _ => return None,
     };
     Some(LeadMotion { k: task.agent, displacement_m: sub(to, chain.points()[task.agent]) })

@@ -1,6 +1,6 @@
 //! Measures of a chain at the end of each of its cycles.
 
-use super::{ActState, ChainContext};
+use super::{ChainContext, ChainCycleState};
 use crate::clearance::{min_clearance, self_gap_m};
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_THRESHOLD_M;
@@ -16,7 +16,7 @@ const MEASURE_INTERVAL_CYCLES: u64 = 16;
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
 pub(super) fn measure_chain<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     own: &mut RodBvh<D>,
     robots_gap_m: f64,
 ) {

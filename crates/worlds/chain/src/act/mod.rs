@@ -1,7 +1,7 @@
 //! Phase *act*: the actions of one chain in a cycle.
 //!
 //! Its inputs are in a [`ChainContext`], which is copied and never changes: the world, the chain's share of it, the
-//! cycle and the nearby obstacles. Everything that it changes is in [`ActState`]: the chain's body, beside the
+//! cycle and the nearby obstacles. Everything that it changes is in [`ChainCycleState`]: the chain's body, beside the
 //! positions before the cycle, and the sink of events. The parts are functions over these two, or over less where
 //! they need less; joints, robots on wheels, agents and escapes have small structs of their own. Decisions are
 //! values that are passed on in one direction: an escape returns whether the chain is pressed, a driver returns a
@@ -53,7 +53,7 @@ use desired_move::{CycleInputs, InitiatorContext};
 use event_sink::EventSink;
 use negotiation::Negotiation;
 use sidestep_kernel::stream::{Draws, Purpose};
-use sidestep_kernel::{Cycle, PhaseContext, Slot};
+use sidestep_kernel::{Cycle, EntitySlot, PhaseContext};
 use sidestep_rods::geometry::{Aabb, Point, distance};
 use sidestep_rods::{Obstacles, Propagator, Veto};
 
@@ -62,7 +62,7 @@ use sidestep_rods::{Obstacles, Propagator, Veto};
 struct ChainContext<'a, const D: usize> {
     world: &'a ChainWorld<D>,
     spec: &'a ChainSpec<D>,
-    slot: Slot,
+    slot: EntitySlot,
     now: Cycle,
     obstacles: &'a Obstacles<D>,
 }
@@ -72,12 +72,12 @@ struct ChainContext<'a, const D: usize> {
 struct Initiator<'a, const D: usize> {
     context: ChainContext<'a, D>,
     task: &'a Task<D>,
-    follows: FollowMode,
+    follows: ChainFollowMode,
 }
 
 /// How the rest of a chain follows its initiator.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum FollowMode {
+enum ChainFollowMode {
     /// At once, moved by one process.
     AtOnce,
     /// At once, each connector moved by its agent.
@@ -87,7 +87,7 @@ enum FollowMode {
 }
 
 /// A chain as it acts: what its cycle changes.
-struct ActState<'a, const D: usize> {
+struct ChainCycleState<'a, const D: usize> {
     body: &'a mut ChainBodyState<D>,
     /// Its positions before the cycle.
     before: &'a PositionBuffer<D>,
@@ -97,7 +97,10 @@ struct ActState<'a, const D: usize> {
 }
 
 /// Lets the chains of one conflict group act, one after the other.
-pub(crate) fn act<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, group: &mut [Slot]) {
+pub(crate) fn act<const D: usize>(
+    phase: &mut PhaseContext<'_, ChainWorld<D>>,
+    group: &mut [EntitySlot],
+) {
     // The order of a group depends on the workers that joined it; results must not.
     group.sort_unstable();
     for &slot in &*group {
@@ -108,13 +111,13 @@ pub(crate) fn act<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, g
 /// Lets one chain of a conflict group act.
 pub(crate) fn act_one<const D: usize>(
     phase: &mut PhaseContext<'_, ChainWorld<D>>,
-    group: &[Slot],
-    slot: Slot,
+    group: &[EntitySlot],
+    slot: EntitySlot,
 ) {
     let &mut PhaseContext { world, state, now, .. } = phase;
     let claim = state.claim(slot as usize);
     let others = group.iter().copied();
-    let others = others.filter(|s| *s != slot && state.claim(*s as usize).meets(&claim));
+    let others = others.filter(|s| *s != slot && state.claim(*s as usize).intersects(&claim));
     // Movers stand where they will be at the end of the cycle, because that is where the chain's motions lead.
     phase.scratch.nearby.gather(world, state, now + 1, others);
     run_cycle(phase, slot, claim);
@@ -123,7 +126,7 @@ pub(crate) fn act_one<const D: usize>(
 /// Runs one cycle of a chain, which stays in its claim.
 fn run_cycle<const D: usize>(
     phase: &mut PhaseContext<'_, ChainWorld<D>>,
-    slot: Slot,
+    slot: EntitySlot,
     claim: Aabb<D>,
 ) {
     let &mut PhaseContext { world, state, now, .. } = phase;
@@ -137,9 +140,9 @@ fn run_cycle<const D: usize>(
     broken::apply_changes(context, body, &mut sink);
     let inputs =
         CycleInputs { decision: state.decision(slot as usize), orders: orders::take_orders(body) };
-    let follows = FollowMode::choose_follow_mode(context, body);
-    if follows != FollowMode::Deferred {
-        body.catch_up();
+    let follows = ChainFollowMode::choose_follow_mode(context, body);
+    if follows != ChainFollowMode::Deferred {
+        body.apply_deferred_motions();
         scratch.before.record(body);
         scratch.escaped.record(body);
     }
@@ -148,11 +151,11 @@ fn run_cycle<const D: usize>(
     let before = &scratch.before;
     let propagator = &mut scratch.propagator;
     let negotiation = Negotiation::new(scratch.percept_log.as_mut());
-    let mut acting = ActState { body, before, propagator, negotiation, sink };
-    if follows == FollowMode::Deferred {
+    let mut acting = ChainCycleState { body, before, propagator, negotiation, sink };
+    if follows == ChainFollowMode::Deferred {
         let lead_context =
             InitiatorContext { inputs, follows, escaping: &escaping, is_pressed: false };
-        drive::run_task(context, &mut acting, &lead_context);
+        drive::run_task_cycle(context, &mut acting, &lead_context);
         // Its measures are taken when the chain follows: no obstacle is there to measure a distance to.
         acting.body.tally.steps += 1;
         return;
@@ -162,8 +165,9 @@ fn run_cycle<const D: usize>(
     } else {
         act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }
-    let solid = scratch.nearby.solid();
-    let robots_gap_m = follow::follow(context, &mut acting, solid, &mut scratch.robot_bodies);
+    let solid = scratch.nearby.solid_to_robots();
+    let robots_gap_m =
+        follow::move_swarm_robots(context, &mut acting, solid, &mut scratch.robot_bodies);
     measure::measure_chain(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
 }
 
@@ -171,16 +175,16 @@ fn run_cycle<const D: usize>(
 /// may use up the speed that the task would need.
 fn act_whole_chain<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     escaping: &mut EscapeContext<'_, D>,
     inputs: CycleInputs,
-    follows: FollowMode,
+    follows: ChainFollowMode,
 ) {
     let is_pressed = escaping.escape(context, acting);
     let lead_context = InitiatorContext { inputs, follows, escaping, is_pressed };
-    let outcome = drive::run_task(context, acting, &lead_context);
-    if follows == FollowMode::AsTeam {
-        negotiation::negotiate_rest(context, acting);
+    let outcome = drive::run_task_cycle(context, acting, &lead_context);
+    if follows == ChainFollowMode::AsTeam {
+        negotiation::negotiate_without_motion(context, acting);
     }
     let veto = escaping.enforce_claim(context, acting.body, acting.before);
     if let Some(veto) = &veto {
@@ -188,7 +192,7 @@ fn act_whole_chain<const D: usize>(
     }
     let Some(step) = outcome.step else { return };
     if let Some(veto) = &veto {
-        orders::record_result_veto(acting.body, veto);
+        orders::record_order_veto(acting.body, veto);
     }
     orders::complete_result(acting.body, &step, outcome.gives_way);
 }
@@ -200,7 +204,7 @@ impl<'a, const D: usize> ChainContext<'a, D> {
     }
 
     /// Returns the chain's random draws of this cycle for a purpose.
-    fn draws(self, purpose: Purpose) -> Draws {
+    fn random_draws(self, purpose: Purpose) -> Draws {
         self.world.streams.draws(self.slot, self.now, purpose)
     }
 }
@@ -216,7 +220,7 @@ impl<const D: usize> Initiator<'_, D> {
     }
 }
 
-impl FollowMode {
+impl ChainFollowMode {
     /// Returns how a chain follows its initiator in this cycle.
     fn choose_follow_mode<const D: usize>(
         context: ChainContext<'_, D>,
@@ -230,13 +234,13 @@ impl FollowMode {
     }
 }
 
-impl<const D: usize> ActState<'_, D> {
+impl<const D: usize> ChainCycleState<'_, D> {
     /// Counts a veto; of several in a row by one connector for one reason only the first is an
     /// event, because a chain that is blocked meets the same veto in every cycle.
     fn record_veto(&mut self, veto: &Veto<D>) {
         let Self { body, before, sink, .. } = self;
         body.tally.add_veto(veto.reason);
-        sink.record_trace(|trace| trace.vetoes.push(*veto));
+        sink.record_inspection(|trace| trace.vetoes.push(*veto));
         let objection = Some(VetoRecord { by: veto.by as u32, reason: veto.reason });
         let driving = &mut body.driving;
         if driving.last_event.is_none() || driving.objection != objection {

@@ -3,10 +3,10 @@
 
 use super::event_sink::EventSink;
 use super::situation::situation;
-use super::{ActState, ChainContext, Initiator};
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::agents::percept::ChainPercepts;
-use crate::agents::side::ChainSide;
-use crate::agents::{ChainControls, ConnectorRole, Intention, LeaderOutcome};
+use crate::agents::side::NeighborSide;
+use crate::agents::{ChainAgentControls, ConnectorRole, Intention, LeaderOutcome};
 use crate::deploy::{SensingContext, final_positions};
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
@@ -33,13 +33,13 @@ impl<'a, const D: usize> Negotiation<'a, D> {
 /// an agent is lost, or if the deadline passed before the leader had finished.
 pub(super) fn negotiate_move<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     to: Point<D>,
 ) -> Option<RecoveryOutcome<D>> {
     let is_empty = initiator.context.obstacles.is_empty();
     let intention = Intention {
         to: WirePoint(to),
-        source: initiator.task.source(),
+        source: initiator.task.request_source(),
         situation: situation(initiator, acting.body),
         memory: std::mem::take(&mut acting.body.driving.ladder),
         is_empty,
@@ -60,9 +60,9 @@ pub(super) fn negotiate_move<const D: usize>(
 }
 
 /// Lets the agents of a chain whose leader has not moved find out which of them are lost.
-pub(super) fn negotiate_rest<const D: usize>(
+pub(super) fn negotiate_without_motion<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
 ) {
     if !acting.negotiation.is_done {
         negotiate(context, acting, &ConnectorRole::Rests);
@@ -72,16 +72,17 @@ pub(super) fn negotiate_rest<const D: usize>(
 /// Lets the agents negotiate, and carries out their decisions; returns the outcome of the leader's intention.
 fn negotiate<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     role: &ConnectorRole<D>,
 ) -> Option<LeaderOutcome<D>> {
-    let ActState { body, negotiation, sink, .. } = acting;
+    let ChainCycleState { body, negotiation, sink, .. } = acting;
     negotiation.is_done = true;
     let ChainContext { world, slot, now, obstacles, .. } = context;
     let leader = context.task(body).map_or(0, |task| task.agent);
     let sights = world.percepts(SensingContext { chain: slot, now, body, obstacles }, leader, role);
     let submitted = body.submitted.take().filter(|submitted| submitted.cycle == now);
-    let ChainControls { controls, gone, .. } = match (submitted, &mut negotiation.percept_log) {
+    let ChainAgentControls { controls, gone, .. } = match (submitted, &mut negotiation.percept_log)
+    {
         (Some(submitted), _) => submitted,
         (None, Some(percept_log)) => {
             percept_log.push((slot, sights));
@@ -99,7 +100,7 @@ fn negotiate<const D: usize>(
     let mut missing = body.missing.clone();
     missing.resize(controls.len(), MissingNeighbors::default());
     for control in controls.iter().flatten() {
-        body.tally.add_traffic(control.traffic);
+        body.tally.add_network_traffic(control.traffic);
         missing[control.connector as usize] = control.missing;
     }
     mark_missing(&mut missing, &gone);
@@ -135,7 +136,7 @@ fn record_missing<const D: usize>(
 fn mark_missing(missing: &mut [MissingNeighbors], gone: &[u32]) {
     let n = missing.len() as u32;
     for &k in gone {
-        for side in ChainSide::ALL {
+        for side in NeighborSide::ALL {
             if let Some(neighbor) = side.neighbor(k, n) {
                 missing[neighbor as usize][side.other() as usize] = Some(k);
             }
@@ -148,7 +149,7 @@ fn lost_connectors(missing: &[MissingNeighbors]) -> BTreeMap<u32, u32> {
     let n = missing.len() as u32;
     let mut lost = BTreeMap::new();
     for (k, sides) in (0..).zip(missing) {
-        for (side, missing) in ChainSide::ALL.into_iter().zip(sides) {
+        for (side, missing) in NeighborSide::ALL.into_iter().zip(sides) {
             // Connectors farther away only know of it from messages.
             if let Some(connector) = missing.filter(|_| side.neighbor(k, n) == *missing) {
                 lost.entry(connector).or_insert(k);

@@ -1,14 +1,14 @@
 //! Orders of an external caller for one cycle, and their result.
 
-use super::joints::ArmFollower;
+use super::joints::ArmJointSolver;
 use super::situation::out_of_range_veto;
-use super::{ActState, ChainContext, Initiator};
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::external::{OrderOutcome, Orders, Target};
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::execute_request;
 use crate::state::ChainBodyState;
-use sidestep_rods::geometry::{norm, normalized, sub, with_dimensions};
+use sidestep_rods::geometry::{convert_dimensions, norm, normalized, sub};
 use sidestep_rods::{
     Chain, MotionOutcome, MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect,
 };
@@ -26,7 +26,7 @@ pub(super) fn take_orders<const D: usize>(body: &mut ChainBodyState<D>) -> Order
 }
 
 /// Returns the motion that orders ask for in this cycle, if they have a target.
-pub(super) fn step_from_orders<const D: usize>(
+pub(super) fn motion_from_orders<const D: usize>(
     initiator: Initiator<'_, D>,
     chain: &Chain<D>,
     orders: Orders,
@@ -36,7 +36,7 @@ pub(super) fn step_from_orders<const D: usize>(
     let motion = match target? {
         Target::Connector(to) => {
             let k = connector.map_or(agent, |k| k as usize);
-            let to = with_dimensions(to);
+            let to = convert_dimensions(to);
             let at = chain.points()[k];
             let connector = &chain.connectors()[k];
             let mobility = &connector.mobility;
@@ -51,7 +51,7 @@ pub(super) fn step_from_orders<const D: usize>(
         Target::Rod(to) => {
             let last = chain.rods().len().checked_sub(1)?;
             let i = rod.map_or(agent.min(last), |i| i as usize);
-            RequestedMotion::Rod { i, to: to.map(with_dimensions) }
+            RequestedMotion::Rod { i, to: to.map(convert_dimensions) }
         }
     };
     Some(StepMotion::new(chain, &motion, initiator.step_m()))
@@ -66,9 +66,9 @@ pub(super) struct StepOptions {
 }
 
 /// Carries out an ordered motion, unless parts have to escape.
-pub(super) fn execute_step<const D: usize>(
+pub(super) fn execute_ordered_motion<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     step: &StepMotion<D>,
     options: StepOptions,
 ) {
@@ -81,13 +81,13 @@ pub(super) fn execute_step<const D: usize>(
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
-    acting.sink.record_trace(|trace| trace.climbed = Some(climbed));
+    acting.sink.record_inspection(|trace| trace.climbed = Some(climbed));
     let displacement = sub(body.chain.points()[step.first], at);
     let driving = &mut body.driving;
     driving.way_m.gone += norm(displacement);
     driving.idle = if displacement == [0.0; D] { driving.idle.saturating_add(1) } else { 0 };
     if let Some(ahead) = normalized(displacement).filter(|_| step.first == initiator.task.agent) {
-        driving.ahead = with_dimensions(ahead);
+        driving.ahead = convert_dimensions(ahead);
     }
     body.tally.way_m += norm(displacement);
 }
@@ -96,11 +96,11 @@ pub(super) fn execute_step<const D: usize>(
 /// of the rest.
 fn request_or_bisect<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     step: &StepMotion<D>,
     goes_far: bool,
 ) -> RecoveryOutcome<D> {
-    let mut veto = match request_fraction(context, acting, step, 1.0) {
+    let mut veto = match request_partial_motion(context, acting, step, 1.0) {
         MotionOutcome::Moved(moved) => {
             match &moved.cut_short {
                 Some(veto) => record_veto(acting, veto),
@@ -115,7 +115,7 @@ fn request_or_bisect<const D: usize>(
     let mut last = None;
     let bisections = if goes_far { BISECTIONS } else { 0 };
     for _ in 0..bisections {
-        match request_fraction(context, acting, step, done + half) {
+        match request_partial_motion(context, acting, step, done + half) {
             MotionOutcome::Moved(moved) => {
                 done += half;
                 last = Some(moved);
@@ -132,20 +132,20 @@ fn request_or_bisect<const D: usize>(
 }
 
 /// Requests a fraction of a motion, counted from its start: all of that fraction, or nothing.
-fn request_fraction<const D: usize>(
+fn request_partial_motion<const D: usize>(
     context: ChainContext<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     step: &StepMotion<D>,
     part: f64,
 ) -> MotionOutcome<D> {
-    let motion = step.motion(part);
+    let motion = step.partial_motion(part);
     // The caller gets a report of a veto, as a planner does.
     let request = MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
-    let ActState { body, before, propagator, .. } = acting;
+    let ChainCycleState { body, before, propagator, .. } = acting;
     let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
     let outcome = outcome
         .unwrap_or_else(|_| MotionOutcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
-    let outcome = match ArmFollower::from_body(context, before, body) {
+    let outcome = match ArmJointSolver::from_body(context, before, body) {
         Some(mut arm) => arm.execute_order(step, part, outcome),
         None => outcome,
     };
@@ -156,17 +156,17 @@ fn request_fraction<const D: usize>(
 }
 
 /// Counts a veto of an ordered motion, and records it in the result.
-fn record_veto<const D: usize>(acting: &mut ActState<'_, D>, veto: &Veto<D>) {
+fn record_veto<const D: usize>(acting: &mut ChainCycleState<'_, D>, veto: &Veto<D>) {
     acting.record_veto(veto);
-    record_result_veto(acting.body, veto);
+    record_order_veto(acting.body, veto);
 }
 
-/// Puts a veto into the result, after [`ActState::record_veto`] has made it the present objection.
-pub(super) fn record_result_veto<const D: usize>(body: &mut ChainBodyState<D>, veto: &Veto<D>) {
+/// Puts a veto into the result, after [`ChainCycleState::record_veto`] has made it the present objection.
+pub(super) fn record_order_veto<const D: usize>(body: &mut ChainBodyState<D>, veto: &Veto<D>) {
     let answer = &mut body.external.answer;
     answer.veto = body.driving.objection;
     answer.obstacle = veto.obstacle;
-    answer.reached_m = with_dimensions(veto.reached);
+    answer.reached_m = convert_dimensions(veto.reached);
 }
 
 /// Completes the result at the end of the chain's motions.
@@ -179,7 +179,7 @@ pub(super) fn complete_result<const D: usize>(
     let done_share = step.done_fraction(chain);
     let reached = chain.points()[step.first];
     let answer = &mut body.external.answer;
-    answer.target_m = step.to.map(with_dimensions);
+    answer.target_m = step.to.map(convert_dimensions);
     answer.outcome = match answer.veto {
         None if gives_way => OrderOutcome::Waited,
         None => OrderOutcome::Moved,
@@ -190,6 +190,6 @@ pub(super) fn complete_result<const D: usize>(
     answer.done_share = if answer.outcome == OrderOutcome::Moved { 1.0 } else { done_share };
     // A veto has set how far the connector could have gone.
     if answer.outcome != OrderOutcome::Vetoed {
-        answer.reached_m = with_dimensions(reached);
+        answer.reached_m = convert_dimensions(reached);
     }
 }

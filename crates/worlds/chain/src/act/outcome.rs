@@ -1,7 +1,7 @@
 //! The outcome of a motion of an initiator.
 
 use super::tasks::give_up_if_stuck;
-use super::{ActState, Initiator};
+use super::{ChainCycleState, Initiator};
 use crate::driver::TaskKind;
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
@@ -9,11 +9,11 @@ use crate::state::ChainBodyState;
 use crate::world::purpose;
 use sidestep_kernel::distr::normal;
 use sidestep_rods::CompletedMotion;
-use sidestep_rods::geometry::{Point, first_axis, normalized, with_dimensions};
+use sidestep_rods::geometry::{Point, convert_dimensions, normalized, unit_x};
 
 /// Whether an initiator moved where it wanted, or near it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MoveResult {
+pub(super) enum MoveProgress {
     Ahead,
     Nowhere,
 }
@@ -21,10 +21,10 @@ pub(super) enum MoveResult {
 /// Counts the result of a motion; returns whether the initiator moved.
 pub(super) fn record_result<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     climbed: &RecoveryOutcome<D>,
     displacement: Point<D>,
-) -> MoveResult {
+) -> MoveProgress {
     acting.body.tally.rungs.record(climbed);
     let agent = initiator.task.agent;
     let went = match climbed {
@@ -32,34 +32,34 @@ pub(super) fn record_result<const D: usize>(
             acting.body.driving.idle = 0;
             acting.body.driving.last_event = None;
             record_motion(acting.body, moved, displacement);
-            return MoveResult::Ahead;
+            return MoveProgress::Ahead;
         }
         RecoveryOutcome::Shorter { moved, .. } => {
             record_motion(acting.body, moved, displacement);
-            MoveResult::Ahead
+            MoveProgress::Ahead
         }
         RecoveryOutcome::Sideways { moved, turn_rad, .. } => {
             report_once(acting, EventKind::Sideways, agent, *turn_rad);
             record_motion(acting.body, moved, displacement);
-            MoveResult::Ahead
+            MoveProgress::Ahead
         }
         RecoveryOutcome::PulledBack { by, moved } => {
             report_once(acting, EventKind::PulledBack, *by, 0.0);
             record_motion(acting.body, moved, [0.0; D]);
-            MoveResult::Nowhere
+            MoveProgress::Nowhere
         }
         RecoveryOutcome::Stuck { .. } => {
             report_once(acting, EventKind::Stuck, agent, 0.0);
-            turn_away(initiator, acting.body);
-            MoveResult::Nowhere
+            turn_to_random_heading(initiator, acting.body);
+            MoveProgress::Nowhere
         }
         RecoveryOutcome::TurnOnTheSpot { .. }
         | RecoveryOutcome::Waiting { .. }
-        | RecoveryOutcome::Vetoed(_) => MoveResult::Nowhere,
+        | RecoveryOutcome::Vetoed(_) => MoveProgress::Nowhere,
     };
     acting.body.driving.idle = match went {
-        MoveResult::Ahead => 0,
-        MoveResult::Nowhere => acting.body.driving.idle.saturating_add(1),
+        MoveProgress::Ahead => 0,
+        MoveProgress::Nowhere => acting.body.driving.idle.saturating_add(1),
     };
     give_up_if_stuck(initiator, acting.body, &mut acting.sink);
     went
@@ -67,7 +67,7 @@ pub(super) fn record_result<const D: usize>(
 
 /// Reports only the first of several events of one kind between two motions that succeeded at the first try.
 fn report_once<const D: usize>(
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     kind: EventKind,
     connector: usize,
     value: f64,
@@ -79,12 +79,15 @@ fn report_once<const D: usize>(
 }
 
 /// Turns a wandering initiator that is stuck to a random direction.
-fn turn_away<const D: usize>(initiator: Initiator<'_, D>, body: &mut ChainBodyState<D>) {
+fn turn_to_random_heading<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &mut ChainBodyState<D>,
+) {
     if matches!(initiator.task.driver, TaskKind::Wander(_)) {
-        let draws = &mut initiator.context.draws(purpose::TURN_AWAY);
+        let draws = &mut initiator.context.random_draws(purpose::TURN_AWAY);
         let any: Point<D> = std::array::from_fn(|_| normal(draws));
-        let ahead: Point<D> = normalized(any).unwrap_or(first_axis());
-        body.driving.ahead = with_dimensions(ahead);
+        let ahead: Point<D> = normalized(any).unwrap_or(unit_x());
+        body.driving.ahead = convert_dimensions(ahead);
     }
 }
 
@@ -94,7 +97,7 @@ fn record_motion<const D: usize>(
     displacement: Point<D>,
 ) {
     if let Some(ahead) = normalized(displacement) {
-        body.driving.ahead = with_dimensions(ahead);
+        body.driving.ahead = convert_dimensions(ahead);
     }
     body.tally.add_motion(moved);
 }

@@ -1,10 +1,10 @@
 //! A driver of the program's own: what its initiator perceives, and what it proposes.
 
 use super::Initiator;
-use crate::driver::own_driver::{DriverPercept, NearbyObstacle, OwnDriver, Proposal};
+use crate::driver::own_driver::{DriverAction, DriverPercept, NearbyObstacle, OwnDriver};
 use crate::state::ChainBodyState;
 use crate::world::{OTHER_CHAIN, purpose};
-use sidestep_rods::geometry::{Aabb, Point, norm, scaled, sub, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, convert_dimensions, norm, scaled, sub};
 use sidestep_rods::{Chain, Obstacles};
 use std::cmp::Ordering;
 
@@ -13,10 +13,10 @@ pub(super) fn ask_own_driver<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
     driver: &OwnDriver,
-) -> Proposal {
+) -> DriverAction {
     let Initiator { context, task, .. } = initiator;
     let connectors_m: Vec<Point<3>> =
-        body.chain.points().iter().map(|at| with_dimensions(*at)).collect();
+        body.chain.points().iter().map(|at| convert_dimensions(*at)).collect();
     let look_m = context.world.look_m;
     let obstacles = nearby_obstacles(&body.chain, task.agent, context.obstacles, look_m);
     let percept = DriverPercept {
@@ -31,7 +31,7 @@ pub(super) fn ask_own_driver<const D: usize>(
         objection: body.driving.objection,
         obstacles: &obstacles,
     };
-    let draws = &mut context.draws(purpose::DRIVER);
+    let draws = &mut context.random_draws(purpose::DRIVER);
     driver.decide(&percept, &mut body.driver_memory, draws)
 }
 
@@ -60,8 +60,8 @@ fn nearby_obstacles<const D: usize>(
             // Ids from there on are those of the parts of other chains.
             id: (obstacle.id < OTHER_CHAIN).then_some(obstacle.id),
             gap_m,
-            to_surface_m: with_dimensions(to_surface),
-            velocity_m_s: with_dimensions(obstacle.velocity_m_s),
+            to_surface_m: convert_dimensions(to_surface),
+            velocity_m_s: convert_dimensions(obstacle.velocity_m_s),
         });
     });
     // A full order, because obstacles are visited in that of the grid.
@@ -88,7 +88,7 @@ mod tests {
             [0.0, 0.0],
             [-1.0, 0.0],
             2,
-            Rod::fixed(0.5, 0.01),
+            Rod::with_fixed_length(0.5, 0.01),
             Connector::free(0.1),
         )
         .expect("a chain");

@@ -1,14 +1,14 @@
 //! Paths that are planned once local rules come no nearer to a target.
 
-use super::{ActState, ChainContext, Initiator};
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::Targets;
 use crate::events::EventKind;
 use crate::scratch::PositionBuffer;
 use crate::state::{ChainBodyState, MotionPlan};
 use crate::world::purpose;
 use sidestep_arms::plan::{
-    ChainPosture, ConfigurationSpace, JointPosture, JointSpace, PlanningQuery, RodSpace, plan,
-    plan_joints,
+    ChainPosture, ConfigurationSpace, JointPosture, JointSpace, PlanningQuery,
+    RodConfigurationSpace, plan, plan_joints,
 };
 use sidestep_kernel::InputError;
 use sidestep_rods::find_tunneling;
@@ -24,7 +24,7 @@ const STEP_LIMIT_FRACTION: f64 = 0.99;
 /// after twice that time, because the search takes long where no path exists.
 pub(super) fn plan_if_stuck<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     targets: &Targets<D>,
 ) {
     let Initiator { context, task, .. } = initiator;
@@ -64,7 +64,7 @@ fn find_path<const D: usize>(
     body: &ChainBodyState<D>,
     query: &PlanningQuery<D>,
 ) -> Result<Option<MotionPlan<D>>, InputError> {
-    let draws = &mut context.draws(purpose::PLAN);
+    let draws = &mut context.random_draws(purpose::PLAN);
     let ChainContext { world, spec, obstacles, .. } = context;
     let chain = &body.chain;
     let rules = world.rules;
@@ -103,28 +103,32 @@ pub(super) fn follow_plan<const D: usize>(
     before: &PositionBuffer<D>,
 ) {
     body.plan = match body.plan.take() {
-        Some(MotionPlan::Rods(path)) => follow_rods(initiator, body, path).map(MotionPlan::Rods),
+        Some(MotionPlan::Rods(path)) => {
+            follow_rod_path(initiator, body, path).map(MotionPlan::Rods)
+        }
         Some(MotionPlan::Joints(path)) => {
-            follow_joints(initiator, body, &before.joints, path).map(MotionPlan::Joints)
+            follow_joint_path(initiator, body, &before.joints, path).map(MotionPlan::Joints)
         }
         None => None,
     };
 }
 
 /// Follows a path of rods; returns the rest of it.
-fn follow_rods<const D: usize>(
+fn follow_rod_path<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
     mut path: VecDeque<ChainPosture<D>>,
 ) -> Option<VecDeque<ChainPosture<D>>> {
     let ChainContext { world, obstacles, .. } = initiator.context;
     let self_collision = world.rules.self_collision;
-    let space = RodSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent).ok()?;
+    let space =
+        RodConfigurationSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent)
+            .ok()?;
     let from = space.present_posture();
     let to = path.front()?;
     let limits = StepLimits::from_initiator(initiator);
-    let segment = Segment { space: &space, from: &from, to };
-    let (next, is_there) = limits.step(&segment, 1.0, ChainPosture::clone);
+    let segment = PathSegment { space: &space, from: &from, to };
+    let (next, is_there) = limits.next_posture(&segment, 1.0, ChainPosture::clone);
     if !space.is_path_free(&from, &next) || !move_along(initiator, body, &from, &next) {
         return None;
     }
@@ -136,7 +140,7 @@ fn follow_rods<const D: usize>(
 
 /// Follows a path of an arm's joints; returns the rest of it. In a cycle in which the arm escaped from something its
 /// joints have no speed left for the plan.
-fn follow_joints<const D: usize>(
+fn follow_joint_path<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
     joints_before: &[f64],
@@ -159,9 +163,9 @@ fn follow_joints<const D: usize>(
         limits.joint = limits.joint.min(escape.speed_max_m_s * dt_s);
     }
     let fraction = arm.follower.reachable_fraction(&joints, to, dt_s);
-    let segment = Segment { space: &space, from: &joints, to };
+    let segment = PathSegment { space: &space, from: &joints, to };
     let (mut next, is_there) =
-        limits.step(&segment, fraction, |values| arm.connector_positions::<D>(values));
+        limits.next_posture(&segment, fraction, |values| arm.connector_positions::<D>(values));
     // Rounding must not make a motion at exactly the maximum speed faster.
     for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.reachable_ranges(&joints, dt_s)) {
         *x = x.clamp(lower, upper);
@@ -208,7 +212,7 @@ struct StepLimits {
 }
 
 /// A straight piece of a planned path.
-struct Segment<'a, S: ConfigurationSpace> {
+struct PathSegment<'a, S: ConfigurationSpace> {
     space: &'a S,
     from: &'a S::Posture,
     to: &'a S::Posture,
@@ -222,13 +226,13 @@ impl StepLimits {
 
     /// Returns the posture between two that is reached in one cycle, at most a `fraction` of the motion, and whether
     /// it is the second one. `positions` returns where the connectors of a posture are.
-    fn step<const D: usize, S: ConfigurationSpace>(
+    fn next_posture<const D: usize, S: ConfigurationSpace>(
         &self,
-        segment: &Segment<'_, S>,
+        segment: &PathSegment<'_, S>,
         mut fraction: f64,
         positions: impl Fn(&S::Posture) -> ChainPosture<D>,
     ) -> (S::Posture, bool) {
-        let Segment { space, from, to } = *segment;
+        let PathSegment { space, from, to } = *segment;
         let start = positions(from);
         let mut next = space.interpolate(from, to, fraction);
         while fraction >= MIN_FRACTION {

@@ -45,6 +45,6 @@ pub(super) fn out_of_range_veto<const D: usize>(chain: &Chain<D>, by: usize) -> 
 }
 
 /// Returns whether some connector is not free, so that reaching a place takes return passes.
-pub(super) fn is_held<const D: usize>(chain: &Chain<D>) -> bool {
+pub(super) fn has_held_connector<const D: usize>(chain: &Chain<D>) -> bool {
     chain.connectors().iter().any(|c| c.is_still() || c.mobility != Mobility::Free)
 }

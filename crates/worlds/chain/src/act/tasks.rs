@@ -5,11 +5,14 @@ use super::{ChainContext, Initiator};
 use crate::driver::own_driver::DriverMemory;
 use crate::driver::{Task, TaskKind};
 use crate::events::{Event, EventKind};
-use crate::metrics::AbandonedTaskPart;
+use crate::metrics::AbandonedSubtask;
 use crate::state::{ChainBodyState, Standstill};
 
 /// Returns how a task ends: a list of targets none of which was reached is not done.
-pub(super) fn end_event<const D: usize>(task: &Task<D>, body: &ChainBodyState<D>) -> EventKind {
+pub(super) fn task_end_event<const D: usize>(
+    task: &Task<D>,
+    body: &ChainBodyState<D>,
+) -> EventKind {
     if !matches!(task.driver, TaskKind::Targets(_)) {
         return EventKind::Done;
     }
@@ -27,7 +30,7 @@ pub(super) fn start_next_task<const D: usize>(
     how: EventKind,
 ) {
     let Some(task) = context.task(body) else { return };
-    body.catch_up();
+    body.apply_deferred_motions();
     body.plan = None;
     body.standstill = Standstill::default();
     body.driver_memory = DriverMemory::default();
@@ -36,8 +39,10 @@ pub(super) fn start_next_task<const D: usize>(
     let ended = f64::from(driving.task);
     driving.start_next_task(next.agent, body.chain.points());
     body.tally.done += u64::from(how == EventKind::Done);
-    body.motions =
-        context.spec.motions(&body.driving).expect("scripts are tried when they are compiled");
+    body.motions = context
+        .spec
+        .script_motions(&body.driving)
+        .expect("scripts are tried when they are compiled");
     sink.record(&body.chain, how, task.agent, ended);
 }
 
@@ -50,7 +55,7 @@ pub(super) fn give_up_if_stuck<const D: usize>(
 ) {
     let Initiator { context, task, .. } = initiator;
     let cycles_tried = body.driving.idle.max(body.driving.late);
-    if context.world.start_time_s(u64::from(cycles_tried)) <= task.patience_s {
+    if context.world.cycle_start_time_s(u64::from(cycles_tried)) <= task.patience_s {
         return;
     }
     let objection = body.driving.objection;
@@ -59,7 +64,7 @@ pub(super) fn give_up_if_stuck<const D: usize>(
         TaskKind::Targets(targets) => 1.0 / targets.places.len() as f64,
         _ => 1.0 - context.world.fraction_done(body, task),
     };
-    body.tally.given_up.push(AbandonedTaskPart {
+    body.tally.given_up.push(AbandonedSubtask {
         task: body.driving.task,
         part: body.driving.next,
         nearest_m: body.driving.nearest_m,
@@ -75,7 +80,7 @@ pub(super) fn give_up_if_stuck<const D: usize>(
             let event = sink.new_event(&body.chain, EventKind::TargetGivenUp, by, target);
             sink.events.push(Event { reason, ..event });
             body.plan = None;
-            body.driving.advance_part();
+            body.driving.start_next_subtask();
         }
         _ => start_next_task(context, body, sink, EventKind::GivenUp),
     }

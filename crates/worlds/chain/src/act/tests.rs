@@ -4,7 +4,7 @@ use crate::events::EventKind;
 use crate::metrics::ChainTally;
 use crate::scenario::ChainScenario;
 use crate::state::Snapshot;
-use crate::{ChainRun, ChainState};
+use crate::{ChainRun, ChainWorldState};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
@@ -267,9 +267,9 @@ fn the_time_for_which_scattered_parts_have_waited_is_a_part_of_the_state() {
 
     // Also without its counts a chain that is restored gives up when it would have.
     let world = run.world();
-    let state =
-        ChainState::restore(world, &after, vec![ChainTally::default()]).expect("its own state");
-    let waited = |state: &ChainState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
+    let state = ChainWorldState::restore(world, &after, vec![ChainTally::default()])
+        .expect("its own state");
+    let waited = |state: &ChainWorldState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
     assert!(waited(&state).is_some_and(|cycles| cycles > 100), "{:?}", waited(&state));
     assert_eq!(waited(&state), waited(run.state()));
     let told = run.agent_metrics().to_string();
@@ -343,7 +343,7 @@ fn a_literal_escape_of_very_many_steps_is_refused() {
     let error = compiled(text("1e5", "literal")).expect_err("too many steps");
     assert!(error.cause().contains("flee 2e3 m in a cycle"), "{error}");
     assert!(
-        error.position().is_some() && error.remedy().contains("chain.escape_speed_m_s"),
+        error.line_and_column().is_some() && error.remedy().contains("chain.escape_speed_m_s"),
         "{error}"
     );
     compiled(text("1e5", "simultaneous")).expect("solved at once");
@@ -352,7 +352,7 @@ fn a_literal_escape_of_very_many_steps_is_refused() {
 
 #[test]
 fn a_motion_of_many_sub_steps_heeds_an_interrupt() {
-    let rod = Rod::fixed(0.5, 0.01);
+    let rod = Rod::with_fixed_length(0.5, 0.01);
     let mut chain =
         Chain::straight([0.0; 2], [-1.0, 0.0], 3, rod, Connector::free(0.05)).expect("a chain");
     let ball = Obstacles::new(vec![Obstacle::ball(0, [0.0, 99.0], 0.1)], 1.0).expect("a ball");

@@ -1,8 +1,8 @@
 //! An initiator on wheels: the link between the swarm's leader and this world (slides N1 to N6).
 
 use super::initiator::{move_initiator, wait_for_escape};
-use super::outcome::MoveResult;
-use super::{ActState, Initiator};
+use super::outcome::MoveProgress;
+use super::{ChainCycleState, Initiator};
 use crate::driver::TaskKind;
 use crate::navigate::{NavigationGoal, Navigator};
 use crate::state::ChainBodyState;
@@ -10,7 +10,7 @@ use crate::swarm::drive::{Pose2, WheelSpeeds};
 use crate::swarm::follower::speed_fraction;
 use crate::swarm::leader::LeaderDecision;
 use sidestep_kernel::math::{atan2, cos, sin, wrap_angle};
-use sidestep_rods::geometry::{Point, distance, move_toward, with_dimensions};
+use sidestep_rods::geometry::{Point, convert_dimensions, distance, move_toward};
 
 /// Time for which a leader stands and waits for a robot that is late, s: enough to turn around and drive half a meter.
 const LATE_ROBOT_TIMEOUT_S: f64 = 3.0;
@@ -34,7 +34,7 @@ pub(super) struct WheelStep {
 }
 
 /// A navigator and the chain that it leads.
-pub(super) struct NavigatorContext<'a, const D: usize> {
+pub(super) struct NavigatedChain<'a, const D: usize> {
     pub(super) initiator: Initiator<'a, D>,
     pub(super) navigator: &'a Navigator,
     pub(super) body: &'a mut ChainBodyState<D>,
@@ -43,24 +43,24 @@ pub(super) struct NavigatorContext<'a, const D: usize> {
 /// Moves an initiator on wheels; one that is blocked may turn on the spot.
 pub(super) fn drive_on_wheels<const D: usize>(
     initiator: Initiator<'_, D>,
-    acting: &mut ActState<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
     steered: WheelStep,
 ) {
     let TaskKind::Navigate(navigator) = &initiator.task.driver else { return };
     let WheelStep { pose, wheels } = steered;
     if comes_too_near(acting.body, initiator.task.agent, pose.at) {
         wait_for_escape(initiator, acting);
-        return NavigatorContext { initiator, navigator, body: acting.body }
-            .turn_if_blocked(wheels);
+        return NavigatedChain { initiator, navigator, body: acting.body }.turn_if_blocked(wheels);
     }
     let was = initiator.position(acting.body);
-    let went = move_initiator(initiator, acting, with_dimensions(pose.at));
-    let mut wheeled = NavigatorContext { initiator, navigator, body: acting.body };
+    let went = move_initiator(initiator, acting, convert_dimensions(pose.at));
+    let mut wheeled = NavigatedChain { initiator, navigator, body: acting.body };
     match went {
-        MoveResult::Ahead => wheeled.update_heading(pose.heading_rad),
+        MoveProgress::Ahead => wheeled.update_heading(pose.heading_rad),
         // A robot whose connector was pulled away follows it on its wheels.
-        MoveResult::Nowhere if wheeled.has_robots() && initiator.position(wheeled.body) != was => {}
-        MoveResult::Nowhere => wheeled.turn_if_blocked(wheels),
+        MoveProgress::Nowhere
+            if wheeled.has_robots() && initiator.position(wheeled.body) != was => {}
+        MoveProgress::Nowhere => wheeled.turn_if_blocked(wheels),
     }
 }
 
@@ -86,14 +86,14 @@ fn comes_too_near<const D: usize>(body: &ChainBodyState<D>, agent: usize, to: Po
     })
 }
 
-impl<const D: usize> NavigatorContext<'_, D> {
+impl<const D: usize> NavigatedChain<'_, D> {
     fn has_robots(&self) -> bool {
         self.initiator.context.spec.robots.is_some()
     }
 
     /// Returns whether a navigator has reached its goal.
     pub(super) fn has_arrived(&self) -> bool {
-        let at = with_dimensions(self.initiator.position(self.body));
+        let at = convert_dimensions(self.initiator.position(self.body));
         let index = self.body.driving.next as usize;
         self.navigator.goal.as_ref().is_some_and(|goal| goal.is_reached(at, index))
     }
@@ -101,7 +101,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
     /// Returns the step of a decision, slower if robots lag; counts the cycles in which it stands.
     pub(super) fn steer(&mut self, decision: LeaderDecision) -> WheelStep {
         let world = self.initiator.context.world;
-        self.locate();
+        self.locate_on_goal_line();
         let pace = self.speed_fraction();
         let body = &mut *self.body;
         let driving = &mut body.driving;
@@ -117,7 +117,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
         leader.followed = decision.followed;
         body.driving.leader = Some(leader);
         body.tally.layers[decision.layer as usize - 1] += 1;
-        let waited_s = world.start_time_s(u64::from(body.driving.rested));
+        let waited_s = world.cycle_start_time_s(u64::from(body.driving.rested));
         let pace = if waited_s > LATE_ROBOT_TIMEOUT_S { RESUME_SPEED_FRACTION } else { pace };
         let slowed = decision.wheels.scaled(pace);
         let pose = self.navigator.drive.step(leader.pose, slowed, world.dt_s);
@@ -125,14 +125,14 @@ impl<const D: usize> NavigatorContext<'_, D> {
     }
 
     /// Finds where on the line to its goal a navigator begins its task.
-    fn locate(&mut self) {
+    fn locate_on_goal_line(&mut self) {
         // A task without a leader's memory has not taken its first step yet.
         if self.body.driving.leader.is_some() {
             return;
         }
         if let Some(goal) = &self.navigator.goal {
-            let at = with_dimensions(self.initiator.position(self.body));
-            self.body.driving.next = goal.start_index(at) as u32;
+            let at = convert_dimensions(self.initiator.position(self.body));
+            self.body.driving.next = goal.start_waypoint_index(at) as u32;
         }
     }
 
@@ -142,7 +142,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
     pub(super) fn robot_return_target(&self, has_fled: bool) -> Option<Point<D>> {
         let leader = self.body.driving.leader.filter(|_| self.has_robots())?;
         let at = self.initiator.position(self.body);
-        let robot = with_dimensions(leader.pose.at);
+        let robot = convert_dimensions(leader.pose.at);
         if at == robot {
             return None;
         }
@@ -166,7 +166,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
 
     /// Updates a navigator that has moved, with a heading that the chain did not veto.
     fn update_heading(&mut self, heading_rad: f64) {
-        let at: Point<2> = with_dimensions(self.initiator.position(self.body));
+        let at: Point<2> = convert_dimensions(self.initiator.position(self.body));
         let driving = &mut self.body.driving;
         let Some(leader) = &mut driving.leader else { return };
         leader.pose = Pose2 { at, heading_rad };
@@ -182,7 +182,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
     /// Turns a navigator that is blocked on the spot, if it can.
     fn turn_if_blocked(&mut self, wheels: WheelSpeeds) {
         let Some(leader) = self.body.driving.leader else { return };
-        let wheels = self.navigator.leader.blocked_wheels(wheels);
+        let wheels = self.navigator.leader.wheel_speeds_if_blocked(wheels);
         let turned =
             self.navigator.drive.step(leader.pose, wheels, self.initiator.context.world.dt_s);
         self.update_heading(turned.heading_rad);
@@ -192,7 +192,7 @@ impl<const D: usize> NavigatorContext<'_, D> {
     fn speed_fraction(&self) -> f64 {
         let Some(robots) = &self.initiator.context.spec.robots else { return 1.0 };
         let followers = self.body.robots.iter().zip(self.body.chain.points());
-        let lags_m = followers.map(|(robot, at)| distance(robot.pose.at, with_dimensions(*at)));
+        let lags_m = followers.map(|(robot, at)| distance(robot.pose.at, convert_dimensions(*at)));
         speed_fraction(lags_m.fold(0.0, f64::max), robots.lag_limit_m)
     }
 }

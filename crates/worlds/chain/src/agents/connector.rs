@@ -9,19 +9,19 @@ use super::control::{ExecutedMotion, LeaderOutcome};
 use super::link::NeighborLink;
 use super::message::{MotionProtocol, NeighborMessage, Packet};
 use super::percept::{ConnectorPercept, ConnectorRole};
-use super::side::{ChainSide, PerSide};
+use super::side::{NeighborSide, PerSide};
 use super::traffic::NetworkTraffic;
 use crate::motion::recovery::RecoveryLimits;
 use crate::world::ChainWorld;
 use climb::RecoveryProgress;
-use follow::SlaveMotion;
+use follow::SlaveMotionState;
 use lead::LeadMotionState;
 use sidestep_kernel::network::{
-    ConversationId, DropCounts, DropReason, PacketHeader, RetryPolicy, digest, parse_packet,
+    ConversationId, DropCounts, DropReason, PacketHeader, RetryPolicy, digest_pieces, parse_packet,
 };
 use sidestep_kernel::{Cycle, EntityId, InputError};
 use sidestep_rods::geometry::Point;
-use sidestep_rods::local_solver::LocalSolver;
+use sidestep_rods::local_solver::ConnectorReactionSolver;
 use sidestep_rods::{Chain, Obstacles, ReactionRules, Rod};
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ pub struct ConnectorAgent<const D: usize> {
     rods: PerSide<Option<Rod>>,
     /// Receivers of the packets to each neighbor; made once, because packets share their list of receivers.
     receivers: PerSide<Option<Arc<[EntityId]>>>,
-    solver: LocalSolver<D>,
+    solver: ConnectorReactionSolver<D>,
     /// Obstacles that its sensors see in this cycle.
     obstacles: Obstacles<D>,
     /// The cycle; none before the first.
@@ -63,8 +63,8 @@ pub struct ConnectorAgent<const D: usize> {
     links: PerSide<Option<NeighborLink<NeighborMessage<D>>>>,
     missing: PerSide<Option<u32>>,
     /// Packets of a cycle that has not begun here yet.
-    early_packets: Vec<(ChainSide, Cycle, Packet<D>)>,
-    following: Option<SlaveMotion>,
+    early_packets: Vec<(NeighborSide, Cycle, Packet<D>)>,
+    following: Option<SlaveMotionState>,
     leading: Option<LeadMotionState<D>>,
     climbing: Option<RecoveryProgress<D>>,
     /// Number of the motion that it makes in this cycle.
@@ -142,13 +142,13 @@ impl<const D: usize> ConnectorAgent<D> {
         let spec = &world.chains[chain as usize];
         let mut agent = Self::from_chain(&spec.start, connector, &world.rules, world.rungs);
         agent.solver = agent.solver.with_reaction(world.reaction.clone());
-        agent.first_id = world.first_id(chain);
+        agent.first_id = world.first_connector_id(chain);
         agent.fingerprint = world.fingerprint;
-        agent.members = member_digest(agent.first_id, agent.n);
+        agent.members = member_ids_digest(agent.first_id, agent.n);
         agent.receivers = neighbor_receivers(agent.first_id, connector, agent.n);
         agent.radio = world.network.as_ref().map(|network| RadioTimeouts {
             retry: network.retry_policy(),
-            ticks: network.deadline_ticks(),
+            ticks: network.conversation_ticks(),
         });
         agent
     }
@@ -156,7 +156,7 @@ impl<const D: usize> ConnectorAgent<D> {
     /// Returns the same agent, which talks only with agents of the same build.
     #[must_use]
     pub fn with_build(self, build: &str) -> Self {
-        let fingerprint = digest([build.as_bytes(), &self.fingerprint.to_le_bytes()]);
+        let fingerprint = digest_pieces([build.as_bytes(), &self.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
     }
 
@@ -177,12 +177,12 @@ impl<const D: usize> ConnectorAgent<D> {
             n,
             first_id: 0,
             fingerprint: 0,
-            members: member_digest(0, n),
+            members: member_ids_digest(0, n),
             radio: None,
             rungs,
             rods,
             receivers: neighbor_receivers(0, k, n),
-            solver: LocalSolver::new(chain, k as usize, rules),
+            solver: ConnectorReactionSolver::new(chain, k as usize, rules),
             obstacles: Obstacles::default(),
             cycle: None,
             began: 0,
@@ -212,7 +212,7 @@ impl<const D: usize> ConnectorAgent<D> {
     pub(crate) fn with_network(self, network: Option<&sidestep_kernel::network::Network>) -> Self {
         let radio = network.map(|network| RadioTimeouts {
             retry: network.retry_policy(),
-            ticks: network.deadline_ticks(),
+            ticks: network.conversation_ticks(),
         });
         Self { radio, ..self }
     }
@@ -235,7 +235,7 @@ impl<const D: usize> ConnectorAgent<D> {
     /// # Errors
     /// When a number of the percept is invalid; then the agent is as before.
     pub fn start(&mut self, percept: ConnectorPercept<D>, tick: u64) -> Result<(), InputError> {
-        self.obstacles.set_moving(&percept.validated_obstacles(self.me, self.n)?)?;
+        self.obstacles.replace_moving(&percept.validated_obstacles(self.me, self.n)?)?;
         self.solver.set_max_bend_rad(percept.max_bend_rad)?;
         self.cycle = Some(percept.cycle);
         self.began = tick;
@@ -292,7 +292,7 @@ impl<const D: usize> ConnectorAgent<D> {
             }
             (ConnectorRole::Leads(intention), None) => {
                 self.climbing = Some(RecoveryProgress::new(intention, self.position.base));
-                return self.process();
+                return self.advance_until_waiting();
             }
         }
         self.finish(None);
@@ -314,7 +314,7 @@ impl<const D: usize> ConnectorAgent<D> {
         let (header, message) = parse_packet::<MotionProtocol>(bytes, self.fingerprint)?;
         let PacketHeader { conversation: ConversationId { cycle, members, .. }, sender, .. } =
             header;
-        let mut sides = ChainSide::ALL.into_iter();
+        let mut sides = NeighborSide::ALL.into_iter();
         let side = sides.find(|side| self.neighbor_id(*side) == Some(from));
         let side = side.filter(|_| sender == from).ok_or(DropReason::Sender)?;
         if members != self.members {
@@ -334,7 +334,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Returns the id on the network of the neighbor on a side, if there is one.
-    fn neighbor_id(&self, side: ChainSide) -> Option<EntityId> {
+    fn neighbor_id(&self, side: NeighborSide) -> Option<EntityId> {
         let neighbor = side.neighbor(self.me, self.n)?;
         Some(self.first_id + neighbor)
     }
@@ -344,21 +344,21 @@ impl<const D: usize> ConnectorAgent<D> {
         self.dropped
     }
 
-    fn accept_packet(&mut self, side: ChainSide, packet: Packet<D>) {
+    fn accept_packet(&mut self, side: NeighborSide, packet: Packet<D>) {
         if self.is_silent {
             return;
         }
         let Some(link) = &mut self.links[side] else { return };
         let messages = link.receive(packet.parcel);
-        let beyond = packet.missing.filter(|k| side.is_side_of(*k, self.me));
+        let beyond = packet.missing.filter(|k| side.is_toward(*k, self.me));
         self.mark_missing(side, beyond);
         for message in messages {
             self.on_message(side, message);
         }
-        self.process();
+        self.advance_until_waiting();
     }
 
-    fn on_message(&mut self, from: ChainSide, message: NeighborMessage<D>) {
+    fn on_message(&mut self, from: NeighborSide, message: NeighborMessage<D>) {
         if self.is_over || self.is_closed {
             return;
         }
@@ -375,14 +375,14 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Records the lost connector on one side, and sends it to the other side if it has changed. A leader stops.
-    fn mark_missing(&mut self, side: ChainSide, missing: Option<u32>) {
+    fn mark_missing(&mut self, side: NeighborSide, missing: Option<u32>) {
         if self.missing[side] == missing {
             return;
         }
         self.missing[side] = missing;
         self.send(side.other(), NeighborMessage::Here);
         if let Some(missing) = missing {
-            self.give_up_leading();
+            self.abort_led_motion();
             if self.climbing.take().is_some() {
                 self.ended = Some(LeaderOutcome::Stands { missing });
                 self.finish(None);
@@ -391,34 +391,34 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     fn nearest_missing(&self) -> Option<u32> {
-        let both = ChainSide::ALL.into_iter().filter_map(|side| self.missing[side]);
+        let both = NeighborSide::ALL.into_iter().filter_map(|side| self.missing[side]);
         both.min_by_key(|k| k.abs_diff(self.me))
     }
 
     /// Sends a message to a neighbor, if there is one.
-    fn send(&mut self, to: ChainSide, message: NeighborMessage<D>) {
+    fn send(&mut self, to: NeighborSide, message: NeighborMessage<D>) {
         if let Some(link) = &mut self.links[to] {
             link.push(message);
         }
     }
 
     /// Ends the cycle, as the leader decides or as a message from the leader says.
-    fn finish(&mut self, from: Option<ChainSide>) {
-        self.give_up_leading();
+    fn finish(&mut self, from: Option<NeighborSide>) {
+        self.abort_led_motion();
         self.is_over = true;
-        for side in ChainSide::ALL.into_iter().filter(|side| Some(*side) != from) {
+        for side in NeighborSide::ALL.into_iter().filter(|side| Some(*side) != from) {
             self.send(side, NeighborMessage::Over);
         }
     }
 
     /// Advances as far as possible before the next message.
-    fn process(&mut self) {
+    fn advance_until_waiting(&mut self) {
         while self.advance_leading() || self.continue_recovery() {}
     }
 }
 
 /// Returns the digest of the ids of a chain's connectors.
-fn member_digest(first_id: EntityId, n: u32) -> u64 {
+fn member_ids_digest(first_id: EntityId, n: u32) -> u64 {
     let ids: Vec<EntityId> = (first_id..first_id + n).collect();
     ConversationId::new(0, MotionProtocol, &ids).members
 }

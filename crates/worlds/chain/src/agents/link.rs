@@ -114,7 +114,7 @@ impl<M: Clone> NeighborLink<M> {
     /// Records the size of a packet that goes over it.
     pub(super) fn record_packet(&mut self, bytes: usize) {
         if let Some(retry) = &mut self.retry {
-            retry.record_packet(bytes);
+            retry.record_packet_size(bytes);
         }
     }
 
@@ -130,7 +130,7 @@ impl<M: Clone> NeighborLink<M> {
     }
 
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
-    pub(super) fn next_parcel(&mut self, tick: u64) -> Option<MessageBatch<M>> {
+    pub(super) fn next_batch(&mut self, tick: u64) -> Option<MessageBatch<M>> {
         // All that are unconfirmed, because the neighbor may lack any of them.
         let from = if self.again { 0 } else { self.sent };
         let confirms = self.owes && self.retry.is_some();
@@ -162,7 +162,7 @@ impl<M: Clone> NeighborLink<M> {
     }
 
     /// Returns whether anything has come from the neighbor in this cycle.
-    pub(super) fn is_heard(&self) -> bool {
+    pub(super) fn has_heard_neighbor(&self) -> bool {
         self.is_heard
     }
 }

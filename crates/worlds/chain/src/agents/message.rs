@@ -21,12 +21,12 @@ impl MotionProtocol {
     const NUMBER: u8 = 2;
 }
 
-impl network::Protocol for MotionProtocol {
-    fn number(self) -> u8 {
+impl network::ConversationTopic for MotionProtocol {
+    fn wire_number(self) -> u8 {
         Self::NUMBER
     }
 
-    fn from_number(number: u8) -> Option<Self> {
+    fn from_wire_number(number: u8) -> Option<Self> {
         (number == Self::NUMBER).then_some(Self)
     }
 }

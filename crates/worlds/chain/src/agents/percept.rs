@@ -97,7 +97,7 @@ impl SensedObstacle {
             }),
             _ => return None,
         };
-        Some(Obstacle::still(self.id, core, self.radius_m))
+        Some(Obstacle::new_static(self.id, core, self.radius_m))
     }
 
     /// Returns the coordinates `k` times `D` and after.

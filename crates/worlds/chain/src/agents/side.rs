@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 
 /// One of the two directions along a chain, and the neighbor there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum ChainSide {
+pub(crate) enum NeighborSide {
     /// Toward connector 0.
     Below,
     /// Toward the last connector.
     Above,
 }
 
-impl ChainSide {
+impl NeighborSide {
     /// In the order of arrays with a value for each side.
     pub(crate) const ALL: [Self; 2] = [Self::Below, Self::Above];
 
@@ -31,7 +31,7 @@ impl ChainSide {
     }
 
     /// Returns whether connector `other` is on this side of connector `k`.
-    pub(crate) fn is_side_of(self, other: u32, k: u32) -> bool {
+    pub(crate) fn is_toward(self, other: u32, k: u32) -> bool {
         match self {
             Self::Below => other < k,
             Self::Above => other > k,
@@ -52,33 +52,33 @@ impl<T> PerSide<T> {
     }
 
     /// Makes the value below first.
-    pub(crate) fn from_fn(mut make: impl FnMut(ChainSide) -> T) -> Self {
-        Self { below: make(ChainSide::Below), above: make(ChainSide::Above) }
+    pub(crate) fn from_fn(mut make: impl FnMut(NeighborSide) -> T) -> Self {
+        Self { below: make(NeighborSide::Below), above: make(NeighborSide::Above) }
     }
 
     /// Visits the value below first.
-    pub(crate) fn for_each(&mut self, mut visit: impl FnMut(ChainSide, &mut T)) {
-        visit(ChainSide::Below, &mut self.below);
-        visit(ChainSide::Above, &mut self.above);
+    pub(crate) fn for_each(&mut self, mut visit: impl FnMut(NeighborSide, &mut T)) {
+        visit(NeighborSide::Below, &mut self.below);
+        visit(NeighborSide::Above, &mut self.above);
     }
 }
 
-impl<T> std::ops::Index<ChainSide> for PerSide<T> {
+impl<T> std::ops::Index<NeighborSide> for PerSide<T> {
     type Output = T;
 
-    fn index(&self, side: ChainSide) -> &T {
+    fn index(&self, side: NeighborSide) -> &T {
         match side {
-            ChainSide::Below => &self.below,
-            ChainSide::Above => &self.above,
+            NeighborSide::Below => &self.below,
+            NeighborSide::Above => &self.above,
         }
     }
 }
 
-impl<T> std::ops::IndexMut<ChainSide> for PerSide<T> {
-    fn index_mut(&mut self, side: ChainSide) -> &mut T {
+impl<T> std::ops::IndexMut<NeighborSide> for PerSide<T> {
+    fn index_mut(&mut self, side: NeighborSide) -> &mut T {
         match side {
-            ChainSide::Below => &mut self.below,
-            ChainSide::Above => &mut self.above,
+            NeighborSide::Below => &mut self.below,
+            NeighborSide::Above => &mut self.above,
         }
     }
 }

@@ -6,7 +6,8 @@
 use crate::agents::{ConnectorAgent, ConnectorControl, ConnectorPercept};
 use crate::world::{ChainWorld, purpose};
 use sidestep_kernel::network::{
-    AgentDistances, AgentLoop, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyTiming,
+    AgentLoop, FaultInjector, FaultStreams, FaultyTransport, InterAgentDistances, Network,
+    ReplyBatching,
 };
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
@@ -33,7 +34,7 @@ impl<'a> NegotiationContext<'a> {
         Self {
             network: world.network.as_ref(),
             streams: world.streams,
-            first_id: world.first_id(chain),
+            first_id: world.first_connector_id(chain),
             begins: world.negotiation_start(now),
         }
     }
@@ -42,23 +43,23 @@ impl<'a> NegotiationContext<'a> {
 impl<const D: usize> ChainWorld<D> {
     /// Returns the first tick of a cycle's talk, and its time in seconds after the start of the run.
     pub fn negotiation_start(&self, now: Cycle) -> (u64, f64) {
-        (first_tick(self.network.as_ref(), now), self.start_time_s(now))
+        (first_tick(self.network.as_ref(), now), self.cycle_start_time_s(now))
     }
 
     /// Returns the faults of one connector's packets where each has a process of its own; none where the
     /// network is reliable.
     pub fn fault_injector(&self) -> Option<FaultInjector> {
-        Some(FaultInjector::new(self.network.clone()?, draws(self.streams)))
+        Some(FaultInjector::new(self.network.clone()?, fault_streams(self.streams)))
     }
 }
 
 /// Returns the tick in which the talk of a cycle starts.
 pub(super) fn first_tick(network: Option<&Network>, now: Cycle) -> u64 {
     // One tick more than a talk lasts, so that no packet of a cycle arrives in the next one.
-    network.map_or(0, |network| now * (network.deadline_ticks() + 1))
+    network.map_or(0, |network| now * (network.conversation_ticks() + 1))
 }
 
-fn draws(streams: Streams) -> FaultStreams {
+fn fault_streams(streams: Streams) -> FaultStreams {
     FaultStreams {
         streams,
         network: purpose::NETWORK,
@@ -70,7 +71,7 @@ fn draws(streams: Streams) -> FaultStreams {
 /// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
 struct StartPositions<'a, const D: usize>(EntityId, &'a [ConnectorPercept<D>]);
 
-impl<const D: usize> AgentDistances for StartPositions<'_, D> {
+impl<const D: usize> InterAgentDistances for StartPositions<'_, D> {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         let [a, b] = link.map(|id| self.1[(id - self.0) as usize].at.0);
         distance(a, b)
@@ -89,7 +90,7 @@ pub(super) fn run_agents<const D: usize>(
 ) -> Vec<Option<ConnectorControl<D>>> {
     let places = StartPositions(talk.first_id, &sights);
     let begins = [talk.begins];
-    let draws = draws(talk.streams);
+    let draws = fault_streams(talk.streams);
     let transport = FaultyTransport::in_memory(talk.network, draws, Some(&places), &begins);
     let (start_tick, _) = talk.begins;
     for (agent, sight) in agents.iter_mut().zip(&sights) {
@@ -98,18 +99,18 @@ pub(super) fn run_agents<const D: usize>(
     let mut network = AgentLoop {
         transport,
         replies: match talk.network {
-            Some(_) => ReplyTiming::PerTick,
+            Some(_) => ReplyBatching::PerTick,
             // Where no time is counted, a process answers each packet when it comes.
-            None => ReplyTiming::PerPacket,
+            None => ReplyBatching::PerPacket,
         },
-        max_flight_ticks: Some(talk.network.map_or(1, max_flight_ticks)),
+        max_flight_ticks: Some(talk.network.map_or(1, max_packet_delay_ticks)),
     };
     network.run(agents, start_tick, ConnectorAgent::is_done);
     agents.iter().map(ConnectorAgent::control).collect()
 }
 
 /// Returns the most ticks that a packet takes; no bound where large ones take their time on a link.
-fn max_flight_ticks(network: &Network) -> u64 {
+fn max_packet_delay_ticks(network: &Network) -> u64 {
     let is_narrow = network.bandwidth_bit_s < f64::INFINITY;
     if is_narrow { u64::MAX } else { 1 + u64::from(network.faults().max_delay_cycles) }
 }

@@ -1,6 +1,6 @@
 //! Perception of the connectors of a chain at the start of their talk.
 
-use crate::agents::side::ChainSide;
+use crate::agents::side::NeighborSide;
 use crate::agents::{ConnectorPercept, ConnectorRole, SensedObstacle};
 use crate::state::ChainBodyState;
 use crate::world::{ChainSpec, ChainWorld};
@@ -22,7 +22,7 @@ pub(crate) struct SensingContext<'a, const D: usize> {
 
 impl<const D: usize> SensingContext<'_, D> {
     /// Returns the position of the neighbor of connector `k` on a side, if there is one.
-    fn neighbor_position(&self, k: u32, side: ChainSide) -> Option<WirePoint<D>> {
+    fn neighbor_position(&self, k: u32, side: NeighborSide) -> Option<WirePoint<D>> {
         let points = self.body.chain.points();
         let neighbor = side.neighbor(k, points.len() as u32)?;
         Some(WirePoint(points[neighbor as usize]))
@@ -42,7 +42,7 @@ impl<const D: usize> SensingContext<'_, D> {
 
 impl<const D: usize> ChainWorld<D> {
     /// Returns the id on the network of a chain's connector 0; the others follow.
-    pub(crate) fn first_id(&self, chain: EntityId) -> EntityId {
+    pub(crate) fn first_connector_id(&self, chain: EntityId) -> EntityId {
         let before = self.chains[..chain as usize].iter().map(|spec| spec.start.points().len());
         before.sum::<usize>() as EntityId
     }
@@ -55,8 +55,8 @@ impl<const D: usize> ChainWorld<D> {
         role: &ConnectorRole<D>,
     ) -> Vec<ConnectorPercept<D>> {
         let SensingContext { chain, now, body, .. } = sensed;
-        let first_id = self.first_id(chain);
-        let at_s = self.start_time_s(now);
+        let first_id = self.first_connector_id(chain);
+        let at_s = self.cycle_start_time_s(now);
         let sees_m = self.sensor_range_m(&self.chains[chain as usize]);
         let n = body.chain.points().len() as u32;
         let mut percepts = Vec::with_capacity(n as usize);
@@ -67,7 +67,7 @@ impl<const D: usize> ChainWorld<D> {
             percepts.push(ConnectorPercept {
                 cycle: now,
                 at: WirePoint(body.chain.points()[k as usize]),
-                neighbors: ChainSide::ALL.map(|side| sensed.neighbor_position(k, side)),
+                neighbors: NeighborSide::ALL.map(|side| sensed.neighbor_position(k, side)),
                 max_bend_rad: body.chain.connectors()[k as usize].max_bend_rad,
                 seen: sensed.obstacles_near(k, sees_m),
                 is_silent,

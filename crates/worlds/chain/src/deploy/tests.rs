@@ -6,7 +6,7 @@ mod silence;
 
 use super::final_positions;
 use super::negotiation::{NegotiationContext, first_tick, run_agents};
-use crate::agents::side::ChainSide;
+use crate::agents::side::NeighborSide;
 use crate::agents::{
     ConnectorAgent, ConnectorControl, ConnectorPercept, ConnectorRole, Intention, LeaderOutcome,
     SensedObstacle,
@@ -57,7 +57,7 @@ fn sights<const D: usize>(
     let sight = |k: u32| ConnectorPercept {
         cycle: 5,
         at: WirePoint(points[k as usize]),
-        neighbors: ChainSide::ALL
+        neighbors: NeighborSide::ALL
             .map(|side| side.neighbor(k, n).map(|j| WirePoint(points[j as usize]))),
         max_bend_rad: chain.connectors()[k as usize].max_bend_rad,
         seen: seen.clone(),

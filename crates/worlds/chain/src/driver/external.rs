@@ -79,7 +79,7 @@ impl ExternalControlState {
     }
 
     /// Returns whether it belongs to a chain of `n` connectors.
-    pub(crate) fn is_within(&self, n: usize) -> bool {
+    pub(crate) fn has_valid_indices(&self, n: usize) -> bool {
         let Orders { connector, rod, .. } = self.orders;
         let is_connector_there = connector.is_none_or(|k| (k as usize) < n);
         let is_rod_there = rod.is_none_or(|k| (k as usize) < n.saturating_sub(1));

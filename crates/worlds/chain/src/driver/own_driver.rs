@@ -10,7 +10,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Drivers of a program's own, by the names that scenarios call them.
-pub type Drivers = BTreeMap<String, Arc<dyn Driver>>;
+pub type DriverRegistry = BTreeMap<String, Arc<dyn Driver>>;
 
 /// A rule by which an initiator chooses its motions. Implement it for drivers of your own; see
 /// `crates/sidestep/examples/own_driver.rs`.
@@ -25,7 +25,7 @@ pub trait Driver: Debug + Send + Sync {
         percept: &DriverPercept<'_>,
         memory: &mut DriverMemory,
         draws: &mut Draws,
-    ) -> Proposal;
+    ) -> DriverAction;
 }
 
 /// A driver's memory between two cycles of its task: four words; their meaning is up to the driver.
@@ -37,7 +37,7 @@ pub struct DriverMemory {
 
 /// What an initiator is to do in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Proposal {
+pub enum DriverAction {
     /// Rest; it moves only to get out of the way.
     Rest,
     /// Go toward a place, in meters, as far as its speed allows; in the plane the last coordinate counts for nothing.
@@ -106,9 +106,9 @@ impl OwnDriver {
         percept: &DriverPercept<'_>,
         memory: &mut DriverMemory,
         draws: &mut Draws,
-    ) -> Proposal {
+    ) -> DriverAction {
         let proposal = self.driver.decide(percept, memory, draws);
-        if let Proposal::GoTo(to) = proposal {
+        if let DriverAction::GoTo(to) = proposal {
             let is_place = to.iter().all(|coordinate| coordinate.is_finite());
             assert!(
                 is_place,
@@ -124,14 +124,14 @@ impl OwnDriver {
 mod tests {
     use super::*;
     use crate::ChainRun;
-    use crate::own_parts::OwnParts;
+    use crate::own_parts::CustomBehaviors;
     use crate::scenario::AnyChainScenario;
     use sidestep_kernel::Simulation;
     use sidestep_scenario::Source;
 
     /// Proposes one thing, for as many cycles as its memory counts.
     #[derive(Debug)]
-    struct Always(Proposal, u32);
+    struct Always(DriverAction, u32);
 
     impl Driver for Always {
         fn decide(
@@ -139,11 +139,11 @@ mod tests {
             percept: &DriverPercept<'_>,
             memory: &mut DriverMemory,
             _: &mut Draws,
-        ) -> Proposal {
+        ) -> DriverAction {
             let [count, ..] = &mut memory.words;
             *count += 1;
             assert_eq!(percept.cycles, u64::from(*count), "a task begins without memories");
-            if *count > self.1 { Proposal::Done } else { self.0 }
+            if *count > self.1 { DriverAction::Done } else { self.0 }
         }
     }
 
@@ -153,10 +153,10 @@ mod tests {
              [[chains]]\nconnectors = 3\nat_m = [0.0, 0.0]\nrod_m = 0.5\ntasks = [{tasks}]\n"
         );
         let source = Source::new("s.toml", text, "");
-        let mut own = OwnParts::default();
+        let mut own = CustomBehaviors::default();
         own.drivers.insert("own".into(), Arc::new(driver));
         let AnyChainScenario::Plane(compiled) =
-            AnyChainScenario::with_parts(&source, &own).expect("a scenario")
+            AnyChainScenario::with_custom_behaviors(&source, &own).expect("a scenario")
         else {
             panic!("it is in the plane")
         };
@@ -170,7 +170,7 @@ mod tests {
         let to = [-1.0, -1.0, 0.0];
         let built_in = "{ kind = \"targets\", targets_m = [[-1.0, -1.0]], lasts_s = 1.0 }";
         let places = |tasks: &str| {
-            let run = run(Always(Proposal::GoTo(to), u32::MAX), tasks, 40);
+            let run = run(Always(DriverAction::GoTo(to), u32::MAX), tasks, 40);
             run.state().body(0).chain.points().to_vec()
         };
         assert_eq!(places("{ kind = \"own\", lasts_s = 1.0 }"), places(built_in));
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_driver_that_is_done_makes_room_for_the_next_task() {
-        let driver = Always(Proposal::Rest, 5);
+        let driver = Always(DriverAction::Rest, 5);
         let run = run(driver, "{ kind = \"own\" }, { kind = \"own\" }", 100);
         assert!(run.is_over());
         assert_eq!(run.metrics().done, 2);
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn memory_is_part_of_the_digest_and_of_checkpoints() {
-        let start = |cycles: u64| run(Always(Proposal::Rest, 50), "{ kind = \"own\" }", cycles);
+        let start = |cycles: u64| run(Always(DriverAction::Rest, 50), "{ kind = \"own\" }", cycles);
         let saved = start(20).checkpoint();
         let mut resumed = start(3);
         resumed.restore(&saved).expect("its own checkpoint");

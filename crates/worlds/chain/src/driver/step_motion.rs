@@ -2,8 +2,8 @@
 
 use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, angle_rad, distance, first_axis, lerp, move_toward, norm, normalized,
-    perpendicular, rejection, scaled, sub,
+    Point, add, add_scaled, angle_between_rad, distance, lerp, move_toward, norm, normalized,
+    perpendicular, perpendicular_component, scaled, sub, unit_x,
 };
 use sidestep_rods::{Chain, RequestedMotion};
 
@@ -38,7 +38,7 @@ impl<const D: usize> StepMotion<D> {
     }
 
     /// Returns a fraction of the motion; all of it ends at the target bit for bit.
-    pub(crate) fn motion(&self, part: f64) -> RequestedMotion<D> {
+    pub(crate) fn partial_motion(&self, part: f64) -> RequestedMotion<D> {
         let Self { first, from, to, .. } = *self;
         if self.is_rod {
             return RequestedMotion::Rod { i: first, to: interpolate(from, to, part) };
@@ -71,7 +71,7 @@ fn max_travel_m<const D: usize>(from: [Point<D>; 2], to: [Point<D>; 2]) -> f64 {
     let was_m = norm(was);
     let will_m = norm(will);
     distance(middle(from), middle(to))
-        + 0.5 * (was_m.max(will_m) * angle_rad(was, will) + (will_m - was_m).abs())
+        + 0.5 * (was_m.max(will_m) * angle_between_rad(was, will) + (will_m - was_m).abs())
 }
 
 /// Returns the ends of a rod after a fraction of that motion. In between it is never shorter or longer than at both
@@ -82,9 +82,9 @@ fn interpolate<const D: usize>(from: [Point<D>; 2], to: [Point<D>; 2], part: f64
     }
     let was = sub(from[1], from[0]);
     let will = sub(to[1], to[0]);
-    let u = normalized(was).or(normalized(will)).unwrap_or(first_axis());
-    let aside = normalized(rejection(will, u)).unwrap_or(perpendicular(u));
-    let turn_rad = part * angle_rad(was, will);
+    let u = normalized(was).or(normalized(will)).unwrap_or(unit_x());
+    let aside = normalized(perpendicular_component(will, u)).unwrap_or(perpendicular(u));
+    let turn_rad = part * angle_between_rad(was, will);
     let direction = add_scaled(scaled(u, cos(turn_rad)), aside, sin(turn_rad));
     let half = scaled(direction, 0.5 * (norm(was) + part * (norm(will) - norm(was))));
     let at = lerp(middle(from), middle(to), part);
@@ -102,7 +102,7 @@ mod tests {
 
     /// Goes on errands of at most `step_m` until the rod is there; returns how many that took.
     fn carried<const D: usize>(start: [Point<D>; 2], to: [Point<D>; 2], step_m: f64) -> usize {
-        let rod = Rod::fixed(distance(start[0], start[1]), 0.01);
+        let rod = Rod::with_fixed_length(distance(start[0], start[1]), 0.01);
         let mut chain =
             Chain::new(start.to_vec(), vec![Connector::free(0.02); 2], vec![rod]).expect("a chain");
         for n in 0..1000 {

@@ -1,7 +1,7 @@
 use crate::ChainRun;
 use crate::kinds;
 use crate::scenario::AnyChainScenario;
-use sidestep_kernel::control::{BufferMut, OrderLog, Orders, SpaceKind, Team};
+use sidestep_kernel::control::{AgentTeam, BufferMut, MultiAgentOrder, OrderLog, ValueDomain};
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::view::{BodyId, FactValue};
 use sidestep_kernel::{Cycle, Simulation};
@@ -67,7 +67,7 @@ fn plane(text: &str, workers: usize) -> ChainRun<2> {
 
 /// Observations of a team: one vector per space.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
-    let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
+    let AgentTeam { agents, observation_spaces: observed, .. } = &run.agent_teams()[team];
     let sizes: Vec<usize> =
         observed.iter().map(|space| space.value_count() * agents.len()).collect();
     let mut whole: Vec<Vec<i64>> = sizes.iter().map(|&n| vec![0; n]).collect();
@@ -91,14 +91,17 @@ fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<f64>> {
 /// The name of a choice that the first agent of a team observes.
 fn name(run: &dyn Simulation, team: usize, space: &str) -> String {
     let number = observed(run, team)[space][0] as usize;
-    let space =
-        run.teams()[team].observation_spaces.iter().find(|s| s.name == space).expect("a space");
-    let SpaceKind::Discrete(names) = &space.kind else { panic!("no choice") };
+    let space = run.agent_teams()[team]
+        .observation_spaces
+        .iter()
+        .find(|s| s.name == space)
+        .expect("a space");
+    let ValueDomain::Discrete(names) = &space.kind else { panic!("no choice") };
     names[number].clone()
 }
 
 fn order(run: &mut dyn Simulation, order: &str, agent: u32, values: &[f64]) {
-    run.order(&Orders { order, agents: &[agent], values })
+    run.order(&MultiAgentOrder { order, agents: &[agent], values })
         .unwrap_or_else(|error| panic!("{error}"));
 }
 
@@ -106,7 +109,7 @@ fn order(run: &mut dyn Simulation, order: &str, agent: u32, values: &[f64]) {
 /// turns a rod instead, every fifth the tail leads.
 fn decide(run: &mut dyn Simulation, team: usize) {
     let (seen, now) = (observed(run, team), run.cycle());
-    let agents = run.teams()[team].agents.clone();
+    let agents = run.agent_teams()[team].agents.clone();
     let n = seen["gap_m"].len() / agents.len();
     for (row, &agent) in agents.iter().enumerate() {
         let k = if now.is_multiple_of(5) { n - 1 } else { 0 };
@@ -128,8 +131,8 @@ fn decide(run: &mut dyn Simulation, team: usize) {
 /// Decides for all chains that take orders, for `cycles` cycles.
 fn decided(run: &mut dyn Simulation, cycles: u64) {
     for _ in 0..cycles {
-        let teams: Vec<usize> = (0..run.teams().len())
-            .filter(|&team| !run.teams()[team].action_spaces.is_empty())
+        let teams: Vec<usize> = (0..run.agent_teams().len())
+            .filter(|&team| !run.agent_teams()[team].action_spaces.is_empty())
             .collect();
         teams.into_iter().for_each(|team| decide(run, team));
         run.advance(1);
@@ -163,7 +166,7 @@ fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers_and_wherever_
         let cycles = 7.min(60 - run.cycle());
         decided(run, cycles);
     });
-    assert!(rows.rows("orders") > 600, "{}", rows.rows("orders"));
+    assert!(rows.row_count("orders") > 600, "{}", rows.row_count("orders"));
     for workers in [1, 2, 3, 8] {
         let mut again = plane(MIXED, workers);
         again.replay_orders(book(&rows)).expect("they were obeyed once");
@@ -228,7 +231,7 @@ fn an_order_is_a_part_of_the_state_until_the_cycle_has_used_it() {
 fn chains_of_one_name_and_length_are_a_team_and_those_that_decide_for_themselves_only_observe() {
     let run = plane(MIXED, 1);
     let teams: Vec<_> = run
-        .teams()
+        .agent_teams()
         .iter()
         .map(|team| {
             (
@@ -243,7 +246,7 @@ fn chains_of_one_name_and_length_are_a_team_and_those_that_decide_for_themselves
         [("snake", vec![0, 1], 5, 15), ("chain", vec![2], 0, 8), ("chain 2", vec![3], 5, 15)];
     assert_eq!(teams, expected);
     for space in run
-        .teams()
+        .agent_teams()
         .iter()
         .flat_map(|team| team.observation_spaces.iter().chain(&team.action_spaces))
     {
@@ -294,11 +297,14 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = plane(MIXED, 1);
     let before = run.digest();
     let one = |order: &'static str, values: &'static [f64], words: &'static str| {
-        (Orders { order, agents: &[0], values }, words)
+        (MultiAgentOrder { order, agents: &[0], values }, words)
     };
     let refused = [
-        (Orders { order: "to_m", agents: &[9], values: &[0.0; 2] }, "there is no chain 9"),
-        (Orders { order: "to_m", agents: &[2], values: &[0.0; 2] }, "chain 2 decides for itself"),
+        (MultiAgentOrder { order: "to_m", agents: &[9], values: &[0.0; 2] }, "there is no chain 9"),
+        (
+            MultiAgentOrder { order: "to_m", agents: &[2], values: &[0.0; 2] },
+            "chain 2 decides for itself",
+        ),
         one("fly", &[0.0], "it takes to_m, connector, reach, rod_to_m, rod"),
         one("to_m", &[0.0; 3], "needs 1 x 2 values, not 3"),
         one("to_m", &[f64::NAN, 0.0], "is NaN; it must be a number from -1000000 to 1000000"),
@@ -319,7 +325,7 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
         assert_eq!(run.digest(), before, "{error}");
     }
     let mut book = OrderLog::default();
-    book.add(3, &Orders { order: "rod_to_m", agents: &[0], values: &[0.0; 4] });
+    book.add(3, &MultiAgentOrder { order: "rod_to_m", agents: &[0], values: &[0.0; 4] });
     let error = run.replay_orders(book).expect_err("a rod is no point").to_string();
     assert!(error.contains("its places are 0 m apart"), "{error}");
     assert!(run.observe(0, &mut []).is_err() && run.observe(7, &mut []).is_err());
@@ -345,11 +351,11 @@ fn who_looks_at_a_connector_sees_the_order_that_is_ahead() {
     order(&mut run, "connector", 0, &[5.0]);
     let digest = run.digest();
     let told = run.inspect(BodyId::new(kinds::CONNECTOR, 0, Some(5))).expect("it is there");
-    assert_eq!(told.value("Wish", "what"), Some(&"go, as ordered".into()));
+    assert_eq!(told.fact_value("Wish", "what"), Some(&"go, as ordered".into()));
     assert_eq!(
-        told.value("Wish", "of"),
+        told.fact_value("Wish", "of"),
         Some(&FactValue::Body(BodyId::new(kinds::CONNECTOR, 0, Some(5))))
     );
-    assert_eq!(told.value("Ladder", "rung"), Some(&"as wanted".into()));
+    assert_eq!(told.fact_value("Ladder", "rung"), Some(&"as wanted".into()));
     assert_eq!(run.digest(), digest);
 }

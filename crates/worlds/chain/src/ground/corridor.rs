@@ -45,13 +45,13 @@ impl CorridorLeg {
     /// Returns its fault, if it has one.
     fn fault(self) -> Option<String> {
         match self {
-            Self::Straight { length_m } if !is_good_length(length_m) => {
+            Self::Straight { length_m } if !is_valid_leg_length(length_m) => {
                 Some(format!("has a length of {length_m} m"))
             }
-            Self::Bend { radius_m, .. } if !is_good_length(radius_m) => {
+            Self::Bend { radius_m, .. } if !is_valid_leg_length(radius_m) => {
                 Some(format!("has a radius of {radius_m} m"))
             }
-            Self::Bend { turn_deg, .. } if !is_good_turn(turn_deg) => {
+            Self::Bend { turn_deg, .. } if !is_valid_turn(turn_deg) => {
                 Some(format!("turns by {turn_deg} degrees"))
             }
             _ => None,
@@ -59,11 +59,11 @@ impl CorridorLeg {
     }
 }
 
-fn is_good_length(length_m: f64) -> bool {
+fn is_valid_leg_length(length_m: f64) -> bool {
     length_m > 0.0 && length_m <= MAX_LENGTH_M
 }
 
-fn is_good_turn(turn_deg: f64) -> bool {
+fn is_valid_turn(turn_deg: f64) -> bool {
     turn_deg != 0.0 && turn_deg.abs() <= MAX_TURN_DEG
 }
 
@@ -87,7 +87,7 @@ impl Corridor {
     /// When there is no leg, or a length, radius, turn or width is not positive (a turn: 0) or
     /// absurd.
     pub fn new(legs: Vec<CorridorLeg>, width_m: f64) -> Result<Self, InputError> {
-        if !is_good_length(width_m) {
+        if !is_valid_leg_length(width_m) {
             return Err(corridor_error("corridor".into(), format!("has a width of {width_m} m")));
         }
         if legs.is_empty() {

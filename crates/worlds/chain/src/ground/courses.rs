@@ -63,9 +63,13 @@ impl<const D: usize> MovingObstacle<D> {
     fn fault(&self) -> Option<(&'static str, &'static str)> {
         let still = ("does not move", "give it a speed, or make it a static obstacle");
         match &self.course {
-            ObstaclePath::Straight { velocity_m_s } if !is_motion(velocity_m_s) => Some(still),
+            ObstaclePath::Straight { velocity_m_s } if !is_valid_velocity(velocity_m_s) => {
+                Some(still)
+            }
             ObstaclePath::Straight { .. } => None,
-            ObstaclePath::Bouncing { velocity_m_s, .. } if !is_motion(velocity_m_s) => Some(still),
+            ObstaclePath::Bouncing { velocity_m_s, .. } if !is_valid_velocity(velocity_m_s) => {
+                Some(still)
+            }
             ObstaclePath::Bouncing { room, .. } if !contains_box(room, &self.bounds) => {
                 Some(("is not in its room", "put it inside, or make the room larger"))
             }
@@ -112,7 +116,7 @@ impl<const D: usize> MovingObstacle<D> {
 }
 
 /// Returns whether a velocity is finite and not zero.
-fn is_motion<const D: usize>(velocity_m_s: &Point<D>) -> bool {
+fn is_valid_velocity<const D: usize>(velocity_m_s: &Point<D>) -> bool {
     is_finite(velocity_m_s) && norm(*velocity_m_s) > 0.0
 }
 
@@ -150,13 +154,13 @@ fn bounce_position_and_velocity([lo_m, hi_m]: [f64; 2], v_m_s: f64, t_s: f64) ->
     if span_m <= 0.0 {
         return (0.0, 0.0);
     }
-    let (x_m, forward) = shuttle(v_m_s * t_s - lo_m, span_m);
+    let (x_m, forward) = shuttle_position(v_m_s * t_s - lo_m, span_m);
     (lo_m + x_m, if forward { v_m_s } else { -v_m_s })
 }
 
 /// Returns the position on a line of `length_m` after a distance of `traveled_m` to and fro on it, and whether the body
 /// goes forward from there.
-fn shuttle(traveled_m: f64, length_m: f64) -> (f64, bool) {
+fn shuttle_position(traveled_m: f64, length_m: f64) -> (f64, bool) {
     let m = traveled_m.rem_euclid(2.0 * length_m);
     // The remainder may round up to the modulus itself.
     if m < length_m { (m, true) } else { ((2.0 * length_m - m).max(0.0), false) }
@@ -175,7 +179,7 @@ fn patrol_position_and_velocity<const D: usize>(
     let (mut left_m, forward) = if closed {
         ((speed_m_s * t_s).rem_euclid(length_m), true)
     } else {
-        shuttle(speed_m_s * t_s, length_m)
+        shuttle_position(speed_m_s * t_s, length_m)
     };
     let mut at = way_points[0];
     let mut u = [0.0; D];

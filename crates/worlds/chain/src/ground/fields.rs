@@ -16,7 +16,7 @@ const MAX_ATTEMPTS: u64 = 1000;
 
 /// Balls, or capsules in all directions, spread evenly over a box.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ObstacleField<const D: usize> {
+pub(crate) struct RandomObstacleField<const D: usize> {
     /// Region of their middles.
     pub(crate) room: Aabb<D>,
     /// Their total size, as a part of the room's. They may overlap, and those that would come too
@@ -32,33 +32,37 @@ pub(crate) struct ObstacleField<const D: usize> {
     pub(crate) keep_m: f64,
 }
 
-impl<const D: usize> ObstacleField<D> {
+impl<const D: usize> RandomObstacleField<D> {
     /// Returns the obstacles, numbered from `first_id`; gaps in the numbers are those left out.
     ///
     /// # Errors
     /// When a room, part or size is not finite or not positive, or there are over ten million
     /// obstacles.
-    pub(crate) fn fill(&self, seed: Seed, first_id: u32) -> Result<Vec<Obstacle<D>>, InputError> {
+    pub(crate) fn generate_obstacles(
+        &self,
+        seed: Seed,
+        first_id: u32,
+    ) -> Result<Vec<Obstacle<D>>, InputError> {
         let n = self.obstacle_count()?;
         let streams = Streams::new(seed);
         let clear = KeepClearIndex::new(&self.keep_clear, self.keep_m, self.length_m)?;
         let mut obstacles = Vec::new();
         for k in 0..n {
-            let ends = self.ends(&mut streams.draws(k, 0, purposes::STILL));
+            let ends = self.random_core_ends(&mut streams.draws(k, 0, purposes::STILL));
             if clear.is_clear(ends, self.radius_m) {
                 let core = if ends[0] == ends[1] {
                     ConvexCore::Point(ends[0])
                 } else {
                     ConvexCore::Segment(ends)
                 };
-                obstacles.push(Obstacle::still(first_id + k, core, self.radius_m));
+                obstacles.push(Obstacle::new_static(first_id + k, core, self.radius_m));
             }
         }
         Ok(obstacles)
     }
 
     /// Returns the ends of a core somewhere in the room.
-    fn ends(&self, draws: &mut Draws) -> [Point<D>; 2] {
+    fn random_core_ends(&self, draws: &mut Draws) -> [Point<D>; 2] {
         let middle = random_point(draws, &self.room);
         let u = random_direction(draws);
         [-0.5, 0.5].map(|k| add_scaled(middle, u, k * self.length_m))
@@ -94,7 +98,7 @@ impl<const D: usize> ObstacleField<D> {
 
 /// Balls that go straight on, and are thrown back at the sides of a room.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct WanderingObstacles<const D: usize> {
+pub(crate) struct BouncingBallField<const D: usize> {
     /// The room that they never leave.
     pub(crate) room: Aabb<D>,
     pub(crate) n: u32,
@@ -108,7 +112,7 @@ pub(crate) struct WanderingObstacles<const D: usize> {
     pub(crate) keep_m: f64,
 }
 
-impl<const D: usize> WanderingObstacles<D> {
+impl<const D: usize> BouncingBallField<D> {
     /// Returns the obstacles, numbered from `first_id`.
     ///
     /// # Errors
@@ -174,7 +178,8 @@ const ROUNDING_M: f64 = 1e-6;
 impl<const D: usize> KeepClearIndex<D> {
     /// Returns bodies from which obstacles of about `size_m` keep a distance.
     fn new(bodies: &[ConvexCore<D>], keep_m: f64, size_m: f64) -> Result<Self, InputError> {
-        let bodies = (0..).zip(bodies).map(|(k, core)| Obstacle::still(k, *core, 0.0)).collect();
+        let bodies =
+            (0..).zip(bodies).map(|(k, core)| Obstacle::new_static(k, *core, 0.0)).collect();
         // Determines the cells of a grid, never the result, so that any length will do where none is given. No cell is
         // smaller than 1 mm, or points would make cells of no size.
         let reach_m = size_m + 2.0 * keep_m;
@@ -218,10 +223,10 @@ mod tests {
     use super::*;
     use sidestep_rods::geometry::norm;
 
-    fn field<const D: usize>(part: f64, length_m: f64) -> ObstacleField<D> {
+    fn field<const D: usize>(part: f64, length_m: f64) -> RandomObstacleField<D> {
         let mut tail = [0.0; D];
         tail[0] = -3.0;
-        ObstacleField {
+        RandomObstacleField {
             room: Aabb { lo: [-4.0; D], hi: [4.0; D] },
             part,
             radius_m: 0.3,
@@ -233,7 +238,7 @@ mod tests {
 
     fn check<const D: usize>(length_m: f64) {
         let field = field::<D>(0.2, length_m);
-        let found = field.fill(Seed(3), 5).unwrap();
+        let found = field.generate_obstacles(Seed(3), 5).unwrap();
         assert!(found.len() > 10 && found.len() < field.obstacle_count().unwrap() as usize);
         for o in &found {
             let ends = match o.core {
@@ -248,8 +253,8 @@ mod tests {
             );
             assert!(field.keep_clear[0].nearest_to_segment(ends).distance_m > 0.5);
         }
-        assert_eq!(found, field.fill(Seed(3), 5).unwrap());
-        assert_ne!(found, field.fill(Seed(4), 5).unwrap());
+        assert_eq!(found, field.generate_obstacles(Seed(3), 5).unwrap());
+        assert_ne!(found, field.generate_obstacles(Seed(4), 5).unwrap());
     }
 
     #[test]
@@ -262,15 +267,15 @@ mod tests {
 
     #[test]
     fn a_field_has_the_size_it_is_asked_for() {
-        let field = ObstacleField { keep_clear: Vec::new(), ..field::<3>(0.3, 0.5) };
+        let field = RandomObstacleField { keep_clear: Vec::new(), ..field::<3>(0.3, 0.5) };
         let one = 4.0 / 3.0 * PI * 0.027 + PI * 0.09 * 0.5;
-        let size = field.fill(Seed(1), 0).unwrap().len() as f64 * one;
+        let size = field.generate_obstacles(Seed(1), 0).unwrap().len() as f64 * one;
         assert!((size / 512.0 - 0.3).abs() < 0.001, "{size}");
     }
 
     #[test]
     fn a_crowd_stays_in_its_room_with_the_sizes_and_speeds_it_is_given() {
-        let crowd = WanderingObstacles {
+        let crowd = BouncingBallField {
             room: Aabb { lo: [-3.0, -2.0], hi: [3.0, 2.0] },
             n: 40,
             radius_m: 0.2..=0.5,
@@ -290,23 +295,23 @@ mod tests {
                 assert!((0..2).all(|i| at.hi[i] < crowd.room.hi[i] + 1e-9));
             }
         }
-        let cramped = WanderingObstacles { keep_m: 9.0, ..crowd.clone() };
+        let cramped = BouncingBallField { keep_m: 9.0, ..crowd.clone() };
         assert!(cramped.generate(Seed(9), 0).is_err());
-        let too_large = WanderingObstacles { radius_m: 2.5..=3.0, ..crowd };
+        let too_large = BouncingBallField { radius_m: 2.5..=3.0, ..crowd };
         assert!(too_large.generate(Seed(9), 0).is_err());
     }
 
     #[test]
     fn impossible_fields_are_refused() {
         for wrong in [
-            ObstacleField { part: f64::NAN, ..field::<2>(0.1, 0.0) },
-            ObstacleField { part: -1.0, ..field(0.1, 0.0) },
-            ObstacleField { radius_m: 0.0, ..field(0.1, 0.0) },
-            ObstacleField { radius_m: 1e-9, ..field(0.1, 0.0) },
-            ObstacleField { length_m: -1.0, ..field(0.1, 0.0) },
-            ObstacleField { room: Aabb { lo: [1.0; 2], hi: [0.0; 2] }, ..field(0.1, 0.0) },
+            RandomObstacleField { part: f64::NAN, ..field::<2>(0.1, 0.0) },
+            RandomObstacleField { part: -1.0, ..field(0.1, 0.0) },
+            RandomObstacleField { radius_m: 0.0, ..field(0.1, 0.0) },
+            RandomObstacleField { radius_m: 1e-9, ..field(0.1, 0.0) },
+            RandomObstacleField { length_m: -1.0, ..field(0.1, 0.0) },
+            RandomObstacleField { room: Aabb { lo: [1.0; 2], hi: [0.0; 2] }, ..field(0.1, 0.0) },
         ] {
-            assert!(wrong.fill(Seed(1), 0).is_err(), "{wrong:?}");
+            assert!(wrong.generate_obstacles(Seed(1), 0).is_err(), "{wrong:?}");
         }
     }
 }

@@ -48,17 +48,17 @@ impl FloorMap {
 
     /// Returns the floor of a map; unknown pixels are solid unless `unknown` says that they are
     /// free.
-    pub fn from_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
+    pub fn from_pixel_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
         let solid = map.pixels().iter().map(|&cell| unknown.apply(cell) != Cell::Free).collect();
         let floor = Self::new(map.width(), map.height(), [map.resolution_m(); 2], solid);
         let plane = map.plane();
-        Self { corner_m: plane.origin_m, axes: axes(plane.yaw_rad), ..floor }
+        Self { corner_m: plane.origin_m, axes: axes_from_yaw(plane.yaw_rad), ..floor }
     }
 
     /// Returns the same floor with its middle at a place, turned about it.
     #[must_use]
-    pub fn centered(mut self, middle: Point<2>, yaw_rad: f64) -> Self {
-        self.axes = axes(yaw_rad);
+    pub fn centered_at(mut self, middle: Point<2>, yaw_rad: f64) -> Self {
+        self.axes = axes_from_yaw(yaw_rad);
         let [w, h] = self.extent_m();
         self.corner_m =
             add_scaled(add_scaled(middle, self.axes[0], -0.5 * w), self.axes[1], -0.5 * h);
@@ -67,7 +67,7 @@ impl FloorMap {
 
     /// Returns the same floor with open ground around it.
     #[must_use]
-    pub fn with_open_surroundings(self) -> Self {
+    pub fn without_outer_walls(self) -> Self {
         Self { is_walled: false, ..self }
     }
 
@@ -97,7 +97,7 @@ impl FloorMap {
     }
 
     /// Returns whether a pixel is solid; pixels outside the floor are like its surroundings.
-    pub fn is_solid(&self, col: i64, row: i64) -> bool {
+    pub fn is_pixel_solid(&self, col: i64, row: i64) -> bool {
         let inside =
             (0..i64::from(self.width)).contains(&col) && (0..i64::from(self.height)).contains(&row);
         if inside {
@@ -113,12 +113,12 @@ impl FloorMap {
         let from = sub(at, self.corner_m);
         let col = (dot(from, self.axes[0]) / self.pixel_m[0]).floor() as i64;
         let row = (dot(from, self.axes[1]) / self.pixel_m[1]).floor() as i64;
-        !self.is_solid(col, row)
+        !self.is_pixel_solid(col, row)
     }
 
     /// Returns the middle of a pixel in meters; rows count from the bottom.
     pub fn pixel_center(&self, col: u32, row: u32) -> Point<2> {
-        self.pixel_position(f64::from(col) + 0.5, f64::from(row) + 0.5)
+        self.pixel_to_world(f64::from(col) + 0.5, f64::from(row) + 0.5)
     }
 
     /// Returns the box around the floor.
@@ -126,12 +126,12 @@ impl FloorMap {
         let w = f64::from(self.width);
         let h = f64::from(self.height);
         Aabb::from_points(
-            &[(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| self.pixel_position(x, y)),
+            &[(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| self.pixel_to_world(x, y)),
         )
     }
 
     /// Returns the place of a point counted in pixels; the same bits for the same point.
-    fn pixel_position(&self, col: f64, row: f64) -> Point<2> {
+    fn pixel_to_world(&self, col: f64, row: f64) -> Point<2> {
         let x = col * self.pixel_m[0];
         let y = row * self.pixel_m[1];
         add(self.corner_m, add(scaled(self.axes[0], x), scaled(self.axes[1], y)))
@@ -144,17 +144,17 @@ impl FloorMap {
         let height = i64::from(self.height);
         let mut ends = Vec::new();
         for row in 0..=height {
-            let edges =
-                (0..width).map(|col| self.is_solid(col, row - 1) != self.is_solid(col, row));
+            let edges = (0..width)
+                .map(|col| self.is_pixel_solid(col, row - 1) != self.is_pixel_solid(col, row));
             for run in runs(edges) {
-                ends.push(run.map(|col| self.pixel_position(col as f64, row as f64)));
+                ends.push(run.map(|col| self.pixel_to_world(col as f64, row as f64)));
             }
         }
         for col in 0..=width {
-            let edges =
-                (0..height).map(|row| self.is_solid(col - 1, row) != self.is_solid(col, row));
+            let edges = (0..height)
+                .map(|row| self.is_pixel_solid(col - 1, row) != self.is_pixel_solid(col, row));
             for run in runs(edges) {
-                ends.push(run.map(|row| self.pixel_position(col as f64, row as f64)));
+                ends.push(run.map(|row| self.pixel_to_world(col as f64, row as f64)));
             }
         }
         (first_id..).zip(ends).map(|(id, ends)| Obstacle::capsule(id, ends, 0.0)).collect()
@@ -162,7 +162,7 @@ impl FloorMap {
 }
 
 /// Returns the unit vectors along rows and columns of a floor that is turned.
-fn axes(yaw_rad: f64) -> [Point<2>; 2] {
+fn axes_from_yaw(yaw_rad: f64) -> [Point<2>; 2] {
     let s = sin(yaw_rad);
     let c = cos(yaw_rad);
     [[c, s], [-s, c]]
@@ -205,8 +205,9 @@ mod tests {
         let middle = prop::array::uniform2(-5.0..5.0f64);
         (pixels, size, middle, -3.0..3.0f64, any::<bool>()).prop_map(
             |((width, height, solid), pixel_m, middle, yaw_rad, is_walled)| {
-                let floor = FloorMap::new(width, height, pixel_m, solid).centered(middle, yaw_rad);
-                if is_walled { floor } else { floor.with_open_surroundings() }
+                let floor =
+                    FloorMap::new(width, height, pixel_m, solid).centered_at(middle, yaw_rad);
+                if is_walled { floor } else { floor.without_outer_walls() }
             },
         )
     }
@@ -215,10 +216,10 @@ mod tests {
     fn boxes(floor: &FloorMap, solid: bool) -> Vec<ConvexCore<2>> {
         let (width, height) = (i64::from(floor.width), i64::from(floor.height));
         let all = (-1..=height).flat_map(|row| (-1..=width).map(move |col| (col, row)));
-        all.filter(|&(col, row)| floor.is_solid(col, row) == solid)
+        all.filter(|&(col, row)| floor.is_pixel_solid(col, row) == solid)
             .map(|(col, row)| {
                 ConvexCore::Cuboid(Cuboid {
-                    center: floor.pixel_position(col as f64 + 0.5, row as f64 + 0.5),
+                    center: floor.pixel_to_world(col as f64 + 0.5, row as f64 + 0.5),
                     axes: floor.axes,
                     half_m: floor.pixel_m.map(|m| 0.5 * m),
                 })
@@ -231,7 +232,7 @@ mod tests {
         fn walls_are_exactly_as_near_as_what_they_stand_for(
             floor in floor(), part in prop::array::uniform2(0.0..1.0f64),
         ) {
-            let at = floor.pixel_position(
+            let at = floor.pixel_to_world(
                 part[0] * f64::from(floor.width),
                 part[1] * f64::from(floor.height),
             );
@@ -252,7 +253,7 @@ mod tests {
         fn a_way_crosses_a_wall_as_often_as_what_it_is_in_changes(
             floor in floor(), parts in prop::array::uniform4(-0.1..1.1f64),
         ) {
-            let point = |k: usize| floor.pixel_position(
+            let point = |k: usize| floor.pixel_to_world(
                 parts[k] * f64::from(floor.width),
                 parts[k + 1] * f64::from(floor.height),
             );
@@ -278,10 +279,9 @@ mod tests {
         assert_eq!(walls[0], Obstacle::capsule(10, [[0.5, 0.25], [2.0, 0.25]], 0.0));
         assert!(floor.is_free([0.6, 0.3]) && !floor.is_free([1.25, 0.6]));
         assert!(
-            !floor.is_free([-0.1, 0.3])
-                && floor.clone().with_open_surroundings().is_free([-0.1, 0.3])
+            !floor.is_free([-0.1, 0.3]) && floor.clone().without_outer_walls().is_free([-0.1, 0.3])
         );
-        assert_eq!(floor.with_open_surroundings().walls(10).len(), 12, "and four outside");
+        assert_eq!(floor.without_outer_walls().walls(10).len(), 12, "and four outside");
     }
 
     #[test]
@@ -289,10 +289,10 @@ mod tests {
         let pixels = vec![Cell::Free, Cell::Wall, Cell::Unknown];
         let plane = Isometry2 { origin_m: [1.0, 2.0], yaw_rad: 0.0 };
         let map = PixelMap::new(3, 1, 0.5, plane, pixels);
-        let solid = |policy| FloorMap::from_map(&map, policy).count_solid();
+        let solid = |policy| FloorMap::from_pixel_map(&map, policy).count_solid();
         let policies = [UnknownPolicy::Wall, UnknownPolicy::Keep, UnknownPolicy::Free];
         assert_eq!(policies.map(solid), [2, 2, 1]);
-        assert!(FloorMap::from_map(&map, UnknownPolicy::Wall).is_free([1.25, 2.25]));
+        assert!(FloorMap::from_pixel_map(&map, UnknownPolicy::Wall).is_free([1.25, 2.25]));
     }
 
     #[test]
@@ -301,7 +301,7 @@ mod tests {
         for yaw_rad in [0.0, 0.5, 3.0] {
             let plane = Isometry2 { origin_m: [1.0, 2.0], yaw_rad };
             let map = PixelMap::new(3, 2, 0.5, plane, pixels.to_vec());
-            let floor = FloorMap::from_map(&map, UnknownPolicy::Wall);
+            let floor = FloorMap::from_pixel_map(&map, UnknownPolicy::Wall);
             for (k, cell) in pixels.iter().enumerate() {
                 let middle = [0.5 * (k % 3) as f64 + 0.25, 0.5 * (k / 3) as f64 + 0.25];
                 let at = plane.transform_point(middle);
@@ -315,7 +315,7 @@ mod tests {
         for (name, most_walls) in [("porto/porto", 1500), ("berlin/berlin", 2500)] {
             let Some(path) = shared(&format!("maps/{name}.yaml")) else { return };
             let map = rosmap::load(&path).expect(name);
-            let floor = FloorMap::from_map(&map, UnknownPolicy::Wall);
+            let floor = FloorMap::from_pixel_map(&map, UnknownPolicy::Wall);
             let counts = map.counts();
             assert_eq!(floor.count_solid(), counts.wall + counts.unknown);
             let walls = floor.walls(0);
@@ -334,8 +334,8 @@ mod tests {
         let (width, height) = (i64::from(floor.width), i64::from(floor.height));
         let all = (-1..=height).flat_map(|row| (-1..=width).map(move |col| (col, row)));
         let edges = all.map(|(col, row)| {
-            let solid = floor.is_solid(col, row);
-            let differs = |col, row| usize::from(floor.is_solid(col, row) != solid);
+            let solid = floor.is_pixel_solid(col, row);
+            let differs = |col, row| usize::from(floor.is_pixel_solid(col, row) != solid);
             differs(col + 1, row) + differs(col, row + 1)
         });
         edges.sum()

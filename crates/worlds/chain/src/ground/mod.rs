@@ -1,22 +1,22 @@
 //! The ground on which chains move: its obstacles, and their places.
 //!
 //! ```text
-//! corridor.rs: winding corridors          fields.rs: balls and capsules at random
-//! floor.rs:    floors of pixels           courses.rs: positions of movers at a time
-//! site.rs:     maps and Stage worlds       route.rs:   room for a chain
+//! corridor.rs:   winding corridors         fields.rs:  balls and capsules at random
+//! floor.rs:      floors of pixels          courses.rs: positions of movers at a time
+//! ground_map.rs: maps and Stage worlds     route.rs:   room for a chain
 //! ```
 
 pub mod corridor;
 pub(crate) mod courses;
 pub(crate) mod fields;
 pub(crate) mod floor;
+pub(crate) mod ground_map;
 pub(crate) mod route;
-pub(crate) mod site;
 
 pub use corridor::{Corridor, CorridorLeg};
 pub use courses::{MovingObstacle, MovingObstacles, ObstaclePath};
 pub use floor::FloorMap;
-pub use site::Site;
+pub use ground_map::GroundMap;
 
 use sidestep_kernel::stream::Purpose;
 use sidestep_rods::geometry::Point;

@@ -1,6 +1,6 @@
 //! Space for a chain on a floor: a start for its leader, and a free path behind it.
 
-use super::{GroundPose, Site, purposes};
+use super::{GroundMap, GroundPose, purposes};
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -58,7 +58,7 @@ struct PlacementFailure {
 /// # Errors
 /// When sizes are not positive, or there is no room, with the cause.
 pub(crate) fn find_placement(
-    site: &Site,
+    site: &GroundMap,
     obstacles: &Obstacles<2>,
     required: &SpaceRequirement,
     seed: Seed,
@@ -78,7 +78,7 @@ pub(crate) fn find_placement(
             continue;
         }
         failure.free_places += 1;
-        let path = search.route_from(leader, draws.next_u32());
+        let path = search.route_away_from(leader, draws.next_u32());
         failure.longest_m = failure.longest_m.max(length_m(&path));
         if let Some(points) = search.lay_chain(&path) {
             failure.laid += 1;
@@ -141,7 +141,7 @@ impl PlacementFailure {
 }
 
 struct RouteSearch<'a> {
-    site: &'a Site,
+    site: &'a GroundMap,
     obstacles: &'a Obstacles<2>,
     required: &'a SpaceRequirement,
 }
@@ -156,7 +156,7 @@ impl RouteSearch<'_> {
     }
 
     /// Returns a long path away from a position, straightened.
-    fn route_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
+    fn route_away_from(&self, leader: Point<2>, choice: u32) -> Vec<Point<2>> {
         let SpaceRequirement { spacing_m, clearance_m, .. } = *self.required;
         // On a grid of 4 neighbors a path is up to sqrt(2) times as long as in a straight line.
         let reach_m = 1.5 * self.required.length_m() + spacing_m;
@@ -166,12 +166,12 @@ impl RouteSearch<'_> {
         let side = 2 * grid.half + 1;
         let free = FreeSpace::new(side, side, |col, row| self.is_free(grid.place((col, row))));
         let steps = Distances::to_nearest(&free, 1, &[(grid.half, grid.half)]);
-        let path = path_back(&steps, far_box(&steps, grid.half, choice));
-        self.straighten(path.into_iter().rev().map(|at| grid.place(at)).collect())
+        let path = path_back(&steps, choose_far_box(&steps, grid.half, choice));
+        self.straighten_path(path.into_iter().rev().map(|at| grid.place(at)).collect())
     }
 
     /// Returns a path with fewer corners: from each, straight ahead as far as there is clearance.
-    fn straighten(&self, path: Vec<Point<2>>) -> Vec<Point<2>> {
+    fn straighten_path(&self, path: Vec<Point<2>>) -> Vec<Point<2>> {
         let mut straightened = vec![path[0]];
         let mut from = 0;
         while from + 1 < path.len() {
@@ -250,7 +250,7 @@ impl SearchGrid {
 
 /// Returns one of the boxes that are nearly the most steps away: with the farthest alone, all chains of a site would lie
 /// in the same dead end.
-fn far_box(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
+fn choose_far_box(steps: &Distances, half: u32, choice: u32) -> (u32, u32) {
     let most = steps.max_steps().unwrap_or(0);
     let mut far = Vec::new();
     for row in 0..=2 * half {
@@ -312,7 +312,7 @@ mod tests {
     };
 
     /// A corridor with a bend: `#` is solid, a pixel has a side of 0.5 m.
-    fn bent() -> Site {
+    fn bent() -> GroundMap {
         let rows = [
             "####################",
             "#..................#",
@@ -325,10 +325,10 @@ mod tests {
         let cell = |c| if c == '#' { Cell::Wall } else { Cell::Free };
         let plane = Isometry2 { origin_m: [-2.0, 1.0], yaw_rad: 0.0 };
         let map = PixelMap::new(20, 6, 0.5, plane, pixels.map(cell).collect());
-        Site::from_map(&map, UnknownPolicy::Wall)
+        GroundMap::from_pixel_map(&map, UnknownPolicy::Wall)
     }
 
-    fn check(name: &str, site: &Site, required: &SpaceRequirement, seeds: u64) {
+    fn check(name: &str, site: &GroundMap, required: &SpaceRequirement, seeds: u64) {
         let obstacles = Obstacles::new(site.obstacles(0), 1.0).unwrap();
         for seed in 0..seeds {
             let start = find_placement(site, &obstacles, required, Seed(seed), 0).expect(name);
@@ -338,7 +338,7 @@ mod tests {
                 (required.connectors, start.leader.at)
             );
             let within = required.within.unwrap_or_else(|| site.bounds());
-            assert!(within.meets(&Aabb::from_points(&[start.leader.at])));
+            assert!(within.intersects(&Aabb::from_points(&[start.leader.at])));
             for rod in start.points.windows(2) {
                 assert!((distance(rod[0], rod[1]) - required.spacing_m).abs() < 1e-9);
                 let apart_m = obstacles.clearance_m([rod[0], rod[1]], 0.0, 1.0);
@@ -348,7 +348,7 @@ mod tests {
                 assert!(site.is_free(p));
                 assert!(obstacles.clearance_m([p; 2], 0.0, 1.0) >= required.clearance_m);
             }
-            let rod = Rod::fixed(required.spacing_m, required.rod_clearance_m);
+            let rod = Rod::with_fixed_length(required.spacing_m, required.rod_clearance_m);
             let n = required.connectors;
             let connectors = vec![Connector::free(required.clearance_m); n];
             assert!(Chain::new(start.points, connectors, vec![rod; n - 1]).is_ok());
@@ -402,11 +402,16 @@ mod tests {
         for name in ["porto/porto", "berlin/berlin"] {
             let Some(path) = shared(&format!("maps/{name}.yaml")) else { return };
             let map = rosmap::load(&path).expect(name);
-            check(name, &Site::from_map(&map, UnknownPolicy::Wall), &WANTED, 4);
+            check(name, &GroundMap::from_pixel_map(&map, UnknownPolicy::Wall), &WANTED, 4);
         }
         let path = shared("worlds/stage/SFU.world").expect("there");
         let world = stage::load(&path).expect("SFU");
         let within = Some(Aabb { lo: [-20.0, -10.0], hi: [5.0, 10.0] });
-        check("SFU", &Site::from_stage(&world), &SpaceRequirement { within, ..WANTED }, 3);
+        check(
+            "SFU",
+            &GroundMap::from_stage_world(&world),
+            &SpaceRequirement { within, ..WANTED },
+            3,
+        );
     }
 }

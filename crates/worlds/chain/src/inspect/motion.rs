@@ -1,16 +1,16 @@
 //! The rung of the ladder, the connectors that moved, the robots that follow, and the outcome.
 
-use super::{ConnectorInspection, line};
+use super::{ConnectorInspection, line_mark};
 use crate::kinds;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::state::ChainBodyState;
 use crate::view::obstacle_body_id;
-use sidestep_kernel::geometry::angle_rad;
+use sidestep_kernel::geometry::angle_between_rad;
 use sidestep_kernel::view::{
     BodyId, FactSection, FactTable, FactValue, Inspection, MarkRole, Quantity,
 };
 use sidestep_rods::CompletedMotion;
-use sidestep_rods::geometry::{distance, sub, with_dimensions};
+use sidestep_rods::geometry::{convert_dimensions, distance, sub};
 use std::borrow::Cow;
 
 /// Most connectors that an inspection lists.
@@ -18,7 +18,7 @@ const MAX_LISTED_CONNECTORS: usize = 64;
 
 impl<const D: usize> ConnectorInspection<'_, D> {
     /// Adds the rung of the ladder on which the initiator ended.
-    pub(super) fn add_recovery(&self, inspection: &mut Inspection) {
+    pub(super) fn add_recovery_rung(&self, inspection: &mut Inspection) {
         let Some(climbed) = &self.trace.climbed else { return };
         let section = FactSection::new("Ladder");
         let (rung, moved) = match climbed {
@@ -42,12 +42,12 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         };
         let section = section.fact("rung", rung);
         inspection.add_section(match moved {
-            Some(moved) => self.with_motion(section, moved),
+            Some(moved) => self.with_motion_facts(section, moved),
             None => section,
         });
     }
 
-    fn with_motion(&self, section: FactSection, moved: &CompletedMotion<D>) -> FactSection {
+    fn with_motion_facts(&self, section: FactSection, moved: &CompletedMotion<D>) -> FactSection {
         let cut = moved.cut_short.map(|veto| {
             let because = veto
                 .obstacle
@@ -67,7 +67,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     /// Adds the connectors that move, how far, and how far their rods turn.
-    pub(super) fn add_moves(&self, inspection: &mut Inspection) {
+    pub(super) fn add_moved_connectors(&self, inspection: &mut Inspection) {
         let before = self.before.chain.points();
         let after = self.after.chain.points();
         let moved: Vec<usize> =
@@ -80,14 +80,14 @@ impl<const D: usize> ConnectorInspection<'_, D> {
             let turn = (k + 1 < before.len()).then(|| {
                 let was = sub(before[k + 1], before[k]);
                 let is = sub(after[k + 1], after[k]);
-                FactValue::degrees(angle_rad(was, is))
+                FactValue::degrees(angle_between_rad(was, is))
             });
             let way = FactValue::meters(distance(before[k], after[k]));
-            table.push_row([self.connector(k).into(), way, turn.into()]);
+            table.push_row([self.connector_body_id(k).into(), way, turn.into()]);
             inspection.add_mark(
                 MarkRole::Done,
                 format!("connector {k}"),
-                line(&[before[k], after[k]]),
+                line_mark(&[before[k], after[k]]),
             );
         }
         inspection.add_section(
@@ -99,7 +99,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     /// Adds the lags of the robots that keep to the connectors.
-    pub(super) fn add_lags(&self, inspection: &mut Inspection) {
+    pub(super) fn add_robot_lags(&self, inspection: &mut Inspection) {
         let Some(robots) = &self.world.chains[self.slot as usize].robots else { return };
         let mut table = FactTable::new(["robot", "behind now", "behind then", "touches"]);
         let all = 0..self.before.robots.len();
@@ -124,11 +124,12 @@ impl<const D: usize> ConnectorInspection<'_, D> {
     }
 
     /// Adds how far the connector gets, and all events of the cycle.
-    pub(super) fn add_outcome(&self, inspection: &mut Inspection) {
+    pub(super) fn add_outcome_section(&self, inspection: &mut Inspection) {
         let mut table = FactTable::new(["event", "connector", "with", "value"]);
         for event in &self.scratch.events {
             let entry = crate::view::view_event(event);
-            let value = entry.value.map(|amount| FactValue::number(amount.value, unit(&amount)));
+            let value =
+                entry.value.map(|amount| FactValue::number(amount.value, unit_name(&amount)));
             table.push_row([
                 entry.kind.name().into(),
                 entry.who.into(),
@@ -149,11 +150,11 @@ impl<const D: usize> ConnectorInspection<'_, D> {
 
 /// Returns the distance of a robot from its connector.
 fn lag_m<const D: usize>(body: &ChainBodyState<D>, k: usize) -> f64 {
-    distance(body.robots[k].pose.at, with_dimensions(body.chain.points()[k]))
+    distance(body.robots[k].pose.at, convert_dimensions(body.chain.points()[k]))
 }
 
 /// Returns the unit of an amount, as worlds write it.
-fn unit(amount: &Quantity) -> &'static str {
+fn unit_name(amount: &Quantity) -> &'static str {
     match amount.unit {
         Cow::Borrowed(unit) => unit,
         Cow::Owned(_) => "",

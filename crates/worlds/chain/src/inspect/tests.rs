@@ -23,27 +23,28 @@ fn a_veto_names_the_obstacle_and_says_how_far_the_initiator_could_have_gone() {
     let mut run = run(AGAINST_A_DISC);
     let free = told(&*run, 0);
     assert_eq!(free.section("Veto"), None);
-    assert_eq!(free.value("Wish", "what"), Some(&"go".into()));
-    assert_eq!(free.value("Ladder", "rung"), Some(&"as wanted".into()));
+    assert_eq!(free.fact_value("Wish", "what"), Some(&"go".into()));
+    assert_eq!(free.fact_value("Ladder", "rung"), Some(&"as wanted".into()));
     run.advance(20);
     let told = told(&*run, 2);
     let head: BodyId = BodyId::new(kinds::CONNECTOR, 0, Some(0));
-    assert_eq!(told.value("Veto", "by"), Some(&FactValue::Body(head)));
-    assert_eq!(told.value("Veto", "reason"), Some(&"target-blocked".into()));
+    assert_eq!(told.fact_value("Veto", "by"), Some(&FactValue::Body(head)));
+    assert_eq!(told.fact_value("Veto", "reason"), Some(&"target-blocked".into()));
     let disc = BodyId::new(BodyKind::OBSTACLE, 0, None);
-    assert_eq!(told.value("Veto", "because of"), Some(&FactValue::from(Some(disc))));
-    let Some(FactValue::Place([x_m, ..])) = told.value("Veto", "as far as") else {
+    assert_eq!(told.fact_value("Veto", "because of"), Some(&FactValue::from(Some(disc))));
+    let Some(FactValue::Place([x_m, ..])) = told.fact_value("Veto", "as far as") else {
         panic!("nowhere")
     };
     assert!((0.56..=0.6).contains(x_m), "the disc begins at 0.6 m, and it can go to {x_m} m");
-    let Some(FactValue::Number { value: far_m, unit: "m" }) = told.value("Veto", "could go") else {
+    let Some(FactValue::Number { value: far_m, unit: "m" }) = told.fact_value("Veto", "could go")
+    else {
         panic!("no way")
     };
     assert!((0.0..0.07).contains(far_m), "less than a step, and not {far_m} m");
-    assert_eq!(told.value("Outcome", "next place"), told.value("Now", "place"));
-    assert_eq!(told.value("Wish", "of"), Some(&FactValue::Body(head)));
+    assert_eq!(told.fact_value("Outcome", "next place"), told.fact_value("Now", "place"));
+    assert_eq!(told.fact_value("Wish", "of"), Some(&FactValue::Body(head)));
     assert_eq!(told.marks_with_role(MarkRole::Wish).count(), 1);
-    assert_eq!(told.value("Moves", "connectors"), Some(&FactValue::count(0)));
+    assert_eq!(told.fact_value("Moves", "connectors"), Some(&FactValue::count(0)));
 }
 
 #[test]
@@ -55,13 +56,15 @@ fn the_layer_of_a_leader_and_the_lateness_of_its_robots_are_told() {
     let mut run = run(text);
     run.advance(30);
     let told = run.inspect(BodyId::new(kinds::ROBOT, 0, Some(3))).expect("it is there");
-    let Some(FactValue::Text(layer)) = told.value("Decides", "layer") else { panic!("no layer") };
+    let Some(FactValue::Text(layer)) = told.fact_value("Decides", "layer") else {
+        panic!("no layer")
+    };
     assert!(layer.starts_with(|digit| ('1'..='6').contains(&digit)), "{layer}");
     let robots = told.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     assert_eq!(robots.rows.len(), 4);
     run.advance(1);
     let then = run.inspect(BodyId::new(kinds::ROBOT, 0, Some(3))).expect("it is there");
-    assert_eq!(then.value("Now", "place"), told.value("Outcome", "next place"));
+    assert_eq!(then.fact_value("Now", "place"), told.fact_value("Outcome", "next place"));
     let table = then.section("Robots").and_then(|s| s.table.as_ref()).expect("four robots");
     let [was, is] = [(robots, "behind then"), (table, "behind now")]
         .map(|(table, head)| table.column(head).expect("a column").cloned().collect::<Vec<_>>());

@@ -208,14 +208,14 @@ impl<const D: usize> ObstacleEscaper<D> {
 
     /// Returns whether the leader of a chain should rest instead of moving as it wants: whether that keeps parts of the
     /// chain inside moving obstacles for less time.
-    pub(crate) fn should_rest(
+    pub(crate) fn should_leader_rest(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
         rules: &ReactionRules,
         lead: &LeadMotion<D>,
     ) -> bool {
-        self.simultaneous.should_rest(chain, obstacles, rules, lead)
+        self.simultaneous.should_leader_rest(chain, obstacles, rules, lead)
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `escape_plan` is the chain's memory: the

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, dot, first_axis, norm, normalized, perpendicular, scaled, sub,
+    Point, add, add_scaled, dot, norm, normalized, perpendicular, scaled, sub, unit_x,
 };
 use sidestep_rods::{
     Chain, CompletedMotion, MotionOutcome, MotionRequest, Obstacles, Propagator, RequestSource,
@@ -135,7 +135,7 @@ pub(crate) trait ChainMover<const D: usize> {
     type Failure;
 
     /// Returns the position of a connector that leads.
-    fn place(&self, k: usize) -> Point<D>;
+    fn position(&self, k: usize) -> Point<D>;
 
     /// Carries out a motion: all of it, or nothing moves.
     fn request(&mut self, request: &MotionRequest<D>) -> Result<MotionOutcome<D>, Self::Failure>;
@@ -144,7 +144,7 @@ pub(crate) trait ChainMover<const D: usize> {
     fn find_veto(&mut self, request: &MotionRequest<D>) -> Result<Option<Veto<D>>, Self::Failure>;
 
     /// Returns the end farther from an initiator; `None` if there is none that could lead.
-    fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, Self::Failure>;
+    fn farther_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, Self::Failure>;
 }
 
 /// An end of a chain that may lead.
@@ -171,7 +171,7 @@ pub struct DirectMover<'a, const D: usize> {
 impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
     type Failure = InputError;
 
-    fn place(&self, k: usize) -> Point<D> {
+    fn position(&self, k: usize) -> Point<D> {
         self.chain.points()[k]
     }
 
@@ -185,7 +185,7 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
         Ok(attempted.veto().copied())
     }
 
-    fn other_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, InputError> {
+    fn farther_end(&mut self, k: usize) -> Result<Option<ChainEnd<D>>, InputError> {
         let points = self.chain.points();
         let by = farther_end(k, points.len());
         let neighbor = if by == 0 { points.get(1) } else { points.get(by - 1) };
@@ -194,13 +194,13 @@ impl<const D: usize> ChainMover<D> for DirectMover<'_, D> {
     }
 }
 
-struct RecoveryAttempt<'a, M, const D: usize> {
+struct VetoRecoveryAttempt<'a, M, const D: usize> {
     by: &'a mut M,
     wanted: MotionRequest<D>,
     vetoes: Vec<Veto<D>>,
 }
 
-impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
+impl<M: ChainMover<D>, const D: usize> VetoRecoveryAttempt<'_, M, D> {
     /// Tries all of a motion, or none.
     fn attempt(
         &mut self,
@@ -233,30 +233,33 @@ impl<M: ChainMover<D>, const D: usize> RecoveryAttempt<'_, M, D> {
     fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> RequestedMotion<D> {
         match self.wanted.motion {
             RequestedMotion::Connector { k, to } => {
-                RequestedMotion::Connector { k, to: self.with_change(k, to, change) }
+                RequestedMotion::Connector { k, to: self.changed_target(k, to, change) }
             }
             RequestedMotion::Rod { i, to: [first, second] } => RequestedMotion::Rod {
                 i,
-                to: [self.with_change(i, first, &change), self.with_change(i + 1, second, &change)],
+                to: [
+                    self.changed_target(i, first, &change),
+                    self.changed_target(i + 1, second, &change),
+                ],
             },
         }
     }
 
     /// Returns the target of a connector with another displacement than to `to`.
-    fn with_change(
+    fn changed_target(
         &self,
         k: usize,
         to: Point<D>,
         change: impl Fn(Point<D>) -> Point<D>,
     ) -> Point<D> {
-        let at = self.by.place(k);
+        let at = self.by.position(k);
         add(at, change(sub(to, at)))
     }
 
     /// Returns the initiator and the displacement that it wants.
     fn wanted_displacement(&self) -> (usize, Point<D>) {
-        let (k, to) = moving_head(&self.wanted.motion);
-        (k, sub(to, self.by.place(k)))
+        let (k, to) = head_and_target(&self.wanted.motion);
+        (k, sub(to, self.by.position(k)))
     }
 }
 
@@ -294,13 +297,13 @@ impl RecoveryLadder {
                 MotionOutcome::Vetoed(veto) => (RecoveryOutcome::Vetoed(veto), Some(veto)),
             });
         }
-        let mut climb = RecoveryAttempt { by, wanted: *wanted, vetoes: Vec::new() };
-        self.memory.record_goal(situation.goal_distance_m);
+        let mut climb = VetoRecoveryAttempt { by, wanted: *wanted, vetoes: Vec::new() };
+        self.memory.record_goal_distance(situation.goal_distance_m);
         if self.memory.pulling_back > 0 {
-            return Ok((self.pull_back(&mut climb)?, None));
+            return Ok((self.pull_from_other_end(&mut climb)?, None));
         }
         if let Some(moved) = climb.attempt(wanted.motion)? {
-            self.memory.record_straight(self.rungs.straight);
+            self.memory.record_straight_tick(self.rungs.straight);
             return Ok((RecoveryOutcome::Straight(moved), None));
         }
         let objection = climb.vetoes.first().copied();
@@ -309,7 +312,7 @@ impl RecoveryLadder {
 
     fn try_rungs<M: ChainMover<D>, const D: usize>(
         &mut self,
-        climb: &mut RecoveryAttempt<'_, M, D>,
+        climb: &mut VetoRecoveryAttempt<'_, M, D>,
         situation: &InitiatorSituation,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         if let Some(recovery) = try_shorter(climb)? {
@@ -325,7 +328,7 @@ impl RecoveryLadder {
     /// Tries other headings, first those on the side where one was good.
     fn try_sideways<M: ChainMover<D>, const D: usize>(
         &mut self,
-        climb: &mut RecoveryAttempt<'_, M, D>,
+        climb: &mut VetoRecoveryAttempt<'_, M, D>,
         situation: &InitiatorSituation,
     ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
         let (k, displacement) = climb.wanted_displacement();
@@ -337,7 +340,7 @@ impl RecoveryLadder {
             let turn = |v| turn_toward(v, u, axes[plane], turn_rad);
             let Some(moved) = climb.attempt(climb.with_displacement(turn))? else { continue };
             self.memory.record_sideways(plane, turn_rad);
-            let place = memory::visit_key(climb.by.place(k), u);
+            let place = memory::visit_key(climb.by.position(k), u);
             if self.memory.record_visit(place, situation.goal_distance_m) > self.rungs.visits {
                 self.memory.pulling_back = self.rungs.pull_back;
             }
@@ -349,7 +352,7 @@ impl RecoveryLadder {
     /// Tries the rungs for an initiator that cannot move at all.
     fn try_stationary_rungs<M: ChainMover<D>, const D: usize>(
         &mut self,
-        climb: &mut RecoveryAttempt<'_, M, D>,
+        climb: &mut VetoRecoveryAttempt<'_, M, D>,
         situation: &InitiatorSituation,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         let memory = &mut self.memory;
@@ -362,13 +365,13 @@ impl RecoveryLadder {
             return Ok(RecoveryOutcome::Waiting { n: memory.waits });
         }
         memory.pulling_back = self.rungs.pull_back;
-        self.pull_back(climb)
+        self.pull_from_other_end(climb)
     }
 
     /// Lets the other end lead along its rod, or beside it; the initiator is dragged.
-    fn pull_back<M: ChainMover<D>, const D: usize>(
+    fn pull_from_other_end<M: ChainMover<D>, const D: usize>(
         &mut self,
-        climb: &mut RecoveryAttempt<'_, M, D>,
+        climb: &mut VetoRecoveryAttempt<'_, M, D>,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         let (k, displacement) = climb.wanted_displacement();
         let begins = self.memory.pulling_back == self.rungs.pull_back;
@@ -376,7 +379,7 @@ impl RecoveryLadder {
             return self.report_stuck(climb);
         }
         self.memory.hand_overs += u32::from(begins);
-        let Some(ChainEnd { by, at, ahead: u }) = climb.by.other_end(k)? else {
+        let Some(ChainEnd { by, at, ahead: u }) = climb.by.farther_end(k)? else {
             return self.report_stuck(climb);
         };
         let axes = axes_across(u);
@@ -395,7 +398,7 @@ impl RecoveryLadder {
 
     fn report_stuck<M: ChainMover<D>, const D: usize>(
         &mut self,
-        climb: &mut RecoveryAttempt<'_, M, D>,
+        climb: &mut VetoRecoveryAttempt<'_, M, D>,
     ) -> Result<RecoveryOutcome<D>, M::Failure> {
         self.memory.forget_failures();
         if climb.vetoes.is_empty() {
@@ -410,7 +413,7 @@ impl RecoveryLadder {
 }
 
 fn try_shorter<M: ChainMover<D>, const D: usize>(
-    climb: &mut RecoveryAttempt<'_, M, D>,
+    climb: &mut VetoRecoveryAttempt<'_, M, D>,
 ) -> Result<Option<RecoveryOutcome<D>>, M::Failure> {
     for part in STEP_FRACTIONS {
         if let Some(moved) =
@@ -422,7 +425,7 @@ fn try_shorter<M: ChainMover<D>, const D: usize>(
     Ok(None)
 }
 
-fn moving_head<const D: usize>(motion: &RequestedMotion<D>) -> (usize, Point<D>) {
+fn head_and_target<const D: usize>(motion: &RequestedMotion<D>) -> (usize, Point<D>) {
     match *motion {
         RequestedMotion::Connector { k, to } => (k, to),
         RequestedMotion::Rod { i, to } => (i, to[0]),
@@ -466,11 +469,7 @@ fn axes_across<const D: usize>(u: Point<D>) -> [Point<D>; 2] {
         let e: Point<D> = std::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
         let across = add_scaled(e, u, -dot(e, u));
         // A direction along an axis cannot turn toward that axis; any other perpendicular does.
-        if norm(across) > 1e-6 {
-            normalized(across).unwrap_or(first_axis())
-        } else {
-            perpendicular(u)
-        }
+        if norm(across) > 1e-6 { normalized(across).unwrap_or(unit_x()) } else { perpendicular(u) }
     })
 }
 

@@ -27,11 +27,11 @@ pub(crate) fn execute_request<const D: usize>(
     request: &MotionRequest<D>,
 ) -> Result<MotionOutcome<D>, InputError> {
     if let RequestedMotion::Connector { k, to } = request.motion
-        && let Some(base) = sliding_connector(chain, k)
+        && let Some(base) = first_constrained_connector(chain, k)
     {
         let order = ReachRequest { k, target: to, base, tolerance_m: TOLERANCE_M };
         let scene = &mut MotionEnvironment { propagator, obstacles };
-        return move_sliding(scene, chain, &order, request);
+        return move_with_sliding_connector(scene, chain, &order, request);
     }
     let outcome = propagator.propagate(chain, obstacles, request)?;
     let (MotionOutcome::Vetoed(veto), RequestedMotion::Connector { k, to }) =
@@ -44,7 +44,7 @@ pub(crate) fn execute_request<const D: usize>(
         return Ok(outcome);
     }
     let order = ReachRequest { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
-    move_with_base(&mut MotionEnvironment { propagator, obstacles }, chain, &order, veto)
+    move_with_fixed_base(&mut MotionEnvironment { propagator, obstacles }, chain, &order, veto)
 }
 
 /// Returns whether a return pass may answer a veto.
@@ -54,7 +54,7 @@ fn is_held_veto(reason: VetoReason) -> bool {
 
 /// Returns the first connector, other than the one that moves, that belongs on a line, on a plane or in a
 /// box.
-fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
+fn first_constrained_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
     // Most chains have none, and would be searched for each motion.
     if chain.is_plain() {
         return None;
@@ -68,7 +68,7 @@ fn sliding_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize
 /// Moves a chain one of whose connectors slides. Where that one could follow only by moving much farther than the
 /// initiator, as the foot of a rod that stands across its line, or from one side of its master to the other, return
 /// passes find a position nearby.
-fn move_sliding<const D: usize>(
+fn move_with_sliding_connector<const D: usize>(
     scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     order: &ReachRequest<D>,
@@ -94,7 +94,7 @@ fn move_sliding<const D: usize>(
 }
 
 /// Moves a chain whose base has vetoed, as far as the speed limit of its joints allows.
-fn move_with_base<const D: usize>(
+fn move_with_fixed_base<const D: usize>(
     scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     order: &ReachRequest<D>,
@@ -194,7 +194,7 @@ fn move_to_target<const D: usize>(
             let rules = scene.propagator.rules;
             let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
             let jump_m = rules.slave_step_max_m.min(MAX_JUMP * longest_m);
-            (move_to_posture(scene, chain, before, order, objection)?, jump_m)
+            (move_by_ik(scene, chain, before, order, objection)?, jump_m)
         }
     })
 }
@@ -210,7 +210,7 @@ const SLOWED_FRACTION: f64 = 0.9;
 /// is nearly straight, and not at all along a straight line, so damped least squares find the nearest
 /// posture that reaches the target, and the chain moves straight to it if neither the posture nor the motion is
 /// blocked.
-fn move_to_posture<const D: usize>(
+fn move_by_ik<const D: usize>(
     scene: &MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
@@ -218,7 +218,7 @@ fn move_to_posture<const D: usize>(
     objection: Veto<D>,
 ) -> Result<MotionOutcome<D>, InputError> {
     let ReachRequest { k, target, base, tolerance_m } = *order;
-    if let Some(by) = out_of_reach(chain, order) {
+    if let Some(by) = connector_out_of_reach(chain, order) {
         return Ok(MotionOutcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
     }
     let goal = ChainIkGoal {
@@ -253,7 +253,10 @@ fn may_move<const D: usize>(connector: &Connector<D>, at: Point<D>, to: Point<D>
 }
 
 /// Returns the connector, if there is one, from whose positions the rods do not reach the target.
-fn out_of_reach<const D: usize>(chain: &Chain<D>, order: &ReachRequest<D>) -> Option<usize> {
+fn connector_out_of_reach<const D: usize>(
+    chain: &Chain<D>,
+    order: &ReachRequest<D>,
+) -> Option<usize> {
     for (i, connector) in chain.connectors().iter().enumerate() {
         // A failed connector may be repaired, so it is reported as failed.
         if i == order.k || connector.failed {
@@ -303,9 +306,12 @@ mod tests {
     /// An arm of two rods, bent a little; the base is fixed.
     fn arm() -> Chain<2> {
         let points = vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let mut arm =
-            Chain::new(points, vec![Connector::free(0.05); 3], vec![Rod::fixed(1.0, 0.02); 2])
-                .unwrap();
+        let mut arm = Chain::new(
+            points,
+            vec![Connector::free(0.05); 3],
+            vec![Rod::with_fixed_length(1.0, 0.02); 2],
+        )
+        .unwrap();
         arm.set_mobility(0, Mobility::Fixed).unwrap();
         arm
     }
@@ -337,7 +343,7 @@ mod tests {
         let joint_step_max_m = 0.08;
         let rules = ReactionRules { joint_step_max_m, ..ReactionRules::default() };
         for n_rods in [3, 7, 11, 25] {
-            let rod = Rod::fixed(1.0, 0.03);
+            let rod = Rod::with_fixed_length(1.0, 0.03);
             let mut arm =
                 Chain::straight([0.0; 2], [1.0, 0.0], n_rods, rod, Connector::free(0.05)).unwrap();
             arm.set_mobility(0, Mobility::Fixed).unwrap();
@@ -345,7 +351,7 @@ mod tests {
             for _ in 0..4000 {
                 let before = arm.points().to_vec();
                 let to = sidestep_rods::geometry::move_toward(before[n_rods], target, 0.04);
-                let request = MotionRequest::operator_request(n_rods, to);
+                let request = MotionRequest::from_operator(n_rods, to);
                 execute_request(
                     &mut Propagator::new(rules),
                     &mut arm,
@@ -372,7 +378,7 @@ mod tests {
             [3.8, 0.8],
             [4.4, 0.0],
         ];
-        let rods = vec![Rod::fixed(1.0, 0.02); 6];
+        let rods = vec![Rod::with_fixed_length(1.0, 0.02); 6];
         let mut chain = Chain::new(points, vec![Connector::free(0.05); 7], rods).unwrap();
         for (i, mobility) in held {
             chain.set_mobility(*i, *mobility).unwrap();
@@ -383,7 +389,7 @@ mod tests {
             for _ in 0..2000 {
                 let before = chain.points().to_vec();
                 let to = sidestep_rods::geometry::move_toward(before[k], *place, 0.01);
-                let request = MotionRequest::operator_request(k, to);
+                let request = MotionRequest::from_operator(k, to);
                 let came = execute_request(
                     &mut Propagator::new(rules),
                     &mut chain,
@@ -430,7 +436,7 @@ mod tests {
     fn a_target_that_no_position_on_the_rail_reaches_is_out_of_reach() {
         let mut chain = arm();
         chain.set_mobility(0, Mobility::OnSegment([[0.0, 0.0], [1.0, 0.0]])).unwrap();
-        let request = MotionRequest::operator_request(2, [1.5, 4.0]);
+        let request = MotionRequest::from_operator(2, [1.5, 4.0]);
         let came = execute_request(
             &mut Propagator::default(),
             &mut chain,

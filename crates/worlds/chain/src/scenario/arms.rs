@@ -1,6 +1,6 @@
 //! Arms from URDF files.
 
-use super::Compiler;
+use super::ChainScenarioCompiler;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
@@ -30,9 +30,9 @@ pub(super) struct ArmSection {
     joints: Option<Vec<f64>>,
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns an arm with its base at `at_m`.
-    pub(super) fn arm(
+    pub(super) fn compile_arm(
         &self,
         section: &Spanned<ArmSection>,
         at_m: [f64; 3],
@@ -57,7 +57,9 @@ impl<const D: usize> Compiler<'_, D> {
             return Err(self.source.error(at, cause, "give another base or another tip"));
         }
         let values = self.values(s, &model, &serial, at.clone())?;
-        serial.check_limits("joints", &values).map_err(|error| self.posture_error(at, &error))?;
+        serial
+            .check_limits("joints", &values)
+            .map_err(|error| self.invalid_posture_error(at, &error))?;
         Ok(Arm::new(serial, at_m, values))
     }
 
@@ -76,7 +78,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns an error about the joint values at the start, at the key that gives them.
-    fn posture_error(&self, at: Range<usize>, error: &InputError) -> InputError {
+    fn invalid_posture_error(&self, at: Range<usize>, error: &InputError) -> InputError {
         let at = self.source.key_span(at, &["joints", "posture"]);
         self.source.error_from(at, error)
     }
@@ -111,8 +113,8 @@ impl<const D: usize> Compiler<'_, D> {
         match (&s.joints, &s.posture, &s.srdf) {
             (Some(values), None, None) => {
                 serial
-                    .check_count("joints", values)
-                    .map_err(|error| self.posture_error(at, &error))?;
+                    .check_joint_values("joints", values)
+                    .map_err(|error| self.invalid_posture_error(at, &error))?;
                 Ok(values.clone())
             }
             (None, Some(name), Some(srdf)) => {
@@ -120,8 +122,8 @@ impl<const D: usize> Compiler<'_, D> {
                 let semantics = self.source.with_file_key(at.clone(), "srdf", semantics)?;
                 let posture = semantics
                     .posture("posture", name)
-                    .map_err(|error| self.posture_error(at, &error))?;
-                Ok(serial.with_posture(model, &posture))
+                    .map_err(|error| self.invalid_posture_error(at, &error))?;
+                Ok(serial.posture_values(model, &posture))
             }
             (None, None, None) => Ok(serial.rest_values()),
             _ => {

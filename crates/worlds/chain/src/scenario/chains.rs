@@ -1,8 +1,8 @@
 //! Chains: their shape, their limits, and their start.
 
 use super::super::driver::{Task, TaskKind};
-use super::super::formation::Robots;
-use super::super::ground::Site;
+use super::super::formation::RobotSwarmConfig;
+use super::super::ground::GroundMap;
 use super::super::ground::route::{SpaceRequirement, find_placement};
 use super::super::motion::escape::{EscapeMethod, ObstacleEscapeRules};
 use super::super::world::{ChainChange, ChainChangeKind, ChainSpec};
@@ -12,12 +12,12 @@ use super::mobility::MobilitySection;
 use super::navigators::RobotsSection;
 use super::obstacles::to_dimensions;
 use super::tasks::TaskSection;
-use super::{BoxSection, Compiler, MIN_REACH_M, PointValue, PositiveNumber};
+use super::{BoxSection, ChainScenarioCompiler, MIN_REACH_M, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
 use sidestep_kernel::{InputError, Seed, math};
-use sidestep_rods::geometry::{Point, add_scaled, first_axis, normalized, perpendicular};
+use sidestep_rods::geometry::{Point, add_scaled, normalized, perpendicular, unit_x};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacles, Rod};
 use sidestep_scenario::{NumberRange, Sections, Spanned};
 use std::sync::Arc;
@@ -60,7 +60,7 @@ const MAX_CONNECTORS: usize = 10_000_000;
 /// Everything already present when the chains of a section are placed.
 #[derive(Clone, Copy)]
 struct PlacementContext<'a, const D: usize> {
-    site: Option<&'a Site>,
+    site: Option<&'a GroundMap>,
     /// The number of the section.
     number: u32,
     /// The chains of the sections before.
@@ -74,7 +74,7 @@ pub(super) struct ChainSection<const D: usize> {
     /// A name for people.
     #[serde(default)]
     name: String,
-    #[serde(default = "one_chain")]
+    #[serde(default = "default_chain_count")]
     pub(super) count: usize,
     apart_m: Option<PointValue<D>>,
     connectors: Option<usize>,
@@ -101,7 +101,7 @@ pub(super) struct ChainSection<const D: usize> {
     pub(super) changes: Sections<ChangeSection<D>>,
 }
 
-fn one_chain() -> usize {
+fn default_chain_count() -> usize {
     1
 }
 
@@ -121,13 +121,13 @@ pub(super) struct LimitSection<const D: usize> {
     failed: Option<bool>,
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns the chains of all sections, `count` of each, in the order of the file, which gives
     /// their slots.
     pub(super) fn chains(
         &self,
         dt_s: f64,
-        site: Option<&Site>,
+        site: Option<&GroundMap>,
     ) -> Result<Vec<ChainSpec<D>>, InputError> {
         self.check_total()?;
         let mut all = Vec::new();
@@ -135,7 +135,7 @@ impl<const D: usize> Compiler<'_, D> {
             let around = PlacementContext { site, number, placed: &all };
             let spec = self.chain(section, dt_s, around)?;
             for copy in 0..section.get_ref().count {
-                all.push(self.copy_chain(&spec, section, copy)?);
+                all.push(self.shifted_copy(&spec, section, copy)?);
             }
         }
         if all.is_empty() {
@@ -164,7 +164,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns one more chain like `spec`, shifted by a multiple of `apart_m`.
-    fn copy_chain(
+    fn shifted_copy(
         &self,
         spec: &ChainSpec<D>,
         section: &Spanned<ChainSection<D>>,
@@ -196,19 +196,20 @@ impl<const D: usize> Compiler<'_, D> {
         around: PlacementContext<D>,
     ) -> Result<ChainSpec<D>, InputError> {
         let s = section.get_ref();
-        let (start, arm) = self.shape(section, around)?;
+        let (start, arm) = self.compile_chain_shape(section, around)?;
         let tasks = self.tasks(section, &start)?;
         if let Some(arm) = &arm {
             for (section, task) in s.tasks.0.iter().zip(&tasks) {
-                self.check_joint_reach(section, task, arm)?;
+                self.check_arm_targets_reachable(section, task, arm)?;
             }
         }
-        let changes = self.changes(section, &start, dt_s)?;
+        let changes = self.compile_changes(section, &start, dt_s)?;
         let speed_m_s = tasks.iter().map(|task| task.speed_m_s).fold(0.0, f64::max);
         self.check_steps(section, &start, speed_m_s * dt_s)?;
-        let robots = s.robots.as_ref().map(|robots| self.robots(robots, speed_m_s)).transpose()?;
+        let robots =
+            s.robots.as_ref().map(|robots| self.compile_robots(robots, speed_m_s)).transpose()?;
         if let Some(robots) = &robots {
-            self.check_room(section, robots, &start)?;
+            self.check_robot_spacing(section, robots, &start)?;
         }
         if D != 2 && robots.is_some() {
             let remedy = "set chain.dimensions = 2, or leave robots out";
@@ -243,7 +244,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the changes of a chain by their time.
-    fn changes(
+    fn compile_changes(
         &self,
         section: &Spanned<ChainSection<D>>,
         start: &Chain<D>,
@@ -263,15 +264,15 @@ impl<const D: usize> Compiler<'_, D> {
             let cause = "a chain that breaks more than once";
             return Err(self.source.error(section.span(), cause, "break it once"));
         }
-        self.check_breaks(s, dt_s)?;
+        self.check_break_before_reform(s, dt_s)?;
         Ok(changes)
     }
 
     /// Refuses to join a chain that has not been broken by then, by the cycles in which both take effect.
-    fn check_breaks(&self, s: &ChainSection<D>, dt_s: f64) -> Result<(), InputError> {
-        let broken = s.changes.0.iter().find_map(|change| change.get_ref().break_cycle(dt_s));
+    fn check_break_before_reform(&self, s: &ChainSection<D>, dt_s: f64) -> Result<(), InputError> {
+        let broken = s.changes.0.iter().find_map(|change| change.get_ref().cycle_of_break(dt_s));
         for change in &s.changes.0 {
-            let Some(joined) = change.get_ref().join_cycle(dt_s) else { continue };
+            let Some(joined) = change.get_ref().cycle_of_join(dt_s) else { continue };
             if broken.is_none_or(|broken| joined < broken) {
                 let at = self.source.key_span(change.span(), &["reform"]);
                 let remedy = "break the chain before: a change with scatter = [first, last]";
@@ -329,10 +330,10 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses robots that overlap when their rods are shortest, and a margin below 0.
-    fn check_room(
+    fn check_robot_spacing(
         &self,
         section: &Spanned<ChainSection<D>>,
-        robots: &Robots,
+        robots: &RobotSwarmConfig,
         chain: &Chain<D>,
     ) -> Result<(), InputError> {
         let radius_m = robots.follower.ring.radius_m;
@@ -350,7 +351,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(())
     }
 
-    fn shape(
+    fn compile_chain_shape(
         &self,
         section: &Spanned<ChainSection<D>>,
         around: PlacementContext<D>,
@@ -358,10 +359,10 @@ impl<const D: usize> Compiler<'_, D> {
         let s = section.get_ref();
         let radius_m = self.radius_m(section)?;
         if let Some(arm) = &s.arm {
-            let (chain, arm) = self.arm_shape(section, arm, radius_m)?;
+            let (chain, arm) = self.arm_and_chain(section, arm, radius_m)?;
             return Ok((chain, Some(arm)));
         }
-        let rod = self.rod(section, radius_m)?;
+        let rod = self.compile_rod(section, radius_m)?;
         if let Some(within) = s.within_m.as_ref().filter(|_| !s.anywhere) {
             let cause = "within_m of a chain that has its place";
             let remedy = "leave it out, or set anywhere = true";
@@ -373,14 +374,14 @@ impl<const D: usize> Compiler<'_, D> {
             self.points(section, rod.max_m)?
         };
         let mut connectors = vec![Connector::free(radius_m); points.len()];
-        self.trim_leaders(s, &mut connectors);
+        self.remove_leader_margins(s, &mut connectors);
         if let Some(deg) = s.max_bend_deg {
             for connector in &mut connectors {
                 connector.max_bend_rad = deg.to_radians();
             }
         }
         for limit in &s.limits.0 {
-            self.limit(&mut connectors, limit)?;
+            self.apply_limit_section(&mut connectors, limit)?;
         }
         let rods = vec![rod; points.len() - 1];
         let chain = Chain::new(points, connectors, rods)
@@ -407,7 +408,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Removes the margin from leaders, because they are exactly where their connectors are.
-    fn trim_leaders(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
+    fn remove_leader_margins(&self, s: &ChainSection<D>, connectors: &mut [Connector<D>]) {
         let Some(robots) = &s.robots else { return };
         for task in s.tasks.0.iter().map(Spanned::get_ref).filter(|task| task.is_navigator()) {
             if let Some(connector) = connectors.get_mut(task.connector()) {
@@ -417,7 +418,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns an arm, and the chain of its connectors that guides it.
-    fn arm_shape(
+    fn arm_and_chain(
         &self,
         section: &Spanned<ChainSection<D>>,
         arm: &Spanned<ArmSection>,
@@ -437,14 +438,14 @@ impl<const D: usize> Compiler<'_, D> {
         }
         let base_m = s.at_m.map_or([0.0; D], PointValue::get);
         let arm_span = arm.span();
-        let arm = self.arm(arm, to_dimensions(base_m))?;
+        let arm = self.compile_arm(arm, to_dimensions(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(LINK_RADIUS_FACTOR * radius_m));
         let solid = solid.map_err(|error| self.source.error_from(arm_span, &error))?;
         // `D` is three here, which the compiler cannot know.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
-        let mut connectors: Vec<_> = solid.connectors().iter().map(arm_connector).collect();
+        let mut connectors: Vec<_> = solid.connectors().iter().map(convert_arm_connector).collect();
         for limit in &s.limits.0 {
-            self.limit(&mut connectors, limit)?;
+            self.apply_limit_section(&mut connectors, limit)?;
         }
         self.check_arm_whole(section, &connectors)?;
         let chain = Chain::new(points, connectors, solid.rods().to_vec())
@@ -476,7 +477,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    fn rod(
+    fn compile_rod(
         &self,
         section: &Spanned<ChainSection<D>>,
         connector_radius_m: f64,
@@ -518,14 +519,14 @@ impl<const D: usize> Compiler<'_, D> {
         let obstacles = self.placement_obstacles(Some(site), placed)?;
         let obstacles = Obstacles::new(obstacles, rod.max_m.max(MIN_REACH_M))
             .map_err(|error| self.source.error_from(at.clone(), &error))?;
-        let obstacles = obstacles.in_plane().expect("only worlds in the plane have a ground");
+        let obstacles = obstacles.as_planar().expect("only worlds in the plane have a ground");
         let wanted = SpaceRequirement {
             connectors,
             spacing_m: rod.max_m,
             clearance_m: ROOM_FACTOR * radius_m,
             rod_clearance_m: ROOM_FACTOR * rod.radius_m,
             ahead_m: rod.max_m,
-            within: s.within_m.as_ref().map(|within| within.get_ref().floor()),
+            within: s.within_m.as_ref().map(|within| within.get_ref().footprint()),
         };
         let start = find_placement(site, obstacles, &wanted, Seed(self.head.seed), number)
             .map_err(|error| self.source.error_from(at, &error))?;
@@ -578,7 +579,7 @@ impl<const D: usize> Compiler<'_, D> {
     /// Returns the direction from the first connector to the last; by default the chain looks along the first axis.
     fn direction(&self, s: &ChainSection<D>) -> Result<Point<D>, InputError> {
         match (&s.along, s.heading_deg) {
-            (None, None) => Ok(first_axis().map(|x: f64| -x)),
+            (None, None) => Ok(unit_x().map(|x: f64| -x)),
             (None, Some(deg)) => {
                 let rad = deg.to_radians();
                 // The first connector leads, the others are behind it.
@@ -596,7 +597,7 @@ impl<const D: usize> Compiler<'_, D> {
         }
     }
 
-    fn limit(
+    fn apply_limit_section(
         &self,
         connectors: &mut [Connector<D>],
         limit: &Spanned<LimitSection<D>>,
@@ -642,8 +643,8 @@ fn folded<const D: usize>(
     rod_m: f64,
     [leg_m, apart_m]: [f64; 2],
 ) -> Vec<Point<D>> {
-    let leg = rod_count(leg_m, rod_m);
-    let apart = rod_count(apart_m, rod_m);
+    let leg = rod_count_for_length(leg_m, rod_m);
+    let apart = rod_count_for_length(apart_m, rod_m);
     let aside = perpendicular(u);
     let mut points = Vec::with_capacity(n);
     for k in 0..n {
@@ -660,12 +661,12 @@ fn folded<const D: usize>(
 }
 
 /// Returns the number of rods that come nearest to a length, one at least.
-fn rod_count(length_m: f64, rod_m: f64) -> usize {
+fn rod_count_for_length(length_m: f64, rod_m: f64) -> usize {
     (length_m / rod_m).round().max(1.0) as usize
 }
 
 /// Returns a connector of an arm in `D` dimensions, which are three: an arm holds connectors only by fixing them.
-fn arm_connector<const D: usize>(c: &Connector<3>) -> Connector<D> {
+fn convert_arm_connector<const D: usize>(c: &Connector<3>) -> Connector<D> {
     Connector {
         mobility: if c.is_still() { Mobility::Fixed } else { Mobility::Free },
         max_bend_rad: c.max_bend_rad,

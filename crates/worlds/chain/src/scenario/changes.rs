@@ -3,7 +3,7 @@
 use super::super::world::{ChainChange, ChainChangeKind};
 use super::mobility::MobilitySection;
 use super::tasks::DEFAULT_SPEED_M_S;
-use super::{Compiler, PointValue, PositiveNumber};
+use super::{ChainScenarioCompiler, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
@@ -50,17 +50,17 @@ pub(super) struct ChangeSection<const D: usize> {
 
 impl<const D: usize> ChangeSection<D> {
     /// Returns the cycle at the start of which it takes effect.
-    fn cycle(&self, dt_s: f64) -> u64 {
+    fn effective_cycle(&self, dt_s: f64) -> u64 {
         (self.at_s.get() / dt_s).round() as u64
     }
 
     /// Returns the cycle in which it breaks the chain, if it does.
-    pub(super) fn break_cycle(&self, dt_s: f64) -> Option<u64> {
-        self.scatter.is_some().then(|| self.cycle(dt_s))
+    pub(super) fn cycle_of_break(&self, dt_s: f64) -> Option<u64> {
+        self.scatter.is_some().then(|| self.effective_cycle(dt_s))
     }
 
     /// Returns whether it may let a connector go that is held or has failed.
-    pub(super) fn releases(&self, connector: usize) -> bool {
+    pub(super) fn may_release_connector(&self, connector: usize) -> bool {
         self.connector == Some(connector) && (self.failed == Some(false) || self.mobility.is_some())
     }
 
@@ -70,12 +70,12 @@ impl<const D: usize> ChangeSection<D> {
     }
 
     /// Returns the cycle in which it joins the chain again, if it does.
-    pub(super) fn join_cycle(&self, dt_s: f64) -> Option<u64> {
-        (self.reform == Some(true)).then(|| self.cycle(dt_s))
+    pub(super) fn cycle_of_join(&self, dt_s: f64) -> Option<u64> {
+        (self.reform == Some(true)).then(|| self.effective_cycle(dt_s))
     }
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     pub(super) fn change(
         &self,
         section: &Spanned<ChangeSection<D>>,
@@ -84,7 +84,7 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<ChainChange<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
-        Ok(ChainChange { cycle: s.cycle(dt_s), what: self.change_kind(s, chain, at)? })
+        Ok(ChainChange { cycle: s.effective_cycle(dt_s), what: self.change_kind(s, chain, at)? })
     }
 
     fn change_kind(
@@ -93,7 +93,7 @@ impl<const D: usize> Compiler<'_, D> {
         chain: &Chain<D>,
         at: Range<usize>,
     ) -> Result<ChainChangeKind<D>, InputError> {
-        self.check_one_change(s, at.clone())?;
+        self.check_single_change_key(s, at.clone())?;
         let n = chain.points().len();
         if let Some([first, last]) = s.scatter {
             return self.scatter(s, [first, last], n, at);
@@ -133,7 +133,11 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses two changes at once, and keys that have no effect beside the one.
-    fn check_one_change(&self, s: &ChangeSection<D>, at: Range<usize>) -> Result<(), InputError> {
+    fn check_single_change_key(
+        &self,
+        s: &ChangeSection<D>,
+        at: Range<usize>,
+    ) -> Result<(), InputError> {
         let throws = s.scatter.is_some();
         let joins = s.reform == Some(true);
         let others = [s.failed.is_some(), s.max_bend_deg.is_some(), s.mobility.is_some()];

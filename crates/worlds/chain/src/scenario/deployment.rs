@@ -1,6 +1,6 @@
 //! Scenarios in which agents that know only their neighbors and their own perception can move the chains.
 
-use super::{ChainSpec, Compiler};
+use super::{ChainScenarioCompiler, ChainSpec};
 use crate::deploy::deployment::Deployment;
 use crate::driver::TaskKind;
 use crate::world::ChainChangeKind;
@@ -21,10 +21,10 @@ impl NonLocalKey {
     }
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Refuses a scenario that is deployed as a team and in which a connector would have to know more than it
     /// does.
-    pub(super) fn check_local(
+    pub(super) fn check_local_knowledge(
         &self,
         chains: &[ChainSpec<D>],
         rules: &ReactionRules,

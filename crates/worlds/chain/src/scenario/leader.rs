@@ -1,7 +1,7 @@
 //! Refusals of tasks that their connector can never do.
 
 use super::super::driver::{Task, TaskKind};
-use super::Compiler;
+use super::ChainScenarioCompiler;
 use super::chains::ChainSection;
 use super::tasks::TaskSection;
 use sidestep_arms::Arm;
@@ -10,7 +10,7 @@ use sidestep_rods::geometry::distance;
 use sidestep_rods::{Chain, Mobility};
 use sidestep_scenario::Spanned;
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Refuses a task that moves a fixed or failed connector, and targets off the line, the plane or the
     /// box on which it belongs, unless a change may let it go.
     pub(super) fn check_leader(
@@ -22,7 +22,7 @@ impl<const D: usize> Compiler<'_, D> {
     ) -> Result<(), InputError> {
         let k = task.agent;
         let moves = !matches!(task.driver, TaskKind::Rest | TaskKind::External);
-        if !moves || s.changes.0.iter().any(|change| change.get_ref().releases(k)) {
+        if !moves || s.changes.0.iter().any(|change| change.get_ref().may_release_connector(k)) {
             return Ok(());
         }
         let connector = &start.connectors()[k];
@@ -41,7 +41,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Refuses targets to which no joints of an arm bring the connector that leads, with the reason.
-    pub(super) fn check_joint_reach(
+    pub(super) fn check_arm_targets_reachable(
         &self,
         section: &Spanned<TaskSection<D>>,
         task: &Task<D>,

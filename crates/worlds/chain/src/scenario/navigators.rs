@@ -1,12 +1,14 @@
 //! Initiators on wheels, and the robots that follow them.
 
-use super::super::formation::Robots;
+use super::super::formation::RobotSwarmConfig;
 use super::super::navigate::{NavigationGoal, Navigator};
 use super::super::swarm::drive::DifferentialDrive;
 use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
-use super::super::swarm::leader::{Leader, TargetDetector, TurnMode, WallLeaveRule, WallLossRule};
-use super::{Compiler, MAX_VALUE, PositiveRule};
+use super::super::swarm::leader::{
+    LeaderController, TargetDetector, TurnMode, WallLeaveRule, WallLossDetection,
+};
+use super::{ChainScenarioCompiler, MAX_VALUE, PositiveRule};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -53,9 +55,9 @@ impl Rule for RobotSizeRule {
 
 /// Angles up to a whole turn to either side, degrees.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TurnAngleRule;
+pub(super) struct TurnAngleRangeRule;
 
-impl Rule for TurnAngleRule {
+impl Rule for TurnAngleRangeRule {
     fn allows(number: f64) -> bool {
         number.abs() <= 360.0
     }
@@ -108,7 +110,7 @@ pub(super) struct NavigatorSection {
     /// Distance at which a wall is lost.
     lost_m: Option<f64>,
     /// Sector of the laser that looks at the wall.
-    sector_deg: Option<[Number<TurnAngleRule>; 2]>,
+    sector_deg: Option<[Number<TurnAngleRangeRule>; 2]>,
     /// Rule by which a wall is left.
     leaving: WallLossWord,
     /// Whether walls are left at all.
@@ -152,7 +154,7 @@ pub(super) struct RobotsSection {
     turn_gain_per_s: Option<RobotSize>,
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns a navigator that drives at `speed_m_s`.
     pub(super) fn navigator(
         &self,
@@ -163,7 +165,7 @@ impl<const D: usize> Compiler<'_, D> {
             let s = NavigatorSection::default();
             return Ok(Navigator {
                 leader: s.leader(speed_m_s)?,
-                drive: s.drive(speed_m_s)?,
+                drive: s.differential_drive(speed_m_s)?,
                 goal: self.goal(&s)?,
             });
         };
@@ -171,7 +173,7 @@ impl<const D: usize> Compiler<'_, D> {
         let s = section.get_ref();
         let leader = s.leader(speed_m_s);
         let leader = leader.map_err(|error| self.source.error_from(section.span(), &error))?;
-        let drive = s.drive(speed_m_s);
+        let drive = s.differential_drive(speed_m_s);
         let drive = drive.map_err(|error| self.source.error_from(section.span(), &error))?;
         Ok(Navigator { leader, drive, goal: self.goal(s)? })
     }
@@ -194,29 +196,29 @@ impl<const D: usize> Compiler<'_, D> {
             let tolerance_m = s.tolerance_m.map_or(DEFAULT_TOLERANCE_M, f64::from);
             return Ok(Some(NavigationGoal::Target { at: at.get(), tolerance_m }));
         }
-        let middle = self.corridor_middle(LINE_STEP_M)?;
+        let middle = self.corridor_center_line(LINE_STEP_M)?;
         Ok(middle.map(|(line, width_m)| NavigationGoal::EndOf { line, width_m }))
     }
 
     /// Returns the robots of a swarm with a leader that drives at `speed_m_s`.
-    pub(super) fn robots(
+    pub(super) fn compile_robots(
         &self,
         section: &Spanned<RobotsSection>,
         speed_m_s: f64,
-    ) -> Result<Robots, InputError> {
+    ) -> Result<RobotSwarmConfig, InputError> {
         let robots = section.get_ref().robots(speed_m_s);
         robots.map_err(|error| self.source.error_from(section.span(), &error))
     }
 }
 
 impl NavigatorSection {
-    fn drive(&self, speed_m_s: f64) -> Result<DifferentialDrive, InputError> {
+    fn differential_drive(&self, speed_m_s: f64) -> Result<DifferentialDrive, InputError> {
         let wheelbase_m = self.wheelbase_m.map_or(DEFAULT_WHEELBASE_M, f64::from);
         DifferentialDrive::new(wheelbase_m, speed_m_s)
     }
 
-    fn leader(&self, speed_m_s: f64) -> Result<Leader, InputError> {
-        let usual = Leader::new(speed_m_s)?;
+    fn leader(&self, speed_m_s: f64) -> Result<LeaderController, InputError> {
+        let usual = LeaderController::new(speed_m_s)?;
         let laser = Laser::new(
             self.beams.unwrap_or(DEFAULT_BEAMS),
             self.range_m.map_or(usual.laser.range_m(), f64::from),
@@ -228,7 +230,7 @@ impl NavigatorSection {
             Some(ends) => ends.map(|deg| f64::from(deg).to_radians()),
             None => usual.sector_rad,
         };
-        let leader = Leader {
+        let leader = LeaderController {
             laser,
             sector_rad,
             speed_m_s,
@@ -236,9 +238,9 @@ impl NavigatorSection {
             far_m: self.far_m.unwrap_or(usual.far_m),
             lost_m: self.lost_m.unwrap_or(usual.lost_m),
             leaving: match self.leaving {
-                WallLossWord::Latched => WallLossRule::Latched,
-                WallLossWord::Range => WallLossRule::Range,
-                WallLossWord::Level => WallLossRule::Level,
+                WallLossWord::Latched => WallLossDetection::Latched,
+                WallLossWord::Range => WallLossDetection::Range,
+                WallLossWord::Level => WallLossDetection::Level,
             },
             leave_rule: self.leave_rule.unwrap_or(true).then(WallLeaveRule::default),
             target_sense: TargetDetector {
@@ -257,7 +259,7 @@ impl NavigatorSection {
 }
 
 impl RobotsSection {
-    fn robots(&self, speed_m_s: f64) -> Result<Robots, InputError> {
+    fn robots(&self, speed_m_s: f64) -> Result<RobotSwarmConfig, InputError> {
         let wheel_m_s = self.wheel_speed_m_s.map_or(WHEEL_SPEED_FACTOR * speed_m_s, f64::from);
         let wheelbase_m = self.wheelbase_m.map_or(DEFAULT_WHEELBASE_M, f64::from);
         let drive = DifferentialDrive::new(wheelbase_m, wheel_m_s)?;
@@ -265,7 +267,7 @@ impl RobotsSection {
         follower.gain_per_s = self.gain_per_s.map_or(follower.gain_per_s, f64::from);
         follower.turn_gain_per_s = self.turn_gain_per_s.map_or(follower.turn_gain_per_s, f64::from);
         follower.ring.range_m = self.sensors_m.map_or(follower.ring.range_m, f64::from);
-        Ok(Robots {
+        Ok(RobotSwarmConfig {
             follower,
             lag_limit_m: self.lag_limit_m.map_or(DEFAULT_LAG_LIMIT_M, f64::from),
         })

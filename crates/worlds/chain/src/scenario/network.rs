@@ -1,6 +1,6 @@
 //! The section of a network that may lose and delay messages.
 
-use super::{ChainSpec, Compiler};
+use super::{ChainScenarioCompiler, ChainSpec};
 use crate::deploy::deployment::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use sidestep_kernel::network::{self, Network};
 use sidestep_kernel::{EntityId, InputError};
 use sidestep_scenario::network::{AgentNaming, SectionError, check_sides, endless_s, time_window};
 
-pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<ConnectorCounts>;
+pub(super) type NetworkSection = sidestep_scenario::network::NetworkSection<ChainConnectorCounts>;
 
 /// A period in which a connector's radio is dead: it sends nothing, hears nothing, and knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
@@ -70,15 +70,19 @@ pub(super) struct UnidirectionalLinkSection {
 /// The connectors of a scenario: their number in each chain. On the network they are counted on, chain
 /// after chain.
 #[derive(Debug)]
-pub(super) struct ConnectorCounts(Vec<u32>);
+pub(super) struct ChainConnectorCounts(Vec<u32>);
 
-impl ConnectorCounts {
+impl ChainConnectorCounts {
     fn from_chains<const D: usize>(chains: &[ChainSpec<D>]) -> Self {
         Self(chains.iter().map(|spec| spec.start.points().len() as u32).collect())
     }
 
     /// Returns ids on the network, or which chain or connector does not exist.
-    fn ids(&self, chain: EntityId, connectors: &[u32]) -> Result<Vec<EntityId>, SectionError> {
+    fn network_ids(
+        &self,
+        chain: EntityId,
+        connectors: &[u32],
+    ) -> Result<Vec<EntityId>, SectionError> {
         let Some((before, &[n, ..])) = self.0.split_at_checked(chain as usize) else {
             let cause = format!("chain {chain} does not exist");
             let last = self.0.len().max(1) - 1;
@@ -93,7 +97,7 @@ impl ConnectorCounts {
     }
 }
 
-impl AgentNaming for ConnectorCounts {
+impl AgentNaming for ChainConnectorCounts {
     type RadioOutage = RadioOutageSection;
     type Partition = PartitionSection;
     type UnidirectionalLink = UnidirectionalLinkSection;
@@ -106,13 +110,16 @@ impl AgentNaming for ConnectorCounts {
     const MAX_DEADLINE_TEXT: &str = "at most dt_s";
 
     fn radio_outage(&self, one: &RadioOutageSection) -> Result<network::RadioOutage, SectionError> {
-        let agent = self.ids(one.chain, &[one.connector])?[0];
+        let agent = self.network_ids(one.chain, &[one.connector])?[0];
         Ok(network::RadioOutage { agent, window: time_window(one.from_s, one.until_s)? })
     }
 
     fn partition(&self, one: &PartitionSection) -> Result<network::NetworkPartition, SectionError> {
-        let sides =
-            one.sides.iter().map(|side| self.ids(one.chain, side)).collect::<Result<_, _>>()?;
+        let sides = one
+            .sides
+            .iter()
+            .map(|side| self.network_ids(one.chain, side))
+            .collect::<Result<_, _>>()?;
         check_sides(&one.sides, "connector")?;
         Ok(network::NetworkPartition { sides, window: time_window(one.from_s, one.until_s)? })
     }
@@ -122,7 +129,7 @@ impl AgentNaming for ConnectorCounts {
         one: &UnidirectionalLinkSection,
     ) -> Result<network::UnidirectionalLink, SectionError> {
         let UnidirectionalLinkSection { sender, receiver, chain, from_s, until_s } = *one;
-        let ids = self.ids(chain, &[sender, receiver])?;
+        let ids = self.network_ids(chain, &[sender, receiver])?;
         if sender.abs_diff(receiver) != 1 {
             let cause = format!("connectors {sender} and {receiver} are no neighbors");
             let remedy = "only neighbors talk to each other: give numbers that differ by 1";
@@ -133,7 +140,7 @@ impl AgentNaming for ConnectorCounts {
     }
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns the network, if the scenario has one.
     pub(super) fn network(
         &self,
@@ -146,7 +153,7 @@ impl<const D: usize> Compiler<'_, D> {
             let remedy = "set deployment = \"team\", or leave [chain.network] out";
             return Err(self.source.error(section.span(), cause, remedy));
         }
-        let network = section.get_ref().network(dt_s, &ConnectorCounts::from_chains(chains));
+        let network = section.get_ref().network(dt_s, &ChainConnectorCounts::from_chains(chains));
         network.map(Some).map_err(|SectionError { span, cause, remedy }| {
             self.source.error(span.unwrap_or_else(|| section.span()), cause, remedy)
         })

@@ -1,12 +1,12 @@
 //! Obstacles: grounds, single obstacles, and fields of them.
 
-use super::super::ground::fields::{ObstacleField, WanderingObstacles};
+use super::super::ground::fields::{BouncingBallField, RandomObstacleField};
 use super::super::ground::{
-    Corridor, CorridorLeg, MovingObstacle, MovingObstacles, ObstaclePath, Site,
+    Corridor, CorridorLeg, GroundMap, MovingObstacle, MovingObstacles, ObstaclePath,
 };
-use super::super::world::{ChainSpec, push_parts};
+use super::super::world::{ChainSpec, push_part_obstacles};
 use super::tasks::DEFAULT_SPEED_M_S;
-use super::{Compiler, MAX_VALUE, MIN_REACH_M, PointValue, PositiveNumber};
+use super::{ChainScenarioCompiler, MAX_VALUE, MIN_REACH_M, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::{rosmap, stage};
@@ -112,7 +112,7 @@ pub(super) struct FieldSection<const D: usize> {
 }
 
 /// All obstacles for a world's chains.
-pub(super) struct GroundObstacles<const D: usize> {
+pub(super) struct ScenarioObstacles<const D: usize> {
     pub(super) obstacles: Obstacles<D>,
     pub(super) movers: MovingObstacles<D>,
 }
@@ -125,7 +125,7 @@ struct ObstacleBuilder<const D: usize> {
 }
 
 impl<const D: usize> ObstacleBuilder<D> {
-    fn add_still(&mut self, obstacles: impl IntoIterator<Item = Obstacle<D>>) {
+    fn add_static(&mut self, obstacles: impl IntoIterator<Item = Obstacle<D>>) {
         for obstacle in obstacles {
             self.next_id = self.next_id.max(obstacle.id + 1);
             self.still.push(obstacle);
@@ -133,22 +133,22 @@ impl<const D: usize> ObstacleBuilder<D> {
     }
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns the ground of a world; random obstacles come last, because they keep away from
     /// chains.
-    pub(super) fn ground(
+    pub(super) fn compile_ground(
         &self,
-        site: Option<&Site>,
+        site: Option<&GroundMap>,
         chains: &[ChainSpec<D>],
-    ) -> Result<GroundObstacles<D>, InputError> {
+    ) -> Result<ScenarioObstacles<D>, InputError> {
         let mut all = self.given_obstacles(site)?;
         for (k, section) in (0..).zip(&self.file.fields.0) {
-            self.add_field(section, k, chains, &mut all)?;
+            self.add_obstacle_field(section, k, chains, &mut all)?;
         }
         let reach_m = chains.iter().map(longest_part_m).fold(0.0, f64::max).max(MIN_REACH_M);
         let obstacles = Obstacles::new(all.still, reach_m);
         let movers = MovingObstacles::new(all.movers);
-        Ok(GroundObstacles {
+        Ok(ScenarioObstacles {
             obstacles: obstacles.map_err(|error| self.ground_error(&error))?,
             movers: movers.map_err(|error| self.ground_error(&error))?,
         })
@@ -161,11 +161,11 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns all obstacles except those at random places, which keep away from chains.
-    fn given_obstacles(&self, site: Option<&Site>) -> Result<ObstacleBuilder<D>, InputError> {
+    fn given_obstacles(&self, site: Option<&GroundMap>) -> Result<ObstacleBuilder<D>, InputError> {
         let mut all = ObstacleBuilder { still: Vec::new(), movers: Vec::new(), next_id: 0 };
         self.add_corridor(&mut all)?;
         if let Some(site) = site {
-            all.add_still(site.obstacles(0).iter().map(wall_to_dimensions));
+            all.add_static(site.obstacles(0).iter().map(embed_wall));
         }
         for section in &self.file.obstacles.0 {
             self.add_obstacle(section, &mut all)?;
@@ -177,19 +177,19 @@ impl<const D: usize> Compiler<'_, D> {
     /// start, and the parts of the chains that are placed already.
     pub(super) fn placement_obstacles(
         &self,
-        site: Option<&Site>,
+        site: Option<&GroundMap>,
         placed: &[ChainSpec<D>],
     ) -> Result<Vec<Obstacle<D>>, InputError> {
         let ObstacleBuilder { still: mut all, movers, .. } = self.given_obstacles(site)?;
         all.extend(movers.iter().map(|mover| mover.at(0.0)));
         for (slot, spec) in (0..).zip(placed) {
-            push_parts(&mut all, slot, &spec.start);
+            push_part_obstacles(&mut all, slot, &spec.start);
         }
         Ok(all)
     }
 
     /// Returns the floors of a map or of a Stage world, if the scenario names one.
-    pub(super) fn site(&self) -> Result<Option<Site>, InputError> {
+    pub(super) fn compile_site(&self) -> Result<Option<GroundMap>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
         let s = section.get_ref();
         let at = section.span();
@@ -212,11 +212,14 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(match (&s.map, &s.stage) {
             (Some(map), _) => {
                 let map = rosmap::load(&self.source.path(map.as_ref()));
-                Some(Site::from_map(&self.source.with_file_key(at, "map", map)?, unknown))
+                Some(GroundMap::from_pixel_map(
+                    &self.source.with_file_key(at, "map", map)?,
+                    unknown,
+                ))
             }
             (_, Some(world)) => {
                 let world = stage::load(&self.source.path(world.as_ref()));
-                Some(Site::from_stage(&self.source.with_file_key(at, "stage", world)?))
+                Some(GroundMap::from_stage_world(&self.source.with_file_key(at, "stage", world)?))
             }
             _ => None,
         })
@@ -225,12 +228,12 @@ impl<const D: usize> Compiler<'_, D> {
     fn add_corridor(&self, all: &mut ObstacleBuilder<D>) -> Result<(), InputError> {
         let Some(corridor) = self.corridor()? else { return Ok(()) };
         let walls = corridor.walls(all.next_id);
-        all.add_still(walls.iter().map(wall_to_dimensions));
+        all.add_static(walls.iter().map(embed_wall));
         Ok(())
     }
 
     /// Returns the middle of the corridor, and its width in meters, if the scenario has one.
-    pub(super) fn corridor_middle(
+    pub(super) fn corridor_center_line(
         &self,
         step_m: f64,
     ) -> Result<Option<(Vec<Point<2>>, f64)>, InputError> {
@@ -279,15 +282,15 @@ impl<const D: usize> Compiler<'_, D> {
         let id = all.next_id;
         self.check_shape_keys(s, at.clone())?;
         if let Some(corners) = &s.corners_m {
-            return self.add_outline(s, corners, at, all);
+            return self.add_polygon_walls(s, corners, at, all);
         }
-        let body = Obstacle::still(id, self.core(s, at.clone())?, s.radius_m);
+        let body = Obstacle::new_static(id, self.compile_core(s, at.clone())?, s.radius_m);
         body.check().map_err(|error| {
             let at = self.source.key_span(at.clone(), &["radius_m", "size_m"]);
             self.source.error_from(at, &error)
         })?;
         all.next_id += 1;
-        match self.course(s, at.clone())? {
+        match self.compile_obstacle_path(s, at.clone())? {
             None => all.still.push(body),
             Some(course) => {
                 let mover = MovingObstacle::new(body, course);
@@ -311,7 +314,7 @@ impl<const D: usize> Compiler<'_, D> {
         self.source.refuse_unused_keys(at, &keys, "for this obstacle")
     }
 
-    fn add_outline(
+    fn add_polygon_walls(
         &self,
         s: &ObstacleSection<D>,
         corners: &[PointValue<D>],
@@ -327,11 +330,15 @@ impl<const D: usize> Compiler<'_, D> {
         let corners: Vec<Point<2>> =
             corners.iter().map(|corner| to_dimensions(corner.get())).collect();
         let walls = outline_walls(all.next_id, &corners, s.radius_m);
-        all.add_still(walls.iter().map(wall_to_dimensions));
+        all.add_static(walls.iter().map(embed_wall));
         Ok(())
     }
 
-    fn core(&self, s: &ObstacleSection<D>, at: Range<usize>) -> Result<ConvexCore<D>, InputError> {
+    fn compile_core(
+        &self,
+        s: &ObstacleSection<D>,
+        at: Range<usize>,
+    ) -> Result<ConvexCore<D>, InputError> {
         match (s.at_m, s.ends_m, s.size_m) {
             (Some(center), None, None) => Ok(ConvexCore::Point(center.get())),
             (None, Some(ends), None) => Ok(ConvexCore::Segment(ends.map(PointValue::get))),
@@ -354,7 +361,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the course of an obstacle; `None` if it stands still.
-    fn course(
+    fn compile_obstacle_path(
         &self,
         s: &ObstacleSection<D>,
         at: Range<usize>,
@@ -380,7 +387,7 @@ impl<const D: usize> Compiler<'_, D> {
         Ok(Some(course))
     }
 
-    fn add_field(
+    fn add_obstacle_field(
         &self,
         section: &Spanned<FieldSection<D>>,
         number: u64,
@@ -404,17 +411,23 @@ impl<const D: usize> Compiler<'_, D> {
         match (s.fill_fraction.or(s.part), s.n, s.speed_m_s) {
             (Some(part), None, None) if least == greatest => {
                 let length_m = s.length_m.unwrap_or(0.0);
-                let field =
-                    ObstacleField { room, part, radius_m: least, length_m, keep_clear, keep_m };
-                let obstacles = field.fill(seed, all.next_id);
-                all.add_still(
+                let field = RandomObstacleField {
+                    room,
+                    part,
+                    radius_m: least,
+                    length_m,
+                    keep_clear,
+                    keep_m,
+                };
+                let obstacles = field.generate_obstacles(seed, all.next_id);
+                all.add_static(
                     obstacles.map_err(|error| self.source.error_from(section.span(), &error))?,
                 );
             }
             (None, Some(n), Some(speed_m_s)) if s.length_m.is_none() => {
                 let [radius_m, speed_m_s] =
-                    self.crowd_sizes([s.radius_m, speed_m_s], section.span())?;
-                let crowd = WanderingObstacles { room, n, radius_m, speed_m_s, keep_clear, keep_m };
+                    self.crowd_radii_and_speeds([s.radius_m, speed_m_s], section.span())?;
+                let crowd = BouncingBallField { room, n, radius_m, speed_m_s, keep_clear, keep_m };
                 let movers = crowd.generate(seed, all.next_id);
                 all.movers.extend(
                     movers.map_err(|error| self.source.error_from(section.span(), &error))?,
@@ -432,7 +445,7 @@ impl<const D: usize> Compiler<'_, D> {
     }
 
     /// Returns the radii and speeds of a crowd.
-    fn crowd_sizes(
+    fn crowd_radii_and_speeds(
         &self,
         limits: [NumberRange; 2],
         at: Range<usize>,
@@ -469,7 +482,7 @@ pub(super) fn to_dimensions<const FROM: usize, const TO: usize>(p: Point<FROM>) 
 }
 
 /// Returns a plane wall in the required number of dimensions.
-fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
+fn embed_wall<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     let core = match wall.core {
         ConvexCore::Point(c) => ConvexCore::Point(to_dimensions(c)),
         ConvexCore::Segment(ends) => ConvexCore::Segment(ends.map(to_dimensions)),
@@ -483,7 +496,7 @@ fn wall_to_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
             })
         }
     };
-    Obstacle::still(wall.id, core, wall.radius_m)
+    Obstacle::new_static(wall.id, core, wall.radius_m)
 }
 
 /// Returns the axes of a box that is turned in the plane of the first two: in space, about the third axis.

@@ -1,8 +1,8 @@
 //! The sections that a scenario was compiled from, so that another seed reads no file again.
 
-use super::{ChainFile, ChainScenario, Compiler};
-use crate::ground::Site;
-use crate::own_parts::OwnParts;
+use super::{ChainScenario, ChainScenarioCompiler, ChainScenarioFile};
+use crate::ground::GroundMap;
+use crate::own_parts::CustomBehaviors;
 use crate::world::ChainWorld;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -14,10 +14,10 @@ use std::sync::Arc;
 pub(crate) struct ScenarioSpec<const D: usize> {
     source: Source,
     head: Head,
-    file: ChainFile<D>,
-    site: Option<Site>,
+    file: ChainScenarioFile<D>,
+    site: Option<GroundMap>,
     /// Drivers and reactions beside the built-in ones.
-    own: OwnParts,
+    own: CustomBehaviors,
 }
 
 impl<const D: usize> ScenarioSpec<D> {
@@ -28,11 +28,18 @@ impl<const D: usize> ScenarioSpec<D> {
     pub(super) fn new(
         source: &Source,
         head: Head,
-        file: ChainFile<D>,
-        own: &OwnParts,
+        file: ChainScenarioFile<D>,
+        own: &CustomBehaviors,
     ) -> Result<Self, InputError> {
-        let compiler = Compiler { source, head: &head, file: &file, site: None, known: None, own };
-        let site = compiler.site()?;
+        let compiler = ChainScenarioCompiler {
+            source,
+            head: &head,
+            file: &file,
+            site: None,
+            known: None,
+            own,
+        };
+        let site = compiler.compile_site()?;
         Ok(Self { source: source.clone(), head, file, site, own: own.clone() })
     }
 
@@ -66,11 +73,11 @@ impl<const D: usize> ScenarioSpec<D> {
         known: Option<&ChainWorld<D>>,
     ) -> Result<ChainScenario<D>, InputError> {
         let Self { source, file, site, own, .. } = self;
-        Compiler { source, head, file, site: site.as_ref(), known, own }.compile()
+        ChainScenarioCompiler { source, head, file, site: site.as_ref(), known, own }.compile()
     }
 }
 
-impl<const D: usize> ChainFile<D> {
+impl<const D: usize> ChainScenarioFile<D> {
     /// Returns whether the seed decides where a chain starts.
     pub(super) fn has_random_start(&self) -> bool {
         self.chains.0.iter().any(|section| section.get_ref().anywhere)

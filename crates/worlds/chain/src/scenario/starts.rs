@@ -1,10 +1,10 @@
 //! Checks that chains have their places to themselves at the start.
 
 use super::super::metrics::PENETRATION_THRESHOLD_M;
-use super::super::world::{ChainSpec, OTHER_CHAIN, push_parts};
-use super::obstacles::GroundObstacles;
-use super::{Compiler, MIN_REACH_M};
-use sidestep_kernel::{InputError, Slot};
+use super::super::world::{ChainSpec, OTHER_CHAIN, push_part_obstacles};
+use super::obstacles::ScenarioObstacles;
+use super::{ChainScenarioCompiler, MIN_REACH_M};
+use sidestep_kernel::{EntitySlot, InputError};
 use sidestep_rods::geometry::Aabb;
 use sidestep_rods::{Chain, Obstacle, Obstacles};
 use std::ops::Range;
@@ -18,23 +18,27 @@ struct StartOverlap {
     depth_m: f64,
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Refuses chains that start in obstacles, or in each other, because every motion out of there
     /// would pass through a solid.
     pub(super) fn check_starts(
         &self,
         chains: &[ChainSpec<D>],
-        ground: &GroundObstacles<D>,
+        ground: &ScenarioObstacles<D>,
     ) -> Result<(), InputError> {
         if self.file.chain.may_start_inside {
             return Ok(());
         }
         let mut obstacles = ground.obstacles.clone();
         let moving: Vec<_> = ground.movers.at(0.0).filter(Obstacle::is_in_range).collect();
-        obstacles.set_moving(&moving)?;
+        obstacles.replace_moving(&moving)?;
         for (slot, spec) in chains.iter().enumerate() {
             if let Some(inside) = deepest(&spec.start, &obstacles, None) {
-                return Err(self.start_error(slot, inside, &format!("obstacle {}", inside.id)));
+                return Err(self.start_overlap_error(
+                    slot,
+                    inside,
+                    &format!("obstacle {}", inside.id),
+                ));
             }
         }
         if chains.len() < 2 {
@@ -43,22 +47,22 @@ impl<const D: usize> Compiler<'_, D> {
         // All chains are obstacles to all, each apart from its own parts, so that the grid of obstacles is built once.
         let mut parts = Vec::new();
         for (slot, spec) in (0..).zip(chains) {
-            push_parts(&mut parts, slot, &spec.start);
+            push_part_obstacles(&mut parts, slot, &spec.start);
         }
         let rods = chains.iter().flat_map(|spec| spec.start.rods());
         let longest_m = rods.map(|rod| rod.max_m).fold(MIN_REACH_M, f64::max);
         let parts = Obstacles::new(parts, longest_m)?;
         for (slot, spec) in chains.iter().enumerate() {
-            let own = OTHER_CHAIN + slot as Slot;
+            let own = OTHER_CHAIN + slot as EntitySlot;
             if let Some(inside) = deepest(&spec.start, &parts, Some(own)) {
                 let other = format!("chain {}", inside.id - OTHER_CHAIN);
-                return Err(self.start_error(slot, inside, &other));
+                return Err(self.start_overlap_error(slot, inside, &other));
             }
         }
         Ok(())
     }
 
-    fn start_error(&self, slot: usize, inside: StartOverlap, what: &str) -> InputError {
+    fn start_overlap_error(&self, slot: usize, inside: StartOverlap, what: &str) -> InputError {
         let StartOverlap { connector, depth_m, .. } = inside;
         let cause = format!(
             "chain {slot} begins {depth_m:.3e} m deep in {what}, with connector {connector} or \

@@ -4,7 +4,7 @@ use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
 use super::navigators::NavigatorSection;
-use super::{BoxSection, Compiler, MAX_VALUE, PointValue, PositiveNumber};
+use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
@@ -118,7 +118,7 @@ impl<const D: usize> TaskSection<D> {
     }
 }
 
-impl<const D: usize> Compiler<'_, D> {
+impl<const D: usize> ChainScenarioCompiler<'_, D> {
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,

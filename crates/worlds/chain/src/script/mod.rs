@@ -72,7 +72,7 @@ impl Script {
     }
 
     fn error(&self, at: usize, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
-        InputError::new(&self.place, cause, remedy).with_offset(&self.text, at)
+        InputError::new(&self.place, cause, remedy).with_byte_offset(&self.text, at)
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) fn script(place: &str, text: &str) -> Result<Script, InputError> {
     check_nesting(place, text)?;
     let items = parse_program.parse(LocatingSlice::new(text)).map_err(|error| {
         let (cause, remedy) = describe_error(error.inner(), &text[error.offset()..]);
-        InputError::new(place, cause, remedy).with_offset(text, error.offset())
+        InputError::new(place, cause, remedy).with_byte_offset(text, error.offset())
     })?;
     let mut main = Vec::new();
     let mut procedures = Vec::new();
@@ -58,7 +58,7 @@ fn check_nesting(place: &str, text: &str) -> Result<(), InputError> {
         }
         if depth > MAX_NESTING {
             let cause = format!("more than {MAX_NESTING} brackets in each other");
-            return Err(InputError::new(place, cause, "use procedures").with_offset(text, at));
+            return Err(InputError::new(place, cause, "use procedures").with_byte_offset(text, at));
         }
     }
     Ok(())
@@ -72,14 +72,16 @@ fn describe_error(error: &ContextError, rest: &str) -> (String, String) {
     });
     let expected = expected.unwrap_or_else(|| STATEMENTS.into());
     let found = match rest.chars().next() {
-        Some(c) if is_name(c) => format!("`{}`", rest.split(|c| !is_name(c)).next().unwrap_or("")),
+        Some(c) if is_name_char(c) => {
+            format!("`{}`", rest.split(|c| !is_name_char(c)).next().unwrap_or(""))
+        }
         Some(c) => format!("`{}`", c.escape_debug()),
         None => "the end of the script".into(),
     };
     (format!("{found} where {expected} is expected"), format!("write {expected} there"))
 }
 
-fn is_name(c: char) -> bool {
+fn is_name_char(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
@@ -106,11 +108,11 @@ fn skip_blank(input: &mut ParserInput) -> ModalResult<()> {
 }
 
 fn name<'a>(input: &mut ParserInput<'a>) -> ModalResult<&'a str> {
-    let letters = (one_of(char::is_alphabetic), take_while(0.., is_name)).take();
+    let letters = (one_of(char::is_alphabetic), take_while(0.., is_name_char)).take();
     terminated(letters, skip_blank).parse_next(input)
 }
 
-fn parse_sign<'a>(expected: char) -> impl ModalParser<ParserInput<'a>, char, ContextError> {
+fn parse_symbol<'a>(expected: char) -> impl ModalParser<ParserInput<'a>, char, ContextError> {
     terminated(expected, skip_blank)
 }
 
@@ -153,9 +155,9 @@ fn parse_statement(input: &mut ParserInput) -> ModalResult<Statement> {
 }
 
 fn parse_block(input: &mut ParserInput) -> ModalResult<Vec<Statement>> {
-    cut_err(parse_sign('[')).context(expected("`[`")).parse_next(input)?;
+    cut_err(parse_symbol('[')).context(expected("`[`")).parse_next(input)?;
     let statements = repeat(0.., parse_statement).parse_next(input)?;
-    cut_err(parse_sign(']')).context(expected("a statement or `]`")).parse_next(input)?;
+    cut_err(parse_symbol(']')).context(expected("a statement or `]`")).parse_next(input)?;
     Ok(statements)
 }
 
@@ -165,9 +167,9 @@ fn parse_argument(input: &mut ParserInput) -> ModalResult<Expression> {
 
 fn parse_coordinates(input: &mut ParserInput) -> ModalResult<Vec<Expression>> {
     let mut found = vec![parse_argument(input)?];
-    cut_err(parse_sign(',')).context(expected("`,`")).parse_next(input)?;
+    cut_err(parse_symbol(',')).context(expected("`,`")).parse_next(input)?;
     found.push(parse_argument(input)?);
-    if opt(parse_sign(',')).parse_next(input)?.is_some() {
+    if opt(parse_symbol(',')).parse_next(input)?.is_some() {
         found.push(parse_argument(input)?);
     }
     Ok(found)
@@ -179,19 +181,19 @@ fn parse_arguments(input: &mut ParserInput) -> ModalResult<Vec<Expression>> {
     if opt(peek(begins)).parse_next(input)?.is_none() {
         return Ok(Vec::new());
     }
-    separated(1.., parse_argument, parse_sign(',')).parse_next(input)
+    separated(1.., parse_argument, parse_symbol(',')).parse_next(input)
 }
 
 fn parse_expression(input: &mut ParserInput) -> ModalResult<Expression> {
     let at = input.current_token_start();
     let mut terms = Vec::new();
-    sum(input, &mut terms)?;
+    parse_sum(input, &mut terms)?;
     Ok(Expression { at, terms })
 }
 
-fn sum(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
+fn parse_sum(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
     parse_product(input, terms)?;
-    while let Some(operator) = opt(alt((parse_sign('+'), parse_sign('-')))).parse_next(input)? {
+    while let Some(operator) = opt(alt((parse_symbol('+'), parse_symbol('-')))).parse_next(input)? {
         parse_operand(input, terms, parse_product)?;
         terms.push(if operator == '+' { ExpressionTerm::Add } else { ExpressionTerm::Subtract });
     }
@@ -200,7 +202,7 @@ fn sum(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<
 
 fn parse_product(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
     parse_factor(input, terms)?;
-    while let Some(operator) = opt(alt((parse_sign('*'), parse_sign('/')))).parse_next(input)? {
+    while let Some(operator) = opt(alt((parse_symbol('*'), parse_symbol('/')))).parse_next(input)? {
         parse_operand(input, terms, parse_factor)?;
         terms.push(if operator == '*' { ExpressionTerm::Multiply } else { ExpressionTerm::Divide });
     }
@@ -218,10 +220,10 @@ fn parse_operand(
 }
 
 fn parse_factor(input: &mut ParserInput, terms: &mut Vec<ExpressionTerm>) -> ModalResult<()> {
-    let is_negative = opt(parse_sign('-')).parse_next(input)?.is_some();
-    if opt(parse_sign('(')).parse_next(input)?.is_some() {
-        parse_operand(input, terms, sum)?;
-        cut_err(parse_sign(')')).context(expected("`)`")).parse_next(input)?;
+    let is_negative = opt(parse_symbol('-')).parse_next(input)?.is_some();
+    if opt(parse_symbol('(')).parse_next(input)?.is_some() {
+        parse_operand(input, terms, parse_sum)?;
+        cut_err(parse_symbol(')')).context(expected("`)`")).parse_next(input)?;
     } else {
         terms.push(alt((parse_number, parse_parameter)).parse_next(input)?);
     }
@@ -277,16 +279,16 @@ fn resolve(
             | ScriptAction::Turn(e)
             | ScriptAction::Pitch(e)
             | ScriptAction::Wait(e) => {
-                resolve_values(script, std::slice::from_mut(e), parameters)?;
+                resolve_parameters(script, std::slice::from_mut(e), parameters)?;
             }
-            ScriptAction::Goto(coordinates) => resolve_values(script, coordinates, parameters)?,
+            ScriptAction::Goto(coordinates) => resolve_parameters(script, coordinates, parameters)?,
             ScriptAction::Repeat(count, body) => {
-                resolve_values(script, std::slice::from_mut(count), parameters)?;
+                resolve_parameters(script, std::slice::from_mut(count), parameters)?;
                 resolve(script, body, parameters)?;
             }
             ScriptAction::Call { name, procedure, arguments } => {
                 *procedure = find_procedure(script, *at, name, arguments.len())?;
-                resolve_values(script, arguments, parameters)?;
+                resolve_parameters(script, arguments, parameters)?;
             }
         }
     }
@@ -317,7 +319,7 @@ fn find_procedure(
     Ok(index)
 }
 
-fn resolve_values(
+fn resolve_parameters(
     script: &Script,
     values: &mut [Expression],
     parameters: &[String],

@@ -43,21 +43,21 @@ impl Turtle {
         let ahead = linear_combination(self.ahead, c, self.left, s);
         self.left = linear_combination(self.left, c, self.ahead, -s);
         self.ahead = ahead;
-        self.straighten();
+        self.orthonormalize_axes();
     }
 
     /// Pitches the nose up about the axis to the left.
-    fn pitch(&mut self, angle_rad: f64) {
+    fn pitch_up(&mut self, angle_rad: f64) {
         self.ahead = linear_combination(self.ahead, cos(angle_rad), self.up(), sin(angle_rad));
-        self.straighten();
+        self.orthonormalize_axes();
     }
 
     /// Makes the axes orthonormal again: rounding bends them a little, and each turn multiplies
     /// earlier errors.
-    fn straighten(&mut self) {
-        self.ahead = unit(self.ahead);
+    fn orthonormalize_axes(&mut self) {
+        self.ahead = normalize(self.ahead);
         self.left =
-            unit(linear_combination(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
+            normalize(linear_combination(self.left, 1.0, self.ahead, -dot(self.left, self.ahead)));
     }
 }
 
@@ -65,7 +65,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn unit(a: [f64; 3]) -> [f64; 3] {
+fn normalize(a: [f64; 3]) -> [f64; 3] {
     linear_combination(a, 1.0 / dot(a, a).sqrt(), [0.0; 3], 0.0)
 }
 
@@ -126,12 +126,12 @@ impl<'a> ScriptMotions<'a> {
     }
 
     /// Returns the next statement; none at the end of the script.
-    fn statement(&mut self) -> Option<Result<&'a Statement, InputError>> {
+    fn next_statement(&mut self) -> Option<Result<&'a Statement, InputError>> {
         loop {
             let frame = self.frames.last_mut()?;
             if let Some(statement) = frame.body.get(frame.next) {
                 frame.next += 1;
-                return Some(self.count(statement.at).map(|()| statement));
+                return Some(self.count_statement(statement.at).map(|()| statement));
             }
             if frame.again == 0 {
                 self.frames.pop();
@@ -141,13 +141,13 @@ impl<'a> ScriptMotions<'a> {
             frame.next = 0;
             // Counted as a statement, because a body without statements would repeat unnoticed.
             let at = frame.body.first().map_or(0, |statement| statement.at);
-            if let Err(error) = self.count(at) {
+            if let Err(error) = self.count_statement(at) {
                 return Some(Err(error));
             }
         }
     }
 
-    fn count(&mut self, at: usize) -> Result<(), InputError> {
+    fn count_statement(&mut self, at: usize) -> Result<(), InputError> {
         let Some(left) = self.left.checked_sub(1) else {
             let cause = format!("more than {MAX_STATEMENTS} statements have been carried out");
             return Err(self.script.error(at, cause, "repeat less often"));
@@ -163,36 +163,40 @@ impl<'a> ScriptMotions<'a> {
     ) -> Result<Option<ScriptMotion>, InputError> {
         match &statement.action {
             ScriptAction::Forward(distance) => {
-                self.turtle.advance(self.value(distance)?);
-                self.motion(statement)
+                self.turtle.advance(self.evaluate_expression(distance)?);
+                self.turtle_motion(statement)
             }
             ScriptAction::Goto(coordinates) => {
                 for (i, coordinate) in coordinates.iter().enumerate() {
-                    self.turtle.position_m[i] = self.value(coordinate)?;
+                    self.turtle.position_m[i] = self.evaluate_expression(coordinate)?;
                 }
-                self.motion(statement)
+                self.turtle_motion(statement)
             }
             ScriptAction::Turn(angle) => {
-                self.turtle.turn(self.value(angle)?.to_radians());
+                self.turtle.turn(self.evaluate_expression(angle)?.to_radians());
                 Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
             ScriptAction::Pitch(angle) => {
-                self.turtle.pitch(self.value(angle)?.to_radians());
+                self.turtle.pitch_up(self.evaluate_expression(angle)?.to_radians());
                 Ok(Some(ScriptMotion::Face { ahead: self.turtle.ahead }))
             }
             ScriptAction::Wait(duration) => self.execute_wait(duration).map(Some),
             ScriptAction::Repeat(count, body) => self.execute_repeat(count, body).map(|()| None),
             ScriptAction::Call { procedure, arguments, .. } => {
-                let parameters = arguments.iter().map(|argument| self.value(argument));
+                let parameters =
+                    arguments.iter().map(|argument| self.evaluate_expression(argument));
                 let parameters = parameters.collect::<Result<_, _>>()?;
                 let body = &self.script.procedures[*procedure].body;
-                self.push_frame(statement.at, CallFrame { body, next: 0, again: 0, parameters })?;
+                self.push_call_frame(
+                    statement.at,
+                    CallFrame { body, next: 0, again: 0, parameters },
+                )?;
                 Ok(None)
             }
         }
     }
 
-    fn motion(&self, statement: &Statement) -> Result<Option<ScriptMotion>, InputError> {
+    fn turtle_motion(&self, statement: &Statement) -> Result<Option<ScriptMotion>, InputError> {
         let position_m = self.turtle.position_m;
         if position_m.iter().all(|x| x.is_finite()) {
             return Ok(Some(ScriptMotion::MoveTo { position_m }));
@@ -201,7 +205,7 @@ impl<'a> ScriptMotions<'a> {
     }
 
     fn execute_wait(&self, duration: &Expression) -> Result<ScriptMotion, InputError> {
-        let duration_s = self.value(duration)?;
+        let duration_s = self.evaluate_expression(duration)?;
         if duration_s < 0.0 {
             let cause = format!("a wait of {duration_s} s");
             return Err(self.script.error(duration.at, cause, "write a time from 0 on"));
@@ -214,7 +218,7 @@ impl<'a> ScriptMotions<'a> {
         count: &Expression,
         body: &'a [Statement],
     ) -> Result<(), InputError> {
-        let times = self.value(count)?;
+        let times = self.evaluate_expression(count)?;
         if times < 0.0 || times.fract() != 0.0 || times > MAX_STATEMENTS as f64 {
             let cause = format!("nothing can be repeated {times} times");
             let remedy = format!("write a whole number from 0 to {MAX_STATEMENTS}");
@@ -224,10 +228,13 @@ impl<'a> ScriptMotions<'a> {
             return Ok(());
         }
         let parameters = self.parameters().to_vec();
-        self.push_frame(count.at, CallFrame { body, next: 0, again: times as u64 - 1, parameters })
+        self.push_call_frame(
+            count.at,
+            CallFrame { body, next: 0, again: times as u64 - 1, parameters },
+        )
     }
 
-    fn push_frame(&mut self, at: usize, frame: CallFrame<'a>) -> Result<(), InputError> {
+    fn push_call_frame(&mut self, at: usize, frame: CallFrame<'a>) -> Result<(), InputError> {
         // A finished body is removed, so the last call of a procedure takes no depth.
         while self.frames.last().is_some_and(|f| f.next == f.body.len() && f.again == 0) {
             self.frames.pop();
@@ -244,7 +251,7 @@ impl<'a> ScriptMotions<'a> {
         self.frames.last().map_or(&[], |frame| &frame.parameters)
     }
 
-    fn value(&self, expression: &Expression) -> Result<f64, InputError> {
+    fn evaluate_expression(&self, expression: &Expression) -> Result<f64, InputError> {
         let value = evaluate(&expression.terms, self.parameters());
         if value.is_finite() {
             return Ok(value);
@@ -289,7 +296,8 @@ impl Iterator for ScriptMotions<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let motion = self.statement()?.and_then(|statement| self.execute_statement(statement));
+            let motion =
+                self.next_statement()?.and_then(|statement| self.execute_statement(statement));
             match motion {
                 Ok(None) => {}
                 Ok(Some(motion)) => return Some(Ok(motion)),

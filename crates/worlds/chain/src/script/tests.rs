@@ -83,7 +83,7 @@ fn syntax_errors_have_a_place_and_say_what_was_expected() {
         ("§", (1, 1), "where a statement"),
     ] {
         let error = error_of(text);
-        assert_eq!(error.position(), Some(position), "{error}");
+        assert_eq!(error.line_and_column(), Some(position), "{error}");
         assert!(error.cause().contains(cause), "{error}");
     }
 }
@@ -103,7 +103,7 @@ fn names_that_are_not_there_and_wrong_values_are_errors() {
         ("forward 1e308 forward 1e308", (1, 15), "beyond", "less"),
     ] {
         let error = error_of(text);
-        assert_eq!(error.position(), Some(position), "{error}");
+        assert_eq!(error.line_and_column(), Some(position), "{error}");
         assert!(error.cause().contains(cause) && error.remedy().contains(remedy), "{error}");
     }
 }

@@ -1,11 +1,11 @@
 //! One chain as it is now.
 
-use crate::agents::chain_controls::ChainControls;
+use crate::agents::chain_controls::ChainAgentControls;
 use crate::deferred::DeferredMotions;
 use crate::driver::external::ExternalControlState;
 use crate::driver::own_driver::DriverMemory;
 use crate::driver::{Task, TaskProgress};
-use crate::formation::{Robot, Solid};
+use crate::formation::{Robot, SolidDisc};
 use crate::metrics::ChainTally;
 use crate::motion::escape::EscapePlan;
 use crate::script::ScriptMotion;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_rods::Chain;
-use sidestep_rods::geometry::{Aabb, Point, normalized, with_dimensions};
+use sidestep_rods::geometry::{Aabb, Point, convert_dimensions, normalized};
 use std::collections::VecDeque;
 
 /// One chain as it is now.
@@ -28,7 +28,7 @@ pub struct ChainBodyState<const D: usize> {
     pub driving: TaskProgress,
     /// Scattered connectors, and the places where they will be joined again; none while the chain
     /// is whole.
-    pub scattered: Option<ScatterState>,
+    pub scattered: Option<ScatteredPartState>,
     /// The robots that keep to its connectors; empty if nothing is on wheels.
     pub robots: Vec<Robot>,
     /// Radius of their bodies, meters.
@@ -53,14 +53,14 @@ pub struct ChainBodyState<const D: usize> {
     /// The nearest lost connectors below and above each connector, as its agent knows; empty while none is lost.
     pub(crate) missing: Vec<MissingNeighbors>,
     /// Decisions that agents in other processes have submitted for a cycle.
-    pub(crate) submitted: Option<ChainControls<D>>,
+    pub(crate) submitted: Option<ChainAgentControls<D>>,
     /// Motions that the chain has yet to follow; none in a body that [`ChainState::body`](super::ChainState::body) returns.
     pub(crate) deferred: DeferredMotions<D>,
 }
 
 /// The scattered part of a broken chain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScatterState {
+pub struct ScatteredPartState {
     /// The first scattered connector.
     pub first: u32,
     /// The last scattered connector.
@@ -100,7 +100,7 @@ impl<const D: usize> ChainBodyState<D> {
         let chain = spec.start.clone();
         let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
         let mut body = Self {
-            robots: spec.robots_at(chain.points(), &driving),
+            robots: spec.robots_at_connectors(chain.points(), &driving),
             robot_radius_m: spec.robot_radius_m(),
             driving,
             chain,
@@ -117,26 +117,26 @@ impl<const D: usize> ChainBodyState<D> {
             submitted: None,
             deferred: DeferredMotions::default(),
         };
-        body.motions = spec.motions(&body.driving)?;
+        body.motions = spec.script_motions(&body.driving)?;
         Ok(body)
     }
 
     /// Lets the chain follow deferred motions, if there are any.
-    pub(crate) fn catch_up(&mut self) {
-        self.deferred.catch_up(&mut self.chain, &mut self.tally);
+    pub(crate) fn apply_deferred_motions(&mut self) {
+        self.deferred.apply_to_chain(&mut self.chain, &mut self.tally);
     }
 
     /// Returns the solid parts that other chains perceive: its robots, or its connectors if it has none.
-    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, Solid)> + '_ {
+    pub(crate) fn solids(&self) -> impl Iterator<Item = (usize, SolidDisc)> + '_ {
         (0..self.chain.points().len()).map(|k| (k, self.solid(k)))
     }
 
-    fn solid(&self, k: usize) -> Solid {
+    fn solid(&self, k: usize) -> SolidDisc {
         if let Some(robot) = self.robots.get(k) {
-            return Solid { at: robot.pose.at, radius_m: self.robot_radius_m };
+            return SolidDisc { at: robot.pose.at, radius_m: self.robot_radius_m };
         }
         let radius_m = self.chain.connectors()[k].radius_m;
-        Solid { at: with_dimensions(self.chain.points()[k]), radius_m }
+        SolidDisc { at: convert_dimensions(self.chain.points()[k]), radius_m }
     }
 
     /// Returns the box around its solid parts in the plane.
@@ -152,7 +152,7 @@ impl<const D: usize> ChainBodyState<D> {
         self.driving.leader.unwrap_or_else(|| {
             let [x, y, _] = self.driving.ahead;
             let [x, y] = normalized([x, y]).unwrap_or([1.0, 0.0]);
-            let at = with_dimensions(self.chain.points()[task.agent]);
+            let at = convert_dimensions(self.chain.points()[task.agent]);
             LeaderState::new(Pose2 { at, heading_rad: atan2(y, x) })
         })
     }

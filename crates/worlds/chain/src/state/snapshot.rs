@@ -4,9 +4,10 @@
 //! own, by id, of the chains where there is something to save.
 
 use super::body::{
-    ChainBodyState, MissingNeighbors, MotionPlan, ScatterState, Standstill, flatten, unflatten,
+    ChainBodyState, MissingNeighbors, MotionPlan, ScatteredPartState, Standstill, flatten,
+    unflatten,
 };
-use crate::agents::chain_controls::ChainControls;
+use crate::agents::chain_controls::ChainAgentControls;
 use crate::driver::TaskProgress;
 use crate::driver::external::ExternalControlState;
 use crate::driver::own_driver::DriverMemory;
@@ -37,12 +38,12 @@ pub(super) trait SnapshotComponent {
     fn restore(
         &mut self,
         record: &Self::Record,
-        owner: &ComponentOwner,
+        owner: &ExpectedChainSizes,
     ) -> Result<(), CheckpointError>;
 }
 
 /// The chain to which a component belongs.
-pub(super) struct ComponentOwner {
+pub(super) struct ExpectedChainSizes {
     /// Cycles done.
     cycle: Cycle,
     /// Number of its connectors; records with higher numbers are damaged.
@@ -61,7 +62,7 @@ pub struct ChainRecord {
     /// See [`ChainBodyState::driving`].
     pub driving: TaskProgress,
     /// See [`ChainBodyState::scattered`].
-    pub scattered: Option<ScatterState>,
+    pub scattered: Option<ScatteredPartState>,
     /// See [`ChainBodyState::robots`].
     pub robots: Vec<Robot>,
 }
@@ -101,7 +102,11 @@ impl SnapshotComponent for Option<Vec<f64>> {
         self.clone()
     }
 
-    fn restore(&mut self, values: &Vec<f64>, _: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(
+        &mut self,
+        values: &Vec<f64>,
+        _: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
         let joints = self.as_mut().filter(|joints| joints.len() == values.len());
         joints.ok_or(CheckpointError::Damaged)?.clone_from(values);
         Ok(())
@@ -122,7 +127,7 @@ impl<const D: usize> SnapshotComponent for Option<MotionPlan<D>> {
     fn restore(
         &mut self,
         path: &Vec<Vec<f64>>,
-        owner: &ComponentOwner,
+        owner: &ExpectedChainSizes,
     ) -> Result<(), CheckpointError> {
         let values = owner.joints.unwrap_or(owner.coordinates);
         if path.is_empty() || path.iter().any(|posture| posture.len() != values) {
@@ -145,7 +150,7 @@ impl SnapshotComponent for EscapePlan {
         (!self.is_none()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, _: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, _: &ExpectedChainSizes) -> Result<(), CheckpointError> {
         *self = *record;
         Ok(())
     }
@@ -158,7 +163,7 @@ impl SnapshotComponent for Standstill {
         (self.cycles > 0).then_some(self.cycles)
     }
 
-    fn restore(&mut self, cycles: &u32, _: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, cycles: &u32, _: &ExpectedChainSizes) -> Result<(), CheckpointError> {
         self.cycles = *cycles;
         Ok(())
     }
@@ -171,21 +176,21 @@ impl SnapshotComponent for DriverMemory {
         (*self != Self::default()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, _: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, record: &Self, _: &ExpectedChainSizes) -> Result<(), CheckpointError> {
         *self = *record;
         Ok(())
     }
 }
 
 /// The rest of the scattered parts is in the record of their chain.
-impl SnapshotComponent for Option<ScatterState> {
+impl SnapshotComponent for Option<ScatteredPartState> {
     type Record = Cycle;
 
     fn save(&self, _: Cycle) -> Option<Cycle> {
         Some(self.as_ref()?.waited).filter(|waited| *waited > 0)
     }
 
-    fn restore(&mut self, waited: &Cycle, _: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(&mut self, waited: &Cycle, _: &ExpectedChainSizes) -> Result<(), CheckpointError> {
         self.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
         Ok(())
     }
@@ -198,8 +203,12 @@ impl SnapshotComponent for ExternalControlState {
         (!self.is_none()).then_some(*self)
     }
 
-    fn restore(&mut self, record: &Self, owner: &ComponentOwner) -> Result<(), CheckpointError> {
-        if !record.is_within(owner.connectors) {
+    fn restore(
+        &mut self,
+        record: &Self,
+        owner: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
+        if !record.has_valid_indices(owner.connectors) {
             return Err(CheckpointError::Damaged);
         }
         *self = *record;
@@ -214,7 +223,11 @@ impl SnapshotComponent for Vec<MissingNeighbors> {
         (!self.is_empty()).then(|| self.clone())
     }
 
-    fn restore(&mut self, record: &Self, owner: &ComponentOwner) -> Result<(), CheckpointError> {
+    fn restore(
+        &mut self,
+        record: &Self,
+        owner: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
         let n = owner.connectors;
         let exist = record.iter().flatten().flatten().all(|k| (*k as usize) < n);
         if record.len() != n || !exist {
@@ -225,7 +238,7 @@ impl SnapshotComponent for Vec<MissingNeighbors> {
     }
 }
 
-impl<const D: usize> SnapshotComponent for Option<ChainControls<D>> {
+impl<const D: usize> SnapshotComponent for Option<ChainAgentControls<D>> {
     type Record = Vec<u8>;
 
     fn save(&self, cycle: Cycle) -> Option<Vec<u8>> {
@@ -234,8 +247,12 @@ impl<const D: usize> SnapshotComponent for Option<ChainControls<D>> {
         Some(postcard::to_stdvec(submitted).expect("decisions are plain data"))
     }
 
-    fn restore(&mut self, bytes: &Vec<u8>, owner: &ComponentOwner) -> Result<(), CheckpointError> {
-        let controls: ChainControls<D> =
+    fn restore(
+        &mut self,
+        bytes: &Vec<u8>,
+        owner: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
+        let controls: ChainAgentControls<D> =
             postcard::from_bytes(bytes).map_err(|_| CheckpointError::Damaged)?;
         if controls.cycle != owner.cycle || controls.check(owner.connectors).is_err() {
             return Err(CheckpointError::Damaged);
@@ -258,7 +275,7 @@ fn restore_component<const D: usize, C: SnapshotComponent>(
     for (slot, record) in list {
         let body = bodies.get_mut(*slot as usize).ok_or(CheckpointError::Damaged)?;
         let connectors = body.chain.points().len();
-        let owner = ComponentOwner {
+        let owner = ExpectedChainSizes {
             cycle,
             connectors,
             coordinates: connectors * D,
@@ -297,12 +314,12 @@ impl<const D: usize> ChainBodyState<D> {
         }
         // Failures and joint limits of past changes are in no record: they follow from the scenario.
         for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
-            change.apply_constraints(&mut chain);
+            change.apply_limits(&mut chain);
         }
         for (point, at) in chain.points_mut().iter_mut().zip(record.points_m.chunks_exact(D)) {
             point.copy_from_slice(at);
         }
-        let motions = spec.motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
+        let motions = spec.script_motions(&record.driving).map_err(|_| CheckpointError::Damaged)?;
         let driving = record.driving.clone();
         let scattered = record.scattered.clone();
         let robots = record.robots.clone();
@@ -337,21 +354,21 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
         // Empty lists add nothing, so that a new component does not change the digests of worlds without it.
-        add_any(&mut hasher, &self.joints);
-        add_any(&mut hasher, &self.plans);
-        add_any(&mut hasher, &self.escape_plans);
-        add_any(&mut hasher, &self.standstills);
-        add_any(&mut hasher, &self.waited);
-        add_any(&mut hasher, &self.externals);
-        add_any(&mut hasher, &self.missing);
-        add_any(&mut hasher, &self.submitted);
-        add_any(&mut hasher, &self.driver_memories);
+        add_nonempty_list(&mut hasher, &self.joints);
+        add_nonempty_list(&mut hasher, &self.plans);
+        add_nonempty_list(&mut hasher, &self.escape_plans);
+        add_nonempty_list(&mut hasher, &self.standstills);
+        add_nonempty_list(&mut hasher, &self.waited);
+        add_nonempty_list(&mut hasher, &self.externals);
+        add_nonempty_list(&mut hasher, &self.missing);
+        add_nonempty_list(&mut hasher, &self.submitted);
+        add_nonempty_list(&mut hasher, &self.driver_memories);
         hasher.finish()
     }
 }
 
 /// Adds a list to a digest, unless it is empty.
-fn add_any<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
+fn add_nonempty_list<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
     if !list.is_empty() {
         add(hasher, &list);
     }

@@ -51,7 +51,7 @@ impl WheelSpeeds {
 
     /// Returns the same turn with the middle at rest.
     #[must_use]
-    pub fn turn_in_place(self) -> Self {
+    pub fn as_turn_in_place(self) -> Self {
         let half = 0.5 * (self.right_m_s - self.left_m_s);
         Self::new(-half, half)
     }
@@ -91,7 +91,7 @@ impl DifferentialDrive {
 
     /// Returns wheel speeds for a speed and a turn. If both together are too fast, the turn comes
     /// first, because a robot that faces the right way gets there, if late.
-    pub fn wheels(&self, speed_m_s: f64, turn_rad_s: f64) -> WheelSpeeds {
+    pub fn wheel_speeds(&self, speed_m_s: f64, turn_rad_s: f64) -> WheelSpeeds {
         let max = self.max_wheel_m_s;
         let half = (0.5 * turn_rad_s * self.wheelbase_m).clamp(-max, max);
         let room = max - half.abs();
@@ -158,7 +158,7 @@ mod tests {
 
         #[test]
         fn no_wheel_exceeds_its_limit(speed in -9.0..9.0f64, turn in -30.0..30.0f64) {
-            let wheels = drive().wheels(speed, turn);
+            let wheels = drive().wheel_speeds(speed, turn);
             prop_assert!(wheels.left_m_s.abs() <= 1.0 + 1e-12 && wheels.right_m_s.abs() <= 1.0 + 1e-12);
         }
 

@@ -32,7 +32,7 @@ pub struct Follower {
 
 /// Position and velocity of the connector that a follower keeps to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TrackingTarget {
+pub struct FollowerTarget {
     /// Its place at the end of the tick, meters.
     pub at: Point<2>,
     /// Its mean velocity in the tick, m/s.
@@ -41,7 +41,7 @@ pub struct TrackingTarget {
 
 /// What a follower does in a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FollowerCommand {
+pub struct FollowerDecision {
     /// Speeds of its wheels.
     pub wheels: WheelSpeeds,
     /// Whether its sensors slowed it down.
@@ -109,7 +109,7 @@ impl Follower {
     }
 
     /// Returns the distance from its place within which its body and its bumper stay for `dt_s` seconds.
-    pub(crate) fn reach_m(&self, dt_s: f64) -> f64 {
+    pub(crate) fn reach_within_m(&self, dt_s: f64) -> f64 {
         self.ring.radius_m + self.drive.max_wheel_m_s() * dt_s + BUMPER_M
     }
 
@@ -118,15 +118,15 @@ impl Follower {
     pub fn decide(
         &self,
         pose: &Pose2,
-        goal: &TrackingTarget,
+        goal: &FollowerTarget,
         gaps: &SectorGaps,
         dt_s: f64,
-    ) -> FollowerCommand {
+    ) -> FollowerDecision {
         let wished = add_scaled(goal.velocity_m_s, sub(goal.at, pose.at), self.gain_per_s);
         let wanted = self.avoid_obstacles(wished, pose.heading_rad, gaps);
         let speed_m_s = norm(wanted);
         if speed_m_s <= STANDING_M_S {
-            return FollowerCommand {
+            return FollowerDecision {
                 wheels: WheelSpeeds::default(),
                 is_held: norm(wished) > STANDING_M_S,
             };
@@ -136,7 +136,7 @@ impl Follower {
         let off_rad = if is_backward { wrap_angle(off_rad - PI) } else { off_rad };
         // Only the part of the wish along the heading is driven; the turn makes the rest possible.
         let ahead_m_s = speed_m_s * cos(off_rad).max(0.0);
-        let wheels = self.drive.wheels(ahead_m_s, self.turn_gain_per_s * off_rad);
+        let wheels = self.drive.wheel_speeds(ahead_m_s, self.turn_gain_per_s * off_rad);
         self.limit_speed(wheels, is_backward, gaps, dt_s)
     }
 
@@ -144,7 +144,7 @@ impl Follower {
     pub fn follow(
         &self,
         pose: &Pose2,
-        goal: &TrackingTarget,
+        goal: &FollowerTarget,
         around: NearbyBodies<'_, impl Iterator<Item = RobotBody> + Clone>,
         dt_s: f64,
     ) -> FollowResult {
@@ -187,7 +187,7 @@ impl Follower {
         is_backward: bool,
         gaps: &SectorGaps,
         dt_s: f64,
-    ) -> FollowerCommand {
+    ) -> FollowerDecision {
         let turn_rad_s = self.drive.turn_rad_s(wheels);
         let (toward_rad, sign) = if is_backward { (PI, -1.0) } else { (0.0, 1.0) };
         // The chord of an arc leads half of its turn aside.
@@ -196,8 +196,8 @@ impl Follower {
         let horizon_s = self.horizon_s.max(2.0 * dt_s);
         let safe_m_s = safe_speed_m_s(gaps, toward_rad, slack_rad, horizon_s);
         let speed_m_s = wheels.speed_m_s();
-        FollowerCommand {
-            wheels: self.drive.wheels(sign * speed_m_s.min(safe_m_s), turn_rad_s),
+        FollowerDecision {
+            wheels: self.drive.wheel_speeds(sign * speed_m_s.min(safe_m_s), turn_rad_s),
             is_held: speed_m_s > safe_m_s,
         }
     }
@@ -215,7 +215,7 @@ pub(crate) fn speed_fraction(worst_lag_m: f64, limit_m: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ray::tests::any_core;
+    use super::super::ray::tests::core_strategy;
     use super::*;
     use proptest::prelude::*;
     use sidestep_rods::geometry::distance;
@@ -227,7 +227,7 @@ mod tests {
         Follower::new(DifferentialDrive::new(0.4, 0.6).unwrap(), 0.25).unwrap()
     }
 
-    fn run(mut pose: Pose2, goal: impl Fn(f64) -> TrackingTarget, ticks: usize) -> (Pose2, f64) {
+    fn run(mut pose: Pose2, goal: impl Fn(f64) -> FollowerTarget, ticks: usize) -> (Pose2, f64) {
         let follower = follower();
         let open = [follower.ring.range_m; 8];
         for k in 0..ticks {
@@ -241,7 +241,7 @@ mod tests {
     fn it_arrives_at_a_connector_at_rest_from_wherever_it_looks() {
         for k in 0..24 {
             let pose = Pose2 { at: [0.0, 0.0], heading_rad: f64::from(k) * 0.26 - PI };
-            let rest = TrackingTarget { at: [0.5, 0.3], velocity_m_s: [0.0; 2] };
+            let rest = FollowerTarget { at: [0.5, 0.3], velocity_m_s: [0.0; 2] };
             let (_, off_m) = run(pose, |_| rest, 600);
             assert!(off_m < 0.01, "from {}: {off_m}", pose.heading_rad);
         }
@@ -249,14 +249,14 @@ mod tests {
 
     #[test]
     fn it_keeps_up_with_a_connector_that_moves() {
-        let goal = |t: f64| TrackingTarget { at: [0.5 * t, 0.0], velocity_m_s: [0.5, 0.0] };
+        let goal = |t: f64| FollowerTarget { at: [0.5 * t, 0.0], velocity_m_s: [0.5, 0.0] };
         let (_, lag_m) = run(Pose2 { at: [-0.3, 0.1], heading_rad: 0.0 }, goal, 500);
         assert!(lag_m < 0.02, "{lag_m}");
     }
 
     #[test]
     fn it_backs_off_where_its_connector_goes_back() {
-        let goal = |t: f64| TrackingTarget { at: [-0.4 * t, 0.0], velocity_m_s: [-0.4, 0.0] };
+        let goal = |t: f64| FollowerTarget { at: [-0.4 * t, 0.0], velocity_m_s: [-0.4, 0.0] };
         let (pose, lag_m) = run(Pose2 { at: [0.0, 0.0], heading_rad: 0.0 }, goal, 300);
         assert!(lag_m < 0.02 && pose.heading_rad.abs() < 0.01, "{pose:?}");
     }
@@ -265,15 +265,15 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(100))]
         #[test]
         fn it_never_enters_what_stands_still(
-            cores in prop::collection::vec((any_core(), 0.01..0.4f64), 1..8),
+            cores in prop::collection::vec((core_strategy(), 0.01..0.4f64), 1..8),
             at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
             goal in prop::array::uniform2(-3.0..3.0f64),
         ) {
-            let all: Vec<_> = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
+            let all: Vec<_> = cores.iter().map(|(core, r)| Obstacle::new_static(1, *core, *r)).collect();
             let obstacles = Obstacles::new(all, 1.0).unwrap();
             prop_assume!(obstacles.clearance_m([at, at], 0.25, 1.0) > 0.0);
             let follower = follower();
-            let goal = TrackingTarget { at: goal, velocity_m_s: [0.0; 2] };
+            let goal = FollowerTarget { at: goal, velocity_m_s: [0.0; 2] };
             let mut pose = Pose2 { at, heading_rad };
             for _ in 0..300 {
                 let gaps = follower.ring.read(&pose, &obstacles, []);

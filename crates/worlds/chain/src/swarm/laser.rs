@@ -105,7 +105,7 @@ impl Laser {
         Ok(Self {
             range_m,
             noise_std_m,
-            beams_per_side: last_beam(half_field_rad, step_rad),
+            beams_per_side: last_beam_within_angle(half_field_rad, step_rad),
             directions: angles_rad.map(|angle_rad| [cos(angle_rad), sin(angle_rad)]).collect(),
         })
     }
@@ -115,7 +115,7 @@ impl Laser {
         self.range_m
     }
 
-    fn step_rad(&self) -> f64 {
+    fn beam_step_rad(&self) -> f64 {
         TAU / self.directions.len() as f64
     }
 
@@ -133,10 +133,10 @@ impl Laser {
     ) {
         scan.ranges_m.clear();
         scan.ranges_m.resize(self.directions.len(), 0.0);
-        for beam in self.read_beams() {
+        for beam in self.beam_indices() {
             scan.ranges_m[beam] = self.range_m;
         }
-        let view = Viewpoint { pose, turn: [cos(pose.heading_rad), sin(pose.heading_rad)] };
+        let view = ScanPose { pose, turn: [cos(pose.heading_rad), sin(pose.heading_rad)] };
         let near = bounds_around(pose.at, self.range_m);
         let mut some_move = false;
         // Movers come last, because a beam records whether a mover is what it meets first.
@@ -147,7 +147,7 @@ impl Laser {
                 self.scan_body(&view, &obstacle_body(o), scan);
             }
         });
-        for robot in around.robots.into_iter().filter(|robot| robot.bounds().meets(&near)) {
+        for robot in around.robots.into_iter().filter(|robot| robot.bounds().intersects(&near)) {
             self.scan_body(&view, &robot, scan);
         }
         scan.meets_mover.clear();
@@ -158,7 +158,7 @@ impl Laser {
             scan.true_m.clone_from(&scan.ranges_m);
         }
         if self.noise_std_m > 0.0 {
-            for beam in self.read_beams() {
+            for beam in self.beam_indices() {
                 let error_m = self.noise_std_m * normal(noise);
                 let range_m = &mut scan.ranges_m[beam];
                 *range_m = (*range_m + error_m).clamp(0.0, self.range_m);
@@ -167,7 +167,7 @@ impl Laser {
     }
 
     /// Shortens the beams that meet a moving obstacle, and records which they are.
-    fn scan_movers(&self, view: &Viewpoint<'_>, obstacles: &Obstacles<2>, scan: &mut LaserScan) {
+    fn scan_movers(&self, view: &ScanPose<'_>, obstacles: &Obstacles<2>, scan: &mut LaserScan) {
         scan.still_m.clone_from(&scan.ranges_m);
         obstacles.visit(&bounds_around(view.pose.at, self.range_m), |o| {
             if is_moving(o) {
@@ -179,14 +179,14 @@ impl Laser {
     }
 
     /// Returns the beams it reads, from the rightmost to the leftmost.
-    fn read_beams(&self) -> impl Iterator<Item = usize> {
+    fn beam_indices(&self) -> impl Iterator<Item = usize> {
         let n = self.directions.len();
         let m = self.beams_per_side;
         (0..(2 * m + 1).min(n)).map(move |k| (n + k - m) % n)
     }
 
     /// Shortens the beams that meet a body.
-    fn scan_body(&self, view: &Viewpoint<'_>, body: &RobotBody, scan: &mut LaserScan) {
+    fn scan_body(&self, view: &ScanPose<'_>, body: &RobotBody, scan: &mut LaserScan) {
         let RobotBody { core, radius_m } = body;
         match core {
             ConvexCore::Point(c) => self.scan_segment(view, [*c; 2], body, scan),
@@ -207,21 +207,21 @@ impl Laser {
     /// Shortens the beams that meet a body, whose core lies around the segment `ends`.
     fn scan_segment(
         &self,
-        view: &Viewpoint<'_>,
+        view: &ScanPose<'_>,
         ends: [Point<2>; 2],
         body: &RobotBody,
         scan: &mut LaserScan,
     ) {
-        let Viewpoint { pose, turn } = *view;
+        let ScanPose { pose, turn } = *view;
         let n = self.directions.len();
-        let (first, count) = match ray::extent_rad(pose.at, ends, body.radius_m) {
+        let (first, count) = match ray::capsule_extent_rad(pose.at, ends, body.radius_m) {
             None => (0, n),
             Some((middle, half)) => {
                 let right = wrap_angle(middle - pose.heading_rad) - half;
                 // One more at each end, and one for the fraction that is cut off: a beam too many costs a test, a beam
                 // too few passes through the body.
-                let beams = (2.0 * half / self.step_rad()) as usize + 3;
-                let first = (right / self.step_rad()).floor() as isize;
+                let beams = (2.0 * half / self.beam_step_rad()) as usize + 3;
+                let first = (right / self.beam_step_rad()).floor() as isize;
                 (first.rem_euclid(n as isize) as usize, beams.min(n))
             }
         };
@@ -242,25 +242,25 @@ impl Laser {
     /// rightmost on.
     pub fn readings<'a>(&'a self, scan: &'a LaserScan) -> impl Iterator<Item = (f64, f64)> + 'a {
         let rightmost = -(self.beams_per_side as f64);
-        let step_rad = self.step_rad();
-        let ranges_m = self.read_values(&scan.ranges_m).enumerate();
+        let step_rad = self.beam_step_rad();
+        let ranges_m = self.read_beam_values(&scan.ranges_m).enumerate();
         ranges_m.map(move |(k, range_m)| ((rightmost + k as f64) * step_rad, range_m))
     }
 
     /// Returns the ranges without errors in the order of [`Self::readings`]; none unless they were
     /// kept.
     pub fn true_ranges<'a>(&'a self, scan: &'a LaserScan) -> impl Iterator<Item = f64> + 'a {
-        self.read_values(&scan.true_m)
+        self.read_beam_values(&scan.true_m)
     }
 
     /// Returns the values of the beams that it reads, from the rightmost on.
-    fn read_values<'a>(&'a self, of_all: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        self.read_beams().filter_map(|beam| of_all.get(beam).copied())
+    fn read_beam_values<'a>(&'a self, of_all: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.beam_indices().filter_map(|beam| of_all.get(beam).copied())
     }
 
     /// Returns the least range within a sector of beams, given by its ends relative to the heading,
     /// left positive; `None` if [`Self::can_see_sector`] returns false.
-    pub fn min_range_m(&self, scan: &LaserScan, sector_rad: [f64; 2]) -> Option<f64> {
+    pub fn min_sector_range_m(&self, scan: &LaserScan, sector_rad: [f64; 2]) -> Option<f64> {
         let n = self.directions.len() as isize;
         let beams = self.sector_beams(sector_rad)?;
         let ranges_m = beams.map(|k| scan.ranges_m[k.rem_euclid(n) as usize]);
@@ -268,8 +268,8 @@ impl Laser {
     }
 
     /// Returns the least range of the beams of a sector that meet a moving body, or of the others, as
-    /// [`Self::min_range_m`].
-    pub fn min_range_by_motion_m(
+    /// [`Self::min_sector_range_m`].
+    pub fn min_range_where_moving_m(
         &self,
         scan: &LaserScan,
         sector_rad: [f64; 2],
@@ -295,8 +295,8 @@ impl Laser {
     /// Returns the beams of a sector; negative ones are to the right.
     fn sector_beams(&self, [from_rad, to_rad]: [f64; 2]) -> Option<RangeInclusive<isize>> {
         // Ends that are multiples of the step count as inside, whatever their rounding.
-        let first = (from_rad / self.step_rad() - 1e-9).ceil() as isize;
-        let last = (to_rad / self.step_rad() + 1e-9).floor() as isize;
+        let first = (from_rad / self.beam_step_rad() - 1e-9).ceil() as isize;
+        let last = (to_rad / self.beam_step_rad() + 1e-9).floor() as isize;
         let side = self.beams_per_side as isize;
         let n = self.directions.len() as isize;
         let sees_all = 2 * side + 1 >= n && last.saturating_sub(first) < n;
@@ -307,7 +307,7 @@ impl Laser {
 }
 
 /// The place from which a scan is made.
-struct Viewpoint<'a> {
+struct ScanPose<'a> {
     pose: &'a Pose2,
     /// The direction of the heading, by which each beam's direction is turned.
     turn: Point<2>,
@@ -326,13 +326,13 @@ fn is_moving(o: &Obstacle<2>) -> bool {
 }
 
 /// Returns the number of the last beam at an angle; a beam exactly there counts, whatever its rounding.
-fn last_beam(angle_rad: f64, step_rad: f64) -> usize {
+fn last_beam_within_angle(angle_rad: f64, step_rad: f64) -> usize {
     (angle_rad / step_rad + 1e-9) as usize
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::ray::tests::{any_core, marched_m};
+    use super::super::ray::tests::{core_strategy, marched_m};
     use super::*;
     use proptest::prelude::*;
     use sidestep_kernel::Seed;
@@ -360,13 +360,13 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(60))]
         #[test]
         fn every_beam_goes_as_far_as_marching_does(
-            cores in prop::collection::vec((any_core(), 0.01..0.5f64), 1..8),
-            body in (any_core(), 0.01..0.5f64),
+            cores in prop::collection::vec((core_strategy(), 0.01..0.5f64), 1..8),
+            body in (core_strategy(), 0.01..0.5f64),
             at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
         ) {
             let laser = Laser::new(180, 3.2, PI, 0.0).unwrap();
             let pose = Pose2 { at, heading_rad };
-            let all = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
+            let all = cores.iter().map(|(core, r)| Obstacle::new_static(1, *core, *r)).collect();
             let obstacles = Obstacles::new(all, 1.0).unwrap();
             let bodies = [RobotBody { core: body.0, radius_m: body.1 }];
             let scan = scanned(&laser, &pose, &obstacles, &bodies);
@@ -393,9 +393,9 @@ mod tests {
         let pose = Pose2 { at: [0.0, 0.0], heading_rad: 0.0 };
         let scan = scanned(&laser, &pose, &obstacles, &[]);
         let side = f64::to_radians(90.0);
-        assert!((laser.min_range_m(&scan, [0.0, side]).unwrap() - 0.6).abs() < 1e-12);
-        assert_eq!(laser.min_range_m(&scan, [-side, 0.0]), Some(3.2));
-        assert_eq!(laser.min_range_m(&scan, [0.0, side + 0.1]), None, "beyond the field");
+        assert!((laser.min_sector_range_m(&scan, [0.0, side]).unwrap() - 0.6).abs() < 1e-12);
+        assert_eq!(laser.min_sector_range_m(&scan, [-side, 0.0]), Some(3.2));
+        assert_eq!(laser.min_sector_range_m(&scan, [0.0, side + 0.1]), None, "beyond the field");
     }
 
     #[test]

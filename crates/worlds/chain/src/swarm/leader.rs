@@ -64,7 +64,7 @@ impl BehaviorLayer {
 
 /// The rule for when a wall counts as being left. The slides do not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum WallLossRule {
+pub enum WallLossDetection {
     /// It was near, is no longer, and is not lost yet: an event with a memory.
     #[default]
     Latched,
@@ -120,7 +120,7 @@ pub enum TurnMode {
 
 /// A leader: its laser and the parameters of its behavior.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Leader {
+pub struct LeaderController {
     /// The laser with which it sees walls and movers.
     pub laser: Laser,
     /// Angles to each side of straight ahead between which it looks for walls.
@@ -134,7 +134,7 @@ pub struct Leader {
     /// Distance above which a wall is lost, meters.
     pub lost_m: f64,
     /// Rule for when a wall counts as being left.
-    pub leaving: WallLossRule,
+    pub leaving: WallLossDetection,
     /// Rule for when a target ends the following of a wall; `None` for never, as in the slides.
     pub leave_rule: Option<WallLeaveRule>,
     /// Detection of targets.
@@ -150,7 +150,7 @@ pub struct Leader {
 /// farther aside has passed, or follows the leader.
 const AHEAD_RAD: f64 = 1.05;
 
-impl Leader {
+impl LeaderController {
     /// Returns the leader of the slides: 0.7 to 0.9 m from walls, a laser of 3.2 m all around whose
     /// front quarters count on each side, the latched reading and the leave rule.
     ///
@@ -167,7 +167,7 @@ impl Leader {
             near_m: 0.7,
             far_m: 0.9,
             lost_m: 1.3,
-            leaving: WallLossRule::default(),
+            leaving: WallLossDetection::default(),
             leave_rule: Some(WallLeaveRule::default()),
             target_sense: TargetDetector::default(),
             turning: TurnMode::default(),
@@ -255,7 +255,7 @@ pub struct LeaderSurroundings<'a> {
 
 /// What a leader makes of a scan, and of its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LeaderPercept {
+pub struct WallAndTargetPercept {
     /// Distances of the nearest walls, meters.
     pub walls_m: LeftRight<f64>,
     /// The target, if it is detected.
@@ -288,7 +288,7 @@ pub struct LeaderDecision {
     pub is_mover_ahead: bool,
 }
 
-impl Leader {
+impl LeaderController {
     /// Reads the laser into `scan`, whose old contents are discarded.
     pub fn scan(
         &self,
@@ -310,7 +310,7 @@ impl Leader {
         around: &LeaderSurroundings<'_>,
         scan: &LaserScan,
         is_patient: bool,
-    ) -> LeaderPercept {
+    ) -> WallAndTargetPercept {
         let [from, to] = self.sector_rad;
         let stands_for_it = self.gives_way && is_patient;
         let walls_m = LeftRight {
@@ -318,10 +318,10 @@ impl Leader {
             right: self.wall_distance_m(scan, [-to, -from], stands_for_it),
         };
         let target = around.target.filter(|&target| self.detects(pose, around, target));
-        let mover_m = self.laser.min_range_by_motion_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
+        let mover_m = self.laser.min_range_where_moving_m(scan, [-AHEAD_RAD, AHEAD_RAD], true);
         let is_mover_ahead = self.gives_way && mover_m.is_some_and(|mover_m| mover_m < self.near_m);
         let target = target.map(|target| self.sighting(pose, target, scan));
-        LeaderPercept { walls_m, target, is_mover_ahead, stands_for_it }
+        WallAndTargetPercept { walls_m, target, is_mover_ahead, stands_for_it }
     }
 
     /// Returns the distance of the nearest wall in a sector. A mover for which the leader stands is no wall, or it would
@@ -333,9 +333,9 @@ impl Leader {
         stands_for_movers: bool,
     ) -> f64 {
         let range_m = if stands_for_movers {
-            self.laser.min_range_by_motion_m(scan, sector_rad, false)
+            self.laser.min_range_where_moving_m(scan, sector_rad, false)
         } else {
-            self.laser.min_range_m(scan, sector_rad)
+            self.laser.min_sector_range_m(scan, sector_rad)
         };
         range_m.unwrap_or(self.laser.range_m())
     }
@@ -359,17 +359,21 @@ impl Leader {
             let cone = [bearing_rad - rule.half_angle_rad, bearing_rad + rule.half_angle_rad];
             let needed_m = rule.free_m.min(distance(pose.at, target));
             // Where the laser has no beams nothing is known to be free.
-            let free_m = self.laser.min_range_m(scan, cone);
+            let free_m = self.laser.min_sector_range_m(scan, cone);
             way_is_free = free_m.is_some_and(|free_m| free_m >= needed_m);
         }
         TargetSighting { bearing_rad, way_is_free }
     }
 
     /// Returns the layer that acts, and its wheel speeds.
-    pub fn decide(&self, followed: LeftRight<bool>, percept: &LeaderPercept) -> LeaderDecision {
+    pub fn decide(
+        &self,
+        followed: LeftRight<bool>,
+        percept: &WallAndTargetPercept,
+    ) -> LeaderDecision {
         let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
-        let left = self.wall_view(followed.left, percept.walls_m.left, leaves_walls);
-        let right = self.wall_view(followed.right, percept.walls_m.right, leaves_walls);
+        let left = self.wall_status(followed.left, percept.walls_m.left, leaves_walls);
+        let right = self.wall_status(followed.right, percept.walls_m.right, leaves_walls);
         let s = self.speed_m_s;
         let to_left = WheelSpeeds::new(0.0, s);
         let to_right = WheelSpeeds::new(s, 0.0);
@@ -401,30 +405,30 @@ impl Leader {
         LeaderDecision { wheels, layer, followed, is_mover_ahead }
     }
 
-    fn wall_view(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> WallView {
+    fn wall_status(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> WallStatus {
         let is_far = wall_m > self.far_m;
         let is_followed = !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
         let is_left_behind = is_far
             && !leaves_walls
             && match self.leaving {
-                WallLossRule::Latched => is_followed,
-                WallLossRule::Range => wall_m < self.lost_m,
-                WallLossRule::Level => true,
+                WallLossDetection::Latched => is_followed,
+                WallLossDetection::Range => wall_m < self.lost_m,
+                WallLossDetection::Level => true,
             };
-        WallView { is_close: wall_m < self.near_m, is_followed, is_left_behind }
+        WallStatus { is_close: wall_m < self.near_m, is_followed, is_left_behind }
     }
 
     /// Returns the wheel speeds to use if the way of its wheels is blocked.
-    pub fn blocked_wheels(&self, wheels: WheelSpeeds) -> WheelSpeeds {
+    pub fn wheel_speeds_if_blocked(&self, wheels: WheelSpeeds) -> WheelSpeeds {
         match self.turning {
             TurnMode::AboutAWheel => WheelSpeeds::default(),
-            TurnMode::OnTheSpotWhereBlocked => wheels.turn_in_place(),
+            TurnMode::OnTheSpotWhereBlocked => wheels.as_turn_in_place(),
         }
     }
 }
 
 #[derive(Debug, Clone, Copy)]
-struct WallView {
+struct WallStatus {
     is_close: bool,
     is_followed: bool,
     is_left_behind: bool,
@@ -435,23 +439,27 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn leader(leaving: WallLossRule) -> Leader {
-        Leader { leaving, ..Leader::new(0.5).unwrap() }
+    fn leader(leaving: WallLossDetection) -> LeaderController {
+        LeaderController { leaving, ..LeaderController::new(0.5).unwrap() }
     }
 
-    fn percept(left: f64, right: f64) -> LeaderPercept {
+    fn percept(left: f64, right: f64) -> WallAndTargetPercept {
         let walls_m = LeftRight { left, right };
-        LeaderPercept { walls_m, target: None, is_mover_ahead: false, stands_for_it: true }
+        WallAndTargetPercept { walls_m, target: None, is_mover_ahead: false, stands_for_it: true }
     }
 
-    fn layer(leader: &Leader, followed: (bool, bool), percept: &LeaderPercept) -> BehaviorLayer {
+    fn layer(
+        leader: &LeaderController,
+        followed: (bool, bool),
+        percept: &WallAndTargetPercept,
+    ) -> BehaviorLayer {
         let (left, right) = followed;
         leader.decide(LeftRight { left, right }, percept).layer
     }
 
     #[test]
     fn the_table_of_the_slides_holds_line_by_line() {
-        let leader = leader(WallLossRule::Latched);
+        let leader = leader(WallLossDetection::Latched);
         let (l, r) = (WheelSpeeds::new(0.0, 0.5), WheelSpeeds::new(0.5, 0.0));
         for (walls, followed, layer, wheels) in [
             ((0.6, 0.8), (false, false), BehaviorLayer::CloseLeft, r),
@@ -477,28 +485,28 @@ mod tests {
             layer(&leader(leaving), (followed, false), &percept(left, 0.8))
         };
         let (far, keep) = (BehaviorLayer::FarLeft, BehaviorLayer::KeepMoving);
-        assert_eq!(reading(WallLossRule::Latched, true, 1.0), far);
-        assert_eq!(reading(WallLossRule::Latched, false, 1.0), keep, "never near");
-        assert_eq!(reading(WallLossRule::Latched, true, 1.4), keep, "lost");
-        assert_eq!(reading(WallLossRule::Range, false, 1.0), far);
-        assert_eq!(reading(WallLossRule::Range, true, 1.4), keep);
-        assert_eq!(reading(WallLossRule::Level, false, 3.2), far);
+        assert_eq!(reading(WallLossDetection::Latched, true, 1.0), far);
+        assert_eq!(reading(WallLossDetection::Latched, false, 1.0), keep, "never near");
+        assert_eq!(reading(WallLossDetection::Latched, true, 1.4), keep, "lost");
+        assert_eq!(reading(WallLossDetection::Range, false, 1.0), far);
+        assert_eq!(reading(WallLossDetection::Range, true, 1.4), keep);
+        assert_eq!(reading(WallLossDetection::Level, false, 3.2), far);
     }
 
     #[test]
     fn a_leader_that_cannot_work_is_refused() {
-        let right = leader(WallLossRule::Latched);
+        let right = leader(WallLossDetection::Latched);
         assert!(right.check().is_ok());
-        assert!(Leader::new(f64::NAN).is_err());
-        assert!(Leader { near_m: 1.0, ..right.clone() }.check().is_err());
-        assert!(Leader { lost_m: 4.0, ..right.clone() }.check().is_err());
+        assert!(LeaderController::new(f64::NAN).is_err());
+        assert!(LeaderController { near_m: 1.0, ..right.clone() }.check().is_err());
+        assert!(LeaderController { lost_m: 4.0, ..right.clone() }.check().is_err());
         let narrow = Laser::new(180, 3.2, 0.5, 0.0).unwrap();
-        assert!(Leader { laser: narrow, ..right }.check().is_err());
+        assert!(LeaderController { laser: narrow, ..right }.check().is_err());
     }
 
     #[test]
     fn a_lost_wall_is_forgotten() {
-        let leader = leader(WallLossRule::Latched);
+        let leader = leader(WallLossDetection::Latched);
         let near = leader.decide(LeftRight::default(), &percept(0.8, 3.2)).followed;
         assert_eq!(near, LeftRight { left: true, right: false });
         let leaving = leader.decide(near, &percept(1.2, 3.2)).followed;
@@ -510,9 +518,11 @@ mod tests {
     #[test]
     fn a_free_way_to_the_target_ends_the_following() {
         let target = |way_is_free| Some(TargetSighting { bearing_rad: 0.1, way_is_free });
-        for leaving in [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level] {
+        for leaving in
+            [WallLossDetection::Latched, WallLossDetection::Range, WallLossDetection::Level]
+        {
             let leader = leader(leaving);
-            let seen = |free| LeaderPercept { target: target(free), ..percept(1.0, 3.2) };
+            let seen = |free| WallAndTargetPercept { target: target(free), ..percept(1.0, 3.2) };
             assert_eq!(layer(&leader, (true, false), &seen(true)), BehaviorLayer::TargetCheck);
             assert_ne!(layer(&leader, (true, false), &seen(false)), BehaviorLayer::TargetCheck);
         }
@@ -530,7 +540,7 @@ mod tests {
         let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
         let mut sees = |needs_line_of_sight, range_m| {
             let target_sense = TargetDetector { range_m, needs_line_of_sight };
-            let leader = Leader { target_sense, ..leader(WallLossRule::Latched) };
+            let leader = LeaderController { target_sense, ..leader(WallLossDetection::Latched) };
             let scan = &mut LaserScan::default();
             leader.scan(&pose, &around, &mut noise, scan);
             leader.perceive(&pose, &around, scan, true).target.is_some()
@@ -544,7 +554,7 @@ mod tests {
     fn what_moves_is_waited_for_and_is_no_wall_until_patience_ends() {
         use sidestep_kernel::{Seed, stream::Streams};
         use sidestep_rods::Obstacle;
-        let leader = leader(WallLossRule::Latched);
+        let leader = leader(WallLossDetection::Latched);
         let sees = |at, velocity_m_s, is_patient| {
             let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };
             let obstacles = Obstacles::new(vec![disc], 1.0).unwrap();
@@ -570,7 +580,7 @@ mod tests {
         fn what_is_mirrored_decides_mirrored_but_for_ties(
             left in 0.3..2.0f64, right in 0.3..2.0f64, fl: bool, fr: bool,
         ) {
-            let leader = leader(WallLossRule::Latched);
+            let leader = leader(WallLossDetection::Latched);
             let this = leader.decide(LeftRight { left: fl, right: fr }, &percept(left, right));
             let other = leader.decide(LeftRight { left: fr, right: fl }, &percept(right, left));
             let both_close = left < 0.7 && right < 0.7;

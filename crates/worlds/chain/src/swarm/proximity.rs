@@ -43,17 +43,17 @@ impl SensorRing {
         });
         obstacles.visit(&near, |o| {
             let body = RobotBody { core: o.core, radius_m: o.radius_m };
-            self.read_body(pose, &borders, &body, &mut gaps);
+            self.sense_body(pose, &borders, &body, &mut gaps);
         });
-        for body in bodies.into_iter().filter(|body| body.bounds().meets(&near)) {
-            self.read_body(pose, &borders, &body, &mut gaps);
+        for body in bodies.into_iter().filter(|body| body.bounds().intersects(&near)) {
+            self.sense_body(pose, &borders, &body, &mut gaps);
         }
         gaps
     }
 
     /// Finds the nearest point of a convex body in a sector: the nearest of all, or one on a
     /// border.
-    fn read_body(
+    fn sense_body(
         &self,
         pose: &Pose2,
         borders: &[[f64; 2]; SECTORS],
@@ -111,7 +111,7 @@ pub(crate) fn safe_speed_m_s(
 
 #[cfg(test)]
 mod tests {
-    use super::super::ray::tests::any_core;
+    use super::super::ray::tests::core_strategy;
     use super::*;
     use proptest::prelude::*;
     use sidestep_rods::Obstacle;
@@ -121,10 +121,10 @@ mod tests {
     proptest! {
         #[test]
         fn a_sector_reads_what_the_nearest_of_many_rays_does(
-            cores in prop::collection::vec((any_core(), 0.01..0.5f64), 1..12),
+            cores in prop::collection::vec((core_strategy(), 0.01..0.5f64), 1..12),
             at in prop::array::uniform2(-3.0..3.0f64), heading_rad in -3.1..3.1f64,
         ) {
-            let all = cores.iter().map(|(core, r)| Obstacle::still(1, *core, *r)).collect();
+            let all = cores.iter().map(|(core, r)| Obstacle::new_static(1, *core, *r)).collect();
             let obstacles = Obstacles::new(all, 1.0).unwrap();
             let gaps = RING.read(&Pose2 { at, heading_rad }, &obstacles, []);
             for (k, gap_m) in gaps.iter().enumerate() {

@@ -14,20 +14,26 @@ pub(crate) fn distance_m(
     radius_m: f64,
 ) -> Option<f64> {
     match core {
-        ConvexCore::Point(c) => distance_to_disc(from, u, *c, radius_m),
-        ConvexCore::Segment(ends) => distance_to_capsule(from, u, *ends, radius_m),
+        ConvexCore::Point(c) => ray_distance_to_disc(from, u, *c, radius_m),
+        ConvexCore::Segment(ends) => ray_distance_to_capsule(from, u, *ends, radius_m),
         // The outline of a box with round corners is the outer one of its edges' capsules.
         ConvexCore::Cuboid(cuboid) => {
             if core.nearest_to_point(from).distance_m <= radius_m {
                 return Some(0.0);
             }
-            let edges = cuboid.edges_2d().map(|edge| distance_to_capsule(from, u, edge, radius_m));
+            let edges =
+                cuboid.edges_2d().map(|edge| ray_distance_to_capsule(from, u, edge, radius_m));
             edges.into_iter().flatten().reduce(f64::min)
         }
     }
 }
 
-fn distance_to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64) -> Option<f64> {
+fn ray_distance_to_disc(
+    from: Point<2>,
+    u: Point<2>,
+    center: Point<2>,
+    radius_m: f64,
+) -> Option<f64> {
     let to = sub(center, from);
     let ahead_m = dot(u, to);
     let aside_m = cross_2d(u, to);
@@ -38,7 +44,7 @@ fn distance_to_disc(from: Point<2>, u: Point<2>, center: Point<2>, radius_m: f64
     (half2 >= 0.0 && ahead_m > 0.0).then(|| (ahead_m - half2.sqrt()).max(0.0))
 }
 
-fn distance_to_capsule(
+fn ray_distance_to_capsule(
     from: Point<2>,
     u: Point<2>,
     ends: [Point<2>; 2],
@@ -47,27 +53,27 @@ fn distance_to_capsule(
     if radius_m > 0.0 && ConvexCore::Segment(ends).nearest_to_point(from).distance_m <= radius_m {
         return Some(0.0);
     }
-    let caps = ends.map(|end| distance_to_disc(from, u, end, radius_m)).into_iter().flatten();
-    caps.chain(distance_to_sides(from, u, ends, radius_m)).reduce(f64::min)
+    let caps = ends.map(|end| ray_distance_to_disc(from, u, end, radius_m)).into_iter().flatten();
+    caps.chain(distance_to_capsule_sides(from, u, ends, radius_m)).reduce(f64::min)
 }
 
 /// Returns the distance to the long sides of a capsule; without a radius, they are the segment.
-fn distance_to_sides(
+fn distance_to_capsule_sides(
     from: Point<2>,
     u: Point<2>,
     ends: [Point<2>; 2],
     radius_m: f64,
 ) -> Option<f64> {
     let aside = scaled(perpendicular(normalized(sub(ends[1], ends[0]))?), radius_m);
-    let left = distance_to_segment(from, u, ends.map(|end| add(end, aside)));
+    let left = ray_distance_to_segment(from, u, ends.map(|end| add(end, aside)));
     if radius_m == 0.0 {
         return left;
     }
-    let right = distance_to_segment(from, u, ends.map(|end| sub(end, aside)));
+    let right = ray_distance_to_segment(from, u, ends.map(|end| sub(end, aside)));
     [left, right].into_iter().flatten().reduce(f64::min)
 }
 
-fn distance_to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
+fn ray_distance_to_segment(from: Point<2>, u: Point<2>, [a, b]: [Point<2>; 2]) -> Option<f64> {
     let d = sub(b, a);
     let to_a = sub(a, from);
     // The ends lie on both sides of the ray's line, or on it.
@@ -92,7 +98,11 @@ pub(crate) fn is_clear(obstacles: &Obstacles<2>, line: [Point<2>; 2]) -> bool {
 
 /// Returns the directions in which a capsule is seen from `from`: the middle one and half the angle
 /// between the outermost; `None` if it may be in any direction.
-pub(super) fn extent_rad(from: Point<2>, ends: [Point<2>; 2], radius_m: f64) -> Option<(f64, f64)> {
+pub(super) fn capsule_extent_rad(
+    from: Point<2>,
+    ends: [Point<2>; 2],
+    radius_m: f64,
+) -> Option<(f64, f64)> {
     use sidestep_kernel::math::{asin, atan2, wrap_angle};
     // At the surface rounding decides what is seen in which direction.
     if ConvexCore::Segment(ends).nearest_to_point(from).distance_m <= radius_m + 1e-9 {
@@ -136,7 +146,7 @@ pub(super) mod tests {
         None
     }
 
-    pub(crate) fn any_core() -> impl Strategy<Value = ConvexCore<2>> {
+    pub(crate) fn core_strategy() -> impl Strategy<Value = ConvexCore<2>> {
         let point = || prop::array::uniform2(-3.0..3.0f64);
         let cuboid = (point(), -3.0..3.0f64, prop::array::uniform2(0.05..1.0f64)).prop_map(
             |(center, turn, half_m)| {
@@ -156,7 +166,7 @@ pub(super) mod tests {
         #[test]
         fn a_ray_goes_as_far_as_marching_does(
             from in prop::array::uniform2(-3.0..3.0f64), toward in -3.2..3.2f64,
-            core in any_core(), radius_m in 0.01..0.8f64,
+            core in core_strategy(), radius_m in 0.01..0.8f64,
         ) {
             let u = [cos(toward), sin(toward)];
             let (exact, marched) = (distance_m(from, u, &core, radius_m), marched_m(from, u, &core, radius_m));

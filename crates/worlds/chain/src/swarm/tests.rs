@@ -1,6 +1,6 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
-use super::leader::{TurnMode, WallLossRule};
+use super::leader::{TurnMode, WallLossDetection};
 use super::{DifferentialDrive, Laser, Pose2};
 use crate::fixtures::convoy::{Convoy, ConvoyConfig, ConvoyStats, ConvoySurroundings};
 use crate::fixtures::{TestRng, corridor_line, corridor_walls};
@@ -60,10 +60,10 @@ fn run(plan: ConvoyConfig, start: Pose2, course: &Course, seed: u64) -> Run {
     let mut measures = ConvoyStats::default();
     let mut arrived = false;
     for _ in 0..(course.limit_s / dt_s) as u64 {
-        let tick = convoy.tick();
+        let tick = convoy.advance_tick();
         measures.record(&convoy, &course.obstacles, &tick);
         assert!(convoy.chain().max_rod_violation_m() <= 1e-9);
-        arrived = distance(convoy.leader().at, course.finish) <= course.finish_radius_m;
+        arrived = distance(convoy.leader_pose().at, course.finish) <= course.finish_radius_m;
         if arrived {
             break;
         }
@@ -90,7 +90,8 @@ fn a_leader_passes_the_pinned_corridor_and_touches_nothing() {
 
 #[test]
 fn in_a_corridor_as_wide_as_its_band_a_leader_hardly_slows_down() {
-    for leaving in [WallLossRule::Latched, WallLossRule::Range, WallLossRule::Level] {
+    for leaving in [WallLossDetection::Latched, WallLossDetection::Range, WallLossDetection::Level]
+    {
         let mut plan = alone();
         plan.leader.leaving = leaving;
         let Run { arrived, measures, .. } = run(plan, at(2.0, 0.0), &corridor(1.6), 1);
@@ -144,7 +145,7 @@ fn a_leader_reaches_its_target_among_25_discs_thirty_times_of_thirty() {
 #[test]
 fn a_leader_that_takes_leaving_literally_turns_for_ever_in_the_open() {
     let mut plan = alone();
-    (plan.leader.leaving, plan.leader.leave_rule) = (WallLossRule::Level, None);
+    (plan.leader.leaving, plan.leader.leave_rule) = (WallLossDetection::Level, None);
     let course = Course { limit_s: 60.0, ..field(0, 0) };
     let Run { arrived, measures, .. } = run(plan, at(-8.5, -8.5), &course, 1);
     assert!(!arrived && measures.layers == [0, 0, 0, measures.ticks, 0, 0]);
@@ -254,7 +255,7 @@ fn a_leader_that_is_blocked_stands_or_turns_on_the_spot() {
         plan.leader.turning = turning;
         let Run { measures, convoy, .. } = run(plan, at(0.0, 0.0), &course, 1);
         assert!(measures.leader_clearance_m >= -1e-9 && measures.vetoes > 100);
-        let pose = convoy.leader();
+        let pose = convoy.leader_pose();
         assert!(pose.at[0].abs() <= 0.05 + 1e-6 && pose.at[1].abs() <= 0.05 + 1e-6);
         assert_eq!(measures.vetoes < measures.ticks - 50, turns, "{measures:?}");
     }

@@ -1,5 +1,5 @@
 use crate::{RobotsRun, robots_run};
-use sidestep_kernel::control::{BufferMut, OrderLog, Orders, Team};
+use sidestep_kernel::control::{AgentTeam, BufferMut, MultiAgentOrder, OrderLog};
 use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
@@ -52,7 +52,7 @@ fn run(workers: usize) -> RobotsRun {
 
 /// Observations of a team: one vector per space.
 fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<i64>> {
-    let Team { agents, observation_spaces: observed, .. } = &run.teams()[team];
+    let AgentTeam { agents, observation_spaces: observed, .. } = &run.agent_teams()[team];
     let mut rooms: Vec<_> =
         observed.iter().map(|s| vec![0; s.value_count() * agents.len()]).collect();
     let mut room: Vec<_> = rooms.iter_mut().map(|room| BufferMut::Integer(room)).collect();
@@ -63,7 +63,7 @@ fn observed(run: &dyn Simulation, team: usize) -> BTreeMap<String, Vec<i64>> {
 /// A policy that depends on its observations: ahead unless something is reported there.
 fn decide(run: &dyn Simulation, team: usize) -> Vec<f64> {
     let seen = observed(run, team);
-    let n = run.teams()[team].agents.len();
+    let n = run.agent_teams()[team].agents.len();
     let beams = seen.get("sonar-8_report").map_or(0, |reports| reports.len() / n);
     let action = |k: usize| {
         let is_blocked = beams > 0 && seen["sonar-8_report"][k * beams] != 0;
@@ -75,14 +75,16 @@ fn decide(run: &dyn Simulation, team: usize) -> Vec<f64> {
 /// Decides for all that take orders, for `cycles` cycles.
 fn decided(run: &mut RobotsRun, cycles: u64) {
     for _ in 0..cycles {
-        let teams: Vec<Team> = run.teams().to_vec();
+        let teams: Vec<AgentTeam> = run.agent_teams().to_vec();
         for (k, team) in teams.iter().enumerate().filter(|(_, team)| !team.action_spaces.is_empty())
         {
             let values = decide(run, k);
             let agents = &team.agents;
-            run.order(&Orders { order: "action", agents, values: &values }).expect("right");
+            run.order(&MultiAgentOrder { order: "action", agents, values: &values })
+                .expect("right");
             let word = run.cycle() as f64 + 10.0;
-            let said = Orders { order: "broadcast", agents: &agents[..1], values: &[word] };
+            let said =
+                MultiAgentOrder { order: "broadcast", agents: &agents[..1], values: &[word] };
             run.order(&said).expect("right");
         }
         run.advance(1);
@@ -109,7 +111,7 @@ fn recorded(run: &mut RobotsRun, until: Cycle, go_on: impl Fn(&mut RobotsRun)) -
 fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers_and_wherever_it_is_resumed() {
     let mut first = run(1);
     let rows = recorded(&mut first, 60, |run| decided(run, 7.min(60 - run.cycle())));
-    assert!(rows.rows("orders") > 300, "{}", rows.rows("orders"));
+    assert!(rows.row_count("orders") > 300, "{}", rows.row_count("orders"));
     for workers in [1, 2, 3, 8] {
         let mut again = run(workers);
         again.replay_orders(book(&rows)).expect("they were obeyed once");
@@ -123,7 +125,9 @@ fn a_run_is_the_same_from_its_recorded_orders_whatever_the_workers_and_wherever_
         let mut before = run(1);
         decided(&mut before, at);
         // An order that was given before the checkpoint is in it.
-        before.order(&Orders { order: "trip", agents: &[5], values: &[1.0] }).expect("right");
+        before
+            .order(&MultiAgentOrder { order: "trip", agents: &[5], values: &[1.0] })
+            .expect("right");
         let checkpoint = before.checkpoint();
         decided(&mut before, 60 - at);
         let mut after = run(2);
@@ -156,7 +160,7 @@ fn what_is_observed_is_what_the_robot_would_perceive_in_the_cycle() {
     let mut recorder = MemoryRecorder::new(&run.schemas());
     for now in 0..60 {
         for team in [0, 2] {
-            let agents = run.teams()[team].agents.clone();
+            let agents = run.agent_teams()[team].agents.clone();
             let all = observed(&run, team);
             let beams = all["sonar-8_report"].len() / agents.len();
             for (k, &agent) in agents.iter().enumerate() {
@@ -173,9 +177,9 @@ fn what_is_observed_is_what_the_robot_would_perceive_in_the_cycle() {
     }
     seen.sort_by_key(|&(now, agent, ..)| (now, agent));
     let schema = run.schemas().into_iter().find(|schema| schema.name == "readings").expect("kept");
-    let team = &run.teams()[0].observation_spaces;
+    let team = &run.agent_teams()[0].observation_spaces;
     let names = |space: usize, number: usize| match &team[space].kind {
-        sidestep_kernel::control::SpaceKind::Discrete(names) => names[number].clone(),
+        sidestep_kernel::control::ValueDomain::Discrete(names) => names[number].clone(),
         _ => panic!("a choice"),
     };
     let column = |name: &str| {
@@ -185,7 +189,7 @@ fn what_is_observed_is_what_the_robot_would_perceive_in_the_cycle() {
     };
     let reports: Vec<_> = seen.iter().map(|&(.., report, _)| names(0, report)).collect();
     let classes: Vec<_> = seen.iter().map(|&(.., class)| names(1, class)).collect();
-    assert_eq!(recorder.rows("readings"), seen.len());
+    assert_eq!(recorder.row_count("readings"), seen.len());
     assert_eq!(column("reported"), reports);
     assert_eq!(column("reported_class"), classes);
 }
@@ -210,7 +214,8 @@ fn an_order_stands_until_the_slow_robot_has_its_turn_and_the_last_one_counts() {
     let place = |run: &RobotsRun| observed(run, 0)["at_boxes"][0];
     run.advance(1);
     for action in [1.0, 0.0] {
-        run.order(&Orders { order: "action", agents: &[0], values: &[action] }).expect("right");
+        run.order(&MultiAgentOrder { order: "action", agents: &[0], values: &[action] })
+            .expect("right");
     }
     let places: Vec<_> = (0..6)
         .map(|_| {
@@ -247,22 +252,40 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = run(1);
     let before = run.digest();
     let last = run.world().bodies.len() as EntityId - 1;
-    let refused: [(Orders<'_>, &str); 9] = [
-        (Orders { order: "action", agents: &[99], values: &[0.0] }, "there is no robot 99"),
-        (Orders { order: "action", agents: &[last], values: &[0.0] }, "there is no robot 8"),
-        (Orders { order: "action", agents: &[6], values: &[0.0] }, "robot 6 decides for itself"),
+    let refused: [(MultiAgentOrder<'_>, &str); 9] = [
         (
-            Orders { order: "jump", agents: &[0], values: &[0.0] },
+            MultiAgentOrder { order: "action", agents: &[99], values: &[0.0] },
+            "there is no robot 99",
+        ),
+        (
+            MultiAgentOrder { order: "action", agents: &[last], values: &[0.0] },
+            "there is no robot 8",
+        ),
+        (
+            MultiAgentOrder { order: "action", agents: &[6], values: &[0.0] },
+            "robot 6 decides for itself",
+        ),
+        (
+            MultiAgentOrder { order: "jump", agents: &[0], values: &[0.0] },
             "it takes action, trip, broadcast",
         ),
-        (Orders { order: "action", agents: &[0, 1], values: &[0.0] }, "needs 2 x 1 values, not 1"),
-        (Orders { order: "action", agents: &[0, 1], values: &[0.0, 99.0] }, "one of 0 forward"),
         (
-            Orders { order: "action", agents: &[0], values: &[f64::NAN] },
+            MultiAgentOrder { order: "action", agents: &[0, 1], values: &[0.0] },
+            "needs 2 x 1 values, not 1",
+        ),
+        (
+            MultiAgentOrder { order: "action", agents: &[0, 1], values: &[0.0, 99.0] },
+            "one of 0 forward",
+        ),
+        (
+            MultiAgentOrder { order: "action", agents: &[0], values: &[f64::NAN] },
             "is NaN; it must be one of",
         ),
-        (Orders { order: "broadcast", agents: &[0], values: &[-1.0] }, "a whole number from 0"),
-        (Orders { order: "action", agents: &[], values: &[1.0] }, "needs 0 values, not 1"),
+        (
+            MultiAgentOrder { order: "broadcast", agents: &[0], values: &[-1.0] },
+            "a whole number from 0",
+        ),
+        (MultiAgentOrder { order: "action", agents: &[], values: &[1.0] }, "needs 0 values, not 1"),
     ];
     for (orders, words) in refused {
         let error = run.order(&orders).expect_err(words).to_string();
@@ -270,7 +293,7 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
         assert_eq!(run.digest(), before, "{error}");
     }
     let mut book = OrderLog::default();
-    book.add(3, &Orders { order: "action", agents: &[0], values: &[77.0] });
+    book.add(3, &MultiAgentOrder { order: "action", agents: &[0], values: &[77.0] });
     let error = run.replay_orders(book).expect_err("out of bounds").to_string();
     assert!(error.contains("is 77"), "{error}");
     let mut short = [0; 3];

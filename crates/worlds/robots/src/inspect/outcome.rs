@@ -6,7 +6,7 @@ use crate::act::WalkResult;
 use crate::action::{Action, StepPath};
 use crate::effector::ObstacleRule;
 use crate::world::Role;
-use sidestep_kernel::Slot;
+use sidestep_kernel::EntitySlot;
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{self, FactSection, FactTable, FactValue, MarkShape};
 use std::ops::Range;
@@ -75,12 +75,12 @@ impl<T: OccupantWord> Inspector<'_, T> {
         let kind = &self.cycle.world.kinds[usize::from(blocker.kind)];
         let side = blocker.side.name();
         section
-            .fact("cut by", blocker.by.map(|slot: Slot| self.body_in(slot)))
+            .fact("cut by", blocker.by.map(|slot: EntitySlot| self.body_in(slot)))
             .fact("what is there", kind.as_str())
             .fact("touches it with its", side)
     }
 
-    fn body_in(&self, slot: Slot) -> view::BodyId {
+    fn body_in(&self, slot: EntitySlot) -> view::BodyId {
         self.cycle.world.body_id(self.cycle.body(slot).id)
     }
 

@@ -38,25 +38,25 @@ fn a_robot_that_is_cut_is_told_by_whom_and_what_it_saw_and_claimed() {
     assert_eq!(column("true range"), [FactValue::meters(0.5), FactValue::meters(0.0)]);
     assert_eq!(column("report"), column("truth"), "sensors are reliable");
     assert_eq!(column("chance of the report"), [FactValue::Share(1.0), FactValue::Share(1.0)]);
-    assert_eq!(second.value("Decides", "action"), Some(&"forward".into()));
+    assert_eq!(second.fact_value("Decides", "action"), Some(&"forward".into()));
     assert_eq!(second.marks_with_role(MarkRole::Claim).count(), 1);
-    assert_eq!(second.value("Conflict group", "bodies"), Some(&FactValue::count(2)));
-    assert_eq!(second.value("Conflict group", "turn"), Some(&FactValue::count(2)));
+    assert_eq!(second.fact_value("Conflict group", "bodies"), Some(&FactValue::count(2)));
+    assert_eq!(second.fact_value("Conflict group", "turn"), Some(&FactValue::count(2)));
     let order = second.section("Conflict group").and_then(|s| s.table.as_ref()).expect("an order");
     let turns: Vec<_> = order.column("body").expect("a column").collect();
     assert_eq!(turns, [&FactValue::Body(robot(0)), &FactValue::Body(robot(1))]);
-    assert_eq!(second.value("Outcome", "cut by"), Some(&FactValue::from(Some(robot(0)))));
-    assert_eq!(second.value("Outcome", "steps made"), Some(&FactValue::count(0)));
-    assert_eq!(second.value("Outcome", "probability"), Some(&FactValue::Share(1.0)));
-    assert_eq!(second.value("Outcome", "next place"), second.value("Now", "place"));
+    assert_eq!(second.fact_value("Outcome", "cut by"), Some(&FactValue::from(Some(robot(0)))));
+    assert_eq!(second.fact_value("Outcome", "steps made"), Some(&FactValue::count(0)));
+    assert_eq!(second.fact_value("Outcome", "probability"), Some(&FactValue::Share(1.0)));
+    assert_eq!(second.fact_value("Outcome", "next place"), second.fact_value("Now", "place"));
     let first = told(&run, 0);
-    assert_eq!(first.value("Outcome", "steps made"), Some(&FactValue::count(1)));
-    assert_eq!(first.value("Outcome", "cut by"), None);
+    assert_eq!(first.fact_value("Outcome", "steps made"), Some(&FactValue::count(1)));
+    assert_eq!(first.fact_value("Outcome", "cut by"), None);
     run.advance(1);
     let then = [0, 1].map(|id| told(&run, id));
-    assert_eq!(then[0].value("Now", "place"), first.value("Outcome", "next place"));
-    assert_eq!(then[1].value("Now", "last contact"), Some(&"robot at its front".into()));
-    assert_eq!(then[1].value("Perceives", "nothing of the kind"), None);
+    assert_eq!(then[0].fact_value("Now", "place"), first.fact_value("Outcome", "next place"));
+    assert_eq!(then[1].fact_value("Now", "last contact"), Some(&"robot at its front".into()));
+    assert_eq!(then[1].fact_value("Perceives", "nothing of the kind"), None);
 }
 
 #[test]
@@ -102,11 +102,14 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
                 for (id, told) in (0..).zip(&all) {
                     let then = run.inspect(run.world().body_id(id)).expect("it is there");
                     for (now, next) in [("place", "next place"), ("heading", "next heading")] {
-                        let (now, next) = (then.value("Now", now), told.value("Outcome", next));
+                        let (now, next) =
+                            (then.fact_value("Now", now), told.fact_value("Outcome", next));
                         // A body that goes straight is reported so before it turns at its next decision.
                         assert_eq!(now, next, "{rule}, {policy}: {:?}", told.body);
                     }
-                    moved += usize::from(told.value("Now", "place") != then.value("Now", "place"));
+                    moved += usize::from(
+                        told.fact_value("Now", "place") != then.fact_value("Now", "place"),
+                    );
                 }
             }
             assert!(moved > 50, "{rule}, {policy}: {moved} moved");

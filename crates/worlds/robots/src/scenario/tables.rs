@@ -6,7 +6,7 @@ use super::{EffectorSection, MatrixRows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_kernel::InputError;
-use sidestep_kernel::distr::check_row;
+use sidestep_kernel::distr::check_probability_row;
 use sidestep_scenario::{Spanned, suggestion};
 use std::collections::BTreeMap;
 
@@ -228,7 +228,7 @@ fn checked_row<T>(
             "give one entry per column, in the order of the list of names",
         ));
     }
-    check_row(values).map_err(|e| {
+    check_probability_row(values).map_err(|e| {
         let cause = format!("row `{}`: {e}", name.get_ref());
         at.error(row.span(), cause, "make the entries probabilities that sum to 1")
     })?;
@@ -274,7 +274,7 @@ pub(super) fn effector(
         let span = transitions.span();
         let list: Vec<Transition> = transitions.get_ref().iter().map(transition).collect();
         let row: Vec<f64> = list.iter().map(|t| t.p).collect();
-        check_row(&row).map_err(|e| {
+        check_probability_row(&row).map_err(|e| {
             let cause = format!("action `{action}` of effector `{name}`: {e}");
             at.error(span, cause, "make the probabilities `p` of its transitions sum to 1")
         })?;

@@ -23,8 +23,8 @@ fn assert_refused(text: &str, at: &str, words: &str) {
     let told = format!("{}; {}", error.cause(), error.remedy());
     assert!(told.contains(words), "{text}\n{told}");
     let offset = text.rfind(at).expect(at);
-    let wanted = InputError::new("", "", "").with_offset(text, offset);
-    assert_eq!(error.position(), wanted.position(), "{text}\n{error}");
+    let wanted = InputError::new("", "", "").with_byte_offset(text, offset);
+    assert_eq!(error.line_and_column(), wanted.line_and_column(), "{text}\n{error}");
 }
 
 fn remarks(text: &str, folder: &Path) -> Vec<Remark> {
@@ -161,7 +161,7 @@ fn a_list_of_starts_for_another_map_is_refused_with_both_sizes() {
     list("5\t9", "0\t0\t4\t2");
     let error = with("").expect_err("another map");
     assert!(error.cause().contains("5 x 9") && error.cause().contains("5 x 3"), "{error}");
-    assert_eq!(error.position(), Some((2, 1)));
+    assert_eq!(error.line_and_column(), Some((2, 1)));
     list("5\t3", "0\t1\t4\t0");
     let error = with("size = 2").expect_err("no room");
     assert!(error.cause().contains("does not fit at (4, 2)"), "{error}");
@@ -187,7 +187,7 @@ fn an_effector_that_was_learned_for_other_boxes_is_refused() {
     };
     assert!(remarks(&of(0.5), Path::new("")).is_empty());
     let error = compiled(&of(0.25), Path::new("")).expect_err("another box");
-    assert!(error.position().is_some(), "{error}");
+    assert!(error.line_and_column().is_some(), "{error}");
     assert!(error.cause().contains("boxes of 0.25 m, and those of the map are 0.5 m"), "{error}");
     assert!(error.remedy().contains("--box 0.5"), "{error}");
 }

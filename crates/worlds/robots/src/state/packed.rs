@@ -4,7 +4,7 @@ use crate::decide::Contact;
 use crate::effector::Side;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
-use sidestep_kernel::space::Position;
+use sidestep_kernel::space::GridPosition;
 
 /// The action that a body is about to do in this cycle, in one byte: 0 for none, else its number plus 1, and a
 /// flag in the highest bit.
@@ -112,7 +112,7 @@ pub(crate) struct PackedPose(u32);
 impl PackedPose {
     /// Column and row are those of the padded grid, below 2^15.
     #[inline]
-    pub(crate) fn new(at: Position, facing: Facing) -> Self {
+    pub(crate) fn new(at: GridPosition, facing: Facing) -> Self {
         Self(u32::from(facing.0) << 30 | at.row() << 15 | at.col())
     }
 

@@ -1,6 +1,6 @@
 mod poses;
 
-use super::criteria::IkCriteria;
+use super::criteria::PostureEvaluator;
 use super::step::JointRanges;
 use super::*;
 use crate::ik::IkEngine;
@@ -76,7 +76,7 @@ proptest! {
         target in prop::array::uniform4(0.0..1.0f64),
         variable in 0usize..4,
         turn in prop::sample::select(vec![
-            OrientationMask::Free, OrientationMask::Axis(Axis::X), OrientationMask::Axis(Axis::Z), OrientationMask::Whole,
+            OrientationMask::Free, OrientationMask::Axis(FrameAxis::X), OrientationMask::Axis(FrameAxis::Z), OrientationMask::Whole,
         ]),
     ) {
         let arm = arm();
@@ -85,11 +85,11 @@ proptest! {
         let spheres = vec![ObstacleSphere { center_m: [0.4, 0.3, 0.6], radius_m: 3.0 }];
         let asked = PoseMask { along: [true, false, true], turn };
         let goal = ArmGoal { spheres, asked, ..ArmGoal::from_pose(arm.forward_kinematics(&target).tip) };
-        let scene = IkCriteria::new(&arm, &skeleton, &goal);
+        let scene = PostureEvaluator::new(&arm, &skeleton, &goal);
         let look_at = |by: f64| {
             let mut values = values.clone();
             values[variable] += by;
-            let mut look = IkCriteria::empty_evaluation(&arm);
+            let mut look = PostureEvaluator::empty_evaluation(&arm);
             scene.evaluate(&values, &mut look);
             look
         };
@@ -206,7 +206,8 @@ fn the_connectors_of_an_iiwa_lead_to_its_joints_and_those_of_a_panda_do_not() {
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         assert!(answer.reached, "{:?}", answer.reason);
         let skeleton = arm.skeleton();
-        let connectors = arm.connectors(&skeleton, &arm.forward_kinematics(&answer.values));
+        let connectors =
+            arm.connector_positions(&skeleton, &arm.forward_kinematics(&answer.values));
         (answer.engine, arm.recover_joint_values(&skeleton, &connectors, &answer.values))
     };
     let (engine, recovered) = engine_of(&path);

@@ -81,7 +81,7 @@ fn poses_of_an_independent_library_are_those_of_rpy_quaternion_and_forward_kinem
     let arm = six();
     for (values, xyz_m, rpy_rad, quaternion) in KNOWN {
         let tip = arm.forward_kinematics(&values).tip;
-        let by_rpy = Transform::from_origin(&Origin { xyz_m, rpy_rad });
+        let by_rpy = Transform::from_urdf_origin(&Origin { xyz_m, rpy_rad });
         let by_quaternion = Transform::from_quaternion("q", xyz_m, quaternion).expect("right");
         for pose in [by_rpy, by_quaternion] {
             assert!(apart_m(pose.origin_m, tip.origin_m) < 1e-11);
@@ -99,7 +99,7 @@ fn poses_of_an_independent_library_are_those_of_rpy_quaternion_and_forward_kinem
 fn poses_of_an_independent_library_are_reached() {
     let arm = six();
     for (_, xyz_m, rpy_rad, _) in KNOWN {
-        let goal = ArmGoal::from_pose(Transform::from_origin(&Origin { xyz_m, rpy_rad }));
+        let goal = ArmGoal::from_pose(Transform::from_urdf_origin(&Origin { xyz_m, rpy_rad }));
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         assert!(answer.reached, "{:?}", answer.reason);
         assert!(answer.error_m <= 1e-6 && answer.error_rad <= 1e-6);
@@ -142,8 +142,8 @@ proptest! {
         // Turned about the free axis, and shifted along it, which the arm may undo.
         let mut rpy_rad = [0.0; 3];
         rpy_rad[axis] = off[axis];
-        let target = tip.compose(&Transform::from_origin(&Origin { xyz_m: [0.0; 3], rpy_rad }));
-        let asked = PoseMask { along: [true; 3], turn: OrientationMask::Axis(Axis::ALL[axis]) };
+        let target = tip.compose(&Transform::from_urdf_origin(&Origin { xyz_m: [0.0; 3], rpy_rad }));
+        let asked = PoseMask { along: [true; 3], turn: OrientationMask::Axis(FrameAxis::ALL[axis]) };
         let goal = ArmGoal { asked, ..ArmGoal::from_pose(target) };
         let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
         prop_assert!(answer.reached, "{:?}", answer.reason);
@@ -220,7 +220,7 @@ fn orientations_out_of_reach_are_told_as_such() {
     let arm = six();
     // As far as the arm gets, it points outward.
     let far = arm.forward_kinematics(&[0.0; 6]).tip.origin_m;
-    let back = Transform::from_origin(&Origin { xyz_m: far, rpy_rad: [3.0, 0.0, 0.0] });
+    let back = Transform::from_urdf_origin(&Origin { xyz_m: far, rpy_rad: [3.0, 0.0, 0.0] });
     let goal = ArmGoal { ignore_limits: true, restarts: 20, ..ArmGoal::from_pose(back) };
     let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
     assert!(matches!(answer.reason, Some(IkFailure::NotTurned { .. })), "{answer:?}");

@@ -3,7 +3,7 @@
 
 use super::hosted_aircraft::HostAircraft;
 use super::state::{
-    Coordinator, CoordinatorMemberData, CoordinatorTask, HierarchyData, samples_per_round,
+    Coordinator, CoordinatorMemberData, CoordinatorTask, RootCoordinatorData, samples_per_round,
 };
 use crate::agents::participant::InvalidMessage;
 use crate::agents::{ActionChoice, CommonKnowledge};
@@ -45,10 +45,10 @@ pub(super) fn check_state(
 }
 
 fn check_hierarchy(
-    hierarchy: &HierarchyData,
+    hierarchy: &RootCoordinatorData,
     services: &HostAircraft,
 ) -> Result<(), InvalidMessage> {
-    let HierarchyData { epochs, missing, unreachable } = hierarchy;
+    let RootCoordinatorData { epochs, missing, unreachable } = hierarchy;
     let group = services.own.common.ids.len();
     let parts = services.parts.len();
     InvalidMessage::Length.ensure([epochs.len(), missing.len()] == [parts; 2])?;

@@ -1,11 +1,11 @@
 //! A host: the airplane's part in all coordinators of its group.
 
 use super::epoch::CoordinatorEpoch;
-use super::messages::{self, MessageReader};
-use super::replica::{CoordinatorReplica, HostedCoordinator, QueuedMessage};
+use super::messages::{self, MessageReceiverContext};
+use super::replica::{CoordinatorReplica, HostedCoordinator, OutgoingHostMessage};
 use super::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
-    HostMoment, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, HostMoment,
+    ItineraryStep, MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
 use std::sync::Arc;
@@ -56,7 +56,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         tick: u64,
     ) -> Result<(), InvalidMessage> {
         let CoordinatorHostConfig { me, group, .. } = *self.rules;
-        let reader = MessageReader { me, group, replicas: self.replicas.len() };
+        let reader = MessageReceiverContext { me, group, replicas: self.replicas.len() };
         let (replica, message, state) = messages::decode(bytes, from, reader)?;
         let replica = &mut self.replicas[usize::from(replica)];
         let moment = HostMoment { services: &self.services, tick };
@@ -69,7 +69,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
     pub(super) fn on_timer(&mut self, tick: u64) {
         let moment = HostMoment { services: &self.services, tick };
         for replica in &mut self.replicas {
-            let watches = self.services.is_watching(replica.number.into());
+            let watches = self.services.is_awaiting_coordinator(replica.number.into());
             replica.on_timer(watches, &moment);
         }
         self.run_coordinators(tick);
@@ -81,7 +81,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         self.replicas
             .iter()
             .filter_map(|replica| {
-                replica.next_timer(self.services.is_watching(replica.number.into()))
+                replica.next_timer(self.services.is_awaiting_coordinator(replica.number.into()))
             })
             .min()
     }
@@ -96,13 +96,13 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         let mut has_changed = true;
         while std::mem::take(&mut has_changed) {
             for k in 0..self.replicas.len() {
-                has_changed |= self.run(k, tick);
+                has_changed |= self.run_coordinator(k, tick);
             }
         }
     }
 
     /// Runs a coordinator if it is here. Returns whether anything has changed for the others here.
-    fn run(&mut self, k: usize, tick: u64) -> bool {
+    fn run_coordinator(&mut self, k: usize, tick: u64) -> bool {
         let epochs: Vec<CoordinatorEpoch> =
             self.replicas.iter().map(|replica| replica.promised).collect();
         let is_here: Vec<bool> = self.replicas.iter().map(CoordinatorReplica::is_hosting).collect();
@@ -116,11 +116,11 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         let context =
             CoordinatorHostContext { epochs: &epochs, is_here: &is_here, has_timed_out, tick };
         match coordinator.advance(&mut self.services, &context) {
-            CoordinatorStep::Hop(to) => replica.migrate(&coordinator, to, tick),
-            CoordinatorStep::Done => {}
+            ItineraryStep::Hop(to) => replica.migrate_coordinator(&coordinator, to, tick),
+            ItineraryStep::Done => {}
             // It has continued without the one that it waited for, and waits anew.
-            CoordinatorStep::Stay if has_timed_out => replica.host(coordinator, tick),
-            CoordinatorStep::Stay => {
+            ItineraryStep::Stay if has_timed_out => replica.host_coordinator(coordinator, tick),
+            ItineraryStep::Stay => {
                 replica.put_back(HostedCoordinator { coordinator, heartbeat_at, timeout_at });
                 return self.services.has_news();
             }
@@ -134,7 +134,7 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
     }
 
     /// Returns the messages on their way out.
-    pub(super) fn take_messages(&mut self) -> Vec<QueuedMessage> {
+    pub(super) fn take_messages(&mut self) -> Vec<OutgoingHostMessage> {
         self.replicas.iter_mut().flat_map(|replica| std::mem::take(&mut replica.out)).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! What an airplane exposes to the coordinators that it hosts, and the news that they leave there for each other.
 
 use super::CoordinatorHostServices;
-use super::state::RoundData;
+use super::state::OptimizationProgress;
 use crate::agents::link::ConversationEnd;
 use crate::agents::{OptimizationResult, Ownship};
 use crate::flight::{Point, distance_m};
@@ -18,9 +18,9 @@ pub(super) struct HostAircraft {
     /// Tick in which sampling ends, so that some time is left to bring the controls.
     pub sampling_end: u64,
     /// News of the part's coordinator for the one above it.
-    pub report: Option<RoundData>,
+    pub report: Option<OptimizationProgress>,
     /// News of the one above for the part's coordinator.
-    pub answer: Option<HierarchyReply>,
+    pub answer: Option<RootCoordinatorReply>,
     /// Whether there is no one above, and will be none.
     pub is_orphan: bool,
     has_news: bool,
@@ -30,8 +30,8 @@ pub(super) struct HostAircraft {
 
 /// The news of the coordinator above for that of a part.
 #[derive(Debug, Clone)]
-pub(super) struct HierarchyReply {
-    pub data: RoundData,
+pub(super) struct RootCoordinatorReply {
+    pub data: OptimizationProgress,
     /// Whether it has any results.
     pub is_known: bool,
 }
@@ -57,12 +57,12 @@ impl HostAircraft {
         (self.parts.len() > 1).then_some(self.parts.len())
     }
 
-    pub(super) fn set_report(&mut self, report: RoundData) {
+    pub(super) fn set_part_report(&mut self, report: OptimizationProgress) {
         self.report = Some(report);
         self.has_news = true;
     }
 
-    pub(super) fn set_reply(&mut self, answer: HierarchyReply) {
+    pub(super) fn set_reply(&mut self, answer: RootCoordinatorReply) {
         self.report = None;
         self.answer = Some(answer);
         self.has_news = true;
@@ -83,7 +83,7 @@ impl HostAircraft {
 }
 
 impl CoordinatorHostServices for HostAircraft {
-    fn is_watching(&self, number: usize) -> bool {
+    fn is_awaiting_coordinator(&self, number: usize) -> bool {
         // Only the part's coordinator waits for the one above it.
         let is_above = self.root_number() == Some(number) && self.report.is_some();
         self.end.is_none() && (number == self.part || is_above)

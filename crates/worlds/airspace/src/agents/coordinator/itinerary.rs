@@ -1,24 +1,26 @@
 //! The tours of coordinators: the airplane that they visit next, and the reason.
 
-use super::hosted_aircraft::{HierarchyReply, HostAircraft};
-use super::state::{Coordinator, CoordinatorMemberData, CoordinatorTask, HierarchyData, RoundData};
-use super::{CoordinatorHostContext, CoordinatorStep, MigratingCoordinator, check};
+use super::hosted_aircraft::{HostAircraft, RootCoordinatorReply};
+use super::state::{
+    Coordinator, CoordinatorMemberData, CoordinatorTask, OptimizationProgress, RootCoordinatorData,
+};
+use super::{CoordinatorHostContext, ItineraryStep, MigratingCoordinator, check};
 use crate::agents::OptimizationResult;
 use crate::agents::link::to_bytes;
 use crate::agents::participant::InvalidMessage;
 
 impl Coordinator {
     /// Gathers the data of the airplanes of its part, from number `k` on.
-    fn gather_members(&mut self, k: usize, services: &HostAircraft) -> Option<CoordinatorStep> {
-        let RoundData { round, airplanes, .. } = &mut self.data;
+    fn gather_member_data(&mut self, k: usize, services: &HostAircraft) -> Option<ItineraryStep> {
+        let OptimizationProgress { round, airplanes, .. } = &mut self.data;
         for (k, airplane) in airplanes.iter_mut().enumerate().skip(k) {
             if airplane.place == services.own.me {
-                airplane.record_model(&services.own, *round);
+                airplane.update_from_host(&services.own, *round);
             } else if airplane.is_presumed {
                 airplane.presume(&services.own);
             } else {
                 self.task = CoordinatorTask::Gather(k);
-                return Some(CoordinatorStep::Hop(airplane.place));
+                return Some(ItineraryStep::Hop(airplane.place));
             }
         }
         self.task = CoordinatorTask::Return;
@@ -30,14 +32,14 @@ impl Coordinator {
         &mut self,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<CoordinatorStep> {
+    ) -> Option<ItineraryStep> {
         let home = context.epochs[services.part].owner.into();
         if services.own.me != home {
-            return Some(CoordinatorStep::Hop(home));
+            return Some(ItineraryStep::Hop(home));
         }
         self.task = match services.root_number() {
             Some(_) => CoordinatorTask::Await,
-            None => self.advance_task(
+            None => self.advance_optimization(
                 services,
                 context,
                 CoordinatorTask::Gather(0),
@@ -49,7 +51,7 @@ impl Coordinator {
 
     /// Takes the step of the algorithm. Returns the task after it, which depends on whether the
     /// decisions are made.
-    fn advance_task(
+    fn advance_optimization(
         &mut self,
         services: &HostAircraft,
         context: &CoordinatorHostContext<'_>,
@@ -61,8 +63,8 @@ impl Coordinator {
     }
 
     /// Waits for the coordinator above, which takes the data and brings the results.
-    fn wait_for_root(&mut self, services: &mut HostAircraft) -> Option<CoordinatorStep> {
-        if let Some(HierarchyReply { data, is_known }) = services.answer.take() {
+    fn wait_for_root(&mut self, services: &mut HostAircraft) -> Option<ItineraryStep> {
+        if let Some(RootCoordinatorReply { data, is_known }) = services.answer.take() {
             if is_known {
                 self.data = data;
             }
@@ -71,9 +73,9 @@ impl Coordinator {
             self.data.is_final = true;
         } else {
             if services.report.is_none() {
-                services.set_report(self.data.clone());
+                services.set_part_report(self.data.clone());
             }
-            return Some(CoordinatorStep::Stay);
+            return Some(ItineraryStep::Stay);
         }
         services.report = None;
         self.task = if self.data.is_final {
@@ -85,20 +87,16 @@ impl Coordinator {
     }
 
     /// Delivers the controls to the airplanes of its part, from number `k` on.
-    fn deliver_controls(
-        &mut self,
-        k: usize,
-        services: &mut HostAircraft,
-    ) -> Option<CoordinatorStep> {
+    fn deliver_controls(&mut self, k: usize, services: &mut HostAircraft) -> Option<ItineraryStep> {
         let me = services.own.me;
         // This includes an airplane that was passed over because it could not be reached then.
         self.conclude(services);
         let mut remaining = self.data.airplanes.iter().enumerate().skip(k);
         let next = remaining.find(|(_, airplane)| !airplane.is_presumed && airplane.place != me);
-        let Some((number, next)) = next else { return Some(CoordinatorStep::Done) };
+        let Some((number, next)) = next else { return Some(ItineraryStep::Done) };
         let host = next.place;
         self.task = CoordinatorTask::Deliver(number);
-        Some(CoordinatorStep::Hop(host))
+        Some(ItineraryStep::Hop(host))
     }
 
     fn conclude(&self, services: &mut HostAircraft) {
@@ -122,7 +120,7 @@ impl Coordinator {
         &mut self,
         services: &HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> &mut HierarchyData {
+    ) -> &mut RootCoordinatorData {
         let parts = &context.epochs[..services.parts.len()];
         let hierarchy = self.hierarchy.get_or_insert_default();
         hierarchy.missing.resize(parts.len(), false);
@@ -136,12 +134,12 @@ impl Coordinator {
     }
 
     /// Collects the data of the parts from number `k` on.
-    fn collect_parts(
+    fn collect_part_reports(
         &mut self,
         first: usize,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<CoordinatorStep> {
+    ) -> Option<ItineraryStep> {
         let mut has_timed_out = context.has_timed_out;
         for k in first..services.parts.len() {
             self.task = CoordinatorTask::Collect(k);
@@ -152,24 +150,24 @@ impl Coordinator {
             let report = services.report.clone().filter(|_| is_here && context.is_here[k]);
             if let Some(report) = report {
                 hierarchy.missing[k] = false;
-                self.add_report(report);
+                self.merge_part_report(report);
             } else if hierarchy.missing[k] || std::mem::take(&mut has_timed_out) {
                 hierarchy.missing[k] = true;
                 self.presume(k, services);
             } else if is_here || is_lost {
                 // The part's coordinator is not home yet, or it is brought back elsewhere.
-                return Some(CoordinatorStep::Stay);
+                return Some(ItineraryStep::Stay);
             } else {
-                return Some(CoordinatorStep::Hop(home));
+                return Some(ItineraryStep::Hop(home));
             }
         }
         // Whether the decisions are made or not, every part waits for an answer.
         let parts = CoordinatorTask::HandBack(services.parts.len());
-        self.task = self.advance_task(services, context, parts, parts);
+        self.task = self.advance_optimization(services, context, parts, parts);
         None
     }
 
-    fn add_report(&mut self, report: RoundData) {
+    fn merge_part_report(&mut self, report: OptimizationProgress) {
         self.data.round = report.round;
         self.data.calm = report.calm;
         self.data.airplanes.extend(report.airplanes);
@@ -191,7 +189,7 @@ impl Coordinator {
         k: usize,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<CoordinatorStep> {
+    ) -> Option<ItineraryStep> {
         for k in (0..k).rev() {
             self.task = CoordinatorTask::HandBack(k + 1);
             let hierarchy = self.update_hierarchy(services, context);
@@ -200,7 +198,7 @@ impl Coordinator {
                 continue;
             }
             if home != services.own.me {
-                return Some(CoordinatorStep::Hop(home));
+                return Some(ItineraryStep::Hop(home));
             }
             if context.is_here[k] && services.report.is_some() {
                 services.set_reply(self.reply_for(&services.parts[k]));
@@ -208,7 +206,7 @@ impl Coordinator {
         }
         if self.data.is_final {
             self.release_waiting(services, context);
-            return Some(CoordinatorStep::Done);
+            return Some(ItineraryStep::Done);
         }
         self.data.airplanes.clear();
         self.task = CoordinatorTask::Collect(0);
@@ -216,16 +214,22 @@ impl Coordinator {
     }
 
     /// Returns the results for a part.
-    fn reply_for(&self, part: &[usize]) -> HierarchyReply {
+    fn reply_for(&self, part: &[usize]) -> RootCoordinatorReply {
         let of_part = self.data.airplanes.iter().filter(|a| part.contains(&a.place));
         let airplanes = of_part.cloned().collect();
-        HierarchyReply { data: RoundData { airplanes, ..self.data }, is_known: true }
+        RootCoordinatorReply {
+            data: OptimizationProgress { airplanes, ..self.data },
+            is_known: true,
+        }
     }
 
     /// Releases a part that was left out while its coordinator waited here.
     fn release_waiting(&self, services: &mut HostAircraft, context: &CoordinatorHostContext<'_>) {
         if context.is_here[services.part] && services.report.is_some() {
-            services.set_reply(HierarchyReply { data: RoundData::default(), is_known: false });
+            services.set_reply(RootCoordinatorReply {
+                data: OptimizationProgress::default(),
+                is_known: false,
+            });
         }
     }
 }
@@ -240,8 +244,8 @@ impl MigratingCoordinator for Coordinator {
             part.into_iter().flatten().map(|&place| CoordinatorMemberData::new(place)).collect();
         Self {
             task: if is_above { CoordinatorTask::Collect(0) } else { CoordinatorTask::Gather(0) },
-            data: RoundData { airplanes, ..RoundData::default() },
-            hierarchy: is_above.then(HierarchyData::default),
+            data: OptimizationProgress { airplanes, ..OptimizationProgress::default() },
+            hierarchy: is_above.then(RootCoordinatorData::default),
         }
     }
 
@@ -265,14 +269,14 @@ impl MigratingCoordinator for Coordinator {
         &mut self,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> CoordinatorStep {
+    ) -> ItineraryStep {
         loop {
             let step = match self.task {
-                CoordinatorTask::Gather(k) => self.gather_members(k, services),
+                CoordinatorTask::Gather(k) => self.gather_member_data(k, services),
                 CoordinatorTask::Return => self.return_home(services, context),
                 CoordinatorTask::Await => self.wait_for_root(services),
                 CoordinatorTask::Deliver(k) => self.deliver_controls(k, services),
-                CoordinatorTask::Collect(k) => self.collect_parts(k, services, context),
+                CoordinatorTask::Collect(k) => self.collect_part_reports(k, services, context),
                 CoordinatorTask::HandBack(k) => self.return_results(k, services, context),
             };
             if let Some(step) = step {

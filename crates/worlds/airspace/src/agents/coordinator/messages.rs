@@ -7,7 +7,7 @@ use sidestep_kernel::network::PacketBuffer;
 
 /// A message about one of the coordinators of a group.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub(super) enum CoordinatorMessage {
+pub(super) enum CoordinatorHostMessage {
     /// "The coordinator is on its way to you": with its state.
     Hop(CoordinatorVersion),
     /// "It has arrived here."
@@ -24,7 +24,7 @@ pub(super) enum CoordinatorMessage {
     Vote(CoordinatorEpoch, Option<CoordinatorVersion>),
 }
 
-impl CoordinatorMessage {
+impl CoordinatorHostMessage {
     /// Returns whether the bytes of a state follow it.
     fn has_state(&self) -> bool {
         matches!(self, Self::Hop(_) | Self::Vote(_, Some(_)))
@@ -46,16 +46,16 @@ pub(super) struct VoteRequest {
 
 /// A message as it was read: the number of the coordinator that it is about, and the bytes of a
 /// state where it carries one.
-pub(super) type ParsedCoordinatorMessage<'a> = (u16, CoordinatorMessage, &'a [u8]);
+pub(super) type ParsedCoordinatorHostMessage<'a> = (u16, CoordinatorHostMessage, &'a [u8]);
 
 /// Returns a message in the form in which it travels: a state goes behind it.
-pub(super) fn encode(number: u16, message: &CoordinatorMessage, state: &[u8]) -> PacketBuffer {
+pub(super) fn encode(number: u16, message: &CoordinatorHostMessage, state: &[u8]) -> PacketBuffer {
     PacketBuffer::from_parts(&(number, message), state)
 }
 
 /// What a host has to know of itself to check a message.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct MessageReader {
+pub(super) struct MessageReceiverContext {
     /// Its place in the group.
     pub me: usize,
     /// Number of hosts of the group.
@@ -71,23 +71,25 @@ pub(super) struct MessageReader {
 pub(super) fn decode(
     bytes: &[u8],
     from: usize,
-    reader: MessageReader,
-) -> Result<ParsedCoordinatorMessage<'_>, InvalidMessage> {
-    let MessageReader { me, group, replicas } = reader;
-    let read = postcard::take_from_bytes::<(u16, CoordinatorMessage)>(bytes);
+    reader: MessageReceiverContext,
+) -> Result<ParsedCoordinatorHostMessage<'_>, InvalidMessage> {
+    let MessageReceiverContext { me, group, replicas } = reader;
+    let read = postcard::take_from_bytes::<(u16, CoordinatorHostMessage)>(bytes);
     let ((number, message), state) = read.map_err(|_| InvalidMessage::Form)?;
     InvalidMessage::Airplane.ensure(from < group && from != me)?;
     InvalidMessage::Kind.ensure(usize::from(number) < replicas)?;
     InvalidMessage::Form.ensure(message.has_state() || state.is_empty())?;
     let is_valid = match &message {
-        CoordinatorMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
-        CoordinatorMessage::Ack(at) | CoordinatorMessage::Alive(at, _) => at.is_valid_for(group),
-        CoordinatorMessage::Stale(epoch) => epoch.is_valid_for(group),
-        CoordinatorMessage::Elect(VoteRequest { epoch, seen, has, .. }) => {
+        CoordinatorHostMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
+        CoordinatorHostMessage::Ack(at) | CoordinatorHostMessage::Alive(at, _) => {
+            at.is_valid_for(group)
+        }
+        CoordinatorHostMessage::Stale(epoch) => epoch.is_valid_for(group),
+        CoordinatorHostMessage::Elect(VoteRequest { epoch, seen, has, .. }) => {
             let is_own = epoch.is_valid_for(group) && usize::from(epoch.owner) == from;
             is_own && seen.is_valid_for(group) && has.is_none_or(|has| has.is_valid_for(group))
         }
-        CoordinatorMessage::Vote(epoch, copy) => {
+        CoordinatorHostMessage::Vote(epoch, copy) => {
             let is_mine = epoch.is_valid_for(group) && usize::from(epoch.owner) == me;
             is_mine && copy.is_none_or(|copy| copy.is_valid_for(group))
         }

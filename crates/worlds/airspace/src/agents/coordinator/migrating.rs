@@ -6,7 +6,7 @@ use sidestep_kernel::network::RetryPolicy;
 
 /// The next step of a coordinator that was run on a host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CoordinatorStep {
+pub(super) enum ItineraryStep {
     /// It hops to the host at this place.
     Hop(usize),
     /// It waits here for another one.
@@ -53,7 +53,7 @@ pub(super) trait MigratingCoordinator: Sized {
         &mut self,
         services: &mut Self::Services,
         context: &CoordinatorHostContext<'_>,
-    ) -> CoordinatorStep;
+    ) -> ItineraryStep;
 
     /// Records that a host cannot be reached.
     fn on_unreachable(&mut self, place: usize);
@@ -65,7 +65,7 @@ pub(super) trait MigratingCoordinator: Sized {
 /// What a host exposes to the coordinators that it hosts.
 pub(super) trait CoordinatorHostServices {
     /// Returns whether the host misses a coordinator that is not heard of.
-    fn is_watching(&self, number: usize) -> bool;
+    fn is_awaiting_coordinator(&self, number: usize) -> bool;
 
     /// Returns whether a coordinator has left news for another one on the host since the last call.
     fn has_news(&mut self) -> bool {

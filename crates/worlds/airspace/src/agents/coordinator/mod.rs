@@ -76,8 +76,8 @@ mod replica;
 mod state;
 
 use migrating::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
-    HostMoment, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, HostMoment,
+    ItineraryStep, MigratingCoordinator,
 };
 pub use participant::CoordinatorHostParticipant;
 

@@ -3,11 +3,11 @@
 use super::CoordinatorHostConfig;
 use super::host::CoordinatorHost;
 use super::hosted_aircraft::{HostAircraft, partition_group};
-use super::replica::QueuedMessage;
+use super::replica::OutgoingHostMessage;
 use super::state::{Coordinator, samples_per_round};
 use crate::agents::link::{ConversationEnd, EndpointConfig};
 use crate::agents::participant::{
-    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, WithOutcome,
+    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, ParticipantWithOutcome,
 };
 use crate::agents::{CommonKnowledge, OptimizationResult, Ownship};
 use sidestep_kernel::EntityId;
@@ -115,7 +115,7 @@ impl Participant for CoordinatorHostParticipant {
     fn take_messages(&mut self) -> Vec<OutgoingMessage> {
         let queued = self.host.take_messages().into_iter();
         queued
-            .map(|QueuedMessage { to, message }| OutgoingMessage {
+            .map(|OutgoingHostMessage { to, message }| OutgoingMessage {
                 to: to.map(|place| self.group[place]),
                 message,
             })
@@ -127,7 +127,7 @@ impl Participant for CoordinatorHostParticipant {
     }
 }
 
-impl WithOutcome for CoordinatorHostParticipant {
+impl ParticipantWithOutcome for CoordinatorHostParticipant {
     type Outcome = OptimizationResult;
 
     fn finish(&mut self) -> ConversationEnd<OptimizationResult> {

@@ -3,7 +3,7 @@
 //! The protocol and the argument for it are at the head of the module above.
 
 use super::epoch::{CoordinatorEpoch, CoordinatorVersion};
-use super::messages::{CoordinatorMessage, VoteRequest, encode};
+use super::messages::{CoordinatorHostMessage, VoteRequest, encode};
 use super::{CoordinatorHostConfig, HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 use sidestep_kernel::network::PacketBuffer;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A message on its way out, to one other host or to all.
 #[derive(Debug, Clone)]
-pub(super) struct QueuedMessage {
+pub(super) struct OutgoingHostMessage {
     pub to: Option<usize>,
     pub message: PacketBuffer,
 }
@@ -94,7 +94,7 @@ pub(super) struct CoordinatorReplica<P> {
     pub role: ReplicaRole<P>,
     /// The hosts that did not answer when no majority could be found, if that has happened.
     pub unanswering: Option<Vec<usize>>,
-    pub out: Vec<QueuedMessage>,
+    pub out: Vec<OutgoingHostMessage>,
 }
 
 impl<P: MigratingCoordinator> CoordinatorReplica<P> {
@@ -125,7 +125,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.heard_at = tick;
         if usize::from(self.promised.owner) == self.rules.me {
             let coordinator = P::new(services, self.number.into());
-            self.host(coordinator, tick);
+            self.host_coordinator(coordinator, tick);
         }
     }
 
@@ -150,7 +150,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Takes the coordinator in at a tick, from which its times on this host count.
-    pub(super) fn host(&mut self, coordinator: P, tick: u64) {
+    pub(super) fn host_coordinator(&mut self, coordinator: P, tick: u64) {
         let heartbeat_at = tick.saturating_add(self.rules.heartbeat_ticks());
         let timeout_at = tick.saturating_add(self.rules.wait_timeout_ticks());
         self.role =
@@ -163,11 +163,11 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Sends the coordinator to another host.
-    pub(super) fn migrate(&mut self, coordinator: &P, to: usize, tick: u64) {
+    pub(super) fn migrate_coordinator(&mut self, coordinator: &P, to: usize, tick: u64) {
         let at = self.accepted.after_hop();
         let state: Arc<[u8]> = coordinator.encode().into();
         self.record_alive(at, tick);
-        self.send(to, &CoordinatorMessage::Hop(at), &state);
+        self.send(to, &CoordinatorHostMessage::Hop(at), &state);
         // Where nothing is lost, it has left for good.
         let Some(policy) = self.rules.retry_policy else { return };
         let tries = if self.rules.expected[to] { policy.tries } else { policy.first_tries };
@@ -185,21 +185,21 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     pub(super) fn on_message(
         &mut self,
         from: usize,
-        message: CoordinatorMessage,
+        message: CoordinatorHostMessage,
         state: &[u8],
         moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
         let tick = moment.tick;
         match message {
-            CoordinatorMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
-            CoordinatorMessage::Vote(epoch, copy) => {
+            CoordinatorHostMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
+            CoordinatorHostMessage::Vote(epoch, copy) => {
                 let copy = copy.map(|at| CoordinatorStateCopy { at, state: state.into() });
                 self.on_vote(from, epoch, copy, moment)?;
             }
-            CoordinatorMessage::Ack(at) => self.on_ack(from, at, tick),
-            CoordinatorMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
-            CoordinatorMessage::Stale(epoch) => self.on_stale(epoch, moment),
-            CoordinatorMessage::Elect(candidacy) => self.on_vote_request(from, candidacy, tick),
+            CoordinatorHostMessage::Ack(at) => self.on_ack(from, at, tick),
+            CoordinatorHostMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
+            CoordinatorHostMessage::Stale(epoch) => self.on_newer_epoch(epoch, moment),
+            CoordinatorHostMessage::Elect(candidacy) => self.on_vote_request(from, candidacy, tick),
         }
         if let ReplicaRole::Candidate(candidate) = &mut self.role {
             candidate.heard[from] = true;
@@ -216,7 +216,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     ) -> Result<(), InvalidMessage> {
         let &HostMoment { services, tick } = moment;
         if at.epoch < self.promised {
-            self.send(from, &CoordinatorMessage::Stale(self.promised), &[]);
+            self.send(from, &CoordinatorHostMessage::Stale(self.promised), &[]);
         } else if at <= self.accepted {
             // A copy on the network, or the acknowledgement was lost.
             self.acknowledge(from, at);
@@ -225,14 +225,14 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             self.record_alive(at, tick);
             self.accepted = at;
             self.acknowledge(from, at);
-            self.host(coordinator, tick);
+            self.host_coordinator(coordinator, tick);
         }
         Ok(())
     }
 
     fn acknowledge(&mut self, to: usize, at: CoordinatorVersion) {
         if self.rules.retry_policy.is_some() {
-            self.send(to, &CoordinatorMessage::Ack(at), &[]);
+            self.send(to, &CoordinatorHostMessage::Ack(at), &[]);
         }
     }
 
@@ -247,16 +247,16 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Receives the news that it was alive some ticks ago.
     fn on_alive(&mut self, from: usize, at: CoordinatorVersion, ago: u64, tick: u64) {
         if at.epoch < self.promised {
-            return self.send(from, &CoordinatorMessage::Stale(self.promised), &[]);
+            return self.send(from, &CoordinatorHostMessage::Stale(self.promised), &[]);
         }
         let is_over = match &self.role {
             ReplicaRole::Idle => false,
             // One of a newer epoch is there instead.
             ReplicaRole::Hosting(_) => at.epoch > self.accepted.epoch,
             // It has arrived, if the host that it went to knows of it, or if it has come farther.
-            ReplicaRole::Sending { to, .. } => self.has_arrived(*to, from, at),
+            ReplicaRole::Sending { to, .. } => self.has_hop_arrived(*to, from, at),
             ReplicaRole::Candidate(ElectionCandidate { request, lost, .. }) => match lost {
-                Some(lost) => self.has_arrived(*lost, from, at),
+                Some(lost) => self.has_hop_arrived(*lost, from, at),
                 // The hearsay of others is of use unless it is so old that the coordinator is
                 // missed all the same.
                 None => at >= request.seen && ago < self.rules.election_timeout_ticks,
@@ -268,7 +268,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.record_alive(at, tick.saturating_sub(ago));
     }
 
-    fn has_arrived(&self, to: usize, from: usize, at: CoordinatorVersion) -> bool {
+    fn has_hop_arrived(&self, to: usize, from: usize, at: CoordinatorVersion) -> bool {
         let left = self.copy.as_ref().map(|copy| copy.at);
         left.is_none_or(|left| at > left || (at == left && from == to))
     }
@@ -276,7 +276,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Receives the news that a newer epoch was accepted by another host. A host that has the
     /// coordinator in its care wants to bring it back in a still newer one, unless one is alive in
     /// that one.
-    fn on_stale(&mut self, epoch: CoordinatorEpoch, moment: &HostMoment<'_, P::Services>) {
+    fn on_newer_epoch(&mut self, epoch: CoordinatorEpoch, moment: &HostMoment<'_, P::Services>) {
         if epoch <= self.promised {
             return;
         }
@@ -316,7 +316,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ReplicaRole::Candidate(_) => self.retry_vote_requests(tick),
             ReplicaRole::Hosting(stay) if stay.heartbeat_at <= tick => {
                 stay.heartbeat_at = tick + self.rules.heartbeat_ticks();
-                self.broadcast(&CoordinatorMessage::Alive(self.accepted, 0));
+                self.broadcast(&CoordinatorHostMessage::Alive(self.accepted, 0));
             }
             // The coordinator checks the time when it is run.
             ReplicaRole::Hosting(_) => {}
@@ -334,8 +334,8 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let to = *to;
         if *heartbeat_at <= tick {
             *heartbeat_at = tick + self.rules.heartbeat_ticks();
-            let message = encode(self.number, &CoordinatorMessage::Alive(copy.at, 0), &[]);
-            self.out.push(QueuedMessage { to: None, message });
+            let message = encode(self.number, &CoordinatorHostMessage::Alive(copy.at, 0), &[]);
+            self.out.push(OutgoingHostMessage { to: None, message });
         }
         if *due > tick {
             return;
@@ -343,7 +343,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         *due = tick + policy.timeout_ticks(copy.state.len());
         if let Some(left) = tries_left.checked_sub(1) {
             *tries_left = left;
-            return self.send(to, &CoordinatorMessage::Hop(copy.at), &copy.state);
+            return self.send(to, &CoordinatorHostMessage::Hop(copy.at), &copy.state);
         }
         let coordinator = P::decode(&copy.state, services, self.number.into());
         if coordinator.is_ok_and(|coordinator| coordinator.is_done_without(to)) {
@@ -359,7 +359,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let policy = self.rules.retry_policy?;
         match &self.role {
             ReplicaRole::Idle if watches && self.unanswering.is_none() => {
-                let missed_at = self.election_timeout().max(self.quiet_until);
+                let missed_at = self.election_due_tick().max(self.quiet_until);
                 Some(missed_at.saturating_add(self.rank * policy.ticks))
             }
             ReplicaRole::Idle => None,
@@ -370,7 +370,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     }
 
     /// Returns the tick in which it is missed, if there is no further sign of life.
-    pub(super) fn election_timeout(&self) -> u64 {
+    pub(super) fn election_due_tick(&self) -> u64 {
         self.heard_at.saturating_add(self.rules.election_timeout_ticks)
     }
 
@@ -381,12 +381,12 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.quiet_until = tick.saturating_add(answer_ticks.saturating_mul(3));
     }
 
-    pub(super) fn send(&mut self, to: usize, message: &CoordinatorMessage, state: &[u8]) {
+    pub(super) fn send(&mut self, to: usize, message: &CoordinatorHostMessage, state: &[u8]) {
         let message = encode(self.number, message, state);
-        self.out.push(QueuedMessage { to: Some(to), message });
+        self.out.push(OutgoingHostMessage { to: Some(to), message });
     }
 
-    pub(super) fn broadcast(&mut self, message: &CoordinatorMessage) {
-        self.out.push(QueuedMessage { to: None, message: encode(self.number, message, &[]) });
+    pub(super) fn broadcast(&mut self, message: &CoordinatorHostMessage) {
+        self.out.push(OutgoingHostMessage { to: None, message: encode(self.number, message, &[]) });
     }
 }

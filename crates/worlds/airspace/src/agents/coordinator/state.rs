@@ -32,7 +32,7 @@ pub(super) struct CoordinatorMemberData {
 
 /// The data of the algorithm up to its present round; with exact expectations one step makes all rounds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct RoundData {
+pub(super) struct OptimizationProgress {
     /// Number of rounds made, and of calm ones at the end of them.
     pub round: u32,
     pub calm: u32,
@@ -60,7 +60,7 @@ pub(super) enum CoordinatorTask {
 
 /// The data of a coordinator above others about their parts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct HierarchyData {
+pub(super) struct RootCoordinatorData {
     /// The newest known epoch of each part's coordinator, which says where that one is at home.
     pub epochs: Vec<CoordinatorEpoch>,
     /// Whether each part is left out, because its coordinator cannot be found.
@@ -73,9 +73,9 @@ pub(super) struct HierarchyData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Coordinator {
     pub task: CoordinatorTask,
-    pub data: RoundData,
+    pub data: OptimizationProgress,
     /// Present only in the coordinator above others.
-    pub hierarchy: Option<HierarchyData>,
+    pub hierarchy: Option<RootCoordinatorData>,
 }
 
 /// Returns the number of samples in a round; `None` where expectations are exact.
@@ -93,7 +93,7 @@ impl CoordinatorMemberData {
     }
 
     /// Reads the model of the airplane that the coordinator is on.
-    pub(super) fn record_model(&mut self, host: &Ownship, round: u32) {
+    pub(super) fn update_from_host(&mut self, host: &Ownship, round: u32) {
         let options = &host.options;
         self.is_presumed = false;
         self.beacon = Some(host.beacon.clone());
@@ -133,7 +133,7 @@ impl CoordinatorMemberData {
     }
 }
 
-impl RoundData {
+impl OptimizationProgress {
     /// Takes the step of the algorithm for which all have been visited. `is_late` says that time is
     /// nearly up, so that sampling ends.
     pub(super) fn advance(&mut self, common: &CommonKnowledge, is_late: bool) {
@@ -210,7 +210,7 @@ impl RoundData {
     fn learn_from_samples(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
         let mut total = Vec::with_capacity(block);
         for k in 0..block {
-            let parts = (0..self.airplanes.len()).map(|i| self.collision_cost(common, i, k));
+            let parts = (0..self.airplanes.len()).map(|i| self.joint_sample_cost(common, i, k));
             total.push(parts.fold(0.0, |sum, part| sum + part));
         }
         let settings = common.settings;
@@ -229,7 +229,7 @@ impl RoundData {
     }
 
     /// Returns the part of an airplane in the cost of the joint sample `k`.
-    fn collision_cost(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
+    fn joint_sample_cost(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
         let objective = &common.objective;
         let own = &self.airplanes[i];
         let mut cost = own.own_costs[k];

@@ -3,7 +3,7 @@
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::agents::traffic_state::StateBeacon;
-use crate::flight::Air;
+use crate::flight::FlightEnvironment;
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
@@ -44,9 +44,9 @@ impl ObservedAircraft {
 /// The situation as all of a group see it, and numbers on which they have agreed, before they exchange
 /// their plans.
 #[derive(Debug, Clone)]
-pub struct ExchangeSetup {
+pub struct ShieldExchangeSetup {
     /// The air that all fly through.
-    pub air: Air,
+    pub air: FlightEnvironment,
     /// Airplanes at least this many meters above each other need not avoid each other.
     pub vertical_m: f64,
     /// The present cycle.
@@ -59,7 +59,7 @@ pub struct ExchangeSetup {
     pub aircraft: Vec<ObservedAircraft>,
 }
 
-impl ExchangeSetup {
+impl ShieldExchangeSetup {
     /// Returns whether the airplane at one place goes before another one: it flies on without the
     /// other's consent, but the other does not without its own.
     ///

@@ -25,7 +25,7 @@ pub struct SurveillanceReport {
 
 impl SurveillanceReport {
     /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
-    pub(crate) fn known_aircraft(&self) -> KnownAircraft {
+    pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
         let &Self { id, pose, altitude_m, .. } = self;
         KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
     }
@@ -44,7 +44,7 @@ pub struct Beacon {
 
 /// A piece of knowledge about an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum SurveillanceItem {
+pub enum GroupingMessageItem {
     /// What it says of itself; others relay it.
     Beacon(Beacon),
     /// What it has heard: sent once, when it expects no further beacon.
@@ -56,7 +56,7 @@ pub enum SurveillanceItem {
     },
 }
 
-impl SurveillanceItem {
+impl GroupingMessageItem {
     /// Returns the airplane that it is about.
     pub(super) fn subject_id(&self) -> EntityId {
         match self {

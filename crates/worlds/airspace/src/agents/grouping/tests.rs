@@ -81,9 +81,9 @@ fn found(
     let n = links.near.len();
     let mut agents: Vec<GroupingAgent> = (0..n).map(|i| links.agent(i, certainty)).collect();
     let (mut due, mut sent) = (Vec::new(), 0);
-    let mut say = |due: &mut Vec<(usize, usize, Vec<SurveillanceItem>)>,
+    let mut say = |due: &mut Vec<(usize, usize, Vec<GroupingMessageItem>)>,
                    from: usize,
-                   outgoing: Vec<Vec<SurveillanceItem>>| {
+                   outgoing: Vec<Vec<GroupingMessageItem>>| {
         for items in outgoing {
             let to = (0..n).filter(|&to| links.near[from][to]);
             sent += to.clone().count();
@@ -99,7 +99,7 @@ fn found(
             let (from, to, items) = due.swap_remove(draws.uniform_below(due.len() as u32) as usize);
             let seen = &agents[to].input.near;
             let place = seen.binary_search_by_key(&id(from), |one| one.id).expect("near");
-            agents[to].check(place, &items).expect("sound");
+            agents[to].check_message(place, &items).expect("sound");
             let outgoing = agents[to].on_message(place, items);
             say(&mut due, to, outgoing);
         }
@@ -176,7 +176,7 @@ proptest! {
                 0 | 1 => roster.add_report(id(i), ids(&links.hears[i])),
                 _ => roster.add_beacon(beacon(i), i > 0 && draws.uniform_below(2) == 0),
             };
-            prop_assert_eq!(roster.update_chain(), roster.is_complete(id(0)));
+            prop_assert_eq!(roster.advance_chain_search(), roster.is_complete(id(0)));
         }
     }
 }
@@ -195,7 +195,9 @@ fn a_crowd_of_hundreds_is_found_at_once() {
         let beacon = Beacon { own: sighted(i), near: near(i), non_cooperative: Vec::new() };
         for from in [i, 1 + i % (n - 1), i] {
             assert!(
-                agent.on_message(from, vec![SurveillanceItem::Beacon(beacon.clone())]).is_empty()
+                agent
+                    .on_message(from, vec![GroupingMessageItem::Beacon(beacon.clone())])
+                    .is_empty()
             );
         }
     }
@@ -215,7 +217,9 @@ fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     let mut draws = Streams::new(Seed(1)).draws(0, 0, Purpose(907));
     let agent = Links::drawn(3, 1.0, 1.0, &mut draws).agent(0, PlanCertainty::Mixable);
     let right = Beacon { own: sighted(1), near: vec![id(0), id(2)], non_cooperative: Vec::new() };
-    let check = |beacon: &Beacon| agent.check(1, &vec![SurveillanceItem::Beacon(beacon.clone())]);
+    let check = |beacon: &Beacon| {
+        agent.check_message(1, &vec![GroupingMessageItem::Beacon(beacon.clone())])
+    };
     assert_eq!(check(&right), Ok(()));
     let altered = |alter: fn(&mut Beacon)| {
         let mut beacon = right.clone();
@@ -226,5 +230,5 @@ fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     assert_eq!(altered(|beacon| beacon.own.altitude_m = f64::NAN), Err(InvalidMessage::Number));
     assert_eq!(altered(|beacon| beacon.near = vec![7, 1]), Err(InvalidMessage::Airplane));
     assert_eq!(altered(|beacon| beacon.near = vec![beacon.own.id]), Err(InvalidMessage::Airplane));
-    assert_eq!(agent.check(1, &Vec::new()), Err(InvalidMessage::Length));
+    assert_eq!(agent.check_message(1, &Vec::new()), Err(InvalidMessage::Length));
 }

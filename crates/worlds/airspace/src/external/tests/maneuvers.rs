@@ -6,7 +6,7 @@ use crate::external::observation::MAX_NEIGHBORS;
 use crate::external_action::ExternalAction;
 use crate::flight::distance_m;
 use crate::kinds;
-use sidestep_kernel::control::{OrderLog, Orders};
+use sidestep_kernel::control::{MultiAgentOrder, OrderLog};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::view::BodyId;
 use sidestep_kernel::{EntityId, Simulation};
@@ -27,7 +27,7 @@ fn heading_rad(run: &AirspaceRun, id: usize) -> f64 {
 #[test]
 fn a_turn_is_flown_for_one_decision_and_the_last_order_counts() {
     let mut run = lone("");
-    let actions = run.teams()[0].action_spaces[0].value_count();
+    let actions = run.agent_teams()[0].action_spaces[0].value_count();
     let ranking: Vec<f64> = (0..actions).map(|k| k as f64).collect();
     let orders: [(&str, &[f64]); 3] = [
         (ExternalAction::RANKING, &ranking),
@@ -35,7 +35,7 @@ fn a_turn_is_flown_for_one_decision_and_the_last_order_counts() {
         (ExternalAction::TURN_RATE, &[0.02]),
     ];
     for (order, values) in orders {
-        run.order(&Orders { order, agents: &[0], values }).expect("right");
+        run.order(&MultiAgentOrder { order, agents: &[0], values }).expect("right");
     }
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
@@ -49,8 +49,12 @@ fn a_velocity_is_turned_to_as_fast_as_may_be() {
     let mut run = lone("");
     let north = std::f64::consts::FRAC_PI_2;
     for cycle in 1..=6 {
-        run.order(&Orders { order: ExternalAction::VELOCITY, agents: &[0], values: &[0.0, 7.0] })
-            .expect("right");
+        run.order(&MultiAgentOrder {
+            order: ExternalAction::VELOCITY,
+            agents: &[0],
+            values: &[0.0, 7.0],
+        })
+        .expect("right");
         run.advance(1);
         // Four degrees per second, for five seconds each.
         let expected_rad = (f64::from(cycle) * 20_f64.to_radians()).min(north);
@@ -61,15 +65,15 @@ fn a_velocity_is_turned_to_as_fast_as_may_be() {
 #[test]
 fn the_first_of_a_ranking_is_flown() {
     let mut run = lone("");
-    let actions = run.teams()[0].action_spaces[0].value_count();
+    let actions = run.agent_teams()[0].action_spaces[0].value_count();
     // The first action turns right as fast as it can, the last proceeds.
     let first: Vec<f64> = (0..actions).map(|k| k as f64).collect();
     let last: Vec<f64> = first.iter().rev().copied().collect();
-    run.order(&Orders { order: ExternalAction::RANKING, agents: &[0], values: &last })
+    run.order(&MultiAgentOrder { order: ExternalAction::RANKING, agents: &[0], values: &last })
         .expect("right");
     run.advance(1);
     assert_eq!(heading_rad(&run, 0), 0.0);
-    run.order(&Orders { order: ExternalAction::RANKING, agents: &[0], values: &first })
+    run.order(&MultiAgentOrder { order: ExternalAction::RANKING, agents: &[0], values: &first })
         .expect("right");
     run.advance(1);
     assert!((heading_rad(&run, 0) + 20_f64.to_radians()).abs() < 1e-12);
@@ -86,8 +90,12 @@ fn ordered_into_each_other(shield: &str) -> AirspaceRun {
         let agents: Vec<EntityId> = (0..6).collect();
         let toward = |slot: &EntityId| run.state().airplanes[*slot as usize].pose().at.map(|v| -v);
         let values: Vec<f64> = agents.iter().flat_map(toward).collect();
-        run.order(&Orders { order: ExternalAction::VELOCITY, agents: &agents, values: &values })
-            .expect("right");
+        run.order(&MultiAgentOrder {
+            order: ExternalAction::VELOCITY,
+            agents: &agents,
+            values: &values,
+        })
+        .expect("right");
         run.advance(1);
     }
     run
@@ -107,7 +115,7 @@ fn an_order_stands_until_its_airplane_comes_in_and_none_after_its_flight() {
                 at_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\nappears_s = 20.0\n\
                 [[airplanes]]\nat_m = [0, 9000]\nheading_deg = 0\nway_points_m = [[300, 9000]]\n";
     let mut run = run_of(text, 1);
-    run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.03] })
+    run.order(&MultiAgentOrder { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.03] })
         .expect("right");
     run.advance(4);
     assert_eq!(heading_rad(&run, 0), 0.0);
@@ -115,7 +123,7 @@ fn an_order_stands_until_its_airplane_comes_in_and_none_after_its_flight() {
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.15).abs() < 1e-12);
     let before = run.digest();
-    run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[1], values: &[0.03] })
+    run.order(&MultiAgentOrder { order: ExternalAction::TURN_RATE, agents: &[1], values: &[0.03] })
         .expect("right");
     assert_eq!(run.digest(), before, "it has arrived");
 }
@@ -157,8 +165,12 @@ fn the_delay_so_far_grows_with_a_detour_only() {
     // Ten seconds back, and the turns there.
     for _ in 0..10 {
         let back = [-cos(0.3), sin(0.3)];
-        run.order(&Orders { order: ExternalAction::VELOCITY, agents: &[0], values: &back })
-            .expect("right");
+        run.order(&MultiAgentOrder {
+            order: ExternalAction::VELOCITY,
+            agents: &[0],
+            values: &back,
+        })
+        .expect("right");
         run.advance(1);
     }
     assert!(delay(&run) > at_first + 20.0, "{} {at_first}", delay(&run));
@@ -169,8 +181,11 @@ fn others_that_decide_themselves_are_observed_and_take_no_orders() {
     let mut run = run_of(&MIXED.replace("\"external\"", "\"mvp\""), 1);
     run.advance(10);
     assert_eq!(observed(&run, 0)["due"].iter().sum::<f64>(), 7.0);
-    let error =
-        run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.0] });
+    let error = run.order(&MultiAgentOrder {
+        order: ExternalAction::TURN_RATE,
+        agents: &[0],
+        values: &[0.0],
+    });
     let error = error.expect_err("it decides itself").to_string();
     assert!(error.contains("airplane 0 decides for itself"), "{error}");
 }
@@ -179,31 +194,47 @@ fn others_that_decide_themselves_are_observed_and_take_no_orders() {
 fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     let mut run = run(1);
     let before = run.digest();
-    let actions = run.teams()[0].action_spaces[0].value_count();
+    let actions = run.agent_teams()[0].action_spaces[0].value_count();
     let double = [vec![1.0], (1..actions).map(|k| k as f64).collect()].concat();
     let (turn, velocity) = (ExternalAction::TURN_RATE, ExternalAction::VELOCITY);
-    let refused: [(Orders<'_>, &str); 10] = [
-        (Orders { order: turn, agents: &[99], values: &[0.0] }, "there is no airplane 99"),
-        (Orders { order: turn, agents: &[7], values: &[0.0] }, "there is no airplane 7"),
+    let refused: [(MultiAgentOrder<'_>, &str); 10] = [
+        (MultiAgentOrder { order: turn, agents: &[99], values: &[0.0] }, "there is no airplane 99"),
+        (MultiAgentOrder { order: turn, agents: &[7], values: &[0.0] }, "there is no airplane 7"),
         (
-            Orders { order: "climb", agents: &[0], values: &[0.0] },
+            MultiAgentOrder { order: "climb", agents: &[0], values: &[0.0] },
             "it takes ranking, turn_rate_rad_s",
         ),
-        (Orders { order: turn, agents: &[0, 1], values: &[0.0] }, "needs 2 x 1 values, not 1"),
-        (Orders { order: turn, agents: &[0], values: &[0.08] }, "it must be a number from -0.0698"),
-        // The slower one may turn by 3 degrees per second only.
-        (Orders { order: turn, agents: &[5], values: &[0.06] }, "it must be a number from -0.0523"),
-        (Orders { order: velocity, agents: &[0], values: &[0.0, -0.0] }, "0 has no direction"),
         (
-            Orders { order: velocity, agents: &[0], values: &[f64::NAN, 1.0] },
+            MultiAgentOrder { order: turn, agents: &[0, 1], values: &[0.0] },
+            "needs 2 x 1 values, not 1",
+        ),
+        (
+            MultiAgentOrder { order: turn, agents: &[0], values: &[0.08] },
+            "it must be a number from -0.0698",
+        ),
+        // The slower one may turn by 3 degrees per second only.
+        (
+            MultiAgentOrder { order: turn, agents: &[5], values: &[0.06] },
+            "it must be a number from -0.0523",
+        ),
+        (
+            MultiAgentOrder { order: velocity, agents: &[0], values: &[0.0, -0.0] },
+            "0 has no direction",
+        ),
+        (
+            MultiAgentOrder { order: velocity, agents: &[0], values: &[f64::NAN, 1.0] },
             "must be a finite number",
         ),
         (
-            Orders { order: ExternalAction::RANKING, agents: &[0], values: &vec![99.0; actions] },
+            MultiAgentOrder {
+                order: ExternalAction::RANKING,
+                agents: &[0],
+                values: &vec![99.0; actions],
+            },
             "is 99; it must be",
         ),
         (
-            Orders { order: ExternalAction::RANKING, agents: &[0], values: &double },
+            MultiAgentOrder { order: ExternalAction::RANKING, agents: &[0], values: &double },
             "action 1 stands in it 2 times and action 0 not at all; give each action from 0 to",
         ),
     ];
@@ -213,7 +244,7 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
         assert_eq!(run.digest(), before, "{error}");
     }
     let mut book = OrderLog::default();
-    book.add(3, &Orders { order: velocity, agents: &[0], values: &[0.0, 0.0] });
+    book.add(3, &MultiAgentOrder { order: velocity, agents: &[0], values: &[0.0, 0.0] });
     let error = run.replay_orders(book).expect_err("no direction").to_string();
     assert!(error.contains("to airplane 0 cannot be obeyed: 0 has no direction"), "{error}");
 }
@@ -221,12 +252,15 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
 #[test]
 fn who_asks_what_was_ordered_does_not_use_it_up() {
     let mut run = lone("");
-    run.order(&Orders { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.02] })
+    run.order(&MultiAgentOrder { order: ExternalAction::TURN_RATE, agents: &[0], values: &[0.02] })
         .expect("right");
     let inspection = run.inspect(BodyId::new(kinds::AIRPLANE, 0, None)).expect("it is in the air");
-    assert_eq!(inspection.value("Decides", "action"), Some(&"the turn that was ordered".into()));
+    assert_eq!(
+        inspection.fact_value("Decides", "action"),
+        Some(&"the turn that was ordered".into())
+    );
     run.advance(1);
     assert!((heading_rad(&run, 0) - 0.1).abs() < 1e-12, "{}", heading_rad(&run, 0));
     let inspection = run.inspect(BodyId::new(kinds::AIRPLANE, 0, None)).expect("it is in the air");
-    assert_eq!(inspection.value("Decides", "action"), Some(&"to the way-point".into()));
+    assert_eq!(inspection.fact_value("Decides", "action"), Some(&"to the way-point".into()));
 }

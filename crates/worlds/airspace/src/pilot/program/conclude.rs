@@ -2,19 +2,19 @@
 
 use super::Pilot;
 use super::cycle_state::PilotCyclePhase;
-use crate::agents::exchange::ExchangeResult;
+use crate::agents::exchange::ShieldExchangeResult;
 use crate::agents::intent::Intent;
 use crate::agents::packet::Protocol;
 use crate::agents::traffic_state::{TrafficPicture, record_beacon};
 use crate::agents::{ConversationEnd, OptimizationResult};
 use crate::decide::{
-    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_choice,
-    candidates_by_velocity,
+    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
+    candidates_from_choice,
 };
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
-use crate::pilot::common_knowledge::unheard_aircraft;
-use crate::pilot::control::{Maneuver, OptimizerStats};
+use crate::pilot::common_knowledge::unheard_as_non_cooperative;
+use crate::pilot::control::{Maneuver, OptimizationStatus};
 use crate::pilot::conversations::ConversationOutcome;
 
 impl Pilot {
@@ -42,7 +42,7 @@ impl Pilot {
     pub(super) fn decide(&mut self, tick: u64) {
         let Some(state) = &self.state else { return };
         let group: Vec<KnownAircraft> =
-            state.percept.group.iter().map(|one| one.known_aircraft()).collect();
+            state.percept.group.iter().map(|one| one.as_known_aircraft()).collect();
         let others = state.percept.non_cooperative.len() + state.unheard.len();
         let strategy = DecisionStrategy::for_group(&self.world, &group, others);
         match strategy {
@@ -64,7 +64,7 @@ impl Pilot {
             state.control.events.push(event.with_value(members as f64));
         }
         let considered =
-            candidates_alone(&self.world, own.known_aircraft(), own.external_action.as_ref());
+            candidates_alone(&self.world, own.as_known_aircraft(), own.external_action.as_ref());
         self.set_candidates(considered);
     }
 
@@ -96,7 +96,7 @@ impl Pilot {
     ) {
         let Some(state) = &mut self.state else { return };
         if self.world.network.is_some() {
-            state.record_end(&self.world, &ended, &self.memory.contacts);
+            state.record_conversation_end(&self.world, &ended, &self.memory.contacts);
         }
         match std::mem::replace(&mut state.phase, PilotCyclePhase::Decided) {
             PilotCyclePhase::Grouping(conversation) => {
@@ -115,17 +115,17 @@ impl Pilot {
             }
             PilotCyclePhase::Shielding(conversation, allowed) => {
                 self.keep_ended(conversation);
-                self.on_exchange(ended.outcome, &allowed);
+                self.on_shield_exchange_end(ended.outcome, &allowed);
             }
             PilotCyclePhase::Decided | PilotCyclePhase::Over => {}
         }
     }
 
     /// Stores the outcome of the shield's exchange, in which it has proposed the candidates that were `allowed`.
-    fn on_exchange(&mut self, outcome: Option<ConversationOutcome>, allowed: &[usize]) {
+    fn on_shield_exchange_end(&mut self, outcome: Option<ConversationOutcome>, allowed: &[usize]) {
         let Some(state) = &mut self.state else { return };
         self.memory.contacts = match outcome {
-            Some(ConversationOutcome::Exchange(ExchangeResult {
+            Some(ConversationOutcome::Exchange(ShieldExchangeResult {
                 decision,
                 held_back,
                 contacts,
@@ -149,7 +149,7 @@ impl Pilot {
         let Some(state) = &mut self.state else { return };
         let (decided, beacons) =
             result.map_or_else(Default::default, |result| (result.decided, result.beacons));
-        state.control.optimized = Some(OptimizerStats::from_choice(decided.as_ref()));
+        state.control.optimized = Some(OptimizationStatus::from_choice(decided.as_ref()));
         if self.world.network.is_some() {
             for (beacon, &id) in beacons.into_iter().zip(&*state.members) {
                 if let Some(beacon) = beacon {
@@ -158,7 +158,7 @@ impl Pilot {
             }
         }
         let considered =
-            candidates_by_choice(&self.world, state.percept.own.known_aircraft(), decided);
+            candidates_from_choice(&self.world, state.percept.own.as_known_aircraft(), decided);
         self.set_candidates(considered);
     }
 
@@ -168,12 +168,12 @@ impl Pilot {
         let mut group = Vec::new();
         let mut memory = Vec::new();
         let mut me = 0;
-        let unheard = state.unheard.iter().map(|one| unheard_aircraft(&self.world, one));
+        let unheard = state.unheard.iter().map(|one| unheard_as_non_cooperative(&self.world, one));
         let mut non_cooperative: Vec<_> =
             state.percept.non_cooperative.iter().cloned().chain(unheard).collect();
         for (one, intent) in state.percept.group.iter().zip(intents) {
             let Some(intent) = intent else {
-                non_cooperative.push(unheard_aircraft(&self.world, one));
+                non_cooperative.push(unheard_as_non_cooperative(&self.world, one));
                 continue;
             };
             if one.id == self.id {
@@ -187,7 +187,7 @@ impl Pilot {
         let now = state.percept.cycle;
         let mut all =
             candidates_by_velocity(&self.world, &group, &non_cooperative, &mut memory, now);
-        if self.world.has_resolutions() {
+        if self.world.has_resolution_memory() {
             self.memory.resolving = memory.swap_remove(me);
         }
         self.set_candidates(all.swap_remove(me));

@@ -6,7 +6,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{Conversation, ConversationEnd};
 use crate::decide::ManeuverCandidates;
 use crate::events::{Event, EventKind};
-use crate::pilot::control::Control;
+use crate::pilot::control::AirplaneControl;
 use crate::pilot::conversations::{ConversationOutcome, DynParticipant};
 use crate::pilot::percept::{Percept, SurveillanceReport};
 use crate::pilot::schedule::ConversationSchedule;
@@ -25,7 +25,7 @@ pub(super) struct PilotCycleState {
     pub(super) phase: PilotCyclePhase,
     pub(super) candidates: ManeuverCandidates,
     /// Its control, as far as that is decided.
-    pub(super) control: Control,
+    pub(super) control: AirplaneControl,
 }
 
 /// The part of a cycle that an airplane is in.
@@ -43,7 +43,7 @@ pub(super) enum PilotCyclePhase {
 }
 
 /// When a conversation takes place, compared with those of a cycle.
-pub(super) enum ConversationTiming {
+pub(super) enum RelativeConversationTiming {
     /// It comes later.
     Later,
     /// It comes so much later that no airplane can be there.
@@ -66,7 +66,10 @@ impl PilotCycleState {
     }
 
     /// Returns where a conversation stands that is none of those that it has been in.
-    pub(super) fn timing_of(&self, conversation: &ConversationId) -> ConversationTiming {
+    pub(super) fn conversation_timing(
+        &self,
+        conversation: &ConversationId,
+    ) -> RelativeConversationTiming {
         let topic = match self.phase {
             PilotCyclePhase::Grouping(_) => Protocol::Group,
             PilotCyclePhase::Deciding(_) | PilotCyclePhase::Decided => Protocol::Decision,
@@ -79,13 +82,13 @@ impl PilotCycleState {
         // No airplane begins a cycle before all have ended the one before it.
         let last = self.percept.cycle.saturating_add(1);
         if conversation.cycle > last {
-            ConversationTiming::TooFarAhead
+            RelativeConversationTiming::TooFarAhead
         } else if here.is_before(conversation) {
-            ConversationTiming::Later
+            RelativeConversationTiming::Later
         } else if (conversation.cycle, conversation.topic) == (here.cycle, here.topic) {
-            ConversationTiming::OtherMembers
+            RelativeConversationTiming::OtherMembers
         } else {
-            ConversationTiming::Past
+            RelativeConversationTiming::Past
         }
     }
 
@@ -93,13 +96,13 @@ impl PilotCycleState {
     pub(super) fn record_traffic(&mut self, ticks: u64) {
         let (traffic, recorded) = match &self.phase {
             PilotCyclePhase::Grouping(conversation) => {
-                (conversation.traffic(), &mut self.control.grouping)
+                (conversation.network_traffic(), &mut self.control.grouping)
             }
             PilotCyclePhase::Deciding(conversation) => {
-                (conversation.traffic(), &mut self.control.deciding)
+                (conversation.network_traffic(), &mut self.control.deciding)
             }
             PilotCyclePhase::Shielding(conversation, _) => {
-                (conversation.traffic(), &mut self.control.shielding)
+                (conversation.network_traffic(), &mut self.control.shielding)
             }
             PilotCyclePhase::Decided | PilotCyclePhase::Over => return,
         };
@@ -107,7 +110,7 @@ impl PilotCycleState {
     }
 
     /// Records how a conversation has ended, and the others that it no longer hears.
-    pub(super) fn record_end(
+    pub(super) fn record_conversation_end(
         &mut self,
         world: &AirspaceWorld,
         end: &ConversationEnd<ConversationOutcome>,
@@ -128,7 +131,7 @@ impl PilotCycleState {
     }
 
     /// Returns the ids of those that the participant of a conversation is to know, rising.
-    pub(super) fn members_of(&self, topic: Protocol) -> Arc<[EntityId]> {
+    pub(super) fn topic_members(&self, topic: Protocol) -> Arc<[EntityId]> {
         match topic {
             Protocol::Shield => self.exchange_members().into(),
             Protocol::Group | Protocol::Decision => self.members.clone(),
@@ -164,11 +167,11 @@ impl PilotCycleState {
         for other in unheard {
             let heard_in = match contacts.get(&other) {
                 Some(contact) => contact.heard_in,
-                None => world.first_cycle(other as usize),
+                None => world.appearance_cycle(other as usize),
             };
             // One that has been unheard for longer was recorded then.
             if heard_in + 1 >= now {
-                self.control.events.push(Event::new_pair(now, EventKind::Unheard, id, other));
+                self.control.events.push(Event::new_for_pair(now, EventKind::Unheard, id, other));
             }
         }
     }

@@ -96,11 +96,14 @@ fn pilots_that_find_their_groups_fly_the_run_that_flies_itself() {
 #[test]
 fn what_was_ordered_from_outside_is_in_the_sight() {
     use crate::external_action::ExternalAction;
-    use sidestep_kernel::control::Orders;
+    use sidestep_kernel::control::MultiAgentOrder;
     let order = |run: &mut AirspaceRun| {
         let turn = if run.cycle().is_multiple_of(2) { 0.03 } else { -0.02 };
-        let orders =
-            Orders { order: ExternalAction::TURN_RATE, agents: &[0, 2], values: &[turn, -turn] };
+        let orders = MultiAgentOrder {
+            order: ExternalAction::TURN_RATE,
+            agents: &[0, 2],
+            values: &[turn, -turn],
+        };
         run.order(&orders).expect("right");
     };
     is_flown_alike("deployment = \"team\"\nmethod = \"external\"", FOUR, order);
@@ -128,7 +131,7 @@ fn everybody_filters_as_one_process_does_to_the_bit() {
 }
 
 /// Drops some controls, by cycle and id.
-fn with_gaps(run: &AirspaceRun, controls: Vec<Control>) -> Vec<Control> {
+fn with_gaps(run: &AirspaceRun, controls: Vec<AirplaneControl>) -> Vec<AirplaneControl> {
     let is_lost = |id: EntityId| (u64::from(id) * 5 + run.cycle() * 3).is_multiple_of(7);
     let silent = run.cycle() == 4;
     controls.into_iter().filter(|control| !silent && !is_lost(control.id)).collect()
@@ -182,7 +185,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
     let mut driven = run("deployment = \"team\"\nnetwork = {}", FOUR);
     let good = TestPilots::from_run(&driven).decide(&driven);
     let before = driven.digest();
-    let changed = |change: &dyn Fn(&mut Control)| {
+    let changed = |change: &dyn Fn(&mut AirplaneControl)| {
         let mut controls = good.clone();
         change(&mut controls[1]);
         controls
@@ -192,7 +195,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         profile: crate::shield::TurnProfile { omegas_rad_s },
         side: crate::shield::OrbitSide::Left,
     };
-    let wrong: [(Vec<Control>, &str); 7] = [
+    let wrong: [(Vec<AirplaneControl>, &str); 7] = [
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),
         (changed(&|control| control.cycle = 3), "give that of airplane 1 and cycle 0"),
         (changed(&|control| control.maneuver = profile(vec![0.0; 4])), "give 5, one for each step"),

@@ -138,7 +138,7 @@ proptest! {
         prop_assert_eq!(refused, extra_packets, "each is counted");
         for (found, expected) in disturbed.pilots.iter().zip(&alone.pilots) {
             let (found, expected) = (found.control(), expected.control());
-            let maneuver = |control: &Option<Control>| control.as_ref().map(|one| one.maneuver.clone());
+            let maneuver = |control: &Option<AirplaneControl>| control.as_ref().map(|one| one.maneuver.clone());
             prop_assert_eq!(maneuver(&found), maneuver(&expected));
         }
     }

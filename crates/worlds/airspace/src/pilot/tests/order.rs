@@ -13,7 +13,11 @@ enum PilotInput {
 
 /// Lets pilots decide a cycle. The next input of any of them is drawn, so that packets overtake each other and some
 /// are in the second conversation before others have begun the first.
-fn decided(pilots: &mut [Pilot], percepts: Vec<Percept>, draws: &mut Draws) -> Vec<Control> {
+fn decided(
+    pilots: &mut [Pilot],
+    percepts: Vec<Percept>,
+    draws: &mut Draws,
+) -> Vec<AirplaneControl> {
     let ids: Vec<EntityId> = percepts.iter().map(|percept| percept.own.id).collect();
     let mut due: Vec<(EntityId, PilotInput)> = percepts
         .into_iter()

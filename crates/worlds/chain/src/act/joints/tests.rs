@@ -40,7 +40,7 @@ fn assert_joints_keep_their_laws(run: &mut ChainRun<3>, most: u64, case: &str) {
         run.advance(1);
         let now = joints(run);
         assert!(arm.serial.outside_limits(&now).is_empty(), "{case}: {now:?}");
-        for ((a, b), speed) in before.iter().zip(&now).zip(arm.follower.speeds()) {
+        for ((a, b), speed) in before.iter().zip(&now).zip(arm.follower.max_speeds()) {
             let most = speed * run.world().dt_s * (1.0 + 1e-9);
             assert!((b - a).abs() <= most, "{case}: {} in cycle {}", b - a, run.cycle());
         }

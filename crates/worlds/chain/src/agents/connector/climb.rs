@@ -9,7 +9,7 @@ use super::ConnectorAgent;
 use crate::agents::control::LeaderOutcome;
 use crate::agents::message::{LeadOrder, NeighborMessage};
 use crate::agents::percept::Intention;
-use crate::agents::side::ChainSide;
+use crate::agents::side::NeighborSide;
 use crate::motion::recovery::{ChainEnd, ChainMover, RecoveryLadder, RecoveryOutcome, farther_end};
 use sidestep_rods::geometry::{Point, normalized, sub};
 use sidestep_rods::serde_point::WirePoint;
@@ -40,7 +40,7 @@ enum RecoveryAnswer<const D: usize> {
 
 /// A question of the ladder that has no answer yet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum RecoveryQuestion<const D: usize> {
+enum RecoveryLadderQuery<const D: usize> {
     /// A motion, or only whether it would be possible.
     Motion { request: MotionRequest<D>, only_asks: bool },
     /// Where the far end of the chain is, and in which direction its rod points.
@@ -50,7 +50,7 @@ enum RecoveryQuestion<const D: usize> {
 /// Reason for which a climb does not go on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum RecoveryHaltReason<const D: usize> {
-    Asks(RecoveryQuestion<D>),
+    Asks(RecoveryLadderQuery<D>),
     Beyond,
 }
 
@@ -67,7 +67,7 @@ struct AnswerReplay<'a, const D: usize> {
 }
 
 impl<const D: usize> AnswerReplay<'_, D> {
-    fn outcome(
+    fn replay_outcome(
         &mut self,
         request: &MotionRequest<D>,
         only_asks: bool,
@@ -78,7 +78,7 @@ impl<const D: usize> AnswerReplay<'_, D> {
                 Ok(outcome.clone())
             }
             Some(_) => Err(RecoveryHaltReason::Beyond),
-            None => Err(RecoveryHaltReason::Asks(RecoveryQuestion::Motion {
+            None => Err(RecoveryHaltReason::Asks(RecoveryLadderQuery::Motion {
                 request: *request,
                 only_asks,
             })),
@@ -89,7 +89,7 @@ impl<const D: usize> AnswerReplay<'_, D> {
 impl<const D: usize> ChainMover<D> for AnswerReplay<'_, D> {
     type Failure = RecoveryHaltReason<D>;
 
-    fn place(&self, _: usize) -> Point<D> {
+    fn position(&self, _: usize) -> Point<D> {
         self.at
     }
 
@@ -97,21 +97,21 @@ impl<const D: usize> ChainMover<D> for AnswerReplay<'_, D> {
         &mut self,
         request: &MotionRequest<D>,
     ) -> Result<MotionOutcome<D>, RecoveryHaltReason<D>> {
-        self.outcome(request, false)
+        self.replay_outcome(request, false)
     }
 
     fn find_veto(
         &mut self,
         request: &MotionRequest<D>,
     ) -> Result<Option<Veto<D>>, RecoveryHaltReason<D>> {
-        Ok(self.outcome(request, true)?.veto().copied())
+        Ok(self.replay_outcome(request, true)?.veto().copied())
     }
 
-    fn other_end(&mut self, _: usize) -> Result<Option<ChainEnd<D>>, RecoveryHaltReason<D>> {
+    fn farther_end(&mut self, _: usize) -> Result<Option<ChainEnd<D>>, RecoveryHaltReason<D>> {
         match self.answers.next() {
             Some(RecoveryAnswer::End(end)) => Ok(*end),
             Some(_) => Err(RecoveryHaltReason::Beyond),
-            None => Err(RecoveryHaltReason::Asks(RecoveryQuestion::End)),
+            None => Err(RecoveryHaltReason::Asks(RecoveryLadderQuery::End)),
         }
     }
 }
@@ -148,11 +148,11 @@ impl<const D: usize> ConnectorAgent<D> {
         true
     }
 
-    fn ask_chain(&mut self, question: RecoveryQuestion<D>) {
+    fn ask_chain(&mut self, question: RecoveryLadderQuery<D>) {
         match question {
-            RecoveryQuestion::End if self.n == 1 => self.add_answer(RecoveryAnswer::End(None)),
-            RecoveryQuestion::End => self.send(self.far_side(), NeighborMessage::AskEnd),
-            RecoveryQuestion::Motion { request, only_asks } => {
+            RecoveryLadderQuery::End if self.n == 1 => self.add_answer(RecoveryAnswer::End(None)),
+            RecoveryLadderQuery::End => self.send(self.farther_end_side(), NeighborMessage::AskEnd),
+            RecoveryLadderQuery::Motion { request, only_asks } => {
                 let Some(climbing) = &mut self.climbing else { return };
                 climbing.requests += 1;
                 let (k, to) = match request.motion {
@@ -167,17 +167,17 @@ impl<const D: usize> ConnectorAgent<D> {
                 if k == self.me {
                     self.start_leading(order, None);
                 } else {
-                    self.send(self.far_side(), NeighborMessage::Order(order));
+                    self.send(self.farther_end_side(), NeighborMessage::Order(order));
                 }
             }
         }
     }
 
     /// Returns the side of the end that leads where this connector is stuck.
-    fn far_side(&self) -> ChainSide {
+    fn farther_end_side(&self) -> NeighborSide {
         match farther_end(self.me as usize, self.n as usize) {
-            0 => ChainSide::Below,
-            _ => ChainSide::Above,
+            0 => NeighborSide::Below,
+            _ => NeighborSide::Above,
         }
     }
 
@@ -197,7 +197,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Passes a leader's question on to the end, or answers it there.
-    pub(super) fn on_order(&mut self, from: ChainSide, message: NeighborMessage<D>) {
+    pub(super) fn on_order(&mut self, from: NeighborSide, message: NeighborMessage<D>) {
         let onward = from.other();
         if self.rods[onward].is_some() {
             return self.send(onward, message);
@@ -217,12 +217,12 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Passes an answer on to the leader, or takes it there.
-    pub(super) fn on_answer(&mut self, from: ChainSide, message: NeighborMessage<D>) {
+    pub(super) fn on_answer(&mut self, from: NeighborSide, message: NeighborMessage<D>) {
         let is_mine = self.climbing.as_ref().is_some_and(|climbing| climbing.waits);
         if !is_mine {
             return self.send(from.other(), message);
         }
-        if self.leading.is_some() || from != self.far_side() {
+        if self.leading.is_some() || from != self.farther_end_side() {
             return;
         }
         match message {

@@ -4,7 +4,7 @@ use super::ConnectorAgent;
 use crate::agents::control::{ConnectorControl, ConnectorMove};
 use crate::agents::link::NeighborLink;
 use crate::agents::message::{MotionProtocol, Packet};
-use crate::agents::side::ChainSide;
+use crate::agents::side::NeighborSide;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
     ConversationId, DropReason, NetworkAgent, OutgoingPacket, PacketHeader,
@@ -29,7 +29,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
     /// Sends unconfirmed messages again, and gives up a neighbor that never confirms.
     fn on_timer(&mut self, tick: u64) {
         self.now = self.now.max(tick);
-        for side in ChainSide::ALL {
+        for side in NeighborSide::ALL {
             let link = self.links[side].as_mut().filter(|_| !self.is_silent);
             if link.is_some_and(|link| link.on_timer(tick)) {
                 self.mark_missing(side, side.neighbor(self.me, self.n));
@@ -38,14 +38,14 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
         if !self.is_done() && self.deadline().is_some_and(|deadline| deadline <= tick) {
             self.end_cycle();
         }
-        self.process();
+        self.advance_until_waiting();
     }
 
     fn next_timer(&self) -> Option<u64> {
         if self.is_done() {
             return None;
         }
-        let links = ChainSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        let links = NeighborSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
         links.filter_map(NeighborLink::next_retry).chain(self.deadline()).min()
     }
 
@@ -55,11 +55,10 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
             return Vec::new();
         }
         let mut out = Vec::new();
-        for side in ChainSide::ALL {
+        for side in NeighborSide::ALL {
             let Some(receivers) = &self.receivers[side] else { continue };
             let missing = self.missing[side.other()];
-            let Some(parcel) =
-                self.links[side].as_mut().and_then(|link| link.next_parcel(self.now))
+            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.next_batch(self.now))
             else {
                 continue;
             };
@@ -73,7 +72,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
                 sequence,
             };
             let payload = Packet { missing, parcel }.encode().into_packet(&header);
-            self.traffic.count(payload.len());
+            self.traffic.record_message(payload.len());
             if let Some(link) = &mut self.links[side] {
                 link.record_packet(payload.len());
             }
@@ -86,12 +85,12 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
 impl<const D: usize> ConnectorAgent<D> {
     /// Ends the cycle because time is up. A neighbor that has not been heard at all is lost.
     fn end_cycle(&mut self) {
-        for side in ChainSide::ALL {
-            if self.links[side].as_ref().is_some_and(|link| !link.is_heard()) {
+        for side in NeighborSide::ALL {
+            if self.links[side].as_ref().is_some_and(|link| !link.has_heard_neighbor()) {
                 self.mark_missing(side, side.neighbor(self.me, self.n));
             }
         }
-        self.give_up_leading();
+        self.abort_led_motion();
         self.climbing = None;
         self.is_late = !self.is_over && self.nearest_missing().is_none();
         self.is_closed = true;
@@ -104,7 +103,7 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Returns whether its cycle is over. It still answers questions of its neighbors.
     pub fn is_done(&self) -> bool {
-        let mut links = ChainSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
+        let mut links = NeighborSide::ALL.into_iter().filter_map(|side| self.links[side].as_ref());
         self.is_closed || self.is_over && links.all(NeighborLink::is_quiet)
     }
 
@@ -125,7 +124,7 @@ impl<const D: usize> ConnectorAgent<D> {
             goes,
             led: self.led,
             ended: self.ended.clone(),
-            missing: ChainSide::ALL.map(|side| self.missing[side]),
+            missing: NeighborSide::ALL.map(|side| self.missing[side]),
             is_late: self.is_late,
             traffic: self.traffic,
         })

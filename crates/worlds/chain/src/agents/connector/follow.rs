@@ -2,19 +2,21 @@
 
 use super::ConnectorAgent;
 use crate::agents::message::{ConsentMessage, NeighborMessage, PrepareMessage, VetoMessage};
-use crate::agents::side::ChainSide;
+use crate::agents::side::NeighborSide;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::local_solver::{LocalSolver, MasterMotion, SlavePosition, SlaveReaction};
+use sidestep_rods::local_solver::{
+    ConnectorReactionSolver, MasterMotion, SlavePosition, SlaveReaction,
+};
 use sidestep_rods::serde_point::WirePoint;
-use sidestep_rods::{PendingVeto, Rod, VetoReason};
+use sidestep_rods::{IncompleteVeto, Rod, VetoReason};
 
 /// What a connector remembers of a motion, from its master's question to the decision.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct SlaveMotion {
+pub(super) struct SlaveMotionState {
     /// Number of the motion in its cycle.
     pub(super) request: u32,
     sub_step: u32,
-    master: ChainSide,
+    master: NeighborSide,
     /// Whether it has asked the connector beyond it.
     has_asked: bool,
     /// Whether it waits for the answer.
@@ -28,7 +30,7 @@ pub(super) struct SlaveMotion {
 
 impl<const D: usize> ConnectorAgent<D> {
     /// Answers a master, or asks the next connector first.
-    pub(super) fn on_prepare(&mut self, from: ChainSide, prepare: &PrepareMessage<D>) {
+    pub(super) fn on_prepare(&mut self, from: NeighborSide, prepare: &PrepareMessage<D>) {
         let Some(rod) = self.rods[from].filter(|_| self.leading.is_none()) else { return };
         let before = self.following.take().filter(|f| f.request == prepare.request);
         if before.is_none() {
@@ -47,8 +49,8 @@ impl<const D: usize> ConnectorAgent<D> {
             }
             Err(refusal) => {
                 self.position.revert();
-                self.following = before.map(|f| SlaveMotion { has_consented: false, ..f });
-                self.send_veto(from, refusal, LocalSolver::<D>::has_more_places(rod));
+                self.following = before.map(|f| SlaveMotionState { has_consented: false, ..f });
+                self.send_veto(from, refusal, ConnectorReactionSolver::<D>::has_more_places(rod));
             }
         }
     }
@@ -57,7 +59,7 @@ impl<const D: usize> ConnectorAgent<D> {
     /// an earlier sub-step.
     fn follow(
         &mut self,
-        from: ChainSide,
+        from: NeighborSide,
         prepare: &PrepareMessage<D>,
         reaction: &SlaveReaction<D>,
         had_asked: bool,
@@ -66,7 +68,7 @@ impl<const D: usize> ConnectorAgent<D> {
         self.position.now = at;
         let onward = from.other();
         let asks = !ends && self.rods[onward].is_some();
-        self.following = Some(SlaveMotion {
+        self.following = Some(SlaveMotionState {
             request: prepare.request,
             sub_step: prepare.sub_step,
             master: from,
@@ -96,10 +98,10 @@ impl<const D: usize> ConnectorAgent<D> {
 
     fn reaction(
         &mut self,
-        from: ChainSide,
+        from: NeighborSide,
         rod: Rod,
         prepare: &PrepareMessage<D>,
-    ) -> Result<SlaveReaction<D>, PendingVeto> {
+    ) -> Result<SlaveReaction<D>, IncompleteVeto> {
         let onward = from.other();
         let next = self.beside[onward].map(|track| track.base).zip(self.rods[onward]);
         let slave = SlavePosition { so: self.position.base, rod, next };
@@ -114,8 +116,8 @@ impl<const D: usize> ConnectorAgent<D> {
         self.solver.react(&slave, &self.obstacles, &pull)
     }
 
-    fn send_veto(&mut self, to: ChainSide, refusal: PendingVeto, may_go_elsewhere: bool) {
-        let PendingVeto { reason, obstacle } = refusal;
+    fn send_veto(&mut self, to: NeighborSide, refusal: IncompleteVeto, may_go_elsewhere: bool) {
+        let IncompleteVeto { reason, obstacle } = refusal;
         let by = self.me;
         let objection = VetoMessage { by, reason, obstacle, has_turned: false, may_go_elsewhere };
         self.send(to, NeighborMessage::Object(objection));
@@ -134,12 +136,12 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Passes a consent on to its master, or to the motion that it leads.
-    pub(super) fn on_consent(&mut self, from: ChainSide, consent: &ConsentMessage<D>) {
+    pub(super) fn on_consent(&mut self, from: NeighborSide, consent: &ConsentMessage<D>) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         if let Some(following) = waiting {
             following.waits = false;
             following.has_consented = true;
-            let SlaveMotion { master, rotated, .. } = *following;
+            let SlaveMotionState { master, rotated, .. } = *following;
             self.record_neighbor(from, consent);
             let joined = self.merged_consent(consent, rotated);
             self.send(master, NeighborMessage::Consent(joined));
@@ -148,7 +150,7 @@ impl<const D: usize> ConnectorAgent<D> {
         }
     }
 
-    fn record_neighbor(&mut self, side: ChainSide, consent: &ConsentMessage<D>) {
+    fn record_neighbor(&mut self, side: NeighborSide, consent: &ConsentMessage<D>) {
         if let Some(beside) = &mut self.beside[side] {
             beside.now = consent.at;
         }
@@ -156,16 +158,17 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Passes a veto on to its master, or to the motion that it leads. Where this connector had alternatives, the
     /// reason is that the search for one has reached its limit.
-    pub(super) fn on_veto(&mut self, from: ChainSide, objection: VetoMessage) {
+    pub(super) fn on_veto(&mut self, from: NeighborSide, objection: VetoMessage) {
         let waiting = self.following.as_mut().filter(|f| f.waits && f.master == from.other());
         let Some(following) = waiting else { return self.receive_veto(from, &objection) };
         following.waits = false;
-        let SlaveMotion { master, has_others, has_turned, .. } = *following;
+        let SlaveMotionState { master, has_others, has_turned, .. } = *following;
         self.position.revert();
         if let Some(beside) = &mut self.beside[from] {
             beside.revert();
         }
-        let may_go_elsewhere = self.rods[master].is_some_and(LocalSolver::<D>::has_more_places);
+        let may_go_elsewhere =
+            self.rods[master].is_some_and(ConnectorReactionSolver::<D>::has_more_places);
         let reason = if has_others { VetoReason::Limit } else { objection.reason };
         let objection = VetoMessage {
             reason,
@@ -177,7 +180,7 @@ impl<const D: usize> ConnectorAgent<D> {
     }
 
     /// Carries out the motion, or returns to where it was before it, and passes that on.
-    pub(super) fn on_settle(&mut self, from: ChainSide, request: u32, goes: bool) {
+    pub(super) fn on_settle(&mut self, from: NeighborSide, request: u32, goes: bool) {
         // One that has not consented was not part of a motion that is carried out.
         let its = self.following.take_if(|motion| {
             let is_same = motion.request == request && motion.master == from;

@@ -34,7 +34,7 @@ fn through_the_corridor(
     let last = line.len() - (1.0 / step_m) as usize;
     for (at, _) in line[..last].iter().filter(|(at, _)| at[0] > LEAD_M || at[1] != 0.0) {
         let way_m = distance(*at, chain.points()[0]);
-        let request = MotionRequest::operator_request(0, *at);
+        let request = MotionRequest::from_operator(0, *at);
         match propagator.propagate(&mut chain, &obstacles, &request).unwrap() {
             MotionOutcome::Moved(moved) => {
                 let steps = moved.max_slave_step_m / way_m;

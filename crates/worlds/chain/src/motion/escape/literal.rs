@@ -5,7 +5,7 @@
 //! slaves included, is farther from its position at the start of the tick than its speed allows, and a
 //! part that only this limit keeps from escaping is reported.
 
-use super::threat::{Nearness, Threat, collect, gap_m, nearness};
+use super::threat::{ObstacleProximity, Threat, collect_threats, gap_m, obstacle_proximity};
 use super::{
     ChainPart, EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart,
 };
@@ -64,7 +64,7 @@ impl<const D: usize> LiteralEscape<D> {
         let ahead = self.rules.look_ahead_margin();
         // No part gets farther from where it is now than from one side of its start to the other.
         let reach_m = 2.0 * self.max_travel_m(tick);
-        collect(
+        collect_threats(
             tick.chain,
             tick.obstacles,
             &mut self.body,
@@ -103,14 +103,14 @@ impl<const D: usize> LiteralEscape<D> {
         report: &mut EscapeReport<D>,
     ) -> Result<(), InputError> {
         self.vetoes.clear();
-        self.measure_all(tick, margin);
+        self.measure_threats(tick, margin);
         while *tries > 0 {
             let Some(deepest) = self.deepest() else { break };
             *tries -= 1;
             interrupt::check();
             match self.reduce_violation(tick, deepest)? {
                 Ok(touched) => {
-                    self.measure(tick, &touched);
+                    self.update_depths(tick, &touched);
                     report.moves += 1;
                     let Threat { part, mover, .. } = self.threats[deepest];
                     let obstacle = tick.obstacles.moving()[mover].id;
@@ -128,7 +128,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Measures all threats in a margin; none counts as given up after that.
-    fn measure_all(&mut self, tick: &ObstacleEscapeInput<'_, D>, margin: EscapeMargin) {
+    fn measure_threats(&mut self, tick: &ObstacleEscapeInput<'_, D>, margin: EscapeMargin) {
         for threat in &mut self.threats {
             threat.given_up = false;
             threat.margin_m = margin.required_gap_m(&tick.obstacles.moving()[threat.mover]);
@@ -137,7 +137,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Measures the threats of some connectors and their rods again; all others are as deep as before.
-    fn measure(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
+    fn update_depths(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
         for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
             threat.depth_m = threat_depth(tick, threat);
         }
@@ -165,8 +165,8 @@ impl<const D: usize> LiteralEscape<D> {
     ) -> Result<Result<Range<usize>, Veto<D>>, InputError> {
         let threat = self.threats[which];
         let mover = tick.obstacles.moving()[threat.mover];
-        let near = nearness(tick.chain, threat.part, &mover);
-        let mut best_veto = no_agent_veto(tick.chain, threat.part, mover.id);
+        let near = obstacle_proximity(tick.chain, threat.part, &mover);
+        let mut best_veto = immovable_part_veto(tick.chain, threat.part, mover.id);
         for (k, lever) in movable_connectors(tick.chain, threat.part, &near).into_iter().flatten() {
             let push_m =
                 ((threat.depth_m + PUSH_MARGIN_M) / lever).min(self.max_distance_m(tick, k));
@@ -224,10 +224,10 @@ impl<const D: usize> LiteralEscape<D> {
             }
             MotionOutcome::Vetoed(veto) => return Ok(Err(veto)),
         };
-        let refused = if let Some(by) = self.first_too_far(tick, touched.clone()) {
+        let refused = if let Some(by) = self.first_too_fast_connector(tick, touched.clone()) {
             Some(Veto { by, ..make_veto(tick.chain, k, VetoReason::StepLimit, None) })
         } else {
-            let deeper_in = self.find_loss(tick, &touched, which, distance(to, at));
+            let deeper_in = self.find_worsened_obstacle(tick, &touched, which, distance(to, at));
             deeper_in.map(|id| make_veto(tick.chain, k, VetoReason::TargetBlocked, id))
         };
         let run = touched.clone();
@@ -240,7 +240,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Returns the first connector that went farther than its speed allows.
-    fn first_too_far(
+    fn first_too_fast_connector(
         &self,
         tick: &ObstacleEscapeInput<'_, D>,
         touched: Range<usize>,
@@ -252,7 +252,7 @@ impl<const D: usize> LiteralEscape<D> {
 
     /// Returns the obstacle in which a motion left a part too deep: the part itself, if it did not get farther away, or
     /// another that is as deep now.
-    fn find_loss(
+    fn find_worsened_obstacle(
         &self,
         tick: &ObstacleEscapeInput<'_, D>,
         touched: &Range<usize>,
@@ -272,7 +272,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     fn report_trapped(&mut self, tick: &ObstacleEscapeInput<'_, D>, report: &mut EscapeReport<D>) {
-        self.measure_all(tick, EscapeMargin::NONE);
+        self.measure_threats(tick, EscapeMargin::NONE);
         let Some(deepest) = self.deepest() else { return };
         let threat = self.threats[deepest];
         report.deepest_m = threat.depth_m;
@@ -293,7 +293,7 @@ fn threat_depth<const D: usize>(tick: &ObstacleEscapeInput<'_, D>, threat: &Thre
 fn movable_connectors<const D: usize>(
     chain: &Chain<D>,
     part: ChainPart,
-    near: &Nearness<D>,
+    near: &ObstacleProximity<D>,
 ) -> [Option<(usize, f64)>; 2] {
     let a = near.along_rod;
     let ends = match part {
@@ -309,7 +309,11 @@ fn movable_connectors<const D: usize>(
 }
 
 /// Returns the veto of a part without a connector that may move.
-fn no_agent_veto<const D: usize>(chain: &Chain<D>, part: ChainPart, obstacle: u32) -> Veto<D> {
+fn immovable_part_veto<const D: usize>(
+    chain: &Chain<D>,
+    part: ChainPart,
+    obstacle: u32,
+) -> Veto<D> {
     let (ChainPart::Connector(k) | ChainPart::Rod(k)) = part;
     let reason = if chain.connectors()[k].failed { VetoReason::Failed } else { VetoReason::Fixed };
     make_veto(chain, k, reason, obstacle)

@@ -144,7 +144,7 @@ fn it_is_told_when_only_the_speed_limit_is_in_the_way() {
 fn who_never_moves_is_told_and_nothing_changes() {
     let (mut chain, mut obstacles) = (swarm::<2>(2), mover([0.0, 0.7], 0.4, [0.0, -0.5]));
     for k in 0..3 {
-        chain.set_failed(k, true);
+        chain.set_connector_failed(k, true);
     }
     let before = chain.clone();
     let mut escaper = ObstacleEscaper::new(literal(DT_S, 1.0));
@@ -163,7 +163,7 @@ fn who_never_moves_is_told_and_nothing_changes() {
 #[test]
 fn an_arm_bends_away_and_its_base_keeps_every_bit() {
     for (y, velocity) in [(0.9, -0.3), (-0.9, 0.3)] {
-        let rod = Rod::fixed(0.5, 0.05);
+        let rod = Rod::with_fixed_length(0.5, 0.05);
         let points = vec![[0.0, 0.0], [0.4, 0.3], [0.8, 0.0], [1.2, 0.3], [1.6, 0.0]];
         let mut chain = Chain::new(points, vec![Connector::free(0.08); 5], vec![rod; 4]).unwrap();
         chain.set_mobility(0, Mobility::Fixed).unwrap();

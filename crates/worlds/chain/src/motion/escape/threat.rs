@@ -1,6 +1,6 @@
 //! The parts of a chain near a moving obstacle, with their distances.
 
-use sidestep_rods::geometry::{Aabb, Point, distance, first_axis, normalized, perpendicular, sub};
+use sidestep_rods::geometry::{Aabb, Point, distance, normalized, perpendicular, sub, unit_x};
 use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
 use std::ops::Range;
 
@@ -45,7 +45,7 @@ pub(super) struct Threat {
 
 /// The position of a part relative to an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Nearness<const D: usize> {
+pub(super) struct ObstacleProximity<const D: usize> {
     /// Distance of the surfaces, meters; negative if they overlap.
     pub(super) gap_m: f64,
     /// Unit vector from the obstacle to the part. If the cores overlap it is perpendicular to the obstacle's velocity,
@@ -56,19 +56,20 @@ pub(super) struct Nearness<const D: usize> {
 }
 
 /// Returns the position of a part relative to an obstacle.
-pub(super) fn nearness<const D: usize>(
+pub(super) fn obstacle_proximity<const D: usize>(
     chain: &Chain<D>,
     part: ChainPart,
     mover: &Obstacle<D>,
-) -> Nearness<D> {
+) -> ObstacleProximity<D> {
     let (body, radius_m) = part_body(chain, part);
     let nearest = mover.core.nearest_to_segment(body);
     let length_m = distance(body[0], body[1]);
     let along_rod =
         if length_m > 0.0 { distance(body[0], nearest.on_body) / length_m } else { 0.0 };
-    Nearness {
+    ObstacleProximity {
         gap_m: nearest.distance_m - mover.radius_m - radius_m,
-        away: normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover)),
+        away: normalized(sub(nearest.on_body, nearest.on_core))
+            .unwrap_or_else(|| leftward_direction(mover)),
         along_rod,
     }
 }
@@ -89,12 +90,12 @@ fn part_body<const D: usize>(chain: &Chain<D>, part: ChainPart) -> ([Point<D>; 2
 }
 
 /// Returns the direction perpendicular to the velocity of an obstacle, to its left.
-pub(super) fn left_of<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
-    perpendicular(normalized(mover.velocity_m_s).unwrap_or(first_axis()))
+pub(super) fn leftward_direction<const D: usize>(mover: &Obstacle<D>) -> Point<D> {
+    perpendicular(normalized(mover.velocity_m_s).unwrap_or(unit_x()))
 }
 
 /// Collects all parts that are nearer than `within_m` to a moving obstacle.
-pub(super) fn collect<const D: usize>(
+pub(super) fn collect_threats<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     body: &mut RodBvh<D>,

@@ -36,14 +36,14 @@ pub struct RecoveryMemory {
     pub(super) hand_overs: u32,
     /// Least distance from the goal, meters.
     pub(super) best_m: Option<f64>,
-    pub(super) places: VecDeque<Visit>,
+    pub(super) places: VecDeque<PlaceVisitCount>,
 }
 
 /// A cell and a heading.
 pub(super) type VisitKey = ([i64; 3], i64);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Visit {
+pub(super) struct PlaceVisitCount {
     place: VisitKey,
     times: u32,
     /// Distance from the goal at the first of these times, meters.
@@ -67,7 +67,7 @@ impl RecoveryMemory {
 
     /// Records the distance of the goal. Coming a cell nearer than ever before is progress, after
     /// which the other end may lead again.
-    pub(super) fn record_goal(&mut self, goal_m: Option<f64>) {
+    pub(super) fn record_goal_distance(&mut self, goal_m: Option<f64>) {
         let Some(goal_m) = goal_m else { return };
         if self.best_m.is_none_or(|best_m| goal_m < best_m - CELL_M) {
             self.best_m = Some(goal_m);
@@ -88,12 +88,12 @@ impl RecoveryMemory {
         rungs: &RecoveryLimits,
     ) {
         if source == RequestSource::Autonomous {
-            self.record_goal(goal_m);
-            self.record_straight(rungs.straight);
+            self.record_goal_distance(goal_m);
+            self.record_straight_tick(rungs.straight);
         }
     }
 
-    pub(super) fn record_straight(&mut self, forget_after: u32) {
+    pub(super) fn record_straight_tick(&mut self, forget_after: u32) {
         self.reset_failures();
         self.on_detour = false;
         self.straight = self.straight.saturating_add(1);
@@ -131,7 +131,7 @@ impl RecoveryMemory {
         let mut visit = known
             .and_then(|k| self.places.remove(k))
             .filter(|visit| goal_m > visit.goal_m - MIN_PROGRESS_FRACTION * CELL_M)
-            .unwrap_or(Visit { place, times: 0, goal_m });
+            .unwrap_or(PlaceVisitCount { place, times: 0, goal_m });
         visit.times += 1;
         self.places.push_back(visit);
         if self.places.len() > MAX_VISITS {

@@ -147,7 +147,7 @@ impl PlacementBuilder<'_> {
             PlacementError::Body(id, c, r) => {
                 // An error knows the line of a span.
                 let span = self.spans[id as usize].clone();
-                let other = self.placer.source.error(span, "", "").position();
+                let other = self.placer.source.error(span, "", "").line_and_column();
                 let line = other.map_or(String::new(), |(line, _)| format!(" (line {line})"));
                 format!("{body} stands on body {id}{line} at [{c}, {r}]")
             }

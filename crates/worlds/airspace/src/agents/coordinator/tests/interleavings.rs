@@ -68,7 +68,7 @@ impl SystemState {
             let others = (0..GROUP).filter(|&to| to != k);
             let to: Vec<usize> = sent.to.map_or_else(|| others.collect(), |to| vec![to]);
             let flights = to.into_iter().filter(|&to| self.is_alive[to]);
-            let bytes = sent.message.message();
+            let bytes = sent.message.message_bytes();
             self.flights.extend(flights.map(|to| (k, to, bytes.to_vec())));
         }
         self.flights.sort_unstable();
@@ -200,7 +200,7 @@ impl SystemState {
             let (replica, now) = (&self.hosts[k].replicas[0], self.tick);
             let left = |tick: u64| tick.saturating_sub(now);
             add(&(replica.promised, replica.newest, replica.accepted, replica.candidate_number));
-            add(&(left(replica.election_timeout()), left(replica.quiet_until)));
+            add(&(left(replica.election_due_tick()), left(replica.quiet_until)));
             add(&replica.unanswering);
             add(&replica.copy.as_ref().map(|copy| (copy.at, copy.state.to_vec())));
             match &replica.role {

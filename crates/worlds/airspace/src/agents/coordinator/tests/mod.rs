@@ -7,7 +7,7 @@ mod recovery;
 use super::epoch::CoordinatorEpoch;
 use super::host::CoordinatorHost;
 use super::migrating::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, CoordinatorStep,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, ItineraryStep,
     MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
@@ -46,7 +46,7 @@ struct TestHost {
 }
 
 impl CoordinatorHostServices for TestHost {
-    fn is_watching(&self, _: usize) -> bool {
+    fn is_awaiting_coordinator(&self, _: usize) -> bool {
         !self.is_done()
     }
 
@@ -68,24 +68,20 @@ impl TestCoordinator {
         (k..services.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(
-        &mut self,
-        services: &TestHost,
-        context: &CoordinatorHostContext<'_>,
-    ) -> CoordinatorStep {
+    fn hop(&mut self, services: &TestHost, context: &CoordinatorHostContext<'_>) -> ItineraryStep {
         loop {
             match self.task {
                 TestTask::Visit(k) => match self.next(k, services) {
                     Some(next) => {
                         self.task = TestTask::Visit(next);
-                        return CoordinatorStep::Hop(next.into());
+                        return ItineraryStep::Hop(next.into());
                     }
                     None => self.task = TestTask::Return,
                 },
                 TestTask::Return => {
                     let home = usize::from(context.epochs[0].owner);
                     if home != services.me {
-                        return CoordinatorStep::Hop(home);
+                        return ItineraryStep::Hop(home);
                     }
                     self.rounds_left = self.rounds_left.saturating_sub(1);
                     self.task = if self.rounds_left > 0 {
@@ -97,9 +93,9 @@ impl TestCoordinator {
                 TestTask::Deliver(k) => match self.next(k, services) {
                     Some(next) => {
                         self.task = TestTask::Deliver(next);
-                        return CoordinatorStep::Hop(next.into());
+                        return ItineraryStep::Hop(next.into());
                     }
-                    None => return CoordinatorStep::Done,
+                    None => return ItineraryStep::Done,
                 },
             }
         }
@@ -128,9 +124,9 @@ impl MigratingCoordinator for TestCoordinator {
         &mut self,
         services: &mut TestHost,
         context: &CoordinatorHostContext<'_>,
-    ) -> CoordinatorStep {
+    ) -> ItineraryStep {
         if !services.is_restless && !std::mem::replace(&mut services.is_rested, true) {
-            return CoordinatorStep::Stay;
+            return ItineraryStep::Stay;
         }
         self.unreachable[services.me] = false;
         let step = self.hop(services, context);

@@ -1,10 +1,10 @@
 //! The hard constraints, which every motion keeps.
 
-use super::contacts::{Contacts, nearest};
+use super::contacts::{Contacts, nearest_points};
 use super::posture::{PartPoint, TrialPosture, ends};
-use super::solve_input::SolveInput;
+use super::solve_input::EscapeSolveInput;
 use sidestep_kernel::math::cos;
-use sidestep_rods::geometry::{Point, angle_rad, distance, normalized, sub};
+use sidestep_rods::geometry::{Point, angle_between_rad, distance, normalized, sub};
 use sidestep_rods::{BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, RodSweep, TOLERANCE_M};
 
 /// A bend limit: that of a connector, or its bend before the tick where that was sharper.
@@ -42,7 +42,7 @@ impl BendConstraint {
 
     fn is_met<const D: usize>(&self, points: &[Point<D>]) -> bool {
         let [a, b, c] = [0, 1, 2].map(|k| points[self.connector - 1 + k]);
-        angle_rad(sub(b, a), sub(c, b)) <= self.most_rad + BEND_TOLERANCE_RAD
+        angle_between_rad(sub(b, a), sub(c, b)) <= self.most_rad + BEND_TOLERANCE_RAD
     }
 }
 
@@ -51,18 +51,18 @@ const BEND_MARGIN: f64 = 1e-6;
 /// Rounding of displacements, meters.
 const ROUNDING_M: f64 = 1e-12;
 
-pub(super) struct Constraints<'a, 'b, const D: usize> {
-    pub(super) input: &'a SolveInput<'b, D>,
+pub(super) struct EscapeConstraintChecker<'a, 'b, const D: usize> {
+    pub(super) input: &'a EscapeSolveInput<'b, D>,
     pub(super) points: &'a [Point<D>],
 }
 
-impl<const D: usize> Constraints<'_, '_, D> {
+impl<const D: usize> EscapeConstraintChecker<'_, '_, D> {
     pub(super) fn are_met(&self, contacts: &Contacts<D>, bends: &[BendConstraint]) -> bool {
         self.are_lengths_met()
             && self.are_travels_met()
             && bends.iter().all(|bend| bend.is_met(self.points))
             && contacts.pairs.iter().all(|pair| {
-                nearest(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
+                nearest_points(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
             })
             && contacts.walls.iter().all(|wall| {
                 let to = ends(self.points, wall.part);
@@ -82,7 +82,7 @@ impl<const D: usize> Constraints<'_, '_, D> {
     }
 
     fn are_travels_met(&self) -> bool {
-        let SolveInput { chain, start, .. } = *self.input;
+        let EscapeSolveInput { chain, start, .. } = *self.input;
         self.points.iter().enumerate().all(|(k, p)| {
             let connector = &chain.connectors()[k];
             let was = chain.points()[k];

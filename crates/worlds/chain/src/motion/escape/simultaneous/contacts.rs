@@ -1,6 +1,6 @@
 //! All bodies that the parts of a chain may touch in a tick.
 
-use super::super::threat::{Threat, collect};
+use super::super::threat::{Threat, collect_threats};
 use super::super::{ChainPart, EscapeMargin};
 use super::posture::ends;
 use sidestep_rods::geometry::{Aabb, ConvexCore, NearestPoints, Point, between_segments, distance};
@@ -34,7 +34,7 @@ pub(super) struct Contacts<const D: usize> {
 
 impl<const D: usize> Contacts<D> {
     /// Collects the parts near obstacles that move. Connectors move by `move_m` at most.
-    pub(super) fn find_movers(
+    pub(super) fn collect_threats(
         &mut self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
@@ -42,7 +42,7 @@ impl<const D: usize> Contacts<D> {
         move_m: f64,
     ) {
         let reach_m = CONTACT_RANGE_FACTOR * move_m;
-        collect(
+        collect_threats(
             chain,
             obstacles,
             &mut self.body,
@@ -128,20 +128,20 @@ pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: ChainPart) -> f64
 /// exempt: connectors one index apart, rods two.
 fn candidate_pairs(rod: usize, other: usize, last: Option<usize>) -> [Option<[ChainPart; 2]>; 6] {
     [
-        connector_pair(rod, other),
-        last.and_then(|last| connector_pair(rod, last)),
-        rod_and_connector(rod, other),
-        last.and_then(|last| rod_and_connector(rod, last)),
+        nonadjacent_connectors(rod, other),
+        last.and_then(|last| nonadjacent_connectors(rod, last)),
+        rod_connector_pair(rod, other),
+        last.and_then(|last| rod_connector_pair(rod, last)),
         (rod + 1 < other).then_some([ChainPart::Connector(rod), ChainPart::Rod(other)]),
         (other > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Rod(other)]),
     ]
 }
 
-fn connector_pair(one: usize, other: usize) -> Option<[ChainPart; 2]> {
+fn nonadjacent_connectors(one: usize, other: usize) -> Option<[ChainPart; 2]> {
     (other > one + 1).then_some([ChainPart::Connector(one), ChainPart::Connector(other)])
 }
 
-fn rod_and_connector(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
+fn rod_connector_pair(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
     (connector > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(connector)])
 }
 
@@ -150,12 +150,12 @@ fn near_pair<const D: usize>(
     parts: [ChainPart; 2],
     reach_m: f64,
 ) -> Option<PartPair> {
-    let apart_m = nearest(chain.points(), parts).distance_m;
+    let apart_m = nearest_points(chain.points(), parts).distance_m;
     let touch_m = parts.map(|part| radius_m(chain, part)).iter().sum::<f64>();
     (apart_m < touch_m + reach_m).then(|| PartPair { parts, keep_m: touch_m.min(apart_m) })
 }
 
-pub(super) fn nearest<const D: usize>(
+pub(super) fn nearest_points<const D: usize>(
     points: &[Point<D>],
     parts: [ChainPart; 2],
 ) -> NearestPoints<D> {

@@ -10,11 +10,11 @@ use super::super::threat::gap_m;
 use super::posture::ends;
 use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
 use super::solve::{EscapeSolver, direction_away};
-use super::solve_input::{ExitDirection, SolveInput};
+use super::solve_input::{EscapeSolveInput, ExitDirection};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, cross, normalized, perpendicular, scaled, with_dimensions,
+    Point, add, add_scaled, convert_dimensions, cross, normalized, perpendicular, scaled,
 };
 use std::f64::consts::FRAC_PI_6;
 use std::ops::RangeInclusive;
@@ -68,23 +68,23 @@ impl EscapePlan {
     }
 
     /// Forgets the exit of a chain with no obstacle near.
-    pub(super) fn clear(&mut self) {
+    pub(super) fn clear_exit(&mut self) {
         *self = Self { rests: self.rests, ..Self::default() };
     }
 
-    pub(super) fn tick(&mut self) {
+    pub(super) fn count_down_pause(&mut self) {
         self.pause = self.pause.saturating_sub(1);
     }
 
     pub(super) fn exit_direction<const D: usize>(&self) -> Option<ExitDirection<D>> {
         self.passing
-            .map(|p| ExitDirection { obstacle: p.obstacle, toward: with_dimensions(p.toward) })
+            .map(|p| ExitDirection { obstacle: p.obstacle, toward: convert_dimensions(p.toward) })
     }
 
     /// Ends an exit once no part is near the obstacle.
     pub(super) fn clear_if_passed<const D: usize>(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         solver: &EscapeSolver<D>,
     ) {
         if self.exit_direction().is_some_and(|through| solver.has_passed(input, &through)) {
@@ -93,10 +93,10 @@ impl EscapePlan {
     }
 
     /// Searches for the best exit; returns whether it is another than before.
-    pub(super) fn plan<const D: usize>(
+    pub(super) fn plan_exit<const D: usize>(
         &mut self,
         rules: &ObstacleEscapeRules,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         solver: &EscapeSolver<D>,
         gap_m: f64,
     ) -> bool {
@@ -105,9 +105,11 @@ impl EscapePlan {
         }
         self.pause = CHOICE_INTERVAL_TICKS;
         let around = endangered_connectors(input, solver);
-        let Some(rollout) = Rollout::rollout_between(rules, input, around) else { return false };
+        let Some(rollout) = Rollout::from_connector_range(rules, input, around) else {
+            return false;
+        };
         let now = self.exit_direction();
-        let mut left = rollout.ticks_for(MAX_WORK);
+        let mut left = rollout.ticks_for_work(MAX_WORK);
         let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
         // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
         let mut best = (IMPROVEMENT_FACTOR * cost_now - MIN_BENEFIT_TICKS, now);
@@ -124,7 +126,7 @@ impl EscapePlan {
         }
         self.passing = best.1.map(|exit| ActiveExit {
             obstacle: exit.obstacle,
-            toward: with_dimensions(exit.toward),
+            toward: convert_dimensions(exit.toward),
         });
         best.1 != now
     }
@@ -132,7 +134,7 @@ impl EscapePlan {
 
 /// Returns the exits through the obstacles that touch the chain.
 fn exit_candidates<const D: usize>(
-    input: &SolveInput<'_, D>,
+    input: &EscapeSolveInput<'_, D>,
     solver: &EscapeSolver<D>,
 ) -> Vec<ExitDirection<D>> {
     let mut exits = Vec::new();
@@ -171,7 +173,7 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
     let mut axes = vec![first];
     if D == 3 {
         let normal = cross(through, first);
-        axes.extend(normalized(with_dimensions::<3, D>([normal[0], normal[1], normal[2]])));
+        axes.extend(normalized(convert_dimensions::<3, D>([normal[0], normal[1], normal[2]])));
     }
     for axis in axes {
         // All around in steps of 30 degrees; straight through is there already.
@@ -185,10 +187,10 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
 
 /// Returns the connectors of the chain around those in danger.
 fn endangered_connectors<const D: usize>(
-    input: &SolveInput<'_, D>,
+    input: &EscapeSolveInput<'_, D>,
     solver: &EscapeSolver<D>,
 ) -> RangeInclusive<usize> {
-    let SolveInput { chain, obstacles, .. } = *input;
+    let EscapeSolveInput { chain, obstacles, .. } = *input;
     let mut from = usize::MAX;
     let mut to = 0;
     for threat in &solver.contacts.threats {

@@ -8,7 +8,7 @@
 
 use super::super::ObstacleEscapeRules;
 use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
-use super::solve_input::{LeadMotion, SolveInput};
+use super::solve_input::{EscapeSolveInput, LeadMotion};
 
 /// Connectors to either side of the leader that rollouts include: many more than for an exit, because the leader pulls
 /// those far behind it between obstacles, too.
@@ -19,16 +19,17 @@ const MAX_WORK: usize = 40_000;
 
 /// Resting is rolled out only where moving brings parts inside, because rollouts are all the cost
 /// of a choice.
-pub(super) fn should_rest<const D: usize>(
+pub(super) fn should_leader_rest<const D: usize>(
     rules: &ObstacleEscapeRules,
-    input: &SolveInput<'_, D>,
+    input: &EscapeSolveInput<'_, D>,
     lead: &LeadMotion<D>,
 ) -> bool {
     let from = lead.k.saturating_sub(SIDE_CONNECTORS);
     let to = (lead.k + SIDE_CONNECTORS).min(input.chain.points().len() - 1);
-    let rollout = Rollout::rollout_between(rules, input, from..=to).filter(Rollout::is_approached);
+    let rollout =
+        Rollout::from_connector_range(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
-    let mut left = rollout.ticks_for(MAX_WORK);
+    let mut left = rollout.ticks_for_work(MAX_WORK);
     let wanted = LeadMotion { k: lead.k - from, displacement_m: lead.displacement_m };
     let rest = LeadMotion { displacement_m: [0.0; D], ..wanted };
     let wanted_cost = rollout.cost(&RolloutOptions::with_lead(wanted), f64::INFINITY, &mut left);

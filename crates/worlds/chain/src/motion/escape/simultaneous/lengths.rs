@@ -35,7 +35,7 @@ const ERROR_TOLERANCE_M: f64 = 1e-12;
 
 impl<const D: usize> LengthSolver<D> {
     /// Corrects until all lengths are within their limits, if they get there.
-    pub(super) fn restore(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) {
+    pub(super) fn restore_lengths(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) {
         for _ in 0..MAX_CORRECTIONS {
             if self.correct(posture, rods) <= ERROR_TOLERANCE_M {
                 break;
@@ -47,9 +47,9 @@ impl<const D: usize> LengthSolver<D> {
     pub(super) fn correct(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) -> f64 {
         let worst_m = self.measure(posture, rods);
         if worst_m > ERROR_TOLERANCE_M {
-            self.set_up(posture);
+            self.assemble_equations(posture);
             self.eliminate();
-            self.apply(posture);
+            self.apply_corrections(posture);
         }
         worst_m
     }
@@ -74,7 +74,7 @@ impl<const D: usize> LengthSolver<D> {
         worst_m
     }
 
-    fn set_up(&mut self, posture: &TrialPosture<'_, D>) {
+    fn assemble_equations(&mut self, posture: &TrialPosture<'_, D>) {
         self.diagonal.clear();
         self.side.clear();
         for (i, u) in self.directions.iter().enumerate() {
@@ -100,7 +100,7 @@ impl<const D: usize> LengthSolver<D> {
         }
     }
 
-    fn apply(&self, posture: &mut TrialPosture<'_, D>) {
+    fn apply_corrections(&self, posture: &mut TrialPosture<'_, D>) {
         for (i, (u, by_m)) in self.directions.iter().zip(&self.beyond_m).enumerate() {
             let ease = [posture.inverse_mass[i], posture.inverse_mass[i + 1]];
             posture.points[i] = add_scaled(posture.points[i], *u, ease[0] * by_m);

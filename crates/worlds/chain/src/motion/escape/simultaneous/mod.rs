@@ -30,12 +30,12 @@ mod tests;
 use super::threat::Threat;
 use super::{EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart};
 pub use escape_plan::EscapePlan;
-use leader_choice::should_rest;
+use leader_choice::should_leader_rest;
 use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, Obstacles, ReactionRules, Veto, VetoReason};
 use solve::EscapeSolver;
 pub(crate) use solve_input::LeadMotion;
-use solve_input::{ExitDirection, SoftConstraints, SolveInput};
+use solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
 
 /// Escapes of all parts of a chain at once. It owns its buffers.
 #[derive(Debug, Clone)]
@@ -74,15 +74,15 @@ impl<const D: usize> SimultaneousEscape<D> {
         let max_step_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (max_step_m / thinnest_m).ceil().max(1.0);
         let mut report = EscapeReport::default();
-        escape_plan.tick();
+        escape_plan.count_down_pause();
         for step in 1..=steps as usize {
             let max_step_m = max_step_m * step as f64 / steps;
             // Taken out, because the solve borrows the start and changes everything else.
             let mut at = std::mem::take(&mut self.start);
             at.clear();
             at.extend_from_slice(start);
-            let input = SolveInput { chain, obstacles, rules, start: &at, max_step_m };
-            let has_moved = self.find_step(&input, escape_plan, &mut report);
+            let input = EscapeSolveInput { chain, obstacles, rules, start: &at, max_step_m };
+            let has_moved = self.find_step_positions(&input, escape_plan, &mut report);
             if has_moved {
                 chain.points_mut().copy_from_slice(&self.best);
             }
@@ -101,7 +101,7 @@ impl<const D: usize> SimultaneousEscape<D> {
     }
 
     /// Tries both on copies; the chain stays as it is.
-    pub(super) fn should_rest(
+    pub(super) fn should_leader_rest(
         &self,
         chain: &Chain<D>,
         obstacles: &Obstacles<D>,
@@ -109,20 +109,20 @@ impl<const D: usize> SimultaneousEscape<D> {
         lead: &LeadMotion<D>,
     ) -> bool {
         let max_step_m = self.rules.max_step_m();
-        let input = SolveInput { chain, obstacles, rules, start: chain.points(), max_step_m };
-        should_rest(&self.rules, &input, lead)
+        let input = EscapeSolveInput { chain, obstacles, rules, start: chain.points(), max_step_m };
+        should_leader_rest(&self.rules, &input, lead)
     }
 
     /// Finds the positions of one step, in `best`; returns whether any part moves.
-    fn find_step(
+    fn find_step_positions(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         escape_plan: &mut EscapePlan,
         report: &mut EscapeReport<D>,
     ) -> bool {
         let margin = self.rules.look_ahead_margin();
         if !self.solver.find_contacts(input, margin) {
-            escape_plan.clear();
+            escape_plan.clear_exit();
             return false;
         }
         escape_plan.clear_if_passed(input, &self.solver);
@@ -132,17 +132,17 @@ impl<const D: usize> SimultaneousEscape<D> {
         }
         let mut gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
         // An exit is searched for only where the plain escape has left the chain in danger.
-        if escape_plan.plan(&self.rules, input, &self.solver, gap_m) {
+        if escape_plan.plan_exit(&self.rules, input, &self.solver, gap_m) {
             gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);
         }
-        self.report(input, gap_m, nearest, report)
+        self.fill_report(input, gap_m, nearest, report)
     }
 
     /// Solves with the margins of the look-ahead and, if that leaves a part inside, without; the
     /// better one is in `best`. Returns its least gap, meters; the present one if nothing is better.
     fn attempt(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         through: Option<ExitDirection<D>>,
         before_m: f64,
     ) -> f64 {
@@ -166,9 +166,9 @@ impl<const D: usize> SimultaneousEscape<D> {
         if best_m == f64::NEG_INFINITY { before_m } else { best_m }
     }
 
-    fn report(
+    fn fill_report(
         &self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         gap_m: f64,
         nearest: Option<Threat>,
         report: &mut EscapeReport<D>,
@@ -201,7 +201,7 @@ impl<const D: usize> SimultaneousEscape<D> {
 
 /// Returns the margin around the obstacle of a threat, meters.
 fn margin_around<const D: usize>(
-    input: &SolveInput<'_, D>,
+    input: &EscapeSolveInput<'_, D>,
     margin: EscapeMargin,
     threat: Option<Threat>,
 ) -> f64 {

@@ -41,7 +41,7 @@ struct PinchEpisode {
 }
 
 /// Runs a seed and returns its long episodes.
-fn episodes(discs: usize, seed: u64) -> (World, Vec<PinchEpisode>) {
+fn long_pinch_episodes(discs: usize, seed: u64) -> (World, Vec<PinchEpisode>) {
     let path = root().join("scenarios/chain/movers.toml");
     let settings = [format!("seed={seed}"), format!("fields.0.n={discs}")];
     let source = Source::read(&path, &settings).expect("a scenario");
@@ -68,16 +68,21 @@ fn episodes(discs: usize, seed: u64) -> (World, Vec<PinchEpisode>) {
 }
 
 /// Returns the longest time in a row that a chain is inside, in ticks, if it goes along some ways; at most `enough`.
-fn inside(world: &World, episode: &PinchEpisode, legs: &[TimedExit], enough: usize) -> usize {
+fn longest_inside_ticks(
+    world: &World,
+    episode: &PinchEpisode,
+    legs: &[TimedExit],
+    enough: usize,
+) -> usize {
     let (mut chain, mut obstacles) = (episode.chain.clone(), (*world.obstacles).clone());
     let rules = world.escape.expect("something moves");
     let (margin, max_step_m) = (rules.look_ahead_margin(), rules.speed_max_m_s * rules.dt_s);
     let (mut solver, mut now, mut most, mut clear) = (EscapeSolver::default(), 0, 0, 0);
     for tick in 0..TICKS {
         let movers: Vec<_> = movers(world, episode, tick + 1);
-        obstacles.set_moving(&movers).expect("movers in range");
+        obstacles.replace_moving(&movers).expect("movers in range");
         let (start, was) = (chain.points().to_vec(), chain.clone());
-        let given = SolveInput {
+        let given = EscapeSolveInput {
             chain: &was,
             obstacles: &obstacles,
             rules: &world.rules,
@@ -102,7 +107,7 @@ fn inside(world: &World, episode: &PinchEpisode, legs: &[TimedExit], enough: usi
 }
 
 fn movers(world: &World, episode: &PinchEpisode, tick: usize) -> Vec<Obstacle<2>> {
-    world.movers.at(world.start_time_s(episode.cycle + tick as u64)).collect()
+    world.movers.at(world.cycle_start_time_s(episode.cycle + tick as u64)).collect()
 }
 
 /// Returns the obstacles nearest to the chain when it began to be inside.
@@ -153,16 +158,18 @@ fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<TimedExit>> {
 fn the_only_long_pinch_that_is_left_can_be_left_by_resting_in_time() {
     let mut told = Vec::new();
     for (discs, seed) in [(16, 5)] {
-        let (world, episodes) = episodes(discs, seed);
+        let (world, episodes) = long_pinch_episodes(discs, seed);
         for episode in &episodes {
             let motions = motions(&nearest(&world, episode), seed);
             let least = |from: usize| {
                 let late =
                     motions.iter().filter(|legs| legs.first().is_some_and(|l| l.from >= from));
-                late.fold(episode.ticks, |best, legs| best.min(inside(&world, episode, legs, best)))
+                late.fold(episode.ticks, |best, legs| {
+                    best.min(longest_inside_ticks(&world, episode, legs, best))
+                })
             };
             let bests = [0, BEFORE - 50, BEFORE - 20].map(least);
-            let alone = inside(&world, episode, &[], usize::MAX);
+            let alone = longest_inside_ticks(&world, episode, &[], usize::MAX);
             println!(
                 "{discs} discs, seed {seed}, cycle {}: {} ticks inside; nobody leads: {alone}; {} motions: {bests:?}",
                 episode.cycle,

@@ -2,7 +2,7 @@
 
 use super::super::{EscapeMargin, ObstacleEscapeRules};
 use super::solve::EscapeSolver;
-use super::solve_input::{ExitDirection, LeadMotion, SoftConstraints, SolveInput};
+use super::solve_input::{EscapeSolveInput, ExitDirection, LeadMotion, SoftConstraints};
 use super::{PRESSED_SPEED_FRACTION, TOUCH_M};
 use sidestep_rods::geometry::{Point, add, distance, norm};
 use sidestep_rods::{Chain, MotionRequest, Obstacle, Obstacles, Propagator, ReactionRules};
@@ -57,21 +57,21 @@ impl<const D: usize> RolloutTrial<D> {
     /// Leads the chain on, unless it needs its speed, of `max_step_m` a tick, to escape. `start` holds the positions at the
     /// start of the tick.
     fn move_leader(&mut self, lead: LeadMotion<D>, start: &[Point<D>], max_step_m: f64) {
-        if self.max_displacement_m(start) > PRESSED_SPEED_FRACTION * max_step_m {
+        if self.max_displacement_from_m(start) > PRESSED_SPEED_FRACTION * max_step_m {
             return;
         }
         let escaped = self.chain.points().to_vec();
         let to = add(escaped[lead.k], lead.displacement_m);
-        let request = MotionRequest::operator_request(lead.k, to);
+        let request = MotionRequest::from_operator(lead.k, to);
         // Beyond the range of coordinates nothing is led.
         let went = self.propagator.propagate(&mut self.chain, &self.obstacles, &request);
-        if went.is_err() || self.max_displacement_m(start) > max_step_m {
+        if went.is_err() || self.max_displacement_from_m(start) > max_step_m {
             self.chain.points_mut().copy_from_slice(&escaped);
         }
     }
 
     /// Returns the longest displacement of a connector from its start.
-    fn max_displacement_m(&self, start: &[Point<D>]) -> f64 {
+    fn max_displacement_from_m(&self, start: &[Point<D>]) -> f64 {
         let moves = start.iter().zip(self.chain.points());
         moves.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
     }
@@ -92,13 +92,13 @@ impl<const D: usize> RolloutOptions<D> {
 
 impl<'a, const D: usize> Rollout<'a, D> {
     /// Returns a rollout of the connectors between two; none if there are none.
-    pub(super) fn rollout_between(
+    pub(super) fn from_connector_range(
         rules: &ObstacleEscapeRules,
-        input: &SolveInput<'a, D>,
+        input: &EscapeSolveInput<'a, D>,
         between: RangeInclusive<usize>,
     ) -> Option<Self> {
         let (from, to) = between.into_inner();
-        let SolveInput { chain, obstacles, max_step_m, .. } = *input;
+        let EscapeSolveInput { chain, obstacles, max_step_m, .. } = *input;
         let cut = Chain::new_broken(
             chain.points()[from..=to].to_vec(),
             chain.connectors()[from..=to].to_vec(),
@@ -116,7 +116,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
             }
         }
         let mut near = obstacles.clone();
-        near.set_moving(&moving).ok()?;
+        near.replace_moving(&moving).ok()?;
         Some(Self {
             rules: input.rules,
             chain: cut.ok()?,
@@ -134,7 +134,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
     }
 
     /// Returns the ticks of rollouts that an amount of work allows, in ticks times connectors.
-    pub(super) fn ticks_for(&self, work: usize) -> usize {
+    pub(super) fn ticks_for_work(&self, work: usize) -> usize {
         work / self.chain.points().len()
     }
 
@@ -194,8 +194,13 @@ impl<'a, const D: usize> Rollout<'a, D> {
         through: &mut Option<ExitDirection<D>>,
     ) -> f64 {
         let RolloutTrial { chain, obstacles, solver, .. } = trial;
-        let input =
-            SolveInput { chain, obstacles, rules: self.rules, start, max_step_m: self.max_step_m };
+        let input = EscapeSolveInput {
+            chain,
+            obstacles,
+            rules: self.rules,
+            start,
+            max_step_m: self.max_step_m,
+        };
         let gap_m = self.find_positions(&input, solver, through);
         chain.points_mut().copy_from_slice(&solver.points);
         gap_m
@@ -204,7 +209,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
     /// Solves for the positions at the end of a tick, which the solver has then. Returns the least gap, meters.
     fn find_positions(
         &self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         solver: &mut EscapeSolver<D>,
         through: &mut Option<ExitDirection<D>>,
     ) -> f64 {

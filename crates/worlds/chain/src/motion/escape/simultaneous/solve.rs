@@ -5,16 +5,16 @@
 //! obstacles may be in conflict with laws, and never the other way round.
 
 use super::super::EscapeMargin;
-use super::super::threat::{ChainPart, Threat, gap_m, left_of};
-use super::constraints::{BendConstraint, Constraints};
-use super::contacts::{Contacts, fraction_along, nearest, radius_m};
+use super::super::threat::{ChainPart, Threat, gap_m, leftward_direction};
+use super::constraints::{BendConstraint, EscapeConstraintChecker};
+use super::contacts::{Contacts, fraction_along, nearest_points, radius_m};
 use super::lengths::LengthSolver;
 use super::posture::{PartPoint, TrialPosture, ends};
-use super::solve_input::{ExitDirection, SoftConstraints, SolveInput};
+use super::solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
 use sidestep_rods::Obstacle;
 use sidestep_rods::geometry::{
-    NearestPoints, Point, add_scaled, distance, first_axis, lerp, normalized, perpendicular,
-    scaled, sub,
+    NearestPoints, Point, add_scaled, distance, lerp, normalized, perpendicular, scaled, sub,
+    unit_x,
 };
 use std::f64::consts::PI;
 
@@ -57,11 +57,11 @@ impl<const D: usize> EscapeSolver<D> {
     /// Collects the contacts of a tick; returns whether any moving obstacle is near.
     pub(super) fn find_contacts(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         margin: EscapeMargin,
     ) -> bool {
-        let SolveInput { chain, obstacles, rules, max_step_m, .. } = *input;
-        self.contacts.find_movers(chain, obstacles, margin, max_step_m);
+        let EscapeSolveInput { chain, obstacles, rules, max_step_m, .. } = *input;
+        self.contacts.collect_threats(chain, obstacles, margin, max_step_m);
         if self.contacts.threats.is_empty() {
             return false;
         }
@@ -78,7 +78,7 @@ impl<const D: usize> EscapeSolver<D> {
     /// Finds positions by soft constraints; returns whether they keep the hard ones.
     pub(super) fn solve(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         constraints: &SoftConstraints<D>,
     ) -> bool {
         self.points.clear();
@@ -105,7 +105,7 @@ impl<const D: usize> EscapeSolver<D> {
 
     /// Moves all connectors around an obstacle that the chain leaves through at once, because parts that are only
     /// dragged would lag.
-    fn start_exit(&mut self, input: &SolveInput<'_, D>, through: Option<ExitDirection<D>>) {
+    fn start_exit(&mut self, input: &EscapeSolveInput<'_, D>, through: Option<ExitDirection<D>>) {
         let Some(through) = through else { return };
         let moving = input.obstacles.moving();
         let Some(mover) = moving.iter().find(|o| o.id == through.obstacle) else { return };
@@ -121,7 +121,7 @@ impl<const D: usize> EscapeSolver<D> {
     /// Pushes parts away from moving obstacles; returns the greatest correction, meters.
     fn push_from_movers(
         &mut self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         through: Option<ExitDirection<D>>,
         soft: Option<EscapeMargin>,
     ) -> f64 {
@@ -162,7 +162,7 @@ impl<const D: usize> EscapeSolver<D> {
         for wall in &contacts.walls {
             let ends = posture.ends(wall.part);
             let nearest = wall.core.nearest_to_segment(ends);
-            let short_m = wall.keep_m + slack_m(wall.keep_m) - nearest.distance_m;
+            let short_m = wall.keep_m + clearance_slack_m(wall.keep_m) - nearest.distance_m;
             let Some(away) = normalized(sub(nearest.on_body, nearest.on_core)) else { continue };
             if short_m > 0.0 {
                 let along_rod = fraction_along(ends, nearest.on_body);
@@ -171,14 +171,14 @@ impl<const D: usize> EscapeSolver<D> {
             }
         }
         for pair in &contacts.pairs {
-            let nearest = nearest(posture.points, pair.parts);
-            let short_m = pair.keep_m + slack_m(pair.keep_m) - nearest.distance_m;
+            let nearest = nearest_points(posture.points, pair.parts);
+            let short_m = pair.keep_m + clearance_slack_m(pair.keep_m) - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
                 let one = part_point(&posture, one, nearest.on_body);
                 let other = part_point(&posture, other, nearest.on_core);
                 let away = normalized(sub(nearest.on_core, nearest.on_body))
-                    .unwrap_or_else(|| perpendicular(first_axis()));
+                    .unwrap_or_else(|| perpendicular(unit_x()));
                 posture.separate(one, other, away, short_m);
                 greatest_m = greatest_m.max(short_m);
             }
@@ -187,7 +187,7 @@ impl<const D: usize> EscapeSolver<D> {
     }
 
     /// Keeps every connector within its speed, and at a position that its mobility allows.
-    fn limit_travel(&mut self, input: &SolveInput<'_, D>) {
+    fn limit_travel(&mut self, input: &EscapeSolveInput<'_, D>) {
         for (k, point) in self.points.iter_mut().enumerate() {
             if self.inverse_mass[k] > 0.0 {
                 let room_m = input.max_travel_m(k) * (1.0 - RESERVE_FRACTION);
@@ -199,7 +199,7 @@ impl<const D: usize> EscapeSolver<D> {
     }
 
     /// Corrects until the hard constraints hold, if necessary for a fraction of the motion; returns whether they do.
-    fn settle(&mut self, input: &SolveInput<'_, D>) -> bool {
+    fn settle(&mut self, input: &EscapeSolveInput<'_, D>) -> bool {
         MOTION_FRACTIONS.iter().any(|&part| {
             if part < 1.0 {
                 for (point, from) in self.points.iter_mut().zip(input.chain.points()) {
@@ -210,19 +210,23 @@ impl<const D: usize> EscapeSolver<D> {
                 self.push_from_walls();
                 self.limit_travel(input);
                 let mut posture = trial_posture(&mut self.points, &self.inverse_mass);
-                self.lengths.restore(&mut posture, input.chain.rods());
+                self.lengths.restore_lengths(&mut posture, input.chain.rods());
                 round % CHECK_INTERVAL == 0 && self.meets_constraints(input)
             })
         })
     }
 
-    fn meets_constraints(&self, input: &SolveInput<'_, D>) -> bool {
+    fn meets_constraints(&self, input: &EscapeSolveInput<'_, D>) -> bool {
         let Self { contacts, points, bends, .. } = self;
-        Constraints { input, points }.are_met(contacts, bends)
+        EscapeConstraintChecker { input, points }.are_met(contacts, bends)
     }
 
     /// Returns whether all parts are farther from an obstacle than it takes to have passed it.
-    pub(super) fn has_passed(&self, input: &SolveInput<'_, D>, through: &ExitDirection<D>) -> bool {
+    pub(super) fn has_passed(
+        &self,
+        input: &EscapeSolveInput<'_, D>,
+        through: &ExitDirection<D>,
+    ) -> bool {
         let moving = input.obstacles.moving();
         let threats = self.contacts.threats.iter();
         threats.filter(|t| moving[t.mover].id == through.obstacle).all(|threat| {
@@ -234,7 +238,7 @@ impl<const D: usize> EscapeSolver<D> {
     /// threat that has it.
     pub(super) fn min_gap(
         &self,
-        input: &SolveInput<'_, D>,
+        input: &EscapeSolveInput<'_, D>,
         points: &[Point<D>],
     ) -> (f64, Option<Threat>) {
         let mut least = (f64::INFINITY, None);
@@ -271,10 +275,10 @@ pub(super) fn direction_away<const D: usize>(
     mover: &Obstacle<D>,
     nearest: &NearestPoints<D>,
 ) -> Point<D> {
-    normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| left_of(mover))
+    normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| leftward_direction(mover))
 }
 
-fn slack_m(keep_m: f64) -> f64 {
+fn clearance_slack_m(keep_m: f64) -> f64 {
     MAX_SLACK_M.min(SLACK_FRACTION * keep_m)
 }
 

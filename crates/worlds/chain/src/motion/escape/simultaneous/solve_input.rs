@@ -5,7 +5,7 @@ use sidestep_rods::geometry::{Point, distance};
 use sidestep_rods::{Chain, Obstacles, ReactionRules};
 
 #[derive(Clone, Copy)]
-pub(super) struct SolveInput<'a, const D: usize> {
+pub(super) struct EscapeSolveInput<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     pub(super) obstacles: &'a Obstacles<D>,
     pub(super) rules: &'a ReactionRules,
@@ -15,7 +15,7 @@ pub(super) struct SolveInput<'a, const D: usize> {
     pub(super) max_step_m: f64,
 }
 
-impl<const D: usize> SolveInput<'_, D> {
+impl<const D: usize> EscapeSolveInput<'_, D> {
     /// Returns the distance from its start that a connector may have, meters: as far as its speed
     /// allows, or as far as it already is.
     pub(super) fn max_travel_m(&self, k: usize) -> f64 {

@@ -117,7 +117,7 @@ proptest! {
         for _ in 0..120 {
             plane.tick();
         }
-        let snake = straight::<3>(30, Rod::fixed(0.2, 0.02), 0.05);
+        let snake = straight::<3>(30, Rod::with_fixed_length(0.2, 0.02), 0.05);
         let mut space = Case::new(snake, balls(seed, n, speed_m_s), cap);
         for _ in 0..60 {
             space.tick();
@@ -165,10 +165,14 @@ fn who_starts_inside_gets_out() {
 #[test]
 fn a_fixed_base_failed_parts_and_walls_stay() {
     let points = vec![[0.0, 0.0], [0.4, 0.3], [0.8, 0.0], [1.2, 0.3], [1.6, 0.0], [2.0, 0.3]];
-    let mut arm =
-        Chain::new(points, vec![Connector::free(0.08); 6], vec![Rod::fixed(0.5, 0.05); 5]).unwrap();
+    let mut arm = Chain::new(
+        points,
+        vec![Connector::free(0.08); 6],
+        vec![Rod::with_fixed_length(0.5, 0.05); 5],
+    )
+    .unwrap();
     arm.set_mobility(0, Mobility::Fixed).unwrap();
-    arm.set_failed(5, true);
+    arm.set_connector_failed(5, true);
     let wall = Obstacle::capsule(3, [[-3.0, -0.2], [4.0, -0.2]], 0.0);
     let ball = Obstacle { radius_m: 0.2, ..ball(1, [1.0, 1.2], [0.0, -0.2]) };
     let mut case = Case::new(arm, vec![wall, ball], 1.0);
@@ -217,7 +221,7 @@ fn inside_by(way: Option<ExitDirection<2>>, from: usize) -> usize {
         obstacles.advance(DT_S);
         let start = chain.points().to_vec();
         let (chain_now, max_step_m) = (chain.clone(), DT_S);
-        let given = SolveInput {
+        let given = EscapeSolveInput {
             chain: &chain_now,
             obstacles: &obstacles,
             rules: &SOLID,

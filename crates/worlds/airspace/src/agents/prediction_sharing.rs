@@ -85,7 +85,7 @@ impl PredictionSharingMember {
         }
     }
 
-    fn distribution(&self, round: u32) -> Option<&Vec<f64>> {
+    fn action_distribution(&self, round: u32) -> Option<&Vec<f64>> {
         self.message_in_round(&self.q, round)
     }
 
@@ -94,7 +94,7 @@ impl PredictionSharingMember {
     }
 
     /// Returns its `k`-th sample of a round. A presumed member has nothing to choose from.
-    fn sample(&self, round: u32, k: usize) -> usize {
+    fn sampled_action(&self, round: u32, k: usize) -> usize {
         self.samples(round).and_then(|samples| samples.get(k)).copied().unwrap_or(0)
     }
 
@@ -155,7 +155,7 @@ impl PredictionSharingAgent {
         }
     }
 
-    fn has_exact_expectations(&self) -> bool {
+    fn has_exact_estimator(&self) -> bool {
         self.own.settings().estimator == Estimator::Exact
     }
 
@@ -168,7 +168,7 @@ impl PredictionSharingAgent {
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 // An exact player needs only the pairs that it is part of.
-                if !self.has_exact_expectations() || i == self.own.me || j == self.own.me {
+                if !self.has_exact_estimator() || i == self.own.me || j == self.own.me {
                     add_pair_costs(&mut game, objective, [i, j], [all[i], all[j]]);
                 }
             }
@@ -189,13 +189,13 @@ impl PredictionSharingAgent {
     fn awaited_in_round(&self) -> Vec<usize> {
         let mut awaited = Vec::new();
         for (j, member) in self.members.iter().enumerate() {
-            let is_missing = if !self.has_exact_expectations() {
+            let is_missing = if !self.has_exact_estimator() {
                 let has_drawn = self.members[self.own.me].samples.contains_key(&self.round);
                 has_drawn && member.samples(self.round).is_none()
-            } else if self.has_moved() {
-                member.distribution(self.round + 1).is_none()
+            } else if self.has_updated_distribution() {
+                member.action_distribution(self.round + 1).is_none()
             } else {
-                member.distribution(self.round_of_update(j)).is_none()
+                member.action_distribution(self.distribution_round(j)).is_none()
             };
             if is_missing {
                 awaited.push(j);
@@ -206,20 +206,20 @@ impl PredictionSharingAgent {
 
     /// Returns the round of which an agent's distribution enters the own update after `round` rounds: in sequence,
     /// those before it have already moved.
-    fn round_of_update(&self, j: usize) -> u32 {
+    fn distribution_round(&self, j: usize) -> u32 {
         let is_sequence = self.own.settings().order == UpdateOrder::Sequence;
         if is_sequence && j < self.own.me { self.round + 1 } else { self.round }
     }
 
     /// Returns whether its own update of this round is made.
-    fn has_moved(&self) -> bool {
+    fn has_updated_distribution(&self) -> bool {
         self.members[self.own.me].q.contains_key(&(self.round + 1))
     }
 
-    fn exact_step(&mut self) -> OptimizerStep<PredictionSharingMessage> {
+    fn exact_optimizer_step(&mut self) -> OptimizerStep<PredictionSharingMessage> {
         let round = self.round + 1;
-        if !self.has_moved() {
-            return OptimizerStep::Send(self.exact_update(round));
+        if !self.has_updated_distribution() {
+            return OptimizerStep::Send(self.update_exact_distribution(round));
         }
         self.count_calm_rounds(round);
         self.round = round;
@@ -231,12 +231,12 @@ impl PredictionSharingAgent {
         if is_over { OptimizerStep::Conclude } else { OptimizerStep::Done }
     }
 
-    fn exact_update(&mut self, round: u32) -> PredictionSharingMessage {
+    fn update_exact_distribution(&mut self, round: u32) -> PredictionSharingMessage {
         let me = self.own.me;
         let settings = *self.own.settings();
         let mut q: Vec<Vec<f64>> = Vec::with_capacity(self.members.len());
         for (j, member) in self.members.iter().enumerate() {
-            q.extend(member.distribution(self.round_of_update(j)).cloned());
+            q.extend(member.action_distribution(self.distribution_round(j)).cloned());
         }
         if let Some(game) = &self.game {
             self.player.set_expected(|expected| game.expected_costs(me, &q, expected));
@@ -256,7 +256,7 @@ impl PredictionSharingAgent {
     }
 
     /// Draws samples, unless it has; else learns from the samples of all.
-    fn sampled_step(
+    fn sampled_optimizer_step(
         &mut self,
         block: usize,
         ageing: f64,
@@ -273,7 +273,7 @@ impl PredictionSharingAgent {
                 return OptimizerStep::Conclude;
             }
         }
-        let change = self.learn(block, ageing);
+        let change = self.learn_from_samples(block, ageing);
         self.round += 1;
         self.members[me].changes.insert(self.round, change);
         for member in &mut self.members {
@@ -296,13 +296,13 @@ impl PredictionSharingAgent {
         }
     }
 
-    fn learn(&mut self, block: usize, ageing: f64) -> f64 {
+    fn learn_from_samples(&mut self, block: usize, ageing: f64) -> f64 {
         let Some(game) = &self.game else { return 0.0 };
         let mut costs = Vec::with_capacity(block);
         let mut own = Vec::with_capacity(block);
         for k in 0..block {
             let joint: Vec<usize> =
-                self.members.iter().map(|member| member.sample(self.round, k)).collect();
+                self.members.iter().map(|member| member.sampled_action(self.round, k)).collect();
             costs.push(game.cost(&joint));
             own.push(joint[self.own.me]);
         }
@@ -332,10 +332,10 @@ impl Optimizer for PredictionSharingAgent {
         from: usize,
         message: &PredictionSharingMessage,
     ) -> Result<(), InvalidMessage> {
-        self.validate(from, message)
+        self.validate_message(from, message)
     }
 
-    fn limits(&self) -> MessageLimits {
+    fn message_limits(&self) -> MessageLimits {
         let common = &*self.own.common;
         let actions = common.max_actions();
         let rounds = self.own.settings().stop.max_rounds;
@@ -392,8 +392,8 @@ impl Optimizer for PredictionSharingAgent {
             return OptimizerStep::Done;
         }
         match self.own.settings().estimator {
-            Estimator::Exact => self.exact_step(),
-            Estimator::Sampled { block, ageing } => self.sampled_step(block, ageing),
+            Estimator::Exact => self.exact_optimizer_step(),
+            Estimator::Sampled { block, ageing } => self.sampled_optimizer_step(block, ageing),
         }
     }
 

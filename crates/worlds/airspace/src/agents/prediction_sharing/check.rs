@@ -6,7 +6,7 @@ use sidestep_collectives::Estimator;
 
 impl PredictionSharingAgent {
     /// Checks a message of the agent at place `from`.
-    pub(super) fn validate(
+    pub(super) fn validate_message(
         &self,
         from: usize,
         message: &PredictionSharingMessage,
@@ -46,7 +46,7 @@ impl PredictionSharingAgent {
                 InvalidMessage::Number.ensure(samples.iter().all(|&x| usize::from(x) < actions))
             }
             PredictionSharingMessage::Distribution { round, change, q } => {
-                InvalidMessage::Kind.ensure(self.has_exact_expectations())?;
+                InvalidMessage::Kind.ensure(self.has_exact_estimator())?;
                 common.check_round(*round, *change)?;
                 InvalidMessage::Length.ensure(q.len() == actions)?;
                 let are_probabilities = q.iter().all(|p| (0.0..=1.0).contains(p));

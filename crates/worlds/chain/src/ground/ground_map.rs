@@ -10,22 +10,22 @@ use sidestep_rods::{Obstacle, outline_walls};
 
 /// Floors, and solid things that stand on them.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Site {
+pub struct GroundMap {
     floors: Vec<FloorMap>,
     /// Boxes, and walls around floors; their ids are given later.
     solids: Vec<Obstacle<2>>,
 }
 
-impl Site {
+impl GroundMap {
     /// Returns the site of a map, solid all around.
-    pub fn from_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
-        Self { floors: vec![FloorMap::from_map(map, unknown)], solids: Vec::new() }
+    pub fn from_pixel_map(map: &PixelMap, unknown: UnknownPolicy) -> Self {
+        Self { floors: vec![FloorMap::from_pixel_map(map, unknown)], solids: Vec::new() }
     }
 
     /// Returns the site of a Stage world, without its robots (see [`stage::Robot`] for their
     /// starts). A floor plan with a boundary has thin walls around it; without one, nothing beside
     /// it is solid.
-    pub fn from_stage(world: &stage::World) -> Self {
+    pub fn from_stage_world(world: &stage::World) -> Self {
         let mut site = Self::default();
         for plan in &world.floor_plans {
             let pixel_m =
@@ -33,7 +33,7 @@ impl Site {
             let floor = FloorMap::new(plan.width, plan.height, pixel_m, plan.solid.clone());
             // Stage places models by their middles.
             let pose = GroundPose::from(plan.pose);
-            site.floors.push(floor.centered(pose.at, pose.heading_rad).with_open_surroundings());
+            site.floors.push(floor.centered_at(pose.at, pose.heading_rad).without_outer_walls());
             if plan.has_boundary {
                 let edges = cuboid(pose, plan.size_m).edges_2d();
                 site.solids.extend(outline_walls(0, &edges.map(|edge| edge[0]), 0.0));
@@ -41,7 +41,7 @@ impl Site {
         }
         for body in &world.boxes {
             let solid = ConvexCore::Cuboid(cuboid(body.pose.into(), body.size_m));
-            site.solids.push(Obstacle::still(0, solid, 0.0));
+            site.solids.push(Obstacle::new_static(0, solid, 0.0));
         }
         site
     }
@@ -103,7 +103,7 @@ mod tests {
         let body = stage::BoxObstacle { name: String::new(), pose, size_m: [0.2, 0.1] };
         let world =
             stage::World { floor_plans: vec![plan], boxes: vec![body], ..Default::default() };
-        let site = Site::from_stage(&world);
+        let site = GroundMap::from_stage_world(&world);
         // Turned to the left: the solid pixel is the southern one.
         assert!(!site.is_free([10.0, -1.0]) && site.is_free([10.0, 1.0]) && site.is_free([0.0; 2]));
         let obstacles = site.obstacles(3);
@@ -119,7 +119,7 @@ mod tests {
         for name in ["stage/simple", "stage/SFU", "willow/willow-erratic"] {
             let Some(path) = shared(&format!("worlds/{name}.world")) else { return };
             let world = stage::load(&path).expect(name);
-            let site = Site::from_stage(&world);
+            let site = GroundMap::from_stage_world(&world);
             let obstacles = site.obstacles(0);
             println!("{name}: {} obstacles", obstacles.len());
             let all = Obstacles::new(obstacles, 1.0).unwrap();

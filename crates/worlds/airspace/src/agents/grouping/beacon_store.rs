@@ -1,6 +1,6 @@
 //! The knowledge of which airplanes see and hear each other, and the groups that follow from it.
 
-use super::beacon::{Beacon, SurveillanceItem};
+use super::beacon::{Beacon, GroupingMessageItem};
 use sidestep_kernel::EntityId;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,12 +11,12 @@ pub(super) struct BeaconStore {
     reports: BTreeMap<EntityId, Vec<EntityId>>,
     /// Whether all hear all that are near them, without a report.
     is_sure: bool,
-    chain_search: ChainSearch,
+    chain_search: ConnectedGroupSearch,
 }
 
 /// The chain from the own airplane, as far as all is known that it depends on.
 #[derive(Debug)]
-struct ChainSearch {
+struct ConnectedGroupSearch {
     from: EntityId,
     chain: BTreeSet<EntityId>,
     /// Those in it for which some that they have heard are not fully known yet, each with the number of those
@@ -24,7 +24,7 @@ struct ChainSearch {
     due: Vec<(EntityId, usize)>,
 }
 
-impl ChainSearch {
+impl ConnectedGroupSearch {
     fn new(from: EntityId) -> Self {
         Self { from, chain: BTreeSet::from([from]), due: vec![(from, 0)] }
     }
@@ -33,7 +33,7 @@ impl ChainSearch {
 impl BeaconStore {
     /// Returns the roster of an airplane that has heard nothing yet.
     pub(super) fn new(own: Beacon, is_sure: bool) -> Self {
-        let chain_search = ChainSearch::new(own.own.id);
+        let chain_search = ConnectedGroupSearch::new(own.own.id);
         let beacons = BTreeMap::from([(own.own.id, own)]);
         Self { beacons, reports: BTreeMap::new(), is_sure, chain_search }
     }
@@ -47,7 +47,7 @@ impl BeaconStore {
         }
         if self.beacons.get(&id).is_some_and(|known| known.near != beacon.near) {
             // Another airplane has lied about it, and all conclusions from that are void.
-            self.chain_search = ChainSearch::new(self.chain_search.from);
+            self.chain_search = ConnectedGroupSearch::new(self.chain_search.from);
         }
         self.beacons.insert(id, beacon).is_none()
     }
@@ -69,16 +69,20 @@ impl BeaconStore {
 
     /// Returns whether everything that there is to know of an airplane is known.
     pub(super) fn is_fully_known(&self, id: EntityId) -> bool {
-        self.has_beacon(id) && self.heard_by(id).is_some()
+        self.has_beacon(id) && self.aircraft_heard_by(id).is_some()
     }
 
     /// Returns the report of an airplane or its beacon, if that is known.
-    pub(super) fn item(&self, about: EntityId, is_report: bool) -> Option<SurveillanceItem> {
+    pub(super) fn surveillance_item(
+        &self,
+        about: EntityId,
+        is_report: bool,
+    ) -> Option<GroupingMessageItem> {
         if is_report {
             let heard = self.reports.get(&about)?.clone();
-            return Some(SurveillanceItem::Report { about, heard });
+            return Some(GroupingMessageItem::Report { about, heard });
         }
-        self.beacons.get(&about).cloned().map(SurveillanceItem::Beacon)
+        self.beacons.get(&about).cloned().map(GroupingMessageItem::Beacon)
     }
 
     /// Returns whether one airplane does not hear another one's items from itself, as far as is known.
@@ -88,7 +92,7 @@ impl BeaconStore {
     }
 
     /// Returns those near an airplane that it has heard, if that is known.
-    fn heard_by(&self, id: EntityId) -> Option<&[EntityId]> {
+    fn aircraft_heard_by(&self, id: EntityId) -> Option<&[EntityId]> {
         if self.is_sure {
             self.beacons.get(&id).map(|beacon| &beacon.near[..])
         } else {
@@ -101,7 +105,7 @@ impl BeaconStore {
     }
 
     fn can_hear(&self, id: EntityId, other: EntityId) -> bool {
-        self.heard_by(id).is_some_and(|heard| heard.binary_search(&other).is_ok())
+        self.aircraft_heard_by(id).is_some_and(|heard| heard.binary_search(&other).is_ok())
     }
 
     /// Returns whether two airplanes hear each other.
@@ -111,13 +115,13 @@ impl BeaconStore {
 
     /// Returns all to which a chain of airplanes that hear each other leads from one, itself among them, and whether
     /// everything is known that this depends on.
-    fn chain(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
+    fn connected_aircraft(&self, from: EntityId) -> (BTreeSet<EntityId>, bool) {
         let mut chain = BTreeSet::from([from]);
         let mut due = vec![from];
         let mut is_complete = true;
         while let Some(id) = due.pop() {
             is_complete &= self.is_fully_known(id);
-            for &other in self.heard_by(id).unwrap_or_default() {
+            for &other in self.aircraft_heard_by(id).unwrap_or_default() {
                 is_complete &= self.is_fully_known(other);
                 if self.is_linked(id, other) && chain.insert(other) {
                     due.push(other);
@@ -129,16 +133,19 @@ impl BeaconStore {
 
     /// Returns the same as [`Self::is_complete`] for the own airplane, and continues where it stopped before: each
     /// link is visited once, however often incomplete knowledge arrives.
-    pub(super) fn update_chain(&mut self) -> bool {
-        let mut search = std::mem::replace(&mut self.chain_search, ChainSearch::new(0));
-        let is_complete = self.extend_chain(&mut search);
+    pub(super) fn advance_chain_search(&mut self) -> bool {
+        let mut search = std::mem::replace(&mut self.chain_search, ConnectedGroupSearch::new(0));
+        let is_complete = self.continue_chain_search(&mut search);
         self.chain_search = search;
         is_complete
     }
 
-    fn extend_chain(&self, ChainSearch { chain, due, .. }: &mut ChainSearch) -> bool {
+    fn continue_chain_search(
+        &self,
+        ConnectedGroupSearch { chain, due, .. }: &mut ConnectedGroupSearch,
+    ) -> bool {
         while let Some(&(id, visited)) = due.last() {
-            let heard = self.heard_by(id).filter(|_| self.has_beacon(id));
+            let heard = self.aircraft_heard_by(id).filter(|_| self.has_beacon(id));
             let Some(heard) = heard else { return false };
             let Some(&other) = heard.get(visited) else {
                 due.pop();
@@ -158,11 +165,11 @@ impl BeaconStore {
 
     /// Returns whether all is known on which the group of an airplane depends.
     pub(super) fn is_complete(&self, id: EntityId) -> bool {
-        self.chain(id).1
+        self.connected_aircraft(id).1
     }
 
     /// Returns the group of an airplane, itself among it, by rising id.
     pub(super) fn group(&self, id: EntityId) -> Vec<EntityId> {
-        self.chain(id).0.into_iter().collect()
+        self.connected_aircraft(id).0.into_iter().collect()
     }
 }

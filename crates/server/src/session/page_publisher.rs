@@ -22,7 +22,7 @@ const MAX_CREDIT: u32 = 1000;
 pub(super) const MAX_SCANNED_BODIES: usize = 16;
 
 /// A page's view of one session.
-pub(super) struct PageView {
+pub(super) struct PagePublisher {
     session: SessionId,
     outbox: Arc<Outbox>,
     encoder: FrameEncoder,
@@ -42,7 +42,7 @@ pub(super) struct PageView {
     last_status: Option<SessionStatus>,
 }
 
-impl PageView {
+impl PagePublisher {
     pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, scenery: &Scenery) -> Self {
         let now = Instant::now();
         Self {
@@ -64,7 +64,7 @@ impl PageView {
     /// Switches to another run.
     pub(super) fn restart(&mut self, scenery: &Scenery) {
         // An unsent frame of the run before is of no use, and its credit is given back.
-        if self.outbox.clear_session(self.session) {
+        if self.outbox.discard_update(self.session) {
             self.credit += 1;
         }
         self.encoder.restart(scenery);
@@ -74,7 +74,7 @@ impl PageView {
     }
 
     /// Records that the run is at another cycle.
-    pub(super) fn mark_moved(&mut self) {
+    pub(super) fn mark_cycle_changed(&mut self) {
         self.is_stale = true;
         self.has_moved = true;
     }
@@ -104,9 +104,9 @@ impl PageView {
         if !self.is_due(now) {
             return;
         }
-        if !self.check_credit(now) {
+        if !self.admit_frame(now) {
             if now >= self.events_due {
-                self.take_events(run, log, now);
+                self.record_events(run, log, now);
             }
             return;
         }
@@ -118,7 +118,7 @@ impl PageView {
 
     /// Forwards a frame of another process, whose events are recorded already, if one is due and there is credit.
     pub(super) fn forward_frame(&mut self, frame: &Frame, log: &mut EventStore, now: Instant) {
-        if self.is_due(now) && self.check_credit(now) {
+        if self.is_due(now) && self.admit_frame(now) {
             self.send_frame(frame, log);
         }
     }
@@ -128,7 +128,7 @@ impl PageView {
     }
 
     /// Returns whether there is credit for the frame that is due. One for which there is none is counted as left out.
-    fn check_credit(&mut self, now: Instant) -> bool {
+    fn admit_frame(&mut self, now: Instant) -> bool {
         let has_credit = self.credit > 0;
         if has_credit {
             self.is_stale = false;
@@ -159,7 +159,7 @@ impl PageView {
     }
 
     /// Takes the events of a run without showing a frame.
-    pub(super) fn take_events(
+    pub(super) fn record_events(
         &mut self,
         run: &mut dyn Simulation,
         log: &mut EventStore,
@@ -186,7 +186,7 @@ impl PageView {
     }
 
     /// Returns whether the last reported status differs from this one.
-    pub(super) fn needs_report(&self, status: &SessionStatus) -> bool {
+    pub(super) fn is_new_status(&self, status: &SessionStatus) -> bool {
         self.last_status.as_ref() != Some(status)
     }
 
