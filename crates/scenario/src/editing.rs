@@ -18,6 +18,22 @@ pub struct Editing {
     pub files: Vec<FileUse>,
     /// Words about the use of such files, for people who choose one.
     pub about_files: &'static str,
+    /// A new scenario that people begin by drawing its map; none for a world without drawn maps.
+    pub drawing: Option<NewDrawing>,
+}
+
+/// A new scenario with an empty floor of a chosen size within walls.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NewDrawing {
+    /// Its noun for people: "scenario of robots".
+    pub name: &'static str,
+    /// What is on the floor, for people who are about to choose its size.
+    pub about: &'static str,
+    /// Its text. The page writes in it `{name}`, as a string of TOML; `{box_size_m}`; `{map}`, the lines of `map.ascii`
+    /// from north to south; and `{column}` and `{row}`, a box in the middle.
+    pub text: &'static str,
+    /// The tool with which drawing begins, by its `id`.
+    pub tool: &'static str,
 }
 
 /// A tool of the page's toolbar.

@@ -107,31 +107,25 @@ export function asciiOf(floor: Pick<OccupancyGrid, "width" | "height">, boxes: U
   return `${lines.join("\n")}\n`;
 }
 
-/** The text of a scenario with an empty map within walls and one robot in the middle. */
-export function emptyScenario(name: string, width: number, height: number, box_m: number): string {
-  const wall = "#".repeat(width);
-  const free = `#${".".repeat(width - 2)}#`;
-  const rows = [wall, ...Array.from({ length: height - 2 }, () => free), wall].join("\n");
-  const [column, row] = [Math.floor(width / 2) - 1, Math.floor(height / 2) - 1];
-  return `# Drawn in the studio. Positions are [column, row] in boxes from the lower-left corner.
+/** What people choose of a new drawing. */
+export interface DrawingChoice {
+  name: string;
+  columns: number;
+  rows: number;
+  box_m: number;
+}
 
-format = 1
-world = "robots"
-name = ${JSON.stringify(name)}
-seed = 1
-
-# Wall #, free . and unknown ?; the first line is the north edge.
-[map]
-box_size_m = ${box_m}
-ascii = """
-${rows}
-"""
-
-[[robots]]
-size = 2
-at = [[${column}, ${row}]]
-sensors = ["sonar-ring"]
-effector = "nomad"
-behaviour = { kind = "wander" }
-`;
+/** The text of a new scenario with an empty map within walls; `template` is what its world declares. */
+export function drawnScenario(template: string, { name, columns, rows, box_m }: DrawingChoice): string {
+  const wall = "#".repeat(columns);
+  const free = `#${".".repeat(columns - 2)}#`;
+  const values: Record<string, string> = {
+    name: JSON.stringify(name),
+    box_size_m: String(box_m),
+    map: [wall, ...Array.from({ length: rows - 2 }, () => free), wall].join("\n"),
+    column: String(Math.floor(columns / 2) - 1),
+    row: String(Math.floor(rows / 2) - 1),
+  };
+  // Only known words: braces are part of TOML, too.
+  return template.replace(/\{(\w+)\}/g, (whole, key: string) => values[key] ?? whole);
 }

@@ -64,6 +64,18 @@ export interface FileUse {
   defaults: [string, number][];
 }
 
+/** A new scenario with an empty floor of a chosen size within walls. */
+export interface NewDrawing {
+  /** Its noun for people. */
+  name: string;
+  /** What is on the floor. */
+  about: string;
+  /** Its text, with places for what is chosen: see `crates/scenario/src/editing.rs`. */
+  text: string;
+  /** The tool with which drawing begins. */
+  tool: string;
+}
+
 export interface Editing {
   tools: Tool[];
   tools_in_space: Tool[];
@@ -71,6 +83,7 @@ export interface Editing {
   notes: EditNote[];
   files: FileUse[];
   about_files: string;
+  drawing: NewDrawing | null;
 }
 
 /** The editing of a world that declares none, or none yet. */
@@ -81,6 +94,7 @@ export const NO_EDITING: Editing = {
   notes: [],
   files: [],
   about_files: "",
+  drawing: null,
 };
 
 /** The editing in a reply of the server. */

@@ -7,7 +7,8 @@ const ALL: Record<string, unknown> = JSON.parse(
   readFileSync(new URL("./editing.json", import.meta.url), "utf8"),
 ) as Record<string, unknown>;
 
-/** Returns the editing of a world; that of robots for a made-up one. */
+/** Returns the editing of a world; that of robots for a made-up one, which cannot be begun by drawing. */
 export function declaredEditing(world: string): Editing {
-  return editingOf(ALL[world] ?? ALL["robots"]);
+  const declared = ALL[world];
+  return declared === undefined ? { ...editingOf(ALL["robots"]), drawing: null } : editingOf(declared);
 }

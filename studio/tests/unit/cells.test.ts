@@ -1,6 +1,7 @@
 import { describe, expect, test } from "vitest";
-import { emptyScenario, AsciiMap, cellOf, cornerPosition, type GridPlacement } from "../../src/edit/ascii-map";
+import { drawnScenario, AsciiMap, cellOf, cornerPosition, type GridPlacement } from "../../src/edit/ascii-map";
 import { changedCells } from "../../src/edit/paint";
+import { declaredEditing } from "../fake/editing";
 import { brushCells, floodCells, lineCells, rectangleCells, type Cell } from "../../src/edit/cells";
 
 const sorted = (cells: Cell[]): string[] => cells.map((cell) => cell.join()).sort();
@@ -123,7 +124,12 @@ describe("a drawn map", () => {
   });
 
   test("an empty map has the requested size", () => {
-    const art = /"""\n([^"]*)"""/.exec(emptyScenario("x", 8, 6, 0.25))![1]!;
+    const choice = { name: 'a "hall"', columns: 8, rows: 6, box_m: 0.25 };
+    const text = drawnScenario(declaredEditing("robots").drawing!.text, choice);
+    expect(text).toContain('name = "a \\"hall\\""');
+    expect(text).toContain("at = [[3, 2]]");
+    expect(text).toContain('behaviour = { kind = "wander" }');
+    const art = /"""\n([^"]*)"""/.exec(text)![1]!;
     const map = new AsciiMap(art, 0.25);
     expect([map.width, map.height]).toEqual([8, 6]);
     expect(map.charAt([0, 3])).toBe("#");

@@ -102,6 +102,35 @@ fn a_default_scenario_shows_every_key_of_its_schema_and_no_other() {
     }
 }
 
+#[test]
+fn a_new_drawing_of_a_world_runs_and_begins_with_one_of_its_tools() {
+    let mut drawings = 0;
+    for kind in WORLDS.iter() {
+        let editing = kind.editing();
+        let Some(drawing) = editing.drawing else { continue };
+        drawings += 1;
+        assert!(editing.tools.iter().any(|tool| tool.id == drawing.tool), "{}", drawing.tool);
+        let wall = "#".repeat(8);
+        let free = format!("#{}#", ".".repeat(6));
+        let map = [&*wall, &free, &free, &free, &free, &wall].join("\n");
+        let values = [
+            ("{name}", "\"A hall\""),
+            ("{box_size_m}", "0.25"),
+            ("{map}", &map),
+            ("{column}", "3"),
+            ("{row}", "2"),
+        ];
+        let mut text = drawing.text.to_string();
+        for (place, value) in values {
+            assert!(text.contains(place), "{place}");
+            text = text.replace(place, value);
+        }
+        let mut run = sidestep::parse(text).start().expect("a valid scenario");
+        assert_eq!(run.advance(10).expect("it runs"), 10);
+    }
+    assert_eq!(drawings, 1, "robots have drawn maps");
+}
+
 /// Gathers the keys of a schema, with their own schemas.
 fn keys(root: &Value, part: &Value, way: &str, found: &mut Vec<(String, Value)>) {
     if let Some(target) = part.get("$ref").and_then(Value::as_str) {

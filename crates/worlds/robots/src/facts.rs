@@ -4,7 +4,7 @@
 use super::decide::External;
 use serde_json::json;
 use sidestep_scenario::editing::{
-    EditAction, EditItems, EditNote, EditTool, Editing, FileUse, PaintArea, UsedFile,
+    EditAction, EditItems, EditNote, EditTool, Editing, FileUse, NewDrawing, PaintArea, UsedFile,
 };
 use sidestep_scenario::facts::{
     GroupSizes, PositionUnit, RecordedPositions, RewardMeasure, RewardTerm, WorldFacts,
@@ -155,5 +155,11 @@ pub(crate) fn editing() -> Editing {
             },
         ],
         about_files: "A map replaces the scenario's own. A profile adds sensors and effectors that robots can use.",
+        drawing: Some(NewDrawing {
+            name: "scenario of robots",
+            about: "An empty floor within walls, and one robot on it. Everything can be changed later.",
+            text: include_str!("drawing.toml"),
+            tool: "brush",
+        }),
     }
 }
