@@ -15,7 +15,7 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, MultiAgentOrder};
-use sidestep::kernel::ports::{TableSchema, Values};
+use sidestep::kernel::ports::{ColumnValues, TableSchema};
 use sidestep::kernel::view::{Body, BodyId, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
@@ -271,7 +271,7 @@ fn draw_error(error: &DrawError) -> PyErr {
 /// Returns a dict of tables by name, also of those without rows.
 fn tables_dict(
     py: Python<'_>,
-    rows: Vec<(TableSchema, Vec<Values>)>,
+    rows: Vec<(TableSchema, Vec<ColumnValues>)>,
 ) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     for (schema, columns) in rows {

@@ -21,7 +21,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
-use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, ColumnValues, TableSchema};
 use sidestep::scenario::{MetricInfo, metric_label};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -46,7 +46,7 @@ pub(crate) struct Table {
 
 impl Table {
     /// Returns a table of these rows; numbers are not copied.
-    pub(crate) fn new(schema: TableSchema, columns: Vec<Values>) -> PyResult<Self> {
+    pub(crate) fn new(schema: TableSchema, columns: Vec<ColumnValues>) -> PyResult<Self> {
         let fields = schema.columns.iter().map(field).collect::<Vec<_>>();
         let about = schema.about.iter().cloned().collect::<HashMap<_, _>>();
         let arrow = Arc::new(Schema::new_with_metadata(fields, about));
@@ -248,23 +248,23 @@ fn field(spec: &ColumnSpec) -> Field {
     Field::new(&spec.name, ty, spec.is_nullable).with_metadata(about)
 }
 
-fn array(spec: &ColumnSpec, values: Values) -> Result<ArrayRef, ArrowError> {
+fn array(spec: &ColumnSpec, values: ColumnValues) -> Result<ArrayRef, ArrowError> {
     Ok(match values {
-        Values::U32(cells) => numbers::<_, UInt32Type>(cells),
-        Values::U64(cells) => numbers::<_, UInt64Type>(cells),
-        Values::I32(cells) => numbers::<_, Int32Type>(cells),
-        Values::I64(cells) => numbers::<_, Int64Type>(cells),
-        Values::F64(cells) => numbers::<_, Float64Type>(cells),
-        Values::Bool(cells) => {
-            Arc::new(cells.iter_options().map(|cell| cell.copied()).collect::<BooleanArray>())
+        ColumnValues::U32(cells) => numbers::<_, UInt32Type>(cells),
+        ColumnValues::U64(cells) => numbers::<_, UInt64Type>(cells),
+        ColumnValues::I32(cells) => numbers::<_, Int32Type>(cells),
+        ColumnValues::I64(cells) => numbers::<_, Int64Type>(cells),
+        ColumnValues::F64(cells) => numbers::<_, Float64Type>(cells),
+        ColumnValues::Bool(cells) => {
+            Arc::new(cells.iter_with_missing().map(|cell| cell.copied()).collect::<BooleanArray>())
         }
-        Values::Label(cells) => {
+        ColumnValues::Label(cells) => {
             let (keys, valid) = cells.into_parts();
             let keys = UInt32Array::new(ScalarBuffer::from(keys), valid.map(NullBuffer::from));
             let labels: ArrayRef = Arc::new(StringArray::from_iter_values(&spec.labels));
             Arc::new(DictionaryArray::<UInt32Type>::try_new(keys, labels)?)
         }
-        Values::Text(texts) => Arc::new(texts.iter_options().collect::<StringArray>()),
+        ColumnValues::Text(texts) => Arc::new(texts.iter_with_missing().collect::<StringArray>()),
     })
 }
 

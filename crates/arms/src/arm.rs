@@ -1,6 +1,6 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
-use super::kinematics::{ArmGoal, ConnectorTargetTracker, SerialChain, Skeleton, Vector};
+use super::kinematics::{ArmGoal, ConnectorTargetSolver, SerialChain, Skeleton, Vector};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
@@ -25,14 +25,14 @@ pub struct Arm {
     /// Joint values at the start, rad or m.
     pub values: Vec<f64>,
     /// Finds joint values that follow its connectors.
-    pub follower: ConnectorTargetTracker,
+    pub follower: ConnectorTargetSolver,
 }
 
 impl Arm {
     /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
         let skeleton = serial.skeleton();
-        let follower = ConnectorTargetTracker::new(&serial, &skeleton);
+        let follower = ConnectorTargetSolver::new(&serial, &skeleton);
         Self { values: follower.clamp(values), skeleton, serial, at_m, follower }
     }
 

@@ -191,7 +191,7 @@ fn receive_messages(child: &mut Child) -> Receiver<LinkMessage> {
         for line in
             out.into_iter().flat_map(|out| BufReader::new(out).lines()).map_while(Result::ok)
         {
-            if let Ok(message) = kinds.resolve_names_in(|| serde_json::from_str(&line))
+            if let Ok(message) = kinds.resolve_names_during(|| serde_json::from_str(&line))
                 && sender.send(message).is_err()
             {
                 return;

@@ -54,7 +54,7 @@ pub use column::AtomicColumn;
 pub use digest::Digest;
 pub use error::InputError;
 pub use interrupt::Interrupt;
-pub use run::{Run, RunSetup};
+pub use run::{Run, RunInputs};
 pub use run_config::{GroupSizeHistogram, RunConfig, RunStats};
 pub use simulation::Simulation;
 pub use units::{Cycle, EntityId, EntitySlot, Seed};

@@ -12,7 +12,7 @@ use crate::interrupt::Interrupt;
 use crate::ports::{RecordError, Recorder, SystemClock, TableBuffer, TableRowsBuffer, TableSchema};
 use crate::run_config::{GroupSizeHistogram, RunConfig, RunStats};
 use crate::simulation::Simulation;
-use crate::text::{KeyValues, StateReport};
+use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::{
@@ -25,7 +25,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// The start of a run: its settings, its state, and the collector beside the state.
-pub struct RunSetup<W: World> {
+pub struct RunInputs<W: World> {
     /// The settings, from the keys that all scenarios share.
     pub config: RunConfig,
     /// The state before the first cycle.
@@ -65,8 +65,8 @@ pub struct Run<W: World> {
 impl<W: ControllableWorld> Run<W> {
     /// Creates a run at its start, with `workers` workers; the world is shared, not copied.
     /// `scenario` is the resolved scenario's text.
-    pub fn new(world: Arc<W>, start: RunSetup<W>, scenario: &str, workers: usize) -> Self {
-        let RunSetup { config, state, collector } = start;
+    pub fn new(world: Arc<W>, start: RunInputs<W>, scenario: &str, workers: usize) -> Self {
+        let RunInputs { config, state, collector } = start;
         let engine = Engine::new(&*world, world.body_count(&state), workers);
         let teams = world.agent_teams();
         Self {
@@ -142,7 +142,7 @@ impl<W: World> Run<W> {
         for worker in engine.worker_states_mut() {
             world.collect(collector, &mut worker.scratch);
         }
-        world.commit_results(collector);
+        world.merge_worker_results(collector);
     }
 
     /// Number of cycles that may run before rows must be recorded.
@@ -301,7 +301,7 @@ impl<W: World> Observer<W> for WorldHookObserver<'_, W> {
         mut scratches: Scratches<'_, W::Scratch>,
     ) -> ControlFlow<()> {
         scratches.for_each(|scratch| self.world.collect(self.collector, scratch));
-        self.world.commit_results(self.collector);
+        self.world.merge_worker_results(self.collector);
         let is_full = self.world.cycles_until_flush(state, self.collector, now + 1) == 0;
         if is_full || self.world.is_over(state) {
             ControlFlow::Break(())
@@ -498,7 +498,7 @@ where
         self.world.summary_lines(&Run::metrics(self))
     }
 
-    fn poses(&self) -> StateReport {
+    fn poses(&self) -> JsonTextReport {
         self.world.poses(&self.state, self.cycle)
     }
 

@@ -9,7 +9,7 @@ use crate::digest::Digest;
 use crate::interrupt::Interrupt;
 use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::run_config::RunConfig;
-use crate::text::{KeyValues, StateReport};
+use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use crate::world::DecisionMode;
@@ -164,7 +164,7 @@ pub trait Simulation: Any + Send {
     fn summary_lines(&self) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self) -> StateReport;
+    fn poses(&self) -> JsonTextReport;
 
     /// Returns the time spent in each phase in this process.
     fn phase_times(&self) -> PhaseTimes;

@@ -7,7 +7,7 @@ pub type KeyValues = Vec<(String, String)>;
 
 /// A statement about a state: as JSON, and in words.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StateReport {
+pub struct JsonTextReport {
     /// The form for machines, which `--json` prints.
     pub json: Value,
     /// The form for people; every line ends in a line feed.

@@ -17,7 +17,7 @@ use crate::control::{AgentTeams, BufferMut, Order, OrderError};
 use crate::digest::Digest;
 use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::run_config::RunStats;
-use crate::text::{KeyValues, StateReport};
+use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId, EntitySlot};
 use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
 use serde::Serialize;
@@ -149,7 +149,7 @@ pub trait World: Phases<State: Send> + Send + 'static {
 
     /// Adds the collected results of all workers to the sums and rows, in an order that does not
     /// depend on each worker's share.
-    fn commit_results(&self, collector: &mut Self::Collector);
+    fn merge_worker_results(&self, collector: &mut Self::Collector);
 }
 
 /// The rows and events that a world keeps during a run.
@@ -310,5 +310,5 @@ pub trait WorldMetrics: World {
     fn summary_lines(&self, metrics: &Self::Metrics) -> KeyValues;
 
     /// Returns the pose of every body at this cycle, as `sidestep replay` prints it.
-    fn poses(&self, state: &Self::State, now: Cycle) -> StateReport;
+    fn poses(&self, state: &Self::State, now: Cycle) -> JsonTextReport;
 }

@@ -11,7 +11,7 @@ use crate::recent_senders::{RecentSenders, drop_counts};
 use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::chain::agents::{
-    ChainAgentControls, ConnectorAgent, ConnectorPercept as Percept,
+    ChainCycleControls, ConnectorAgent, ConnectorPercept as Percept,
 };
 use sidestep::worlds::chain::{ChainRun, ChainWorld, Deployment};
 use sidestep_session::fleet::AgentName;
@@ -113,7 +113,7 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         true
     }
 
-    fn accepts_controls_of_lost_nodes(&self) -> bool {
+    fn accepts_controls_from_lost_nodes(&self) -> bool {
         // What it has sent its neighbors since its decision may be lost with it: they may have decided otherwise, and a rod
         // would tear if only one of its ends moved.
         false
@@ -160,10 +160,10 @@ impl<const D: usize> DistributedWorld for DistributedChains<D> {
         controls.retain(|(agent, _)| invalid.iter().all(|one| one.agent != *agent));
         // The neighbors of a lost connector have decided without its answers: the world must know that it was absent.
         controls
-            .extend(lost.iter().map(|&id| (id, ChainAgentControls::<D>::ABSENT_CONTROL.to_vec())));
+            .extend(lost.iter().map(|&id| (id, ChainCycleControls::<D>::ABSENT_CONTROL.to_vec())));
         let by_chain =
             self.world.decode_agent_controls(run.cycle(), controls).expect("all are valid");
-        let mut by_chain: Vec<Option<ChainAgentControls<D>>> =
+        let mut by_chain: Vec<Option<ChainCycleControls<D>>> =
             by_chain.into_iter().map(Some).collect();
         for group in groups {
             let (chain, _) = self.chain_and_number(group[0]);

@@ -41,13 +41,13 @@ pub trait DistributedWorld: Send + Sync {
     }
 
     /// Returns whether a control counts if it arrived before the node of its agent was lost.
-    fn accepts_controls_of_lost_nodes(&self) -> bool {
+    fn accepts_controls_from_lost_nodes(&self) -> bool {
         true
     }
 
     /// Receives the controls of a round with the given groups, where later rounds depend on them, and removes invalid
     /// ones, which it returns. `lost` are the agents without a node; `controls` has none of theirs unless these count
-    /// ([`DistributedWorld::accepts_controls_of_lost_nodes`]).
+    /// ([`DistributedWorld::accepts_controls_from_lost_nodes`]).
     fn accept_controls(
         &self,
         _run: &dyn Simulation,
@@ -75,7 +75,7 @@ pub trait DistributedWorld: Send + Sync {
     ///
     /// # Errors
     /// When there is no such agent.
-    fn find_agent(&self, name: &AgentName) -> Result<EntityId, InputError> {
+    fn find_agent_id(&self, name: &AgentName) -> Result<EntityId, InputError> {
         self.id(name).ok_or_else(|| {
             let cause = format!("the scenario has no {} {name}", name.noun);
             InputError::new(name.option(), cause, self.agent_hint())

@@ -6,13 +6,13 @@ use sidestep::kernel::ports::Envelope;
 use sidestep::kernel::{Cycle, EntityId};
 
 /// Returns the first ticks of a cycle's conversations, each with its time in seconds after the start of the run.
-type ConversationTimesFn = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
+type ConversationStartsFn = Box<dyn Fn(Cycle) -> Vec<(u64, f64)> + Send>;
 
 /// The faults of the scenario's network, for the packets of one agent.
 pub(crate) struct FaultyChannel {
     injector: FaultInjector,
     sender: EntityId,
-    conversation_starts: ConversationTimesFn,
+    conversation_starts: ConversationStartsFn,
 }
 
 impl FaultyChannel {

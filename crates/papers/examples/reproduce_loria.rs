@@ -3,7 +3,7 @@
 //! `cargo run --release -p sidestep-papers --example reproduce_loria [-- --quick]`; timed runs are
 //! recorded to a temporary folder, column by column.
 
-use sidestep::kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep::kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 use sidestep_papers::loria::{self, LoriaConfig};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -11,18 +11,20 @@ use std::io::{BufWriter, Write};
 /// Writes every column to a file of its own, in the byte order of this machine.
 struct ColumnFiles(Vec<Vec<BufWriter<File>>>);
 
-fn bytes(values: &Values) -> Vec<u8> {
+fn bytes(values: &ColumnValues) -> Vec<u8> {
     match values {
-        Values::U32(v) | Values::Label(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
-        Values::U64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
-        Values::I32(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
-        Values::F64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
+        ColumnValues::U32(v) | ColumnValues::Label(v) => {
+            v.iter().flat_map(|x| x.to_ne_bytes()).collect()
+        }
+        ColumnValues::U64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
+        ColumnValues::I32(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
+        ColumnValues::F64(v) => v.iter().flat_map(|x| x.to_ne_bytes()).collect(),
         other => panic!("robots record no column of {}", other.column_type().name()),
     }
 }
 
 impl Recorder for ColumnFiles {
-    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+    fn append(&mut self, table: usize, block: &[ColumnValues]) -> Result<(), RecordError> {
         for (file, values) in self.0[table].iter_mut().zip(block) {
             file.write_all(&bytes(values)).map_err(|e| RecordError::new("column", e))?;
         }

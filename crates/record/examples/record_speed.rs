@@ -6,7 +6,7 @@
 //! another, as a world does.
 
 use cpu_time::ProcessTime;
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues, Recorder, TableSchema};
 use sidestep_record::{ParquetRecorder, Provenance};
 
 const ROWS: usize = 8_000_000;
@@ -58,7 +58,7 @@ fn schema() -> TableSchema {
 /// A robot: column, row, heading.
 type Robot = (u32, u32, u32);
 
-fn walk(robots: u32, cycles: u64) -> Vec<Vec<Values>> {
+fn walk(robots: u32, cycles: u64) -> Vec<Vec<ColumnValues>> {
     let mut random = 88_172_645_463_325_252;
     let mut next = move || {
         random ^= random << 13;
@@ -80,7 +80,7 @@ fn block(
     first: u64,
     cycles: u64,
     next: &mut impl FnMut() -> u64,
-) -> Vec<Values> {
+) -> Vec<ColumnValues> {
     let (mut cycle, mut robot, mut col, mut row, mut heading) =
         (vec![], vec![], vec![], vec![], vec![]);
     for (r, state) in team.iter_mut().enumerate() {
@@ -94,11 +94,11 @@ fn block(
         }
     }
     vec![
-        Values::U64(cycle.into()),
-        Values::U32(robot.into()),
-        Values::U32(col.into()),
-        Values::U32(row.into()),
-        Values::Label(heading.into()),
+        ColumnValues::U64(cycle.into()),
+        ColumnValues::U32(robot.into()),
+        ColumnValues::U32(col.into()),
+        ColumnValues::U32(row.into()),
+        ColumnValues::Label(heading.into()),
     ]
 }
 

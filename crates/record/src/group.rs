@@ -2,7 +2,7 @@
 
 use parquet::errors::Result;
 use parquet::schema::types::{SchemaDescriptor, TypePtr};
-use sidestep_kernel::ports::{TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, TableSchema};
 
 use crate::encode::ColumnEncoder;
 
@@ -26,8 +26,8 @@ impl RowGroup {
 
     /// Takes as many rows of a block as fit, from `start` on, and returns the first row that is
     /// left.
-    pub(crate) fn fill(&mut self, block: &[Values], start: usize) -> Result<usize> {
-        let rows = block.first().map_or(0, Values::len);
+    pub(crate) fn fill(&mut self, block: &[ColumnValues], start: usize) -> Result<usize> {
+        let rows = block.first().map_or(0, ColumnValues::len);
         let end = rows.min(start + ROWS - self.rows);
         for (column, values) in self.columns.iter_mut().zip(block) {
             column.append(values, start..end)?;

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use parquet::file::metadata::KeyValue;
 use parquet::schema::types::TypePtr;
 use sidestep_kernel::ports::recorder::check_block;
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 
 use crate::disk;
 use crate::group::RowGroup;
@@ -79,7 +79,7 @@ impl ParquetRecorder {
 }
 
 impl Recorder for ParquetRecorder {
-    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+    fn append(&mut self, table: usize, block: &[ColumnValues]) -> Result<(), RecordError> {
         let schema = self.tables.get(table).map(|t| &t.schema);
         check_block(schema.ok_or_else(|| RecordError::new(table, "no such table"))?, block)?;
         self.run_unless_failed(|tables| tables[table].append(block))
@@ -131,7 +131,7 @@ impl TableWriter {
         })
     }
 
-    fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
+    fn append(&mut self, block: &[ColumnValues]) -> Result<(), RecordError> {
         if self.finished {
             return Err(RecordError::new(self.folder.display(), "the table is finished"));
         }

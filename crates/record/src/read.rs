@@ -14,7 +14,9 @@ use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::statistics::Statistics;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::table::TextCells;
-use sidestep_kernel::ports::{Cells, ColumnSpec, ColumnType, RecordError, TableSchema, Values};
+use sidestep_kernel::ports::{
+    Cells, ColumnSpec, ColumnType, ColumnValues, RecordError, TableSchema,
+};
 
 use crate::disk;
 use crate::format::FormatVersion;
@@ -34,7 +36,7 @@ pub struct Table {
     /// Name and columns, as declared.
     pub schema: TableSchema,
     /// The values, one entry for each column of the schema, all of one length.
-    pub columns: Vec<Values>,
+    pub columns: Vec<ColumnValues>,
     /// Scenario, seed and version of the run.
     pub origin: Provenance,
     /// Whether the run has ended; otherwise the rows reach to its last checkpoint.
@@ -44,11 +46,11 @@ pub struct Table {
 impl Table {
     /// Returns the number of rows, which all columns have.
     pub fn rows(&self) -> usize {
-        self.columns.first().map_or(0, Values::len)
+        self.columns.first().map_or(0, ColumnValues::len)
     }
 
     /// Returns the values of the column `name`; `None` if the table has no such column.
-    pub fn column(&self, name: &str) -> Option<&Values> {
+    pub fn column(&self, name: &str) -> Option<&ColumnValues> {
         Some(&self.columns[position(&self.schema, name)?])
     }
 }
@@ -259,11 +261,15 @@ impl<'a> PartReader<'a> {
     }
 
     fn empty_table(&self, complete: bool) -> Table {
-        let columns = self.schema.columns.iter().map(|c| Values::empty(c.ty)).collect();
+        let columns = self.schema.columns.iter().map(|c| ColumnValues::empty(c.ty)).collect();
         Table { schema: self.schema.clone(), columns, origin: self.origin.clone(), complete }
     }
 
-    fn read_into(&self, columns: &mut [Values], cycles: CycleRange) -> Result<(), InputError> {
+    fn read_into(
+        &self,
+        columns: &mut [ColumnValues],
+        cycles: CycleRange,
+    ) -> Result<(), InputError> {
         (0..self.file.num_row_groups())
             .try_for_each(|group| self.read_group_into(group, columns, cycles))
     }
@@ -272,7 +278,7 @@ impl<'a> PartReader<'a> {
     fn read_group_into(
         &self,
         group: usize,
-        columns: &mut [Values],
+        columns: &mut [ColumnValues],
         cycles: CycleRange,
     ) -> Result<(), InputError> {
         let cycle_column = position(&self.schema, CYCLE);
@@ -289,7 +295,7 @@ impl<'a> PartReader<'a> {
     }
 
     /// Returns all rows of one row group.
-    fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
+    fn read_group(&self, group: usize) -> ParquetResult<Vec<ColumnValues>> {
         check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
         let group = self.file.get_row_group(group)?;
         let rows = group.metadata().num_rows();
@@ -376,11 +382,16 @@ fn bounds(group: &RowGroupMetaData, column: usize) -> Option<(u64, u64)> {
 }
 
 /// Appends the rows with a cycle in the range; without a column of cycles all of them.
-fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycles: CycleRange) {
+fn append(
+    columns: &mut [ColumnValues],
+    rows: Vec<ColumnValues>,
+    cycle: Option<usize>,
+    cycles: CycleRange,
+) {
     let keep: Option<Vec<bool>> = match cycle.map(|c| &rows[c]) {
         _ if cycles.is_all() => None,
-        Some(Values::U64(v)) => Some(v.iter().map(|&c| cycles.contains(c)).collect()),
-        Some(Values::U32(v)) => Some(v.iter().map(|&c| cycles.contains(c.into())).collect()),
+        Some(ColumnValues::U64(v)) => Some(v.iter().map(|&c| cycles.contains(c)).collect()),
+        Some(ColumnValues::U32(v)) => Some(v.iter().map(|&c| cycles.contains(c.into())).collect()),
         _ => None,
     };
     for (column, mut values) in columns.iter_mut().zip(rows) {
@@ -391,7 +402,7 @@ fn append(columns: &mut [Values], rows: Vec<Values>, cycle: Option<usize>, cycle
     }
 }
 
-fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<Values> {
+fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<ColumnValues> {
     use ColumnReader::{
         BoolColumnReader, ByteArrayColumnReader, DoubleColumnReader, Int32ColumnReader,
         Int64ColumnReader,
@@ -399,20 +410,22 @@ fn read_column(reader: ColumnReader, spec: &ColumnSpec) -> ParquetResult<Values>
     let nullable = spec.is_nullable;
     Ok(match (reader, spec.ty) {
         (Int32ColumnReader(r), ColumnType::U32) => {
-            Values::U32(read_cells(r, nullable, |v| Ok(v as u32))?)
+            ColumnValues::U32(read_cells(r, nullable, |v| Ok(v as u32))?)
         }
-        (Int32ColumnReader(r), ColumnType::I32) => Values::I32(read_cells(r, nullable, Ok)?),
+        (Int32ColumnReader(r), ColumnType::I32) => ColumnValues::I32(read_cells(r, nullable, Ok)?),
         (Int64ColumnReader(r), ColumnType::U64) => {
-            Values::U64(read_cells(r, nullable, |v| Ok(v as u64))?)
+            ColumnValues::U64(read_cells(r, nullable, |v| Ok(v as u64))?)
         }
-        (Int64ColumnReader(r), ColumnType::I64) => Values::I64(read_cells(r, nullable, Ok)?),
-        (DoubleColumnReader(r), ColumnType::F64) => Values::F64(read_cells(r, nullable, Ok)?),
-        (BoolColumnReader(r), ColumnType::Bool) => Values::Bool(read_cells(r, nullable, Ok)?),
+        (Int64ColumnReader(r), ColumnType::I64) => ColumnValues::I64(read_cells(r, nullable, Ok)?),
+        (DoubleColumnReader(r), ColumnType::F64) => ColumnValues::F64(read_cells(r, nullable, Ok)?),
+        (BoolColumnReader(r), ColumnType::Bool) => ColumnValues::Bool(read_cells(r, nullable, Ok)?),
         (ByteArrayColumnReader(r), ColumnType::Label) => {
             let mut index = LabelIndex::new(spec);
-            Values::Label(read_cells(r, nullable, |label| index.index_of(&label))?)
+            ColumnValues::Label(read_cells(r, nullable, |label| index.index_of(&label))?)
         }
-        (ByteArrayColumnReader(r), ColumnType::Text) => Values::Text(read_texts(r, nullable)?),
+        (ByteArrayColumnReader(r), ColumnType::Text) => {
+            ColumnValues::Text(read_texts(r, nullable)?)
+        }
         _ => return Err(ParquetError::General(format!("column `{}` has another type", spec.name))),
     })
 }

@@ -25,7 +25,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{Cells, ColumnType, ColumnWithRole, RecordError, Values};
+use sidestep_kernel::ports::{Cells, ColumnType, ColumnValues, ColumnWithRole, RecordError};
 
 use crate::disk;
 use crate::format::{self, FormatVersion};
@@ -236,10 +236,16 @@ fn write_column<R>(
         Some(valid) => valid[rows.clone()].iter().map(|valid| i16::from(*valid)).collect(),
     };
     match values {
-        Values::I64(v) => write_values::<Int64Type>(column.typed(), &levels, present(v, rows)),
-        Values::F64(v) => write_values::<DoubleType>(column.typed(), &levels, present(v, rows)),
-        Values::Bool(v) => write_values::<BoolType>(column.typed(), &levels, present(v, rows)),
-        Values::Text(v) => {
+        ColumnValues::I64(v) => {
+            write_values::<Int64Type>(column.typed(), &levels, present(v, rows))
+        }
+        ColumnValues::F64(v) => {
+            write_values::<DoubleType>(column.typed(), &levels, present(v, rows))
+        }
+        ColumnValues::Bool(v) => {
+            write_values::<BoolType>(column.typed(), &levels, present(v, rows))
+        }
+        ColumnValues::Text(v) => {
             let texts = rows.filter_map(|row| v.get(row)).map(ByteArray::from).collect();
             write_values::<ByteArrayType>(column.typed(), &levels, texts)
         }
@@ -341,7 +347,7 @@ struct TableReader<R> {
     /// The role of each column; `None` for those that this version does not have, which are left out.
     roles: Vec<Option<R>>,
     /// A column without rows for each of the file.
-    empty: Vec<Values>,
+    empty: Vec<ColumnValues>,
 }
 
 impl<R: DeserializeOwned + Clone> TableReader<R> {
@@ -366,14 +372,14 @@ impl<R: DeserializeOwned + Clone> TableReader<R> {
         Ok(Self { bytes, file, program_version, checksums, names, roles, empty })
     }
 
-    fn read_group(&self, group: usize) -> ParquetResult<Vec<Values>> {
+    fn read_group(&self, group: usize) -> ParquetResult<Vec<ColumnValues>> {
         check_bytes(&self.bytes, self.file.metadata(), group, &self.checksums)?;
         let mut values = self.empty.clone();
         read_group(self.file.get_row_group(group)?.as_ref(), &mut values)?;
         Ok(values)
     }
 
-    fn table(&self, values: Vec<Values>) -> LoadedTable<R> {
+    fn table(&self, values: Vec<ColumnValues>) -> LoadedTable<R> {
         let mut columns = Vec::new();
         for ((name, role), values) in self.names.iter().zip(&self.roles).zip(values) {
             if let Some(role) = role.clone() {
@@ -410,7 +416,7 @@ fn cannot_open(path: &Path, e: &io::Error) -> InputError {
 fn empty_values(
     file: &SerializedFileReader<File>,
     entries: &[RoleColumnEntry],
-) -> ParquetResult<Vec<Values>> {
+) -> ParquetResult<Vec<ColumnValues>> {
     let stored = file.metadata().file_metadata().schema_descr();
     if stored.num_columns() != entries.len() {
         return Err(columns_differ());
@@ -419,15 +425,15 @@ fn empty_values(
     columns.map(|(entry, column)| empty_column(entry, column)).collect()
 }
 
-fn empty_column(entry: &RoleColumnEntry, column: &ColumnDescriptor) -> ParquetResult<Values> {
+fn empty_column(entry: &RoleColumnEntry, column: &ColumnDescriptor) -> ParquetResult<ColumnValues> {
     if column.name() != entry.name || column.max_def_level() != 1 || column.max_rep_level() != 0 {
         return Err(columns_differ());
     }
     match column.physical_type() {
-        PhysicalType::INT64 => Ok(Values::empty(ColumnType::I64)),
-        PhysicalType::DOUBLE => Ok(Values::empty(ColumnType::F64)),
-        PhysicalType::BOOLEAN => Ok(Values::empty(ColumnType::Bool)),
-        PhysicalType::BYTE_ARRAY => Ok(Values::empty(ColumnType::Text)),
+        PhysicalType::INT64 => Ok(ColumnValues::empty(ColumnType::I64)),
+        PhysicalType::DOUBLE => Ok(ColumnValues::empty(ColumnType::F64)),
+        PhysicalType::BOOLEAN => Ok(ColumnValues::empty(ColumnType::Bool)),
+        PhysicalType::BYTE_ARRAY => Ok(ColumnValues::empty(ColumnType::Text)),
         _ => Err(columns_differ()),
     }
 }
@@ -436,15 +442,15 @@ fn columns_differ() -> ParquetError {
     ParquetError::General(format!("its columns are not those of `{COLUMNS}`"))
 }
 
-fn read_group(group: &dyn RowGroupReader, columns: &mut [Values]) -> ParquetResult<()> {
+fn read_group(group: &dyn RowGroupReader, columns: &mut [ColumnValues]) -> ParquetResult<()> {
     use parquet::column::reader::ColumnReader as Reader;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
     for (i, values) in columns.iter_mut().enumerate() {
         let read = match group.get_column_reader(i)? {
-            Reader::Int64ColumnReader(r) => Values::I64(read_cells(r, true, Ok)?),
-            Reader::DoubleColumnReader(r) => Values::F64(read_cells(r, true, Ok)?),
-            Reader::BoolColumnReader(r) => Values::Bool(read_cells(r, true, Ok)?),
-            Reader::ByteArrayColumnReader(r) => Values::Text(read_texts(r, true)?),
+            Reader::Int64ColumnReader(r) => ColumnValues::I64(read_cells(r, true, Ok)?),
+            Reader::DoubleColumnReader(r) => ColumnValues::F64(read_cells(r, true, Ok)?),
+            Reader::BoolColumnReader(r) => ColumnValues::Bool(read_cells(r, true, Ok)?),
+            Reader::ByteArrayColumnReader(r) => ColumnValues::Text(read_texts(r, true)?),
             _ => return Err(ParquetError::General(format!("column {i} has another type"))),
         };
         if read.len() != rows {
@@ -460,7 +466,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn column(name: &str, values: Values) -> ColumnWithRole<String> {
+    fn column(name: &str, values: ColumnValues) -> ColumnWithRole<String> {
         ColumnWithRole { name: name.into(), role: "metric".into(), values }
     }
 
@@ -488,12 +494,12 @@ mod tests {
         ) {
             let text = |s: &String| (!s.is_empty()).then(|| s.clone());
             let columns = [
-                column("a.b", Values::I64(rows.iter().map(|r| r.0).collect())),
-                column("b", Values::F64(
+                column("a.b", ColumnValues::I64(rows.iter().map(|r| r.0).collect())),
+                column("b", ColumnValues::F64(
                     rows.iter().map(|r| r.1.filter(|x| !x.is_nan())).collect(),
                 )),
-                column("c", Values::Bool(rows.iter().map(|r| r.2).collect())),
-                column("d", Values::Text(rows.iter().map(|r| text(&r.3)).collect())),
+                column("c", ColumnValues::Bool(rows.iter().map(|r| r.2).collect())),
+                column("d", ColumnValues::Text(rows.iter().map(|r| text(&r.3)).collect())),
             ];
             prop_assert_eq!(back(&columns), columns);
         }
@@ -503,7 +509,7 @@ mod tests {
     fn a_table_of_several_row_groups_survives_its_file() {
         let n = GROUP_ROWS + 5;
         let odd = |k: usize| (k % 2 == 1).then_some(k as i64);
-        let columns = [column("k", Values::I64((0..n).map(odd).collect()))];
+        let columns = [column("k", ColumnValues::I64((0..n).map(odd).collect()))];
         assert_eq!(back(&columns), columns);
     }
 
@@ -511,7 +517,7 @@ mod tests {
     fn a_changed_byte_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
-        let columns = [column("k", Values::I64((0..1000).map(Some).collect()))];
+        let columns = [column("k", ColumnValues::I64((0..1000).map(Some).collect()))];
         write(&path, &columns.iter().collect::<Vec<_>>(), "0.1.0", &[]).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for place in [10, whole.len() / 3] {

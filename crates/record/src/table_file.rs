@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use sidestep_kernel::ports::recorder::check_block;
-use sidestep_kernel::ports::{RecordError, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, RecordError, TableSchema};
 
 use crate::disk;
 use crate::group::RowGroup;
@@ -41,13 +41,13 @@ impl TableFileWriter {
         })
     }
 
-    /// Appends rows: one [`Values`] per column, all of the same length.
+    /// Appends rows: one [`ColumnValues`] per column, all of the same length.
     ///
     /// # Errors
     /// A block that does not match the schema; an I/O error.
-    pub fn append(&mut self, block: &[Values]) -> Result<(), RecordError> {
+    pub fn append(&mut self, block: &[ColumnValues]) -> Result<(), RecordError> {
         check_block(&self.schema, block)?;
-        let rows = block.first().map_or(0, Values::len);
+        let rows = block.first().map_or(0, ColumnValues::len);
         let mut start = 0;
         while start < rows {
             let filled = self.group.fill(block, start);

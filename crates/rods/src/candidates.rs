@@ -6,8 +6,8 @@ use super::geometry::{
     dot, lerp, norm, normalized, scaled, sub, unit_x,
 };
 use super::interval::{
-    self, AngleInterval, RodReach, TurnDirection, bend_forbidden_arc, block_rod, block_rod_tip,
-    min_turn_to_free_rad,
+    self, AngleInterval, RodTurnCircle, TurnDirection, add_tip_blocked_arcs, bend_forbidden_arc,
+    block_rod, min_turn_to_free_rad,
 };
 use super::motion_context::{
     BlockingPart, BlockingPartOwner, IncompleteVeto, MotionContext, SKIN_M, SlaveStep,
@@ -51,7 +51,7 @@ pub(super) struct CandidateScratch<const D: usize> {
 
 /// Pushes, pulls or resizes one rod; returns the slave's new place, bit-identical if it stays.
 #[inline]
-pub(super) fn guide_line_position<const D: usize>(
+pub(super) fn guide_line_slave_position<const D: usize>(
     [mo, mn, so]: [Point<D>; 3],
     rod: Rod,
     min_move_m: f64,
@@ -101,13 +101,16 @@ impl<const D: usize> MotionContext<'_, D> {
         scratch.has_other_side = false;
         let connector = &self.chain.connectors()[step.slave];
         if connector.is_still() {
-            return self.place_fixed_slave(step, scratch);
+            return self.add_immovable_slave_candidate(step, scratch);
         }
         if matches!(connector.mobility, Mobility::OnSegment(_) | Mobility::OnPlane { .. }) {
             return self.add_line_candidates(step, scratch);
         }
-        let guided =
-            guide_line_position([step.mo, step.mn, step.so], step.rod, self.chain.min_move_m());
+        let guided = guide_line_slave_position(
+            [step.mo, step.mn, step.so],
+            step.rod,
+            self.chain.min_move_m(),
+        );
         if let Some(reaction) = self.reaction {
             return self.place_by_reaction(reaction, step, guided, scratch);
         }
@@ -126,7 +129,7 @@ impl<const D: usize> MotionContext<'_, D> {
         match self.rules.rotation {
             RotationRule::Never => Err(objection),
             RotationRule::Literal => self.rotate_once(step, guided, scratch),
-            RotationRule::Union => self.find_rotated_places(step, guided, objection, scratch),
+            RotationRule::Union => self.find_turn_candidates(step, guided, objection, scratch),
         }
     }
 
@@ -194,7 +197,7 @@ impl<const D: usize> MotionContext<'_, D> {
     }
 
     /// Handles a slave that never moves: it objects unless the rod is within its limits as it is.
-    fn place_fixed_slave(
+    fn add_immovable_slave_candidate(
         &self,
         step: &SlaveStep<D>,
         scratch: &mut CandidateScratch<D>,
@@ -251,7 +254,7 @@ impl<const D: usize> MotionContext<'_, D> {
         let hits = scratch
             .blocks
             .iter()
-            .filter_map(|block| RodObstacleHit::from_block(step, guided, block));
+            .filter_map(|block| RodObstacleHit::from_blocking_part(step, guided, block));
         let first = hits
             .min_by(|a, b| a.from_master_m.total_cmp(&b.from_master_m).then(a.name.cmp(&b.name)));
         let at = first.and_then(|hit| hit.tangent_place(step, guided)).unwrap_or(guided);
@@ -264,7 +267,7 @@ impl<const D: usize> MotionContext<'_, D> {
 
     /// Applies the union rule: for the rod's length, and for others it may have, finds the nearest
     /// directions free of all obstacles.
-    fn find_rotated_places(
+    fn find_turn_candidates(
         &self,
         step: &SlaveStep<D>,
         guided: Point<D>,
@@ -374,7 +377,11 @@ struct RodObstacleHit<const D: usize> {
 }
 
 impl<const D: usize> RodObstacleHit<D> {
-    fn from_block(step: &SlaveStep<D>, guided: Point<D>, block: &BlockingPart<D>) -> Option<Self> {
+    fn from_blocking_part(
+        step: &SlaveStep<D>,
+        guided: Point<D>,
+        block: &BlockingPart<D>,
+    ) -> Option<Self> {
         let nearest = block.core.nearest_to_segment([step.mn, guided]);
         let radius_m = block.radius_m + step.rod.radius_m;
         (nearest.distance_m < radius_m).then(|| Self {
@@ -497,7 +504,7 @@ impl<const D: usize> PlanarDirectionSearch<'_, D> {
         let s = add_scaled(self.step.mn, u, self.length_m);
         let mut has_added = false;
         for (k, block) in self.blocks.iter().enumerate() {
-            if !known.known[k] && self.intersects_block(s, block) {
+            if !known.known[k] && self.intersects_blocking_part(s, block) {
                 known.known[k] = true;
                 self.add_blocked_arcs(block, known);
                 has_added = true;
@@ -506,7 +513,7 @@ impl<const D: usize> PlanarDirectionSearch<'_, D> {
         has_added
     }
 
-    fn intersects_block(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
+    fn intersects_blocking_part(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
         // More than the skin in the arcs, so that no direction in an arc looks free by rounding.
         let near_m = block.radius_m + 2.0 * SKIN_M;
         let rod = [self.step.mn, s];
@@ -516,7 +523,7 @@ impl<const D: usize> PlanarDirectionSearch<'_, D> {
 
     fn add_blocked_arcs(&self, block: &BlockingPart<D>, known: &mut BlockedArcs) {
         let step = self.step;
-        let reach = RodReach { master: to_plane(step.mn), length_m: self.length_m };
+        let reach = RodTurnCircle { master: to_plane(step.mn), length_m: self.length_m };
         let core = project_core_to_plane(&block.core);
         let apart_m = core.nearest_to_point(reach.master).distance_m;
         let rod_m = block.radius_m + step.rod.radius_m;
@@ -528,7 +535,7 @@ impl<const D: usize> PlanarDirectionSearch<'_, D> {
         }
         if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
             let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
-            block_rod_tip(&reach, &core, tip_m, &mut known.arcs);
+            add_tip_blocked_arcs(&reach, &core, tip_m, &mut known.arcs);
         }
     }
 }

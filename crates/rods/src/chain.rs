@@ -142,7 +142,7 @@ const CLOSABLE_FRACTION: f64 = 1e-3;
 /// Returns the least of radii and rod lengths. Rods that can close would make every sub-step tiny, so they
 /// count only where there is nothing else.
 fn smallest_part_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
-    let open = rods.iter().filter(|rod| !can_ends_meet(rod)).map(|rod| rod.min_m);
+    let open = rods.iter().filter(|rod| !can_retract_fully(rod)).map(|rod| rod.min_m);
     let min_m = open.chain(radii).fold(f64::INFINITY, f64::min);
     if min_m.is_finite() {
         return min_m;
@@ -152,7 +152,7 @@ fn smallest_part_m(rods: &[Rod], radii: impl Iterator<Item = f64>) -> f64 {
 
 /// Returns whether the ends of a rod can meet, or nearly so. A least length of 0 is not allowed, so the joints of
 /// prismatic arms that retract to nothing have a tiny one.
-fn can_ends_meet(rod: &Rod) -> bool {
+fn can_retract_fully(rod: &Rod) -> bool {
     rod.min_m < CLOSABLE_FRACTION * rod.max_m
 }
 

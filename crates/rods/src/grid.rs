@@ -132,7 +132,7 @@ impl<const D: usize> CellLayout<D> {
         loop {
             let cells = Self::from_bounds(&around, cell_m);
             if cells.len() <= MAX_CELLS_PER_BOX * (n + 1)
-                && cells.sum_cell_counts(bounds) <= MAX_ENTRIES_PER_BOX * (n + 1)
+                && cells.count_cells_of_boxes(bounds) <= MAX_ENTRIES_PER_BOX * (n + 1)
             {
                 return cells;
             }
@@ -148,7 +148,7 @@ impl<const D: usize> CellLayout<D> {
     }
 
     /// Returns the number of cells that boxes meet, summed over the boxes.
-    fn sum_cell_counts(&self, bounds: &[Aabb<D>]) -> usize {
+    fn count_cells_of_boxes(&self, bounds: &[Aabb<D>]) -> usize {
         bounds.iter().map(|b| self.count_cells(b)).sum()
     }
 

@@ -36,7 +36,7 @@ impl AngleInterval {
 
 /// What of a rod decides in which directions an obstacle is in its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RodReach {
+pub(super) struct RodTurnCircle {
     pub(crate) master: Point<2>,
     pub(crate) length_m: f64,
 }
@@ -44,7 +44,7 @@ pub(super) struct RodReach {
 /// Adds the directions in which a rod of no thickness meets the points within `radius_m` of a
 /// core. Returns false, and adds nothing, where the master itself is inside.
 pub(super) fn block_rod(
-    reach: &RodReach,
+    reach: &RodTurnCircle,
     core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -62,7 +62,7 @@ pub(super) fn block_rod(
 }
 
 fn block_by_capsule(
-    reach: &RodReach,
+    reach: &RodTurnCircle,
     [a, b]: [Point<2>; 2],
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -170,8 +170,8 @@ fn clip_to_circle(a: Point<2>, d: Point<2>, reach_m: f64) -> [Option<Point<2>>; 
 
 /// Adds the directions in which the rod's far end is within `radius_m` of a core: arcs of the
 /// circle on which it turns, up to four for a capsule.
-pub(super) fn block_rod_tip(
-    reach: &RodReach,
+pub(super) fn add_tip_blocked_arcs(
+    reach: &RodTurnCircle,
     core: &ConvexCore<2>,
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -188,7 +188,7 @@ pub(super) fn block_rod_tip(
 }
 
 fn add_tip_arcs_of_capsule(
-    reach: &RodReach,
+    reach: &RodTurnCircle,
     [a, b]: [Point<2>; 2],
     radius_m: f64,
     arcs: &mut Vec<AngleInterval>,
@@ -373,14 +373,14 @@ mod tests {
         std::env::var("SIDESTEP_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
     }
 
-    fn tip(reach: &RodReach, angle_rad: f64) -> Point<2> {
-        let RodReach { master: [x, y], length_m } = *reach;
+    fn tip(reach: &RodTurnCircle, angle_rad: f64) -> Point<2> {
+        let RodTurnCircle { master: [x, y], length_m } = *reach;
         [x + length_m * math::cos(angle_rad), y + length_m * math::sin(angle_rad)]
     }
 
     #[derive(Debug, Clone)]
     struct Case {
-        reach: RodReach,
+        reach: RodTurnCircle,
         core: ConvexCore<2>,
         radius_m: f64,
         tip_radius_m: f64,
@@ -404,7 +404,7 @@ mod tests {
         let angles = prop::collection::vec(0.0..TAU, 8);
         (point(), 0.05..2.5f64, core, radii, angles).prop_map(
             |(master, length_m, core, (radius_m, more_m), angles_rad)| Case {
-                reach: RodReach { master, length_m },
+                reach: RodTurnCircle { master, length_m },
                 core,
                 radius_m,
                 tip_radius_m: radius_m + more_m,
@@ -423,7 +423,7 @@ mod tests {
             return Ok(());
         }
         let mut tips = Vec::new();
-        block_rod_tip(reach, core, *tip_radius_m, &mut tips);
+        add_tip_blocked_arcs(reach, core, *tip_radius_m, &mut tips);
         let borders = arcs
             .iter()
             .chain(&tips)
@@ -466,7 +466,7 @@ mod tests {
 
     /// Returns the depth of the rod, or its end, in any core, meters.
     fn depth_m(
-        reach: &RodReach,
+        reach: &RodTurnCircle,
         cores: &[ConvexCore<2>],
         [rod_m, tip_m]: [f64; 2],
         angle_rad: f64,
@@ -490,13 +490,13 @@ mod tests {
             rod_m in 0.01..0.2f64, more_m in 0.01..0.3f64, start_rad in 0.0..TAU,
         ) {
             // Walls in a row: where one ends the next begins.
-            let reach = RodReach { master, length_m };
+            let reach = RodTurnCircle { master, length_m };
             let cores: Vec<_> =
                 corners.windows(2).map(|ends| ConvexCore::Segment([ends[0], ends[1]])).collect();
             let (mut arcs, radii_m) = (Vec::new(), [rod_m, rod_m + more_m]);
             for core in &cores {
                 prop_assume!(block_rod(&reach, core, rod_m, &mut arcs));
-                block_rod_tip(&reach, core, radii_m[1], &mut arcs);
+                add_tip_blocked_arcs(&reach, core, radii_m[1], &mut arcs);
             }
             for (side, sign) in [(TurnDirection::Left, 1.0), (TurnDirection::Right, -1.0)] {
                 let turn_rad = min_turn_to_free_rad(&arcs, start_rad, side);

@@ -43,7 +43,7 @@ pub(super) struct SeparationBounds<const D: usize> {
 
 impl<const D: usize> SeparationBounds<D> {
     /// Returns whether a chain is long enough for this to be worth the effort.
-    pub(super) fn is_chain_long_enough(chain: &Chain<D>) -> bool {
+    pub(super) fn has_enough_rods(chain: &Chain<D>) -> bool {
         chain.rods().len() >= MIN_RODS
     }
 

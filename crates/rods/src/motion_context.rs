@@ -217,13 +217,18 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         };
         // Each rod stands for the connector at its lower end, so that none is visited twice.
         let is_last = other + 2 == self.chain.connectors().len();
-        let lower = self.own_blocking_connector(other, rod, tip);
-        let upper = is_last.then(|| self.own_blocking_connector(other + 1, rod, tip));
+        let lower = self.own_connector_blocking_part(other, rod, tip);
+        let upper = is_last.then(|| self.own_connector_blocking_part(other + 1, rod, tip));
         [Some(own_rod), Some(lower), upper].map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
     }
 
     #[inline]
-    fn own_blocking_connector(&self, c: usize, rod: Option<usize>, tip: usize) -> BlockingPart<D> {
+    fn own_connector_blocking_part(
+        &self,
+        c: usize,
+        rod: Option<usize>,
+        tip: usize,
+    ) -> BlockingPart<D> {
         BlockingPart {
             core: ConvexCore::Point(self.position(c)),
             radius_m: self.chain.connectors()[c].radius_m,

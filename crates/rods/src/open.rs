@@ -7,7 +7,7 @@
 //! motions of the same connector overlap likewise: each follows the one before it, two connectors
 //! behind.
 
-use super::candidates::guide_line_position;
+use super::candidates::guide_line_slave_position;
 use super::chain::{Chain, Rod};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
@@ -48,8 +48,8 @@ fn sweep<const D: usize, const NEARLY: bool>(
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
     let from = std::mem::replace(&mut points[k], to);
-    let mut sweeps =
-        ChainDirection::BOTH.map(|direction| ObstacleFreeSweep::start(direction, k, from, to));
+    let mut sweeps = ChainDirection::BOTH
+        .map(|direction| ObstacleFreePropagation::start(direction, k, from, to));
     let [up, down] = &mut sweeps;
     // In turn until one has ended, then the rest of the other one.
     while up.advance::<NEARLY>(points, rods, min_move_m)
@@ -84,11 +84,11 @@ pub(super) fn pull_through_targets<const D: usize>(
         std::array::from_fn::<_, MAX_BATCH, _>(|j| {
             // Sweeps beyond the last motion fill the array and are never advanced.
             let j = j.min(to.len() - 1);
-            ObstacleFreeSweep::start(direction, k, motion_start_point(at, to, j), to[j])
+            ObstacleFreePropagation::start(direction, k, motion_start_point(at, to, j), to[j])
         })
     });
     for sweeps in &mut sweeps {
-        advance_sweep_batch(&mut sweeps[..to.len()], points, rods, min_move_m);
+        run_staggered_sweeps(&mut sweeps[..to.len()], points, rods, min_move_m);
     }
     let [up, down] = sweeps;
     let mut travel_m = 0.0;
@@ -109,8 +109,8 @@ fn motion_start_point<const D: usize>(at: Point<D>, to: &[Point<D>], j: usize) -
     if j == 0 { at } else { to[j - 1] }
 }
 
-fn advance_sweep_batch<const D: usize>(
-    sweeps: &mut [ObstacleFreeSweep<D>],
+fn run_staggered_sweeps<const D: usize>(
+    sweeps: &mut [ObstacleFreePropagation<D>],
     points: &mut [Point<D>],
     rods: &[Rod],
     min_move_m: f64,
@@ -130,7 +130,7 @@ fn advance_sweep_batch<const D: usize>(
 }
 
 /// One sweep, outward from the initiator.
-struct ObstacleFreeSweep<const D: usize> {
+struct ObstacleFreePropagation<const D: usize> {
     direction: ChainDirection,
     /// The connector that moved last, and its position before and after.
     master: usize,
@@ -141,7 +141,7 @@ struct ObstacleFreeSweep<const D: usize> {
     longest2: f64,
 }
 
-impl<const D: usize> ObstacleFreeSweep<D> {
+impl<const D: usize> ObstacleFreePropagation<D> {
     /// Returns the sweep of connector `k` that moves.
     fn start(direction: ChainDirection, k: usize, mo: Point<D>, mn: Point<D>) -> Self {
         Self { direction, master: k, mo, mn, changed: 0, longest2: 0.0 }
@@ -158,7 +158,7 @@ impl<const D: usize> ObstacleFreeSweep<D> {
         let Some(slave) = self.direction.next(self.master, points.len()) else { return false };
         let so = points[slave];
         let rod = rods[slave.min(self.master)];
-        let guided = guide_line_position([self.mo, self.mn, so], rod, min_move_m);
+        let guided = guide_line_slave_position([self.mo, self.mn, so], rod, min_move_m);
         let new = if NEARLY && distance(guided, so) <= min_move_m { so } else { guided };
         if new == so && self.may_end_at(slave, points, rods) {
             return false;

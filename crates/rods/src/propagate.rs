@@ -150,7 +150,7 @@ impl<const D: usize> Propagator<D> {
             return Ok(MotionOutcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
-        if self.reaction.is_none() && self.try_batch_pull(chain, obstacles, &driven, n) {
+        if self.reaction.is_none() && self.try_substep_batch(chain, obstacles, &driven, n) {
             return Ok(MotionOutcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
@@ -215,7 +215,7 @@ impl<const D: usize> Propagator<D> {
         // applies, so which of them runs is a matter of speed alone. The cheap ones know the built-in
         // reaction only.
         let is_built_in = self.reaction.is_none();
-        let is_open = is_built_in && is_obstacle_free(chain, obstacles, &driven);
+        let is_open = is_built_in && can_only_self_collide(chain, obstacles, &driven);
         if is_open && !self.rules.self_collision {
             open::pull_chain_by_connector(
                 chain,
@@ -226,11 +226,11 @@ impl<const D: usize> Propagator<D> {
             );
             return Ok(());
         }
-        if is_open && self.pull_if_parts_separated(chain, &driven, is_last) {
+        if is_open && self.try_collision_free_pull(chain, &driven, is_last) {
             return Ok(());
         }
         if self.rules.self_collision {
-            if is_built_in && !is_open && self.sweep_if_parts_separated(chain, obstacles, &driven) {
+            if is_built_in && !is_open && self.try_self_clear_sweep(chain, obstacles, &driven) {
                 return Ok(());
             }
             let points = chain.points();
@@ -510,7 +510,7 @@ fn has_arrived<const D: usize>(chain: &Chain<D>, driven: &InitiatingConnectors<D
 }
 
 /// Returns whether only the chain itself can be in the way of a motion.
-fn is_obstacle_free<const D: usize>(
+fn can_only_self_collide<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
     driven: &InitiatingConnectors<D>,

@@ -6,14 +6,14 @@
 //! parts only just reach, passes converge too slowly, and the parts are laid out instead. If the gap is
 //! longer than the remaining parts, one end is pulled nearer, if it is allowed to move.
 
-use super::candidates::guide_line_position;
+use super::candidates::guide_line_slave_position;
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Point, distance, lerp};
 use super::motion_context::is_length_allowed;
 use super::obstacle::Obstacles;
 use super::pass::ChainDirection;
 use super::propagate::Propagator;
-use super::span::joints_across_gap;
+use super::span::joint_positions_across_gap;
 use super::veto::MotionRequest;
 use sidestep_kernel::InputError;
 use std::ops::RangeInclusive;
@@ -104,7 +104,7 @@ pub fn reform_chain<const D: usize>(
     }
     if !is_whole(chain, low, high) {
         let [a, b] = [chain.points()[low], chain.points()[high]];
-        let places = joints_across_gap(a, b, &chain.rods()[low..high]);
+        let places = joint_positions_across_gap(a, b, &chain.rods()[low..high]);
         chain.points_mut()[first..=last].copy_from_slice(&places);
     }
     if is_whole(chain, low, high) {
@@ -170,7 +170,7 @@ fn run_pass<const D: usize>(
         let mn = chain.points()[master];
         let so = chain.points()[slave];
         let rod = chain.rod_between(master, slave);
-        chain.points_mut()[slave] = guide_line_position([mo, mn, so], rod, min_move_m);
+        chain.points_mut()[slave] = guide_line_slave_position([mo, mn, so], rod, min_move_m);
         master = slave;
         mo = so;
     }

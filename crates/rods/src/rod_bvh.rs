@@ -32,7 +32,7 @@ impl<const D: usize> RodBvh<D> {
         for (rod, bounds) in boxes.enumerate() {
             if self.rods[rod] != bounds {
                 self.rods[rod] = bounds;
-                self.mark_leaf_loose(rod / RODS_PER_LEAF);
+                self.mark_leaf_for_refit(rod / RODS_PER_LEAF);
             }
         }
         self.refit_loose_leaves();
@@ -49,7 +49,7 @@ impl<const D: usize> RodBvh<D> {
         self.refit_loose_leaves();
     }
 
-    fn mark_leaf_loose(&mut self, leaf: usize) {
+    fn mark_leaf_for_refit(&mut self, leaf: usize) {
         self.loose = if self.loose.is_empty() {
             leaf..leaf + 1
         } else {
@@ -86,7 +86,7 @@ impl<const D: usize> RodBvh<D> {
     /// Updates the box of a rod that has moved.
     pub fn set(&mut self, rod: usize, bounds: Aabb<D>) {
         self.rods[rod] = bounds;
-        self.mark_leaf_loose(rod / RODS_PER_LEAF);
+        self.mark_leaf_for_refit(rod / RODS_PER_LEAF);
         let mut node = self.leaves + rod / RODS_PER_LEAF;
         // If a node contains the box, so do all above it.
         while node > 0 && !self.nodes[node].contains(&bounds) {

@@ -11,7 +11,7 @@ use super::geometry::{
 
 /// Returns places for the joints of rods from `a` to `b`; rods that cannot span this gap come as near
 /// to it as they can. They lie straight if they can be so short, and as a triangle otherwise.
-pub(super) fn joints_across_gap<const D: usize>(
+pub(super) fn joint_positions_across_gap<const D: usize>(
     a: Point<D>,
     b: Point<D>,
     rods: &[Rod],
@@ -20,7 +20,7 @@ pub(super) fn joints_across_gap<const D: usize>(
     let sum_min_m: f64 = rods.iter().map(|rod| rod.min_m).sum();
     let sum_max_m: f64 = rods.iter().map(|rod| rod.max_m).sum();
     if gap_m < sum_min_m {
-        return triangle_joints(a, b, &folded_rod_lengths_m(rods, gap_m));
+        return triangle_joint_positions(a, b, &folded_rod_lengths_m(rods, gap_m));
     }
     let fraction = (gap_m - sum_min_m) / (sum_max_m - sum_min_m).max(f64::MIN_POSITIVE);
     let lengths_m: Vec<f64> = rods.iter().map(|rod| length_m(rod, fraction)).collect();
@@ -68,7 +68,11 @@ fn joints_on_line<const D: usize>([a, b]: [Point<D>; 2], lengths_m: &[f64]) -> V
 /// Returns the joints of rods that lie as a triangle. Its first side is the gap, extended beyond `a`
 /// by as many rods as half of the perimeter has room for; its second is the next rod; the others
 /// make the third. So none is longer than the two others together.
-fn triangle_joints<const D: usize>(a: Point<D>, b: Point<D>, lengths_m: &[f64]) -> Vec<Point<D>> {
+fn triangle_joint_positions<const D: usize>(
+    a: Point<D>,
+    b: Point<D>,
+    lengths_m: &[f64],
+) -> Vec<Point<D>> {
     let gap_m = distance(a, b);
     let half_m = 0.5 * (gap_m + lengths_m.iter().sum::<f64>());
     let ahead = normalized(sub(b, a)).unwrap_or(unit_x());
@@ -136,7 +140,7 @@ mod tests {
 
     fn worst_m<const D: usize>(a: Point<D>, b: Point<D>, rods: &[Rod]) -> f64 {
         let mut points = vec![a];
-        points.extend(joints_across_gap(a, b, rods));
+        points.extend(joint_positions_across_gap(a, b, rods));
         points.push(b);
         assert_eq!(points.len(), rods.len() + 1);
         let outside_m = |(ends, rod): (&[Point<D>], &Rod)| {

@@ -13,7 +13,7 @@
     reason = "an index is a lane or a coordinate of several arrays"
 )]
 
-use super::candidates::{clamped, guide_line_position};
+use super::candidates::{clamped, guide_line_slave_position};
 use super::chain::{Chain, MAX_COORDINATE_M, Rod, is_in_range, out_of_range};
 use super::geometry::{Point, distance, dot, sub};
 use super::motion_context::is_length_allowed;
@@ -223,7 +223,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
         w < self.n && w < j && j - w < self.connectors
     }
 
-    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guide_line_position`], lane
+    /// Computes the reaction of every lane's slave when lane 0 is at connector `j`: [`guide_line_slave_position`], lane
     /// by lane. Before the call, `next` holds the positions of one connector ago; after it, those of
     /// the slaves that now become masters.
     #[inline]
@@ -247,7 +247,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
             scale[w] = t / d[w];
         }
         if one_by_one {
-            return self.react_lane_by_lane(now, next, j);
+            return self.react_scalar(now, next, j);
         }
         for i in 0..D {
             for w in 0..LANES {
@@ -284,7 +284,7 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
 
     /// The same as [`LaneMotions::react`] by single lanes, some of which rest, have ended, or are at no slave.
     #[cold]
-    fn react_lane_by_lane(
+    fn react_scalar(
         &mut self,
         now: &SimdLanePositions<D>,
         next: &mut SimdLanePositions<D>,
@@ -305,17 +305,17 @@ impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
                 next.set(w + 1, so);
                 continue;
             }
-            let new = guide_line_position([mo, mn, so], rod, self.min_move_m);
+            let new = guide_line_slave_position([mo, mn, so], rod, self.min_move_m);
             self.rests[w] = new == so;
             next.set(w + 1, new);
             if MEASURES {
-                self.measure_lane(w, [mn, so, new], rod);
+                self.measure_lane_motion(w, [mn, so, new], rod);
             }
         }
         self.is_mixed = (0..self.n).any(|w| self.rests[w] || self.ended[w]);
     }
 
-    fn measure_lane(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
+    fn measure_lane_motion(&mut self, w: usize, [mn, so, new]: [Point<D>; 3], rod: Rod) {
         let moved = sub(new, so);
         let length_m = distance(mn, new);
         let outside_m = (length_m - rod.max_m).max(rod.min_m - length_m);

@@ -2,7 +2,7 @@
 
 use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
 use serde::{Deserialize, Serialize};
-use sidestep_kernel::text::{KeyValues, StateReport};
+use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{BodyKind, Kinds};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
@@ -91,7 +91,7 @@ pub trait CompiledScenario: Send + Sync {
     fn body_count(&self) -> usize;
 
     /// Returns the contents of the scenario, for people to check.
-    fn contents(&self, source: &Source) -> StateReport;
+    fn contents(&self, source: &Source) -> JsonTextReport;
 
     /// Returns the effects that the scenario's author may not expect, warnings first.
     fn remarks(&self) -> Vec<Remark> {

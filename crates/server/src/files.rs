@@ -149,7 +149,7 @@ impl AllowedFiles {
             return Ok(roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect());
         };
         let path = self.resolve(folder)?;
-        let mut paths = folder_paths(&path).map_err(|e| {
+        let mut paths = folder_entry_paths(&path).map_err(|e| {
             Problem::new(folder, format!("cannot be listed: {e}"), "give a folder that may be read")
         })?;
         paths.sort();
@@ -167,7 +167,7 @@ impl AllowedFiles {
 }
 
 /// Returns the paths of the entries of a folder, at most [`MAX_ENTRIES`].
-fn folder_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
+fn folder_entry_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
     fs::read_dir(folder)?.take(MAX_ENTRIES).map(|item| Ok(item?.path())).collect()
 }
 

@@ -106,7 +106,7 @@ impl StudioServer {
     /// # Errors
     /// When something that was named does not exist, or the port cannot be bound.
     pub fn start(options: ServerOptions) -> Result<Self, Error> {
-        let (folders, mut open) = classify_targets(&options.targets);
+        let (folders, mut open) = classify_target_paths(&options.targets);
         for fleet in &options.fleets {
             open.push(TargetRef { kind: "fleet".into(), path: fleet.endpoint.clone() });
         }
@@ -200,7 +200,7 @@ fn run(runtime: Runtime, listener: TcpListener, state: &Arc<AppState>) {
 }
 
 /// Returns the folders that may be read, and the things to open.
-fn classify_targets(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
+fn classify_target_paths(targets: &[PathBuf]) -> (Vec<PathBuf>, Vec<TargetRef>) {
     let mut folders: Vec<PathBuf> = Vec::new();
     let mut open = Vec::new();
     for path in targets {
@@ -263,13 +263,13 @@ mod tests {
         std::fs::write(path("a.toml"), "").expect("written");
         std::fs::write(path("b.mcap"), "").expect("written");
         let targets = ["run", "a.toml", "b.mcap", "sweep"].map(path);
-        let (folders, open) = classify_targets(&targets);
+        let (folders, open) = classify_target_paths(&targets);
         assert_eq!(folders, [path("run"), place.path().to_path_buf(), path("sweep")]);
         let kinds: Vec<&str> = open.iter().map(|target| target.kind.as_str()).collect();
         assert_eq!(kinds, ["recording", "scenario", "recording", "sweep"]);
-        assert_eq!(classify_targets(&[]), (vec![".".into()], vec![]));
+        assert_eq!(classify_target_paths(&[]), (vec![".".into()], vec![]));
         assert_eq!(
-            classify_targets(&["a.toml".into()]).0,
+            classify_target_paths(&["a.toml".into()]).0,
             [PathBuf::from("a.toml")],
             "it does not exist"
         );

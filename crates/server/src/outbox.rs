@@ -56,7 +56,7 @@ impl Outbox {
     }
 
     /// Records that a request was received; each needs one reply.
-    pub(crate) fn record_request(&self) {
+    pub(crate) fn add_open_request(&self) {
         self.lock().open_requests += 1;
     }
 
@@ -72,7 +72,7 @@ impl Outbox {
     }
 
     /// Returns the bytes of all long requests without a reply.
-    pub(crate) fn large_request_bytes(&self) -> usize {
+    pub(crate) fn pending_large_request_bytes(&self) -> usize {
         self.lock().long.iter().map(|(_, bytes)| bytes).sum()
     }
 
@@ -186,7 +186,7 @@ mod tests {
         assert!(outbox.send_frame(1, None, vec![2]));
         outbox.send_status(1, &notice("old"));
         outbox.send_status(1, &notice("new"));
-        outbox.record_request();
+        outbox.add_open_request();
         assert_eq!(outbox.backlog(), 1);
         outbox.send_reply(&reply(1));
         assert_eq!(outbox.backlog(), 1);

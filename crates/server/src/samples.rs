@@ -58,7 +58,7 @@ impl MetricSamples {
     pub(crate) fn push(&mut self, cycle: Cycle, metrics: &Value, cost: Duration) {
         self.last_cost = cost;
         let mut found = Vec::new();
-        collect_numbers(metrics, "", &mut found);
+        flatten_numbers(metrics, "", &mut found);
         let row = self.cycles.len();
         self.cycles.push(cycle);
         self.values.iter_mut().for_each(|column| column.push(None));
@@ -109,14 +109,14 @@ impl MetricSamples {
 }
 
 /// Collects the numbers of a tree by their paths; lists are no metrics.
-fn collect_numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
+fn flatten_numbers(tree: &Value, path: &str, found: &mut Vec<(String, f64)>) {
     match tree {
         Value::Number(number) => {
             found.extend(number.as_f64().map(|number| (path.to_string(), number)));
         }
         Value::Object(members) => members.iter().for_each(|(key, value)| match path {
-            "" => collect_numbers(value, key, found),
-            _ => collect_numbers(value, &format!("{path}.{key}"), found),
+            "" => flatten_numbers(value, key, found),
+            _ => flatten_numbers(value, &format!("{path}.{key}"), found),
         }),
         _ => {}
     }

@@ -103,7 +103,7 @@ async fn run(socket: &mut WebSocket, mut sessions: SocketSessions, outbox: &Outb
 
 /// Returns whether a further request may be read.
 fn can_read_request(outbox: &Outbox) -> bool {
-    outbox.backlog() < MAX_BACKLOG && outbox.large_request_bytes() < MAX_LONG_REQUEST_BYTES
+    outbox.backlog() < MAX_BACKLOG && outbox.pending_large_request_bytes() < MAX_LONG_REQUEST_BYTES
 }
 
 /// Sends a message; returns whether the page is still connected.
@@ -150,7 +150,7 @@ impl Drop for SocketSessions {
 impl SocketSessions {
     /// Processes a request; it is answered now, or later by a session.
     fn on_request(&mut self, text: &str) {
-        self.outbox.record_request();
+        self.outbox.add_open_request();
         match decode(text) {
             Err(unreadable) => {
                 let (id, problem) = *unreadable;
@@ -174,7 +174,7 @@ impl SocketSessions {
     }
 
     fn refuse_binary(&self) {
-        self.outbox.record_request();
+        self.outbox.add_open_request();
         let problem = Problem::new("request", "it is not text", "send JSON as the protocol has it");
         refuse(&self.outbox, 0, problem);
     }
@@ -218,17 +218,17 @@ impl SocketSessions {
                 Some(closed.map(|_| ReplyBody::Done))
             }
             SessionMethod::Check { text } => {
-                self.answer_text_request(id, session, move |deps, source| {
+                self.answer_scenario_text_request(id, session, move |deps, source| {
                     Ok(ReplyBody::Problems { problems: text_problems(deps, source, text)? })
                 })
             }
             SessionMethod::Edit { text, edits } => {
-                self.answer_text_request(id, session, move |deps, source| {
+                self.answer_scenario_text_request(id, session, move |deps, source| {
                     apply_edits(deps, source, text, edits)
                 })
             }
             SessionMethod::Model { text } => {
-                self.answer_text_request(id, session, move |deps, source| {
+                self.answer_scenario_text_request(id, session, move |deps, source| {
                     text_values_reply(deps, source, text)
                 })
             }
@@ -259,7 +259,7 @@ impl SocketSessions {
     }
 
     /// Answers a request on a text that stands for a session's scenario.
-    fn answer_text_request(
+    fn answer_scenario_text_request(
         &self,
         id: u32,
         session: SessionId,

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::run_tables::has_rows;
 use sidestep_kernel::InputError;
 use sidestep_kernel::Simulation;
-use sidestep_kernel::ports::{MemoryRecorder, Values};
+use sidestep_kernel::ports::{ColumnValues, MemoryRecorder};
 use sidestep_kernel::view::{BodyId, PositionTableColumns};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
@@ -86,9 +86,9 @@ fn count_bodies(rows: &PositionTableColumns, table: &Table) -> usize {
 fn bits_by_body<'a>(
     rows: &PositionTableColumns,
     names: &[&str],
-    column: impl Fn(&str) -> Option<&'a Values>,
+    column: impl Fn(&str) -> Option<&'a ColumnValues>,
 ) -> BTreeMap<BodyId, Vec<u64>> {
-    let columns: Vec<Option<&Values>> = names.iter().map(|name| column(name)).collect();
+    let columns: Vec<Option<&ColumnValues>> = names.iter().map(|name| column(name)).collect();
     let Some(numbers) = column(rows.number) else { return BTreeMap::new() };
     let parts = rows.part.and_then(&column);
     let mut all: BTreeMap<BodyId, Vec<u64>> = BTreeMap::new();
@@ -108,15 +108,15 @@ fn bits_by_body<'a>(
 }
 
 /// Returns the bits of a value; tables of poses have no text.
-fn bits(values: &Values, row: usize) -> u64 {
+fn bits(values: &ColumnValues, row: usize) -> u64 {
     match values {
-        Values::Text(_) => 0,
-        Values::I64(v) => v[row] as u64,
-        Values::Bool(v) => v[row].into(),
-        Values::U32(v) | Values::Label(v) => v[row].into(),
-        Values::U64(v) => v[row],
-        Values::I32(v) => v[row] as u64,
-        Values::F64(v) => v[row].to_bits(),
+        ColumnValues::Text(_) => 0,
+        ColumnValues::I64(v) => v[row] as u64,
+        ColumnValues::Bool(v) => v[row].into(),
+        ColumnValues::U32(v) | ColumnValues::Label(v) => v[row].into(),
+        ColumnValues::U64(v) => v[row],
+        ColumnValues::I32(v) => v[row] as u64,
+        ColumnValues::F64(v) => v[row].to_bits(),
     }
 }
 
@@ -141,9 +141,9 @@ mod tests {
             history: 1,
         };
         let column = |name: &str, x: f64| match name {
-            "x_m" => Values::F64(vec![1.5, x].into()),
-            "chain" => Values::U32(vec![0, 0].into()),
-            _ => Values::U32(vec![3, 4].into()),
+            "x_m" => ColumnValues::F64(vec![1.5, x].into()),
+            "chain" => ColumnValues::U32(vec![0, 0].into()),
+            _ => ColumnValues::U32(vec![3, 4].into()),
         };
         let names = ["chain", "connector", "x_m"];
         let table = |x| names.map(|name| (name, column(name, x)));

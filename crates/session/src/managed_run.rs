@@ -11,7 +11,7 @@ use crate::row_store::{RowSelection, RowStore};
 use crate::run_recorder::{RunRecorder, restore_run};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
-use sidestep_kernel::ports::{RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_record::{IfExists, McapRecorder, RunFolder};
@@ -225,7 +225,7 @@ impl ManagedRun {
     }
 
     /// Returns the present frame as a table.
-    pub fn frame_rows(&mut self) -> (TableSchema, Vec<Values>) {
+    pub fn frame_rows(&mut self) -> (TableSchema, Vec<ColumnValues>) {
         frame_rows(self.run.as_mut(), &self.kinds)
     }
 
@@ -283,7 +283,7 @@ impl ManagedRun {
     ///
     /// # Errors
     /// When the last ones cannot be handed over.
-    pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<Values>)>, RecordError> {
+    pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<ColumnValues>)>, RecordError> {
         let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
         self.run.record(rows)?;
         let frames = self.frames.as_mut().map(FrameRows::take);

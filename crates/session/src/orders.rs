@@ -1,7 +1,7 @@
 //! The recorded orders and controls of a run that was decided from outside.
 
 use sidestep_kernel::control::{ControlTableReader, OrderTableReader};
-use sidestep_kernel::ports::{TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, TableSchema};
 use sidestep_kernel::{InputError, Simulation};
 use sidestep_record::{for_each_block, tables};
 use std::path::Path;
@@ -34,7 +34,7 @@ pub(crate) fn replay_recorded(run: &mut dyn Simulation, folder: &Path) -> Result
 fn read_blocks(
     folder: &Path,
     table: &str,
-    mut take: impl FnMut(&TableSchema, &[Values]) -> Option<()>,
+    mut take: impl FnMut(&TableSchema, &[ColumnValues]) -> Option<()>,
 ) -> Result<bool, InputError> {
     if !tables(folder)?.iter().any(|name| name == table) {
         return Ok(false);

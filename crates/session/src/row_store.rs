@@ -1,6 +1,6 @@
 //! Rows of a run kept in memory: of all tables, or of some.
 
-use sidestep_kernel::ports::{MemoryRecorder, RecordError, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, MemoryRecorder, RecordError, Recorder, TableSchema};
 use sidestep_kernel::{Cycle, Digest, InputError};
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub struct RowSelection {
 type CheckpointKey = (Cycle, [u8; 16]);
 
 /// Rows that come with a checkpoint, each block with the number of its table.
-type PendingRows = Vec<(usize, Vec<Values>)>;
+type PendingRows = Vec<(usize, Vec<ColumnValues>)>;
 
 /// Rows of the wanted tables, of one past; those of other tables are dropped as they come.
 pub(crate) struct RowStore {
@@ -66,7 +66,7 @@ impl RowStore {
 
     /// Takes out all rows, by table, of a run that is at cycle `now`. Later rows may have another past, and rows of
     /// orders that were handed over do not come again: checkpoints need not be known any longer.
-    pub(crate) fn take(&mut self, now: Cycle) -> Vec<(TableSchema, Vec<Values>)> {
+    pub(crate) fn take(&mut self, now: Cycle) -> Vec<(TableSchema, Vec<ColumnValues>)> {
         self.begin = now;
         self.known.clear();
         self.tables.take()
@@ -135,14 +135,14 @@ fn checkpoint_key(checkpoint: &[u8], cycle: Cycle) -> CheckpointKey {
 }
 
 /// Returns the cycles of the rows of a table; `None` for a table without cycles.
-fn cycle_column<'a>(schema: &TableSchema, columns: &'a [Values]) -> Option<&'a [Cycle]> {
+fn cycle_column<'a>(schema: &TableSchema, columns: &'a [ColumnValues]) -> Option<&'a [Cycle]> {
     let place = schema.columns.iter().position(|column| column.name == "cycle")?;
-    let Some(Values::U64(cycles)) = columns.get(place) else { return None };
+    let Some(ColumnValues::U64(cycles)) = columns.get(place) else { return None };
     Some(cycles)
 }
 
 impl Recorder for RowStore {
-    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+    fn append(&mut self, table: usize, block: &[ColumnValues]) -> Result<(), RecordError> {
         match self.places.get(table) {
             Some(Some(place)) => self.tables.append(*place, block),
             // A table that is not wanted.
@@ -169,13 +169,13 @@ mod tests {
     }
 
     fn append(rows: &mut RowStore, table: usize, cycles: &[Cycle]) {
-        rows.append(table, &[Values::U64(cycles.to_vec().into())]).expect("it fits");
+        rows.append(table, &[ColumnValues::U64(cycles.to_vec().into())]).expect("it fits");
     }
 
     /// The cycles of the rows of both tables.
     fn cycles(rows: &RowStore) -> [Vec<Cycle>; 2] {
         let cycles = |table| match rows.tables.column(table, "cycle") {
-            Some(Values::U64(cycles)) => cycles.to_vec(),
+            Some(ColumnValues::U64(cycles)) => cycles.to_vec(),
             other => panic!("{other:?}"),
         };
         ["a", "c"].map(cycles)

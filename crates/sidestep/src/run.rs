@@ -1,6 +1,6 @@
 //! A run of any world: advanced by its caller, looked at, and recorded.
 
-use crate::kernel::ports::{TableSchema, Values};
+use crate::kernel::ports::{ColumnValues, TableSchema};
 use crate::kernel::{Cycle, Digest, Simulation};
 use crate::session::{Error, ManagedRun, NoWatcher, Summary};
 use std::any::Any;
@@ -16,7 +16,7 @@ pub struct Table {
     /// Its name, its columns, and facts about all rows.
     pub schema: TableSchema,
     /// The values of each column, in the order of the schema; all of one length.
-    pub columns: Vec<Values>,
+    pub columns: Vec<ColumnValues>,
 }
 
 impl Table {
@@ -26,7 +26,7 @@ impl Table {
     }
 
     /// Returns the values of the column with this name; `None` if the table has no such column.
-    pub fn column(&self, name: &str) -> Option<&Values> {
+    pub fn column(&self, name: &str) -> Option<&ColumnValues> {
         let index = self.schema.columns.iter().position(|column| column.name == name)?;
         self.columns.get(index)
     }

@@ -8,7 +8,7 @@ use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateReport, key_value_pair};
+use sidestep_kernel::text::{JsonTextReport, KeyValues, key_value_pair};
 use sidestep_kernel::view::{
     Body, BodyKind, CoordinateColumn, Frame, FrameOptions, Pose, PositionTableColumns, Scenery,
     Shape,
@@ -46,7 +46,7 @@ impl World for PondWorld {
         books.gathered.append(scratch);
     }
 
-    fn commit_results(&self, books: &mut Collector) {
+    fn merge_worker_results(&self, books: &mut Collector) {
         let mut events = std::mem::take(&mut books.gathered);
         events.sort_unstable_by_key(|event| (event.cycle, event.frog));
         for event in events {
@@ -190,8 +190,8 @@ impl WorldMetrics for PondWorld {
         vec![key_value_pair("hops", metrics["hops"].to_string())]
     }
 
-    fn poses(&self, state: &PondState, _: Cycle) -> StateReport {
+    fn poses(&self, state: &PondState, _: Cycle) -> JsonTextReport {
         let pads: Vec<u32> = state.pad.iter().collect();
-        StateReport { text: format!("  pads {pads:?}\n"), json: json!(pads) }
+        JsonTextReport { text: format!("  pads {pads:?}\n"), json: json!(pads) }
     }
 }

@@ -4,9 +4,9 @@ use super::world_impl::Collector;
 use super::{PondWorld, external};
 use serde::Deserialize;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::text::{StateReport, align_pairs, key_value_pair};
+use sidestep_kernel::text::{JsonTextReport, align_pairs, key_value_pair};
 use sidestep_kernel::view::BodyKind;
-use sidestep_kernel::{InputError, Run, RunConfig, RunSetup, Seed, Simulation};
+use sidestep_kernel::{InputError, Run, RunConfig, RunInputs, Seed, Simulation};
 use sidestep_scenario::{
     CompiledScenario, Editing, ResolvedScenario, Source, WorldFacts, WorldType,
 };
@@ -132,10 +132,10 @@ impl CompiledScenario for CompiledPond {
         self.world.frogs as usize
     }
 
-    fn contents(&self, _: &Source) -> StateReport {
+    fn contents(&self, _: &Source) -> JsonTextReport {
         let frogs = self.world.frogs;
         let text = align_pairs(&[key_value_pair("frogs", frogs.to_string())]);
-        StateReport { json: serde_json::json!({ "frogs": frogs }), text }
+        JsonTextReport { json: serde_json::json!({ "frogs": frogs }), text }
     }
 
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
@@ -143,7 +143,7 @@ impl CompiledScenario for CompiledPond {
     }
 
     fn start(&self, source: &Source, workers: usize) -> Box<dyn Simulation> {
-        let start = RunSetup {
+        let start = RunInputs {
             config: self.plan.clone(),
             state: self.world.start(),
             collector: Collector::default(),

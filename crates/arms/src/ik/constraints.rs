@@ -127,10 +127,10 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         i: usize,
         j: usize,
     ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let rod = OwnPart::rod(self.chain, points, i);
-        let other_rod = OwnPart::rod(self.chain, points, j);
-        let ball = OwnPart::connector(self.chain, points, i);
-        let other_ball = OwnPart::connector(self.chain, points, j + 1);
+        let rod = OwnBodyPart::rod(self.chain, points, i);
+        let other_rod = OwnBodyPart::rod(self.chain, points, j);
+        let ball = OwnBodyPart::connector(self.chain, points, i);
+        let other_ball = OwnBodyPart::connector(self.chain, points, j + 1);
         [
             (j > i + 2).then(|| rod.pair(&other_rod)),
             (j > i + 1).then(|| rod.pair(&other_ball)),
@@ -143,13 +143,13 @@ impl<const D: usize> ConstraintChecker<'_, D> {
 }
 
 /// A rod of a chain, or a connector as a rod without length.
-struct OwnPart<const D: usize> {
+struct OwnBodyPart<const D: usize> {
     ends: [usize; 2],
     at: [Point<D>; 2],
     radius_m: f64,
 }
 
-impl<const D: usize> OwnPart<D> {
+impl<const D: usize> OwnBodyPart<D> {
     fn rod(chain: &Chain<D>, points: &[Point<D>], i: usize) -> Self {
         let at = [points[i], points[i + 1]];
         Self { ends: [i, i + 1], at, radius_m: chain.rods()[i].radius_m }

@@ -40,7 +40,7 @@ pub use inverse::{
     ArmBodyPart, ArmGoal, CollidesWith, Collision, FrameAxis, IkFailure, IkResult, IkSolution,
     MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask,
 };
-pub use inverse::{ConnectorTarget, ConnectorTargetTracker};
+pub use inverse::{ConnectorTarget, ConnectorTargetSolver};
 pub use recover::{RecoverError, RecoveredJoints};
 pub use serial::{Dof, JointMotionKind, LinkFrames, SerialChain};
 pub use skeleton::{Skeleton, SkeletonRod};

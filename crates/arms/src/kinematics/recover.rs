@@ -191,7 +191,7 @@ impl JointSearch<'_> {
                 && self.solve_from_connector(connector + 1, known, link);
         }
         let joints = &self.chain.joints[known..until];
-        let placement = PointPlacementProblem { link: &link, p_m: anchor.point_m, target_m };
+        let placement = PointIkProblem { link: &link, p_m: anchor.point_m, target_m };
         for solution in self.solutions(joints, known, placement) {
             self.tries += 1;
             if self.tries > MAX_TRIES {
@@ -262,7 +262,7 @@ impl JointSearch<'_> {
         &self,
         joints: &[MovingJoint],
         known: usize,
-        placement: PointPlacementProblem<'_>,
+        placement: PointIkProblem<'_>,
     ) -> Vec<Vec<JointValueCandidate>> {
         let reference = &self.reference[known..known + joints.len()];
         match joints {
@@ -281,7 +281,7 @@ impl JointSearch<'_> {
     fn solve_single_joint(
         &self,
         joint: &MovingJoint,
-        PointPlacementProblem { link, p_m, target_m }: PointPlacementProblem<'_>,
+        PointIkProblem { link, p_m, target_m }: PointIkProblem<'_>,
         reference: f64,
     ) -> JointValueCandidate {
         let line = joint.axis_line(link);
@@ -317,7 +317,7 @@ impl JointSearch<'_> {
     fn solve_two(
         &self,
         [inner, outer]: [&MovingJoint; 2],
-        PointPlacementProblem { link, p_m, target_m }: PointPlacementProblem<'_>,
+        PointIkProblem { link, p_m, target_m }: PointIkProblem<'_>,
         reference: &[f64],
     ) -> Vec<Vec<JointValueCandidate>> {
         let first = inner.axis_line(link);
@@ -353,7 +353,7 @@ impl JointSearch<'_> {
 
 /// A point to be placed by the joints behind a link.
 #[derive(Debug, Clone, Copy)]
-struct PointPlacementProblem<'a> {
+struct PointIkProblem<'a> {
     /// The link before the joints.
     link: &'a Transform,
     /// The point in the frame of the link behind the joints.

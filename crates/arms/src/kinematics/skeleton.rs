@@ -114,7 +114,7 @@ struct SkeletonBuilder<'a> {
 impl SkeletonBuilder<'_> {
     fn connectors(&self) -> Vec<LinkAnchor> {
         let tip_link = self.chain.joints.len();
-        let tip = self.anchor_at(self.frames.tip.origin_m, tip_link);
+        let tip = self.link_anchor_at(self.frames.tip.origin_m, tip_link);
         let candidates = self.candidates();
         let Some(&base) = candidates.iter().filter(|c| c.first == 0).reduce(outer_anchor) else {
             return self.rigid_body_anchors(tip);
@@ -137,7 +137,7 @@ impl SkeletonBuilder<'_> {
 
     /// Returns the anchors of a single rigid body: its base and its tip.
     fn rigid_body_anchors(&self, tip: LinkAnchor) -> Vec<LinkAnchor> {
-        let base = self.anchor_at([0.0; 3], 0);
+        let base = self.link_anchor_at([0.0; 3], 0);
         if self.is_coincident(&base, &tip) { vec![tip] } else { vec![base, tip] }
     }
 
@@ -149,20 +149,20 @@ impl SkeletonBuilder<'_> {
         let mut entry = first.through_m;
         // A first joint that slides carries the next axis away from the base, so a point on its own axis stays there.
         if self.lines.len() == 1 || self.chain.joints[0].motion == JointMotionKind::Slide {
-            candidates.push(self.anchor_at(entry, 0));
+            candidates.push(self.link_anchor_at(entry, 0));
         }
         for (joint, pair) in self.lines.windows(2).enumerate() {
             let (near, far) =
                 pair[0].common_perpendicular(&pair[1]).unwrap_or((entry, pair[1].nearest(entry)));
-            candidates.push(self.anchor_at(near, joint + 1));
-            candidates.push(self.anchor_at(far, joint + 1));
+            candidates.push(self.link_anchor_at(near, joint + 1));
+            candidates.push(self.link_anchor_at(far, joint + 1));
             entry = far;
         }
         candidates
     }
 
     /// Returns the point at `p_m` that is fixed in `link`, with all links in which it is fixed too.
-    fn anchor_at(&self, p_m: Vector, link: usize) -> LinkAnchor {
+    fn link_anchor_at(&self, p_m: Vector, link: usize) -> LinkAnchor {
         let mut first = link;
         let mut last = link;
         while first > 0 && self.is_on_axis(p_m, first - 1) {

@@ -22,7 +22,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, ReactionRules};
-pub use space::RodConfigurationSpace;
+pub use space::ChainConfigurationSpace;
 
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.
@@ -90,7 +90,7 @@ pub fn plan<const D: usize>(
     query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
-    let space = RodConfigurationSpace::new(chain, obstacles, rules.self_collision, query.k)?;
+    let space = ChainConfigurationSpace::new(chain, obstacles, rules.self_collision, query.k)?;
     let goals = goals(&space, rules, query, draws)?;
     Ok(find_path(&space, goals, draws))
 }
@@ -123,7 +123,7 @@ fn find_path<S: ConfigurationSpace>(
 /// Returns valid postures that reach the target: the first sought from the present posture, the others
 /// from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
-    space: &RodConfigurationSpace<'_, D>,
+    space: &ChainConfigurationSpace<'_, D>,
     rules: ReactionRules,
     query: &PlanningQuery<D>,
     draws: &mut Draws,

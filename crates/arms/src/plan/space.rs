@@ -12,7 +12,7 @@ use sidestep_rods::{Chain, Obstacles};
 use std::f64::consts::PI;
 
 /// The postures of one chain among obstacles.
-pub struct RodConfigurationSpace<'a, const D: usize> {
+pub struct ChainConfigurationSpace<'a, const D: usize> {
     checker: ConstraintChecker<'a, D>,
     /// The connectors from the one that keeps its place outward, to the end of the chain.
     limb: Vec<usize>,
@@ -21,7 +21,7 @@ pub struct RodConfigurationSpace<'a, const D: usize> {
     step_m: f64,
 }
 
-impl<'a, const D: usize> RodConfigurationSpace<'a, D> {
+impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
@@ -61,7 +61,7 @@ impl<'a, const D: usize> RodConfigurationSpace<'a, D> {
     }
 }
 
-impl<const D: usize> ConfigurationSpace for RodConfigurationSpace<'_, D> {
+impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     type Posture = ChainPosture<D>;
 
     fn present_posture(&self) -> ChainPosture<D> {

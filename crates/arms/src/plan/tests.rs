@@ -44,7 +44,7 @@ fn a_way_round_a_wall_is_found_and_free_all_along() {
         let way =
             plan(&chain, &obstacles, ReactionRules::default(), &BEHIND, &mut draws(seed)).unwrap();
         let way = way.unwrap_or_else(|| panic!("{seed}: no way"));
-        let space = RodConfigurationSpace::new(&chain, &obstacles, false, 5).unwrap();
+        let space = ChainConfigurationSpace::new(&chain, &obstacles, false, 5).unwrap();
         let mut at = chain.clone();
         for next in &way {
             let from = at.points().to_vec();

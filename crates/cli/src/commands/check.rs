@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::Value;
 use sidestep::experiment::MAX_PROBLEMS;
 use sidestep::kernel::InputError;
-use sidestep::kernel::text::StateReport;
+use sidestep::kernel::text::JsonTextReport;
 use sidestep::scenario::{CompiledScenario, ImportedScenario, Remark, Source};
 
 const EXAMPLES: &str = "\
@@ -82,7 +82,7 @@ fn print_all_errors(
 }
 
 /// Adds the memory that a run takes: the peak of this process once it has started one with one worker.
-fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &mut StateReport) {
+fn measure_memory(source: &Source, compiled: &dyn CompiledScenario, contents: &mut JsonTextReport) {
     let _run = compiled.start(source, 1);
     let Some(bytes) = peak_bytes() else { return };
     let recorded =

@@ -1,7 +1,7 @@
 //! Tables of recorded runs name their bodies, which other programs need to join and to draw them.
 
 use crate::support::TestFolder;
-use sidestep::kernel::ports::{ColumnSpec, Values};
+use sidestep::kernel::ports::{ColumnSpec, ColumnValues};
 use sidestep_record::{Table, read_table};
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ fn boxes_can_be_drawn_in_meters_and_ids_told_by_kind_from_the_table_alone() {
     }
 }
 
-fn text_column<'t>(table: &'t Table, name: &str) -> (&'t ColumnSpec, &'t Values) {
+fn text_column<'t>(table: &'t Table, name: &str) -> (&'t ColumnSpec, &'t ColumnValues) {
     let spec = table.schema.columns.iter().find(|column| column.name == name);
     spec.zip(table.column(name)).expect("a column of that name")
 }

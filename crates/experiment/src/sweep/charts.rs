@@ -13,7 +13,7 @@ use super::label::capitalized;
 use super::table::RunColumn;
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, FigureKind, Series};
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_statistics::{Sample, wilson};
 use std::collections::BTreeMap;
 
@@ -253,7 +253,7 @@ fn variant_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Figure {
 
 /// Returns the share of runs up to each value, with Wilson's intervals; `None` for a share of runs.
 fn distribution_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Figure> {
-    if matches!(metric.values, Values::Bool(_)) {
+    if matches!(metric.values, ColumnValues::Bool(_)) {
         return None;
     }
     let sorted = Sample::from_runs(groups.values(metric, 0)).sorted();
@@ -279,7 +279,7 @@ fn distribution_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Fig
 
 /// Returns a figure of a metric without its points.
 fn figure(groups: &RunGroups<'_>, metric: &RunColumn, title: String, x_label: String) -> Figure {
-    let share = matches!(metric.values, Values::Bool(_));
+    let share = matches!(metric.values, ColumnValues::Bool(_));
     let label = groups.label(metric);
     let y_label = if share { format!("{label}: share of runs") } else { label.to_string() };
     Figure { title, x_label, y_label, ..Figure::default() }

@@ -6,7 +6,7 @@
 use super::table::Role;
 use super::trial::Outcome;
 use serde_json::Value;
-use sidestep_kernel::ports::{ColumnType, Values};
+use sidestep_kernel::ports::{ColumnType, ColumnValues};
 use std::collections::BTreeMap;
 
 /// Name of the column of reasons why runs failed; it exists only if one did.
@@ -108,22 +108,22 @@ pub(super) fn common_type(a: Option<ColumnType>, b: Option<ColumnType>) -> Optio
 }
 
 /// Returns the values of a column as those of a wider type.
-pub(super) fn widened(values: Values, ty: ColumnType) -> Values {
+pub(super) fn widened(values: ColumnValues, ty: ColumnType) -> ColumnValues {
     let n = values.len();
     match ty {
         _ if values.column_type() == ty => values,
         _ if (0..n).all(|row| values.is_missing(row)) => {
-            let mut missing = Values::empty(ty);
+            let mut missing = ColumnValues::empty(ty);
             missing.resize(n);
             missing
         }
-        ColumnType::F64 => Values::F64((0..n).map(|row| values.number(row)).collect()),
+        ColumnType::F64 => ColumnValues::F64((0..n).map(|row| values.number(row)).collect()),
         _ => {
             let texts = (0..n).map(|row| {
                 let is_missing = values.is_missing(row);
                 (!is_missing).then(|| value_text(&values.json(row)))
             });
-            Values::Text(texts.collect())
+            ColumnValues::Text(texts.collect())
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::groups::RunGroups;
 use super::table::RunColumn;
 use serde::Serialize;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_statistics::{Bootstrap, Interval, Pairs, holm};
 
 /// Difference between a variant and the baseline in one metric, over pairs of equal replicates.
@@ -63,7 +63,7 @@ pub(super) fn comparisons(
     reference: &BaselineIndex,
     bootstrap: Option<&Bootstrap>,
 ) -> Vec<Comparison> {
-    let is_share = matches!(metric.values, Values::Bool(_));
+    let is_share = matches!(metric.values, ColumnValues::Bool(_));
     let mut all = Vec::new();
     for variant in 0..groups.variants.len() {
         let Some(baseline) = reference.of[variant] else { continue };

@@ -7,7 +7,7 @@ use super::variant::DEFAULT_LABEL;
 use serde::Serialize;
 use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::{MetricInfo, metric_label};
 use sidestep_statistics::{Sample, wilson};
 use std::collections::{BTreeMap, BTreeSet};
@@ -161,7 +161,7 @@ impl<'a> RunGroups<'a> {
     pub(super) fn mean_over(&self, metric: &RunColumn, group: &[usize]) -> Estimate {
         if let [variant] = group {
             let values = self.values(metric, *variant);
-            if matches!(metric.values, Values::Bool(_)) {
+            if matches!(metric.values, ColumnValues::Bool(_)) {
                 return proportion(&values, self.seedless[*variant]);
             }
             return Estimate::from_values(values);
@@ -216,7 +216,7 @@ fn row_order(table: &RunTable) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..table.runs()).collect();
     if let Some(trial) = table.columns_with_role(Role::Trial).next() {
         match &trial.values {
-            Values::I64(numbers) => rows.sort_by_key(|&run| numbers.get(run)),
+            ColumnValues::I64(numbers) => rows.sort_by_key(|&run| numbers.get(run)),
             values => rows.sort_by_key(|&run| values.text(run)),
         }
     }

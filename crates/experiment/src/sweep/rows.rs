@@ -10,7 +10,7 @@ use super::table::{Role, RunColumn, RunTable};
 use super::trial::Outcome;
 use serde_json::{Map, Value};
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{ColumnType, Values};
+use sidestep_kernel::ports::{ColumnType, ColumnValues};
 use std::collections::BTreeMap;
 
 /// A table that grows by outcomes. A number takes 8 or 9 bytes, so a million runs of 40 metrics fit
@@ -53,7 +53,7 @@ impl RunTableBuilder {
         let trial = self.trials[row];
         let key = (role, name.to_string());
         let k = *self.index.entry(key).or_insert_with(|| {
-            let values = Values::empty(ColumnType::F64);
+            let values = ColumnValues::empty(ColumnType::F64);
             let column = RunColumn { name: name.into(), role, values };
             let first = ColumnOrder { trial: u64::MAX, place: usize::MAX };
             self.columns.push(ColumnBuilder { column, first });
@@ -131,11 +131,11 @@ impl RunTableBuilder {
                 Some(k) => {
                     // Moved out, so that no value stands in the memory twice.
                     let builder = &mut self.columns[*k];
-                    let empty = Values::empty(ColumnType::F64);
+                    let empty = ColumnValues::empty(ColumnType::F64);
                     let unsorted = std::mem::replace(&mut builder.column.values, empty);
                     unsorted.gather_rows(&order)
                 }
-                None => Values::empty(ty),
+                None => ColumnValues::empty(ty),
             };
             values.resize(order.len());
             columns.push(RunColumn { name: name.into(), role, values: widened(values, ty) });
@@ -204,7 +204,7 @@ impl RunTable {
 }
 
 fn whole_number(column: Option<&RunColumn>, row: usize) -> Option<u64> {
-    let Values::I64(values) = &column?.values else { return None };
+    let ColumnValues::I64(values) = &column?.values else { return None };
     u64::try_from(*values.get(row)?).ok()
 }
 
@@ -232,7 +232,7 @@ fn identity_columns(plan: &Plan, trials: impl Iterator<Item = u64>) -> Vec<RunCo
         let levels = levels(plan, name);
         // The type of all variants of the plan, also of those without a row here: all blocks of a table have it.
         let ty = levels.iter().map(type_of).fold(None, common_type).unwrap_or(ColumnType::F64);
-        let mut values = Values::empty(ColumnType::F64);
+        let mut values = ColumnValues::empty(ColumnType::F64);
         for trial in &trials {
             push_value(&mut values, &levels[trial.variant as usize]);
         }
@@ -243,7 +243,7 @@ fn identity_columns(plan: &Plan, trials: impl Iterator<Item = u64>) -> Vec<RunCo
 }
 
 fn integer_column(name: &str, role: Role, values: impl Iterator<Item = u64>) -> RunColumn {
-    let values = Values::I64(values.map(|value| value as i64).collect());
+    let values = ColumnValues::I64(values.map(|value| value as i64).collect());
     RunColumn { name: name.into(), role, values }
 }
 
@@ -271,22 +271,22 @@ fn json(value: &toml::Value) -> Value {
 }
 
 /// Appends a value; the column gets a wider type if necessary.
-fn push_value(values: &mut Values, value: &Value) {
+fn push_value(values: &mut ColumnValues, value: &Value) {
     if value.is_null() {
         return values.resize(values.len() + 1);
     }
     widen(values, value);
     match values {
-        Values::I64(v) => v.push(value.as_i64()),
-        Values::F64(v) => v.push(value.as_f64()),
-        Values::Bool(v) => v.push(value.as_bool()),
-        Values::Text(v) => v.push(Some(&value_text(value))),
+        ColumnValues::I64(v) => v.push(value.as_i64()),
+        ColumnValues::F64(v) => v.push(value.as_f64()),
+        ColumnValues::Bool(v) => v.push(value.as_bool()),
+        ColumnValues::Text(v) => v.push(Some(&value_text(value))),
         _ => unreachable!("`widen` makes columns of these four types"),
     }
 }
 
 /// Widens the column's type so that it can hold the value.
-fn widen(values: &mut Values, value: &Value) {
+fn widen(values: &mut ColumnValues, value: &Value) {
     if type_of(value) == Some(values.column_type()) {
         return;
     }
@@ -294,7 +294,7 @@ fn widen(values: &mut Values, value: &Value) {
     let own = has_values.then(|| values.column_type());
     let ty = common_type(own, type_of(value)).unwrap_or(ColumnType::F64);
     if ty != values.column_type() {
-        *values = widened(std::mem::replace(values, Values::empty(ty)), ty);
+        *values = widened(std::mem::replace(values, ColumnValues::empty(ty)), ty);
     }
 }
 
@@ -358,8 +358,8 @@ mod tests {
         let text = |name: &str, row| table.column(name).expect(name).values.text(row);
         assert_eq!([text("n", 0), text("n", 4), text("n", 8)], ["1", "2.5", "word"]);
         assert_eq!((text("seed", 3), text("seed", 5)), ("10".into(), "8".into()));
-        assert!(matches!(table.column("wider").expect("there").values, Values::F64(_)));
-        assert!(matches!(table.column("sometimes").expect("there").values, Values::Bool(_)));
+        assert!(matches!(table.column("wider").expect("there").values, ColumnValues::F64(_)));
+        assert!(matches!(table.column("sometimes").expect("there").values, ColumnValues::Bool(_)));
         assert!(table.results().iter().all(|c| c.name != "run_wall_s"));
         assert_eq!(table.timings().len(), 2);
         assert_eq!(table.check(), Ok(()));

@@ -20,7 +20,7 @@ use super::summary::{
 use super::table::{Role, RunColumn, RunTable};
 use sidestep_document::Figure;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::suggestion;
 use sidestep_statistics::{
     Bootstrap, Sample, mean, mean_interval, percentile, quantile_interval, rank_correlation,
@@ -230,7 +230,7 @@ fn metrics_by_name<'a>(
             let remedy = suggestion(name, &known);
             return Err(InputError::new(format!("metrics {name}"), cause, remedy));
         };
-        if matches!(column.values, Values::Text(_)) {
+        if matches!(column.values, ColumnValues::Text(_)) {
             let cause = format!("the metric `{name}` is words, not numbers");
             return Err(InputError::new(format!("metrics {name}"), cause, "leave it out"));
         }
@@ -248,7 +248,7 @@ fn metrics_by_name<'a>(
 
 /// Returns the reason why a metric is uninformative, if it is.
 fn omission_reason(column: &RunColumn) -> Option<String> {
-    if matches!(column.values, Values::Text(_)) {
+    if matches!(column.values, ColumnValues::Text(_)) {
         return Some("words, not numbers".into());
     }
     let runs = column.values.len();
@@ -303,7 +303,7 @@ fn summarize_metric(
         name: column.name.clone(),
         label: groups.label(column),
         meaning: groups.meaning(column),
-        is_share: matches!(column.values, Values::Bool(_)),
+        is_share: matches!(column.values, ColumnValues::Bool(_)),
         explained: explained_variance(groups, column),
         variants,
         comparisons: reference.map_or(Vec::new(), |r| comparisons(groups, column, r, bootstrap)),
@@ -318,7 +318,7 @@ fn metric_values(
     bootstrap: Option<&Bootstrap>,
 ) -> VariantMetric {
     let sample = Sample::from_runs(groups.values(column, variant));
-    let values = if matches!(column.values, Values::Bool(_)) {
+    let values = if matches!(column.values, ColumnValues::Bool(_)) {
         MetricValues::Share(proportion(&sample.values, groups.seedless[variant]))
     } else {
         MetricValues::Numbers(numeric_summary(&sample, bootstrap))

@@ -80,16 +80,16 @@ impl RunTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_kernel::ports::Values;
+    use sidestep_kernel::ports::ColumnValues;
 
-    fn column(name: &str, values: Values) -> RunColumn {
+    fn column(name: &str, values: ColumnValues) -> RunColumn {
         RunColumn { name: name.into(), role: Role::Metric, values }
     }
 
     #[test]
     fn columns_of_different_length_or_the_same_name_are_refused() {
-        let a = column("a", Values::I64([Some(1), None].into_iter().collect()));
-        let short = column("b", Values::Bool(vec![true].into()));
+        let a = column("a", ColumnValues::I64([Some(1), None].into_iter().collect()));
+        let short = column("b", ColumnValues::Bool(vec![true].into()));
         let error = RunTable { columns: vec![a.clone(), short] }.check().unwrap_err();
         assert_eq!(error.cause(), "the column `b` has 1 rows, others have 2");
         let error = RunTable { columns: vec![a.clone(), a.clone()] }.check().unwrap_err();

@@ -6,16 +6,16 @@ use proptest::prelude::*;
 use sidestep_document::FigureKind;
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_statistics::Bootstrap;
 
-fn column(name: &str, role: Role, values: Values) -> RunColumn {
+fn column(name: &str, role: Role, values: ColumnValues) -> RunColumn {
     RunColumn { name: name.into(), role, values }
 }
 
-fn numbers(values: impl IntoIterator<Item = f64>) -> Values {
-    Values::F64(values.into_iter().map(Some).collect())
+fn numbers(values: impl IntoIterator<Item = f64>) -> ColumnValues {
+    ColumnValues::F64(values.into_iter().map(Some).collect())
 }
 
 /// A full grid: 2 regimes, counts 10, 20 and 40, 20 replicates. The delay is
@@ -36,16 +36,17 @@ fn grid() -> RunTable {
         *count as f64 / 10.0 + 3.0 * rush(regime) + 2.0 * common(*replicate) + 0.2 * noise(i, 2)
     };
     let arrived = |(i, row): (usize, &(&str, i64, i64))| Some(noise(i, 3) > rush(row.0));
-    let int =
-        |of: fn(&(&str, i64, i64)) -> i64| Values::I64(rows.iter().map(|r| Some(of(r))).collect());
+    let int = |of: fn(&(&str, i64, i64)) -> i64| {
+        ColumnValues::I64(rows.iter().map(|r| Some(of(r))).collect())
+    };
     let text = |of: &dyn Fn(&(&str, i64, i64)) -> String| {
-        Values::Text(rows.iter().map(|r| Some(of(r))).collect())
+        ColumnValues::Text(rows.iter().map(|r| Some(of(r))).collect())
     };
     let delays = numbers(rows.iter().enumerate().map(delay));
     let floats = |purpose| numbers((0..rows.len()).map(|i| noise(i, purpose)));
     let metric = |name, values| column(name, Role::Metric, values);
     let columns = vec![
-        column("cell", Role::Trial, Values::I64((0..rows.len() as i64).map(Some).collect())),
+        column("cell", Role::Trial, ColumnValues::I64((0..rows.len() as i64).map(Some).collect())),
         column("variant", Role::Variant, text(&|r| format!("{} {}", r.0, r.1))),
         column("replicate", Role::Replicate, int(|r| r.2)),
         column("seed", Role::Seed, int(|r| r.2 + 100)),
@@ -54,7 +55,7 @@ fn grid() -> RunTable {
         column("format", Role::Parameter, int(|_| 1)),
         metric("noise_m", floats(4)),
         metric("mean_delay_percent", delays),
-        metric("arrived", Values::Bool(rows.iter().enumerate().map(arrived).collect())),
+        metric("arrived", ColumnValues::Bool(rows.iter().enumerate().map(arrived).collect())),
         metric("lost", int(|_| 0)),
         metric("reason", text(&|_| "over".into())),
         column("digest", Role::Digest, text(&|_| "ab".into())),
@@ -181,7 +182,7 @@ fn figures_are_lines_over_numbers_bars_over_words_and_points_where_nothing_is_on
 fn samples_of_whole_numbers_are_samples_too() {
     let mut table = hypercube(30, 1);
     let speed = table.columns.iter_mut().find(|c| c.name == "speed_m_s").unwrap();
-    speed.values = Values::I64((0..30).map(|k| Some(k % 4)).collect());
+    speed.values = ColumnValues::I64((0..30).map(|k| Some(k % 4)).collect());
     let summary = summed(&table);
     assert_eq!((summary.baseline.clone(), summary.figures().len()), (None, 3));
 }
@@ -189,10 +190,15 @@ fn samples_of_whole_numbers_are_samples_too() {
 #[test]
 fn parameters_that_always_change_together_share_an_axis() {
     let rows = || (0..12_i64).map(|k| k / 4);
-    let text = |words: [&str; 3]| Values::Text(rows().map(|k| Some(words[k as usize])).collect());
+    let text =
+        |words: [&str; 3]| ColumnValues::Text(rows().map(|k| Some(words[k as usize])).collect());
     let columns = vec![
-        column("variant", Role::Variant, Values::I64(rows().map(Some).collect())),
-        column("replicate", Role::Replicate, Values::I64((0..12).map(|k| Some(k % 4)).collect())),
+        column("variant", Role::Variant, ColumnValues::I64(rows().map(Some).collect())),
+        column(
+            "replicate",
+            Role::Replicate,
+            ColumnValues::I64((0..12).map(|k| Some(k % 4)).collect()),
+        ),
         column("method", Role::Parameter, text(["none", "mvp", "pc"])),
         column("shield", Role::Parameter, text(["off", "on", "auto"])),
         column("lag_m", Role::Metric, numbers((0..12).map(f64::from))),
@@ -219,7 +225,8 @@ fn one_table_has_every_mean_with_its_difference_p_and_n() {
 fn hypercube(variants: i64, replicates: i64) -> RunTable {
     let rows: Vec<(i64, i64)> =
         (0..variants).flat_map(|v| (0..replicates).map(move |r| (v, r))).collect();
-    let int = |of: fn(&(i64, i64)) -> i64| Values::I64(rows.iter().map(|r| Some(of(r))).collect());
+    let int =
+        |of: fn(&(i64, i64)) -> i64| ColumnValues::I64(rows.iter().map(|r| Some(of(r))).collect());
     let columns = vec![
         column("variant", Role::Variant, int(|r| r.0)),
         column("replicate", Role::Replicate, int(|r| r.1)),
@@ -261,7 +268,7 @@ fn no_number_in_a_table_is_without_interval_and_n() {
 fn missing_and_infinite_values_are_counted_and_told() {
     let mut table = grid();
     let delay = table.columns.iter_mut().find(|c| c.name == "mean_delay_percent").unwrap();
-    let Values::F64(values) = &mut delay.values else { panic!("numbers") };
+    let ColumnValues::F64(values) = &mut delay.values else { panic!("numbers") };
     let mut cells: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
     (cells[0], cells[1], cells[25]) = (None, Some(f64::NAN), Some(f64::INFINITY));
     *values = cells.into_iter().collect();
@@ -296,7 +303,7 @@ fn wrong_names_and_tables_are_refused_with_a_remedy() {
     assert_eq!(error.cause(), "there is no metric `noise`");
     let mut twice = grid();
     let replicate = twice.columns.iter_mut().find(|c| c.role == Role::Replicate).unwrap();
-    replicate.values = Values::I64(vec![4; 120].into());
+    replicate.values = ColumnValues::I64(vec![4; 120].into());
     let error = Summary::from_table(&twice, &SummaryOptions::default()).unwrap_err();
     assert_eq!(error.cause(), "variant `calm 10` has two runs of replicate 4");
     let empty = Summary::from_table(&RunTable::default(), &SummaryOptions::default()).unwrap();
@@ -325,12 +332,12 @@ proptest! {
         trial: bool, variant: bool, replicate: bool,
     ) {
         let mut columns = vec![
-            column("p", Role::Parameter, Values::I64(rows.iter().map(|r| Some(r.0)).collect())),
-            column("q", Role::Parameter, Values::F64(rows.iter().map(|r| r.2).collect())),
-            column("x_s", Role::Metric, Values::F64(rows.iter().map(|r| r.2).collect())),
-            column("ok", Role::Metric, Values::Bool(rows.iter().map(|r| r.3).collect())),
+            column("p", Role::Parameter, ColumnValues::I64(rows.iter().map(|r| Some(r.0)).collect())),
+            column("q", Role::Parameter, ColumnValues::F64(rows.iter().map(|r| r.2).collect())),
+            column("x_s", Role::Metric, ColumnValues::F64(rows.iter().map(|r| r.2).collect())),
+            column("ok", Role::Metric, ColumnValues::Bool(rows.iter().map(|r| r.3).collect())),
         ];
-        let int = |numbers: Vec<i64>| Values::I64(numbers.into_iter().map(Some).collect());
+        let int = |numbers: Vec<i64>| ColumnValues::I64(numbers.into_iter().map(Some).collect());
         let (first, second) = (rows.iter().map(|r| r.0), rows.iter().map(|r| r.1));
         if trial { columns.push(column("cell", Role::Trial, int(second.clone().collect()))); }
         if variant { columns.push(column("variant", Role::Variant, int(first.collect()))); }

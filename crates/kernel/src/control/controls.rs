@@ -1,6 +1,6 @@
 //! Controls of agents that decide outside of the run: recorded as rows of a table, and read back to be replayed.
 
-use crate::ports::{MemoryRecorder, Table, TableSchema, Values};
+use crate::ports::{ColumnValues, MemoryRecorder, Table, TableSchema};
 use crate::units::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
@@ -100,17 +100,20 @@ impl ControlTableReader {
     pub const TABLE: &'static str = CONTROLS;
 
     /// Reads the next rows. `None` if they are not those of controls.
-    pub fn read_block(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
+    pub fn read_block(&mut self, schema: &TableSchema, columns: &[ColumnValues]) -> Option<()> {
         let column =
             |name: &str| columns.get(schema.columns.iter().position(|column| column.name == name)?);
-        let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
+        let (ColumnValues::U64(cycles), ColumnValues::U32(agents)) =
+            (column("cycle")?, column("agent")?)
         else {
             return None;
         };
-        let (Values::U32(parts), Values::U32(bytes)) = (column("part")?, column("bytes")?) else {
+        let (ColumnValues::U32(parts), ColumnValues::U32(bytes)) =
+            (column("part")?, column("bytes")?)
+        else {
             return None;
         };
-        let Values::U64(values) = column("value")? else { return None };
+        let ColumnValues::U64(values) = column("value")? else { return None };
         for row in 0..cycles.len() {
             let controls = self.log.cycles.entry(*cycles.get(row)?).or_default();
             // The row that only begins an externally decided cycle.

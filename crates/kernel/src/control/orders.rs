@@ -78,10 +78,10 @@ impl OrderLog {
 
     /// Iterates over the orders, each with the cycle before which it is given.
     pub fn iter(&self) -> impl Iterator<Item = (Cycle, MultiAgentOrder<'_>)> {
-        self.entries.iter().map(|entry| (entry.cycle, self.entry_order(entry)))
+        self.entries.iter().map(|entry| (entry.cycle, self.multi_agent_order(entry)))
     }
 
-    fn entry_order<'a>(&'a self, entry: &'a OrderEntry) -> MultiAgentOrder<'a> {
+    fn multi_agent_order<'a>(&'a self, entry: &'a OrderEntry) -> MultiAgentOrder<'a> {
         MultiAgentOrder {
             order: &entry.order,
             agents: &self.agents[entry.agents.clone()],
@@ -92,7 +92,7 @@ impl OrderLog {
     /// Iterates over the orders that are given before `cycle`.
     pub(crate) fn orders_due(&self, cycle: Cycle) -> impl Iterator<Item = MultiAgentOrder<'_>> {
         let due = self.count_before(cycle)..self.count_before(cycle.saturating_add(1));
-        self.entries[due].iter().map(|entry| self.entry_order(entry))
+        self.entries[due].iter().map(|entry| self.multi_agent_order(entry))
     }
 
     /// Returns the first cycle after `cycle` before which an order is given.

@@ -2,7 +2,7 @@
 
 use super::orders::{ORDERS, OrderLog};
 use super::team::MultiAgentOrder;
-use crate::ports::{MemoryRecorder, TableSchema, Values};
+use crate::ports::{ColumnValues, MemoryRecorder, TableSchema};
 use crate::units::{Cycle, EntityId};
 
 /// Reads the orders of the table `orders`, block after block: each row has one value.
@@ -26,15 +26,18 @@ impl OrderTableReader {
     pub const TABLE: &'static str = ORDERS;
 
     /// Reads the next rows. `None` if the columns are not those of orders.
-    pub fn read_block(&mut self, schema: &TableSchema, columns: &[Values]) -> Option<()> {
+    pub fn read_block(&mut self, schema: &TableSchema, columns: &[ColumnValues]) -> Option<()> {
         let index = |name: &str| schema.columns.iter().position(|column| column.name == name);
         let column = |name: &str| columns.get(index(name)?);
-        let (Values::U64(cycles), Values::U32(agents)) = (column("cycle")?, column("agent")?)
+        let (ColumnValues::U64(cycles), ColumnValues::U32(agents)) =
+            (column("cycle")?, column("agent")?)
         else {
             return None;
         };
-        let orders @ Values::Label(_) = column("order")? else { return None };
-        let (Values::U32(parts), Values::F64(values)) = (column("part")?, column("value")?) else {
+        let orders @ ColumnValues::Label(_) = column("order")? else { return None };
+        let (ColumnValues::U32(parts), ColumnValues::F64(values)) =
+            (column("part")?, column("value")?)
+        else {
             return None;
         };
         let order_column = &schema.columns[index("order")?];

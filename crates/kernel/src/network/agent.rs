@@ -66,7 +66,7 @@ impl<T: Transport> AgentLoop<T> {
         start_tick: u64,
         is_done: impl Fn(&A) -> bool,
     ) {
-        let mut arrivals = LastArrivalTicks::new(agents, self.max_flight_ticks);
+        let mut arrivals = LatestPossibleArrivals::new(agents, self.max_flight_ticks);
         for agent in agents.iter_mut() {
             self.send(agent, start_tick, &mut arrivals);
         }
@@ -100,7 +100,7 @@ impl<T: Transport> AgentLoop<T> {
         &mut self,
         agent: &mut impl NetworkAgent,
         tick: u64,
-        arrivals: &mut LastArrivalTicks,
+        arrivals: &mut LatestPossibleArrivals,
     ) {
         for Envelope { sender, payload, .. } in self.transport.receive(agent.id(), tick) {
             agent.on_packet(sender, &payload, tick);
@@ -111,7 +111,12 @@ impl<T: Transport> AgentLoop<T> {
     }
 
     /// Sends the packets of an agent that wait to be sent.
-    fn send(&mut self, agent: &mut impl NetworkAgent, tick: u64, arrivals: &mut LastArrivalTicks) {
+    fn send(
+        &mut self,
+        agent: &mut impl NetworkAgent,
+        tick: u64,
+        arrivals: &mut LatestPossibleArrivals,
+    ) {
         let sender = agent.id();
         for OutgoingPacket { to, sequence, payload } in agent.take_packets() {
             let Some((last, others)) = to.split_last() else { continue };
@@ -133,7 +138,7 @@ impl<T: Transport> AgentLoop<T> {
 }
 
 /// The last tick in which something may arrive at each agent.
-struct LastArrivalTicks {
+struct LatestPossibleArrivals {
     max_flight_ticks: Option<u64>,
     /// Ids of the agents, rising, so that bisection finds a receiver.
     ids: Vec<EntityId>,
@@ -141,7 +146,7 @@ struct LastArrivalTicks {
     last_ticks: Vec<u64>,
 }
 
-impl LastArrivalTicks {
+impl LatestPossibleArrivals {
     fn new<A: NetworkAgent>(agents: &[A], max_flight_ticks: Option<u64>) -> Self {
         Self {
             max_flight_ticks,

@@ -11,7 +11,7 @@ use crate::units::{Cycle, EntityId};
 use std::collections::BTreeMap;
 
 /// Distances between agents at the start of a cycle, for the range of radios.
-pub trait InterAgentDistances {
+pub trait DistanceLookup {
     /// Returns the distance between two agents in meters.
     fn distance_m(&self, link: [EntityId; 2]) -> f64;
 }
@@ -23,7 +23,7 @@ pub struct FaultyTransport<'a, T> {
     network: Option<&'a Network>,
     streams: FaultStreams,
     /// Without them, every agent reaches every other.
-    distances: Option<&'a dyn InterAgentDistances>,
+    distances: Option<&'a dyn DistanceLookup>,
     /// First tick of each conversation, and its time in seconds after the start of the run, both rising.
     conversations: &'a [(u64, f64)],
     /// Tick from which on each direction of a link is free, where messages take time by their size.
@@ -36,7 +36,7 @@ impl<'a> FaultyTransport<'a, MemoryTransport> {
     pub fn in_memory(
         network: Option<&'a Network>,
         streams: FaultStreams,
-        distances: Option<&'a dyn InterAgentDistances>,
+        distances: Option<&'a dyn DistanceLookup>,
         conversations: &'a [(u64, f64)],
     ) -> Self {
         let faults = network.map(Network::faults).unwrap_or_default();

@@ -102,7 +102,7 @@ impl NetworkPartition {
 
 impl UnidirectionalLink {
     /// Returns whether the fault stops a message at a time.
-    pub(super) fn is_direction_blocked(
+    pub(super) fn is_message_blocked(
         &self,
         sender: EntityId,
         receiver: EntityId,

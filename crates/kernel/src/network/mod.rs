@@ -23,7 +23,7 @@ use crate::ports::NetworkFaults;
 use crate::units::EntityId;
 pub use agent::{AgentLoop, NetworkAgent, OutgoingPacket, ReplyBatching};
 pub use fault_injector::FaultInjector;
-pub use faulty_transport::{FaultyTransport, InterAgentDistances};
+pub use faulty_transport::{DistanceLookup, FaultyTransport};
 pub use links::{
     FaultStreams, GilbertElliott, NetworkPartition, RadioOutage, TimeWindow, UnidirectionalLink,
 };
@@ -86,7 +86,7 @@ impl Network {
             && !self
                 .unidirectional_links
                 .iter()
-                .any(|link| link.is_direction_blocked(sender, receiver, at_s))
+                .any(|link| link.is_message_blocked(sender, receiver, at_s))
     }
 
     fn s_to_ticks(&self, seconds: f64) -> u64 {
@@ -120,7 +120,7 @@ impl Network {
 
     /// Returns the policy for conversations of many steps: a silent agent is given up in a
     /// quarter of the time at the latest, so that enough is left to go on without it.
-    pub fn multi_step_retry_policy(&self) -> RetryPolicy {
+    pub fn long_conversation_retry_policy(&self) -> RetryPolicy {
         // At least two requests, because one alone may be lost on any network.
         let max_tries =
             (self.deadline_s / (WAITS_PER_CONVERSATION * self.patience_s)).max(2.0) as u32;

@@ -81,7 +81,7 @@ impl PacketBuffer {
     }
 
     /// The serialized message, without the room for the header.
-    pub fn message_bytes(&self) -> &[u8] {
+    pub fn serialized_message(&self) -> &[u8] {
         &self.0[HEADER_BYTES..]
     }
 

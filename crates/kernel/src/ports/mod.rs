@@ -9,7 +9,7 @@ pub mod transport;
 pub use clock::{Clock, ManualClock, SystemClock};
 pub use recorder::{MemoryRecorder, RecordError, Recorder};
 pub use table::{
-    Cells, ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnWithRole, Table, TableBuffer,
-    TableBuffers, TableRowsBuffer, TableSchema, Values,
+    Cells, ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnValues, ColumnWithRole, Table,
+    TableBuffer, TableBuffers, TableRowsBuffer, TableSchema,
 };
 pub use transport::{Envelope, MemoryTransport, NetworkFaults, Transport};

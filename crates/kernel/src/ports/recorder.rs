@@ -5,7 +5,7 @@
 //! slow (the run waits) but never changes the run, and a recording that it has not finished is
 //! never taken for complete.
 
-use super::table::{Cells, ColumnSpec, ColumnType, TableSchema, Values};
+use super::table::{Cells, ColumnSpec, ColumnType, ColumnValues, TableSchema};
 use std::fmt;
 
 /// Recording failed: a full disk, a file that cannot be created.
@@ -31,12 +31,12 @@ impl RecordError {
 /// rows cannot be stored, the recording is incomplete from then on: it stays marked so, and
 /// every later call fails too.
 pub trait Recorder: Send {
-    /// Appends one block to the table with this index: one [`Values`] per column of its
+    /// Appends one block to the table with this index: one [`ColumnValues`] per column of its
     /// schema, in its order, all of one length.
     ///
     /// # Errors
     /// When the block does not fit the schema, or when rows cannot be stored.
-    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError>;
+    fn append(&mut self, table: usize, block: &[ColumnValues]) -> Result<(), RecordError>;
 
     /// Makes all rows so far durable, so that a checkpoint may rely on them: all of them belong to
     /// cycles before `next_cycle`, all later ones to `next_cycle` or after it. It must be called
@@ -60,7 +60,7 @@ pub trait Recorder: Send {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MemoryRecorder {
     schemas: Vec<TableSchema>,
-    tables: Vec<Vec<Values>>,
+    tables: Vec<Vec<ColumnValues>>,
     finished: bool,
 }
 
@@ -69,24 +69,26 @@ impl MemoryRecorder {
     pub fn new(schemas: &[TableSchema]) -> Self {
         let tables = schemas
             .iter()
-            .map(|schema| schema.columns.iter().map(|column| Values::empty(column.ty)).collect())
+            .map(|schema| {
+                schema.columns.iter().map(|column| ColumnValues::empty(column.ty)).collect()
+            })
             .collect();
         Self { schemas: schemas.to_vec(), tables, finished: false }
     }
 
     /// Returns the schema and the columns of table `table`, if it exists.
-    pub fn table(&self, table: &str) -> Option<(&TableSchema, &[Values])> {
+    pub fn table(&self, table: &str) -> Option<(&TableSchema, &[ColumnValues])> {
         let t = self.schemas.iter().position(|s| s.name == table)?;
         Some((&self.schemas[t], &self.tables[t]))
     }
 
     /// Returns the schema and the columns of every table, in their order.
-    pub fn tables(&self) -> impl Iterator<Item = (&TableSchema, &[Values])> {
+    pub fn tables(&self) -> impl Iterator<Item = (&TableSchema, &[ColumnValues])> {
         self.schemas.iter().zip(self.tables.iter().map(Vec::as_slice))
     }
 
     /// Returns the column `name` of table `table`, if both exist.
-    pub fn column(&self, table: &str, name: &str) -> Option<&Values> {
+    pub fn column(&self, table: &str, name: &str) -> Option<&ColumnValues> {
         let (schema, columns) = self.table(table)?;
         columns.get(schema.columns.iter().position(|c| c.name == name)?)
     }
@@ -94,18 +96,21 @@ impl MemoryRecorder {
     /// Returns the number of rows of table `table`; 0 for one that does not exist.
     pub fn row_count(&self, table: &str) -> usize {
         let t = self.schemas.iter().position(|s| s.name == table);
-        t.map_or(0, |t| self.tables[t].first().map_or(0, Values::len))
+        t.map_or(0, |t| self.tables[t].first().map_or(0, ColumnValues::len))
     }
 
     /// Moves all rows out, by table, without a copy; the tables are empty then.
-    pub fn take(&mut self) -> Vec<(TableSchema, Vec<Values>)> {
+    pub fn take(&mut self) -> Vec<(TableSchema, Vec<ColumnValues>)> {
         let empty = Self::new(&self.schemas);
         let tables = std::mem::replace(&mut self.tables, empty.tables);
         self.schemas.iter().cloned().zip(tables).collect()
     }
 
     /// Drops rows: `keep` returns for every row of a table whether it stays, or `None` where all do.
-    pub fn retain_rows(&mut self, keep: impl Fn(&TableSchema, &[Values]) -> Option<Vec<bool>>) {
+    pub fn retain_rows(
+        &mut self,
+        keep: impl Fn(&TableSchema, &[ColumnValues]) -> Option<Vec<bool>>,
+    ) {
         for (schema, columns) in self.schemas.iter().zip(&mut self.tables) {
             if let Some(mask) = keep(schema, columns).filter(|mask| mask.contains(&false)) {
                 columns.iter_mut().for_each(|column| column.retain_rows(&mask));
@@ -123,7 +128,7 @@ impl MemoryRecorder {
 ///
 /// # Errors
 /// When a column does not fit; the error reports the first one.
-pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordError> {
+pub fn check_block(schema: &TableSchema, block: &[ColumnValues]) -> Result<(), RecordError> {
     let given = block.len();
     let expected = schema.columns.len();
     if given != expected {
@@ -140,7 +145,7 @@ pub fn check_block(schema: &TableSchema, block: &[Values]) -> Result<(), RecordE
 }
 
 /// Returns the reason why values do not fit a column of a block with this number of rows.
-fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<String> {
+fn column_fault(column: &ColumnSpec, values: &ColumnValues, rows: usize) -> Option<String> {
     if values.column_type() != column.ty {
         return Some(format!("is {:?}, not {:?}", column.ty, values.column_type()));
     }
@@ -152,7 +157,7 @@ fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<Str
     }
     // The maximum, not the first wrong one: a loop without an exit is vectorized, and this one runs over every row
     // of a recorded run.
-    if let Values::Label(indices) = values
+    if let ColumnValues::Label(indices) = values
         && let Some(index) =
             max_valid_value(indices).filter(|&&i| i as usize >= column.labels.len())
     {
@@ -165,12 +170,12 @@ fn column_fault(column: &ColumnSpec, values: &Values, rows: usize) -> Option<Str
 fn max_valid_value(indices: &Cells<u32>) -> Option<&u32> {
     match indices.valid() {
         None => indices.iter().max(),
-        Some(_) => indices.iter_options().flatten().max(),
+        Some(_) => indices.iter_with_missing().flatten().max(),
     }
 }
 
 impl Recorder for MemoryRecorder {
-    fn append(&mut self, table: usize, block: &[Values]) -> Result<(), RecordError> {
+    fn append(&mut self, table: usize, block: &[ColumnValues]) -> Result<(), RecordError> {
         let schema =
             self.schemas.get(table).ok_or_else(|| RecordError::new(table, "no such table"))?;
         check_block(schema, block)?;
@@ -206,7 +211,7 @@ pub fn conformance_test_schemas() -> Vec<TableSchema> {
 }
 
 /// A function that returns a table's column, both by index, after the recording is finished.
-pub type ColumnReadBack = Box<dyn Fn(usize, usize) -> Values>;
+pub type ColumnReadBack = Box<dyn Fn(usize, usize) -> ColumnValues>;
 
 /// Checks the guarantees of a [`Recorder`]. `recorder` is fresh, made with [`conformance_test_schemas`];
 /// `read_back` opens the finished recording.
@@ -229,11 +234,11 @@ pub fn check_conformance<R: Recorder>(
 
     let column = read_back(recorder);
     let big = u64::MAX - 3;
-    let cycles = Values::U64(vec![10, 11, 12, big, big + 1, big + 2].into());
+    let cycles = ColumnValues::U64(vec![10, 11, 12, big, big + 1, big + 2].into());
     assert_eq!(column(0, 0), cycles, "rows keep their order, u64 its range");
-    let entities = Values::U32(vec![0, 7, u32::MAX, 0, 7, u32::MAX].into());
+    let entities = ColumnValues::U32(vec![0, 7, u32::MAX, 0, 7, u32::MAX].into());
     assert_eq!(column(0, 1), entities, "u32 keeps its range");
-    let Values::F64(places_m) = column(0, 2) else { panic!("f64 stays f64") };
+    let ColumnValues::F64(places_m) = column(0, 2) else { panic!("f64 stays f64") };
     let bits: Vec<_> = places_m.iter().map(|x| x.to_bits()).collect();
     let expected = [-0.5, -0.0, 1e300].map(f64::to_bits).repeat(2);
     assert_eq!(bits, expected, "f64 keeps its bits");
@@ -242,28 +247,28 @@ pub fn check_conformance<R: Recorder>(
 }
 
 /// Three rows of the first conformance table.
-fn first_conformance_block(cycle: u64) -> Vec<Values> {
+fn first_conformance_block(cycle: u64) -> Vec<ColumnValues> {
     vec![
-        Values::U64((cycle..cycle + 3).collect()),
-        Values::U32(vec![0, 7, u32::MAX].into()),
-        Values::F64(vec![-0.5, -0.0, 1e300].into()),
+        ColumnValues::U64((cycle..cycle + 3).collect()),
+        ColumnValues::U32(vec![0, 7, u32::MAX].into()),
+        ColumnValues::F64(vec![-0.5, -0.0, 1e300].into()),
     ]
 }
 
 /// Three rows of the second conformance table.
-fn second_conformance_block() -> Vec<Values> {
+fn second_conformance_block() -> Vec<ColumnValues> {
     build_second_block(vec![i32::MIN, 0, i32::MAX], vec![1, 0, 1])
 }
 
 /// Rows of the second conformance table; the second of every two has no note.
-fn build_second_block(delta: Vec<i32>, event: Vec<u32>) -> Vec<Values> {
+fn build_second_block(delta: Vec<i32>, event: Vec<u32>) -> Vec<ColumnValues> {
     let note = |row| (row % 2 == 0).then(|| format!("row {row}"));
-    let notes = Values::Text((0..delta.len()).map(note).collect());
-    vec![Values::I32(delta.into()), Values::Label(event.into()), notes]
+    let notes = ColumnValues::Text((0..delta.len()).map(note).collect());
+    vec![ColumnValues::I32(delta.into()), ColumnValues::Label(event.into()), notes]
 }
 
 fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
-    let mut refuses = |table: usize, block: &[Values], what: &str| {
+    let mut refuses = |table: usize, block: &[ColumnValues], what: &str| {
         assert!(recorder.append(table, block).is_err(), "{what} is refused");
     };
     refuses(0, &second_conformance_block(), "a block of another table");
@@ -272,7 +277,7 @@ fn refuses_what_does_not_fit(recorder: &mut impl Recorder) {
     refuses(1, &build_second_block(vec![1], vec![]), "a column of another length");
     refuses(1, &build_second_block(vec![1], vec![2]), "a label without a name");
     let mut missing = build_second_block(vec![1], vec![0]);
-    missing[0] = Values::I32([None].into_iter().collect());
+    missing[0] = ColumnValues::I32([None].into_iter().collect());
     refuses(1, &missing, "a missing value of a column that is declared without");
 }
 
@@ -284,7 +289,7 @@ mod tests {
     fn a_missing_label_needs_no_name() {
         let label = ColumnSpec::label("callsign", "", Vec::<String>::new());
         let schema = TableSchema::new("t", vec![ColumnSpec { is_nullable: true, ..label }]);
-        let block = |label| [Values::Label([None, label].into_iter().collect())];
+        let block = |label| [ColumnValues::Label([None, label].into_iter().collect())];
         check_block(&schema, &block(None)).expect("no label is named");
         assert!(check_block(&schema, &block(Some(0))).is_err());
     }
@@ -295,13 +300,13 @@ mod tests {
         recorder.append(0, &first_conformance_block(5)).expect("it fits");
         recorder.append(1, &second_conformance_block()).expect("it fits");
         recorder.retain_rows(|schema, columns| {
-            let Values::U64(cycles) = &columns[0] else { return None };
+            let ColumnValues::U64(cycles) = &columns[0] else { return None };
             assert_eq!(schema.name, "first");
             Some(cycles.iter().map(|cycle| *cycle != 6).collect())
         });
         assert_eq!(
             recorder.column("first", "entity"),
-            Some(&Values::U32(vec![0, u32::MAX].into()))
+            Some(&ColumnValues::U32(vec![0, u32::MAX].into()))
         );
         let tables: Vec<_> = recorder.tables().map(|(schema, _)| schema.name.as_str()).collect();
         assert_eq!((tables, recorder.row_count("second")), (vec!["first", "second"], 3));

@@ -215,12 +215,12 @@ impl Serialize for BodyKind {
 }
 
 thread_local! {
-    /// The kinds that the names in a text stand for while [`Kinds::resolve_names_in`] reads it: Serde hands no context to the
+    /// The kinds that the names in a text stand for while [`Kinds::resolve_names_during`] reads it: Serde hands no context to the
     /// code that it derives.
     static READABLE: RefCell<Kinds> = const { RefCell::new(Kinds(Vec::new())) };
 }
 
-/// Reads a name; it stands for one of the kinds of [`Kinds::resolve_names_in`].
+/// Reads a name; it stands for one of the kinds of [`Kinds::resolve_names_during`].
 impl<'de> Deserialize<'de> for BodyKind {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
@@ -293,7 +293,7 @@ impl Kinds {
     }
 
     /// Reads a text with bodies, whose names of kinds stand for these: without this, the text of a body cannot be read.
-    pub fn resolve_names_in<T>(&self, read: impl FnOnce() -> T) -> T {
+    pub fn resolve_names_during<T>(&self, read: impl FnOnce() -> T) -> T {
         let before = READABLE.replace(self.clone());
         let result = read();
         READABLE.set(before);
@@ -370,8 +370,8 @@ mod tests {
         let text = serde_json::to_string(&id).expect("JSON");
         assert_eq!(text, r#"["airplane",7,null]"#);
         let read = || serde_json::from_str::<BodyId>(&text).ok();
-        assert_eq!(Kinds::new([ROBOT, AIRPLANE]).resolve_names_in(read), Some(id));
-        assert_eq!(Kinds::new([ROBOT]).resolve_names_in(read), None);
+        assert_eq!(Kinds::new([ROBOT, AIRPLANE]).resolve_names_during(read), Some(id));
+        assert_eq!(Kinds::new([ROBOT]).resolve_names_during(read), None);
         assert_eq!(read(), None);
     }
 }

@@ -4,7 +4,7 @@ use super::body::{Body, BodyId, Shape};
 use super::kind::{BodyKind, BodyRole};
 use super::pose::{Isometry2, Vec3};
 use super::{Frame, Scenery};
-use crate::ports::Values;
+use crate::ports::ColumnValues;
 use crate::units::Cycle;
 use std::collections::BTreeMap;
 
@@ -72,7 +72,7 @@ impl PositionTableColumns {
         scenery: &Scenery,
         frame: &Frame,
         bodies: &[BodyId],
-        column: impl Fn(&str) -> Option<&'a Values>,
+        column: impl Fn(&str) -> Option<&'a ColumnValues>,
     ) -> Option<Vec<Trail>> {
         let rows = self.rows(frame.cycle, bodies, column)?;
         let mut trails = Vec::new();
@@ -81,7 +81,7 @@ impl PositionTableColumns {
             let is_current = |last: &PositionRow| last.cycle + self.interval >= frame.cycle;
             if rows.last().is_some_and(|last| body.is_none() || is_current(last)) {
                 // A body that is gone has no shape in the frame, so that of its start is used.
-                let start = || scenery.bodies.iter().find(|body| is_start_of(body, id));
+                let start = || scenery.bodies.iter().find(|body| is_start_marker_of(body, id));
                 let like = body.or_else(start);
                 let present = body.map(|body| (frame.cycle, body.pose.at_m));
                 trails.push(Trail { of: id, points: self.points(rows, like, present) });
@@ -95,11 +95,11 @@ impl PositionTableColumns {
         &self,
         before: Cycle,
         bodies: &[BodyId],
-        column: impl Fn(&str) -> Option<&'a Values>,
+        column: impl Fn(&str) -> Option<&'a ColumnValues>,
     ) -> Option<BTreeMap<BodyId, Vec<PositionRow>>> {
-        let Values::U64(cycles) = column("cycle")? else { return None };
+        let ColumnValues::U64(cycles) = column("cycle")? else { return None };
         let integers = |name| match column(name)? {
-            Values::U32(values) | Values::Label(values) => Some(values),
+            ColumnValues::U32(values) | ColumnValues::Label(values) => Some(values),
             _ => None,
         };
         let numbers = integers(self.number)?;
@@ -107,7 +107,7 @@ impl PositionTableColumns {
         let parts = self.part.map(|name| integers(name).ok_or(())).transpose().ok()?;
         let headings = self.heading.map(|name| integers(name).ok_or(())).transpose().ok()?;
         let axes = self.axes.iter().map(|axis| Some((axis, column(axis.column)?)));
-        let axes: Vec<(&CoordinateColumn, &Values)> = axes.collect::<Option<_>>()?;
+        let axes: Vec<(&CoordinateColumn, &ColumnValues)> = axes.collect::<Option<_>>()?;
         let mut rows: BTreeMap<BodyId, Vec<PositionRow>> =
             bodies.iter().map(|&id| (id, Vec::new())).collect();
         for (k, &cycle) in cycles.iter().enumerate().filter(|(_, cycle)| **cycle < before) {
@@ -174,7 +174,7 @@ impl PositionTableColumns {
     }
 }
 
-fn is_start_of(body: &Body, of: BodyId) -> bool {
+fn is_start_marker_of(body: &Body, of: BodyId) -> bool {
     body.kind.role() == BodyRole::StartOf(of.kind) && body.number == of.number
 }
 
@@ -194,7 +194,7 @@ fn push_with_corner(
 }
 
 /// Returns a value of a numeric column as a number; a label or a truth value is no coordinate.
-fn number(values: &Values, row: usize) -> Option<f64> {
+fn number(values: &ColumnValues, row: usize) -> Option<f64> {
     values.number(row).filter(|_| values.is_numeric())
 }
 
@@ -248,11 +248,11 @@ mod tests {
             Body::new(ROBOT, 7, Pose::from_position([11.5, 11.0, 0.25]), Shape::Cuboid { size_m });
         let frame = Frame { cycle: until, bodies: vec![robot], ..Frame::default() };
         let columns = [
-            ("cycle", Values::U64(vec![1, 0, 0].into())),
-            ("body", Values::U32(vec![7, 7, 8].into())),
-            ("col", Values::U32(vec![1, 0, 9].into())),
-            ("row", Values::U32(vec![0, 0, 9].into())),
-            ("heading", Values::Label(vec![0, 0, 0].into())),
+            ("cycle", ColumnValues::U64(vec![1, 0, 0].into())),
+            ("body", ColumnValues::U32(vec![7, 7, 8].into())),
+            ("col", ColumnValues::U32(vec![1, 0, 9].into())),
+            ("row", ColumnValues::U32(vec![0, 0, 9].into())),
+            ("heading", ColumnValues::Label(vec![0, 0, 0].into())),
         ];
         let column = |name: &str| columns.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
         let scenery = Scenery {

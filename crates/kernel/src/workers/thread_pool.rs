@@ -86,7 +86,7 @@ impl ThreadPool {
             return (0..n).for_each(own_task);
         }
         let shared = Arc::clone(&self.ensure_threads().shared);
-        shared.start_call(n, task);
+        shared.publish_job(n, task);
         // A guard, because the threads must be done with the caller's data also when `own_task` unwinds.
         let guard = CompletionWaitGuard(&shared);
         shared.do_share(0, n, &mut own_task);
@@ -149,7 +149,7 @@ impl PoolState {
     }
 
     /// Resets the cursors before the call is visible, and wakes the threads.
-    fn start_call(&self, n: usize, task: Job) {
+    fn publish_job(&self, n: usize, task: Job) {
         self.cursors.iter().for_each(|cursor| cursor.0.store(0, Ordering::Relaxed));
         let mut call = self.lock_call();
         call.number += 1;

@@ -26,7 +26,7 @@ enum TimeMode {
 }
 
 /// What a cycle works with: the agent's program, and its connection to others.
-pub(super) struct CycleResources<'a> {
+pub(super) struct AgentCycleIo<'a> {
     pub(super) program: &'a mut dyn AgentProgram,
     pub(super) channel: Option<&'a mut (dyn ChannelModel + 'static)>,
     pub(super) messenger: &'a mut Messenger,
@@ -170,7 +170,7 @@ impl AgentCycle {
     }
 
     /// Does everything that can be done now.
-    pub(super) fn advance(&mut self, io: &mut CycleResources<'_>) {
+    pub(super) fn advance(&mut self, io: &mut AgentCycleIo<'_>) {
         match self.time {
             TimeMode::Untimed => {
                 self.process_tick(u64::MAX, io);
@@ -187,7 +187,7 @@ impl AgentCycle {
     }
 
     /// Sends the agent's control, once.
-    fn send_control(&mut self, io: &mut CycleResources<'_>) {
+    fn send_control(&mut self, io: &mut AgentCycleIo<'_>) {
         // Where time is counted in ticks, an agent that is done still answers others until the server closes the cycle:
         // the numbers of messages, which are results, would else depend on which node is faster.
         let may_send = self.time != TimeMode::Ticks || self.is_closed;
@@ -202,7 +202,7 @@ impl AgentCycle {
     }
 
     /// Advances to the tick that the server has granted, once all packets that arrive by then are there.
-    fn advance_to_grant(&mut self, io: &mut CycleResources<'_>) {
+    fn advance_to_grant(&mut self, io: &mut AgentCycleIo<'_>) {
         // The first step, in which the agent starts its conversation, needs no grant.
         if self.has_stepped {
             let Some(grant) = self.grant else { return };
@@ -228,7 +228,7 @@ impl AgentCycle {
 
     /// Gives the program the packets that have arrived by a tick, does everything that is due, and sends the resulting
     /// packets. Returns the receivers of these, with the ticks of arrival.
-    fn process_tick(&mut self, by: u64, io: &mut CycleResources<'_>) -> Vec<(EntityId, u64)> {
+    fn process_tick(&mut self, by: u64, io: &mut AgentCycleIo<'_>) -> Vec<(EntityId, u64)> {
         let later = by.checked_add(1).map(|next| self.arrived.split_off(&next));
         let due = std::mem::replace(&mut self.arrived, later.unwrap_or_default());
         let mut due: Vec<(EntityId, AgentPacket)> = due.into_values().flatten().collect();
@@ -252,7 +252,7 @@ impl AgentCycle {
     }
 
     /// Sends the program's packets.
-    fn send_all(&mut self, io: &mut CycleResources<'_>, sent: &mut Vec<(EntityId, u64)>) {
+    fn send_all(&mut self, io: &mut AgentCycleIo<'_>, sent: &mut Vec<(EntityId, u64)>) {
         for packet in io.program.take_packets() {
             self.send(packet, io, sent);
         }
@@ -262,7 +262,7 @@ impl AgentCycle {
     fn send(
         &mut self,
         packet: OutgoingPacket,
-        io: &mut CycleResources<'_>,
+        io: &mut AgentCycleIo<'_>,
         sent: &mut Vec<(EntityId, u64)>,
     ) {
         let bytes = packet.payload.len();
@@ -294,7 +294,7 @@ impl AgentCycle {
     }
 
     /// Returns the arrivals of a packet, counted from the tick for which its faults are drawn.
-    fn arrivals(&self, packet: &PacketInTransit, io: &mut CycleResources<'_>) -> Vec<PacketTiming> {
+    fn arrivals(&self, packet: &PacketInTransit, io: &mut AgentCycleIo<'_>) -> Vec<PacketTiming> {
         if self.out_of_range.binary_search(&packet.to).is_ok() {
             return Vec::new();
         }

@@ -15,7 +15,7 @@ use crate::protocol::{
     AgentPacket, ClockMode, CycleStart, FleetMember, JoinError, Message, NodeStatusReport, Welcome,
 };
 use crate::wire::{PeerId, WireSetupError};
-use agent_cycle::{AgentCycle, CycleResources};
+use agent_cycle::{AgentCycle, AgentCycleIo};
 pub use join::{JoinConfig, join};
 use sidestep::kernel::{Cycle, EntityId};
 use std::time::{Duration, Instant};
@@ -275,7 +275,7 @@ impl Node {
             self.messenger.send_reliable(PeerId::Server, Message::Ready);
         }
         if let Some(cycle) = &mut self.cycle {
-            cycle.advance(&mut CycleResources {
+            cycle.advance(&mut AgentCycleIo {
                 program: &mut *self.program,
                 channel: self.channel.as_deref_mut(),
                 messenger: &mut self.messenger,

@@ -54,7 +54,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
-    let scene = view::scene_json(&fleet_scene(run.simulation()));
+    let scene = view::scene_json(&viewer_scene(run.simulation()));
     let views = ViewPublisher::new(ViewServer::start(&wire, scene).map_err(endpoint_error)?);
     let messenger = Messenger::new(PeerId::Server, Box::new(wire));
     let config = ServerConfig {
@@ -87,7 +87,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
 }
 
 /// Returns the unchanging part of a run, for viewers.
-fn fleet_scene(run: &dyn Simulation) -> FleetScene {
+fn viewer_scene(run: &dyn Simulation) -> FleetScene {
     FleetScene {
         build: WORLDS.build().into(),
         world: run.world_name().into(),

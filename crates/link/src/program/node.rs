@@ -20,7 +20,7 @@ use std::time::Duration;
 /// When anything is wrong with the job, or the server is gone.
 pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let scenario = Scenario::read(&job.common.flown)?;
-    let agent = scenario.world.find_agent(&job.agent)?;
+    let agent = scenario.world.find_agent_id(&job.agent)?;
     let ports: Vec<PortReservation> = job
         .listen
         .iter()

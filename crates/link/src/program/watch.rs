@@ -77,7 +77,7 @@ impl ViewPoller<'_> {
 }
 
 fn parse_reply<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Error> {
-    WORLDS.kinds().resolve_names_in(|| serde_json::from_str(text)).map_err(|e| {
+    WORLDS.kinds().resolve_names_during(|| serde_json::from_str(text)).map_err(|e| {
         let remedy = "see whether this is the address of a fleet's server";
         InputError::new(job.connect.join(", "), format!("its view cannot be read: {e}"), remedy)
             .into()
@@ -87,10 +87,10 @@ fn parse_reply<T: DeserializeOwned>(text: &str, job: &WatchJob) -> Result<T, Err
 /// Refuses a fleet of another build.
 fn check_build(scene: &str, job: &WatchJob) -> Result<(), Error> {
     #[derive(Deserialize)]
-    struct SceneBuild {
+    struct SceneBuildVersion {
         build: String,
     }
-    let SceneBuild { build } = parse_reply(scene, job)?;
+    let SceneBuildVersion { build } = parse_reply(scene, job)?;
     if build == job.build {
         return Ok(());
     }

@@ -58,7 +58,8 @@ impl FleetServer<'_> {
 
     /// Takes the control of an agent, if there is one that counts.
     fn take_control(&mut self, agent: EntityId) -> Option<Vec<u8>> {
-        let counts = !self.has_no_node(agent) || self.run.world().accepts_controls_of_lost_nodes();
+        let counts =
+            !self.has_no_node(agent) || self.run.world().accepts_controls_from_lost_nodes();
         let node = self.nodes.get_mut(&agent)?;
         let control = node.control.take().filter(|_| counts)?;
         node.carried_out += 1;

@@ -41,7 +41,7 @@ struct LatestView {
 
 impl LatestView {
     /// Returns the view if it is newer than the one that the viewer has, else an empty text.
-    fn fetch_if_newer(&mut self, after: u64) -> String {
+    fn text_if_newer(&mut self, after: u64) -> String {
         self.last_query = Some(Instant::now());
         if self.number <= after {
             return String::new();
@@ -86,7 +86,7 @@ impl ViewServer {
             .declare_queryable(VIEW_KEY)
             .callback(move |query| {
                 let after = query.parameters().get("after").and_then(|number| number.parse().ok());
-                let text = lock(&queried).fetch_if_newer(after.unwrap_or(0));
+                let text = lock(&queried).text_if_newer(after.unwrap_or(0));
                 reply(&query, text);
             })
             .wait()

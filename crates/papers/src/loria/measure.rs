@@ -6,7 +6,7 @@ use super::floor::{AvoidancePolicy, Floor, ends};
 use crate::study::{Progress, run_all, setting, source};
 use serde::Serialize;
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{ColumnValues, MemoryRecorder};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::baseline::find_violation;
 use sidestep::worlds::robots::effector::ObstacleRule;
@@ -208,7 +208,7 @@ fn append_poses(tracks: &mut [Track], recorder: &MemoryRecorder) {
 
 fn trajectory_column<'a>(recorder: &'a MemoryRecorder, name: &str) -> &'a [u32] {
     match recorder.column("trajectories", name) {
-        Some(Values::U32(values) | Values::Label(values)) => &values[..],
+        Some(ColumnValues::U32(values) | ColumnValues::Label(values)) => &values[..],
         _ => &[],
     }
 }

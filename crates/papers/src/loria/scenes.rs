@@ -4,7 +4,7 @@ use super::LoriaConfig;
 use super::floor::Floor;
 use super::measure::{LoriaVariant, Track, run_recorded};
 use crate::Scene;
-use sidestep::kernel::ports::Values;
+use sidestep::kernel::ports::ColumnValues;
 use sidestep::kernel::view::{BodyId, FrameOptions, Trail};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::worlds::robots::kinds::ROBOT;
@@ -53,7 +53,7 @@ fn scene(title: &str, variant: &LoriaVariant, cycles: Cycle) -> Scene {
 }
 
 /// Returns the tracks from a cycle on as columns of the table of trajectories.
-fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
+fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, ColumnValues); 5] {
     let mut cycles: Vec<u64> = Vec::new();
     let mut bodies: Vec<u32> = Vec::new();
     let mut cols: Vec<u32> = Vec::new();
@@ -69,11 +69,11 @@ fn columns(tracks: &[Track], from: Cycle) -> [(&'static str, Values); 5] {
         }
     }
     [
-        ("cycle", Values::U64(cycles.into_iter().collect())),
-        ("body", Values::U32(bodies.into_iter().collect())),
-        ("col_boxes", Values::U32(cols.into_iter().collect())),
-        ("row_boxes", Values::U32(rows.into_iter().collect())),
-        ("heading", Values::Label(headings.into_iter().collect())),
+        ("cycle", ColumnValues::U64(cycles.into_iter().collect())),
+        ("body", ColumnValues::U32(bodies.into_iter().collect())),
+        ("col_boxes", ColumnValues::U32(cols.into_iter().collect())),
+        ("row_boxes", ColumnValues::U32(rows.into_iter().collect())),
+        ("heading", ColumnValues::Label(headings.into_iter().collect())),
     ]
 }
 

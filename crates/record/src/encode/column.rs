@@ -8,7 +8,7 @@ use parquet::column::writer::ColumnCloseResult;
 use parquet::errors::Result;
 use parquet::file::statistics::Statistics;
 use parquet::schema::types::ColumnDescPtr;
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues};
 
 use super::chunk::put_text;
 use super::delta::DeltaEncoder;
@@ -84,7 +84,7 @@ impl ColumnEncoder {
     }
 
     /// Appends the values at `range`, and ends pages that become full.
-    pub(crate) fn append(&mut self, values: &Values, mut range: Range<usize>) -> Result<()> {
+    pub(crate) fn append(&mut self, values: &ColumnValues, mut range: Range<usize>) -> Result<()> {
         while !range.is_empty() {
             let n = (PAGE_ROWS - self.rows_in_page).min(range.len());
             self.extend(values, range.start..range.start + n);
@@ -98,7 +98,7 @@ impl ColumnEncoder {
     }
 
     /// Appends values that fit into the page.
-    fn extend(&mut self, values: &Values, range: Range<usize>) {
+    fn extend(&mut self, values: &ColumnValues, range: Range<usize>) {
         let Some(levels) = &mut self.levels else { return self.encoder.extend(values, range) };
         let flags: Vec<u32> = range.clone().map(|row| u32::from(!values.is_missing(row))).collect();
         levels.extend(&flags);
@@ -134,19 +134,19 @@ impl ColumnEncoder {
 }
 
 impl Encoder {
-    fn extend(&mut self, values: &Values, range: Range<usize>) {
+    fn extend(&mut self, values: &ColumnValues, range: Range<usize>) {
         match (self, values) {
-            (Self::U32(encoder), Values::U32(v)) => encoder.extend(&v[range]),
-            (Self::I32(encoder), Values::I32(v)) => encoder.extend(&v[range]),
-            (Self::U64(encoder, bounds), Values::U64(v)) => {
+            (Self::U32(encoder), ColumnValues::U32(v)) => encoder.extend(&v[range]),
+            (Self::I32(encoder), ColumnValues::I32(v)) => encoder.extend(&v[range]),
+            (Self::U64(encoder, bounds), ColumnValues::U64(v)) => {
                 bounds.extend(&v[range.clone()]);
                 encoder.extend(&v[range]);
             }
-            (Self::I64(encoder), Values::I64(v)) => encoder.extend(&v[range]),
-            (Self::F64(page), Values::F64(v)) => put_doubles(&v[range], page),
-            (Self::Bool(page), Values::Bool(v)) => page.extend_from_slice(&v[range]),
-            (Self::Label(encoder), Values::Label(v)) => encoder.extend(&v[range]),
-            (Self::Text(page), Values::Text(v)) => {
+            (Self::I64(encoder), ColumnValues::I64(v)) => encoder.extend(&v[range]),
+            (Self::F64(page), ColumnValues::F64(v)) => put_doubles(&v[range], page),
+            (Self::Bool(page), ColumnValues::Bool(v)) => page.extend_from_slice(&v[range]),
+            (Self::Label(encoder), ColumnValues::Label(v)) => encoder.extend(&v[range]),
+            (Self::Text(page), ColumnValues::Text(v)) => {
                 range.filter_map(|row| v.get(row)).for_each(|text| put_text(text, page));
             }
             _ => unreachable!("`check_block` compared the types"),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues, TableSchema};
 use sidestep_record::{NewRun, ParquetRecorder, Provenance};
 
 /// A column without a meaning.
@@ -26,20 +26,20 @@ pub(crate) fn trajectories() -> TableSchema {
 }
 
 /// The rows of the cycles from `from` to before `to`, robot after robot.
-pub(crate) fn rows(from: u64, to: u64) -> Vec<Values> {
+pub(crate) fn rows(from: u64, to: u64) -> Vec<ColumnValues> {
     let rows = || (0..2).flat_map(move |robot| (from..to).map(move |cycle| (robot, cycle)));
     vec![
-        Values::U64(rows().map(|(_, c)| c).collect()),
-        Values::U32(rows().map(|(r, _)| r).collect()),
-        Values::I32(rows().map(|(r, c)| (c % 7) as i32 - 3 * r as i32).collect()),
-        Values::F64(rows().map(|(r, c)| c as f64 * 0.1 - f64::from(r)).collect()),
-        Values::Label(rows().map(|(r, c)| ((c / 5) as u32 % 4) ^ r).collect()),
+        ColumnValues::U64(rows().map(|(_, c)| c).collect()),
+        ColumnValues::U32(rows().map(|(r, _)| r).collect()),
+        ColumnValues::I32(rows().map(|(r, c)| (c % 7) as i32 - 3 * r as i32).collect()),
+        ColumnValues::F64(rows().map(|(r, c)| c as f64 * 0.1 - f64::from(r)).collect()),
+        ColumnValues::Label(rows().map(|(r, c)| ((c / 5) as u32 % 4) ^ r).collect()),
     ]
 }
 
 /// `blocks` put behind each other.
-pub(crate) fn joined(blocks: &[Vec<Values>]) -> Vec<Values> {
-    let mut all: Vec<_> = blocks[0].iter().map(|v| Values::empty(v.column_type())).collect();
+pub(crate) fn joined(blocks: &[Vec<ColumnValues>]) -> Vec<ColumnValues> {
+    let mut all: Vec<_> = blocks[0].iter().map(|v| ColumnValues::empty(v.column_type())).collect();
     for block in blocks {
         all.iter_mut().zip(block).for_each(|(column, values)| column.append(values));
     }

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use sidestep_kernel::ports::recorder::{check_conformance, conformance_test_schemas};
-use sidestep_kernel::ports::{ColumnSpec, ColumnType, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues, Recorder, TableSchema};
 use sidestep_record::{ParquetRecorder, read_table};
 
 use crate::support::{column, joined, names, origin, recorder, rows, trajectories};
@@ -54,7 +54,7 @@ fn rows_are_chosen_by_cycle_across_parts_and_row_groups() {
     let read = |from, to| read_table(folder.path(), "trajectories", from..to).unwrap().columns;
     assert_eq!(read(7, 8), rows(7, 8));
     assert_eq!(read(600_099, 600_101), joined(&[rows(600_099, 600_100), rows(600_100, 600_101)]));
-    assert_eq!(read(600_200, u64::MAX)[0], Values::U64(vec![].into()));
+    assert_eq!(read(600_200, u64::MAX)[0], ColumnValues::U64(vec![].into()));
     let whole = read_table(folder.path(), "trajectories", ..).unwrap().columns;
     let blocks = [rows(0, 600_000), rows(600_000, 600_100), rows(600_100, 600_200)];
     assert!(whole == joined(&blocks), "every row comes back over page and row group borders");
@@ -65,7 +65,7 @@ fn a_range_of_cycles_of_a_table_without_cycles_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let schema = TableSchema::new("robots", vec![column("size_m", ColumnType::F64, &[])]);
     let mut recorder = ParquetRecorder::create(folder.path(), &[schema], &origin()).unwrap();
-    recorder.append(0, &[Values::F64(vec![f64::NAN, 0.5].into())]).unwrap();
+    recorder.append(0, &[ColumnValues::F64(vec![f64::NAN, 0.5].into())]).unwrap();
     recorder.finish().unwrap();
     assert_eq!(read_table(folder.path(), "robots", ..).unwrap().rows(), 2);
     let error = read_table(folder.path(), "robots", 3..4).unwrap_err();
@@ -181,7 +181,7 @@ fn rows_after_the_end_and_cycles_sealed_twice_are_refused() {
 }
 
 /// Blocks of columns of every type, of the lengths given, with runs, steps and extremes.
-fn blocks() -> impl Strategy<Value = Vec<Vec<Values>>> {
+fn blocks() -> impl Strategy<Value = Vec<Vec<ColumnValues>>> {
     let value = prop_oneof![
         4 => (0..4_u64).boxed(),
         2 => Just(1_000_000_u64).boxed(),
@@ -199,12 +199,12 @@ fn blocks() -> impl Strategy<Value = Vec<Vec<Values>>> {
     proptest::collection::vec(runs, 1..5)
 }
 
-fn block(values: &[u64]) -> Vec<Values> {
+fn block(values: &[u64]) -> Vec<ColumnValues> {
     vec![
-        Values::U64(values.to_vec().into()),
-        Values::U32(values.iter().map(|&v| v as u32).collect()),
-        Values::I32(values.iter().map(|&v| v as i32).collect()),
-        Values::Label(values.iter().map(|&v| (v % 5) as u32).collect()),
+        ColumnValues::U64(values.to_vec().into()),
+        ColumnValues::U32(values.iter().map(|&v| v as u32).collect()),
+        ColumnValues::I32(values.iter().map(|&v| v as i32).collect()),
+        ColumnValues::Label(values.iter().map(|&v| (v % 5) as u32).collect()),
     ]
 }
 
@@ -229,20 +229,20 @@ proptest! {
 }
 
 /// Columns of every type with `rows` rows; one in every `missing` values is missing.
-fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<Values>) {
+fn every_type(rows: u64, missing: u64) -> (TableSchema, Vec<ColumnValues>) {
     let value = |k: u64| (missing > rows || k % missing != 1).then_some(k);
     let all = || (0..rows).map(value);
     let blocks = vec![
-        Values::U32(all().map(|v| v.map(|k| k as u32)).collect()),
-        Values::U64(all().collect()),
-        Values::I32(all().map(|v| v.map(|k| -(k as i32))).collect()),
-        Values::I64(all().map(|v| v.map(|k| i64::MIN + k as i64)).collect()),
-        Values::F64(all().map(|v| v.map(|k| k as f64 / 3.0)).collect()),
-        Values::Bool(all().map(|v| v.map(|k| k % 3 == 0)).collect()),
-        Values::Label(all().map(|v| v.map(|k| (k / 9 % 2) as u32)).collect()),
-        Values::Text(all().map(|v| v.map(|k| format!("a{}", k % 7))).collect()),
+        ColumnValues::U32(all().map(|v| v.map(|k| k as u32)).collect()),
+        ColumnValues::U64(all().collect()),
+        ColumnValues::I32(all().map(|v| v.map(|k| -(k as i32))).collect()),
+        ColumnValues::I64(all().map(|v| v.map(|k| i64::MIN + k as i64)).collect()),
+        ColumnValues::F64(all().map(|v| v.map(|k| k as f64 / 3.0)).collect()),
+        ColumnValues::Bool(all().map(|v| v.map(|k| k % 3 == 0)).collect()),
+        ColumnValues::Label(all().map(|v| v.map(|k| (k / 9 % 2) as u32)).collect()),
+        ColumnValues::Text(all().map(|v| v.map(|k| format!("a{}", k % 7))).collect()),
     ];
-    let spec = |values: &Values| {
+    let spec = |values: &ColumnValues| {
         let labels =
             if values.column_type() == ColumnType::Label { &["no", "yes"][..] } else { &[] };
         let spec = column(values.column_type().name(), values.column_type(), labels);

@@ -3,7 +3,7 @@
 //! surroundings, and nothing else (slide E4), so that it can run as an agent aboard a robot.
 
 use super::{InitiatingConnectors, check, count_sub_steps, project};
-use crate::candidates::{CandidateScratch, guide_line_position};
+use crate::candidates::{CandidateScratch, guide_line_slave_position};
 use crate::chain::{Chain, Rod};
 use crate::geometry::{Point, distance};
 use crate::motion_context::{
@@ -184,7 +184,7 @@ impl<const D: usize> ConnectorReactionSolver<D> {
     /// Returns its reaction where nothing can object.
     fn free_reaction(&self, slave: &SlavePosition<D>, pull: &MasterMotion<D>) -> SlaveReaction<D> {
         let SlavePosition { so, rod, next } = *slave;
-        let at = guide_line_position([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
+        let at = guide_line_slave_position([pull.mo, pull.mn, so], rod, self.chain.min_move_m());
         let is_next_allowed =
             next.is_none_or(|(beyond, rod)| is_length_allowed(rod, distance(so, beyond)));
         let ends = at == so && is_next_allowed;

@@ -4,7 +4,7 @@
 //! [`SeparationBounds`] proves afterwards that no test could have objected; where the proof fails, the
 //! motion is taken back and made with all tests. The result is the same bits either way.
 
-use super::{InitiatingConnectors, MotionEffects, Propagator, is_obstacle_free};
+use super::{InitiatingConnectors, MotionEffects, Propagator, can_only_self_collide};
 use crate::chain::Chain;
 use crate::geometry::distance;
 use crate::motion_bounds::SeparationBounds;
@@ -51,13 +51,13 @@ impl SeparationProofSchedule {
 impl<const D: usize> Propagator<D> {
     /// Makes a sub-step without obstacles if no part comes near another in it: then nothing can object,
     /// and the chain moves as it does without self-collision. Returns whether it was made.
-    pub(super) fn pull_if_parts_separated(
+    pub(super) fn try_collision_free_pull(
         &mut self,
         chain: &mut Chain<D>,
         driven: &InitiatingConnectors<D>,
         is_last: bool,
     ) -> bool {
-        if !SeparationBounds::is_chain_long_enough(chain) {
+        if !SeparationBounds::has_enough_rods(chain) {
             return false;
         }
         self.motion_bounds.record(chain);
@@ -86,7 +86,7 @@ impl<const D: usize> Propagator<D> {
     /// Makes all sub-steps of a request in one batch, if no part comes near another in any of them.
     /// Every part is then where the sub-steps one after the other would have brought it. Returns
     /// whether they were made.
-    pub(super) fn try_batch_pull(
+    pub(super) fn try_substep_batch(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
@@ -95,8 +95,8 @@ impl<const D: usize> Propagator<D> {
     ) -> bool {
         let is_eligible = self.rules.self_collision
             && (2..=open::MAX_BATCH).contains(&n)
-            && is_obstacle_free(chain, obstacles, driven)
-            && SeparationBounds::is_chain_long_enough(chain);
+            && can_only_self_collide(chain, obstacles, driven)
+            && SeparationBounds::has_enough_rods(chain);
         let k = driven.first;
         let from = driven.positions(chain);
         // Sub-steps below the least move are skipped one by one, and must not be in a batch.
@@ -142,13 +142,13 @@ impl<const D: usize> Propagator<D> {
     /// Makes a sub-step among obstacles without tests of the chain against itself, if no rod turns and
     /// no part comes near another in it: then those tests would have changed nothing. Returns whether
     /// it was made.
-    pub(super) fn sweep_if_parts_separated(
+    pub(super) fn try_self_clear_sweep(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
         driven: &InitiatingConnectors<D>,
     ) -> bool {
-        if !SeparationBounds::is_chain_long_enough(chain) || !self.proofs.is_due() {
+        if !SeparationBounds::has_enough_rods(chain) || !self.proofs.is_due() {
             return false;
         }
         let rotated = self.tally.rotated;

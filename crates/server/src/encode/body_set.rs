@@ -96,7 +96,7 @@ impl BodySet {
             // All bodies of a group look alike, so the first one stands for them.
             let first = self.members.iter().position(|member| member.appearance_group() == *group);
             group_appearances
-                .extend(first.map(|k| appearances_by_condition(&bodies[k], dimensions)));
+                .extend(first.map(|k| appearance_per_condition(&bodies[k], dimensions)));
         }
         let mut own_names = Vec::new();
         for (index, member) in (0..).zip(&self.members) {
@@ -137,7 +137,7 @@ fn index_distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> (Vec<T>, Vec
 }
 
 /// Returns the appearance of a body in each condition, because conditions change from frame to frame.
-fn appearances_by_condition(body: &Body, dimensions: u8) -> [Appearance; 5] {
+fn appearance_per_condition(body: &Body, dimensions: u8) -> [Appearance; 5] {
     CONDITIONS.map(|state| convert::appearance(&Body { state, ..body.clone() }, dimensions))
 }
 

@@ -20,7 +20,7 @@ const EDITING_PATH: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../studio/tests/fake/editing.json");
 
 /// Returns the declaration of a type, with its documentation.
-fn declaration<T: TS>(config: &Config) -> String {
+fn typescript_declaration<T: TS>(config: &Config) -> String {
     let docs = T::docs().map(|docs| docs.trim_end().to_string() + "\n").unwrap_or_default();
     format!("{docs}export {}\n", T::decl(config))
 }
@@ -28,7 +28,7 @@ fn declaration<T: TS>(config: &Config) -> String {
 fn types() -> String {
     let config = Config::new().with_large_int("number");
     macro_rules! all {
-        ($($name:ty),+ $(,)?) => { [$(declaration::<$name>(&config)),+] };
+        ($($name:ty),+ $(,)?) => { [$(typescript_declaration::<$name>(&config)),+] };
     }
     let types = all![
         ClientRequest,

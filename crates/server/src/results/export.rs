@@ -1,7 +1,7 @@
 //! Exports of recorded runs, by the exporters of the command, to a file that the browser saves.
 
 use super::HttpError;
-use super::job_queue::{CancelToken, http_error};
+use super::job_queue::{CancelToken, to_http_error};
 use super::query::QueryFields;
 use crate::protocol::Problem;
 use crate::state::AppState;
@@ -121,9 +121,9 @@ fn write_export(
     workers: usize,
     cancel: &CancelToken,
 ) -> Result<Vec<u8>, HttpError> {
-    let recorded = RecordedRun::open(worlds, path).map_err(|e| http_error(&e))?;
+    let recorded = RecordedRun::open(worlds, path).map_err(|e| to_http_error(&e))?;
     let folder = tempfile::tempdir()
-        .map_err(|e| http_error(&Error::cannot_write(&std::env::temp_dir(), &e)))?;
+        .map_err(|e| to_http_error(&Error::cannot_write(&std::env::temp_dir(), &e)))?;
     let out = folder.path().join("export");
     // The page gives the cycle on display: a picture shows it, everything else ends there.
     let is_picture = matches!(spec.format, Format::Svg | Format::Png { .. });
@@ -142,8 +142,8 @@ fn write_export(
     if watcher.is_too_large() {
         return Err(too_large());
     }
-    exported.map_err(|error| http_error(&error))?;
-    std::fs::read(&out).map_err(|e| http_error(&Error::cannot_write(&out, &e)))
+    exported.map_err(|error| to_http_error(&error))?;
+    std::fs::read(&out).map_err(|e| to_http_error(&Error::cannot_write(&out, &e)))
 }
 
 fn too_large() -> HttpError {

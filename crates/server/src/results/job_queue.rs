@@ -101,6 +101,6 @@ fn internal_error() -> HttpError {
     HttpError::new(StatusCode::INTERNAL_SERVER_ERROR, problem)
 }
 
-pub(super) fn http_error(error: &Error) -> HttpError {
+pub(super) fn to_http_error(error: &Error) -> HttpError {
     crate::session::problem_of(error).into()
 }

@@ -1,7 +1,7 @@
 //! Reports: the page of `sidestep report` in a frame, and its parts as files.
 
 use super::HttpError;
-use super::job_queue::{CancelToken, http_error};
+use super::job_queue::{CancelToken, to_http_error};
 use super::query::QueryFields;
 use crate::compress;
 use crate::protocol::Problem;
@@ -68,8 +68,8 @@ fn render_report(
     folder: &Path,
     cancel: &CancelToken,
 ) -> Result<RenderedReport, HttpError> {
-    let document = document(worlds, folder, cancel).map_err(|e| http_error(&e))?;
-    render(&document, "figures").map_err(|e| http_error(&e.into()))
+    let document = document(worlds, folder, cancel).map_err(|e| to_http_error(&e))?;
+    render(&document, "figures").map_err(|e| to_http_error(&e.into()))
 }
 
 /// A part of a report that is sent.

@@ -29,12 +29,12 @@ impl AheadRun {
 
     /// Advances for some milliseconds. Returns the run once it is at its end.
     pub(super) fn advance_slice(&mut self, history: &mut RunHistory) -> Option<&dyn Simulation> {
-        self.skip_known(history);
+        self.skip_computed_cycles(history);
         let cycles = self.pace.cycles().min(self.until.saturating_sub(self.run.cycle()));
         let started = Instant::now();
         let done = self.run.advance(cycles);
         let computing_time = started.elapsed();
-        self.pace.adapt(done, computing_time);
+        self.pace.adapt_cycles_per_slice(done, computing_time);
         history.record(self.run.as_ref(), computing_time);
         let is_at_end = self.run.cycle() >= self.until || self.run.is_over() || done == 0;
         if is_at_end || self.events_taken.elapsed() >= EVENTS_INTERVAL {
@@ -45,7 +45,7 @@ impl AheadRun {
     }
 
     /// Skips the cycles that the played run was the first to compute.
-    fn skip_known(&mut self, history: &mut RunHistory) {
+    fn skip_computed_cycles(&mut self, history: &mut RunHistory) {
         let known = history.keyframes.latest_until(history.log.known_until());
         if let Some((at, checkpoint)) = known
             && at > self.run.cycle()

@@ -1,6 +1,6 @@
 //! A session that watches a fleet: it shows the views that arrive, and controls nothing.
 
-use super::page_publisher::PagePublisher;
+use super::page_publisher::SessionUpdatePublisher;
 use super::{SessionExit, SessionWorker};
 use crate::encode::scene;
 use crate::event_store::EventStore;
@@ -33,7 +33,7 @@ pub(super) struct FleetSession {
     feed: Arc<FleetFeed>,
     /// The unchanging part of the fleet that is watched; another fleet may start at the endpoint later.
     fleet_scene: Arc<FleetScene>,
-    publisher: PagePublisher,
+    publisher: SessionUpdatePublisher,
     log: EventStore,
     /// The newest frame.
     frame: Frame,
@@ -46,7 +46,7 @@ pub(super) struct FleetSession {
 impl FleetSession {
     pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, feed: Arc<FleetFeed>) -> Self {
         let fleet_scene = feed.snapshot().scene;
-        let publisher = PagePublisher::new(session, outbox.clone(), &fleet_scene.scenery);
+        let publisher = SessionUpdatePublisher::new(session, outbox.clone(), &fleet_scene.scenery);
         Self {
             session,
             outbox,

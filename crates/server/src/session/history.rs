@@ -46,7 +46,7 @@ impl RunHistory {
     }
 
     /// Records the cycle at which a run pauses, so that its metrics are those on display.
-    pub(super) fn record_pause_sample(&mut self, run: &dyn Simulation) {
+    pub(super) fn record_sample_at_pause(&mut self, run: &dyn Simulation) {
         if self.samples.is_new_cycle(run.cycle()) {
             self.add_sample(run);
         }

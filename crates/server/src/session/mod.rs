@@ -24,7 +24,7 @@ use crate::protocol::{OpenTarget, Problem, Reply, ReplyResult, RunMethod, Sessio
 use fleet_session::FleetSession;
 use open_run::OpenRun;
 use player::Player;
-use save::SharedSource;
+use save::SharedScenarioText;
 use sidestep_kernel::Interrupt;
 use sidestep_scenario::Source;
 use std::any::Any;
@@ -55,7 +55,7 @@ pub(crate) struct Session {
     requests: SyncSender<(u32, RunMethod)>,
     interrupt: Interrupt,
     thread: JoinHandle<()>,
-    source: SharedSource,
+    source: SharedScenarioText,
 }
 
 impl Session {
@@ -71,7 +71,7 @@ impl Session {
     ) -> std::io::Result<Self> {
         let (sender, receiver) = sync_channel(MAX_QUEUED_REQUESTS);
         let interrupt = Interrupt::default();
-        let source = SharedSource::default();
+        let source = SharedScenarioText::default();
         let worker = SessionWorker { outbox, interrupt: interrupt.clone(), requests: receiver };
         let worker_source = source.clone();
         let thread =
@@ -135,7 +135,7 @@ enum SessionExit {
 
 impl SessionWorker {
     /// Opens the target and serves it, until the socket drops the session or it ends by itself.
-    fn run(self, deps: SessionDeps, request: OpenRequest, source: SharedSource) {
+    fn run(self, deps: SessionDeps, request: OpenRequest, source: SharedScenarioText) {
         let OpenRequest { session, id, target, seed } = request;
         match target {
             OpenTarget::Scenario { path } => {
@@ -162,7 +162,7 @@ impl SessionWorker {
         &self,
         session: SessionId,
         id: u32,
-        source: SharedSource,
+        source: SharedScenarioText,
         open: impl FnOnce() -> Result<OpenRun, Problem>,
     ) {
         let opened = self.catch_panic(|| {

@@ -2,7 +2,7 @@
 
 use super::foxglove::FoxgloveHost;
 use super::save::{
-    SaveOptions, SessionFile, SharedSource, check_savable_text, session_path, write_scenario,
+    SaveOptions, SessionFile, SharedScenarioText, check_savable_text, session_path, write_scenario,
 };
 use crate::encode::problem;
 use crate::files::AllowedFiles;
@@ -64,7 +64,7 @@ pub(crate) struct OpenRun {
     seed: Option<u64>,
     /// The file of the scenario, if it is in one.
     file: Option<SessionFile>,
-    shared_source: SharedSource,
+    shared_source: SharedScenarioText,
 }
 
 impl OpenRun {
@@ -102,7 +102,7 @@ impl OpenRun {
     }
 
     /// Lets other threads read the scenario's text, as it is after each restart and save.
-    pub(crate) fn with_shared_source(mut self, shared_source: SharedSource) -> Self {
+    pub(crate) fn with_shared_source(mut self, shared_source: SharedScenarioText) -> Self {
         shared_source.set(&self.source);
         self.shared_source = shared_source;
         self
@@ -124,7 +124,7 @@ impl OpenRun {
             deps,
             seed,
             file,
-            shared_source: SharedSource::default(),
+            shared_source: SharedScenarioText::default(),
         })
     }
 
@@ -153,7 +153,7 @@ impl OpenRun {
             deps,
             seed,
             file: None,
-            shared_source: SharedSource::default(),
+            shared_source: SharedScenarioText::default(),
         })
     }
 
@@ -233,7 +233,7 @@ impl OpenRun {
     }
 
     /// Starts a recording once more, to be computed ahead; none if the run is no recording.
-    pub(crate) fn start_second_replay(&self) -> Option<Box<dyn Simulation>> {
+    pub(crate) fn start_prefetch_replay(&self) -> Option<Box<dyn Simulation>> {
         // It could be started before. If it cannot now, because its file was deleted for instance, nothing is computed ahead.
         self.recorded.as_ref()?.start_for_viewing(self.deps.workers).ok()
     }

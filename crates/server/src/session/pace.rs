@@ -26,7 +26,7 @@ impl CyclesPerSlice {
 
     /// Adapts the number of cycles to [`SLICE_DURATION`], after some cycles have taken some time. It grows at most fourfold at
     /// a time, because a few cheap cycles say little about the next ones.
-    pub(super) fn adapt(&mut self, cycles: u64, time: Duration) {
+    pub(super) fn adapt_cycles_per_slice(&mut self, cycles: u64, time: Duration) {
         let per_cycle_s = time.as_secs_f64() / cycles.max(1) as f64;
         let fitting = (SLICE_DURATION.as_secs_f64() / per_cycle_s.max(1e-12)) as u64;
         self.0 = fitting.clamp(1, self.0.saturating_mul(4));
@@ -39,7 +39,7 @@ pub(super) struct CycleRate(VecDeque<(Instant, u64)>);
 
 impl CycleRate {
     pub(super) fn record(&mut self, now: Instant, cycles: u64) {
-        self.drop_old(now);
+        self.drop_old_samples(now);
         match self.0.back_mut() {
             // A hundred entries a second are enough for a number on a page.
             Some((at, sum)) if now.duration_since(*at) < RATE_WINDOW / 100 => *sum += cycles,
@@ -48,12 +48,12 @@ impl CycleRate {
     }
 
     pub(super) fn per_s(&mut self, now: Instant) -> f64 {
-        self.drop_old(now);
+        self.drop_old_samples(now);
         let sum: u64 = self.0.iter().map(|(_, cycles)| cycles).sum();
         sum as f64 / RATE_WINDOW.as_secs_f64()
     }
 
-    fn drop_old(&mut self, now: Instant) {
+    fn drop_old_samples(&mut self, now: Instant) {
         while self.0.front().is_some_and(|(at, _)| now.duration_since(*at) > RATE_WINDOW) {
             self.0.pop_front();
         }

@@ -22,7 +22,7 @@ const MAX_CREDIT: u32 = 1000;
 pub(super) const MAX_SCANNED_BODIES: usize = 16;
 
 /// A page's view of one session.
-pub(super) struct PagePublisher {
+pub(super) struct SessionUpdatePublisher {
     session: SessionId,
     outbox: Arc<Outbox>,
     encoder: FrameEncoder,
@@ -42,7 +42,7 @@ pub(super) struct PagePublisher {
     last_status: Option<SessionStatus>,
 }
 
-impl PagePublisher {
+impl SessionUpdatePublisher {
     pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, scenery: &Scenery) -> Self {
         let now = Instant::now();
         Self {
@@ -196,7 +196,7 @@ impl PagePublisher {
     }
 
     /// Returns when a status may be reported again, if none changes at once.
-    pub(super) fn status_due(&self) -> Instant {
+    pub(super) fn status_due_time(&self) -> Instant {
         self.status_due
     }
 

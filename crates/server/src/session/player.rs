@@ -9,7 +9,7 @@ use super::history::RunHistory;
 use super::inspect::inspection;
 use super::open_run::OpenRun;
 use super::pace::{CycleRate, CyclesPerSlice};
-use super::page_publisher::{MAX_SCANNED_BODIES, PagePublisher};
+use super::page_publisher::{MAX_SCANNED_BODIES, SessionUpdatePublisher};
 use super::save::SaveOptions;
 use crate::SPEED_RANGE;
 use crate::encode::{requested_body, scene};
@@ -35,7 +35,7 @@ pub(super) struct Player {
     interrupt: Interrupt,
     pub(super) open_run: OpenRun,
     scenery: Scenery,
-    publisher: PagePublisher,
+    publisher: SessionUpdatePublisher,
     foxglove: FoxgloveLease,
     history: RunHistory,
     /// The second computation of a recording, until it is at its end.
@@ -65,7 +65,7 @@ impl Player {
         let scenery = open_run.run.scenery();
         let mut player = Self {
             session,
-            publisher: PagePublisher::new(session, outbox.clone(), &scenery),
+            publisher: SessionUpdatePublisher::new(session, outbox.clone(), &scenery),
             foxglove: FoxgloveLease::new(open_run.foxglove_host(), session),
             outbox,
             interrupt,
@@ -101,7 +101,7 @@ impl Player {
         }
         self.prefetcher = self
             .open_run
-            .start_second_replay()
+            .start_prefetch_replay()
             .map(|run| AheadRun::new(run, self.open_run.until, self.interrupt.clone()));
         self.pause();
     }
@@ -259,7 +259,7 @@ impl Player {
         self.rate = CycleRate::default();
         self.publisher.request_frame();
         let cycle = self.cycle();
-        self.history.record_pause_sample(self.open_run.run.as_ref());
+        self.history.record_sample_at_pause(self.open_run.run.as_ref());
         if self.digest.as_ref().is_none_or(|(digest_cycle, _)| *digest_cycle != cycle) {
             self.digest = Some((cycle, self.open_run.run.digest().to_string()));
         }
@@ -313,7 +313,7 @@ impl Player {
     }
 
     fn status_due(&self, status: &SessionStatus) -> Option<Instant> {
-        self.publisher.is_new_status(status).then(|| self.publisher.status_due())
+        self.publisher.is_new_status(status).then(|| self.publisher.status_due_time())
     }
 
     /// Pauses where the seek or the run ends.
@@ -344,7 +344,7 @@ impl Player {
         let started = Instant::now();
         let done = self.open_run.run.advance(cycles);
         let computing_time = started.elapsed();
-        self.slice.adapt(done, computing_time);
+        self.slice.adapt_cycles_per_slice(done, computing_time);
         self.rate.record(Instant::now(), done);
         self.publisher.mark_cycle_changed();
         self.digest = None;

@@ -17,9 +17,9 @@ pub(super) struct SessionFile {
 
 /// The scenario of a session, shared with other threads: its place is the file in which it was last saved.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SharedSource(Arc<Mutex<Option<Source>>>);
+pub(crate) struct SharedScenarioText(Arc<Mutex<Option<Source>>>);
 
-impl SharedSource {
+impl SharedScenarioText {
     /// Returns the scenario; `None` until the session's thread has opened it.
     pub(crate) fn get(&self) -> Option<Source> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()

@@ -347,7 +347,7 @@ fn a_text_is_checked_with_its_place_and_refused_where_the_studio_only_reads() {
 #[test]
 fn a_session_that_is_dropped_ends_within_its_cycle_and_answers_all_requests() {
     let (mut page, _) = Page::open(&ROBOTS.replace("cycles = 600", "cycles = 1000000000"), 2);
-    page.outbox.record_request();
+    page.outbox.add_open_request();
     page.send(json!({ "do": "seek", "cycle": 900_000_000 }));
     page.state("seeking");
     let Page { outbox, session, .. } = page;

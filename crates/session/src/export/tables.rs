@@ -4,7 +4,7 @@ use super::target::Target;
 use super::{ExportContext, ExportResult};
 use crate::Error;
 use csv::ByteRecord;
-use sidestep_kernel::ports::{TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, TableSchema};
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, TableFileWriter, for_each_block, tables};
 use std::fs::File;
@@ -165,7 +165,9 @@ fn partial_path(path: &Path) -> PathBuf {
 
 /// Keeps rows of cycles that are multiples of `every`.
 fn downsample(block: &mut Table, every: Cycle) {
-    let Some(Values::U64(cycles)) = block.column("cycle").filter(|_| every > 1) else { return };
+    let Some(ColumnValues::U64(cycles)) = block.column("cycle").filter(|_| every > 1) else {
+        return;
+    };
     let keep: Vec<bool> = cycles.iter().map(|cycle| cycle.is_multiple_of(every)).collect();
     block.columns.iter_mut().for_each(|column| column.retain_rows(&keep));
 }

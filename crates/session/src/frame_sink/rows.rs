@@ -3,7 +3,7 @@
 use super::FrameSink;
 use crate::Error;
 use sidestep_kernel::ports::table::label_index;
-use sidestep_kernel::ports::{Table, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, Table, TableSchema};
 use sidestep_kernel::view::{Body, BodyCondition, Frame, FrameOptions, Kinds};
 use sidestep_kernel::{Cycle, Simulation};
 use std::ops::Range;
@@ -37,7 +37,7 @@ impl FrameRows {
         Self { every: every.max(1), kinds, first: None, last: None, rows: Vec::new() }
     }
 
-    pub(crate) fn take(&mut self) -> (TableSchema, Vec<Values>) {
+    pub(crate) fn take(&mut self) -> (TableSchema, Vec<ColumnValues>) {
         let table = frames_table(&self.kinds);
         let rows = std::mem::take(&mut self.rows);
         (table.schema(), table.block_from_rows(&rows))
@@ -76,7 +76,10 @@ impl FrameSink for FrameRows {
 }
 
 /// Returns the present frame of a run as a table, in which these are all kinds of bodies.
-pub(crate) fn frame_rows(run: &mut dyn Simulation, kinds: &Kinds) -> (TableSchema, Vec<Values>) {
+pub(crate) fn frame_rows(
+    run: &mut dyn Simulation,
+    kinds: &Kinds,
+) -> (TableSchema, Vec<ColumnValues>) {
     let table = frames_table(kinds);
     let rows: Vec<Row> = body_rows(run.frame(FrameOptions::WITHOUT_SCANS)).collect();
     (table.schema(), table.block_from_rows(&rows))

@@ -2,7 +2,7 @@
 
 use crate::run_tables::has_rows;
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_kernel::view::{
     Body, BodyId, BodyKind, BodyRole, LogEvent, LogEventKind, PositionTableColumns, Quantity,
@@ -45,7 +45,7 @@ struct EventRows<'a> {
 impl EventRows<'_> {
     /// Returns the events; `None` for a table of another form.
     fn events(&self, rows: Range<usize>) -> Option<Vec<LogEvent>> {
-        let Values::U64(cycles) = self.table.column("cycle")? else { return None };
+        let ColumnValues::U64(cycles) = self.table.column("cycle")? else { return None };
         self.table.column("event")?;
         rows.map(|row| self.event(row, *cycles.get(row)?)).collect()
     }
@@ -90,7 +90,7 @@ impl EventRows<'_> {
     /// Returns the measure of an event: the first of its floats that is not missing.
     fn quantity(&self, row: usize) -> Option<Quantity> {
         let columns = self.table.schema.columns.iter().zip(&self.table.columns);
-        let mut floats = columns.filter(|(_, values)| matches!(values, Values::F64(_)));
+        let mut floats = columns.filter(|(_, values)| matches!(values, ColumnValues::F64(_)));
         floats.find_map(|(column, values)| {
             let (_, unit) = split_unit(&column.name);
             let unit = unit.unwrap_or_default();
@@ -108,7 +108,7 @@ impl EventRows<'_> {
         let at = self.table.schema.columns.iter().position(|own| own.name == column)?;
         let column = &self.table.schema.columns[at];
         let values = &self.table.columns[at];
-        if !matches!(values, Values::Label(_)) {
+        if !matches!(values, ColumnValues::Label(_)) {
             return None;
         }
         let mut text = String::new();

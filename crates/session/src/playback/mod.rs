@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::cycle::PhaseTimes;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateReport};
+use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
     Body, BodyId, Frame, FrameOptions, Inspection, Kinds, LogEvent, PositionTableColumns, Scenery,
 };
@@ -211,8 +211,8 @@ impl Simulation for RecordedPlayback {
         KeyValues::new()
     }
 
-    fn poses(&self) -> StateReport {
-        StateReport { json: json!([]), text: String::new() }
+    fn poses(&self) -> JsonTextReport {
+        JsonTextReport { json: json!([]), text: String::new() }
     }
 
     fn phase_times(&self) -> PhaseTimes {

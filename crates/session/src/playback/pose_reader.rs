@@ -1,7 +1,7 @@
 //! Places of bodies at any cycle, from the tables that have them.
 
 use crate::run_tables::has_rows;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::view::{
     Body, BodyId, BodyKind, BodyRole, Frame, Pose, PositionTableColumns, Scenery, Shape, Trail,
     Vec3,
@@ -225,7 +225,7 @@ fn last_headings(
     table: &Table,
     cycle: Cycle,
 ) -> Option<BTreeMap<BodyId, Option<u32>>> {
-    let Values::U64(cycles) = table.column("cycle")? else { return None };
+    let ColumnValues::U64(cycles) = table.column("cycle")? else { return None };
     let mut found: BTreeMap<BodyId, (Cycle, Option<u32>)> = BTreeMap::new();
     for (row, &at) in cycles.iter().enumerate().filter(|(_, at)| **at <= cycle) {
         let number = whole_number(table, rows.number, row)?;

@@ -5,7 +5,7 @@ use super::tables::{format_cell, format_rows};
 use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
 use sidestep_document::{Document, document::Text};
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_record::{Table as Recorded, read_table};
 use std::path::Path;
@@ -61,8 +61,8 @@ struct Events<'a> {
 
 impl<'a> Events<'a> {
     fn from_table(table: &'a Recorded) -> Option<Self> {
-        let Some(Values::U64(cycles)) = table.column("cycle") else { return None };
-        let Some(Values::Label(kinds)) = table.column("event") else { return None };
+        let Some(ColumnValues::U64(cycles)) = table.column("cycle") else { return None };
+        let Some(ColumnValues::Label(kinds)) = table.column("event") else { return None };
         let names = &table.schema.columns.iter().find(|c| c.name == "event")?.labels;
         Some(Self { table, cycles, kinds, names })
     }
@@ -87,7 +87,7 @@ impl<'a> Events<'a> {
         let values = self.table.columns.iter().zip(&self.table.schema.columns);
         let floats: Vec<(&str, &[f64])> = values
             .filter_map(|(values, column)| match values {
-                Values::F64(v) => Some((column.name.as_str(), &v[..])),
+                ColumnValues::F64(v) => Some((column.name.as_str(), &v[..])),
                 _ => None,
             })
             .collect();

@@ -8,7 +8,7 @@ use sidestep_document::Table;
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial, Variant};
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::Worlds;
 
 /// Number of variants for which a run is drawn: some examples; the figures are about all variants.
@@ -118,8 +118,8 @@ fn variants(plan: &Plan, table: &RunTable) -> Option<Table> {
         return None;
     }
     let mut runs = vec![0u64; plan.variants.len()];
-    if let Some(Values::I64(of)) = table.column("variant").map(|c| &c.values) {
-        for variant in of.iter_options().flatten() {
+    if let Some(ColumnValues::I64(of)) = table.column("variant").map(|c| &c.values) {
+        for variant in of.iter_with_missing().flatten() {
             // A damaged table may have numbers of no variant.
             if let Some(runs) = usize::try_from(*variant).ok().and_then(|v| runs.get_mut(v)) {
                 *runs += 1;

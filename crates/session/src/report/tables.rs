@@ -4,7 +4,7 @@ use super::metrics::unit_of;
 use crate::run_tables::has_rows;
 use sidestep_document::{Document, Table};
 use sidestep_kernel::InputError;
-use sidestep_kernel::ports::{ColumnSpec, Values};
+use sidestep_kernel::ports::{ColumnSpec, ColumnValues};
 use sidestep_record::read_table;
 use std::path::Path;
 
@@ -56,11 +56,11 @@ pub(super) fn append(document: &mut Document, folder: &Path) -> Result<(), Input
 }
 
 /// Returns a value of a column in a form for people.
-pub(super) fn format_cell(column: &ColumnSpec, values: &Values, row: usize) -> String {
+pub(super) fn format_cell(column: &ColumnSpec, values: &ColumnValues, row: usize) -> String {
     match values {
         // The value that stands for a missing one.
-        Values::U32(v) if v[row] == u32::MAX => "-".into(),
-        Values::F64(v) => super::metrics::format_digits(v[row]),
+        ColumnValues::U32(v) if v[row] == u32::MAX => "-".into(),
+        ColumnValues::F64(v) => super::metrics::format_digits(v[row]),
         _ if values.is_missing(row) => "-".into(),
         _ => column.text(values, row),
     }

@@ -14,7 +14,7 @@ fn sent<T: serde::Serialize + serde::de::DeserializeOwned>(value: &T) -> T {
     let line = serde_json::to_string(value).expect("JSON");
     assert!(!line.contains('\n'));
     let kinds = Kinds::new([FROG, BodyKind::OBSTACLE]);
-    kinds.resolve_names_in(|| serde_json::from_str(&line)).expect("the same type")
+    kinds.resolve_names_during(|| serde_json::from_str(&line)).expect("the same type")
 }
 
 #[test]

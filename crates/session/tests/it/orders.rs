@@ -2,7 +2,7 @@
 
 use crate::support::SHIPPED_WORLDS;
 use sidestep_kernel::control::MultiAgentOrder;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::Source;
 use sidestep_session::{
     ManagedRun, NoWatcher, OutputPaths, RecordedRun, RestoreError, RowSelection, replay_all,
@@ -68,7 +68,7 @@ fn a_run_that_lost_its_deciders_is_not_resumed_without_them() {
 fn taken_cycles(journey: &mut ManagedRun) -> Vec<u64> {
     let tables = journey.take_rows().expect("rows");
     let poses = tables.iter().find(|(schema, _)| schema.name == "trajectories").expect("poses");
-    let Values::U64(cycles) = &poses.1[0] else { panic!("cycles come first") };
+    let ColumnValues::U64(cycles) = &poses.1[0] else { panic!("cycles come first") };
     let mut cycles = cycles.to_vec();
     cycles.sort_unstable();
     cycles.dedup();

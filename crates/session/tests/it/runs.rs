@@ -2,7 +2,7 @@
 
 use crate::support::{InterruptAt, StopAt, TestFolder, WORLDS};
 use sidestep_kernel::Interrupt;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 use sidestep_record::read_table;
 use sidestep_session::report::document;
 use sidestep_session::{
@@ -114,10 +114,10 @@ fn rows_are_kept_of_the_tables_that_are_wanted_and_frames_at_multiples() {
     }
     let rows = journey.take_rows().expect("rows");
     let [(schema, columns)] = &rows[..] else { panic!("{} tables", rows.len()) };
-    let Values::U64(cycles) = &columns[0] else { panic!("cycles come first") };
+    let ColumnValues::U64(cycles) = &columns[0] else { panic!("cycles come first") };
     let mut cycles = cycles.to_vec();
     cycles.dedup();
     assert_eq!((schema.name.as_str(), cycles), ("frames", vec![0, 50, 100]));
     let (_, now) = journey.frame_rows();
-    assert_eq!(now[0], Values::U64(vec![120; now[0].len()].into()));
+    assert_eq!(now[0], ColumnValues::U64(vec![120; now[0].len()].into()));
 }

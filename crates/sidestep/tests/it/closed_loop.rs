@@ -3,7 +3,7 @@
 //! compare.
 
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema, Values};
+use sidestep::kernel::ports::{ColumnSpec, ColumnValues, MemoryRecorder, TableSchema};
 use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
 use sidestep::scenario::Source;
@@ -73,7 +73,7 @@ fn record(source: &Source, cycles: u64, name: &str, folder: &Path) -> std::path:
 
 fn as_csv(recorder: &MemoryRecorder, schema: &TableSchema) -> String {
     let names: Vec<&str> = schema.columns.iter().map(|c| c.name.as_str()).collect();
-    let columns: Vec<(&ColumnSpec, &Values)> = schema
+    let columns: Vec<(&ColumnSpec, &ColumnValues)> = schema
         .columns
         .iter()
         .map(|c| (c, recorder.column(&schema.name, &c.name).expect("a column of the schema")))

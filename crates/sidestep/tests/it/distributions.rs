@@ -5,7 +5,7 @@ use super::tiles::{Tiles, assert_fits, law, repeating};
 use sidestep::error_models::effector::ObstacleRule;
 use sidestep::exact::{ActionOutcome, GridPose};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{ColumnValues, MemoryRecorder};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::{RobotsRun, robots_run};
 use std::collections::BTreeMap;
@@ -113,7 +113,7 @@ fn labels((recorder, simulation): &Recorded, column: &str) -> Vec<String> {
     let schemas = simulation.schemas();
     let readings = schemas.iter().find(|s| s.name == "readings").expect("calibration is on");
     let spec = readings.columns.iter().find(|c| c.name == column).expect("a column");
-    let Some(Values::Label(values)) = recorder.column("readings", column) else {
+    let Some(ColumnValues::Label(values)) = recorder.column("readings", column) else {
         panic!("{column} holds labels")
     };
     values.iter().map(|&v| spec.labels[v as usize].clone()).collect()

@@ -4,7 +4,7 @@
 use super::tiles::{Tiles, assert_fits};
 use sidestep::exact::{Beam, MarkovModel, PomdpOptions};
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{MemoryRecorder, Values};
+use sidestep::kernel::ports::{ColumnValues, MemoryRecorder};
 use sidestep::worlds::robots::exact::markov_model;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use std::collections::BTreeMap;
@@ -215,8 +215,8 @@ fn the_simulator_reports_what_the_file_says() {
 /// Names of the poses in the order of the readings: by cycle, then by robot.
 fn poses_by_cycle(recorder: &MemoryRecorder) -> Vec<String> {
     let numbers = |column: &str| match recorder.column("trajectories", column) {
-        Some(Values::U32(values) | Values::Label(values)) => values.to_vec(),
-        Some(Values::U64(values)) => values.iter().map(|&v| v as u32).collect(),
+        Some(ColumnValues::U32(values) | ColumnValues::Label(values)) => values.to_vec(),
+        Some(ColumnValues::U64(values)) => values.iter().map(|&v| v as u32).collect(),
         _ => panic!("{column}"),
     };
     let [cycle, body, col, row, heading] =
@@ -239,7 +239,9 @@ fn labels(
 ) -> Vec<String> {
     let readings = schemas.iter().find(|s| s.name == "readings").expect("calibration is on");
     let spec = readings.columns.iter().find(|c| c.name == column).expect("a column");
-    let Some(Values::Label(values)) = recorder.column("readings", column) else { panic!("labels") };
+    let Some(ColumnValues::Label(values)) = recorder.column("readings", column) else {
+        panic!("labels")
+    };
     values.iter().map(|&v| spec.labels[v as usize].clone()).collect()
 }
 

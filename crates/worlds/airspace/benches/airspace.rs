@@ -6,8 +6,8 @@
 use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
-    Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourLegs, FlightLevelRange, Point,
-    Pose2, TimeDiscretization, WaypointRule, actions,
+    Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourAlternatives, FlightLevelRange,
+    Point, Pose2, TimeDiscretization, WaypointRule, actions,
 };
 use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
@@ -31,7 +31,7 @@ struct Conflict {
 }
 
 impl Conflict {
-    fn new(n: usize, horizon: usize, legs: &DetourLegs, objective: Objective) -> Self {
+    fn new(n: usize, horizon: usize, legs: &DetourAlternatives, objective: Objective) -> Self {
         let model = AircraftModel {
             v_m_s: 35.0,
             omega_max_rad_s: 4f64.to_radians(),
@@ -147,8 +147,8 @@ fn exact() {
         vertical_m: 300.0,
     };
     for (name, horizon, legs, inflation, cooling) in [
-        ("the paper's actions", 125, DetourLegs::default(), 1.05, 0.8),
-        ("the default preset", 90, DetourLegs::default_preset(), 1.12, 0.7),
+        ("the paper's actions", 125, DetourAlternatives::default(), 1.05, 0.8),
+        ("the default preset", 90, DetourAlternatives::default_preset(), 1.12, 0.7),
     ] {
         let objective = preset(inflation);
         let conflict = Conflict::new(10, horizon, &legs, objective);
@@ -172,7 +172,7 @@ fn exact() {
 fn sampled() {
     let objective =
         Objective { alpha: 1.0, beta: 0.995, inflation: 1.0, mask: true, vertical_m: 300.0 };
-    let conflict = Conflict::new(10, 125, &DetourLegs::default(), objective);
+    let conflict = Conflict::new(10, 125, &DetourAlternatives::default(), objective);
     let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {
         let built = build_group_game(&objective, &conflict.action_predictions());

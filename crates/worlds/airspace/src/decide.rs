@@ -78,7 +78,7 @@ pub(super) struct ManeuverCandidates {
 impl ManeuverCandidates {
     fn from_actions(world: &AirspaceWorld, known: KnownAircraft, actions: Vec<Action>) -> Self {
         Self {
-            profiles: preferences::profiles_from_actions(world, known, &actions),
+            profiles: preferences::turn_profiles_from_actions(world, known, &actions),
             actions,
             decided: None,
         }
@@ -131,7 +131,7 @@ pub(super) fn candidates_alone(
 ) -> ManeuverCandidates {
     match world.method {
         MethodKind::External => {
-            external::candidates_by_external_action(world, known, external_action)
+            external::candidates_for_external_action(world, known, external_action)
         }
         _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
@@ -167,13 +167,13 @@ pub(super) fn candidates_by_velocity(
 
 /// Returns all the different turn profiles of the next `dt` that the actions of an airplane have.
 pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
-    preferences::profiles_from_actions(world, known, world.actions(known.slot))
+    preferences::turn_profiles_from_actions(world, known, world.actions(known.slot))
 }
 
 /// Returns the turn profile straight to the next way-point, for an airplane that avoids nobody.
 pub(super) fn straight_profile(world: &AirspaceWorld, known: KnownAircraft) -> TurnProfile {
     let actions = rank_straight_first(world, known);
-    preferences::profiles_from_actions(world, known, &actions[..1]).swap_remove(0)
+    preferences::turn_profiles_from_actions(world, known, &actions[..1]).swap_remove(0)
 }
 
 /// Decides for all airplanes of a group in one process.

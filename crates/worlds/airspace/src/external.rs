@@ -14,7 +14,7 @@ use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use super::{act, join};
-use observation::{AgentObservation, VisibleAircraft};
+use observation::{AgentKnowledge, VisibleAircraft};
 use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
 use sidestep_kernel::ports::ManualClock;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot, World};
@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 impl AirspaceWorld {
     /// Returns the teams: airplanes that decide, with the same actions, because all agents of a team have the same
     /// spaces. Non-cooperative airplanes are in none.
-    pub(super) fn teams_by_actions(&self) -> AgentTeams {
+    pub(super) fn teams_by_action_space(&self) -> AgentTeams {
         let mut team_by_turns: BTreeMap<(usize, u64), usize> = BTreeMap::new();
         let mut members: Vec<Vec<EntityId>> = Vec::new();
         for i in (0..self.airplanes.len()).filter(|&i| self.is_controlled(i)) {
@@ -104,7 +104,7 @@ impl AirspaceWorld {
     ) {
         let agents = &self.teams.as_slice()[team].agents;
         // Airplanes that decide in no group of this cycle keep this padding.
-        let padding = AgentObservation::default();
+        let padding = AgentKnowledge::default();
         (0..agents.len()).for_each(|row| padding.write(self, row, buffers));
         self.for_each_group(state, now, |context, group, non_cooperative| {
             if group.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
@@ -118,7 +118,7 @@ impl AirspaceWorld {
             let all = VisibleAircraft::from_group(context, &members, non_cooperative);
             for own in &members {
                 if let Ok(row) = agents.binary_search(&own.slot) {
-                    AgentObservation::new(context, own, &all).write(self, row, buffers);
+                    AgentKnowledge::new(context, own, &all).write(self, row, buffers);
                 }
             }
         });

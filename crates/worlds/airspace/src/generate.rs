@@ -1,6 +1,6 @@
 //! Generated traffic: the super-conflict, random crossings, and converging streams.
 
-use super::flight::{AircraftModel, AirplaneConfig, Point, Pose2, distance_m};
+use super::flight::{AircraftModel, AirplaneStart, Point, Pose2, distance_m};
 use super::purpose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ pub(super) struct GeneratorParams<'a> {
 pub(super) fn generate(
     params: &GeneratorParams<'_>,
     streams: &Streams,
-) -> Result<Vec<AirplaneConfig>, usize> {
+) -> Result<Vec<AirplaneStart>, usize> {
     match params.kind {
         GeneratorKind::Superconflict => Ok(superconflict(params, streams)),
         GeneratorKind::Random => random_traffic(params, streams),
@@ -48,10 +48,10 @@ pub(super) fn generate(
     }
 }
 
-fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> AirplaneConfig {
+fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> AirplaneStart {
     let first = to.first().copied().unwrap_or(from);
     let heading_rad = math::atan2(first[1] - from[1], first[0] - from[0]);
-    AirplaneConfig {
+    AirplaneStart {
         callsign: None,
         model: params.model.clone(),
         start: Pose2 { at: from, heading_rad },
@@ -75,7 +75,7 @@ fn airplane_draws(streams: &Streams, id: usize) -> Draws {
 
 /// Returns airplanes evenly spread on a circle, each flying to the opposite point. The seed turns
 /// the circle, and moves each airplane along it by up to the jitter.
-fn superconflict(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<AirplaneConfig> {
+fn superconflict(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<AirplaneStart> {
     let rotation_rad = TAU * airplane_draws(streams, params.n).uniform();
     let mut airplanes = Vec::with_capacity(params.n);
     for k in 0..params.n {
@@ -95,10 +95,10 @@ fn superconflict(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<Airplan
 fn random_traffic(
     params: &GeneratorParams<'_>,
     streams: &Streams,
-) -> Result<Vec<AirplaneConfig>, usize> {
+) -> Result<Vec<AirplaneStart>, usize> {
     let gap_m =
         4.0 * params.model.turn_radius_m() + params.model.separation_m + params.errors_m + 1.0;
-    let mut starts = MinDistancePoints { gap_m, by_square: BTreeMap::new() };
+    let mut starts = SpacedPointGrid { gap_m, by_square: BTreeMap::new() };
     let mut airplanes = Vec::new();
     for id in 0..params.n {
         let mut draws = airplane_draws(streams, id);
@@ -118,12 +118,12 @@ fn random_traffic(
 
 /// Points that are apart from each other, by squares as wide as the gap, so that a point has to be compared only with
 /// those in the squares around it.
-struct MinDistancePoints {
+struct SpacedPointGrid {
     gap_m: f64,
     by_square: BTreeMap<[i64; 2], Vec<Point>>,
 }
 
-impl MinDistancePoints {
+impl SpacedPointGrid {
     fn grid_square(&self, at: Point) -> [i64; 2] {
         at.map(|v| (v / self.gap_m).floor() as i64)
     }
@@ -152,7 +152,7 @@ fn random_point_in_disc(radius_m: f64, draws: &mut Draws) -> Point {
 /// Returns three streams that meet at the center and continue together. Airplanes of a stream
 /// follow each other at four separations; the first of each stream reach the center at the same
 /// time, and so do the second, and so on.
-fn converging_streams(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<AirplaneConfig> {
+fn converging_streams(params: &GeneratorParams<'_>, streams: &Streams) -> Vec<AirplaneStart> {
     let spacing_m = 4.0 * params.model.separation_m;
     let mut airplanes = Vec::with_capacity(params.n);
     for k in 0..params.n {

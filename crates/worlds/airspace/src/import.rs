@@ -76,13 +76,13 @@ fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues)
         "unresolved_places": scn.unresolved_places.len(),
         "unresolved_names": unresolved_destinations(scn).keys().collect::<Vec<_>>(),
         "unresolved": unresolved_destinations(scn).into_values().flatten().map(unresolved_place_json).collect::<Vec<_>>(),
-        "aircraft_without_place": aircraft_at_unknown_places(scn),
+        "aircraft_without_place": unresolved_start_positions(scn),
     });
     let mut lines = vec![("command lines".to_string(), group_thousands(scn.command_lines))];
     lines.extend(count_line("not acted on", &scn.not_understood));
     lines.extend(count_line("not flown", &omitted_commands(scn)));
     lines.extend(count_line("display only", &scn.ignored));
-    lines.extend(first_names_line("left out, place unknown", &aircraft_at_unknown_places(scn)));
+    lines.extend(first_names_line("left out, place unknown", &unresolved_start_positions(scn)));
     lines.extend(first_names_line("unknown way-points", &unresolved_uses(scn)));
     lines.extend(error_lines("unparsed", &scn.unparsed));
     lines.extend(error_lines("not carried out", &refused));
@@ -91,7 +91,7 @@ fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues)
 
 /// Returns the aircraft that start at places known only to a navigation database, with the names of
 /// these places.
-fn aircraft_at_unknown_places(scn: &ScnFile) -> Vec<String> {
+fn unresolved_start_positions(scn: &ScnFile) -> Vec<String> {
     let unplaced = scn.traffic.unplaced.iter();
     unplaced.map(|one| format!("{} at {}", one.aircraft.id, one.place)).collect()
 }

@@ -215,7 +215,7 @@ pub fn airplane_metrics(
     let alone_s = world.alone_s[id as usize];
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let arrived_s = airplane.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
-    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_replayed_to_end(world, id));
+    let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_fully_replayed(world, id));
     AirplaneMetrics {
         airplane: id,
         callsign: world.callsign(id),
@@ -234,7 +234,7 @@ pub fn airplane_metrics(
     }
 }
 
-fn is_replayed_to_end(world: &AirspaceWorld, id: EntityId) -> bool {
+fn is_fully_replayed(world: &AirspaceWorld, id: EntityId) -> bool {
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let track = &world.airplanes[id as usize].track;
     track.as_ref().is_some_and(|track| track.end_s() <= joined_s)
@@ -259,7 +259,7 @@ pub fn pair_metrics(world: &AirspaceWorld, counters: &Counters) -> Vec<PairMetri
     pairs
 }
 
-fn count_airplanes(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
+fn count_airplanes_where(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -> u64 {
     state.airplanes.iter().filter(|airplane| is(airplane)).count() as u64
 }
 
@@ -267,7 +267,7 @@ fn count_airplanes(state: &AirspaceState, is: impl Fn(&AirplaneState) -> bool) -
 fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     let all = (0..).zip(&state.airplanes);
     let ended = all.filter(|(_, airplane)| airplane.arrived_step().is_some());
-    ended.filter(|(id, _)| is_replayed_to_end(world, *id)).count() as u64
+    ended.filter(|(id, _)| is_fully_replayed(world, *id)).count() as u64
 }
 
 fn mean(sum: f64, n: usize) -> Option<f64> {
@@ -298,7 +298,7 @@ pub(crate) fn metrics(
         min_separation_m: counters.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
         losses_of_separation: counters.pairs.values().map(|r| u64::from(r.losses)).sum(),
         lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
-        arrived: count_airplanes(state, |airplane| airplane.arrived_step().is_some()),
+        arrived: count_airplanes_where(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
         messages: traffic.messages,
@@ -321,7 +321,7 @@ pub(crate) fn metrics(
         deadlines_missed: counters.event_count(EventKind::Deadline),
         groups_too_large: counters.event_count(EventKind::GroupTooLarge),
         not_appeared: not_appeared_count(world, now),
-        left: count_airplanes(state, AirplaneState::has_left),
+        left: count_airplanes_where(state, AirplaneState::has_left),
         replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),

@@ -169,7 +169,7 @@ impl ActionPredictions {
         self
     }
 
-    fn piece_points(&self, piece: &SharedPredictionPoints, from: usize, mask: bool) -> &[Point] {
+    fn piece_points(&self, piece: &DistinctSlicePath, from: usize, mask: bool) -> &[Point] {
         let points = &self.predictions[piece.actions[0]].points;
         let end = if mask { piece.counted } else { points.len().min(from + SLICE) };
         &points[from.min(end)..end]
@@ -179,14 +179,14 @@ impl ActionPredictions {
 /// The paths of all actions of an airplane in one slice of time.
 #[derive(Debug, Clone)]
 struct TimeSlice {
-    pieces: Vec<SharedPredictionPoints>,
+    pieces: Vec<DistinctSlicePath>,
     /// Bounds around all of them.
     all: BoundingBox,
 }
 
 /// Points of a slice that some actions share: actions with the same turn differ only later.
 #[derive(Debug, Clone)]
-struct SharedPredictionPoints {
+struct DistinctSlicePath {
     /// The actions, at least one.
     actions: Vec<usize>,
     /// Point of the prediction at which the counted part of the slice ends.
@@ -196,7 +196,7 @@ struct SharedPredictionPoints {
 
 impl TimeSlice {
     fn new(predictions: &[Prediction], from: usize) -> Self {
-        let mut pieces: Vec<SharedPredictionPoints> = Vec::new();
+        let mut pieces: Vec<DistinctSlicePath> = Vec::new();
         for (action, prediction) in predictions.iter().enumerate() {
             let points = slice_points(prediction, from);
             let end = prediction.points.len().min(from + SLICE);
@@ -210,7 +210,7 @@ impl TimeSlice {
                 Some(piece) => piece.actions.push(action),
                 None => {
                     let bounds = BoundingBox::from_points(points);
-                    pieces.push(SharedPredictionPoints { actions: vec![action], counted, bounds });
+                    pieces.push(DistinctSlicePath { actions: vec![action], counted, bounds });
                 }
             }
         }
@@ -242,7 +242,7 @@ impl BoundingBox {
         })
     }
 
-    fn is_nearer_than(&self, other: &Self, gap_m: f64) -> bool {
+    fn is_within_gap(&self, other: &Self, gap_m: f64) -> bool {
         (0..2).all(|k| self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k])
     }
 }
@@ -305,18 +305,18 @@ fn pair_costs(
     let mut costs = None;
     let mut weight = 1.0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
-        let is_near = of_a.all.is_nearer_than(&of_b.all, gap_m);
+        let is_near = of_a.all.is_within_gap(&of_b.all, gap_m);
         let rows = of_a.pieces.iter().filter(|_| is_near);
-        for p in rows.filter(|p| p.bounds.is_nearer_than(&of_b.all, gap_m)) {
+        for p in rows.filter(|p| p.bounds.is_within_gap(&of_b.all, gap_m)) {
             let of_p = a.piece_points(p, k * SLICE, objective.mask);
-            for q in of_b.pieces.iter().filter(|q| p.bounds.is_nearer_than(&q.bounds, gap_m)) {
+            for q in of_b.pieces.iter().filter(|q| p.bounds.is_within_gap(&q.bounds, gap_m)) {
                 let of_q = b.piece_points(q, k * SLICE, objective.mask);
                 let parts = objective.slice_collision_costs(of_p, of_q, weight, r);
                 if parts != [0.0; 2] {
                     // Most pairs never need the table, which is large.
                     let costs =
                         costs.get_or_insert_with(|| vec![[0.0; 2]; a.predictions.len() * columns]);
-                    add_to_action_pairs(costs, columns, [&p.actions, &q.actions], parts);
+                    add_action_pair_costs(costs, columns, [&p.actions, &q.actions], parts);
                 }
             }
         }
@@ -326,7 +326,7 @@ fn pair_costs(
 }
 
 /// Adds `parts` for every two of some actions.
-fn add_to_action_pairs(
+fn add_action_pair_costs(
     costs: &mut [[f64; 2]],
     columns: usize,
     [actions_a, actions_b]: [&[usize]; 2],
@@ -465,12 +465,12 @@ mod tests {
     /// The parts left out by slices, bounds and shared pieces cost nothing, to the bit.
     #[test]
     fn tables_hold_what_two_predictions_cost_to_the_bit() {
-        use super::super::flight::{DetourLegs, actions};
+        use super::super::flight::{DetourAlternatives, actions};
         let model =
             AircraftModel { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
         let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = WaypointRule { tolerance_m: 100.0, passes: true };
-        let all = [DetourLegs::default(), DetourLegs::default_preset()]
+        let all = [DetourAlternatives::default(), DetourAlternatives::default_preset()]
             .map(|legs| actions(&model, 5.0, &[], &legs));
         let mut meetings = 0;
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {

@@ -6,7 +6,7 @@ mod network;
 mod optimizer;
 mod start_groups;
 
-use super::flight::AirplaneConfig;
+use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
@@ -220,7 +220,7 @@ impl CompiledAirspace {
 }
 
 /// Returns the state of an airplane at the start of its flight.
-fn initial_airplane_record(airplane: &AirplaneConfig, fallback: OrbitSide) -> AirplaneSnapshot {
+fn initial_airplane_record(airplane: &AirplaneStart, fallback: OrbitSide) -> AirplaneSnapshot {
     AirplaneSnapshot {
         pose: airplane.start,
         ended: PackedFlightEnd::NONE,

@@ -6,11 +6,13 @@ use super::state::Snapshot;
 use super::world::AirspaceWorld;
 use serde_json::json;
 use sidestep_kernel::Cycle;
-use sidestep_kernel::text::{KeyValues, StateReport, align_pairs, group_thousands, key_value_pair};
+use sidestep_kernel::text::{
+    JsonTextReport, KeyValues, align_pairs, group_thousands, key_value_pair,
+};
 use std::fmt::Write;
 
 /// Returns what is known of a scenario before it runs.
-pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> StateReport {
+pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
     let world = &*compiled.world;
     let shield = if world.shield { "on" } else { "off" };
     let recorded = world.airplanes.iter().filter(|a| a.track.is_some()).count() as u64;
@@ -49,14 +51,14 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> StateReport {
             format!("{}, replayed {until}", group_thousands(recorded)),
         ));
     }
-    lines.extend(timing_text(compiled));
+    lines.extend(scenario_timing_text(compiled));
     lines.extend(geographic_origin_text(world));
     lines.extend(too_close_warning(world, &compiled.too_close));
-    StateReport { json, text: align_pairs(&lines) }
+    JsonTextReport { json, text: align_pairs(&lines) }
 }
 
 /// Returns how often the airplanes decide, and for how long they fly.
-fn timing_text(compiled: &CompiledAirspace) -> KeyValues {
+fn scenario_timing_text(compiled: &CompiledAirspace) -> KeyValues {
     let dt_s = compiled.world.timing.dt_s;
     let cycles = group_thousands(compiled.cycles);
     let duration_s = compiled.cycles as f64 * dt_s;
@@ -129,7 +131,7 @@ pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
 }
 
 /// Returns the pose of every airplane, by entity id.
-pub(super) fn poses(snapshot: &Snapshot) -> StateReport {
+pub(super) fn poses(snapshot: &Snapshot) -> JsonTextReport {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
     let mut text = "  airplane       x_m         y_m    heading_deg\n".to_string();
     for (id, airplane) in snapshot.airplanes.iter().enumerate() {
@@ -138,7 +140,7 @@ pub(super) fn poses(snapshot: &Snapshot) -> StateReport {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}");
     }
-    StateReport { json, text }
+    JsonTextReport { json, text }
 }
 
 /// Returns the first pairs with first fallbacks that are not apart, and the number of others.

@@ -69,9 +69,9 @@ impl InspectionTrace {
         self.profiles = candidates.profiles;
         self.choice = candidates.decided;
         for control in controls.iter().flatten() {
-            self.beacons.add_participant_counts(control.grouping);
-            self.optimization.add_participant_counts(control.deciding);
-            self.exchange.add_participant_counts(control.shielding);
+            self.beacons.add_participant_traffic(control.grouping);
+            self.optimization.add_participant_traffic(control.deciding);
+            self.exchange.add_participant_traffic(control.shielding);
         }
         if world.shield {
             let group: Vec<ShieldedAircraft> =

@@ -47,7 +47,7 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let traffic = &file.traffic;
     let rules = &settings_from_bluesky(name, file);
     let aircraft: Vec<FlyableScnAircraft> =
-        traffic.aircraft.iter().filter_map(flyable_aircraft).collect();
+        traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
     let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
     let zone = SeparationMinima {
         gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
@@ -65,7 +65,8 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
 /// fly among them.
 pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScenarioSettings {
     let mut rules = import_settings(place, file, DT_S);
-    let never_moving = file.traffic.aircraft.iter().filter(|one| flyable_aircraft(one).is_none());
+    let never_moving =
+        file.traffic.aircraft.iter().filter(|one| aircraft_at_flying_speed(one).is_none());
     for ScnAircraft { id, .. } in never_moving {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
         let error =
@@ -94,7 +95,7 @@ impl FlyableScnAircraft {
 
 /// Returns an aircraft as it is when it gets a speed: at its creation, or later, then with the
 /// heading and level that it was given until then. `None` for one that never gets a speed.
-fn flyable_aircraft(aircraft: &ScnAircraft) -> Option<FlyableScnAircraft> {
+fn aircraft_at_flying_speed(aircraft: &ScnAircraft) -> Option<FlyableScnAircraft> {
     let mut one = aircraft.clone();
     if is_flying_speed(one.speed, one.altitude_ft) {
         return Some(FlyableScnAircraft(one));

@@ -5,7 +5,7 @@ mod solo_flight;
 mod tests;
 
 use super::flight::{
-    Action, AirplaneConfig, DetourLegs, FlightEnvironment, FlightLevelRange, FlightTask,
+    Action, AirplaneStart, DetourAlternatives, FlightConditions, FlightLevelRange, FlightTask,
     InterOrderSegment, KnownAircraft, Point, RoutePosition, SegmentAfterOrder, TimeDiscretization,
     Track, WaypointRule, actions, segments_after_orders,
 };
@@ -25,7 +25,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct AirspaceWorld {
     /// The airplanes by id.
-    pub airplanes: Arc<Vec<AirplaneConfig>>,
+    pub airplanes: Arc<Vec<AirplaneStart>>,
     /// Lengths of a cycle, of the steps in it, and of the horizon.
     pub timing: TimeDiscretization,
     /// Rule by which way-points count as reached.
@@ -37,7 +37,7 @@ pub struct AirspaceWorld {
     /// Further hold times of actions, in seconds.
     pub holds_s: Vec<f64>,
     /// Legs to the sides, which take the place of held turns.
-    pub legs: DetourLegs,
+    pub legs: DetourAlternatives,
     /// The method by which airplanes choose their actions.
     pub method: MethodKind,
     /// Settings of MVP; without effect on other methods.
@@ -137,7 +137,7 @@ impl AirspaceWorld {
     /// Returns the turn rates at which airplanes orbit under the shield.
     fn orbits_rad_s(&self) -> Vec<f64> {
         let mut rates: Vec<f64> = Vec::with_capacity(self.airplanes.len());
-        for AirplaneConfig { model, .. } in &*self.airplanes {
+        for AirplaneStart { model, .. } in &*self.airplanes {
             let max_rad_s = self.bounds.max_orbit_rate_rad_s(model, self.timing.dt_s);
             rates.push(max_rad_s.filter(|_| self.shield).unwrap_or(model.omega_max_rad_s));
         }
@@ -167,8 +167,8 @@ impl AirspaceWorld {
     }
 
     /// Returns the properties of the air, which are the same for all airplanes.
-    pub fn flight_environment(&self) -> FlightEnvironment {
-        FlightEnvironment { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
+    pub fn flight_environment(&self) -> FlightConditions {
+        FlightConditions { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
     }
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of
@@ -210,8 +210,8 @@ impl AirspaceWorld {
     /// Returns the cycle from which the method flies an airplane.
     pub fn first_controlled_cycle(&self, i: usize) -> Cycle {
         let recorded = match &self.airplanes[i] {
-            AirplaneConfig { track: None, .. } => 0,
-            AirplaneConfig { is_non_cooperative: true, .. } => Cycle::MAX,
+            AirplaneStart { track: None, .. } => 0,
+            AirplaneStart { is_non_cooperative: true, .. } => Cycle::MAX,
             _ => self.replay_cycles,
         };
         self.appearance_cycle(i).max(recorded)
@@ -276,7 +276,7 @@ impl AirspaceWorld {
         match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
             Some(later) => later.segment(),
             None => {
-                let AirplaneConfig { model, mission, altitude_m, .. } =
+                let AirplaneStart { model, mission, altitude_m, .. } =
                     &self.airplanes[slot as usize];
                 InterOrderSegment { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
             }

@@ -13,13 +13,13 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
 use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateReport};
+use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
     BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
-    Run, RunConfig, RunSetup, RunStats, World, WorldMetrics, WorldView,
+    Run, RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ impl CompiledAirspace {
         let collector =
             Collector { counters, rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunSetup { config: plan, state, collector };
+        let start = RunInputs { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -118,7 +118,7 @@ impl World for AirspaceWorld {
         collector.pending.flown.append(&mut scratch.flown);
     }
 
-    fn commit_results(&self, collector: &mut Collector) {
+    fn merge_worker_results(&self, collector: &mut Collector) {
         let WorkerRows { mut events, mut optimizations, mut flown } =
             std::mem::take(&mut collector.pending);
         // Stable, because a pair may lose separation more than once in a cycle.
@@ -297,7 +297,7 @@ impl WorldMetrics for AirspaceWorld {
         text::outcome(metrics)
     }
 
-    fn poses(&self, state: &AirspaceState, now: Cycle) -> StateReport {
+    fn poses(&self, state: &AirspaceState, now: Cycle) -> JsonTextReport {
         text::poses(&state.snapshot(now))
     }
 }

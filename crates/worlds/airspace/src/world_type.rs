@@ -3,7 +3,7 @@
 use super::method::{Method, Methods};
 use super::scenario::CompiledAirspace;
 use super::{AirspaceWorld, bundle, import, text};
-use sidestep_kernel::text::StateReport;
+use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
@@ -98,7 +98,7 @@ impl AnyCompiled for CompiledAirspace {
         self.world.airplanes.len()
     }
 
-    fn contents(&self, _: &Source) -> StateReport {
+    fn contents(&self, _: &Source) -> JsonTextReport {
         text::describe_scenario(self)
     }
 

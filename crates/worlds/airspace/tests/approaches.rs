@@ -4,7 +4,7 @@
 use sidestep_airspace::metrics::Metrics;
 use sidestep_airspace::{AirspaceRun, airspace_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::ports::{MemoryRecorder, Values};
+use sidestep_kernel::ports::{ColumnValues, MemoryRecorder};
 use sidestep_scenario::Source;
 
 /// A run of airplanes that do not mind each other: place, heading in degrees, way-point.
@@ -68,7 +68,7 @@ fn the_last_row_of_an_airplane_is_the_place_where_it_has_arrived() {
     let mut recorder = MemoryRecorder::new(&run.schemas());
     run.record(&mut recorder).expect("memory has room");
     let numbers = |name: &str| match recorder.column("trajectories", name) {
-        Some(Values::F64(values)) => values.clone(),
+        Some(ColumnValues::F64(values)) => values.clone(),
         other => panic!("{name}: {other:?}"),
     };
     let (x_m, from_s, until_s) = (numbers("x_m"), numbers("from_s"), numbers("until_s"));

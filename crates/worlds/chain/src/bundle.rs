@@ -31,7 +31,7 @@ pub(crate) fn resolve_scenario<const D: usize>(
         add_map_files(&mut bundle, &rosmap::load(&source.path(Path::new(path)))?);
     }
     if let Some(path) = file["ground"]["stage"].as_str() {
-        add_stage_world(&mut bundle, &stage::load(&source.path(Path::new(path)))?);
+        add_stage_world_files(&mut bundle, &stage::load(&source.path(Path::new(path)))?);
     }
     bundle.finish()
 }
@@ -74,7 +74,7 @@ fn add_map_files(bundle: &mut Bundle<'_>, map: &PixelMap) {
     bundle.set("ground.map", format_args!("{path:?}"));
 }
 
-fn add_stage_world(bundle: &mut Bundle<'_>, world: &stage::World) {
+fn add_stage_world_files(bundle: &mut Bundle<'_>, world: &stage::World) {
     let mut text = String::from("# The world as the simulation saw it.\n");
     for (k, plan) in world.floor_plans.iter().enumerate() {
         let bitmap = format!("floor-{k}.pgm");

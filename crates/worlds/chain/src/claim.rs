@@ -67,7 +67,7 @@ fn robots_reach_box<const D: usize>(
     dt_s: f64,
 ) -> Aabb<D> {
     let Some(robots) = &spec.robots else { return Aabb::empty() };
-    let reach_m = robots.follower.reach_within_m(dt_s);
+    let reach_m = robots.follower.max_reach_m(dt_s);
     let places = body.robots.iter().map(|robot| convert_dimensions(robot.pose.at));
     places.fold(Aabb::empty(), |all, at| all.joined(&Aabb::from_points(&[at]).grown(reach_m)))
 }

@@ -59,7 +59,7 @@ impl<const D: usize> ChainWorld<D> {
         let mut action_spaces = Vec::new();
         if spec.has_external_task() {
             observation_spaces.extend(order_result_spaces::<D>());
-            action_spaces = order_action_spaces::<D>(n);
+            action_spaces = chain_action_spaces::<D>(n);
         }
         let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
         AgentTeam { name, agents, observation_spaces, action_spaces }
@@ -250,7 +250,7 @@ fn order_result_spaces<const D: usize>() -> Vec<ValueSpace> {
 }
 
 /// Returns the spaces of the orders for a chain of `n` connectors.
-fn order_action_spaces<const D: usize>(n: usize) -> Vec<ValueSpace> {
+fn chain_action_spaces<const D: usize>(n: usize) -> Vec<ValueSpace> {
     let place = ValueDomain::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
     let mut spaces = vec![
         ValueSpace::new(

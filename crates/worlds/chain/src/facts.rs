@@ -88,5 +88,6 @@ pub(crate) fn editing() -> Editing {
             },
         ],
         about_files: "A ROS map or a Stage world becomes the ground on which chains move.",
+        drawing: None,
     }
 }

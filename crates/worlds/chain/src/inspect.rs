@@ -166,7 +166,7 @@ impl<const D: usize> ConnectorInspection<'_, D> {
         self.add_group_table(inspection, group);
         self.add_intention(inspection);
         self.add_veto_table(inspection);
-        self.add_recovery_rung(inspection);
+        self.add_recovery_section(inspection);
         self.add_moved_connectors(inspection);
         self.add_robot_lags(inspection);
         self.add_outcome_section(inspection);

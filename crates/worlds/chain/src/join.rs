@@ -16,16 +16,16 @@ pub(crate) fn join_conflict_groups<const D: usize>(
 ) {
     let state = phase.state;
     if state.len() <= MAX_PAIRWISE_CHAINS {
-        return bodies.for_each(|slot| join_overlapping_claims(phase, slot, groups));
+        return bodies.for_each(|slot| join_conflicting_chains(phase, slot, groups));
     }
-    let neighbors = state.claim_index();
+    let neighbors = state.sorted_claims();
     for slot in bodies {
         neighbors.visit(slot, |other| groups.join_groups(slot as EntitySlot, other));
     }
 }
 
 /// Joins one chain with those before it whose claims meet its own.
-fn join_overlapping_claims<const D: usize>(
+fn join_conflicting_chains<const D: usize>(
     phase: &mut PhaseContext<'_, ChainWorld<D>>,
     slot: usize,
     groups: &ConflictGroups,

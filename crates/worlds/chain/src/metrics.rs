@@ -460,7 +460,7 @@ impl Metrics {
             reformed: sum_over_chains(tallies, |t| t.reformed),
             not_reformed: sum_over_chains(tallies, |t| t.not_reformed),
             missing_parts: sum_over_chains(tallies, |t| t.missing_parts),
-            given_up: abandoned_task_parts(tallies),
+            given_up: abandoned_subtasks(tallies),
             rungs: tallies.iter().fold(RungTally::default(), |all, t| all.add(&t.rungs)),
             escapes: tallies.iter().fold(EscapeTally::default(), |all, t| all.sum_with(&t.escapes)),
             messages: sum_over_chains(tallies, |t| t.messages),
@@ -474,7 +474,7 @@ impl Metrics {
     }
 }
 
-fn abandoned_task_parts(tallies: &[ChainTally]) -> Vec<ChainAbandonedSubtask> {
+fn abandoned_subtasks(tallies: &[ChainTally]) -> Vec<ChainAbandonedSubtask> {
     let mut parts = Vec::new();
     for (chain, tally) in (0..).zip(tallies) {
         for what in tally.given_up.iter().cloned() {

@@ -40,7 +40,7 @@ impl<'a, const D: usize> Perceiver<'a, D> {
     /// Returns a navigator's perception; its laser's ranges are in the scratch.
     pub(crate) fn percept(&mut self, slot: EntitySlot) -> Option<NavigatorPercept<'a>> {
         let Self { world, state, now, .. } = *self;
-        let body = state.body_with_deferred_motions(slot as usize);
+        let body = state.body_before_deferred_motions(slot as usize);
         let task = world.chains[slot as usize].tasks.get(body.driving.task as usize)?;
         let TaskKind::Navigate(navigator) = &task.driver else { return None };
         let leader = body.leader_state(task);

@@ -51,7 +51,7 @@ impl<const D: usize> ChainWorld<D> {
     /// Returns whether all tasks of all chains are done and everything is whole.
     pub(crate) fn is_all_done(&self, state: &ChainWorldState<D>) -> bool {
         self.chains.iter().enumerate().all(|(slot, spec)| {
-            let body = state.body_with_deferred_motions(slot);
+            let body = state.body_before_deferred_motions(slot);
             let is_done = body.driving.task as usize >= spec.tasks.len();
             is_done && body.scattered.is_none()
         })

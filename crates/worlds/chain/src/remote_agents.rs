@@ -9,7 +9,7 @@
 //! ([`sidestep_kernel::Simulation::submit_controls`]): in such a cycle no chain talks in memory, and one whose connectors
 //! said nothing stands.
 
-use super::agents::{ChainAgentControls, ChainPercepts, ConnectorControl};
+use super::agents::{ChainCycleControls, ChainPercepts, ConnectorControl};
 use super::deploy::Deployment;
 use super::perceive::Perceiver;
 use super::scratch::Scratch;
@@ -69,7 +69,7 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         state: &ChainWorldState<D>,
         chain: EntityId,
-        handed: ChainAgentControls<D>,
+        handed: ChainCycleControls<D>,
     ) -> Result<(), InputError> {
         let place = format!("decisions of chain {chain}");
         let Some(spec) = self.chains.get(chain as usize) else {
@@ -84,7 +84,7 @@ impl<const D: usize> ChainWorld<D> {
     }
 
     /// Reads the decision of a connector for cycle `now`, by its id on the network; none if its agent is gone
-    /// ([`ChainAgentControls::ABSENT_CONTROL`]).
+    /// ([`ChainCycleControls::ABSENT_CONTROL`]).
     ///
     /// # Errors
     /// With the cause, when it is no decision, or none of this connector in this cycle.
@@ -97,7 +97,7 @@ impl<const D: usize> ChainWorld<D> {
         let Some((chain, connector)) = self.find_connector(id) else {
             return Err("there is no such connector; give ids of connectors".into());
         };
-        if bytes == ChainAgentControls::<D>::ABSENT_CONTROL {
+        if bytes == ChainCycleControls::<D>::ABSENT_CONTROL {
             return Ok(None);
         }
         let read = postcard::take_from_bytes::<ConnectorControl<D>>(bytes).ok();
@@ -105,7 +105,7 @@ impl<const D: usize> ChainWorld<D> {
             return Err("its bytes are none of a decision of this build".into());
         };
         let n = self.connector_count(chain);
-        let mut alone = ChainAgentControls::empty(now, n as usize);
+        let mut alone = ChainCycleControls::empty(now, n as usize);
         alone.controls[connector as usize] = Some(control);
         alone.check(n as usize).map_err(|(cause, _)| cause)?;
         Ok(alone.controls.swap_remove(connector as usize))
@@ -119,9 +119,9 @@ impl<const D: usize> ChainWorld<D> {
         &self,
         now: Cycle,
         controls: &[(EntityId, Vec<u8>)],
-    ) -> Result<Vec<ChainAgentControls<D>>, OrderError> {
+    ) -> Result<Vec<ChainCycleControls<D>>, OrderError> {
         let lengths = self.chains.iter().map(|spec| spec.start.points().len());
-        let mut all: Vec<_> = lengths.map(|n| ChainAgentControls::empty(now, n)).collect();
+        let mut all: Vec<_> = lengths.map(|n| ChainCycleControls::empty(now, n)).collect();
         let mut known = BTreeSet::new();
         for (id, bytes) in controls {
             let control = self.read_control(now, *id, bytes);

@@ -113,9 +113,9 @@ impl Rule for PositiveRule {
 
 /// Numbers above 0 up to 1e6.
 #[derive(Debug, Clone, Copy)]
-struct StepLimitValueRule;
+struct PositiveOrInfiniteRule;
 
-impl Rule for StepLimitValueRule {
+impl Rule for PositiveOrInfiniteRule {
     fn allows(number: f64) -> bool {
         number > 0.0 && (number <= MAX_VALUE || number == f64::INFINITY)
     }
@@ -229,7 +229,7 @@ struct RulesSection {
     dt_s: Option<PositiveNumber>,
     rotation: ByName<RotationWord>,
     self_collision: Option<bool>,
-    slave_step_max_m: Option<Number<StepLimitValueRule>>,
+    slave_step_max_m: Option<Number<PositiveOrInfiniteRule>>,
     joint_speed_m_s: Option<Number<PositiveRule>>,
     step_m: Option<PositiveNumber>,
     backtracks: Option<usize>,

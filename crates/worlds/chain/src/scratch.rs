@@ -124,7 +124,7 @@ impl<const D: usize> NearbyObstacles<D> {
     }
 
     /// Returns the obstacles that are solid to robots: of other chains the robots, not the rods.
-    pub(crate) fn solid_to_robots(&self) -> &Obstacles<D> {
+    pub(crate) fn obstacles_solid_to_robots(&self) -> &Obstacles<D> {
         if self.has_others { &self.solid } else { &self.all }
     }
 }

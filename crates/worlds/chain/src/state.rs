@@ -140,7 +140,7 @@ impl<const D: usize> ChainWorldState<D> {
 
     /// Returns one chain, for reading: it is as if it had followed its deferred motions, and keeps them.
     pub fn body(&self, slot: usize) -> ChainBodyStateRef<'_, D> {
-        let body = self.body_with_deferred_motions(slot);
+        let body = self.body_before_deferred_motions(slot);
         if body.deferred.is_empty() {
             return ChainBodyStateRef::Locked(body);
         }
@@ -153,14 +153,14 @@ impl<const D: usize> ChainWorldState<D> {
     /// because otherwise each read makes a copy that follows them.
     pub(crate) fn apply_deferred_motions(&self) {
         for slot in 0..self.len() {
-            if !self.body_with_deferred_motions(slot).deferred.is_empty() {
+            if !self.body_before_deferred_motions(slot).deferred.is_empty() {
                 self.body_mut(slot).apply_deferred_motions();
             }
         }
     }
 
     /// Locks one chain for reading as it is: all connectors except the initiator may have motions still to follow.
-    pub(crate) fn body_with_deferred_motions(
+    pub(crate) fn body_before_deferred_motions(
         &self,
         slot: usize,
     ) -> RwLockReadGuard<'_, ChainBodyState<D>> {
@@ -169,7 +169,7 @@ impl<const D: usize> ChainWorldState<D> {
 
     /// Returns whether the decisions of a chain's agents for a cycle were submitted, and are not carried out yet.
     pub fn has_submitted_controls(&self, slot: usize, cycle: Cycle) -> bool {
-        let body = self.body_with_deferred_motions(slot);
+        let body = self.body_before_deferred_motions(slot);
         body.submitted.as_ref().is_some_and(|submitted| submitted.cycle == cycle)
     }
 
@@ -188,7 +188,7 @@ impl<const D: usize> ChainWorldState<D> {
     }
 
     /// Returns the claims by their lower ends; valid while no chain claims anything.
-    pub(crate) fn claim_index(&self) -> RwLockReadGuard<'_, ClaimIndex<D>> {
+    pub(crate) fn sorted_claims(&self) -> RwLockReadGuard<'_, ClaimIndex<D>> {
         let made = self.claims.load(Relaxed);
         refresh_if_stale(
             &self.neighbors,
@@ -262,7 +262,7 @@ impl<const D: usize> ChainWorldState<D> {
         for slot in 0..self.len() {
             // Deferred motions change places and sums, and no component.
             // Deferred motions change the chain alone, no component, so the body is not copied to follow them.
-            if let Some(record) = component(&self.body_with_deferred_motions(slot)).save(cycle) {
+            if let Some(record) = component(&self.body_before_deferred_motions(slot)).save(cycle) {
                 records.push((slot as EntityId, record));
             }
         }

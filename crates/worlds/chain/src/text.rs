@@ -7,12 +7,12 @@ use super::state::Snapshot;
 use serde_json::{Value, json};
 use sidestep_kernel::World;
 use sidestep_kernel::text::{
-    KeyValues, StateReport, align_pairs, format_fixed, group_thousands, key_value_pair,
+    JsonTextReport, KeyValues, align_pairs, format_fixed, group_thousands, key_value_pair,
 };
 
 /// Returns what a scenario has and how long it lasts, before it runs.
-pub(super) fn describe_scenario<const D: usize>(compiled: &ChainScenario<D>) -> StateReport {
-    StateReport {
+pub(super) fn describe_scenario<const D: usize>(compiled: &ChainScenario<D>) -> JsonTextReport {
+    JsonTextReport {
         json: scenario_contents_json(compiled),
         text: align_pairs(&scenario_contents_lines(compiled)),
     }
@@ -71,7 +71,7 @@ fn scenario_contents_lines<const D: usize>(compiled: &ChainScenario<D>) -> KeyVa
     lines
 }
 
-pub(super) fn describe_poses<const D: usize>(snapshot: &Snapshot) -> StateReport {
+pub(super) fn describe_poses<const D: usize>(snapshot: &Snapshot) -> JsonTextReport {
     let mut rows = Vec::new();
     let axes: String =
         ["x_m", "y_m", "z_m"][..D].iter().map(|axis| format!("{axis:>12}")).collect();
@@ -83,7 +83,7 @@ pub(super) fn describe_poses<const D: usize>(snapshot: &Snapshot) -> StateReport
             text.push_str(&format!("  {chain:<5}  {connector:<9}{at}\n"));
         }
     }
-    StateReport { json: Value::Array(rows), text }
+    JsonTextReport { json: Value::Array(rows), text }
 }
 
 /// Returns the outcome of a run; what did not occur is mostly left out.
@@ -148,12 +148,14 @@ fn motion_lines(m: &Metrics) -> KeyValues {
         ),
         key_value_pair("greatest speed", format!("{:.3} m/s", m.max_speed_m_s)),
     ];
-    lines.extend(m.min_own_gap_m.map(|gap_m| key_value_pair("own parts", own_gap_text(gap_m))));
+    lines.extend(
+        m.min_own_gap_m.map(|gap_m| key_value_pair("own parts", own_parts_gap_text(gap_m))),
+    );
     lines
 }
 
 /// Returns how near the parts of a chain came to each other.
-fn own_gap_text(gap_m: f64) -> String {
+fn own_parts_gap_text(gap_m: f64) -> String {
     match gap_m {
         overlap_m if overlap_m < -TOUCH_M => {
             format!("overlapped by up to {} m", format_fixed(-gap_m, 4))

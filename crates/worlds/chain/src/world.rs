@@ -169,7 +169,7 @@ impl<const D: usize> ChainChange<D> {
     }
 
     /// Puts new limits into the chain; breaking and joining change places, not limits.
-    pub(crate) fn apply_limits(&self, chain: &mut Chain<D>) {
+    pub(crate) fn apply_limit_change(&self, chain: &mut Chain<D>) {
         let done = match &self.what {
             ChainChangeKind::Failed { connector, failed } => {
                 chain.set_connector_failed(*connector, *failed);
@@ -189,7 +189,7 @@ impl<const D: usize> ChainChange<D> {
 
 impl<const D: usize> ChainSpec<D> {
     /// Returns the robots of a swarm at their connectors, all facing ahead along their chain.
-    pub(crate) fn robots_at_connectors(
+    pub(crate) fn place_robots_at_connectors(
         &self,
         points: &[Point<D>],
         driving: &TaskProgress,

@@ -13,13 +13,13 @@ use serde_json::Value;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
 use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateReport};
+use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
     BodyId, EventBuffer, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
-    Run, RunConfig, RunSetup, RunStats, Simulation, World, WorldMetrics, WorldView,
+    Run, RunConfig, RunInputs, RunStats, Simulation, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ impl<const D: usize> ChainScenario<D> {
             ChainWorldState::new(&self.world).expect("scripts are tried when they are compiled");
         let collector = Collector { rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();
-        let start = RunSetup { config: plan, state, collector };
+        let start = RunInputs { config: plan, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -74,7 +74,7 @@ pub struct Collector {
     rows: RecordBuffers,
     /// Events that wait for the next frame.
     log: EventBuffer<Event>,
-    /// Events of a cycle in the order of the workers, until [`World::commit_results`] sorts them.
+    /// Events of a cycle in the order of the workers, until [`World::merge_worker_results`] sorts them.
     gathered: Vec<Event>,
 }
 
@@ -127,7 +127,7 @@ impl<const D: usize> World for ChainWorld<D> {
         collector.gathered.append(&mut scratch.events);
     }
 
-    fn commit_results(&self, collector: &mut Collector) {
+    fn merge_worker_results(&self, collector: &mut Collector) {
         // Events of one chain are already in order, so a stable sort by cycle and chain is enough.
         collector.gathered.sort_by_key(|event| (event.cycle, event.chain));
         for event in collector.gathered.drain(..) {
@@ -289,7 +289,7 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &ChainWorldState<D>, now: Cycle) -> StateReport {
+    fn poses(&self, state: &ChainWorldState<D>, now: Cycle) -> JsonTextReport {
         text::describe_poses::<D>(&state.snapshot(now))
     }
 }

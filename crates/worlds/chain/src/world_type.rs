@@ -4,7 +4,7 @@ use super::driver::own_driver::Driver;
 use super::own_parts::CustomBehaviors;
 use super::scenario::{AnyChainScenario as EitherCompiled, ChainScenario};
 use super::{bundle, remarks, text, world::ChainWorld};
-use sidestep_kernel::text::StateReport;
+use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_rods::Reaction;
@@ -108,7 +108,7 @@ impl<const D: usize> AnyCompiled for ChainScenario<D> {
         self.world.agent_count()
     }
 
-    fn contents(&self, _: &Source) -> StateReport {
+    fn contents(&self, _: &Source) -> JsonTextReport {
         text::describe_scenario(self)
     }
 

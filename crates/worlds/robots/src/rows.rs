@@ -8,8 +8,8 @@ use super::state::{PoseBuffer, RobotsState};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
-    ColumnBlockBuffer, ColumnSpec, ColumnType, RecordError, Recorder, Table, TableBuffer,
-    TableBuffers, TableRowsBuffer, TableSchema, Values,
+    ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnValues, RecordError, Recorder, Table,
+    TableBuffer, TableBuffers, TableRowsBuffer, TableSchema,
 };
 use sidestep_kernel::view::{EventBuffer, Isometry2};
 use sidestep_kernel::{Cycle, EntityId};
@@ -280,7 +280,7 @@ impl Collector {
 }
 
 /// Rows are ordered by body, then by cycle.
-fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) -> Vec<Values> {
+fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) -> Vec<ColumnValues> {
     let cycles = (span.end - span.start) as usize;
     // Doors never move; their events say when they open.
     let moving: Vec<EntityId> =
@@ -308,11 +308,11 @@ fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) ->
         }
     }
     vec![
-        Values::U64(at_cycle.into()),
-        Values::U32(bodies.into()),
-        Values::U32(cols.into()),
-        Values::U32(rows.into()),
-        Values::Label(headings.into()),
+        ColumnValues::U64(at_cycle.into()),
+        ColumnValues::U32(bodies.into()),
+        ColumnValues::U32(cols.into()),
+        ColumnValues::U32(rows.into()),
+        ColumnValues::Label(headings.into()),
     ]
 }
 

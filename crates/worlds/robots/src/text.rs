@@ -7,7 +7,9 @@ use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
 use super::world::{RobotsWorld, Role};
 use serde_json::{Value, json};
-use sidestep_kernel::text::{KeyValues, StateReport, align_pairs, group_thousands, key_value_pair};
+use sidestep_kernel::text::{
+    JsonTextReport, KeyValues, align_pairs, group_thousands, key_value_pair,
+};
 use sidestep_scenario::Source;
 use std::collections::BTreeMap;
 
@@ -61,7 +63,7 @@ fn groups(metrics: &Metrics) -> String {
 }
 
 /// Returns every body by entity id.
-pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateReport {
+pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> JsonTextReport {
     let bodies: Vec<BodyText<'_>> = snapshot
         .bodies
         .iter()
@@ -70,7 +72,7 @@ pub(super) fn poses(world: &RobotsWorld, snapshot: &Snapshot) -> StateReport {
         .collect();
     let heading = "  body  kind        col_boxes  row_boxes  heading\n".to_string();
     let text = bodies.iter().fold(heading, |text, body| text + &body.row());
-    StateReport { json: bodies.iter().map(BodyText::json).collect(), text }
+    JsonTextReport { json: bodies.iter().map(BodyText::json).collect(), text }
 }
 
 struct BodyText<'a> {
@@ -126,7 +128,7 @@ impl BodyText<'_> {
 }
 
 /// Returns map, bodies, sensors and effectors of a scenario.
-pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateReport {
+pub(super) fn contents(compiled: &Compiled, source: &Source) -> JsonTextReport {
     let file: Value = source.parse().unwrap_or_default();
     let world = &*compiled.world;
     let json = json!({
@@ -144,7 +146,7 @@ pub(super) fn contents(compiled: &Compiled, source: &Source) -> StateReport {
         "effectors": effectors(world),
     });
     let text = text(&json);
-    StateReport { json, text }
+    JsonTextReport { json, text }
 }
 
 fn map(world: &RobotsWorld) -> Value {

@@ -11,13 +11,13 @@ use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
-use sidestep_kernel::text::{KeyValues, StateReport};
+use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, InputError, RecordableWorld, Run,
-    RunConfig, RunSetup, RunStats, World, WorldMetrics, WorldView,
+    RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::Source;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ impl Compiled {
         let state = RobotsState::restore(&self.world, &self.start_snapshot());
         let config = self.plan();
         let collector = Collector::new(self.record);
-        let start = RunSetup { config, state, collector };
+        let start = RunInputs { config, state, collector };
         Run::new(self.world, start, &source.text, workers)
     }
 
@@ -94,7 +94,7 @@ impl World for RobotsWorld {
         collector.collect(scratch);
     }
 
-    fn commit_results(&self, collector: &mut Collector) {
+    fn merge_worker_results(&self, collector: &mut Collector) {
         collector.commit(self);
     }
 }
@@ -227,7 +227,7 @@ impl WorldMetrics for RobotsWorld {
         text::summary_lines(metrics)
     }
 
-    fn poses(&self, state: &RobotsState, now: Cycle) -> StateReport {
+    fn poses(&self, state: &RobotsState, now: Cycle) -> JsonTextReport {
         text::poses(self, &state.snapshot(self, now))
     }
 }

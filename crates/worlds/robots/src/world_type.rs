@@ -3,7 +3,7 @@
 use super::decide::Behaviour;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::{RobotsWorld, bundle, remarks, text};
-use sidestep_kernel::text::StateReport;
+use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
@@ -107,7 +107,7 @@ impl AnyCompiled for Compiled {
         self.world.bodies.len()
     }
 
-    fn contents(&self, source: &Source) -> StateReport {
+    fn contents(&self, source: &Source) -> JsonTextReport {
         text::contents(self, source)
     }
 

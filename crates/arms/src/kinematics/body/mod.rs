@@ -16,7 +16,7 @@ mod tests;
 
 use super::serial::{LinkFrames, SerialChain};
 use super::transform::{Transform, Vector};
-use mount::LinkMounts;
+use mount::LinkMountsOnArm;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
 use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
@@ -78,7 +78,7 @@ impl ArmBody {
         solids: &[Solid],
         may_touch: &[(usize, usize)],
     ) -> Self {
-        let mounts = LinkMounts::new(model, chain);
+        let mounts = LinkMountsOnArm::new(model, chain);
         let mut parts = Vec::new();
         let mut links = Vec::new();
         for solid in solids {
@@ -163,7 +163,7 @@ impl ArmBody {
         placed.clear();
         placed.extend(self.parts.iter().map(|part| {
             let pose = part.mount.transform(links, values);
-            let upright = part.core.parry_pose(&pose);
+            let upright = part.core.parry3d_pose(&pose);
             PlacedShape { pose: upright, center_m: pose.origin_m }
         }));
     }
@@ -210,7 +210,7 @@ impl PlacedBody<'_> {
 
 impl LinkShape {
     /// Returns a solid of a model as a part of an arm's body; `None` for shapes that are not among those of bodies.
-    fn new(model: &Model, mounts: &LinkMounts, solid: &Solid) -> Option<Self> {
+    fn new(model: &Model, mounts: &LinkMountsOnArm, solid: &Solid) -> Option<Self> {
         let own = Transform::from_urdf_origin(&solid.origin);
         let center = Transform { origin_m: solid.center_m, ..Transform::IDENTITY };
         let core = core(&solid.shape)?;
@@ -242,7 +242,7 @@ impl ShapeCore {
 
     /// Returns the pose in which parry draws it: cylinders of models are along z, those of parry
     /// along y.
-    fn parry_pose(&self, pose: &Transform) -> ParryPose {
+    fn parry3d_pose(&self, pose: &Transform) -> ParryPose {
         const UP: Transform = Transform {
             rotation: [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
             origin_m: [0.0; 3],

@@ -46,9 +46,9 @@ impl LinkMount {
 }
 
 /// By the index of the link in the model.
-pub(super) struct LinkMounts(Vec<LinkMount>);
+pub(super) struct LinkMountsOnArm(Vec<LinkMount>);
 
-impl LinkMounts {
+impl LinkMountsOnArm {
     pub(super) fn new(model: &Model, chain: &SerialChain) -> Self {
         let mut found: Vec<Option<LinkMount>> = vec![None; model.links.len()];
         let base = link_index(model, &chain.base);

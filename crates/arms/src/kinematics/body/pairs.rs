@@ -1,6 +1,6 @@
 //! Pairs of parts that must not touch.
 
-use super::mount::LinkMounts;
+use super::mount::LinkMountsOnArm;
 use sidestep_import::urdf::{JointKind, Model};
 use std::collections::BTreeSet;
 
@@ -8,12 +8,12 @@ use std::collections::BTreeSet;
 /// may not touch. `links` are the links of the parts, by their index in the model.
 pub(super) fn collision_candidate_pairs(
     model: &Model,
-    mounts: &LinkMounts,
+    mounts: &LinkMountsOnArm,
     links: &[usize],
     may_touch: &[(usize, usize)],
 ) -> Vec<(usize, usize)> {
     let rigid: Vec<usize> =
-        (0..model.links.len()).map(|link| first_rigid_link(model, link)).collect();
+        (0..model.links.len()).map(|link| rigid_group_root(model, link)).collect();
     let joined: BTreeSet<_> = model
         .joints
         .iter()
@@ -27,7 +27,7 @@ pub(super) fn collision_candidate_pairs(
         let ra = rigid[a];
         let rb = rigid[b];
         ra != rb
-            && has_relative_motion(mounts, a, b)
+            && can_links_move_relatively(mounts, a, b)
             && !joined.contains(&ordered_pair(ra, rb))
             && !masked.contains(&ordered_pair(a, b))
     })
@@ -40,14 +40,14 @@ fn ordered_pair(a: usize, b: usize) -> (usize, usize) {
 }
 
 /// Returns whether two links of the model ever move against each other.
-fn has_relative_motion(mounts: &LinkMounts, a: usize, b: usize) -> bool {
+fn can_links_move_relatively(mounts: &LinkMountsOnArm, a: usize, b: usize) -> bool {
     let a = mounts.link(a);
     let b = mounts.link(b);
     a.link != b.link || !a.is_rigid() || !b.is_rigid()
 }
 
 /// Returns the first of the links that fixed joints connect a link with.
-fn first_rigid_link(model: &Model, link: usize) -> usize {
+fn rigid_group_root(model: &Model, link: usize) -> usize {
     let mut at = link;
     while let Some(joint) = model.parent_joint(at).map(|joint| &model.joints[joint]) {
         if joint.kind != JointKind::Fixed {

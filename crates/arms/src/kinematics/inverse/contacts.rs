@@ -73,7 +73,7 @@ impl<'a> ContactFinder<'a> {
         let anchors = &skeleton.connectors;
         let mut rods = Vec::new();
         for (rod, ends) in anchors.windows(2).enumerate() {
-            let mut links = links_holding_rod(&ends[0], &ends[1]);
+            let mut links = links_carrying_rod(&ends[0], &ends[1]);
             if body.is_none_or(|body| !links.any(|link| body.has_shape(link))) {
                 rods.push(rod);
             }
@@ -179,7 +179,7 @@ impl<'a> ContactFinder<'a> {
 }
 
 /// Returns the links that hold the rod between two anchors, or on either side of its slide.
-fn links_holding_rod(inner: &LinkAnchor, outer: &LinkAnchor) -> impl Iterator<Item = usize> {
+fn links_carrying_rod(inner: &LinkAnchor, outer: &LinkAnchor) -> impl Iterator<Item = usize> {
     let first = outer.first.max(inner.first);
     let last = inner.last.min(outer.last);
     first.min(last)..=first.max(last)

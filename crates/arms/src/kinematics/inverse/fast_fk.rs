@@ -121,8 +121,8 @@ impl FastFkJoint {
         let rotation = joint.origin.rotation;
         let still = match joint.motion {
             JointMotionKind::Turn => halve_matrix(&add_all(
-                &joint_rotation_at(joint, 0.0),
-                &joint_rotation_at(joint, PI),
+                &joint_rotation_at_angle(joint, 0.0),
+                &joint_rotation_at_angle(joint, PI),
             )),
             JointMotionKind::Slide => rotation,
         };
@@ -131,7 +131,7 @@ impl FastFkJoint {
             motion: joint.motion,
             drive: joint.drive,
             cosine: add_all(&rotation, &minus_still),
-            sine: add_all(&joint_rotation_at(joint, FRAC_PI_2), &minus_still),
+            sine: add_all(&joint_rotation_at_angle(joint, FRAC_PI_2), &minus_still),
             still,
             origin_m: joint.origin.origin_m,
             axis: joint.origin.transform_direction(joint.axis),
@@ -145,7 +145,7 @@ impl FastFkJoint {
 }
 
 /// Returns the rotation of a joint's frame in the link before it, at an angle.
-fn joint_rotation_at(joint: &MovingJoint, angle_rad: f64) -> [Vector; 3] {
+fn joint_rotation_at_angle(joint: &MovingJoint, angle_rad: f64) -> [Vector; 3] {
     joint.origin.compose(&Transform::from_axis_angle(joint.axis, angle_rad)).rotation
 }
 

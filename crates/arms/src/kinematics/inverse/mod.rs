@@ -37,7 +37,7 @@ mod tracking;
 
 pub use goal::{ArmGoal, FrameAxis, MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask};
 pub use result::{ArmBodyPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
-pub use tracking::{ConnectorTarget, ConnectorTargetTracker};
+pub use tracking::{ConnectorTarget, ConnectorTargetSolver};
 
 use super::serial::SerialChain;
 use search::IkSearch;

@@ -35,7 +35,7 @@ impl IkSearch<'_> {
             }
             self.unwind_toward(&mut result.values, start);
             if nearest {
-                result = self.approach_start_posture(result, start, &mut steps);
+                result = self.move_toward_start_posture(result, start, &mut steps);
             }
             match found.iter().position(|other| !self.is_distinct(other, &result.values)) {
                 None => found.push(result.values),
@@ -68,7 +68,7 @@ impl IkSearch<'_> {
 
     /// Moves a posture toward the start, as far as the goal allows: each step goes a fraction of the
     /// distance, and then descends to the nearest posture that meets the goal.
-    fn approach_start_posture(
+    fn move_toward_start_posture(
         &mut self,
         mut at: DescentResult,
         start: &[f64],

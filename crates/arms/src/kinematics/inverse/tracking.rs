@@ -38,7 +38,7 @@ const ARRIVAL_TOLERANCE: f64 = 1e-13;
 
 /// An arm whose joints follow the places of its connectors.
 #[derive(Debug)]
-pub struct ConnectorTargetTracker {
+pub struct ConnectorTargetSolver {
     fast_fk: FastFk,
     anchors: Vec<LinkAnchor>,
     limits: JointRanges,
@@ -60,7 +60,7 @@ pub struct ConnectorTarget {
     pub at_m: Vector,
 }
 
-impl ConnectorTargetTracker {
+impl ConnectorTargetSolver {
     /// Returns a tracker; `skeleton` must be that of `chain`.
     pub fn new(chain: &SerialChain, skeleton: &Skeleton) -> Self {
         let anchors = skeleton.connectors.clone();
@@ -174,14 +174,14 @@ impl ConnectorTargetTracker {
 
 /// A descent of joint values toward targets of connectors.
 struct TrackingDescent<'a> {
-    arm: &'a ConnectorTargetTracker,
+    arm: &'a ConnectorTargetSolver,
     values: Vec<f64>,
     placed: LinkTransforms,
     stepper: IkStepper,
 }
 
 impl<'a> TrackingDescent<'a> {
-    fn new(arm: &'a ConnectorTargetTracker, start: &[f64]) -> Self {
+    fn new(arm: &'a ConnectorTargetSolver, start: &[f64]) -> Self {
         Self {
             arm,
             values: start.to_vec(),
@@ -333,10 +333,10 @@ mod tests {
     use sidestep_kernel::geometry::add;
     use sidestep_testing::robot_model;
 
-    fn arm(model: &str) -> Option<(SerialChain, ConnectorTargetTracker)> {
+    fn arm(model: &str) -> Option<(SerialChain, ConnectorTargetSolver)> {
         let model = Model::load(&robot_model(model)?).expect("a model");
         let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
-        let follower = ConnectorTargetTracker::new(&chain, &chain.skeleton());
+        let follower = ConnectorTargetSolver::new(&chain, &chain.skeleton());
         Some((chain, follower))
     }
 

@@ -2,7 +2,7 @@
 
 use super::declare::Table;
 use super::schema::TableSchema;
-use super::values::Values;
+use super::values::ColumnValues;
 use crate::ports::recorder::{RecordError, Recorder};
 use std::fmt;
 
@@ -24,7 +24,7 @@ pub trait TableBuffer {
     }
 
     /// Moves all waiting rows out as one block. `None` for a table that is not recorded.
-    fn take(&mut self) -> Option<Vec<Values>>;
+    fn take(&mut self) -> Option<Vec<ColumnValues>>;
 }
 
 /// The tables of a run; the recorded ones are numbered in their order.
@@ -110,7 +110,7 @@ impl<R> TableBuffer for TableRowsBuffer<R> {
         self.rows.len()
     }
 
-    fn take(&mut self) -> Option<Vec<Values>> {
+    fn take(&mut self) -> Option<Vec<ColumnValues>> {
         let rows = std::mem::take(&mut self.rows);
         self.table.as_ref().map(|table| table.block_from_rows(&rows))
     }
@@ -120,7 +120,7 @@ impl<R> TableBuffer for TableRowsBuffer<R> {
 #[derive(Debug, Default)]
 pub struct ColumnBlockBuffer {
     schema: Option<TableSchema>,
-    block: Option<Vec<Values>>,
+    block: Option<Vec<ColumnValues>>,
 }
 
 impl ColumnBlockBuffer {
@@ -135,7 +135,7 @@ impl ColumnBlockBuffer {
     }
 
     /// Keeps the block that is recorded next, and replaces one that waits.
-    pub fn set(&mut self, block: Vec<Values>) {
+    pub fn set(&mut self, block: Vec<ColumnValues>) {
         self.block = Some(block);
     }
 }
@@ -146,12 +146,12 @@ impl TableBuffer for ColumnBlockBuffer {
     }
 
     fn row_count(&self) -> usize {
-        self.block.as_ref().and_then(|block| block.first()).map_or(0, Values::len)
+        self.block.as_ref().and_then(|block| block.first()).map_or(0, ColumnValues::len)
     }
 
-    fn take(&mut self) -> Option<Vec<Values>> {
+    fn take(&mut self) -> Option<Vec<ColumnValues>> {
         let schema = self.schema.as_ref()?;
-        let empty = || schema.columns.iter().map(|column| Values::empty(column.ty)).collect();
+        let empty = || schema.columns.iter().map(|column| ColumnValues::empty(column.ty)).collect();
         Some(self.block.take().unwrap_or_else(empty))
     }
 }
@@ -193,10 +193,10 @@ mod tests {
         let mut recorder = MemoryRecorder::new(&tables.schemas());
         tables.record(&mut recorder).unwrap();
         tables.kept.push(4);
-        tables.blocks.set(vec![Values::U32(vec![5].into())]);
+        tables.blocks.set(vec![ColumnValues::U32(vec![5].into())]);
         tables.record(&mut recorder).unwrap();
-        assert_eq!(recorder.column("kept", "k"), Some(&Values::U32(vec![1, 2, 4].into())));
-        assert_eq!(recorder.column("blocks", "k"), Some(&Values::U32(vec![5].into())));
+        assert_eq!(recorder.column("kept", "k"), Some(&ColumnValues::U32(vec![1, 2, 4].into())));
+        assert_eq!(recorder.column("blocks", "k"), Some(&ColumnValues::U32(vec![5].into())));
         assert_eq!(recorder.column("unwanted", "k"), None);
     }
 

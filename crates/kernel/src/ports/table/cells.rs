@@ -1,4 +1,4 @@
-//! Values side by side, and a mask of the missing ones.
+//! ColumnValues side by side, and a mask of the missing ones.
 
 use std::ops::Deref;
 
@@ -80,7 +80,7 @@ impl<T> Cells<T> {
     }
 
     /// Iterates over all cells; `None` stands for a missing value.
-    pub fn iter_options(&self) -> impl Iterator<Item = Option<&T>> {
+    pub fn iter_with_missing(&self) -> impl Iterator<Item = Option<&T>> {
         (0..self.values.len()).map(|row| self.get(row))
     }
 
@@ -184,15 +184,15 @@ impl TextCells {
     /// Returns the text in `row`; `None` where it is missing or there is no such row.
     pub fn get(&self, row: usize) -> Option<&str> {
         let end = *self.ends.get(row).filter(|_| self.mask.is_valid(row))?;
-        Some(&self.text[self.start(row)..end])
+        Some(&self.text[self.start_offset(row)..end])
     }
 
-    fn start(&self, row: usize) -> usize {
+    fn start_offset(&self, row: usize) -> usize {
         row.checked_sub(1).map_or(0, |before| self.ends[before])
     }
 
     /// Iterates over all cells; `None` stands for a missing text.
-    pub fn iter_options(&self) -> impl Iterator<Item = Option<&str>> {
+    pub fn iter_with_missing(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.ends.len()).map(|row| self.get(row))
     }
 
@@ -233,18 +233,18 @@ impl TextCells {
     pub fn resize(&mut self, rows: usize) {
         self.mask.resize(self.ends.len(), rows);
         self.ends.resize(rows, self.text.len());
-        self.text.truncate(self.start(rows));
+        self.text.truncate(self.start_offset(rows));
     }
 
     /// Appends the cells of `more`; missing ones stay missing.
     pub fn append(&mut self, more: &Self) {
-        more.iter_options().for_each(|text| self.push(text));
+        more.iter_with_missing().for_each(|text| self.push(text));
     }
 
     /// Keeps the cells at which `keep` (of the same length) is true.
     pub fn retain_rows(&mut self, keep: &[bool]) {
         *self = self
-            .iter_options()
+            .iter_with_missing()
             .zip(keep)
             .filter(|(_, keep)| **keep)
             .map(|(text, _)| text)
@@ -306,7 +306,7 @@ mod tests {
             retain(&mut list, &keep[..order.len()]);
             cells.retain_rows(&keep[..order.len()]);
             texts.retain_rows(&keep[..order.len()]);
-            prop_assert_eq!(cells.iter_options().map(Option::<&i64>::copied).collect::<Vec<_>>(), list.clone());
+            prop_assert_eq!(cells.iter_with_missing().map(Option::<&i64>::copied).collect::<Vec<_>>(), list.clone());
             prop_assert_eq!(cells.valid().is_some(), list.contains(&None));
             prop_assert_eq!(texts, words(&list));
         }

@@ -3,13 +3,13 @@
 use super::cells::{Cells, TextCells};
 use super::column_type::ColumnType;
 use super::schema::{ColumnSpec, TableSchema};
-use super::values::Values;
+use super::values::ColumnValues;
 use std::fmt;
 
 /// A table of rows `R`: each column is declared once, with the getter that reads it from a row.
 ///
 /// ```
-/// use sidestep_kernel::ports::{Table, Values};
+/// use sidestep_kernel::ports::{Table, ColumnValues};
 ///
 /// struct Arrival { cycle: u64, delay_s: Option<f64> }
 ///
@@ -18,7 +18,7 @@ use std::fmt;
 ///     .f64("delay_s", "its delay, where there was a plan", |a| a.delay_s);
 /// assert_eq!(table.schema().columns[1].unit(), Some("s"));
 /// let block = table.block_from_rows(&[Arrival { cycle: 7, delay_s: None }]);
-/// assert_eq!(block[0], Values::U64(vec![7].into()));
+/// assert_eq!(block[0], ColumnValues::U64(vec![7].into()));
 /// ```
 pub struct Table<R> {
     name: String,
@@ -28,7 +28,7 @@ pub struct Table<R> {
 
 /// A function that reads all values of a column from a block of rows: one call per block, so that
 /// the getter is inlined into its loop.
-type ColumnGetter<R> = Box<dyn Fn(&[R]) -> Values + Send + Sync>;
+type ColumnGetter<R> = Box<dyn Fn(&[R]) -> ColumnValues + Send + Sync>;
 
 struct TableColumn<R> {
     spec: ColumnSpec,
@@ -74,7 +74,7 @@ macro_rules! typed {
         {
             let spec = ColumnSpec::new(name, ColumnType::$variant, meaning);
             let spec = ColumnSpec { is_nullable: V::IS_NULLABLE, ..spec };
-            self.column(spec, move |rows| Values::$variant(rows.iter().map(&get).collect()))
+            self.column(spec, move |rows| ColumnValues::$variant(rows.iter().map(&get).collect()))
         }
     )*};
 }
@@ -109,13 +109,13 @@ impl<R> Table<R> {
     {
         let spec = ColumnSpec::label(name, meaning, labels);
         let spec = ColumnSpec { is_nullable: V::IS_NULLABLE, ..spec };
-        self.column(spec, move |rows| Values::Label(rows.iter().map(&get).collect()))
+        self.column(spec, move |rows| ColumnValues::Label(rows.iter().map(&get).collect()))
     }
 
     fn column(
         mut self,
         spec: ColumnSpec,
-        values: impl Fn(&[R]) -> Values + Send + Sync + 'static,
+        values: impl Fn(&[R]) -> ColumnValues + Send + Sync + 'static,
     ) -> Self {
         self.columns.push(TableColumn { spec, values: Box::new(values) });
         self
@@ -134,7 +134,7 @@ impl<R> Table<R> {
     }
 
     /// Returns the values of all columns in these rows.
-    pub fn block_from_rows(&self, rows: &[R]) -> Vec<Values> {
+    pub fn block_from_rows(&self, rows: &[R]) -> Vec<ColumnValues> {
         self.columns.iter().map(|column| (column.values)(rows)).collect()
     }
 }
@@ -171,8 +171,8 @@ mod tests {
             .text("h", "", |k| (*k > 0).then(|| k.to_string()));
         let block = table.block_from_rows(&[0, 1, 2]);
         check_block(&table.schema(), &block).unwrap();
-        assert_eq!(block[3], Values::I64([Some(0), None, Some(2)].into_iter().collect()));
-        assert_eq!(block[6], Values::Label(vec![0, 1, 0].into()));
+        assert_eq!(block[3], ColumnValues::I64([Some(0), None, Some(2)].into_iter().collect()));
+        assert_eq!(block[6], ColumnValues::Label(vec![0, 1, 0].into()));
         assert_eq!(block[7].text(2), "2");
         let nullable = table.schema().columns.iter().map(|c| c.is_nullable).collect::<Vec<_>>();
         assert_eq!(nullable, [false, false, false, true, false, false, false, true]);

@@ -4,7 +4,7 @@
 //! schema.rs   ColumnSpec, TableSchema: name, type, unit and meaning of a column
 //! unit.rs     the unit that a name ends in
 //! cells.rs    Cells, Texts: values side by side, and which of them are missing
-//! values.rs   Values: the cells of one column, of any type; RoleColumn: with a name and a role
+//! values.rs   ColumnValues: the cells of one column, of any type; RoleColumn: with a name and a role
 //! declare.rs  Table: columns with their getters; rows -> a block of values
 //! buffer.rs   rows that wait to be recorded
 //! ```
@@ -26,4 +26,4 @@ pub use column_type::ColumnType;
 pub use declare::{Table, label_index};
 pub use schema::{ColumnSpec, TableSchema};
 pub use unit::split_unit;
-pub use values::{ColumnWithRole, Values};
+pub use values::{ColumnValues, ColumnWithRole};

@@ -2,7 +2,7 @@
 
 use super::column_type::ColumnType;
 use super::unit::split_unit;
-use super::values::Values;
+use super::values::ColumnValues;
 
 /// One column: name with its unit (`distance_m`), type and meaning.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,8 +36,8 @@ impl ColumnSpec {
         Self { labels, ..Self::new(name, ColumnType::Label, meaning) }
     }
 
-    /// Returns the value in `row` as text, as [`Values::write`] writes it.
-    pub fn text(&self, values: &Values, row: usize) -> String {
+    /// Returns the value in `row` as text, as [`ColumnValues::write`] writes it.
+    pub fn text(&self, values: &ColumnValues, row: usize) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = values.write(row, &self.labels, &mut text);

@@ -7,7 +7,7 @@ use std::fmt::{self, Write};
 
 /// The values of one column in one block; any of them may be missing.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Values {
+pub enum ColumnValues {
     /// See [`ColumnType::U32`].
     U32(Cells<u32>),
     /// See [`ColumnType::U64`].
@@ -30,18 +30,18 @@ pub enum Values {
 macro_rules! with_cells {
     ($values:expr, $cells:ident => $work:expr) => {
         match $values {
-            Values::U32($cells) | Values::Label($cells) => $work,
-            Values::U64($cells) => $work,
-            Values::I32($cells) => $work,
-            Values::I64($cells) => $work,
-            Values::F64($cells) => $work,
-            Values::Bool($cells) => $work,
-            Values::Text($cells) => $work,
+            ColumnValues::U32($cells) | ColumnValues::Label($cells) => $work,
+            ColumnValues::U64($cells) => $work,
+            ColumnValues::I32($cells) => $work,
+            ColumnValues::I64($cells) => $work,
+            ColumnValues::F64($cells) => $work,
+            ColumnValues::Bool($cells) => $work,
+            ColumnValues::Text($cells) => $work,
         }
     };
 }
 
-impl Values {
+impl ColumnValues {
     /// Creates a column of this type without values.
     pub fn empty(ty: ColumnType) -> Self {
         match ty {
@@ -198,7 +198,7 @@ pub struct ColumnWithRole<R> {
     /// Its role, by which readers select, e.g. only parameters.
     pub role: R,
     /// Its values, one per row.
-    pub values: Values,
+    pub values: ColumnValues,
 }
 
 #[cfg(test)]
@@ -208,23 +208,23 @@ mod tests {
 
     #[test]
     fn values_are_numbers_words_and_json() {
-        let values = Values::Bool([Some(true), None].into_iter().collect());
+        let values = ColumnValues::Bool([Some(true), None].into_iter().collect());
         assert_eq!((values.number(0), values.number(1), values.number(9)), (Some(1.0), None, None));
         assert_eq!((values.text(0).as_str(), values.text(1).as_str()), ("true", ""));
         assert_eq!((values.json(0), values.json(1)), (json!(true), Value::Null));
-        assert_eq!(Values::F64(vec![0.5].into()).text(0), "0.5");
-        assert_eq!(Values::I64(vec![-3].into()).json(0), json!(-3));
-        assert_eq!(Values::Text([Some("a")].into_iter().collect()).json(0), json!("a"));
+        assert_eq!(ColumnValues::F64(vec![0.5].into()).text(0), "0.5");
+        assert_eq!(ColumnValues::I64(vec![-3].into()).json(0), json!(-3));
+        assert_eq!(ColumnValues::Text([Some("a")].into_iter().collect()).json(0), json!("a"));
         let labels = ["low".to_string(), "high".to_string()];
         let mut text = String::new();
-        Values::Label(vec![1].into()).write(0, &labels, &mut text).unwrap();
+        ColumnValues::Label(vec![1].into()).write(0, &labels, &mut text).unwrap();
         assert_eq!(text, "high");
     }
 
     #[test]
     fn every_type_grows_and_is_picked_from() {
         for ty in ColumnType::ALL {
-            let mut values = Values::empty(ty);
+            let mut values = ColumnValues::empty(ty);
             assert_eq!((values.column_type(), values.is_empty(), values.valid()), (ty, true, None));
             values.resize(2);
             values.append(&values.clone());

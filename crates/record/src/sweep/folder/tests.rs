@@ -3,7 +3,7 @@
 use super::super::shares::Share;
 use super::*;
 use crate::run_table::LoadedTable;
-use sidestep_kernel::ports::Values;
+use sidestep_kernel::ports::ColumnValues;
 
 type Folder = SweepFolder<Vec<u32>>;
 
@@ -24,7 +24,7 @@ impl From<RecordError> for Failed {
 }
 
 fn cells() -> Vec<ColumnWithRole<String>> {
-    let values = Values::I64(vec![0, 1].into());
+    let values = ColumnValues::I64(vec![0, 1].into());
     vec![ColumnWithRole { name: "cell".into(), role: "cell".into(), values }]
 }
 
@@ -68,7 +68,7 @@ fn a_sweep_goes_from_plan_over_shares_to_one_table() {
     completion.finish().unwrap();
     let again = Folder::open(&path).unwrap();
     assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
-    let twice = Values::I64(vec![0, 1, 0, 1].into());
+    let twice = ColumnValues::I64(vec![0, 1, 0, 1].into());
     assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
 }
 

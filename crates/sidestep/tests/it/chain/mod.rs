@@ -3,7 +3,7 @@
 //! run (reports.rs); targets of arms (arms.rs); an agent per connector (team.rs); robots on wheels (wheels.rs).
 
 use sidestep::kernel::Simulation;
-use sidestep::kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep::kernel::ports::{ColumnValues, MemoryRecorder, Recorder};
 use sidestep::scenario::Source;
 use sidestep::worlds::chain::metrics::{ChainMetrics, Metrics};
 use sidestep::worlds::chain::{ChainRun, ChainWorld, ChainWorldState, chain_run};

@@ -7,7 +7,7 @@ use super::*;
 fn track(rows: &MemoryRecorder, connector: u32) -> Vec<[f64; 2]> {
     let column = |name| rows.column("trajectories", name).expect("a column");
     match (column("connector"), column("x_m"), column("y_m")) {
-        (Values::U32(who), Values::F64(x), Values::F64(y)) => {
+        (ColumnValues::U32(who), ColumnValues::F64(x), ColumnValues::F64(y)) => {
             let rows = who.iter().zip(x.iter().zip(y)).filter(|(who, _)| **who == connector);
             rows.map(|(_, (x, y))| [*x, *y]).collect()
         }
@@ -27,11 +27,11 @@ fn events<const D: usize>(
     match (column("cycle"), column("event"), column("connector"), column("reason"), column("value"))
     {
         (
-            Values::U64(cycle),
-            Values::Label(event),
-            Values::U32(who),
-            Values::Label(why),
-            Values::F64(value),
+            ColumnValues::U64(cycle),
+            ColumnValues::Label(event),
+            ColumnValues::U32(who),
+            ColumnValues::Label(why),
+            ColumnValues::F64(value),
         ) => {
             let row = |k: usize| {
                 let [event, why] = [(event[k], "event"), (why[k], "reason")]
@@ -106,7 +106,9 @@ fn a_gap_too_long_is_told_with_the_number_of_missing_parts() {
     let told = events(&run, &rows);
     let gap = told.iter().position(|event| event.1 == "gap-too-long").expect("a gap");
     assert!((told[gap].4 - 2.5).abs() < 1e-9, "{told:?}");
-    let Some(Values::U32(missing)) = rows.column("events", "missing") else { panic!("no column") };
+    let Some(ColumnValues::U32(missing)) = rows.column("events", "missing") else {
+        panic!("no column")
+    };
     // 2.5 m of rods of 1.1 m; of other events nothing is missing.
     assert_eq!(missing.iter().sum::<u32>(), 3, "{missing:?}");
     assert_eq!(missing[gap], 3);
@@ -220,8 +222,12 @@ fn progress_means_what_the_task_asks_for() {
 fn what_moves_comes_back_in_the_table_of_movers() {
     let (run, rows) = recorded::<2>(&source(2, DODGING), 2, 40);
     let column = |name| rows.column("movers", name).expect("a column");
-    let (Values::U64(cycle), Values::U32(who), Values::F64(x), Values::F64(y)) =
-        (column("cycle"), column("obstacle"), column("x_m"), column("y_m"))
+    let (
+        ColumnValues::U64(cycle),
+        ColumnValues::U32(who),
+        ColumnValues::F64(x),
+        ColumnValues::F64(y),
+    ) = (column("cycle"), column("obstacle"), column("x_m"), column("y_m"))
     else {
         panic!("other columns")
     };

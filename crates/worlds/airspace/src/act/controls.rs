@@ -68,9 +68,9 @@ fn record_outcomes(
     let mut shielding = NetworkTraffic::default();
     let mut optimized: Vec<OptimizationStatus> = Vec::new();
     for control in controls.iter().flatten() {
-        grouping.add_participant_counts(control.grouping);
-        deciding.add_participant_counts(control.deciding);
-        shielding.add_participant_counts(control.shielding);
+        grouping.add_participant_traffic(control.grouping);
+        deciding.add_participant_traffic(control.deciding);
+        shielding.add_participant_traffic(control.shielding);
         optimized.extend(control.optimized);
     }
     scratch.grouped.add(grouping);

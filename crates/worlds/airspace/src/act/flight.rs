@@ -98,7 +98,7 @@ impl<'a> AircraftCycleMotion<'a> {
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
             FlightPathSource::Track(track) => {
-                track.add_legs_between(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
+                track.add_legs_in_interval(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
             }
         }
         self.record_legs(moment.step_s);

@@ -3,7 +3,7 @@
 use super::network_traffic::NetworkTraffic;
 use super::packet::{ConversationId, PacketHeader};
 use super::participant::{
-    ConversationEnd, ConversationProgress, OutgoingMessage, Participant, ParticipantWithOutcome,
+    ConversationEnd, ConversationProgress, FinishableParticipant, OutgoingMessage, Participant,
 };
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{DropReason, OutgoingPacket};
@@ -115,21 +115,21 @@ impl<P: Participant + ?Sized> Conversation<P> {
             let sequence = self.sent;
             let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
             let payload = message.into_packet(&header);
-            self.traffic.record_message(to.len(), payload.len());
+            self.traffic.count_message(to.len(), payload.len());
             out.push(OutgoingPacket { to, sequence, payload });
             self.sent += 1;
         }
     }
 }
 
-impl<P: ParticipantWithOutcome + ?Sized> Conversation<P> {
+impl<P: FinishableParticipant + ?Sized> Conversation<P> {
     /// Returns the end of the conversation; a participant that is not done ends because time is up.
     pub fn finish(&mut self) -> ConversationEnd<P::Outcome> {
         self.participant.finish()
     }
 }
 
-impl<O> Conversation<dyn ParticipantWithOutcome<Outcome = O>> {
+impl<O> Conversation<dyn FinishableParticipant<Outcome = O>> {
     /// Returns the conversation as it remains for others once it has ended here: it answers their questions.
     pub fn into_ended(self) -> Conversation<dyn Participant> {
         let Self { info, others, sent, traffic, participant } = self;

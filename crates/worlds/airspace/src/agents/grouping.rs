@@ -204,7 +204,7 @@ impl GroupingAgent {
     fn has_all(&mut self) -> bool {
         let present = self.responsive_others();
         self.places_with_missing_items(&present).is_empty()
-            && (present.is_empty() || self.roster.advance_chain_search())
+            && (present.is_empty() || self.roster.advance_group_search())
     }
 
     /// Returns the others near it from which something may come, with their places.

@@ -12,7 +12,7 @@
 
 pub(crate) use super::participant::ConversationEnd;
 use super::participant::{
-    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, ParticipantWithOutcome,
+    ConversationProgress, FinishableParticipant, InvalidMessage, OutgoingMessage, Participant,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -340,7 +340,7 @@ impl<A: ProtocolAgent + Send> Participant for ReliableEndpoint<A> {
     }
 }
 
-impl<A: ProtocolAgent + Send> ParticipantWithOutcome for ReliableEndpoint<A> {
+impl<A: ProtocolAgent + Send> FinishableParticipant for ReliableEndpoint<A> {
     type Outcome = A::Outcome;
 
     fn finish(&mut self) -> ConversationEnd<A::Outcome> {

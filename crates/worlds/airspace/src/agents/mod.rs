@@ -38,8 +38,8 @@ pub use link::{EndpointConfig, MessageLimits, ProtocolAgent, ReliableEndpoint};
 pub(crate) use optimizer::OptimizingAgent;
 pub use ownship::{CommonKnowledge, FiledFlight, Ownship};
 pub use participant::{
-    ConversationEnd, ConversationProgress, InvalidMessage, OutgoingMessage, Participant,
-    ParticipantWithOutcome,
+    ConversationEnd, ConversationProgress, FinishableParticipant, InvalidMessage, OutgoingMessage,
+    Participant,
 };
 use serde::{Deserialize, Serialize};
 use traffic_state::StateBeacon;

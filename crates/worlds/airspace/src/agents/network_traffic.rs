@@ -28,14 +28,14 @@ impl NetworkTraffic {
     }
 
     /// Adds the counts of the same conversation by another participant.
-    pub(crate) fn add_participant_counts(&mut self, other: Self) {
+    pub(crate) fn add_participant_traffic(&mut self, other: Self) {
         let ticks = self.ticks.max(other.ticks);
         self.add(other);
         self.ticks = ticks;
     }
 
     /// Counts a message to `receivers` others.
-    pub(crate) fn record_message(&mut self, receivers: usize, bytes: usize) {
+    pub(crate) fn count_message(&mut self, receivers: usize, bytes: usize) {
         self.messages += receivers as u64;
         self.multicasts += 1;
         self.bytes += (receivers * bytes) as u64;

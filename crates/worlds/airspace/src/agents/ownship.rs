@@ -4,8 +4,7 @@ use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
 use crate::flight::{
-    Action, AircraftModel, FlightEnvironment, KnownAircraft, Point, Pose2, Prediction,
-    RoutePosition,
+    Action, AircraftModel, FlightConditions, KnownAircraft, Point, Pose2, Prediction, RoutePosition,
 };
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::objective::{ActionPredictions, Objective};
@@ -27,7 +26,7 @@ pub struct CommonKnowledge {
     /// Poses at which all see the airplanes of the group, in the order of the ids.
     pub poses: Vec<Pose2>,
     /// The air that all fly through.
-    pub air: FlightEnvironment,
+    pub air: FlightConditions,
     /// The objective that is minimized.
     pub objective: Objective,
     /// Settings of the optimizer, from the scenario.

@@ -55,7 +55,7 @@ pub struct ConversationProgress {
 }
 
 /// A participant that has not ended; once it has, it only answers others.
-pub trait ParticipantWithOutcome: Participant {
+pub trait FinishableParticipant: Participant {
     /// What it finds, chooses or agrees on.
     type Outcome;
 

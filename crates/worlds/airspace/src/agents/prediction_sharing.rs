@@ -195,7 +195,7 @@ impl PredictionSharingAgent {
             } else if self.has_updated_distribution() {
                 member.action_distribution(self.round + 1).is_none()
             } else {
-                member.action_distribution(self.distribution_round(j)).is_none()
+                member.action_distribution(self.required_distribution_round(j)).is_none()
             };
             if is_missing {
                 awaited.push(j);
@@ -206,7 +206,7 @@ impl PredictionSharingAgent {
 
     /// Returns the round of which an agent's distribution enters the own update after `round` rounds: in sequence,
     /// those before it have already moved.
-    fn distribution_round(&self, j: usize) -> u32 {
+    fn required_distribution_round(&self, j: usize) -> u32 {
         let is_sequence = self.own.settings().order == UpdateOrder::Sequence;
         if is_sequence && j < self.own.me { self.round + 1 } else { self.round }
     }
@@ -236,7 +236,7 @@ impl PredictionSharingAgent {
         let settings = *self.own.settings();
         let mut q: Vec<Vec<f64>> = Vec::with_capacity(self.members.len());
         for (j, member) in self.members.iter().enumerate() {
-            q.extend(member.action_distribution(self.distribution_round(j)).cloned());
+            q.extend(member.action_distribution(self.required_distribution_round(j)).cloned());
         }
         if let Some(game) = &self.game {
             self.player.set_expected(|expected| game.expected_costs(me, &q, expected));

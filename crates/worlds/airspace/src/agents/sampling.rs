@@ -109,7 +109,7 @@ impl SamplingAgent {
         u64::from(self.round) * self.block as u64
     }
 
-    fn send_predictions(&mut self) -> SamplingMessage {
+    fn build_predictions_message(&mut self) -> SamplingMessage {
         self.samples = self.own.samples(&self.player, self.total_sample_count(), self.block);
         let predictions = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
         SamplingMessage::Predictions {
@@ -142,7 +142,7 @@ impl SamplingAgent {
     }
 
     /// Computes its part of the costs (lines 10 to 15).
-    fn send_costs(&mut self) -> SamplingMessage {
+    fn build_costs_message(&mut self) -> SamplingMessage {
         let costs: Vec<f64> = (0..self.block).map(|k| self.sample_cost(k)).collect();
         self.members[self.own.me].costs.insert(self.round, costs.clone());
         SamplingMessage::Costs { round: self.round, costs }
@@ -192,7 +192,7 @@ impl Optimizer for SamplingAgent {
     type Message = SamplingMessage;
 
     fn first_message(&mut self) -> SamplingMessage {
-        self.send_predictions()
+        self.build_predictions_message()
     }
 
     fn round(&self) -> u32 {
@@ -255,11 +255,11 @@ impl Optimizer for SamplingAgent {
     fn step(&mut self) -> OptimizerStep<SamplingMessage> {
         if self.has_sent_costs() {
             self.learn_from_samples();
-            OptimizerStep::Send(self.send_predictions())
+            OptimizerStep::Send(self.build_predictions_message())
         } else if self.has_converged() {
             OptimizerStep::Conclude
         } else {
-            OptimizerStep::Send(self.send_costs())
+            OptimizerStep::Send(self.build_costs_message())
         }
     }
 

@@ -1,7 +1,7 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
 use super::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{FlightEnvironment, FlightLevelRange, Point, Pose2, Prediction, distance_m};
+use crate::flight::{FlightConditions, FlightLevelRange, Point, Pose2, Prediction, distance_m};
 use crate::objective::ActionPredictions;
 use crate::shield::{OrbitSide, ShieldedAircraft};
 use serde::{Deserialize, Serialize};
@@ -70,7 +70,7 @@ pub type TrafficPicture = BTreeMap<EntityId, LastKnownState>;
 
 impl OrbitState {
     /// Returns its pose at the start of cycle `now`, carried by the wind since `as_of`.
-    fn pose(&self, air: &FlightEnvironment, beacon: &StateBeacon, now: Cycle) -> Pose2 {
+    fn pose(&self, air: &FlightConditions, beacon: &StateBeacon, now: Cycle) -> Pose2 {
         let elapsed_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
         let Pose2 { at: [x, y], heading_rad } =
@@ -123,7 +123,7 @@ impl LastKnownState {
     /// it.
     pub(crate) fn presumed_predictions(
         &self,
-        air: &FlightEnvironment,
+        air: &FlightConditions,
         is_shielded: bool,
         now: Cycle,
     ) -> ActionPredictions {
@@ -138,7 +138,7 @@ impl LastKnownState {
 
     fn orbit_points(
         &self,
-        air: &FlightEnvironment,
+        air: &FlightConditions,
         orbiting: &OrbitState,
         now: Cycle,
     ) -> Vec<Point> {
@@ -150,7 +150,7 @@ impl LastKnownState {
             .collect()
     }
 
-    fn straight_points(&self, air: &FlightEnvironment, now: Cycle) -> Vec<Point> {
+    fn straight_points(&self, air: &FlightConditions, now: Cycle) -> Vec<Point> {
         let StateBeacon { pose: Pose2 { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
         let bearing_rad = match goal.map(|goal| air.aim_point(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),

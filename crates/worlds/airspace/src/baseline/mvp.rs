@@ -197,7 +197,7 @@ fn is_conflict_active(
 
 #[cfg(test)]
 mod tests {
-    use super::super::moving_aircraft;
+    use super::super::test_aircraft;
     use super::*;
 
     const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.0 };
@@ -224,7 +224,7 @@ mod tests {
         ];
         for (poses, expected_deg) in cases {
             let one = |(slot, (at, deg)): (EntitySlot, &(Point, f64))| {
-                moving_aircraft(slot, *at, deg.to_radians())
+                test_aircraft(slot, *at, deg.to_radians())
             };
             let all: Vec<AircraftState> = (0..).zip(poses).map(one).collect();
             let found = looked(&all, &mut vec![ActiveResolutions::default(); all.len()]);
@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn others_are_found_by_their_slots_in_whatever_order_they_come() {
-        let all = [7, 2, 9, 2, 4].map(|slot| moving_aircraft(slot, [f64::from(slot), 0.0], 0.0));
+        let all = [7, 2, 9, 2, 4].map(|slot| test_aircraft(slot, [f64::from(slot), 0.0], 0.0));
         let by_slot = sorted_by_slot(&all);
         for slot in 0..12 {
             assert_eq!(
@@ -255,20 +255,20 @@ mod tests {
     fn a_conflict_is_minded_until_past_the_closest_point() {
         let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
         let far = [
-            moving_aircraft(0, [0.0, 0.0], 0.0),
-            moving_aircraft(1, [4000.0, 0.0], std::f64::consts::PI),
+            test_aircraft(0, [0.0, 0.0], 0.0),
+            test_aircraft(1, [4000.0, 0.0], std::f64::consts::PI),
         ];
         assert!(looked(&far, &mut memory).iter().all(Option::is_some));
         // Both have turned away, so no conflict is predicted any more.
         let turned = [
-            moving_aircraft(0, [1000.0, 0.0], 0.5),
-            moving_aircraft(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI),
+            test_aircraft(0, [1000.0, 0.0], 0.5),
+            test_aircraft(1, [3000.0, 0.0], 0.5 - std::f64::consts::PI),
         ];
         let kept = looked(&turned, &mut memory);
         assert!(kept.iter().all(Option::is_some), "{kept:?}");
         let past = [
-            moving_aircraft(0, [2500.0, 400.0], 0.0),
-            moving_aircraft(1, [1500.0, -400.0], std::f64::consts::PI),
+            test_aircraft(0, [2500.0, 400.0], 0.0),
+            test_aircraft(1, [1500.0, -400.0], std::f64::consts::PI),
         ];
         assert_eq!(looked(&past, &mut memory), [None, None]);
     }
@@ -277,13 +277,13 @@ mod tests {
     fn two_that_have_lost_separation_and_fly_apart_still_resolve() {
         let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
         let inside = [
-            moving_aircraft(0, [0.0, 0.0], 0.0),
-            moving_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
+            test_aircraft(0, [0.0, 0.0], 0.0),
+            test_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
         ];
         assert!(looked(&inside, &mut memory).iter().all(Option::is_some));
         let beyond = [
-            moving_aircraft(0, [600.0, 0.0], 0.0),
-            moving_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
+            test_aircraft(0, [600.0, 0.0], 0.0),
+            test_aircraft(1, [-300.0, 50.0], std::f64::consts::PI),
         ];
         assert_eq!(looked(&beyond, &mut memory), [None, None]);
     }

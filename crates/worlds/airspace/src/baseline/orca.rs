@@ -100,7 +100,7 @@ fn half_plane(
 
 #[cfg(test)]
 mod tests {
-    use super::super::moving_aircraft;
+    use super::super::test_aircraft;
     use super::*;
     use dodgy_2d::{Agent, AvoidanceOptions, Vec2};
     use proptest::prelude::*;
@@ -134,7 +134,7 @@ mod tests {
         fn the_half_planes_are_those_of_the_paper(
             x in -4000.0f64..4000.0, y in -4000.0f64..4000.0, heading_rad in -3.1f64..3.1,
         ) {
-            let (own, other) = (moving_aircraft(0, [0.0, 0.0], 0.3), moving_aircraft(1, [x, y], heading_rad));
+            let (own, other) = (test_aircraft(0, [0.0, 0.0], 0.3), test_aircraft(1, [x, y], heading_rad));
             let HalfPlane { normal, min_m_s } = half_plane(&own, &other, SETTINGS, 1.0);
             let lacks = (min_m_s - dot(normal, own.velocity)).max(0.0);
             let nearest = [own.velocity[0] + lacks * normal[0], own.velocity[1] + lacks * normal[1]];
@@ -146,7 +146,7 @@ mod tests {
         /// Alone with one neighbor, both headings together keep the zone.
         #[test]
         fn a_heading_is_one_that_all_allow(x in 600.0f64..4000.0, y in -800.0f64..800.0) {
-            let (own, other) = (moving_aircraft(0, [0.0, 0.0], 0.0), moving_aircraft(1, [x, y], 3.1));
+            let (own, other) = (test_aircraft(0, [0.0, 0.0], 0.0), test_aircraft(1, [x, y], 3.1));
             let plane = half_plane(&own, &other, SETTINGS, 1.0);
             let excess = |rad: f64| {
                 dot(plane.normal, [35.0 * math::cos(rad), 35.0 * math::sin(rad)]) - plane.min_m_s

@@ -12,7 +12,7 @@ use sidestep_kernel::math;
 
 /// Returns the candidates of an airplane: the ordered one, and then the others by rank, or by how little they
 /// differ from it. Without an order it follows its flight plan.
-pub(super) fn candidates_by_external_action(
+pub(super) fn candidates_for_external_action(
     world: &AirspaceWorld,
     known: KnownAircraft,
     external_action: Option<&ExternalAction>,

@@ -57,7 +57,7 @@ pub(super) fn rank_by_cost(
 }
 
 /// Returns the different motions of the next `dt` among some actions, in their order.
-pub(super) fn profiles_from_actions(
+pub(super) fn turn_profiles_from_actions(
     world: &AirspaceWorld,
     known: KnownAircraft,
     actions: &[Action],

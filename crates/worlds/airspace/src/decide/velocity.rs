@@ -4,7 +4,7 @@
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
 //! step by step, each airplane as the method says.
 
-use super::preferences::{profiles_from_actions, rank_by_turn_difference};
+use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
 use crate::baseline::{AircraftState, mvp, orca};
 use crate::flight::{InterOrderSegment, KnownAircraft, Point, Pose2};
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
@@ -83,8 +83,11 @@ pub(super) fn rank_by_similarity(
     profile: TurnProfile,
 ) -> Vec<TurnProfile> {
     let turn_rad_s = profile.omegas_rad_s.first().copied().unwrap_or_default();
-    let others =
-        profiles_from_actions(world, known, &rank_by_turn_difference(world, known, turn_rad_s));
+    let others = turn_profiles_from_actions(
+        world,
+        known,
+        &rank_by_turn_difference(world, known, turn_rad_s),
+    );
     let others: Vec<TurnProfile> = others.into_iter().filter(|other| *other != profile).collect();
     [vec![profile], others].concat()
 }

@@ -1,8 +1,8 @@
 //! Conversations of simple agents, over networks with faults.
 
 use crate::agents::{
-    Conversation, ConversationEnd, ConversationSetup, EndpointConfig, InvalidMessage,
-    MessageLimits, ParticipantWithOutcome, ProtocolAgent, ReliableEndpoint,
+    Conversation, ConversationEnd, ConversationSetup, EndpointConfig, FinishableParticipant,
+    InvalidMessage, MessageLimits, ProtocolAgent, ReliableEndpoint,
 };
 use crate::pilot::{ConversationId, ConversationSchedule, Protocol, retry_policy};
 use crate::purpose;
@@ -101,7 +101,7 @@ impl ProtocolAgent for Adder {
 
 /// An agent that sends until it is done.
 struct Alone {
-    conversation: Conversation<dyn ParticipantWithOutcome<Outcome = u64>>,
+    conversation: Conversation<dyn FinishableParticipant<Outcome = u64>>,
     out: Vec<OutgoingPacket>,
     ended: Option<ConversationEnd<u64>>,
 }
@@ -193,7 +193,7 @@ fn sums(
             is_silent,
         };
         let participant = Box::new(ReliableEndpoint::new(Adder::new(me, group, rounds), config));
-        let mut conversation: Conversation<dyn ParticipantWithOutcome<Outcome = u64>> =
+        let mut conversation: Conversation<dyn FinishableParticipant<Outcome = u64>> =
             Conversation::new(info, participant);
         let mut out = Vec::new();
         conversation.start(begins, &mut out);

@@ -9,7 +9,7 @@ use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::{
-    AgentLoop, FaultInjector, FaultStreams, FaultyTransport, InterAgentDistances, ReplyBatching,
+    AgentLoop, DistanceLookup, FaultInjector, FaultStreams, FaultyTransport, ReplyBatching,
 };
 use sidestep_kernel::ports::MemoryTransport;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
@@ -34,12 +34,12 @@ pub(crate) fn decide_group(
     network.run(&mut pilots, schedule.begins, Pilot::has_decided);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     network.run(&mut pilots, schedule.begins, Pilot::is_done);
-    pilot_outcomes(pilots)
+    pilot_outcomes_or_fallbacks(pilots)
 }
 
 /// Returns the outcome of the conversations of a group. Where one waits for a message that never comes, all stay on
 /// their orbits, because plans that are sure are safe only if all fly them.
-fn pilot_outcomes(pilots: Vec<Pilot>) -> Vec<(AirplaneControl, ManeuverCandidates)> {
+fn pilot_outcomes_or_fallbacks(pilots: Vec<Pilot>) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     if pilots.iter().all(Pilot::is_done) {
         let outcomes = pilots.into_iter().map(Pilot::into_outcome);
         outcomes.map(|outcome| outcome.expect("it has come to an end")).collect()
@@ -75,7 +75,7 @@ fn conversation_network<'a>(
     AgentLoop { transport, replies: ReplyBatching::PerPacket, max_flight_ticks: None }
 }
 
-impl InterAgentDistances for AirspaceState {
+impl DistanceLookup for AirspaceState {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         AirspaceState::distance_m(self, link)
     }
@@ -159,7 +159,7 @@ mod tests {
             &mut pilots,
         );
         assert!(pilots.iter().all(|pilot| !pilot.is_done()));
-        for (control, _) in pilot_outcomes(pilots) {
+        for (control, _) in pilot_outcomes_or_fallbacks(pilots) {
             assert_eq!(control.maneuver, Maneuver::Orbit);
             let kinds: Vec<EventKind> = control.events.iter().map(|event| event.kind).collect();
             assert_eq!(kinds, [EventKind::Deadline]);

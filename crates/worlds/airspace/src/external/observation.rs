@@ -29,7 +29,7 @@ pub(super) struct VisibleAircraft {
 
 /// An airplane's knowledge of itself and of others; nothing for one that does not decide.
 #[derive(Debug, Default)]
-pub(super) struct AgentObservation {
+pub(super) struct AgentKnowledge {
     is_due: bool,
     at: Point,
     altitude_m: f64,
@@ -92,7 +92,7 @@ impl VisibleAircraft {
     }
 }
 
-impl AgentObservation {
+impl AgentKnowledge {
     /// Returns the observation of one of a group.
     pub(super) fn new(
         context: &PhaseContext<'_>,
@@ -283,7 +283,7 @@ const UNBOUNDED: ValueDomain = ValueDomain::Real { low: f64::NEG_INFINITY, high:
 const POSITIVE: ValueDomain = ValueDomain::Real { low: 0.0, high: f64::INFINITY };
 const ANGLE: ValueDomain = ValueDomain::Real { low: -PI, high: PI };
 
-/// Returns the spaces of the neighbors in observations, in the order in which [`AgentObservation::write`] fills them.
+/// Returns the spaces of the neighbors in observations, in the order in which [`AgentKnowledge::write`] fills them.
 fn neighbor_observation_spaces(world: &AirspaceWorld) -> Vec<ValueSpace> {
     let ids = ValueDomain::Integer { low: -1, high: world.airplanes.len() as i64 - 1 };
     let each = |name: &str, bounds: ValueDomain, meaning: &str| {

@@ -82,14 +82,14 @@ fn turn_text(omega_rad_s: f64) -> String {
 /// Detours around others: a turn, a straight leg, and then proceeding.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct DetourLegs {
+pub struct DetourAlternatives {
     /// Times in seconds that the turns may last.
     pub turns_s: Vec<f64>,
     /// Ends of the legs, in seconds from the start of the turn.
     pub until_s: Vec<f64>,
 }
 
-impl DetourLegs {
+impl DetourAlternatives {
     /// Returns the legs of the default preset: heading changes of 10 to 60 degrees at the paper's
     /// turn rates, held for as long as most conflicts take to pass.
     pub fn default_preset() -> Self {
@@ -126,7 +126,7 @@ pub fn actions(
     model: &AircraftModel,
     dt_s: f64,
     holds_s: &[f64],
-    legs: &DetourLegs,
+    legs: &DetourAlternatives,
 ) -> Vec<Action> {
     let mut all = Vec::new();
     for k in 0..model.turns {
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn the_action_set_is_ordered_and_contains_straight_flight() {
-        let all = actions(&model(), 5.0, &[30.0], &DetourLegs::default());
+        let all = actions(&model(), 5.0, &[30.0], &DetourAlternatives::default());
         assert_eq!(all.len(), 5 * 3 + 1);
         assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
         assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn legs_take_the_place_of_turns_that_are_undone() {
-        let legs = DetourLegs { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
+        let legs = DetourAlternatives { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
         let all = actions(&model(), 5.0, &[], &legs);
         let omega_rad_s = -4f64.to_radians();
         assert_eq!(all.len(), 4 * 2 + 2 + 1);

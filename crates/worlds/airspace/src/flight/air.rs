@@ -14,7 +14,7 @@ const ALIGNED_RAD: f64 = 1e-10;
 
 /// The air: everything that is the same for all airplanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlightEnvironment {
+pub struct FlightConditions {
     /// Lengths of a cycle, of the steps in it, and of the horizon.
     pub timing: TimeDiscretization,
     /// Rule by which way-points count as reached.
@@ -34,7 +34,7 @@ pub struct RoutePosition<'a> {
     pub pose: Pose2,
 }
 
-impl FlightEnvironment {
+impl FlightConditions {
     /// Returns how an airplane flies through still air.
     pub fn autopilot<'a>(&self, model: &'a AircraftModel, mission: &'a [Point]) -> Autopilot<'a> {
         Autopilot {

@@ -7,7 +7,7 @@ use sidestep_kernel::EntitySlot;
 
 /// One airplane at its start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AirplaneConfig {
+pub struct AirplaneStart {
     /// Its call sign; `None` where only its id identifies it.
     pub callsign: Option<String>,
     /// Its abilities, with the speed that it has until an order changes it.
@@ -30,7 +30,7 @@ pub struct AirplaneConfig {
     pub is_non_cooperative: bool,
 }
 
-impl AirplaneConfig {
+impl AirplaneStart {
     /// Returns whether it keeps a heading, and flies to no way-point, after its first `done` orders.
     pub(crate) fn has_fixed_heading(&self, done: usize) -> bool {
         let last_direction = self.orders.iter().take(done).rev().find(|order| {

@@ -251,7 +251,7 @@ impl Autopilot<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::action::{DetourLegs, actions};
+    use super::super::action::{DetourAlternatives, actions};
     use super::*;
     use proptest::prelude::*;
 
@@ -291,8 +291,8 @@ mod tests {
                 dtau_s: 1.0,
             };
             let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
-            let some = DetourLegs { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
-            let held = actions(&model, 5.0, &[30.0], &DetourLegs::default());
+            let some = DetourAlternatives { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
+            let held = actions(&model, 5.0, &[30.0], &DetourAlternatives::default());
             let all = [held, actions(&model, 5.0, &[], &some)].concat();
             let action = all[which % all.len()];
             let (mut pose, mut next) = (Pose2 { at: [0.0, 0.0], heading_rad }, 0);

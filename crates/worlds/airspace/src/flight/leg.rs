@@ -379,9 +379,9 @@ impl LegPair<'_> {
         let jerks =
             [a.v_m_s * a.omega_rad_s * a.omega_rad_s, b.v_m_s * b.omega_rad_s * b.omega_rad_s];
         [
-            wind_m_s + max_vector_difference(speeds, angle_rad),
-            max_vector_difference(accelerations, angle_rad),
-            max_vector_difference(jerks, angle_rad),
+            wind_m_s + vector_difference_bound(speeds, angle_rad),
+            vector_difference_bound(accelerations, angle_rad),
+            vector_difference_bound(jerks, angle_rad),
         ]
     }
 
@@ -428,7 +428,7 @@ impl LegPair<'_> {
 
 /// Returns a bound on the length of the difference of two vectors of these lengths, with at most this angle between
 /// them.
-fn max_vector_difference([a, b]: [f64; 2], angle_rad: f64) -> f64 {
+fn vector_difference_bound([a, b]: [f64; 2], angle_rad: f64) -> f64 {
     let shorter = a.abs().min(b.abs());
     (a.abs() + b.abs()).min((a - b).abs() + shorter * angle_rad)
 }

@@ -19,9 +19,9 @@ mod order;
 mod segment;
 mod track;
 
-pub use action::{Action, DetourLegs, actions};
-pub use air::{FlightEnvironment, RoutePosition};
-pub use airplane::{AirplaneConfig, KnownAircraft};
+pub use action::{Action, DetourAlternatives, actions};
+pub use air::{FlightConditions, RoutePosition};
+pub use airplane::{AirplaneStart, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
 pub use levels::FlightLevelRange;

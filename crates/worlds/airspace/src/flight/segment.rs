@@ -1,6 +1,6 @@
 //! Segments of a flight: the flight between two orders.
 
-use super::airplane::AirplaneConfig;
+use super::airplane::AirplaneStart;
 use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
 use sidestep_kernel::math;
@@ -42,7 +42,7 @@ impl SegmentAfterOrder {
 
 /// Returns the segments of a flight after each of its orders. Segments along the same route share its way-points,
 /// because there may be ten thousand of each.
-pub(crate) fn segments_after_orders(airplane: &AirplaneConfig) -> Vec<SegmentAfterOrder> {
+pub(crate) fn segments_after_orders(airplane: &AirplaneStart) -> Vec<SegmentAfterOrder> {
     let mut route: Arc<[Point]> = airplane.mission.as_slice().into();
     let mut straight_routes = BTreeMap::new();
     let mut segment = SegmentAfterOrder {

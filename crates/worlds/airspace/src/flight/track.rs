@@ -70,7 +70,7 @@ impl Track {
     }
 
     /// Adds the legs flown in an interval, with times after its start.
-    pub(crate) fn add_legs_between(
+    pub(crate) fn add_legs_in_interval(
         &self,
         from_s: f64,
         until_s: f64,

@@ -133,12 +133,16 @@ impl Inspector<'_> {
         if decision.candidate != Some(0)
             && let Some(preferred) = self.trace.profiles.first()
         {
-            inspection.add_mark(MarkRole::Refused, "what it wanted", self.profile_mark(preferred));
+            inspection.add_mark(
+                MarkRole::Refused,
+                "what it wanted",
+                self.turn_profile_line(preferred),
+            );
         }
     }
 
     /// Returns the path of one `dt` as a line.
-    fn profile_mark(&self, profile: &TurnProfile) -> MarkShape {
+    fn turn_profile_line(&self, profile: &TurnProfile) -> MarkShape {
         // Orders are carried out before anything is flown.
         let v_m_s = self.after.segment(self.world, self.id).model.v_m_s;
         let mut pose: Pose2 = self.before.airplanes[self.id as usize].pose();
@@ -201,7 +205,7 @@ impl Inspector<'_> {
                 .table(table),
         );
         if let Some(profile) = profile {
-            inspection.add_mark(MarkRole::Done, "what it flies", self.profile_mark(profile));
+            inspection.add_mark(MarkRole::Done, "what it flies", self.turn_profile_line(profile));
         }
     }
 }

@@ -123,7 +123,7 @@ pub(super) fn shield_exchange_setup(
             aircraft: if one.id == percept.own.id {
                 percept.own.shielded_aircraft(world)
             } else {
-                shielded_from_report(world, &percept.own, one)
+                shielded_aircraft_from_report(world, &percept.own, one)
             },
             is_on_orbit: one.orbit.is_some(),
             takes_part,
@@ -144,7 +144,7 @@ pub(super) fn shield_exchange_setup(
 
 /// Returns another airplane as the shield knows it from its visible state and its filed flight: where messages get
 /// lost, no order changes its speed or its level.
-fn shielded_from_report(
+fn shielded_aircraft_from_report(
     world: &AirspaceWorld,
     own: &OwnshipState,
     one: &SurveillanceReport,

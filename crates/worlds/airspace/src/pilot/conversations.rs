@@ -8,8 +8,8 @@ use crate::agents::grouping::{self, GroupingResult, SurveillanceReport};
 use crate::agents::intent::{self, Intent};
 use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{
-    ConversationEnd, ConversationProgress, EndpointConfig, InvalidMessage, OptimizationResult,
-    OptimizingAgent, OutgoingMessage, Participant, ParticipantWithOutcome, ProtocolAgent,
+    ConversationEnd, ConversationProgress, EndpointConfig, FinishableParticipant, InvalidMessage,
+    OptimizationResult, OptimizingAgent, OutgoingMessage, Participant, ProtocolAgent,
     ReliableEndpoint, prediction_sharing, sampling,
 };
 use crate::baseline::mvp::ActiveResolutions;
@@ -57,7 +57,7 @@ impl From<ShieldExchangeResult> for ConversationOutcome {
 }
 
 /// A participant of any kind, so that a pilot can hold the present one.
-pub(super) type DynParticipant = dyn ParticipantWithOutcome<Outcome = ConversationOutcome>;
+pub(super) type DynParticipant = dyn FinishableParticipant<Outcome = ConversationOutcome>;
 
 /// A wrapper that turns the outcome of any participant into [`ConversationOutcome`].
 struct ErasedParticipant<P>(P);
@@ -101,7 +101,7 @@ impl<P: Participant> Participant for ErasedParticipant<P> {
     }
 }
 
-impl<P: ParticipantWithOutcome<Outcome: Into<ConversationOutcome>>> ParticipantWithOutcome
+impl<P: FinishableParticipant<Outcome: Into<ConversationOutcome>>> FinishableParticipant
     for ErasedParticipant<P>
 {
     type Outcome = ConversationOutcome;
@@ -123,7 +123,7 @@ pub(super) struct PilotKnowledge<'a> {
     pub(super) contacts: &'a TrafficPicture,
 }
 
-fn endpoint_participant<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
+fn new_endpoint_participant<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
 where
     A: ProtocolAgent<Outcome: Into<ConversationOutcome>> + Send + 'static,
 {
@@ -147,7 +147,7 @@ pub(super) fn grouping_participant(
         range_m: network.map_or(f64::INFINITY, |network| network.range_m),
         certainty: plan_certainty(world),
     };
-    endpoint_participant(grouping::GroupingAgent::new(start), config)
+    new_endpoint_participant(grouping::GroupingAgent::new(start), config)
 }
 
 /// Returns whether each one of a group was heard lately, or is met for the first time.
@@ -173,13 +173,13 @@ pub(super) fn optimization_participant(
             let is_hierarchy = world.deployment == Deployment::HierarchicalPim;
             Box::new(ErasedParticipant(CoordinatorHostParticipant::new(own, is_hierarchy, config)))
         }
-        (Deployment::Team, Estimator::Sampled { block, ageing }) => endpoint_participant(
+        (Deployment::Team, Estimator::Sampled { block, ageing }) => new_endpoint_participant(
             OptimizingAgent::new(sampling::SamplingAgent::new(own, block, ageing)),
             config,
         ),
         (deployment, _) => {
             let by_model = deployment == Deployment::CompactTeam;
-            endpoint_participant(
+            new_endpoint_participant(
                 OptimizingAgent::new(prediction_sharing::PredictionSharingAgent::new(
                     own, by_model,
                 )),
@@ -210,7 +210,7 @@ pub(super) fn intent_participant(
         airplanes: world.airplanes.len(),
         expected: expected_members(percept, contacts),
     };
-    endpoint_participant(intent::IntentExchangeAgent::new(start), config)
+    new_endpoint_participant(intent::IntentExchangeAgent::new(start), config)
 }
 
 /// Returns the participant of the shield's exchange for an airplane that may fly some profiles.
@@ -221,7 +221,7 @@ pub(super) fn shield_exchange_participant(
 ) -> Box<DynParticipant> {
     let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
     let scene = Arc::new(shield_exchange_setup(world, percept, unheard));
-    endpoint_participant(
+    new_endpoint_participant(
         exchange::ShieldExchangeAgent::new(scene, config.me, profiles, contacts.clone()),
         config,
     )

@@ -19,7 +19,7 @@ pub(super) struct EarlyPackets {
 
 /// The packets that no longer wait once a conversation starts.
 #[derive(Debug, Default)]
-pub(super) struct ReleasedEarlyPackets {
+pub(super) struct ConversationStartPackets {
     /// Senders and messages of the conversation, in the order in which they came.
     pub(super) messages: Vec<(EntityId, Vec<u8>)>,
     /// Number of dropped packets of earlier conversations.
@@ -57,8 +57,8 @@ impl EarlyPackets {
 
     /// Takes out the messages of a conversation that starts now, and drops those of conversations before it, and of
     /// conversations of other members at its time.
-    pub(super) fn take(&mut self, conversation: &ConversationId) -> ReleasedEarlyPackets {
-        let mut taken = ReleasedEarlyPackets::default();
+    pub(super) fn take(&mut self, conversation: &ConversationId) -> ConversationStartPackets {
+        let mut taken = ConversationStartPackets::default();
         let mut later = Vec::new();
         for kept in std::mem::take(&mut self.kept) {
             if kept.conversation == *conversation {

@@ -22,7 +22,7 @@ use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
 use crate::settings::Grouping;
 use crate::world::AirspaceWorld;
-use cycle_state::{PilotCyclePhase, PilotCycleState, RelativeConversationTiming};
+use cycle_state::{ConversationMismatch, PilotCyclePhase, PilotCycleState};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
     DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest_pieces, parse_packet,
@@ -239,13 +239,13 @@ impl Pilot {
         {
             return conversation.receive(from, message, tick, out);
         }
-        match state.as_ref().map(|state| state.conversation_timing(&header.conversation)) {
-            None | Some(RelativeConversationTiming::Later) => {
+        match state.as_ref().map(|state| state.relative_conversation_timing(&header.conversation)) {
+            None | Some(ConversationMismatch::Later) => {
                 early.push(header.conversation, from, message)
             }
-            Some(RelativeConversationTiming::OtherMembers) => Err(DropReason::OtherGroup),
-            Some(RelativeConversationTiming::Past) => Err(DropReason::Stale),
-            Some(RelativeConversationTiming::TooFarAhead) => Err(DropReason::NoRoom),
+            Some(ConversationMismatch::OtherMembers) => Err(DropReason::OtherGroup),
+            Some(ConversationMismatch::Past) => Err(DropReason::Stale),
+            Some(ConversationMismatch::TooFarAhead) => Err(DropReason::NoRoom),
         }
     }
 

@@ -70,7 +70,7 @@ impl ConversationSchedule {
 /// Returns how agents that do not answer are asked again.
 pub(crate) fn retry_policy(network: Option<&Network>, topic: Protocol) -> RetryPolicy {
     network.map_or(NO_TIMEOUT, |network| match topic {
-        Protocol::Group | Protocol::Decision => network.multi_step_retry_policy(),
+        Protocol::Group | Protocol::Decision => network.long_conversation_retry_policy(),
         Protocol::Shield => network.retry_policy(),
     })
 }

@@ -1,7 +1,7 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use crate::flight::{AircraftModel, AirplaneConfig, Pose2, TimeDiscretization, Track};
+use crate::flight::{AircraftModel, AirplaneStart, Pose2, TimeDiscretization, Track};
 use crate::flight_plan::AirplaneSection;
 use crate::generate::{GeneratorKind, GeneratorParams, generate};
 use crate::settings::{SeparationM, Speed, TurnCount, TurnRate};
@@ -49,7 +49,7 @@ pub(super) struct ModelSection {
 
 impl ModelSection {
     /// Returns the values of one airplane, completed with those for all.
-    fn with_airplane_values(&self, own: &AirplaneSection) -> Self {
+    fn with_airplane_overrides(&self, own: &AirplaneSection) -> Self {
         Self {
             v_m_s: own.v_m_s.or(self.v_m_s),
             omega_max_deg_s: own.omega_max_deg_s.or(self.omega_max_deg_s),
@@ -84,14 +84,14 @@ impl Compiler<'_> {
         &self,
         streams: &Streams,
         replay: ReplayPeriod,
-    ) -> Result<Vec<AirplaneConfig>, InputError> {
+    ) -> Result<Vec<AirplaneStart>, InputError> {
         let common = self.file.airplane.clone().unwrap_or_default();
         let mut all = match &self.file.airspace.generator {
             Some(generator) => self.generate_airplanes(generator, &common.model(), streams)?,
             None => Vec::new(),
         };
         for section in &self.file.airplanes.0 {
-            let own = common.with_airplane_values(section.get_ref());
+            let own = common.with_airplane_overrides(section.get_ref());
             all.push(match section.get_ref().track(self.source)? {
                 Some(track) => self.recorded_airplane(section, own.model(), track, replay)?,
                 None => self.planned_airplane(section, own.model())?,
@@ -114,7 +114,7 @@ impl Compiler<'_> {
         section: &Spanned<GeneratorSection>,
         model: &AircraftModel,
         streams: &Streams,
-    ) -> Result<Vec<AirplaneConfig>, InputError> {
+    ) -> Result<Vec<AirplaneStart>, InputError> {
         let s = section.get_ref();
         if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
             let because = "for kind = \"random\", whose places are all drawn";
@@ -152,7 +152,7 @@ impl Compiler<'_> {
         &self,
         section: &Spanned<AirplaneSection>,
         model: AircraftModel,
-    ) -> Result<AirplaneConfig, InputError> {
+    ) -> Result<AirplaneStart, InputError> {
         let s = section.get_ref();
         let error =
             |cause: &str, remedy: &str| Err(self.source.error(section.span(), cause, remedy));
@@ -167,7 +167,7 @@ impl Compiler<'_> {
         }
         let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
         let (orders, leaves_s) = s.orders(self.source)?;
-        Ok(AirplaneConfig {
+        Ok(AirplaneStart {
             callsign: s.callsign(self.source)?,
             model,
             start: Pose2 { at: at_m.get(), heading_rad },
@@ -189,7 +189,7 @@ impl Compiler<'_> {
         mut model: AircraftModel,
         track: Track,
         replay: ReplayPeriod,
-    ) -> Result<AirplaneConfig, InputError> {
+    ) -> Result<AirplaneStart, InputError> {
         let top_m_s = track.max_speed_m_s();
         if top_m_s >= MAX_SPEED_M_S {
             let cause = format!("a track with {top_m_s:e} m/s between two of its points");
@@ -205,7 +205,7 @@ impl Compiler<'_> {
         let callsign = section.get_ref().callsign(self.source)?;
         let is_non_cooperative = section.get_ref().is_non_cooperative(self.source)?;
         let airplane = replayed_airplane(track, model, replay, is_non_cooperative);
-        Ok(AirplaneConfig { callsign, ..airplane })
+        Ok(AirplaneStart { callsign, ..airplane })
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
@@ -222,7 +222,7 @@ fn replayed_airplane(
     model: AircraftModel,
     replay: ReplayPeriod,
     is_non_cooperative: bool,
-) -> AirplaneConfig {
+) -> AirplaneStart {
     let begins_s = track.start_s();
     let is_replayed_at_start = (begins_s / replay.dt_s).floor() < replay.cycles as f64;
     let appears_s = if is_non_cooperative || is_replayed_at_start {
@@ -232,7 +232,7 @@ fn replayed_airplane(
         (begins_s / replay.dt_s).ceil() * replay.dt_s
     };
     let joins_s = replay.until_s.max(appears_s);
-    AirplaneConfig {
+    AirplaneStart {
         callsign: None,
         model,
         start: track.pose_at(appears_s),

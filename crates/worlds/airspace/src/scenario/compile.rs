@@ -3,7 +3,7 @@
 use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
 use crate::flight::FlightLevelRange;
-use crate::flight::{AirplaneConfig, FlightTask};
+use crate::flight::{AirplaneStart, FlightTask};
 use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
@@ -71,7 +71,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
         let mut world = self.world()?;
         self.check_deployment(&world)?;
-        self.check_action_limits(&world)?;
+        self.check_action_set_sizes(&world)?;
         self.check_heading_noise(&world)?;
         let (fallbacks, too_close) = if world.shield {
             first_fallbacks_of(&world)
@@ -162,7 +162,7 @@ impl<'a> Compiler<'a> {
         world.teams = match self.known {
             // Teams follow from models alone, which no seed draws.
             Some(known) => Arc::clone(&known.teams),
-            None => Arc::new(world.teams_by_actions()),
+            None => Arc::new(world.teams_by_action_space()),
         };
         Ok(world)
     }
@@ -179,7 +179,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the rule for way-points: reached within a fifth of the largest separation, unless given.
-    fn waypoint_rule(&self, airplanes: &[AirplaneConfig]) -> WaypointRule {
+    fn waypoint_rule(&self, airplanes: &[AirplaneStart]) -> WaypointRule {
         let radius_m = airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
         let given = self.file.airspace.tolerance_m;
         // The 100 m that go with the paper's separation of 500 m.
@@ -231,7 +231,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns the wind, if every airplane can fly against it.
-    fn wind_m_s(&self, airplanes: &[AirplaneConfig]) -> Result<[f64; 2], InputError> {
+    fn wind_m_s(&self, airplanes: &[AirplaneStart]) -> Result<[f64; 2], InputError> {
         let given = self.file.airspace.wind_m_s.as_ref();
         let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
         let min_speed_m_s =
@@ -350,7 +350,7 @@ impl<'a> Compiler<'a> {
 
     /// Refuses sets of actions that are too large for one pair of airplanes: a run checks after
     /// every pair whether it is to stop.
-    fn check_action_limits(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+    fn check_action_set_sizes(&self, world: &AirspaceWorld) -> Result<(), InputError> {
         let actions = world.actions.iter().map(Vec::len).max().unwrap_or(0);
         let horizon = world.timing.horizon;
         if actions <= MAX_ACTIONS && actions * actions * horizon <= MAX_PAIR_STEPS {
@@ -418,7 +418,7 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>
 }
 
 /// Returns the speed of an airplane's model and those of its orders.
-fn planned_speeds_m_s(airplane: &AirplaneConfig) -> impl Iterator<Item = f64> {
+fn planned_speeds_m_s(airplane: &AirplaneStart) -> impl Iterator<Item = f64> {
     let ordered = airplane.orders.iter().filter_map(|order| match order.task {
         FlightTask::Speed(v_m_s) => Some(v_m_s),
         _ => None,

@@ -1,7 +1,7 @@
 //! The section of a network that may lose and delay messages.
 
 use super::compile::Compiler;
-use crate::flight::{AirplaneConfig, FlightTask, TimeDiscretization};
+use crate::flight::{AirplaneStart, FlightTask, TimeDiscretization};
 use crate::settings::Deployment;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -118,7 +118,7 @@ impl Compiler<'_> {
     pub(super) fn network(
         &self,
         timing: &TimeDiscretization,
-        airplanes: &[AirplaneConfig],
+        airplanes: &[AirplaneStart],
     ) -> Result<Option<Network>, InputError> {
         let Some(section) = &self.file.airspace.network else { return Ok(None) };
         let error =

@@ -1,7 +1,7 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
-use crate::flight::DetourLegs;
+use crate::flight::DetourAlternatives;
 use crate::objective::Objective;
 use crate::settings::{Held, ReactiveSettings};
 use schemars::JsonSchema;
@@ -174,12 +174,12 @@ impl Compiler<'_> {
         Err(self.source.error(given.span(), cause, "give a step above 0 and at most 1"))
     }
 
-    pub(super) fn detour_legs(&self) -> Result<DetourLegs, InputError> {
+    pub(super) fn detour_legs(&self) -> Result<DetourAlternatives, InputError> {
         let Some(given) = &self.file.airspace.legs else {
             return Ok(if self.is_paper_preset() {
-                DetourLegs::default()
+                DetourAlternatives::default()
             } else {
-                DetourLegs::default_preset()
+                DetourAlternatives::default_preset()
             });
         };
         let LegsSection { turns_s: TimeList(turns_s), until_s: TimeList(until_s) } =
@@ -199,6 +199,6 @@ impl Compiler<'_> {
                           are holds_s";
             return Err(self.source.error(given.span(), cause, remedy));
         }
-        Ok(DetourLegs { turns_s: turns_s.clone(), until_s: until_s.clone() })
+        Ok(DetourAlternatives { turns_s: turns_s.clone(), until_s: until_s.clone() })
     }
 }

@@ -100,7 +100,7 @@ impl SafeManeuver {
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
         if !self.aircraft.is_protected_from(&other.aircraft)
-            || !self.aircraft.is_in_reach(&other.aircraft, dt_s)
+            || !self.aircraft.can_come_too_near(&other.aircraft, dt_s)
         {
             return true;
         }

@@ -36,7 +36,7 @@ pub fn filter_maneuvers(
 ) -> Vec<ShieldDecision> {
     let mut search = ShieldSearch::new(group, candidates, steps, dtau_s, certainty);
     search.resolve_conflicts();
-    search.replan_from_fallback();
+    search.replan_fallback_aircraft();
     search
         .plans
         .iter()
@@ -206,7 +206,7 @@ impl<'a> ShieldSearch<'a> {
     }
 
     /// Lets those that have fallen back try once more, by falling rank, as long as that helps any.
-    fn replan_from_fallback(&mut self) {
+    fn replan_fallback_aircraft(&mut self) {
         let mut has_changed = true;
         while has_changed {
             has_changed = false;

@@ -78,7 +78,7 @@ impl ShieldedAircraft {
 
     /// Returns whether some plans of `dt_s` seconds, and orbits after them, could bring two airplanes
     /// too near each other.
-    pub(super) fn is_in_reach(&self, other: &Self, dt_s: f64) -> bool {
+    pub(super) fn can_come_too_near(&self, other: &Self, dt_s: f64) -> bool {
         let apart_m = distance_m(self.pose.at, other.pose.at);
         apart_m < self.required_gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s)
     }

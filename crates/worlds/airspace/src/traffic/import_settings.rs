@@ -1,7 +1,7 @@
 //! The settings of a BlueSky file that hold for all its aircraft: those that are flown, and those
 //! that cannot be.
 
-use super::{KNOT_M_S, flyable_aircraft};
+use super::{KNOT_M_S, aircraft_at_flying_speed};
 use sidestep_import::bluesky::{ResolutionMethod, ScnAircraft, ScnFile, Traffic, Wind};
 use sidestep_kernel::{InputError, math};
 
@@ -92,7 +92,7 @@ fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
 
 /// Returns the smallest speed of an aircraft once it moves.
 fn min_speed_m_s(aircraft: &ScnAircraft) -> f64 {
-    flyable_aircraft(aircraft).map_or(f64::INFINITY, |one| one.min_speed_m_s())
+    aircraft_at_flying_speed(aircraft).map_or(f64::INFINITY, |one| one.min_speed_m_s())
 }
 
 #[cfg(test)]

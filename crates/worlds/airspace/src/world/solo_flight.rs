@@ -1,7 +1,7 @@
 //! Solo flights: how long each airplane would fly if there were no other.
 
 use super::AirspaceWorld;
-use crate::flight::{AirplaneConfig, InterOrderSegment, Pose2};
+use crate::flight::{AirplaneStart, InterOrderSegment, Pose2};
 use sidestep_kernel::{EntitySlot, interrupt};
 
 /// Seconds, or steps where these are longer, after which a flight counts as endless: no flight of a scenario is as
@@ -14,7 +14,7 @@ const MAX_COMPUTED_STEPS: usize = 10_000_000;
 /// An airplane on its flight alone.
 struct SoloFlight<'a> {
     world: &'a AirspaceWorld,
-    airplane: &'a AirplaneConfig,
+    airplane: &'a AirplaneStart,
     slot: EntitySlot,
     /// The time at which the method takes it over, in seconds after the start of the run.
     joins_s: f64,

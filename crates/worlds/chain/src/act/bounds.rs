@@ -44,7 +44,7 @@ impl<const D: usize> EscapeContext<'_, D> {
             arm.escape();
         }
         body.tally.escapes.add(&escaped);
-        sink.record_inspection(|trace| trace.escapes = escaped.moves);
+        sink.record_in_trace(|trace| trace.escapes = escaped.moves);
         self.escaped.record(body);
         move_leader_robot(context, body);
         // Only the first of several cycles of escape in a row is an event.

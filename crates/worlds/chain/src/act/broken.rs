@@ -37,7 +37,7 @@ fn apply_change<const D: usize>(
     body.apply_deferred_motions();
     // Its path was planned for the chain as it was.
     body.plan = None;
-    change.apply_limits(&mut body.chain);
+    change.apply_limit_change(&mut body.chain);
     match &change.what {
         ChainChangeKind::Failed { connector, .. }
         | ChainChangeKind::Mobility { connector, .. }
@@ -113,7 +113,7 @@ fn start_reform<const D: usize>(
             (EventKind::Reforming, double_passes as f64)
         }
         ReformResult::GapTooLong { have_m, need_m, missing } => {
-            return report_missing_parts(body, sink, first, need_m - have_m, missing);
+            return record_gap_too_long(body, sink, first, need_m - have_m, missing);
         }
         ReformResult::NotReached { off_m } => (EventKind::NotReformed, off_m),
     };
@@ -122,7 +122,7 @@ fn start_reform<const D: usize>(
 }
 
 /// Reports the length and the number of parts that are missing.
-fn report_missing_parts<const D: usize>(
+fn record_gap_too_long<const D: usize>(
     body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
     first: usize,

@@ -40,7 +40,7 @@ pub(super) fn run_task_cycle<const D: usize>(
     let escaper = lead_context.escaping.escaper.as_deref();
     outcome.gives_way |= lookahead::should_yield(initiator, acting.body, escaper, desired);
     let wanted = intended_move(initiator, acting.body, desired, outcome.gives_way);
-    acting.sink.record_inspection(|trace| trace.intended = Some(wanted));
+    acting.sink.record_in_trace(|trace| trace.intended = Some(wanted));
     let options =
         StepOptions { gives_way: outcome.gives_way, goes_far: lead_context.inputs.orders.goes_far };
     execute(initiator, acting, desired, options);

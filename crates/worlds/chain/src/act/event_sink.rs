@@ -17,7 +17,7 @@ pub(super) struct EventSink<'a, const D: usize> {
 
 impl<const D: usize> EventSink<'_, D> {
     /// Records something if this chain is inspected.
-    pub(super) fn record_inspection(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
+    pub(super) fn record_in_trace(&mut self, record: impl FnOnce(&mut InspectionTrace<D>)) {
         if let Some(trace) = self.trace.as_deref_mut() {
             record(trace);
         }

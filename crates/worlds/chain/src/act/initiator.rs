@@ -1,6 +1,6 @@
 //! One motion of an initiator.
 
-use super::outcome::{MoveProgress, record_result};
+use super::outcome::{MoveOutcome, record_result};
 use super::situation::{out_of_range_veto, situation};
 use super::{ChainCycleState, ChainFollowMode, Initiator, defer, joints, negotiation};
 use crate::motion::recovery::{DirectMover, RecoveryLadder, RecoveryOutcome};
@@ -12,7 +12,7 @@ pub(super) fn move_initiator<const D: usize>(
     initiator: Initiator<'_, D>,
     acting: &mut ChainCycleState<'_, D>,
     to: Point<D>,
-) -> MoveProgress {
+) -> MoveOutcome {
     let at = initiator.position(acting.body);
     let climbed = match initiator.follows {
         ChainFollowMode::Deferred => Some(defer::move_initiator_only(initiator, acting.body, to)),
@@ -21,13 +21,13 @@ pub(super) fn move_initiator<const D: usize>(
     };
     let climbed =
         climbed.map(|climbed| joints::move_joints_with_initiator(initiator, acting, to, climbed));
-    acting.sink.record_inspection(|trace| trace.climbed.clone_from(&climbed));
+    acting.sink.record_in_trace(|trace| trace.climbed.clone_from(&climbed));
     let displacement = sub(initiator.position(acting.body), at);
     acting.body.driving.way_m.wanted += distance(at, to);
     acting.body.driving.way_m.gone += norm(displacement);
     acting.body.tally.way_m += norm(displacement);
     // A chain that stands because an agent is lost does not count that as time without progress.
-    let Some(climbed) = climbed else { return MoveProgress::Nowhere };
+    let Some(climbed) = climbed else { return MoveOutcome::Nowhere };
     record_result(initiator, acting, &climbed, displacement)
 }
 

@@ -56,7 +56,7 @@ struct TrackingReference<'b, const D: usize> {
 
 impl<const D: usize> TrackingReference<'_, D> {
     /// Returns where connector `k` is after a fraction of its way to `to`.
-    fn position(&self, k: usize, to: Point<D>, fraction: f64) -> Point<D> {
+    fn interpolated_position(&self, k: usize, to: Point<D>, fraction: f64) -> Point<D> {
         // An interpolation to the end would differ from it by rounding.
         if fraction < 1.0 { lerp(self.from[k], to, fraction) } else { to }
     }
@@ -241,12 +241,14 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         let arm = self.arm;
         let guide = wanted.guide.map(|guide| {
             let places = guide.iter().enumerate();
-            places.map(|(k, to)| arm.to_base(wanted.position(k, *to, part))).collect::<Vec<_>>()
+            places
+                .map(|(k, to)| arm.to_base(wanted.interpolated_position(k, *to, part)))
+                .collect::<Vec<_>>()
         });
         let mut led = Vec::with_capacity(wanted.led.len());
         let mut aims = Vec::with_capacity(wanted.led.len());
         for &LeadTarget { k, to } in wanted.led {
-            let to = wanted.position(k, to, part);
+            let to = wanted.interpolated_position(k, to, part);
             led.push(LeadTarget { k, to });
             aims.push(ConnectorTarget { connector: k, at_m: arm.to_base(to) });
         }

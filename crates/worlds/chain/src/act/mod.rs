@@ -165,7 +165,7 @@ fn run_cycle<const D: usize>(
     } else {
         act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }
-    let solid = scratch.nearby.solid_to_robots();
+    let solid = scratch.nearby.obstacles_solid_to_robots();
     let robots_gap_m =
         follow::move_swarm_robots(context, &mut acting, solid, &mut scratch.robot_bodies);
     measure::measure_chain(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
@@ -240,7 +240,7 @@ impl<const D: usize> ChainCycleState<'_, D> {
     fn record_veto(&mut self, veto: &Veto<D>) {
         let Self { body, before, sink, .. } = self;
         body.tally.add_veto(veto.reason);
-        sink.record_inspection(|trace| trace.vetoes.push(*veto));
+        sink.record_in_trace(|trace| trace.vetoes.push(*veto));
         let objection = Some(VetoRecord { by: veto.by as u32, reason: veto.reason });
         let driving = &mut body.driving;
         if driving.last_event.is_none() || driving.objection != objection {

@@ -6,7 +6,7 @@ use super::situation::situation;
 use super::{ChainContext, ChainCycleState, Initiator};
 use crate::agents::percept::ChainPercepts;
 use crate::agents::side::NeighborSide;
-use crate::agents::{ChainAgentControls, ConnectorRole, Intention, LeaderOutcome};
+use crate::agents::{ChainCycleControls, ConnectorRole, Intention, LeaderOutcome};
 use crate::deploy::{SensingContext, final_positions};
 use crate::events::EventKind;
 use crate::motion::recovery::RecoveryOutcome;
@@ -81,7 +81,7 @@ fn negotiate<const D: usize>(
     let leader = context.task(body).map_or(0, |task| task.agent);
     let sights = world.percepts(SensingContext { chain: slot, now, body, obstacles }, leader, role);
     let submitted = body.submitted.take().filter(|submitted| submitted.cycle == now);
-    let ChainAgentControls { controls, gone, .. } = match (submitted, &mut negotiation.percept_log)
+    let ChainCycleControls { controls, gone, .. } = match (submitted, &mut negotiation.percept_log)
     {
         (Some(submitted), _) => submitted,
         (None, Some(percept_log)) => {

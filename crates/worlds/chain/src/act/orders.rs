@@ -81,7 +81,7 @@ pub(super) fn execute_ordered_motion<const D: usize>(
     };
     let body = &mut *acting.body;
     body.tally.rungs.record(&climbed);
-    acting.sink.record_inspection(|trace| trace.climbed = Some(climbed));
+    acting.sink.record_in_trace(|trace| trace.climbed = Some(climbed));
     let displacement = sub(body.chain.points()[step.first], at);
     let driving = &mut body.driving;
     driving.way_m.gone += norm(displacement);

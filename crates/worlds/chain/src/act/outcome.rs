@@ -13,7 +13,7 @@ use sidestep_rods::geometry::{Point, convert_dimensions, normalized, unit_x};
 
 /// Whether an initiator moved where it wanted, or near it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MoveProgress {
+pub(super) enum MoveOutcome {
     Ahead,
     Nowhere,
 }
@@ -24,7 +24,7 @@ pub(super) fn record_result<const D: usize>(
     acting: &mut ChainCycleState<'_, D>,
     climbed: &RecoveryOutcome<D>,
     displacement: Point<D>,
-) -> MoveProgress {
+) -> MoveOutcome {
     acting.body.tally.rungs.record(climbed);
     let agent = initiator.task.agent;
     let went = match climbed {
@@ -32,34 +32,34 @@ pub(super) fn record_result<const D: usize>(
             acting.body.driving.idle = 0;
             acting.body.driving.last_event = None;
             record_motion(acting.body, moved, displacement);
-            return MoveProgress::Ahead;
+            return MoveOutcome::Ahead;
         }
         RecoveryOutcome::Shorter { moved, .. } => {
             record_motion(acting.body, moved, displacement);
-            MoveProgress::Ahead
+            MoveOutcome::Ahead
         }
         RecoveryOutcome::Sideways { moved, turn_rad, .. } => {
             report_once(acting, EventKind::Sideways, agent, *turn_rad);
             record_motion(acting.body, moved, displacement);
-            MoveProgress::Ahead
+            MoveOutcome::Ahead
         }
         RecoveryOutcome::PulledBack { by, moved } => {
             report_once(acting, EventKind::PulledBack, *by, 0.0);
             record_motion(acting.body, moved, [0.0; D]);
-            MoveProgress::Nowhere
+            MoveOutcome::Nowhere
         }
         RecoveryOutcome::Stuck { .. } => {
             report_once(acting, EventKind::Stuck, agent, 0.0);
             turn_to_random_heading(initiator, acting.body);
-            MoveProgress::Nowhere
+            MoveOutcome::Nowhere
         }
         RecoveryOutcome::TurnOnTheSpot { .. }
         | RecoveryOutcome::Waiting { .. }
-        | RecoveryOutcome::Vetoed(_) => MoveProgress::Nowhere,
+        | RecoveryOutcome::Vetoed(_) => MoveOutcome::Nowhere,
     };
     acting.body.driving.idle = match went {
-        MoveProgress::Ahead => 0,
-        MoveProgress::Nowhere => acting.body.driving.idle.saturating_add(1),
+        MoveOutcome::Ahead => 0,
+        MoveOutcome::Nowhere => acting.body.driving.idle.saturating_add(1),
     };
     give_up_if_stuck(initiator, acting.body, &mut acting.sink);
     went

@@ -7,8 +7,8 @@ use crate::scratch::PositionBuffer;
 use crate::state::{ChainBodyState, MotionPlan};
 use crate::world::purpose;
 use sidestep_arms::plan::{
-    ChainPosture, ConfigurationSpace, JointPosture, JointSpace, PlanningQuery,
-    RodConfigurationSpace, plan, plan_joints,
+    ChainConfigurationSpace, ChainPosture, ConfigurationSpace, JointPosture, JointSpace,
+    PlanningQuery, plan, plan_joints,
 };
 use sidestep_kernel::InputError;
 use sidestep_rods::find_tunneling;
@@ -104,7 +104,7 @@ pub(super) fn follow_plan<const D: usize>(
 ) {
     body.plan = match body.plan.take() {
         Some(MotionPlan::Rods(path)) => {
-            follow_rod_path(initiator, body, path).map(MotionPlan::Rods)
+            follow_chain_path(initiator, body, path).map(MotionPlan::Rods)
         }
         Some(MotionPlan::Joints(path)) => {
             follow_joint_path(initiator, body, &before.joints, path).map(MotionPlan::Joints)
@@ -114,7 +114,7 @@ pub(super) fn follow_plan<const D: usize>(
 }
 
 /// Follows a path of rods; returns the rest of it.
-fn follow_rod_path<const D: usize>(
+fn follow_chain_path<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
     mut path: VecDeque<ChainPosture<D>>,
@@ -122,7 +122,7 @@ fn follow_rod_path<const D: usize>(
     let ChainContext { world, obstacles, .. } = initiator.context;
     let self_collision = world.rules.self_collision;
     let space =
-        RodConfigurationSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent)
+        ChainConfigurationSpace::new(&body.chain, obstacles, self_collision, initiator.task.agent)
             .ok()?;
     let from = space.present_posture();
     let to = path.front()?;

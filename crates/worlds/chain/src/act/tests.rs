@@ -7,7 +7,7 @@ use crate::state::Snapshot;
 use crate::{ChainRun, ChainWorldState};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
-use sidestep_kernel::ports::{MemoryRecorder, Recorder, Values};
+use sidestep_kernel::ports::{ColumnValues, MemoryRecorder, Recorder};
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{
     Chain, Connector, MotionRequest, Obstacle, Obstacles, Propagator, RequestSource,
@@ -32,8 +32,8 @@ fn told(run: &mut ChainRun<2>, cycles: u64) -> Vec<(String, f64)> {
         run.record(&mut rows).expect("memory has room");
     }
     rows.finish().expect("memory has room");
-    let Some(Values::Label(kinds)) = rows.column("events", "event") else { panic!("kinds") };
-    let Some(Values::F64(values)) = rows.column("events", "value") else { panic!("values") };
+    let Some(ColumnValues::Label(kinds)) = rows.column("events", "event") else { panic!("kinds") };
+    let Some(ColumnValues::F64(values)) = rows.column("events", "value") else { panic!("values") };
     let name = |kind: &u32| EventKind::ALL[*kind as usize].name().to_owned();
     kinds.iter().map(name).zip(values.iter().copied()).collect()
 }

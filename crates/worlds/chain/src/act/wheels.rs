@@ -1,7 +1,7 @@
 //! An initiator on wheels: the link between the swarm's leader and this world (slides N1 to N6).
 
 use super::initiator::{move_initiator, wait_for_escape};
-use super::outcome::MoveProgress;
+use super::outcome::MoveOutcome;
 use super::{ChainCycleState, Initiator};
 use crate::driver::TaskKind;
 use crate::navigate::{NavigationGoal, Navigator};
@@ -56,11 +56,11 @@ pub(super) fn drive_on_wheels<const D: usize>(
     let went = move_initiator(initiator, acting, convert_dimensions(pose.at));
     let mut wheeled = NavigatedChain { initiator, navigator, body: acting.body };
     match went {
-        MoveProgress::Ahead => wheeled.update_heading(pose.heading_rad),
+        MoveOutcome::Ahead => wheeled.update_heading(pose.heading_rad),
         // A robot whose connector was pulled away follows it on its wheels.
-        MoveProgress::Nowhere
-            if wheeled.has_robots() && initiator.position(wheeled.body) != was => {}
-        MoveProgress::Nowhere => wheeled.turn_if_blocked(wheels),
+        MoveOutcome::Nowhere if wheeled.has_robots() && initiator.position(wheeled.body) != was => {
+        }
+        MoveOutcome::Nowhere => wheeled.turn_if_blocked(wheels),
     }
 }
 

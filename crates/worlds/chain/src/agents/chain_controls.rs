@@ -8,7 +8,7 @@ use sidestep_rods::Veto;
 
 /// Decisions of a chain's agents in a cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ChainAgentControls<const D: usize> {
+pub struct ChainCycleControls<const D: usize> {
     /// The cycle that they decide; in any other one they are ignored.
     pub cycle: Cycle,
     /// The decisions, by connector; none of one that has not come to a decision in time.
@@ -17,7 +17,7 @@ pub struct ChainAgentControls<const D: usize> {
     pub gone: Vec<u32>,
 }
 
-impl<const D: usize> ChainAgentControls<D> {
+impl<const D: usize> ChainCycleControls<D> {
     /// The bytes that stand for the decision of an agent that is gone: too few for any decision.
     pub const ABSENT_CONTROL: &'static [u8] = &[0];
 

@@ -115,7 +115,7 @@ impl<const D: usize> TentativePosition<D> {
     }
 
     /// Begins another motion where the last one was settled.
-    fn start(&mut self) {
+    fn start_motion(&mut self) {
         *self = Self::new(self.settled);
     }
 

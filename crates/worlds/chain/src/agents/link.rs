@@ -130,7 +130,7 @@ impl<M: Clone> NeighborLink<M> {
     }
 
     /// Returns the parcel that is to be sent now, if there is anything to say or to confirm.
-    pub(super) fn next_batch(&mut self, tick: u64) -> Option<MessageBatch<M>> {
+    pub(super) fn next_message_batch(&mut self, tick: u64) -> Option<MessageBatch<M>> {
         // All that are unconfirmed, because the neighbor may lack any of them.
         let from = if self.again { 0 } else { self.sent };
         let confirms = self.owes && self.retry.is_some();

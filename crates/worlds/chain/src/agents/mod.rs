@@ -32,7 +32,7 @@ pub(crate) mod percept;
 pub(crate) mod side;
 pub(crate) mod traffic;
 
-pub use chain_controls::ChainAgentControls;
+pub use chain_controls::ChainCycleControls;
 pub use connector::ConnectorAgent;
 pub use control::{ConnectorControl, ConnectorMove, ExecutedMotion, LeaderOutcome};
 pub use message::MotionProtocol;

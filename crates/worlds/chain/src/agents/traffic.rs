@@ -14,7 +14,7 @@ pub struct NetworkTraffic {
 }
 
 impl NetworkTraffic {
-    pub(super) fn record_message(&mut self, bytes: usize) {
+    pub(super) fn count_message(&mut self, bytes: usize) {
         self.messages += 1;
         self.bytes += bytes as u64;
     }

@@ -17,7 +17,7 @@ mod sense;
 #[cfg(test)]
 mod tests;
 
-use crate::agents::{ChainAgentControls, ConnectorAgent, ConnectorPercept};
+use crate::agents::{ChainCycleControls, ConnectorAgent, ConnectorPercept};
 use crate::world::ChainWorld;
 pub use deployment::Deployment;
 pub(crate) use outcome::final_positions;
@@ -31,14 +31,14 @@ impl<const D: usize> ChainWorld<D> {
         chain: EntityId,
         now: Cycle,
         sights: Vec<ConnectorPercept<D>>,
-    ) -> ChainAgentControls<D> {
+    ) -> ChainCycleControls<D> {
         let mut agents = self.chain_agents(chain);
         let controls = negotiation::run_agents(
             negotiation::NegotiationContext::new(self, chain, now),
             &mut agents,
             sights,
         );
-        ChainAgentControls { cycle: now, controls, gone: Vec::new() }
+        ChainCycleControls { cycle: now, controls, gone: Vec::new() }
     }
 
     fn chain_agents(&self, chain: EntityId) -> Vec<ConnectorAgent<D>> {

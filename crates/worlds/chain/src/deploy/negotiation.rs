@@ -6,8 +6,7 @@
 use crate::agents::{ConnectorAgent, ConnectorControl, ConnectorPercept};
 use crate::world::{ChainWorld, purpose};
 use sidestep_kernel::network::{
-    AgentLoop, FaultInjector, FaultStreams, FaultyTransport, InterAgentDistances, Network,
-    ReplyBatching,
+    AgentLoop, DistanceLookup, FaultInjector, FaultStreams, FaultyTransport, Network, ReplyBatching,
 };
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId};
@@ -71,7 +70,7 @@ fn fault_streams(streams: Streams) -> FaultStreams {
 /// Places of a chain's connectors at the start of a cycle, by connector, and the id of the first one.
 struct StartPositions<'a, const D: usize>(EntityId, &'a [ConnectorPercept<D>]);
 
-impl<const D: usize> InterAgentDistances for StartPositions<'_, D> {
+impl<const D: usize> DistanceLookup for StartPositions<'_, D> {
     fn distance_m(&self, link: [EntityId; 2]) -> f64 {
         let [a, b] = link.map(|id| self.1[(id - self.0) as usize].at.0);
         distance(a, b)

@@ -51,7 +51,7 @@ impl CorridorLeg {
             Self::Bend { radius_m, .. } if !is_valid_leg_length(radius_m) => {
                 Some(format!("has a radius of {radius_m} m"))
             }
-            Self::Bend { turn_deg, .. } if !is_valid_turn(turn_deg) => {
+            Self::Bend { turn_deg, .. } if !is_valid_corridor_turn(turn_deg) => {
                 Some(format!("turns by {turn_deg} degrees"))
             }
             _ => None,
@@ -63,7 +63,7 @@ fn is_valid_leg_length(length_m: f64) -> bool {
     length_m > 0.0 && length_m <= MAX_LENGTH_M
 }
 
-fn is_valid_turn(turn_deg: f64) -> bool {
+fn is_valid_corridor_turn(turn_deg: f64) -> bool {
     turn_deg != 0.0 && turn_deg.abs() <= MAX_TURN_DEG
 }
 

@@ -18,7 +18,7 @@ const MAX_LISTED_CONNECTORS: usize = 64;
 
 impl<const D: usize> ConnectorInspection<'_, D> {
     /// Adds the rung of the ladder on which the initiator ended.
-    pub(super) fn add_recovery_rung(&self, inspection: &mut Inspection) {
+    pub(super) fn add_recovery_section(&self, inspection: &mut Inspection) {
         let Some(climbed) = &self.trace.climbed else { return };
         let section = FactSection::new("Ladder");
         let (rung, moved) = match climbed {

@@ -233,20 +233,20 @@ impl<M: ChainMover<D>, const D: usize> VetoRecoveryAttempt<'_, M, D> {
     fn with_displacement(&self, change: impl Fn(Point<D>) -> Point<D>) -> RequestedMotion<D> {
         match self.wanted.motion {
             RequestedMotion::Connector { k, to } => {
-                RequestedMotion::Connector { k, to: self.changed_target(k, to, change) }
+                RequestedMotion::Connector { k, to: self.target_with_displacement(k, to, change) }
             }
             RequestedMotion::Rod { i, to: [first, second] } => RequestedMotion::Rod {
                 i,
                 to: [
-                    self.changed_target(i, first, &change),
-                    self.changed_target(i + 1, second, &change),
+                    self.target_with_displacement(i, first, &change),
+                    self.target_with_displacement(i + 1, second, &change),
                 ],
             },
         }
     }
 
     /// Returns the target of a connector with another displacement than to `to`.
-    fn changed_target(
+    fn target_with_displacement(
         &self,
         k: usize,
         to: Point<D>,
@@ -258,7 +258,7 @@ impl<M: ChainMover<D>, const D: usize> VetoRecoveryAttempt<'_, M, D> {
 
     /// Returns the initiator and the displacement that it wants.
     fn wanted_displacement(&self) -> (usize, Point<D>) {
-        let (k, to) = head_and_target(&self.wanted.motion);
+        let (k, to) = connector_and_target(&self.wanted.motion);
         (k, sub(to, self.by.position(k)))
     }
 }
@@ -425,7 +425,7 @@ fn try_shorter<M: ChainMover<D>, const D: usize>(
     Ok(None)
 }
 
-fn head_and_target<const D: usize>(motion: &RequestedMotion<D>) -> (usize, Point<D>) {
+fn connector_and_target<const D: usize>(motion: &RequestedMotion<D>) -> (usize, Point<D>) {
     match *motion {
         RequestedMotion::Connector { k, to } => (k, to),
         RequestedMotion::Rod { i, to } => (i, to[0]),

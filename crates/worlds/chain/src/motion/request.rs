@@ -218,7 +218,7 @@ fn move_by_ik<const D: usize>(
     objection: Veto<D>,
 ) -> Result<MotionOutcome<D>, InputError> {
     let ReachRequest { k, target, base, tolerance_m } = *order;
-    if let Some(by) = connector_out_of_reach(chain, order) {
+    if let Some(by) = reach_limiting_connector(chain, order) {
         return Ok(MotionOutcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
     }
     let goal = ChainIkGoal {
@@ -253,7 +253,7 @@ fn may_move<const D: usize>(connector: &Connector<D>, at: Point<D>, to: Point<D>
 }
 
 /// Returns the connector, if there is one, from whose positions the rods do not reach the target.
-fn connector_out_of_reach<const D: usize>(
+fn reach_limiting_connector<const D: usize>(
     chain: &Chain<D>,
     order: &ReachRequest<D>,
 ) -> Option<usize> {

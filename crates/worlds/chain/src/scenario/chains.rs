@@ -272,7 +272,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     fn check_break_before_reform(&self, s: &ChainSection<D>, dt_s: f64) -> Result<(), InputError> {
         let broken = s.changes.0.iter().find_map(|change| change.get_ref().cycle_of_break(dt_s));
         for change in &s.changes.0 {
-            let Some(joined) = change.get_ref().cycle_of_join(dt_s) else { continue };
+            let Some(joined) = change.get_ref().cycle_of_reform(dt_s) else { continue };
             if broken.is_none_or(|broken| joined < broken) {
                 let at = self.source.key_span(change.span(), &["reform"]);
                 let remedy = "break the chain before: a change with scatter = [first, last]";

@@ -50,13 +50,13 @@ pub(super) struct ChangeSection<const D: usize> {
 
 impl<const D: usize> ChangeSection<D> {
     /// Returns the cycle at the start of which it takes effect.
-    fn effective_cycle(&self, dt_s: f64) -> u64 {
+    fn cycle_of_change(&self, dt_s: f64) -> u64 {
         (self.at_s.get() / dt_s).round() as u64
     }
 
     /// Returns the cycle in which it breaks the chain, if it does.
     pub(super) fn cycle_of_break(&self, dt_s: f64) -> Option<u64> {
-        self.scatter.is_some().then(|| self.effective_cycle(dt_s))
+        self.scatter.is_some().then(|| self.cycle_of_change(dt_s))
     }
 
     /// Returns whether it may let a connector go that is held or has failed.
@@ -70,8 +70,8 @@ impl<const D: usize> ChangeSection<D> {
     }
 
     /// Returns the cycle in which it joins the chain again, if it does.
-    pub(super) fn cycle_of_join(&self, dt_s: f64) -> Option<u64> {
-        (self.reform == Some(true)).then(|| self.effective_cycle(dt_s))
+    pub(super) fn cycle_of_reform(&self, dt_s: f64) -> Option<u64> {
+        (self.reform == Some(true)).then(|| self.cycle_of_change(dt_s))
     }
 }
 
@@ -84,7 +84,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     ) -> Result<ChainChange<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
-        Ok(ChainChange { cycle: s.effective_cycle(dt_s), what: self.change_kind(s, chain, at)? })
+        Ok(ChainChange { cycle: s.cycle_of_change(dt_s), what: self.change_kind(s, chain, at)? })
     }
 
     fn change_kind(

@@ -6,7 +6,7 @@ use super::super::swarm::drive::DifferentialDrive;
 use super::super::swarm::follower::Follower;
 use super::super::swarm::laser::Laser;
 use super::super::swarm::leader::{
-    LeaderController, TargetDetector, TurnMode, WallLeaveRule, WallLossDetection,
+    LeaderController, TargetDetector, TurnMode, WallLeaveRule, WallLossCriterion,
 };
 use super::{ChainScenarioCompiler, MAX_VALUE, PositiveRule};
 use schemars::JsonSchema;
@@ -55,9 +55,9 @@ impl Rule for RobotSizeRule {
 
 /// Angles up to a whole turn to either side, degrees.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TurnAngleRangeRule;
+pub(super) struct DegreesRangeRule;
 
-impl Rule for TurnAngleRangeRule {
+impl Rule for DegreesRangeRule {
     fn allows(number: f64) -> bool {
         number.abs() <= 360.0
     }
@@ -110,7 +110,7 @@ pub(super) struct NavigatorSection {
     /// Distance at which a wall is lost.
     lost_m: Option<f64>,
     /// Sector of the laser that looks at the wall.
-    sector_deg: Option<[Number<TurnAngleRangeRule>; 2]>,
+    sector_deg: Option<[Number<DegreesRangeRule>; 2]>,
     /// Rule by which a wall is left.
     leaving: WallLossWord,
     /// Whether walls are left at all.
@@ -238,9 +238,9 @@ impl NavigatorSection {
             far_m: self.far_m.unwrap_or(usual.far_m),
             lost_m: self.lost_m.unwrap_or(usual.lost_m),
             leaving: match self.leaving {
-                WallLossWord::Latched => WallLossDetection::Latched,
-                WallLossWord::Range => WallLossDetection::Range,
-                WallLossWord::Level => WallLossDetection::Level,
+                WallLossWord::Latched => WallLossCriterion::Latched,
+                WallLossWord::Range => WallLossCriterion::Range,
+                WallLossWord::Level => WallLossCriterion::Level,
             },
             leave_rule: self.leave_rule.unwrap_or(true).then(WallLeaveRule::default),
             target_sense: TargetDetector {

@@ -165,7 +165,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let mut all = ObstacleBuilder { still: Vec::new(), movers: Vec::new(), next_id: 0 };
         self.add_corridor(&mut all)?;
         if let Some(site) = site {
-            all.add_static(site.obstacles(0).iter().map(embed_wall));
+            all.add_static(site.obstacles(0).iter().map(convert_wall_dimensions));
         }
         for section in &self.file.obstacles.0 {
             self.add_obstacle(section, &mut all)?;
@@ -189,7 +189,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     }
 
     /// Returns the floors of a map or of a Stage world, if the scenario names one.
-    pub(super) fn compile_site(&self) -> Result<Option<GroundMap>, InputError> {
+    pub(super) fn compile_ground_map(&self) -> Result<Option<GroundMap>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
         let s = section.get_ref();
         let at = section.span();
@@ -228,7 +228,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     fn add_corridor(&self, all: &mut ObstacleBuilder<D>) -> Result<(), InputError> {
         let Some(corridor) = self.corridor()? else { return Ok(()) };
         let walls = corridor.walls(all.next_id);
-        all.add_static(walls.iter().map(embed_wall));
+        all.add_static(walls.iter().map(convert_wall_dimensions));
         Ok(())
     }
 
@@ -284,7 +284,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         if let Some(corners) = &s.corners_m {
             return self.add_polygon_walls(s, corners, at, all);
         }
-        let body = Obstacle::new_static(id, self.compile_core(s, at.clone())?, s.radius_m);
+        let body = Obstacle::new_static(id, self.compile_obstacle_core(s, at.clone())?, s.radius_m);
         body.check().map_err(|error| {
             let at = self.source.key_span(at.clone(), &["radius_m", "size_m"]);
             self.source.error_from(at, &error)
@@ -330,11 +330,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let corners: Vec<Point<2>> =
             corners.iter().map(|corner| to_dimensions(corner.get())).collect();
         let walls = outline_walls(all.next_id, &corners, s.radius_m);
-        all.add_static(walls.iter().map(embed_wall));
+        all.add_static(walls.iter().map(convert_wall_dimensions));
         Ok(())
     }
 
-    fn compile_core(
+    fn compile_obstacle_core(
         &self,
         s: &ObstacleSection<D>,
         at: Range<usize>,
@@ -482,7 +482,7 @@ pub(super) fn to_dimensions<const FROM: usize, const TO: usize>(p: Point<FROM>) 
 }
 
 /// Returns a plane wall in the required number of dimensions.
-fn embed_wall<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
+fn convert_wall_dimensions<const D: usize>(wall: &Obstacle<2>) -> Obstacle<D> {
     let core = match wall.core {
         ConvexCore::Point(c) => ConvexCore::Point(to_dimensions(c)),
         ConvexCore::Segment(ends) => ConvexCore::Segment(ends.map(to_dimensions)),

@@ -39,7 +39,7 @@ impl<const D: usize> ScenarioSpec<D> {
             known: None,
             own,
         };
-        let site = compiler.compile_site()?;
+        let site = compiler.compile_ground_map()?;
         Ok(Self { source: source.clone(), head, file, site, own: own.clone() })
     }
 

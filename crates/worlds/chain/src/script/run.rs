@@ -131,7 +131,7 @@ impl<'a> ScriptMotions<'a> {
             let frame = self.frames.last_mut()?;
             if let Some(statement) = frame.body.get(frame.next) {
                 frame.next += 1;
-                return Some(self.count_statement(statement.at).map(|()| statement));
+                return Some(self.consume_statement_budget(statement.at).map(|()| statement));
             }
             if frame.again == 0 {
                 self.frames.pop();
@@ -141,13 +141,13 @@ impl<'a> ScriptMotions<'a> {
             frame.next = 0;
             // Counted as a statement, because a body without statements would repeat unnoticed.
             let at = frame.body.first().map_or(0, |statement| statement.at);
-            if let Err(error) = self.count_statement(at) {
+            if let Err(error) = self.consume_statement_budget(at) {
                 return Some(Err(error));
             }
         }
     }
 
-    fn count_statement(&mut self, at: usize) -> Result<(), InputError> {
+    fn consume_statement_budget(&mut self, at: usize) -> Result<(), InputError> {
         let Some(left) = self.left.checked_sub(1) else {
             let cause = format!("more than {MAX_STATEMENTS} statements have been carried out");
             return Err(self.script.error(at, cause, "repeat less often"));

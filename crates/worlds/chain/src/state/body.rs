@@ -1,6 +1,6 @@
 //! One chain as it is now.
 
-use crate::agents::chain_controls::ChainAgentControls;
+use crate::agents::chain_controls::ChainCycleControls;
 use crate::deferred::DeferredMotions;
 use crate::driver::external::ExternalControlState;
 use crate::driver::own_driver::DriverMemory;
@@ -53,7 +53,7 @@ pub struct ChainBodyState<const D: usize> {
     /// The nearest lost connectors below and above each connector, as its agent knows; empty while none is lost.
     pub(crate) missing: Vec<MissingNeighbors>,
     /// Decisions that agents in other processes have submitted for a cycle.
-    pub(crate) submitted: Option<ChainAgentControls<D>>,
+    pub(crate) submitted: Option<ChainCycleControls<D>>,
     /// Motions that the chain has yet to follow; none in a body that [`ChainState::body`](super::ChainState::body) returns.
     pub(crate) deferred: DeferredMotions<D>,
 }
@@ -100,7 +100,7 @@ impl<const D: usize> ChainBodyState<D> {
         let chain = spec.start.clone();
         let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());
         let mut body = Self {
-            robots: spec.robots_at_connectors(chain.points(), &driving),
+            robots: spec.place_robots_at_connectors(chain.points(), &driving),
             robot_radius_m: spec.robot_radius_m(),
             driving,
             chain,

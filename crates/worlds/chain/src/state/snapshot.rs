@@ -7,7 +7,7 @@ use super::body::{
     ChainBodyState, MissingNeighbors, MotionPlan, ScatteredPartState, Standstill, flatten,
     unflatten,
 };
-use crate::agents::chain_controls::ChainAgentControls;
+use crate::agents::chain_controls::ChainCycleControls;
 use crate::driver::TaskProgress;
 use crate::driver::external::ExternalControlState;
 use crate::driver::own_driver::DriverMemory;
@@ -238,7 +238,7 @@ impl SnapshotComponent for Vec<MissingNeighbors> {
     }
 }
 
-impl<const D: usize> SnapshotComponent for Option<ChainAgentControls<D>> {
+impl<const D: usize> SnapshotComponent for Option<ChainCycleControls<D>> {
     type Record = Vec<u8>;
 
     fn save(&self, cycle: Cycle) -> Option<Vec<u8>> {
@@ -252,7 +252,7 @@ impl<const D: usize> SnapshotComponent for Option<ChainAgentControls<D>> {
         bytes: &Vec<u8>,
         owner: &ExpectedChainSizes,
     ) -> Result<(), CheckpointError> {
-        let controls: ChainAgentControls<D> =
+        let controls: ChainCycleControls<D> =
             postcard::from_bytes(bytes).map_err(|_| CheckpointError::Damaged)?;
         if controls.cycle != owner.cycle || controls.check(owner.connectors).is_err() {
             return Err(CheckpointError::Damaged);
@@ -314,7 +314,7 @@ impl<const D: usize> ChainBodyState<D> {
         }
         // Failures and joint limits of past changes are in no record: they follow from the scenario.
         for change in spec.changes.iter().filter(|change| change.cycle < cycle) {
-            change.apply_limits(&mut chain);
+            change.apply_limit_change(&mut chain);
         }
         for (point, at) in chain.points_mut().iter_mut().zip(record.points_m.chunks_exact(D)) {
             point.copy_from_slice(at);
@@ -354,21 +354,21 @@ impl Snapshot {
         let mut hasher = Hasher::default();
         add(&mut hasher, &(self.cycle, &self.chains));
         // Empty lists add nothing, so that a new component does not change the digests of worlds without it.
-        add_nonempty_list(&mut hasher, &self.joints);
-        add_nonempty_list(&mut hasher, &self.plans);
-        add_nonempty_list(&mut hasher, &self.escape_plans);
-        add_nonempty_list(&mut hasher, &self.standstills);
-        add_nonempty_list(&mut hasher, &self.waited);
-        add_nonempty_list(&mut hasher, &self.externals);
-        add_nonempty_list(&mut hasher, &self.missing);
-        add_nonempty_list(&mut hasher, &self.submitted);
-        add_nonempty_list(&mut hasher, &self.driver_memories);
+        hash_nonempty_list(&mut hasher, &self.joints);
+        hash_nonempty_list(&mut hasher, &self.plans);
+        hash_nonempty_list(&mut hasher, &self.escape_plans);
+        hash_nonempty_list(&mut hasher, &self.standstills);
+        hash_nonempty_list(&mut hasher, &self.waited);
+        hash_nonempty_list(&mut hasher, &self.externals);
+        hash_nonempty_list(&mut hasher, &self.missing);
+        hash_nonempty_list(&mut hasher, &self.submitted);
+        hash_nonempty_list(&mut hasher, &self.driver_memories);
         hasher.finish()
     }
 }
 
 /// Adds a list to a digest, unless it is empty.
-fn add_nonempty_list<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
+fn hash_nonempty_list<T: Serialize>(hasher: &mut Hasher, list: &[T]) {
     if !list.is_empty() {
         add(hasher, &list);
     }

@@ -109,7 +109,7 @@ impl Follower {
     }
 
     /// Returns the distance from its place within which its body and its bumper stay for `dt_s` seconds.
-    pub(crate) fn reach_within_m(&self, dt_s: f64) -> f64 {
+    pub(crate) fn max_reach_m(&self, dt_s: f64) -> f64 {
         self.ring.radius_m + self.drive.max_wheel_m_s() * dt_s + BUMPER_M
     }
 

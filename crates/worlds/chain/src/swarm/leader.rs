@@ -64,7 +64,7 @@ impl BehaviorLayer {
 
 /// The rule for when a wall counts as being left. The slides do not say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum WallLossDetection {
+pub enum WallLossCriterion {
     /// It was near, is no longer, and is not lost yet: an event with a memory.
     #[default]
     Latched,
@@ -134,7 +134,7 @@ pub struct LeaderController {
     /// Distance above which a wall is lost, meters.
     pub lost_m: f64,
     /// Rule for when a wall counts as being left.
-    pub leaving: WallLossDetection,
+    pub leaving: WallLossCriterion,
     /// Rule for when a target ends the following of a wall; `None` for never, as in the slides.
     pub leave_rule: Option<WallLeaveRule>,
     /// Detection of targets.
@@ -167,7 +167,7 @@ impl LeaderController {
             near_m: 0.7,
             far_m: 0.9,
             lost_m: 1.3,
-            leaving: WallLossDetection::default(),
+            leaving: WallLossCriterion::default(),
             leave_rule: Some(WallLeaveRule::default()),
             target_sense: TargetDetector::default(),
             turning: TurnMode::default(),
@@ -372,8 +372,8 @@ impl LeaderController {
         percept: &WallAndTargetPercept,
     ) -> LeaderDecision {
         let leaves_walls = percept.target.is_some_and(|target| target.way_is_free);
-        let left = self.wall_status(followed.left, percept.walls_m.left, leaves_walls);
-        let right = self.wall_status(followed.right, percept.walls_m.right, leaves_walls);
+        let left = self.wall_following_status(followed.left, percept.walls_m.left, leaves_walls);
+        let right = self.wall_following_status(followed.right, percept.walls_m.right, leaves_walls);
         let s = self.speed_m_s;
         let to_left = WheelSpeeds::new(0.0, s);
         let to_right = WheelSpeeds::new(s, 0.0);
@@ -405,15 +405,20 @@ impl LeaderController {
         LeaderDecision { wheels, layer, followed, is_mover_ahead }
     }
 
-    fn wall_status(&self, was_followed: bool, wall_m: f64, leaves_walls: bool) -> WallStatus {
+    fn wall_following_status(
+        &self,
+        was_followed: bool,
+        wall_m: f64,
+        leaves_walls: bool,
+    ) -> WallStatus {
         let is_far = wall_m > self.far_m;
         let is_followed = !leaves_walls && (!is_far || was_followed && wall_m <= self.lost_m);
         let is_left_behind = is_far
             && !leaves_walls
             && match self.leaving {
-                WallLossDetection::Latched => is_followed,
-                WallLossDetection::Range => wall_m < self.lost_m,
-                WallLossDetection::Level => true,
+                WallLossCriterion::Latched => is_followed,
+                WallLossCriterion::Range => wall_m < self.lost_m,
+                WallLossCriterion::Level => true,
             };
         WallStatus { is_close: wall_m < self.near_m, is_followed, is_left_behind }
     }
@@ -439,7 +444,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn leader(leaving: WallLossDetection) -> LeaderController {
+    fn leader(leaving: WallLossCriterion) -> LeaderController {
         LeaderController { leaving, ..LeaderController::new(0.5).unwrap() }
     }
 
@@ -459,7 +464,7 @@ mod tests {
 
     #[test]
     fn the_table_of_the_slides_holds_line_by_line() {
-        let leader = leader(WallLossDetection::Latched);
+        let leader = leader(WallLossCriterion::Latched);
         let (l, r) = (WheelSpeeds::new(0.0, 0.5), WheelSpeeds::new(0.5, 0.0));
         for (walls, followed, layer, wheels) in [
             ((0.6, 0.8), (false, false), BehaviorLayer::CloseLeft, r),
@@ -485,17 +490,17 @@ mod tests {
             layer(&leader(leaving), (followed, false), &percept(left, 0.8))
         };
         let (far, keep) = (BehaviorLayer::FarLeft, BehaviorLayer::KeepMoving);
-        assert_eq!(reading(WallLossDetection::Latched, true, 1.0), far);
-        assert_eq!(reading(WallLossDetection::Latched, false, 1.0), keep, "never near");
-        assert_eq!(reading(WallLossDetection::Latched, true, 1.4), keep, "lost");
-        assert_eq!(reading(WallLossDetection::Range, false, 1.0), far);
-        assert_eq!(reading(WallLossDetection::Range, true, 1.4), keep);
-        assert_eq!(reading(WallLossDetection::Level, false, 3.2), far);
+        assert_eq!(reading(WallLossCriterion::Latched, true, 1.0), far);
+        assert_eq!(reading(WallLossCriterion::Latched, false, 1.0), keep, "never near");
+        assert_eq!(reading(WallLossCriterion::Latched, true, 1.4), keep, "lost");
+        assert_eq!(reading(WallLossCriterion::Range, false, 1.0), far);
+        assert_eq!(reading(WallLossCriterion::Range, true, 1.4), keep);
+        assert_eq!(reading(WallLossCriterion::Level, false, 3.2), far);
     }
 
     #[test]
     fn a_leader_that_cannot_work_is_refused() {
-        let right = leader(WallLossDetection::Latched);
+        let right = leader(WallLossCriterion::Latched);
         assert!(right.check().is_ok());
         assert!(LeaderController::new(f64::NAN).is_err());
         assert!(LeaderController { near_m: 1.0, ..right.clone() }.check().is_err());
@@ -506,7 +511,7 @@ mod tests {
 
     #[test]
     fn a_lost_wall_is_forgotten() {
-        let leader = leader(WallLossDetection::Latched);
+        let leader = leader(WallLossCriterion::Latched);
         let near = leader.decide(LeftRight::default(), &percept(0.8, 3.2)).followed;
         assert_eq!(near, LeftRight { left: true, right: false });
         let leaving = leader.decide(near, &percept(1.2, 3.2)).followed;
@@ -519,7 +524,7 @@ mod tests {
     fn a_free_way_to_the_target_ends_the_following() {
         let target = |way_is_free| Some(TargetSighting { bearing_rad: 0.1, way_is_free });
         for leaving in
-            [WallLossDetection::Latched, WallLossDetection::Range, WallLossDetection::Level]
+            [WallLossCriterion::Latched, WallLossCriterion::Range, WallLossCriterion::Level]
         {
             let leader = leader(leaving);
             let seen = |free| WallAndTargetPercept { target: target(free), ..percept(1.0, 3.2) };
@@ -540,7 +545,7 @@ mod tests {
         let mut noise = Streams::new(Seed(1)).draws(0, 0, super::super::laser::LASER_NOISE);
         let mut sees = |needs_line_of_sight, range_m| {
             let target_sense = TargetDetector { range_m, needs_line_of_sight };
-            let leader = LeaderController { target_sense, ..leader(WallLossDetection::Latched) };
+            let leader = LeaderController { target_sense, ..leader(WallLossCriterion::Latched) };
             let scan = &mut LaserScan::default();
             leader.scan(&pose, &around, &mut noise, scan);
             leader.perceive(&pose, &around, scan, true).target.is_some()
@@ -554,7 +559,7 @@ mod tests {
     fn what_moves_is_waited_for_and_is_no_wall_until_patience_ends() {
         use sidestep_kernel::{Seed, stream::Streams};
         use sidestep_rods::Obstacle;
-        let leader = leader(WallLossDetection::Latched);
+        let leader = leader(WallLossCriterion::Latched);
         let sees = |at, velocity_m_s, is_patient| {
             let disc = Obstacle { velocity_m_s, ..Obstacle::ball(0, at, 0.2) };
             let obstacles = Obstacles::new(vec![disc], 1.0).unwrap();
@@ -580,7 +585,7 @@ mod tests {
         fn what_is_mirrored_decides_mirrored_but_for_ties(
             left in 0.3..2.0f64, right in 0.3..2.0f64, fl: bool, fr: bool,
         ) {
-            let leader = leader(WallLossDetection::Latched);
+            let leader = leader(WallLossCriterion::Latched);
             let this = leader.decide(LeftRight { left: fl, right: fr }, &percept(left, right));
             let other = leader.decide(LeftRight { left: fr, right: fl }, &percept(right, left));
             let both_close = left < 0.7 && right < 0.7;

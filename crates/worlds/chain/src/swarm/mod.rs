@@ -24,4 +24,4 @@ mod tests;
 pub use drive::{DifferentialDrive, Pose2, WheelSpeeds};
 pub use follower::Follower;
 pub use laser::{Laser, LaserScan, NearbyBodies, RobotBody};
-pub use leader::{LeaderController, WallAndTargetPercept, WallLossDetection};
+pub use leader::{LeaderController, WallAndTargetPercept, WallLossCriterion};

@@ -1,6 +1,6 @@
 //! Whole runs: the leader alone, and with its followers (slides E2, N6).
 
-use super::leader::{TurnMode, WallLossDetection};
+use super::leader::{TurnMode, WallLossCriterion};
 use super::{DifferentialDrive, Laser, Pose2};
 use crate::fixtures::convoy::{Convoy, ConvoyConfig, ConvoyStats, ConvoySurroundings};
 use crate::fixtures::{TestRng, corridor_line, corridor_walls};
@@ -90,7 +90,7 @@ fn a_leader_passes_the_pinned_corridor_and_touches_nothing() {
 
 #[test]
 fn in_a_corridor_as_wide_as_its_band_a_leader_hardly_slows_down() {
-    for leaving in [WallLossDetection::Latched, WallLossDetection::Range, WallLossDetection::Level]
+    for leaving in [WallLossCriterion::Latched, WallLossCriterion::Range, WallLossCriterion::Level]
     {
         let mut plan = alone();
         plan.leader.leaving = leaving;
@@ -145,7 +145,7 @@ fn a_leader_reaches_its_target_among_25_discs_thirty_times_of_thirty() {
 #[test]
 fn a_leader_that_takes_leaving_literally_turns_for_ever_in_the_open() {
     let mut plan = alone();
-    (plan.leader.leaving, plan.leader.leave_rule) = (WallLossDetection::Level, None);
+    (plan.leader.leaving, plan.leader.leave_rule) = (WallLossCriterion::Level, None);
     let course = Course { limit_s: 60.0, ..field(0, 0) };
     let Run { arrived, measures, .. } = run(plan, at(-8.5, -8.5), &course, 1);
     assert!(!arrived && measures.layers == [0, 0, 0, measures.ticks, 0, 0]);

@@ -1,7 +1,7 @@
 //! Elections: how a missing coordinator is brought back.
 
 use super::epoch::{CoordinatorEpoch, is_majority};
-use super::messages::{CoordinatorHostMessage, VoteRequest};
+use super::messages::{CoordinatorReplicaMessage, VoteRequest};
 use super::replica::{
     CoordinatorReplica, CoordinatorStateCopy, ElectionCandidate, ElectionCause, ReplicaRole,
 };
@@ -44,7 +44,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         if is_elected {
             return self.restore_coordinator(moment);
         }
-        self.broadcast(&CoordinatorHostMessage::Elect(request));
+        self.broadcast(&CoordinatorReplicaMessage::Elect(request));
     }
 
     /// Returns the number of ticks that a question and its answer take, with a copy if need be.
@@ -64,7 +64,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         };
         let newest = candidate.map_or(self.promised, |own| own.max(self.promised));
         if request.epoch < newest {
-            return self.send(from, &CoordinatorHostMessage::Stale(newest), &[]);
+            return self.send(from, &CoordinatorReplicaMessage::Stale(newest), &[]);
         }
         let is_news = !request.was_lost || self.newest > request.seen;
         let has_voted = request.epoch == self.promised;
@@ -75,7 +75,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         };
         if is_alive {
             let ago = if self.is_idle() { tick.saturating_sub(self.heard_at) } else { 0 };
-            return self.send(from, &CoordinatorHostMessage::Alive(self.newest, ago), &[]);
+            return self.send(from, &CoordinatorReplicaMessage::Alive(self.newest, ago), &[]);
         }
         // This is no sign of life: the epoch may never begin.
         self.promised = request.epoch;
@@ -84,9 +84,9 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let newer = self.copy.clone().filter(|copy| request.has.is_none_or(|has| copy.at > has));
         match newer {
             Some(CoordinatorStateCopy { at, state }) => {
-                self.send(from, &CoordinatorHostMessage::Vote(request.epoch, Some(at)), &state);
+                self.send(from, &CoordinatorReplicaMessage::Vote(request.epoch, Some(at)), &state);
             }
-            None => self.send(from, &CoordinatorHostMessage::Vote(request.epoch, None), &[]),
+            None => self.send(from, &CoordinatorReplicaMessage::Vote(request.epoch, None), &[]),
         }
     }
 
@@ -138,7 +138,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.record_alive(at, tick);
         self.accepted = at;
         self.host_coordinator(coordinator, tick);
-        self.broadcast(&CoordinatorHostMessage::Alive(at, 0));
+        self.broadcast(&CoordinatorReplicaMessage::Alive(at, 0));
     }
 
     /// Again asks the hosts that have not voted, unless they have been asked often enough.
@@ -162,7 +162,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let silent: Vec<usize> =
             (0..candidate.votes.len()).filter(|&k| !candidate.votes[k]).collect();
         for place in silent {
-            self.send(place, &CoordinatorHostMessage::Elect(request), &[]);
+            self.send(place, &CoordinatorReplicaMessage::Elect(request), &[]);
         }
     }
 }

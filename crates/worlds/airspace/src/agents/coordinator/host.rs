@@ -4,8 +4,8 @@ use super::epoch::CoordinatorEpoch;
 use super::messages::{self, MessageReceiverContext};
 use super::replica::{CoordinatorReplica, HostedCoordinator, OutgoingHostMessage};
 use super::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, HostMoment,
-    ItineraryStep, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices,
+    CoordinatorItineraryStep, HostMoment, MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
 use std::sync::Arc;
@@ -116,11 +116,15 @@ impl<P: MigratingCoordinator> CoordinatorHost<P> {
         let context =
             CoordinatorHostContext { epochs: &epochs, is_here: &is_here, has_timed_out, tick };
         match coordinator.advance(&mut self.services, &context) {
-            ItineraryStep::Hop(to) => replica.migrate_coordinator(&coordinator, to, tick),
-            ItineraryStep::Done => {}
+            CoordinatorItineraryStep::Hop(to) => {
+                replica.migrate_coordinator(&coordinator, to, tick)
+            }
+            CoordinatorItineraryStep::Done => {}
             // It has continued without the one that it waited for, and waits anew.
-            ItineraryStep::Stay if has_timed_out => replica.host_coordinator(coordinator, tick),
-            ItineraryStep::Stay => {
+            CoordinatorItineraryStep::Stay if has_timed_out => {
+                replica.host_coordinator(coordinator, tick)
+            }
+            CoordinatorItineraryStep::Stay => {
                 replica.put_back(HostedCoordinator { coordinator, heartbeat_at, timeout_at });
                 return self.services.has_news();
             }

@@ -57,7 +57,7 @@ impl HostAircraft {
         (self.parts.len() > 1).then_some(self.parts.len())
     }
 
-    pub(super) fn set_part_report(&mut self, report: OptimizationProgress) {
+    pub(super) fn set_part_progress(&mut self, report: OptimizationProgress) {
         self.report = Some(report);
         self.has_news = true;
     }

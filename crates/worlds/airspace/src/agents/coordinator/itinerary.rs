@@ -4,23 +4,27 @@ use super::hosted_aircraft::{HostAircraft, RootCoordinatorReply};
 use super::state::{
     Coordinator, CoordinatorMemberData, CoordinatorTask, OptimizationProgress, RootCoordinatorData,
 };
-use super::{CoordinatorHostContext, ItineraryStep, MigratingCoordinator, check};
+use super::{CoordinatorHostContext, CoordinatorItineraryStep, MigratingCoordinator, check};
 use crate::agents::OptimizationResult;
 use crate::agents::link::to_bytes;
 use crate::agents::participant::InvalidMessage;
 
 impl Coordinator {
     /// Gathers the data of the airplanes of its part, from number `k` on.
-    fn gather_member_data(&mut self, k: usize, services: &HostAircraft) -> Option<ItineraryStep> {
+    fn gather_member_data(
+        &mut self,
+        k: usize,
+        services: &HostAircraft,
+    ) -> Option<CoordinatorItineraryStep> {
         let OptimizationProgress { round, airplanes, .. } = &mut self.data;
         for (k, airplane) in airplanes.iter_mut().enumerate().skip(k) {
             if airplane.place == services.own.me {
-                airplane.update_from_host(&services.own, *round);
+                airplane.update_from_ownship(&services.own, *round);
             } else if airplane.is_presumed {
                 airplane.presume(&services.own);
             } else {
                 self.task = CoordinatorTask::Gather(k);
-                return Some(ItineraryStep::Hop(airplane.place));
+                return Some(CoordinatorItineraryStep::Hop(airplane.place));
             }
         }
         self.task = CoordinatorTask::Return;
@@ -32,10 +36,10 @@ impl Coordinator {
         &mut self,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<ItineraryStep> {
+    ) -> Option<CoordinatorItineraryStep> {
         let home = context.epochs[services.part].owner.into();
         if services.own.me != home {
-            return Some(ItineraryStep::Hop(home));
+            return Some(CoordinatorItineraryStep::Hop(home));
         }
         self.task = match services.root_number() {
             Some(_) => CoordinatorTask::Await,
@@ -63,7 +67,7 @@ impl Coordinator {
     }
 
     /// Waits for the coordinator above, which takes the data and brings the results.
-    fn wait_for_root(&mut self, services: &mut HostAircraft) -> Option<ItineraryStep> {
+    fn wait_for_root(&mut self, services: &mut HostAircraft) -> Option<CoordinatorItineraryStep> {
         if let Some(RootCoordinatorReply { data, is_known }) = services.answer.take() {
             if is_known {
                 self.data = data;
@@ -73,9 +77,9 @@ impl Coordinator {
             self.data.is_final = true;
         } else {
             if services.report.is_none() {
-                services.set_part_report(self.data.clone());
+                services.set_part_progress(self.data.clone());
             }
-            return Some(ItineraryStep::Stay);
+            return Some(CoordinatorItineraryStep::Stay);
         }
         services.report = None;
         self.task = if self.data.is_final {
@@ -87,16 +91,20 @@ impl Coordinator {
     }
 
     /// Delivers the controls to the airplanes of its part, from number `k` on.
-    fn deliver_controls(&mut self, k: usize, services: &mut HostAircraft) -> Option<ItineraryStep> {
+    fn deliver_controls(
+        &mut self,
+        k: usize,
+        services: &mut HostAircraft,
+    ) -> Option<CoordinatorItineraryStep> {
         let me = services.own.me;
         // This includes an airplane that was passed over because it could not be reached then.
         self.conclude(services);
         let mut remaining = self.data.airplanes.iter().enumerate().skip(k);
         let next = remaining.find(|(_, airplane)| !airplane.is_presumed && airplane.place != me);
-        let Some((number, next)) = next else { return Some(ItineraryStep::Done) };
+        let Some((number, next)) = next else { return Some(CoordinatorItineraryStep::Done) };
         let host = next.place;
         self.task = CoordinatorTask::Deliver(number);
-        Some(ItineraryStep::Hop(host))
+        Some(CoordinatorItineraryStep::Hop(host))
     }
 
     fn conclude(&self, services: &mut HostAircraft) {
@@ -139,7 +147,7 @@ impl Coordinator {
         first: usize,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<ItineraryStep> {
+    ) -> Option<CoordinatorItineraryStep> {
         let mut has_timed_out = context.has_timed_out;
         for k in first..services.parts.len() {
             self.task = CoordinatorTask::Collect(k);
@@ -150,15 +158,15 @@ impl Coordinator {
             let report = services.report.clone().filter(|_| is_here && context.is_here[k]);
             if let Some(report) = report {
                 hierarchy.missing[k] = false;
-                self.merge_part_report(report);
+                self.merge_part_progress(report);
             } else if hierarchy.missing[k] || std::mem::take(&mut has_timed_out) {
                 hierarchy.missing[k] = true;
                 self.presume(k, services);
             } else if is_here || is_lost {
                 // The part's coordinator is not home yet, or it is brought back elsewhere.
-                return Some(ItineraryStep::Stay);
+                return Some(CoordinatorItineraryStep::Stay);
             } else {
-                return Some(ItineraryStep::Hop(home));
+                return Some(CoordinatorItineraryStep::Hop(home));
             }
         }
         // Whether the decisions are made or not, every part waits for an answer.
@@ -167,7 +175,7 @@ impl Coordinator {
         None
     }
 
-    fn merge_part_report(&mut self, report: OptimizationProgress) {
+    fn merge_part_progress(&mut self, report: OptimizationProgress) {
         self.data.round = report.round;
         self.data.calm = report.calm;
         self.data.airplanes.extend(report.airplanes);
@@ -189,7 +197,7 @@ impl Coordinator {
         k: usize,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> Option<ItineraryStep> {
+    ) -> Option<CoordinatorItineraryStep> {
         for k in (0..k).rev() {
             self.task = CoordinatorTask::HandBack(k + 1);
             let hierarchy = self.update_hierarchy(services, context);
@@ -198,7 +206,7 @@ impl Coordinator {
                 continue;
             }
             if home != services.own.me {
-                return Some(ItineraryStep::Hop(home));
+                return Some(CoordinatorItineraryStep::Hop(home));
             }
             if context.is_here[k] && services.report.is_some() {
                 services.set_reply(self.reply_for(&services.parts[k]));
@@ -206,7 +214,7 @@ impl Coordinator {
         }
         if self.data.is_final {
             self.release_waiting(services, context);
-            return Some(ItineraryStep::Done);
+            return Some(CoordinatorItineraryStep::Done);
         }
         self.data.airplanes.clear();
         self.task = CoordinatorTask::Collect(0);
@@ -269,7 +277,7 @@ impl MigratingCoordinator for Coordinator {
         &mut self,
         services: &mut HostAircraft,
         context: &CoordinatorHostContext<'_>,
-    ) -> ItineraryStep {
+    ) -> CoordinatorItineraryStep {
         loop {
             let step = match self.task {
                 CoordinatorTask::Gather(k) => self.gather_member_data(k, services),

@@ -7,7 +7,7 @@ use sidestep_kernel::network::PacketBuffer;
 
 /// A message about one of the coordinators of a group.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub(super) enum CoordinatorHostMessage {
+pub(super) enum CoordinatorReplicaMessage {
     /// "The coordinator is on its way to you": with its state.
     Hop(CoordinatorVersion),
     /// "It has arrived here."
@@ -24,7 +24,7 @@ pub(super) enum CoordinatorHostMessage {
     Vote(CoordinatorEpoch, Option<CoordinatorVersion>),
 }
 
-impl CoordinatorHostMessage {
+impl CoordinatorReplicaMessage {
     /// Returns whether the bytes of a state follow it.
     fn has_state(&self) -> bool {
         matches!(self, Self::Hop(_) | Self::Vote(_, Some(_)))
@@ -46,10 +46,14 @@ pub(super) struct VoteRequest {
 
 /// A message as it was read: the number of the coordinator that it is about, and the bytes of a
 /// state where it carries one.
-pub(super) type ParsedCoordinatorHostMessage<'a> = (u16, CoordinatorHostMessage, &'a [u8]);
+pub(super) type ParsedCoordinatorReplicaMessage<'a> = (u16, CoordinatorReplicaMessage, &'a [u8]);
 
 /// Returns a message in the form in which it travels: a state goes behind it.
-pub(super) fn encode(number: u16, message: &CoordinatorHostMessage, state: &[u8]) -> PacketBuffer {
+pub(super) fn encode(
+    number: u16,
+    message: &CoordinatorReplicaMessage,
+    state: &[u8],
+) -> PacketBuffer {
     PacketBuffer::from_parts(&(number, message), state)
 }
 
@@ -72,24 +76,24 @@ pub(super) fn decode(
     bytes: &[u8],
     from: usize,
     reader: MessageReceiverContext,
-) -> Result<ParsedCoordinatorHostMessage<'_>, InvalidMessage> {
+) -> Result<ParsedCoordinatorReplicaMessage<'_>, InvalidMessage> {
     let MessageReceiverContext { me, group, replicas } = reader;
-    let read = postcard::take_from_bytes::<(u16, CoordinatorHostMessage)>(bytes);
+    let read = postcard::take_from_bytes::<(u16, CoordinatorReplicaMessage)>(bytes);
     let ((number, message), state) = read.map_err(|_| InvalidMessage::Form)?;
     InvalidMessage::Airplane.ensure(from < group && from != me)?;
     InvalidMessage::Kind.ensure(usize::from(number) < replicas)?;
     InvalidMessage::Form.ensure(message.has_state() || state.is_empty())?;
     let is_valid = match &message {
-        CoordinatorHostMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
-        CoordinatorHostMessage::Ack(at) | CoordinatorHostMessage::Alive(at, _) => {
+        CoordinatorReplicaMessage::Hop(at) => at.is_valid_for(group) && at.hop > 0,
+        CoordinatorReplicaMessage::Ack(at) | CoordinatorReplicaMessage::Alive(at, _) => {
             at.is_valid_for(group)
         }
-        CoordinatorHostMessage::Stale(epoch) => epoch.is_valid_for(group),
-        CoordinatorHostMessage::Elect(VoteRequest { epoch, seen, has, .. }) => {
+        CoordinatorReplicaMessage::Stale(epoch) => epoch.is_valid_for(group),
+        CoordinatorReplicaMessage::Elect(VoteRequest { epoch, seen, has, .. }) => {
             let is_own = epoch.is_valid_for(group) && usize::from(epoch.owner) == from;
             is_own && seen.is_valid_for(group) && has.is_none_or(|has| has.is_valid_for(group))
         }
-        CoordinatorHostMessage::Vote(epoch, copy) => {
+        CoordinatorReplicaMessage::Vote(epoch, copy) => {
             let is_mine = epoch.is_valid_for(group) && usize::from(epoch.owner) == me;
             is_mine && copy.is_none_or(|copy| copy.is_valid_for(group))
         }

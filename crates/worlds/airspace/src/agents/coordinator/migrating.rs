@@ -6,7 +6,7 @@ use sidestep_kernel::network::RetryPolicy;
 
 /// The next step of a coordinator that was run on a host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ItineraryStep {
+pub(super) enum CoordinatorItineraryStep {
     /// It hops to the host at this place.
     Hop(usize),
     /// It waits here for another one.
@@ -53,7 +53,7 @@ pub(super) trait MigratingCoordinator: Sized {
         &mut self,
         services: &mut Self::Services,
         context: &CoordinatorHostContext<'_>,
-    ) -> ItineraryStep;
+    ) -> CoordinatorItineraryStep;
 
     /// Records that a host cannot be reached.
     fn on_unreachable(&mut self, place: usize);

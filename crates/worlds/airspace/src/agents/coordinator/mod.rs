@@ -76,8 +76,8 @@ mod replica;
 mod state;
 
 use migrating::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, HostMoment,
-    ItineraryStep, MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices,
+    CoordinatorItineraryStep, HostMoment, MigratingCoordinator,
 };
 pub use participant::CoordinatorHostParticipant;
 

@@ -7,7 +7,7 @@ use super::replica::OutgoingHostMessage;
 use super::state::{Coordinator, samples_per_round};
 use crate::agents::link::{ConversationEnd, EndpointConfig};
 use crate::agents::participant::{
-    ConversationProgress, InvalidMessage, OutgoingMessage, Participant, ParticipantWithOutcome,
+    ConversationProgress, FinishableParticipant, InvalidMessage, OutgoingMessage, Participant,
 };
 use crate::agents::{CommonKnowledge, OptimizationResult, Ownship};
 use sidestep_kernel::EntityId;
@@ -127,7 +127,7 @@ impl Participant for CoordinatorHostParticipant {
     }
 }
 
-impl ParticipantWithOutcome for CoordinatorHostParticipant {
+impl FinishableParticipant for CoordinatorHostParticipant {
     type Outcome = OptimizationResult;
 
     fn finish(&mut self) -> ConversationEnd<OptimizationResult> {

@@ -3,7 +3,7 @@
 //! The protocol and the argument for it are at the head of the module above.
 
 use super::epoch::{CoordinatorEpoch, CoordinatorVersion};
-use super::messages::{CoordinatorHostMessage, VoteRequest, encode};
+use super::messages::{CoordinatorReplicaMessage, VoteRequest, encode};
 use super::{CoordinatorHostConfig, HostMoment, MigratingCoordinator};
 use crate::agents::participant::InvalidMessage;
 use sidestep_kernel::network::PacketBuffer;
@@ -167,7 +167,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let at = self.accepted.after_hop();
         let state: Arc<[u8]> = coordinator.encode().into();
         self.record_alive(at, tick);
-        self.send(to, &CoordinatorHostMessage::Hop(at), &state);
+        self.send(to, &CoordinatorReplicaMessage::Hop(at), &state);
         // Where nothing is lost, it has left for good.
         let Some(policy) = self.rules.retry_policy else { return };
         let tries = if self.rules.expected[to] { policy.tries } else { policy.first_tries };
@@ -185,21 +185,23 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     pub(super) fn on_message(
         &mut self,
         from: usize,
-        message: CoordinatorHostMessage,
+        message: CoordinatorReplicaMessage,
         state: &[u8],
         moment: &HostMoment<'_, P::Services>,
     ) -> Result<(), InvalidMessage> {
         let tick = moment.tick;
         match message {
-            CoordinatorHostMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
-            CoordinatorHostMessage::Vote(epoch, copy) => {
+            CoordinatorReplicaMessage::Hop(at) => self.on_hop(from, at, state, moment)?,
+            CoordinatorReplicaMessage::Vote(epoch, copy) => {
                 let copy = copy.map(|at| CoordinatorStateCopy { at, state: state.into() });
                 self.on_vote(from, epoch, copy, moment)?;
             }
-            CoordinatorHostMessage::Ack(at) => self.on_ack(from, at, tick),
-            CoordinatorHostMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
-            CoordinatorHostMessage::Stale(epoch) => self.on_newer_epoch(epoch, moment),
-            CoordinatorHostMessage::Elect(candidacy) => self.on_vote_request(from, candidacy, tick),
+            CoordinatorReplicaMessage::Ack(at) => self.on_ack(from, at, tick),
+            CoordinatorReplicaMessage::Alive(at, ago) => self.on_alive(from, at, ago, tick),
+            CoordinatorReplicaMessage::Stale(epoch) => self.on_newer_epoch(epoch, moment),
+            CoordinatorReplicaMessage::Elect(candidacy) => {
+                self.on_vote_request(from, candidacy, tick)
+            }
         }
         if let ReplicaRole::Candidate(candidate) = &mut self.role {
             candidate.heard[from] = true;
@@ -216,7 +218,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     ) -> Result<(), InvalidMessage> {
         let &HostMoment { services, tick } = moment;
         if at.epoch < self.promised {
-            self.send(from, &CoordinatorHostMessage::Stale(self.promised), &[]);
+            self.send(from, &CoordinatorReplicaMessage::Stale(self.promised), &[]);
         } else if at <= self.accepted {
             // A copy on the network, or the acknowledgement was lost.
             self.acknowledge(from, at);
@@ -232,7 +234,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
 
     fn acknowledge(&mut self, to: usize, at: CoordinatorVersion) {
         if self.rules.retry_policy.is_some() {
-            self.send(to, &CoordinatorHostMessage::Ack(at), &[]);
+            self.send(to, &CoordinatorReplicaMessage::Ack(at), &[]);
         }
     }
 
@@ -247,16 +249,16 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
     /// Receives the news that it was alive some ticks ago.
     fn on_alive(&mut self, from: usize, at: CoordinatorVersion, ago: u64, tick: u64) {
         if at.epoch < self.promised {
-            return self.send(from, &CoordinatorHostMessage::Stale(self.promised), &[]);
+            return self.send(from, &CoordinatorReplicaMessage::Stale(self.promised), &[]);
         }
         let is_over = match &self.role {
             ReplicaRole::Idle => false,
             // One of a newer epoch is there instead.
             ReplicaRole::Hosting(_) => at.epoch > self.accepted.epoch,
             // It has arrived, if the host that it went to knows of it, or if it has come farther.
-            ReplicaRole::Sending { to, .. } => self.has_hop_arrived(*to, from, at),
+            ReplicaRole::Sending { to, .. } => self.has_migration_arrived(*to, from, at),
             ReplicaRole::Candidate(ElectionCandidate { request, lost, .. }) => match lost {
-                Some(lost) => self.has_hop_arrived(*lost, from, at),
+                Some(lost) => self.has_migration_arrived(*lost, from, at),
                 // The hearsay of others is of use unless it is so old that the coordinator is
                 // missed all the same.
                 None => at >= request.seen && ago < self.rules.election_timeout_ticks,
@@ -268,7 +270,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.record_alive(at, tick.saturating_sub(ago));
     }
 
-    fn has_hop_arrived(&self, to: usize, from: usize, at: CoordinatorVersion) -> bool {
+    fn has_migration_arrived(&self, to: usize, from: usize, at: CoordinatorVersion) -> bool {
         let left = self.copy.as_ref().map(|copy| copy.at);
         left.is_none_or(|left| at > left || (at == left && from == to))
     }
@@ -316,7 +318,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
             ReplicaRole::Candidate(_) => self.retry_vote_requests(tick),
             ReplicaRole::Hosting(stay) if stay.heartbeat_at <= tick => {
                 stay.heartbeat_at = tick + self.rules.heartbeat_ticks();
-                self.broadcast(&CoordinatorHostMessage::Alive(self.accepted, 0));
+                self.broadcast(&CoordinatorReplicaMessage::Alive(self.accepted, 0));
             }
             // The coordinator checks the time when it is run.
             ReplicaRole::Hosting(_) => {}
@@ -334,7 +336,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         let to = *to;
         if *heartbeat_at <= tick {
             *heartbeat_at = tick + self.rules.heartbeat_ticks();
-            let message = encode(self.number, &CoordinatorHostMessage::Alive(copy.at, 0), &[]);
+            let message = encode(self.number, &CoordinatorReplicaMessage::Alive(copy.at, 0), &[]);
             self.out.push(OutgoingHostMessage { to: None, message });
         }
         if *due > tick {
@@ -343,7 +345,7 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         *due = tick + policy.timeout_ticks(copy.state.len());
         if let Some(left) = tries_left.checked_sub(1) {
             *tries_left = left;
-            return self.send(to, &CoordinatorHostMessage::Hop(copy.at), &copy.state);
+            return self.send(to, &CoordinatorReplicaMessage::Hop(copy.at), &copy.state);
         }
         let coordinator = P::decode(&copy.state, services, self.number.into());
         if coordinator.is_ok_and(|coordinator| coordinator.is_done_without(to)) {
@@ -381,12 +383,12 @@ impl<P: MigratingCoordinator> CoordinatorReplica<P> {
         self.quiet_until = tick.saturating_add(answer_ticks.saturating_mul(3));
     }
 
-    pub(super) fn send(&mut self, to: usize, message: &CoordinatorHostMessage, state: &[u8]) {
+    pub(super) fn send(&mut self, to: usize, message: &CoordinatorReplicaMessage, state: &[u8]) {
         let message = encode(self.number, message, state);
         self.out.push(OutgoingHostMessage { to: Some(to), message });
     }
 
-    pub(super) fn broadcast(&mut self, message: &CoordinatorHostMessage) {
+    pub(super) fn broadcast(&mut self, message: &CoordinatorReplicaMessage) {
         self.out.push(OutgoingHostMessage { to: None, message: encode(self.number, message, &[]) });
     }
 }

@@ -93,7 +93,7 @@ impl CoordinatorMemberData {
     }
 
     /// Reads the model of the airplane that the coordinator is on.
-    pub(super) fn update_from_host(&mut self, host: &Ownship, round: u32) {
+    pub(super) fn update_from_ownship(&mut self, host: &Ownship, round: u32) {
         let options = &host.options;
         self.is_presumed = false;
         self.beacon = Some(host.beacon.clone());
@@ -210,7 +210,8 @@ impl OptimizationProgress {
     fn learn_from_samples(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
         let mut total = Vec::with_capacity(block);
         for k in 0..block {
-            let parts = (0..self.airplanes.len()).map(|i| self.joint_sample_cost(common, i, k));
+            let parts =
+                (0..self.airplanes.len()).map(|i| self.airplane_cost_in_sample(common, i, k));
             total.push(parts.fold(0.0, |sum, part| sum + part));
         }
         let settings = common.settings;
@@ -229,7 +230,7 @@ impl OptimizationProgress {
     }
 
     /// Returns the part of an airplane in the cost of the joint sample `k`.
-    fn joint_sample_cost(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
+    fn airplane_cost_in_sample(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
         let objective = &common.objective;
         let own = &self.airplanes[i];
         let mut cost = own.own_costs[k];

@@ -3,7 +3,7 @@
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::agents::traffic_state::StateBeacon;
-use crate::flight::FlightEnvironment;
+use crate::flight::FlightConditions;
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
@@ -46,7 +46,7 @@ impl ObservedAircraft {
 #[derive(Debug, Clone)]
 pub struct ShieldExchangeSetup {
     /// The air that all fly through.
-    pub air: FlightEnvironment,
+    pub air: FlightConditions,
     /// Airplanes at least this many meters above each other need not avoid each other.
     pub vertical_m: f64,
     /// The present cycle.

@@ -133,14 +133,14 @@ impl BeaconStore {
 
     /// Returns the same as [`Self::is_complete`] for the own airplane, and continues where it stopped before: each
     /// link is visited once, however often incomplete knowledge arrives.
-    pub(super) fn advance_chain_search(&mut self) -> bool {
+    pub(super) fn advance_group_search(&mut self) -> bool {
         let mut search = std::mem::replace(&mut self.chain_search, ConnectedGroupSearch::new(0));
-        let is_complete = self.continue_chain_search(&mut search);
+        let is_complete = self.continue_group_search(&mut search);
         self.chain_search = search;
         is_complete
     }
 
-    fn continue_chain_search(
+    fn continue_group_search(
         &self,
         ConnectedGroupSearch { chain, due, .. }: &mut ConnectedGroupSearch,
     ) -> bool {

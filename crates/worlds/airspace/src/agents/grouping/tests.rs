@@ -176,7 +176,7 @@ proptest! {
                 0 | 1 => roster.add_report(id(i), ids(&links.hears[i])),
                 _ => roster.add_beacon(beacon(i), i > 0 && draws.uniform_below(2) == 0),
             };
-            prop_assert_eq!(roster.advance_chain_search(), roster.is_complete(id(0)));
+            prop_assert_eq!(roster.advance_group_search(), roster.is_complete(id(0)));
         }
     }
 }

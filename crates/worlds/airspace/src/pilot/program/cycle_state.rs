@@ -43,7 +43,7 @@ pub(super) enum PilotCyclePhase {
 }
 
 /// When a conversation takes place, compared with those of a cycle.
-pub(super) enum RelativeConversationTiming {
+pub(super) enum ConversationMismatch {
     /// It comes later.
     Later,
     /// It comes so much later that no airplane can be there.
@@ -66,10 +66,10 @@ impl PilotCycleState {
     }
 
     /// Returns where a conversation stands that is none of those that it has been in.
-    pub(super) fn conversation_timing(
+    pub(super) fn relative_conversation_timing(
         &self,
         conversation: &ConversationId,
-    ) -> RelativeConversationTiming {
+    ) -> ConversationMismatch {
         let topic = match self.phase {
             PilotCyclePhase::Grouping(_) => Protocol::Group,
             PilotCyclePhase::Deciding(_) | PilotCyclePhase::Decided => Protocol::Decision,
@@ -82,13 +82,13 @@ impl PilotCycleState {
         // No airplane begins a cycle before all have ended the one before it.
         let last = self.percept.cycle.saturating_add(1);
         if conversation.cycle > last {
-            RelativeConversationTiming::TooFarAhead
+            ConversationMismatch::TooFarAhead
         } else if here.is_before(conversation) {
-            RelativeConversationTiming::Later
+            ConversationMismatch::Later
         } else if (conversation.cycle, conversation.topic) == (here.cycle, here.topic) {
-            RelativeConversationTiming::OtherMembers
+            ConversationMismatch::OtherMembers
         } else {
-            RelativeConversationTiming::Past
+            ConversationMismatch::Past
         }
     }
 

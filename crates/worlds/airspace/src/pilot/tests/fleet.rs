@@ -3,7 +3,7 @@
 
 use super::*;
 use sidestep_kernel::control::ControlLog;
-use sidestep_kernel::ports::{MemoryRecorder, Recorder, TableSchema, Values};
+use sidestep_kernel::ports::{ColumnValues, MemoryRecorder, Recorder, TableSchema};
 
 const FOUR: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 4\nradius_m = 2600.0\n";
 const CYCLES: Cycle = 12;
@@ -25,7 +25,7 @@ fn flown(
     rows
 }
 
-fn tables(rows: &mut MemoryRecorder) -> Vec<(TableSchema, Vec<Values>)> {
+fn tables(rows: &mut MemoryRecorder) -> Vec<(TableSchema, Vec<ColumnValues>)> {
     rows.take().into_iter().filter(|(schema, _)| schema.name != "controls").collect()
 }
 

@@ -67,7 +67,7 @@ struct AnswerReplay<'a, const D: usize> {
 }
 
 impl<const D: usize> AnswerReplay<'_, D> {
-    fn replay_outcome(
+    fn next_replayed_outcome(
         &mut self,
         request: &MotionRequest<D>,
         only_asks: bool,
@@ -97,14 +97,14 @@ impl<const D: usize> ChainMover<D> for AnswerReplay<'_, D> {
         &mut self,
         request: &MotionRequest<D>,
     ) -> Result<MotionOutcome<D>, RecoveryHaltReason<D>> {
-        self.replay_outcome(request, false)
+        self.next_replayed_outcome(request, false)
     }
 
     fn find_veto(
         &mut self,
         request: &MotionRequest<D>,
     ) -> Result<Option<Veto<D>>, RecoveryHaltReason<D>> {
-        Ok(self.replay_outcome(request, true)?.veto().copied())
+        Ok(self.next_replayed_outcome(request, true)?.veto().copied())
     }
 
     fn farther_end(&mut self, _: usize) -> Result<Option<ChainEnd<D>>, RecoveryHaltReason<D>> {

@@ -58,7 +58,8 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
         for side in NeighborSide::ALL {
             let Some(receivers) = &self.receivers[side] else { continue };
             let missing = self.missing[side.other()];
-            let Some(parcel) = self.links[side].as_mut().and_then(|link| link.next_batch(self.now))
+            let Some(parcel) =
+                self.links[side].as_mut().and_then(|link| link.next_message_batch(self.now))
             else {
                 continue;
             };
@@ -72,7 +73,7 @@ impl<const D: usize> NetworkAgent for ConnectorAgent<D> {
                 sequence,
             };
             let payload = Packet { missing, parcel }.encode().into_packet(&header);
-            self.traffic.record_message(payload.len());
+            self.traffic.count_message(payload.len());
             if let Some(link) = &mut self.links[side] {
                 link.record_packet(payload.len());
             }

@@ -195,8 +195,8 @@ impl<const D: usize> ConnectorAgent<D> {
 
     /// Begins another motion from the settled positions.
     pub(super) fn start_motion(&mut self) {
-        self.position.start();
-        self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.start()));
+        self.position.start_motion();
+        self.beside.for_each(|_, beside| beside.iter_mut().for_each(|track| track.start_motion()));
     }
 
     pub(super) fn accept_sub_step(&mut self) {

@@ -1,6 +1,6 @@
 //! Whole scenarios, deployed as a team and as one process.
 
-use crate::agents::{ChainAgentControls, ConnectorAgent};
+use crate::agents::{ChainCycleControls, ConnectorAgent};
 use crate::scenario::ChainScenario;
 use crate::{ChainRun, chain_run};
 use serde_json::Value;
@@ -138,7 +138,7 @@ fn talk_elsewhere(run: &ChainRun<2>, cycle: u64) {
                 }
             }
             let controls = agents.iter().map(ConnectorAgent::control).collect();
-            let handed = ChainAgentControls { cycle, controls, gone: Vec::new() };
+            let handed = ChainCycleControls { cycle, controls, gone: Vec::new() };
             run.world().submit_controls(run.state(), chain, handed).expect("decisions");
         }
     }
@@ -174,7 +174,7 @@ fn hand_over(run: &mut ChainRun<2>) {
             // Some come too late, and of some the process is gone.
             match (cycle * 7 + u64::from(id)) % 61 {
                 0 => {}
-                1 => controls.push((id, ChainAgentControls::<2>::ABSENT_CONTROL.to_vec())),
+                1 => controls.push((id, ChainCycleControls::<2>::ABSENT_CONTROL.to_vec())),
                 _ => controls.extend(control.map(|one| (id, bytes(one)))),
             }
         }
@@ -238,14 +238,14 @@ fn a_chain_stands_in_a_cycle_in_which_a_decision_does_not_come() {
     let before = elsewhere.state().body(0).chain.points().to_vec();
     let (chain, sights) = elsewhere.world().percepts_in_cycle(elsewhere.state(), 1).remove(0);
     let world = elsewhere.world().clone();
-    let nothing = ChainAgentControls::empty(1, sights.len());
+    let nothing = ChainCycleControls::empty(1, sights.len());
     world.submit_controls(elsewhere.state(), chain, nothing).expect("no decisions");
     elsewhere.advance(1);
     assert_eq!(elsewhere.state().body(0).chain.points(), before);
     talk_elsewhere(&elsewhere, 2);
     elsewhere.advance(1);
     assert_ne!(elsewhere.state().body(0).chain.points(), before, "and goes on");
-    let nothing = || ChainAgentControls::empty(3, 0);
+    let nothing = || ChainCycleControls::empty(3, 0);
     let wrong = world.submit_controls(elsewhere.state(), 7, nothing()).expect_err("no such chain");
     assert!(wrong.to_string().contains("count from 0"), "{wrong}");
     let few = world.submit_controls(elsewhere.state(), 0, nothing()).expect_err("too few");
@@ -261,7 +261,7 @@ fn hand_over_without(run: &mut ChainRun<2>, gone: &[u32]) {
     for (id, control) in (0..).zip(handed.controls) {
         match control {
             _ if gone.contains(&id) => {
-                controls.push((id, ChainAgentControls::<2>::ABSENT_CONTROL.to_vec()))
+                controls.push((id, ChainCycleControls::<2>::ABSENT_CONTROL.to_vec()))
             }
             Some(control) => {
                 controls.push((id, postcard::to_stdvec(&control).expect("plain data")));
@@ -311,9 +311,9 @@ fn bytes_that_are_no_decision_are_refused_and_connectors_are_known_by_their_ids(
     assert_eq!((world.connector_id(1, 8), world.connector_id(2, 0)), (None, None));
     assert_eq!((world.find_connector(15), world.find_connector(16)), (Some((1, 7)), None));
     let refused = |id, bytes: &[u8]| world.read_control(0, id, bytes).expect_err("no decision");
-    assert!(refused(16, ChainAgentControls::<2>::ABSENT_CONTROL).contains("no such connector"));
+    assert!(refused(16, ChainCycleControls::<2>::ABSENT_CONTROL).contains("no such connector"));
     assert!(refused(3, &[1, 2, 3]).contains("none of a decision of this build"));
-    assert_eq!(world.read_control(0, 3, ChainAgentControls::<2>::ABSENT_CONTROL), Ok(None));
+    assert_eq!(world.read_control(0, 3, ChainCycleControls::<2>::ABSENT_CONTROL), Ok(None));
     talk_elsewhere(&run, 0);
     let handed = run.state().body(1).submitted.clone().expect("it has talked");
     let control = handed.controls[3].clone().expect("a decision");

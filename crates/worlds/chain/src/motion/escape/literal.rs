@@ -110,7 +110,7 @@ impl<const D: usize> LiteralEscape<D> {
             interrupt::check();
             match self.reduce_violation(tick, deepest)? {
                 Ok(touched) => {
-                    self.update_depths(tick, &touched);
+                    self.update_threat_depths(tick, &touched);
                     report.moves += 1;
                     let Threat { part, mover, .. } = self.threats[deepest];
                     let obstacle = tick.obstacles.moving()[mover].id;
@@ -137,7 +137,7 @@ impl<const D: usize> LiteralEscape<D> {
     }
 
     /// Measures the threats of some connectors and their rods again; all others are as deep as before.
-    fn update_depths(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
+    fn update_threat_depths(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
         for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
             threat.depth_m = threat_depth(tick, threat);
         }

@@ -87,7 +87,7 @@ impl Group {
             for to in sent.to.map_or_else(|| others.collect(), |to| vec![to]) {
                 for at in self.faults.arrivals(k, to, self.tick, self.sent) {
                     self.sent += 1;
-                    let bytes = sent.message.message_bytes().to_vec();
+                    let bytes = sent.message.serialized_message().to_vec();
                     self.under_way.insert((at, self.sent), (k, to, bytes));
                 }
                 self.sent += 1;

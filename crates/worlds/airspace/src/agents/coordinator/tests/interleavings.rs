@@ -68,7 +68,7 @@ impl SystemState {
             let others = (0..GROUP).filter(|&to| to != k);
             let to: Vec<usize> = sent.to.map_or_else(|| others.collect(), |to| vec![to]);
             let flights = to.into_iter().filter(|&to| self.is_alive[to]);
-            let bytes = sent.message.message_bytes();
+            let bytes = sent.message.serialized_message();
             self.flights.extend(flights.map(|to| (k, to, bytes.to_vec())));
         }
         self.flights.sort_unstable();

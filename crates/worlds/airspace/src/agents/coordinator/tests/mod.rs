@@ -7,8 +7,8 @@ mod recovery;
 use super::epoch::CoordinatorEpoch;
 use super::host::CoordinatorHost;
 use super::migrating::{
-    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices, ItineraryStep,
-    MigratingCoordinator,
+    CoordinatorHostConfig, CoordinatorHostContext, CoordinatorHostServices,
+    CoordinatorItineraryStep, MigratingCoordinator,
 };
 use crate::agents::participant::InvalidMessage;
 use serde::{Deserialize, Serialize};
@@ -68,20 +68,24 @@ impl TestCoordinator {
         (k..services.group as u8).find(|&place| !stays(place.into()))
     }
 
-    fn hop(&mut self, services: &TestHost, context: &CoordinatorHostContext<'_>) -> ItineraryStep {
+    fn hop(
+        &mut self,
+        services: &TestHost,
+        context: &CoordinatorHostContext<'_>,
+    ) -> CoordinatorItineraryStep {
         loop {
             match self.task {
                 TestTask::Visit(k) => match self.next(k, services) {
                     Some(next) => {
                         self.task = TestTask::Visit(next);
-                        return ItineraryStep::Hop(next.into());
+                        return CoordinatorItineraryStep::Hop(next.into());
                     }
                     None => self.task = TestTask::Return,
                 },
                 TestTask::Return => {
                     let home = usize::from(context.epochs[0].owner);
                     if home != services.me {
-                        return ItineraryStep::Hop(home);
+                        return CoordinatorItineraryStep::Hop(home);
                     }
                     self.rounds_left = self.rounds_left.saturating_sub(1);
                     self.task = if self.rounds_left > 0 {
@@ -93,9 +97,9 @@ impl TestCoordinator {
                 TestTask::Deliver(k) => match self.next(k, services) {
                     Some(next) => {
                         self.task = TestTask::Deliver(next);
-                        return ItineraryStep::Hop(next.into());
+                        return CoordinatorItineraryStep::Hop(next.into());
                     }
-                    None => return ItineraryStep::Done,
+                    None => return CoordinatorItineraryStep::Done,
                 },
             }
         }
@@ -124,9 +128,9 @@ impl MigratingCoordinator for TestCoordinator {
         &mut self,
         services: &mut TestHost,
         context: &CoordinatorHostContext<'_>,
-    ) -> ItineraryStep {
+    ) -> CoordinatorItineraryStep {
         if !services.is_restless && !std::mem::replace(&mut services.is_rested, true) {
-            return ItineraryStep::Stay;
+            return CoordinatorItineraryStep::Stay;
         }
         self.unreachable[services.me] = false;
         let step = self.hop(services, context);

@@ -130,8 +130,8 @@ fn candidate_pairs(rod: usize, other: usize, last: Option<usize>) -> [Option<[Ch
     [
         nonadjacent_connectors(rod, other),
         last.and_then(|last| nonadjacent_connectors(rod, last)),
-        rod_connector_pair(rod, other),
-        last.and_then(|last| rod_connector_pair(rod, last)),
+        nonadjacent_rod_connector(rod, other),
+        last.and_then(|last| nonadjacent_rod_connector(rod, last)),
         (rod + 1 < other).then_some([ChainPart::Connector(rod), ChainPart::Rod(other)]),
         (other > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Rod(other)]),
     ]
@@ -141,7 +141,7 @@ fn nonadjacent_connectors(one: usize, other: usize) -> Option<[ChainPart; 2]> {
     (other > one + 1).then_some([ChainPart::Connector(one), ChainPart::Connector(other)])
 }
 
-fn rod_connector_pair(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
+fn nonadjacent_rod_connector(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
     (connector > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(connector)])
 }
 

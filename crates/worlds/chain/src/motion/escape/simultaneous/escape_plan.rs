@@ -68,7 +68,7 @@ impl EscapePlan {
     }
 
     /// Forgets the exit of a chain with no obstacle near.
-    pub(super) fn clear_exit(&mut self) {
+    pub(super) fn reset_exit(&mut self) {
         *self = Self { rests: self.rests, ..Self::default() };
     }
 
@@ -109,7 +109,7 @@ impl EscapePlan {
             return false;
         };
         let now = self.exit_direction();
-        let mut left = rollout.ticks_for_work(MAX_WORK);
+        let mut left = rollout.affordable_ticks(MAX_WORK);
         let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
         // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
         let mut best = (IMPROVEMENT_FACTOR * cost_now - MIN_BENEFIT_TICKS, now);

@@ -29,7 +29,7 @@ pub(super) fn should_leader_rest<const D: usize>(
     let rollout =
         Rollout::from_connector_range(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
-    let mut left = rollout.ticks_for_work(MAX_WORK);
+    let mut left = rollout.affordable_ticks(MAX_WORK);
     let wanted = LeadMotion { k: lead.k - from, displacement_m: lead.displacement_m };
     let rest = LeadMotion { displacement_m: [0.0; D], ..wanted };
     let wanted_cost = rollout.cost(&RolloutOptions::with_lead(wanted), f64::INFINITY, &mut left);

@@ -10,7 +10,7 @@ use sidestep_rods::geometry::{Point, add_scaled, dot, norm, sub};
 
 /// Brings rods back within their limits; owns its buffers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct LengthSolver<const D: usize> {
+pub(super) struct RodLengthProjector<const D: usize> {
     /// Direction of each rod that is at a limit or beyond; zero for others.
     directions: Vec<Point<D>>,
     /// Main diagonal, then pivots; side diagonal toward the rod before; lengths beyond the limits.
@@ -33,7 +33,7 @@ const MAX_CORRECTIONS: usize = 8;
 /// Error at which a restoration ends, meters: a thousandth of the tolerance of lengths.
 const ERROR_TOLERANCE_M: f64 = 1e-12;
 
-impl<const D: usize> LengthSolver<D> {
+impl<const D: usize> RodLengthProjector<D> {
     /// Corrects until all lengths are within their limits, if they get there.
     pub(super) fn restore_lengths(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) {
         for _ in 0..MAX_CORRECTIONS {

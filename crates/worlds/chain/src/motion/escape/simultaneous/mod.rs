@@ -122,7 +122,7 @@ impl<const D: usize> SimultaneousEscape<D> {
     ) -> bool {
         let margin = self.rules.look_ahead_margin();
         if !self.solver.find_contacts(input, margin) {
-            escape_plan.clear_exit();
+            escape_plan.reset_exit();
             return false;
         }
         escape_plan.clear_if_passed(input, &self.solver);

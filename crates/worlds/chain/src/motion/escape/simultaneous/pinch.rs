@@ -124,7 +124,7 @@ fn nearest(world: &World, episode: &PinchEpisode) -> Vec<u32> {
 
 /// Returns the motions that are tried: each way through each obstacle from every tenth tick on for 75 ticks, and pairs
 /// of ways at random, the second from where the first ends.
-fn motions(obstacles: &[u32], seed: u64) -> Vec<Vec<TimedExit>> {
+fn pinch_test_motions(obstacles: &[u32], seed: u64) -> Vec<Vec<TimedExit>> {
     let way = |obstacle: u32, turn: usize| {
         let angle_rad = TAU * turn as f64 / DIRECTIONS as f64;
         ExitDirection { obstacle, toward: [cos(angle_rad), sin(angle_rad)] }
@@ -160,7 +160,7 @@ fn the_only_long_pinch_that_is_left_can_be_left_by_resting_in_time() {
     for (discs, seed) in [(16, 5)] {
         let (world, episodes) = long_pinch_episodes(discs, seed);
         for episode in &episodes {
-            let motions = motions(&nearest(&world, episode), seed);
+            let motions = pinch_test_motions(&nearest(&world, episode), seed);
             let least = |from: usize| {
                 let late =
                     motions.iter().filter(|legs| legs.first().is_some_and(|l| l.from >= from));

@@ -134,7 +134,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
     }
 
     /// Returns the ticks of rollouts that an amount of work allows, in ticks times connectors.
-    pub(super) fn ticks_for_work(&self, work: usize) -> usize {
+    pub(super) fn affordable_ticks(&self, work: usize) -> usize {
         work / self.chain.points().len()
     }
 

@@ -8,7 +8,7 @@ use super::super::EscapeMargin;
 use super::super::threat::{ChainPart, Threat, gap_m, leftward_direction};
 use super::constraints::{BendConstraint, EscapeConstraintChecker};
 use super::contacts::{Contacts, fraction_along, nearest_points, radius_m};
-use super::lengths::LengthSolver;
+use super::lengths::RodLengthProjector;
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
 use sidestep_rods::Obstacle;
@@ -25,7 +25,7 @@ pub(super) struct EscapeSolver<const D: usize> {
     pub(super) points: Vec<Point<D>>,
     inverse_mass: Vec<f64>,
     bends: Vec<BendConstraint>,
-    lengths: LengthSolver<D>,
+    lengths: RodLengthProjector<D>,
 }
 
 /// Distance around an obstacle in which the chain joins an exit through it, as a multiple of its
@@ -162,7 +162,7 @@ impl<const D: usize> EscapeSolver<D> {
         for wall in &contacts.walls {
             let ends = posture.ends(wall.part);
             let nearest = wall.core.nearest_to_segment(ends);
-            let short_m = wall.keep_m + clearance_slack_m(wall.keep_m) - nearest.distance_m;
+            let short_m = wall.keep_m + extra_clearance_m(wall.keep_m) - nearest.distance_m;
             let Some(away) = normalized(sub(nearest.on_body, nearest.on_core)) else { continue };
             if short_m > 0.0 {
                 let along_rod = fraction_along(ends, nearest.on_body);
@@ -172,7 +172,7 @@ impl<const D: usize> EscapeSolver<D> {
         }
         for pair in &contacts.pairs {
             let nearest = nearest_points(posture.points, pair.parts);
-            let short_m = pair.keep_m + clearance_slack_m(pair.keep_m) - nearest.distance_m;
+            let short_m = pair.keep_m + extra_clearance_m(pair.keep_m) - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
                 let one = part_point(&posture, one, nearest.on_body);
@@ -278,7 +278,7 @@ pub(super) fn direction_away<const D: usize>(
     normalized(sub(nearest.on_body, nearest.on_core)).unwrap_or_else(|| leftward_direction(mover))
 }
 
-fn clearance_slack_m(keep_m: f64) -> f64 {
+fn extra_clearance_m(keep_m: f64) -> f64 {
     MAX_SLACK_M.min(SLACK_FRACTION * keep_m)
 }
 
