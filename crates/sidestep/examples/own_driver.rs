@@ -20,15 +20,10 @@ const CORNERS_M: [Point<3>; 4] = [[2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0
 struct Square;
 
 impl Driver for Square {
-    fn decide(
-        &self,
-        percept: &DriverPercept,
-        state: &mut DriverMemory,
-        _: &mut Draws,
-    ) -> DriverAction {
-        let [next, ..] = &mut state.words;
+    fn decide(&self, view: &DriverPercept, own: &mut DriverMemory, _: &mut Draws) -> DriverAction {
+        let [next, ..] = &mut own.words;
         let Some(corner) = CORNERS_M.get(*next as usize) else { return DriverAction::Done };
-        if distance(percept.connectors_m[percept.connector], *corner) < 0.01 {
+        if distance(view.connectors_m[view.connector], *corner) < 0.01 {
             *next += 1;
         }
         DriverAction::GoTo(*corner)
