@@ -1,0 +1,210 @@
+//! What became of a file that was read: the import report, which every reader returns beside its data.
+//!
+//! A reader keeps what it understands, and records here what it did not take as it stood: nothing of a file is dropped,
+//! repaired or guessed in silence. The same report is what people see of a file.
+
+use serde::Serialize;
+
+/// Number of places that a finding names: enough to look at a few by hand.
+pub const MAX_PLACES: usize = 3;
+
+/// The report of one file.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct ImportReport {
+    /// The format of the file, with its variant: `ROS map (map_server)`.
+    pub format: String,
+    /// What was found in it, in the order in which people read it: origin, units, extent in space and time.
+    pub facts: Vec<ImportFact>,
+    /// What was kept.
+    pub kept: Vec<ItemCount>,
+    /// What was not taken as it stood, in the order in which it was found first.
+    pub findings: Vec<Finding>,
+}
+
+/// A property of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ImportFact {
+    /// Its name for people: `extent`.
+    pub name: &'static str,
+    /// Its value with its unit.
+    pub value: String,
+}
+
+/// A number of items of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ItemCount {
+    /// The noun in the plural: `rows`.
+    pub noun: &'static str,
+    /// The number of items.
+    pub count: u64,
+}
+
+/// Something that a reader did not take as it stood, by rule.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What the reader did about it.
+    pub treatment: Treatment,
+    /// The rule, as the subject of a sentence: `rows without a position`.
+    pub rule: String,
+    /// How often it applied.
+    pub count: u64,
+    /// The first places, at most [`MAX_PLACES`]: `line 7`.
+    pub places: Vec<String>,
+    /// What to do for another result; empty where nothing can be done.
+    pub remedy: String,
+}
+
+/// What a reader did about something that it could not take as it stood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Treatment {
+    /// It was left out.
+    Dropped,
+    /// It was replaced with what it can only mean.
+    Repaired,
+    /// A choice that changes the outcome and is not in the file.
+    Guessed,
+    /// It has a meaning that this program does not use.
+    NotUsed,
+    /// It was kept, but can hardly be right.
+    Suspicious,
+}
+
+impl Treatment {
+    /// Returns the word that a report prints before the rule.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Dropped => "dropped",
+            Self::Repaired => "repaired",
+            Self::Guessed => "guessed",
+            Self::NotUsed => "not used",
+            Self::Suspicious => "suspicious",
+        }
+    }
+}
+
+impl ImportReport {
+    /// Returns the report of a file of this format, in which nothing was found yet.
+    pub fn new(format: impl Into<String>) -> Self {
+        Self { format: format.into(), ..Self::default() }
+    }
+
+    /// Adds a property of the file.
+    pub fn add_fact(&mut self, name: &'static str, value: impl Into<String>) {
+        self.facts.push(ImportFact { name, value: value.into() });
+    }
+
+    /// Adds a number of items that were kept.
+    pub fn add_kept(&mut self, noun: &'static str, count: usize) {
+        self.kept.push(ItemCount { noun, count: count as u64 });
+    }
+
+    /// Records that a rule applied at a place; an empty place is not shown.
+    pub fn record(
+        &mut self,
+        treatment: Treatment,
+        rule: impl Into<String>,
+        place: impl Into<String>,
+        remedy: &str,
+    ) {
+        let rule = rule.into();
+        let place = place.into();
+        let known = self
+            .findings
+            .iter_mut()
+            .find(|finding| finding.treatment == treatment && finding.rule == rule);
+        let places = if place.is_empty() { Vec::new() } else { vec![place] };
+        let Some(finding) = known else {
+            let remedy = remedy.to_string();
+            self.findings.push(Finding { treatment, rule, count: 1, places, remedy });
+            return;
+        };
+        finding.count += 1;
+        if finding.places.len() < MAX_PLACES {
+            finding.places.extend(places);
+        }
+    }
+
+    /// Returns the number of items that were left out.
+    pub fn dropped(&self) -> u64 {
+        let dropped = self.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+        dropped.map(|found| found.count).sum()
+    }
+
+    /// Adds the findings of another file that belongs to this one.
+    pub fn add_findings_of(&mut self, other: Self) {
+        for finding in other.findings {
+            let known = self
+                .findings
+                .iter_mut()
+                .find(|own| own.treatment == finding.treatment && own.rule == finding.rule);
+            match known {
+                None => self.findings.push(finding),
+                Some(own) => {
+                    own.count += finding.count;
+                    let room = MAX_PLACES - own.places.len().min(MAX_PLACES);
+                    own.places.extend(finding.places.into_iter().take(room));
+                }
+            }
+        }
+    }
+}
+
+/// One line for each finding, as commands print them.
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.treatment.word(), self.rule)?;
+        if self.count > 1 {
+            write!(f, " ({} times)", self.count)?;
+        }
+        if !self.places.is_empty() {
+            write!(f, ", {}", self.places.join(", "))?;
+            if self.count > self.places.len() as u64 {
+                write!(f, ", ...")?;
+            }
+        }
+        if !self.remedy.is_empty() {
+            write!(f, "; {}", self.remedy)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rule_is_counted_and_names_its_first_places() {
+        let mut report = ImportReport::new("CSV");
+        for line in 7..12 {
+            report.record(
+                Treatment::Dropped,
+                "rows without a position",
+                format!("line {line}"),
+                "",
+            );
+        }
+        report.record(Treatment::Guessed, "the delimiter is `;`", "", "give --delimiter");
+        assert_eq!(report.dropped(), 5);
+        let lines: Vec<String> = report.findings.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            lines[0],
+            "dropped: rows without a position (5 times), line 7, line 8, line 9, ..."
+        );
+        assert_eq!(lines[1], "guessed: the delimiter is `;`; give --delimiter");
+    }
+
+    #[test]
+    fn findings_of_a_second_file_are_added_to_those_of_the_first() {
+        let mut first = ImportReport::new("bag");
+        first.record(Treatment::Dropped, "messages", "0.mcap", "");
+        let mut second = ImportReport::new("bag");
+        second.record(Treatment::Dropped, "messages", "1.mcap", "");
+        second.record(Treatment::Suspicious, "clocks that jump", "", "");
+        first.add_findings_of(second);
+        assert_eq!(first.dropped(), 2);
+        assert_eq!(first.findings[0].places, ["0.mcap", "1.mcap"]);
+        assert_eq!(first.findings.len(), 2);
+    }
+}
