@@ -215,8 +215,8 @@ impl Serialize for BodyKind {
 }
 
 thread_local! {
-    /// The kinds that the names in a text stand for while [`Kinds::resolve_names_during`] reads it: Serde hands no context to the
-    /// code that it derives.
+    /// The kinds that the names in a text stand for while [`Kinds::resolve_names_during`] reads it: Serde hands no
+    /// context to the code that it derives.
     static READABLE: RefCell<Kinds> = const { RefCell::new(Kinds(Vec::new())) };
 }
 
@@ -294,10 +294,19 @@ impl Kinds {
 
     /// Reads a text with bodies, whose names of kinds stand for these: without this, the text of a body cannot be read.
     pub fn resolve_names_during<T>(&self, read: impl FnOnce() -> T) -> T {
-        let before = READABLE.replace(self.clone());
-        let result = read();
-        READABLE.set(before);
-        result
+        let _restorer = KindsRestorer { before: READABLE.replace(self.clone()) };
+        read()
+    }
+}
+
+/// Puts back the kinds that could be read before, also where the reader panics and a test or a server goes on.
+struct KindsRestorer {
+    before: Kinds,
+}
+
+impl Drop for KindsRestorer {
+    fn drop(&mut self) {
+        READABLE.set(Kinds(std::mem::take(&mut self.before.0)));
     }
 }
 
@@ -372,6 +381,16 @@ mod tests {
         let read = || serde_json::from_str::<BodyId>(&text).ok();
         assert_eq!(Kinds::new([ROBOT, AIRPLANE]).resolve_names_during(read), Some(id));
         assert_eq!(Kinds::new([ROBOT]).resolve_names_during(read), None);
+        assert_eq!(read(), None);
+    }
+
+    #[test]
+    fn kinds_are_forgotten_after_a_reader_that_panics() {
+        let read = || serde_json::from_str::<BodyId>(r#"["airplane",7,null]"#).ok();
+        let result = std::panic::catch_unwind(|| {
+            Kinds::new([AIRPLANE]).resolve_names_during(|| panic!("a reader that fails"));
+        });
+        assert!(result.is_err());
         assert_eq!(read(), None);
     }
 }
