@@ -1,5 +1,6 @@
 //! The common parts of XML readers. Every error has its position in the file.
 
+use std::borrow::Cow;
 use std::str::FromStr;
 
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
@@ -8,25 +9,176 @@ use sidestep_kernel::InputError;
 /// The maximum number of elements, comments and pieces of text in one file.
 const MAX_NODES: u32 = 1 << 20;
 
+/// The maximum number of prefixes that are declared in place of the file; each costs one more look at it.
+const MAX_UNDECLARED: usize = 16;
+
+/// The text of an XML file in which each prefix is declared.
+///
+/// Exporters and merged models leave declarations out, and the readers of robot programs do not ask for them. Missing
+/// ones are inserted into the outermost element of a copy; positions are always those of the original.
+pub(super) struct XmlSource<'a> {
+    place: &'a str,
+    original: &'a str,
+    /// The text that is parsed.
+    text: Cow<'a, str>,
+    /// The byte at which declarations were inserted.
+    inserted_at: usize,
+    undeclared: Vec<UndeclaredPrefix>,
+}
+
+/// A prefix that the file uses and does not declare.
+pub(super) struct UndeclaredPrefix {
+    /// The prefix, without the colon.
+    pub(super) prefix: String,
+    /// The place of its first use, for reports.
+    pub(super) place: String,
+}
+
+impl<'a> XmlSource<'a> {
+    /// Checks that `text` is XML; `place` is its name in errors.
+    pub(super) fn new(place: &'a str, text: &'a str) -> Result<Self, InputError> {
+        let mut source = Self {
+            place,
+            original: text,
+            text: Cow::Borrowed(text),
+            inserted_at: root_name_end(text).unwrap_or(0),
+            undeclared: Vec::new(),
+        };
+        loop {
+            let error = match source.document() {
+                Ok(_) => return Ok(source),
+                Err(error) => error,
+            };
+            let Some(prefix) = source.new_undeclared(&error) else {
+                return Err(source.malformed(&error));
+            };
+            source.declare(prefix);
+        }
+    }
+
+    /// Returns the prefixes that were declared in place of the file, in the order of their first use.
+    pub(super) fn undeclared(&self) -> &[UndeclaredPrefix] {
+        &self.undeclared
+    }
+
+    fn document(&self) -> Result<Document<'_>, roxmltree::Error> {
+        let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+        Document::parse_with_options(&self.text, options)
+    }
+
+    /// Returns the prefix that an error is about, if declaring it may help.
+    fn new_undeclared(&self, error: &roxmltree::Error) -> Option<UndeclaredPrefix> {
+        let roxmltree::Error::UnknownNamespace(prefix, at) = error else { return None };
+        let is_known = self.undeclared.iter().any(|known| known.prefix == *prefix);
+        if is_known || prefix.is_empty() || self.undeclared.len() == MAX_UNDECLARED {
+            return None;
+        }
+        Some(UndeclaredPrefix { prefix: prefix.clone(), place: format!("line {}", at.row) })
+    }
+
+    fn declare(&mut self, prefix: UndeclaredPrefix) {
+        let declaration = format!(" xmlns:{0}=\"undeclared:{0}\"", prefix.prefix);
+        self.text.to_mut().insert_str(self.inserted_at, &declaration);
+        self.undeclared.push(prefix);
+    }
+
+    /// Returns the position in the original of a position in the text that is parsed.
+    fn original_offset(&self, offset: usize) -> usize {
+        let inserted = self.text.len() - self.original.len();
+        if offset <= self.inserted_at {
+            return offset;
+        }
+        offset.saturating_sub(inserted).max(self.inserted_at)
+    }
+
+    /// Returns the line of a position in the text that is parsed, for reports.
+    fn line(&self, offset: usize) -> String {
+        // Declarations contain no line breaks.
+        let breaks = self.text.as_bytes()[..offset].iter().filter(|byte| **byte == b'\n');
+        format!("line {}", breaks.count() + 1)
+    }
+
+    fn error_at(
+        &self,
+        offset: usize,
+        cause: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> InputError {
+        let offset = self.original_offset(offset);
+        InputError::new(self.place, cause, remedy).with_byte_offset(self.original, offset)
+    }
+
+    fn malformed(&self, error: &roxmltree::Error) -> InputError {
+        use roxmltree::Error;
+        let (cause, remedy) = match error {
+            Error::UnknownNamespace(prefix, _) => (
+                format!("the prefix `{prefix}:` is declared nowhere"),
+                format!("write xmlns:{prefix}=\"...\" into the outermost element"),
+            ),
+            Error::UnexpectedCloseTag(expected, actual, _) => (
+                format!("</{actual}> closes <{expected}>"),
+                format!("write </{expected}> here, or open <{actual}> before"),
+            ),
+            Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
+                ("the XML ends in the middle".into(), "download the whole file again".into())
+            }
+            Error::NodesLimitReached => (
+                format!("has more than {MAX_NODES} elements"),
+                "check that this is the file".into(),
+            ),
+            Error::DtdDetected => {
+                ("has a document type definition".into(), "remove the <!DOCTYPE ...>".into())
+            }
+            other => (format!("is not well-formed XML: {other}"), "correct the XML there".into()),
+        };
+        let offset = match error {
+            Error::UnclosedRootNode | Error::UnexpectedEndOfStream => self.text.trim_end().len(),
+            other => offset_of(&self.text, other.pos()),
+        };
+        self.error_at(offset, cause, remedy)
+    }
+}
+
+/// Returns the byte after the name of the outermost element, where a declaration can be inserted.
+fn root_name_end(text: &str) -> Option<usize> {
+    let mut rest = text.trim_start_matches('\u{feff}').trim_start();
+    loop {
+        let end = if rest.starts_with("<?") {
+            "?>"
+        } else if rest.starts_with("<!--") {
+            "-->"
+        } else {
+            break;
+        };
+        let (_, after) = rest.split_once(end)?;
+        rest = after.trim_start();
+    }
+    let name = rest.strip_prefix('<')?;
+    let length = name.find(is_name_end)?;
+    Some(text.len() - name.len() + length)
+}
+
+/// Returns whether a character ends the name of an element in its tag.
+fn is_name_end(c: char) -> bool {
+    c.is_whitespace() || c == '>' || c == '/'
+}
+
 /// An XML file in memory, with its text, at which errors point.
 pub(super) struct XmlFile<'a> {
-    place: &'a str,
-    text: &'a str,
+    source: &'a XmlSource<'a>,
     document: Document<'a>,
 }
 
 impl<'a> XmlFile<'a> {
-    /// Parses `text`; `place` is its name in errors.
-    pub(super) fn parse(place: &'a str, text: &'a str) -> Result<Self, InputError> {
-        let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(text, options)
-            .map_err(|error| malformed(place, text, &error))?;
-        Ok(Self { place, text, document })
+    /// Parses a text.
+    pub(super) fn parse(source: &'a XmlSource<'a>) -> Result<Self, InputError> {
+        let document = source.document().map_err(|error| source.malformed(&error))?;
+        Ok(Self { source, document })
     }
 
     /// Returns the outermost element, which must be called `name`.
     pub(super) fn root(&self, name: &str) -> Result<Element<'_>, InputError> {
-        let root = Element { file: self, node: self.document.root_element() };
+        let root = self.root_element();
         if root.name() == name {
             return Ok(root);
         }
@@ -34,39 +186,9 @@ impl<'a> XmlFile<'a> {
         Err(root.error(cause, "check that this is the right kind of file"))
     }
 
-    pub(super) fn elements(&self) -> impl Iterator<Item = Element<'_>> {
-        let nodes = self.document.descendants().filter(Node::is_element);
-        nodes.map(|node| Element { file: self, node })
+    fn root_element(&self) -> Element<'_> {
+        Element { file: self, node: self.document.root_element() }
     }
-}
-
-fn malformed(place: &str, text: &str, error: &roxmltree::Error) -> InputError {
-    use roxmltree::Error;
-    let (cause, remedy) = match error {
-        Error::UnknownNamespace(prefix, _) => (
-            format!("the prefix `{prefix}:` is declared nowhere"),
-            format!("write xmlns:{prefix}=\"...\" into the outermost element"),
-        ),
-        Error::UnexpectedCloseTag(expected, actual, _) => (
-            format!("</{actual}> closes <{expected}>"),
-            format!("write </{expected}> here, or open <{actual}> before"),
-        ),
-        Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
-            ("the XML ends in the middle".into(), "download the whole file again".into())
-        }
-        Error::NodesLimitReached => {
-            (format!("has more than {MAX_NODES} elements"), "check that this is the file".into())
-        }
-        Error::DtdDetected => {
-            ("has a document type definition".into(), "remove the <!DOCTYPE ...>".into())
-        }
-        other => (format!("is not well-formed XML: {other}"), "correct the XML there".into()),
-    };
-    let offset = match error {
-        Error::UnclosedRootNode | Error::UnexpectedEndOfStream => text.trim_end().len(),
-        other => offset_of(text, other.pos()),
-    };
-    InputError::new(place, cause, remedy).with_byte_offset(text, offset)
 }
 
 /// Returns the byte offset of a position that is given by line and column, the column in
@@ -90,24 +212,51 @@ impl<'a> Element<'a> {
         self.node.tag_name().name()
     }
 
-    /// Returns the namespace that its prefix stands for, if it has a prefix.
+    /// Returns the address of its namespace, if it has one.
     pub(super) fn namespace(&self) -> Option<&'a str> {
         self.node.tag_name().namespace()
     }
 
-    /// Returns its direct children that are called `name` and have no prefix.
+    /// Returns the prefix of its name as the file writes it. The parser keeps only what a prefix stands for, and with
+    /// that, elements of a default namespace could not be told from those with a prefix.
+    pub(super) fn prefix(&self) -> Option<&'a str> {
+        let tag = &self.file.source.text[self.node.range().start + 1..];
+        let name = tag.split(is_name_end).next()?;
+        name.split_once(':').map(|(prefix, _)| prefix)
+    }
+
+    /// Returns whether it belongs to the format of the file: it has no prefix, or that of the outermost element.
+    /// Elements with other prefixes are those of other programs.
+    pub(super) fn is_of_format(&self) -> bool {
+        let prefix = self.prefix();
+        prefix.is_none() || prefix == self.file.root_element().prefix()
+    }
+
+    /// Returns the place of its tag, for reports.
+    pub(super) fn line(&self) -> String {
+        self.file.source.line(self.node.range().start)
+    }
+
+    /// Returns its direct children that are called `name`, without those of other programs.
     pub(super) fn children(self, name: &'a str) -> impl Iterator<Item = Element<'a>> {
-        let nodes = self.node.children().filter(move |n| {
-            n.is_element() && n.tag_name().name() == name && n.tag_name().namespace().is_none()
-        });
+        self.child_elements().filter(move |child| child.name() == name && child.is_of_format())
+    }
+
+    /// Returns all its direct children.
+    pub(super) fn child_elements(self) -> impl Iterator<Item = Element<'a>> {
+        let nodes = self.node.children().filter(Node::is_element);
         nodes.map(move |node| Element { node, ..self })
     }
 
-    /// Returns its first direct child that has no prefix.
+    /// Returns itself and all elements in it, in the order of the file.
+    pub(super) fn descendants(self) -> impl Iterator<Item = Element<'a>> {
+        let nodes = self.node.descendants().filter(Node::is_element);
+        nodes.map(move |node| Element { node, ..self })
+    }
+
+    /// Returns its first direct child that is none of another program.
     pub(super) fn first_child(self) -> Option<Element<'a>> {
-        let mut nodes = self.node.children();
-        let node = nodes.find(|n| n.is_element() && n.tag_name().namespace().is_none())?;
-        Some(Element { node, ..self })
+        self.child_elements().find(Self::is_of_format)
     }
 
     /// Returns its direct child called `name`, if there is one.
@@ -152,8 +301,7 @@ impl<'a> Element<'a> {
     }
 
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
-        let offset = self.node.range().start;
-        InputError::new(self.file.place, cause, remedy).with_byte_offset(self.file.text, offset)
+        self.file.source.error_at(self.node.range().start, cause, remedy)
     }
 
     /// Returns the element's name, and the attribute that identifies it.
@@ -202,9 +350,8 @@ impl<'a> XmlAttribute<'a> {
     }
 
     pub(super) fn error(&self, cause: impl Into<String>, remedy: impl Into<String>) -> InputError {
-        let file = self.element.file;
         let offset = self.attribute.range_value().start;
-        InputError::new(file.place, cause, remedy).with_byte_offset(file.text, offset)
+        self.element.file.source.error_at(offset, cause, remedy)
     }
 }
 
@@ -213,7 +360,7 @@ mod tests {
     use super::*;
 
     fn error_of(text: &str) -> InputError {
-        XmlFile::parse("f.xml", text).err().expect("an error")
+        XmlSource::new("f.xml", text).err().expect("an error")
     }
 
     #[test]
@@ -222,7 +369,6 @@ mod tests {
         assert_eq!(error.line_and_column(), Some((2, 6)), "{error}");
         assert!(error.cause().contains("</c> closes <b>"), "{error}");
         assert_eq!(error_of("<a>\n<b>").line_and_column(), Some((2, 4)));
-        assert!(error_of("<a><x:b/></a>").remedy().contains("xmlns:x"));
         for text in ["", "<", "<a", "no xml", "<!DOCTYPE a><a/>", "<a b=\"1\" b=\"2\"/>"] {
             assert!(!error_of(text).remedy().is_empty());
         }
@@ -230,8 +376,9 @@ mod tests {
 
     #[test]
     fn values_are_read_and_wrong_ones_pointed_at() {
-        let file = XmlFile::parse("f.xml", "<a n=' 1.5 ' t='0 0. 1e-3' w='1 x 2' i='inf'/>");
-        let file = file.expect("XML");
+        let text = "<a n=' 1.5 ' t='0 0. 1e-3' w='1 x 2' i='inf'/>";
+        let source = XmlSource::new("f.xml", text).expect("XML");
+        let file = XmlFile::parse(&source).expect("XML");
         let a = file.root("a").expect("a");
         assert_eq!(a.required("n").and_then(|v| v.number()), Ok(1.5));
         assert_eq!(a.required("t").and_then(|v| v.triple()), Ok([0.0, 0.0, 1e-3]));
@@ -241,5 +388,40 @@ mod tests {
         assert!(a.required("n").and_then(|v| v.triple()).is_err());
         assert!(a.required("missing").is_err());
         assert!(file.root("b").is_err());
+    }
+
+    #[test]
+    fn a_prefix_that_is_declared_nowhere_moves_no_position() {
+        let text = "<?xml version='1.0'?><!-- <x> --><a n='1'>\n<x:b/><y:c x:d='2'/><e f='?'/></a>";
+        let source = XmlSource::new("f.xml", text).expect("XML");
+        let known: Vec<_> =
+            source.undeclared().iter().map(|u| (u.prefix.as_str(), u.place.as_str())).collect();
+        assert_eq!(known, [("x", "line 2"), ("y", "line 2")]);
+        let file = XmlFile::parse(&source).expect("XML");
+        let a = file.root("a").expect("a");
+        let prefixes: Vec<_> = a.child_elements().map(|child| child.prefix()).collect();
+        assert_eq!(prefixes, [Some("x"), Some("y"), None]);
+        let value = a.required("n").expect("n");
+        assert_eq!(value.error("c", "r").line_and_column(), Some((1, 40)));
+        let wrong = a.required_child("e").and_then(|e| e.required("f")?.number()).expect_err("?");
+        assert_eq!(wrong.line_and_column(), Some((2, 27)), "{wrong}");
+        // What declaring does not help is an error as before.
+        assert_eq!(error_of("<a>\n<x:b></x:c></a>").line_and_column(), Some((2, 6)));
+        let many: String = (0..40).map(|k| format!("<p{k}:b/>")).collect();
+        assert!(error_of(&format!("<a>{many}</a>")).remedy().contains("xmlns:p"));
+    }
+
+    #[test]
+    fn a_default_namespace_and_the_prefix_of_the_outermost_element_are_the_format() {
+        for text in [
+            "<a xmlns='http://x'><b/><o:b xmlns:o='http://x'/></a>",
+            "<p:a xmlns:p='http://x'><p:b/></p:a>",
+            "<p:a><p:b/></p:a>",
+            "<p:a xmlns:p='http://x'><b/><o:b xmlns:o='http://y'/></p:a>",
+        ] {
+            let source = XmlSource::new("f.xml", text).expect("XML");
+            let file = XmlFile::parse(&source).expect("XML");
+            assert_eq!(file.root("a").expect("a").children("b").count(), 1, "{text}");
+        }
     }
 }

@@ -20,6 +20,7 @@ pub use shapes::{Collision, Shape, Solid, Solids};
 
 use std::path::Path;
 
+use crate::ImportReport;
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 use sidestep_scenario::suggestion;
@@ -40,6 +41,8 @@ pub struct Model {
     pub joints: Vec<Joint>,
     /// The link that is not the child of any joint.
     pub root: usize,
+    /// What of the file was not taken as it stood.
+    pub report: ImportReport,
 }
 
 /// A connection of one link to another.

@@ -2,7 +2,8 @@
 
 use super::tree;
 use super::{Collision, Joint, JointKind, Limits, Mimic, Model, Origin, Shape};
-use crate::xml::{Element, XmlAttribute, XmlFile};
+use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
+use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
 
@@ -30,16 +31,13 @@ const MAX_LINKS: usize = 10_000;
 const MIN_AXIS: f64 = 1e-6;
 
 pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
-    let file = XmlFile::parse(place, text).map_err(|error| {
-        // A prefix that is declared nowhere: the file was meant to be read by xacro first.
-        if error.cause().contains("`xacro:`") {
-            at_position_of(&error, InputError::new(place, XACRO_CAUSE, XACRO_REMEDY))
-        } else {
-            error
-        }
-    })?;
-    refuse_xacro(&file)?;
+    let source = XmlSource::new(place, text)?;
+    let file = XmlFile::parse(&source)?;
     let robot = file.root("robot")?;
+    let mut report = ImportReport::new("URDF");
+    refuse_xacro(robot)?;
+    record_undeclared_prefixes(&source, &mut report);
+    record_other_elements(robot, &mut report);
     let name = robot.required("name")?.text().to_owned();
     let links = links(robot)?;
     let elements: Vec<_> = robot.children("joint").collect();
@@ -55,22 +53,37 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     read_mimics(&elements, &mut joints, &names)?;
     let root = tree::root(robot, &elements, &links.in_order, &joints)?;
     let collisions = robot.children("link").map(collisions).collect::<Result<_, _>>()?;
-    Ok(Model { name, links: links.in_order, collisions, joints, root })
+    report.add_kept("links", links.in_order.len());
+    report.add_kept("joints", joints.len());
+    Ok(Model { name, links: links.in_order, collisions, joints, root, report })
 }
 
-/// Moves `error` to the position of another.
-fn at_position_of(other: &InputError, error: InputError) -> InputError {
-    match other.line_and_column() {
-        Some((line, column)) => error.with_position(line, column),
-        None => error,
+fn record_undeclared_prefixes(source: &XmlSource, report: &mut ImportReport) {
+    for undeclared in source.undeclared() {
+        let rule = format!("the prefix `{}:`, which is declared nowhere", undeclared.prefix);
+        report.record(Treatment::Repaired, rule, undeclared.place.clone(), "");
+    }
+}
+
+/// Records the parts of a robot that are neither links nor joints: simulators, controllers and sensors. Colors are no
+/// news.
+fn record_other_elements(robot: Element, report: &mut ImportReport) {
+    const READ: [&str; 3] = ["link", "joint", "material"];
+    for element in robot.child_elements() {
+        let is_read = element.is_of_format() && READ.contains(&element.name());
+        if !is_read {
+            let prefix = element.prefix().map_or(String::new(), |prefix| format!("{prefix}:"));
+            let rule = format!("elements <{prefix}{}>", element.name());
+            report.record(Treatment::NotUsed, rule, element.line(), "");
+        }
     }
 }
 
 /// Refuses files with xacro elements or macros. A file may declare the prefix without using it, as
 /// expanded files often do.
-fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
-    for element in file.elements() {
-        if element.namespace().is_some_and(|address| address.contains("xacro")) {
+fn refuse_xacro(robot: Element) -> Result<(), InputError> {
+    for element in robot.descendants() {
+        if is_xacro(&element) {
             return Err(element.error(XACRO_CAUSE, XACRO_REMEDY));
         }
         for value in element.attributes() {
@@ -80,6 +93,13 @@ fn refuse_xacro(file: &XmlFile) -> Result<(), InputError> {
         }
     }
     Ok(())
+}
+
+/// Returns whether an element is a macro: by its prefix, which need not be declared, or by what it stands for.
+fn is_xacro(element: &Element) -> bool {
+    let Some(prefix) = element.prefix() else { return false };
+    let is_address = element.namespace().is_some_and(|address| address.contains("xacro"));
+    prefix == "xacro" || is_address
 }
 
 /// The links and the positions of their names.

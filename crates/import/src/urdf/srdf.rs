@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::{MAX_URDF_BYTES, Model};
-use crate::xml::{Element, XmlAttribute, XmlFile};
+use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 use sidestep_scenario::suggestion;
@@ -83,7 +83,8 @@ impl Semantics {
     /// # Errors
     /// Those of [`Semantics::load`], except for reading.
     pub fn parse(place: &str, text: &str, model: &Model) -> Result<Self, InputError> {
-        let file = XmlFile::parse(place, text)?;
+        let source = XmlSource::new(place, text)?;
+        let file = XmlFile::parse(&source)?;
         let reader = SrdfReader { robot: file.root("robot")?, model };
         let groups = reader.groups()?;
         Ok(Self {

@@ -94,7 +94,46 @@ fn other_elements_prefixes_and_missing_meshes_do_not_matter() {
         <mesh filename="package://no/such.stl"/></geometry></visual>
         <d:proximity xmlns:d="http://drake.mit.edu"/></link><gazebo/><transmission name="t"/>"#;
     let text = ARM.replace("<link name=\"hand\"/>", link);
-    assert_eq!(Model::parse("f", &text), Model::parse("f", ARM));
+    let model = Model::parse("f", &text).expect("a model");
+    let arm = Model::parse("f", ARM).expect("a model");
+    assert_eq!(
+        findings(&model),
+        ["not used: elements <gazebo>, line 6", "not used: elements <transmission>, line 6"]
+    );
+    assert_eq!(Model { report: arm.report.clone(), ..model }, arm);
+}
+
+fn findings(model: &Model) -> Vec<String> {
+    model.report.findings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn a_default_namespace_changes_nothing() {
+    let arm = Model::parse("f", ARM).expect("a model");
+    for address in ["http://www.ros.org", "http://drake.mit.edu", "http://ros.org/wiki/xacro"] {
+        let text = ARM.replace("name=\"arm\"", &format!("name=\"arm\" xmlns=\"{address}\""));
+        assert_eq!(Model::parse("f", &text).expect("a model"), arm, "{address}");
+    }
+    // Elements of another program stay out, even where their prefix stands for the default namespace.
+    let text = ARM
+        .replace("name=\"arm\"", "name=\"arm\" xmlns=\"http://d\" xmlns:d=\"http://d\"")
+        .replace("</robot>", "<d:joint name=\"x\" type=\"gear\"/></robot>");
+    let model = Model::parse("f", &text).expect("a model");
+    assert_eq!(model.joints, arm.joints);
+    assert_eq!(findings(&model), ["not used: elements <d:joint>, line 13"]);
+}
+
+#[test]
+fn a_prefix_that_is_declared_nowhere_is_said_and_does_not_matter() {
+    let camera = "<gazebo><sensor:camera name=\"rgb\"/></gazebo>\n</robot>";
+    let text = ARM.replace("</robot>", camera);
+    let model = Model::parse("f", &text).expect("a model");
+    assert_eq!(model.joints, Model::parse("f", ARM).expect("a model").joints);
+    let repaired = "repaired: the prefix `sensor:`, which is declared nowhere, line 13";
+    assert_eq!(findings(&model)[0], repaired);
+    // Errors after it still point at their places.
+    let error = Model::parse("f", &text.replace("revolute", "revolut")).expect_err("wrong");
+    assert_eq!(error.line_and_column(), Some((5, 32)), "{error}");
 }
 
 #[test]
