@@ -331,6 +331,14 @@ impl<'a> XmlAttribute<'a> {
         self.parse_number(self.text())
     }
 
+    /// Reads one number, which may be infinite: too large a one is read so as well.
+    pub(super) fn extended_number(&self) -> Result<f64, InputError> {
+        match f64::from_str(self.text()) {
+            Ok(number) if !number.is_nan() => Ok(number),
+            _ => self.number(),
+        }
+    }
+
     /// Reads three finite numbers between blanks.
     pub(super) fn triple(&self) -> Result<[f64; 3], InputError> {
         let numbers: Result<Vec<_>, _> =

@@ -8,6 +8,7 @@
 //! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter have no
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
+mod limits;
 mod read;
 mod shapes;
 pub mod srdf;
@@ -61,9 +62,11 @@ pub struct Joint {
     /// Unit vector in the joint's frame, about or along which it moves; (1, 0, 0) where it has no
     /// axis.
     pub axis: [f64; 3],
-    /// Lowest and highest value, in rad or m; `None` for joints without such limits.
+    /// Lowest and highest value, in rad or m; `None` for joints without such limits. An end that the file gives
+    /// as a number beyond 1e6 is no limit, and 1e6 if only one end is so.
     pub limits: Option<Limits>,
-    /// Highest speed, in rad/s or m/s; `None` where the file gives none, or 0, which many files have for that.
+    /// Highest speed, in rad/s or m/s; `None` where the file gives none, or what many files have for that: 0, a
+    /// negative number or one beyond 1e6.
     pub max_speed: Option<f64>,
     /// The joint that this one follows.
     pub mimic: Option<Mimic>,

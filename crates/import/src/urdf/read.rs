@@ -1,7 +1,8 @@
 //! URDF text -> [`Model`].
 
+use super::limits::LimitedJoint;
 use super::tree;
-use super::{Collision, Joint, JointKind, Limits, Mimic, Model, Origin, Shape};
+use super::{Collision, Joint, JointKind, Mimic, Model, Origin, Shape};
 use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
@@ -22,7 +23,7 @@ const JOINT_KINDS: [(&str, JointKind); 6] = [
 
 /// The maximum of a coordinate, and of all other numbers of a joint: no robot has a larger one, and squares must stay
 /// finite.
-const MAX_COORDINATE: f64 = 1e6;
+pub(super) const MAX_COORDINATE: f64 = 1e6;
 
 /// The maximum number of links, far above that of any known robot.
 const MAX_LINKS: usize = 10_000;
@@ -44,7 +45,7 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let mut joints = Vec::with_capacity(elements.len());
     let mut names = tree::Names::default();
     for &element in &elements {
-        let joint = joint(element, &links)?;
+        let joint = joint(element, &links, &mut report)?;
         names.add(&joint.name, joints.len()).map_err(|name| {
             element.error(format!("a second joint `{name}`"), "give each joint a name of its own")
         })?;
@@ -186,9 +187,10 @@ fn check_length(value: &XmlAttribute, length_m: f64) -> Result<(), InputError> {
     Err(value.error(cause, format!("give meters from 0 to {MAX_COORDINATE:e}")))
 }
 
-fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
+fn joint(element: Element, links: &Links, report: &mut ImportReport) -> Result<Joint, InputError> {
     let name = element.required("name")?.text().to_owned();
     let kind = kind(element.required("type")?)?;
+    let limited = LimitedJoint { element, kind };
     Ok(Joint {
         name,
         kind,
@@ -196,8 +198,8 @@ fn joint(element: Element, links: &Links) -> Result<Joint, InputError> {
         child: links.link_in_attribute(element.required_child("child")?)?,
         origin: origin(element)?,
         axis: axis(element, kind)?,
-        limits: limits(element, kind)?,
-        max_speed: max_speed(element, kind)?,
+        limits: limited.range(report)?,
+        max_speed: limited.max_speed(report)?,
         mimic: None,
     })
 }
@@ -254,35 +256,6 @@ fn axis(joint: Element, kind: JointKind) -> Result<[f64; 3], InputError> {
         return Err(value.error(cause, "write a vector that is not zero, e.g. \"0 0 1\""));
     }
     Ok([x / length, y / length, z / length])
-}
-
-fn limits(joint: Element, kind: JointKind) -> Result<Option<Limits>, InputError> {
-    if !matches!(kind, JointKind::Revolute | JointKind::Prismatic) {
-        return Ok(None);
-    }
-    let element = joint.required_child("limit")?;
-    let bound = |name| element.attribute(name).map_or(Ok(0.0), bounded_number);
-    let limits = Limits { lower: bound("lower")?, upper: bound("upper")? };
-    if limits.lower > limits.upper {
-        let cause = format!("lower {} is above upper {}", limits.lower, limits.upper);
-        return Err(element.error(cause, "write the smaller number into `lower`"));
-    }
-    Ok(Some(limits))
-}
-
-/// Reads the highest speed of a joint, which continuous joints need not have.
-fn max_speed(joint: Element, kind: JointKind) -> Result<Option<f64>, InputError> {
-    if !kind.has_one_value() {
-        return Ok(None);
-    }
-    let Some(element) = joint.child("limit")? else { return Ok(None) };
-    let Some(value) = element.attribute("velocity") else { return Ok(None) };
-    let speed = bounded_number(value)?;
-    if speed < 0.0 {
-        let cause = format!("a velocity of {speed}");
-        return Err(value.error(cause, "give the highest speed, in rad/s or m/s, above 0"));
-    }
-    Ok((speed > 0.0).then_some(speed))
 }
 
 fn read_mimics(

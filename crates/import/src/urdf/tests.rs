@@ -123,6 +123,67 @@ fn a_default_namespace_changes_nothing() {
     assert_eq!(findings(&model), ["not used: elements <d:joint>, line 13"]);
 }
 
+/// Returns the small arm with another `<limit>`.
+fn with_limit(limit: &str) -> Model {
+    let text = ARM.replace("<limit lower=\"-1\" upper=\"2\"/>", limit);
+    Model::parse("f", &text).expect(limit)
+}
+
+#[test]
+fn numbers_that_stand_for_no_limit_are_none_and_said() {
+    const UNLIMITED: &str = "repaired: limits beyond 1e6, which are none (2 times), line 7, line 7";
+    for infinity in ["1e+16", "1e16", "1.79769e+308", "1.8e308", "inf", "3.4e38", "1e10"] {
+        let model = with_limit(&format!("<limit lower=\"-{infinity}\" upper=\"{infinity}\"/>"));
+        assert_eq!(model.joints[0].limits, None, "{infinity}");
+        assert_eq!(findings(&model), [UNLIMITED]);
+    }
+    // One end alone.
+    let model = with_limit("<limit lower=\"-1e16\" upper=\"2\"/>");
+    assert_eq!(model.joints[0].limits, Some(Limits { lower: -1e6, upper: 2.0 }));
+    let speeds = [
+        ("-1", "repaired: a velocity below 0"),
+        ("-1e16", "repaired: a velocity below 0"),
+        ("1.79769e+308", "repaired: a velocity beyond 1e6"),
+        ("1.8e308", "repaired: a velocity beyond 1e6"),
+        ("0", "guessed: a velocity of 0"),
+    ];
+    for (speed, finding) in speeds {
+        let limit = format!("<limit lower=\"-1\" upper=\"2\" effort=\"-1\" velocity=\"{speed}\"/>");
+        let model = with_limit(&limit);
+        assert_eq!(model.joints[0].max_speed, None, "{speed}");
+        assert_eq!(model.joints[0].limits, Some(Limits { lower: -1.0, upper: 2.0 }));
+        assert!(findings(&model)[0].starts_with(finding), "{:?}", findings(&model));
+    }
+    let model = with_limit("<limit lower=\"-1\" upper=\"2\" velocity=\"3\"/>");
+    assert_eq!(model.joints[0].max_speed, Some(3.0));
+    assert_eq!(findings(&model), [""; 0]);
+    let wrong = [
+        ("lower=\"1e16\" upper=\"1e16\"", "above"),
+        ("lower=\"1e16\" upper=\"-1e16\"", "above"),
+        ("lower=\"nan\" upper=\"1\"", "`nan`"),
+        ("lower=\"-1\" upper=\"1\" velocity=\"nan\"", "`nan`"),
+    ];
+    for (limit, cause) in wrong {
+        let error = error_of("lower=\"-1\" upper=\"2\"", limit);
+        assert!(error.cause().contains(cause), "{error}");
+    }
+}
+
+#[test]
+fn limits_that_do_not_hold_or_are_not_there_are_said() {
+    let model = with_limit("<limit effort=\"1\"/>");
+    assert_eq!(model.joints[0].limits, Some(Limits { lower: 0.0, upper: 0.0 }));
+    assert!(findings(&model)[0].starts_with("suspicious: limits without `lower`"));
+    for (bounds, count) in [("lower=\"-1\" upper=\"2\"", 1), ("lower=\"-1e16\" upper=\"1e16\"", 0)]
+    {
+        let text =
+            ARM.replace("lower=\"-1\" upper=\"2\"", bounds).replace("revolute", "continuous");
+        let model = Model::parse("f", &text).expect("a model");
+        assert_eq!(model.joints[0].limits, None);
+        assert_eq!(findings(&model).len(), count, "{:?}", findings(&model));
+    }
+}
+
 #[test]
 fn a_prefix_that_is_declared_nowhere_is_said_and_does_not_matter() {
     let camera = "<gazebo><sensor:camera name=\"rgb\"/></gazebo>\n</robot>";
