@@ -321,6 +321,11 @@ pub(super) struct XmlAttribute<'a> {
 }
 
 impl<'a> XmlAttribute<'a> {
+    /// Returns its name without a prefix.
+    pub(super) fn name(&self) -> &'a str {
+        self.attribute.name()
+    }
+
     /// Returns the text between the quotation marks, without blanks around it.
     pub(super) fn text(&self) -> &'a str {
         self.attribute.value().trim()

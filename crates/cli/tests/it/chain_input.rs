@@ -277,7 +277,7 @@ fn wrong_models_of_arms_are_named() {
         ("missing link", urdf(axis, "").replace("<link name=\"tip\"/>", ""), "`tip`"),
         ("zero axis", urdf("<axis xyz=\"0 0 0\"/>", ""), "not zero"),
         ("no axis of numbers", urdf("<axis xyz=\"nan 0 1\"/>", ""), "a.urdf:"),
-        ("xacro", urdf(axis, "<xacro:property name=\"x\" value=\"1\"/>"), "xacro"),
+        ("xacro", urdf(axis, "<xacro:hand side=\"left\"/>"), "xacro"),
         ("no XML", "not xml".into(), "a.urdf"),
         ("no robot", "<world/>".into(), "a.urdf"),
         ("two roots", urdf(axis, "<link name=\"alone\"/>"), "connect"),

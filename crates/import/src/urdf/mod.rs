@@ -16,6 +16,7 @@ pub mod srdf;
 pub(crate) mod tests;
 mod tip;
 mod tree;
+mod xacro;
 
 pub use shapes::{Collision, Shape, Solid, Solids};
 
@@ -137,12 +138,12 @@ impl Model {
     /// Reads the URDF file at `path`, plain or compressed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, is xacro, is not URDF, or does not describe a tree of links;
+    /// When the file cannot be read, has xacro where joints may need it, is not URDF, or does not describe a tree of links;
     /// with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
         let place = path.display().to_string();
         if place.trim_end_matches(".gz").ends_with(".xacro") {
-            return Err(InputError::new(&place, read::XACRO_CAUSE, read::XACRO_REMEDY));
+            return Err(InputError::new(&place, xacro::CAUSE, xacro::REMEDY));
         }
         Self::parse(&place, &read_text(path, MAX_URDF_BYTES)?)
     }

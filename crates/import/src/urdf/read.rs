@@ -1,15 +1,12 @@
 //! URDF text -> [`Model`].
 
 use super::limits::LimitedJoint;
-use super::tree;
 use super::{Collision, Joint, JointKind, Mimic, Model, Origin, Shape};
+use super::{tree, xacro};
 use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
-
-pub(super) const XACRO_CAUSE: &str = "is xacro, macros that have to become URDF first";
-pub(super) const XACRO_REMEDY: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.urdf";
 
 /// The joint types by their names in files.
 const JOINT_KINDS: [(&str, JointKind); 6] = [
@@ -36,9 +33,9 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let file = XmlFile::parse(&source)?;
     let robot = file.root("robot")?;
     let mut report = ImportReport::new("URDF");
-    refuse_xacro(robot)?;
     record_undeclared_prefixes(&source, &mut report);
     record_other_elements(robot, &mut report);
+    xacro::check(robot, &mut report)?;
     let name = robot.required("name")?.text().to_owned();
     let links = links(robot)?;
     let elements: Vec<_> = robot.children("joint").collect();
@@ -72,35 +69,12 @@ fn record_other_elements(robot: Element, report: &mut ImportReport) {
     const READ: [&str; 3] = ["link", "joint", "material"];
     for element in robot.child_elements() {
         let is_read = element.is_of_format() && READ.contains(&element.name());
-        if !is_read {
+        if !is_read && !xacro::is_macro(&element) {
             let prefix = element.prefix().map_or(String::new(), |prefix| format!("{prefix}:"));
             let rule = format!("elements <{prefix}{}>", element.name());
             report.record(Treatment::NotUsed, rule, element.line(), "");
         }
     }
-}
-
-/// Refuses files with xacro elements or macros. A file may declare the prefix without using it, as
-/// expanded files often do.
-fn refuse_xacro(robot: Element) -> Result<(), InputError> {
-    for element in robot.descendants() {
-        if is_xacro(&element) {
-            return Err(element.error(XACRO_CAUSE, XACRO_REMEDY));
-        }
-        for value in element.attributes() {
-            if value.text().contains("${") || value.text().contains("$(") {
-                return Err(value.error(XACRO_CAUSE, XACRO_REMEDY));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Returns whether an element is a macro: by its prefix, which need not be declared, or by what it stands for.
-fn is_xacro(element: &Element) -> bool {
-    let Some(prefix) = element.prefix() else { return false };
-    let is_address = element.namespace().is_some_and(|address| address.contains("xacro"));
-    prefix == "xacro" || is_address
 }
 
 /// The links and the positions of their names.

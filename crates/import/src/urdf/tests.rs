@@ -83,8 +83,7 @@ fn xacro_is_refused_and_its_unused_prefix_is_not() {
         assert!(error.remedy().contains("xacro FILE"), "{error}");
     }
     assert!(
-        Model::load(std::path::Path::new("a.urdf.xacro"))
-            .is_err_and(|e| e.cause() == read::XACRO_CAUSE)
+        Model::load(std::path::Path::new("a.urdf.xacro")).is_err_and(|e| e.cause() == xacro::CAUSE)
     );
 }
 
