@@ -232,6 +232,11 @@ impl<'a> Element<'a> {
         prefix.is_none() || prefix == self.file.root_element().prefix()
     }
 
+    /// Returns the outermost element of its file.
+    pub(super) fn root(&self) -> Element<'a> {
+        self.file.root_element()
+    }
+
     /// Returns the place of its tag, for reports.
     pub(super) fn line(&self) -> String {
         self.file.source.line(self.node.range().start)
@@ -346,12 +351,27 @@ impl<'a> XmlAttribute<'a> {
 
     /// Reads three finite numbers between blanks.
     pub(super) fn triple(&self) -> Result<[f64; 3], InputError> {
-        let numbers: Result<Vec<_>, _> =
-            self.text().split_whitespace().map(|word| self.parse_number(word)).collect();
+        self.numbers("write three numbers between blanks, e.g. \"0 0 1\"")
+    }
+
+    /// Reads four finite numbers between blanks.
+    pub(super) fn quadruple(&self) -> Result<[f64; 4], InputError> {
+        self.numbers("write four numbers between blanks, e.g. \"0 0 0 1\"")
+    }
+
+    fn numbers<const N: usize>(&self, remedy: &str) -> Result<[f64; N], InputError> {
+        let words = self.text().split_whitespace();
+        let numbers: Result<Vec<_>, _> = words.map(|word| self.parse_number(word)).collect();
         numbers?.try_into().map_err(|numbers: Vec<f64>| {
-            let cause = format!("`{}` has {} numbers, not 3", self.attribute.name(), numbers.len());
-            self.error(cause, "write three numbers between blanks, e.g. \"0 0 1\"")
+            let name = self.attribute.name();
+            let cause = format!("`{name}` has {} numbers, not {N}", numbers.len());
+            self.error(cause, remedy)
         })
+    }
+
+    /// Returns the place of its element's tag, for reports.
+    pub(super) fn line(&self) -> String {
+        self.element.line()
     }
 
     fn parse_number(&self, word: &str) -> Result<f64, InputError> {

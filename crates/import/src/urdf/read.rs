@@ -1,12 +1,15 @@
 //! URDF text -> [`Model`].
 
 use super::limits::LimitedJoint;
-use super::{Collision, Joint, JointKind, Mimic, Model, Origin, Shape};
-use super::{tree, xacro};
+use super::{Collision, Joint, JointKind, Mimic, Model, Shape};
+use super::{origin, tree, xacro};
 use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
+
+/// The versions of the format that are known. The second adds quaternions and capsules.
+const VERSIONS: [&str; 2] = ["1.0", "1.1"];
 
 /// The joint types by their names in files.
 const JOINT_KINDS: [(&str, JointKind); 6] = [
@@ -36,6 +39,7 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     record_undeclared_prefixes(&source, &mut report);
     record_other_elements(robot, &mut report);
     xacro::check(robot, &mut report)?;
+    check_version(robot, &mut report);
     let name = robot.required("name")?.text().to_owned();
     let links = links(robot)?;
     let elements: Vec<_> = robot.children("joint").collect();
@@ -50,10 +54,23 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     }
     read_mimics(&elements, &mut joints, &names)?;
     let root = tree::root(robot, &elements, &links.in_order, &joints)?;
-    let collisions = robot.children("link").map(collisions).collect::<Result<_, _>>()?;
+    let mut collisions = Vec::with_capacity(links.in_order.len());
+    for link in robot.children("link") {
+        collisions.push(link_collisions(link, &mut report)?);
+    }
     report.add_kept("links", links.in_order.len());
     report.add_kept("joints", joints.len());
     Ok(Model { name, links: links.in_order, collisions, joints, root, report })
+}
+
+/// Names the version in the report. Files of a version that is not known are read as the latest one that is.
+fn check_version(robot: Element, report: &mut ImportReport) {
+    let Some(version) = robot.attribute("version") else { return };
+    report.format = format!("URDF {}", version.text());
+    if !VERSIONS.contains(&version.text()) {
+        let rule = format!("version `{}`, read as 1.1", version.text());
+        report.record(Treatment::Suspicious, rule, robot.line(), "");
+    }
 }
 
 fn record_undeclared_prefixes(source: &XmlSource, report: &mut ImportReport) {
@@ -114,12 +131,19 @@ fn links(robot: Element) -> Result<Links, InputError> {
 }
 
 /// Reads the shapes of a link that count for collisions.
-fn collisions(link: Element) -> Result<Vec<Collision>, InputError> {
+fn link_collisions(link: Element, report: &mut ImportReport) -> Result<Vec<Collision>, InputError> {
     let mut collisions = Vec::new();
     for element in link.children("collision") {
         // Empty elements, and those of other programs, are no shapes.
         if let Some(kind) = element.child("geometry")?.and_then(Element::first_child) {
-            collisions.push(Collision { origin: origin(element)?, shape: shape(kind)? });
+            let origin = origin::read(element, report)?;
+            record_unknown_attributes(element, report);
+            let shape = shape(kind)?;
+            if let Shape::Other { kind: name } = &shape {
+                let rule = format!("collision shapes <{name}>");
+                report.record(Treatment::NotUsed, rule, kind.line(), "");
+            }
+            collisions.push(Collision { origin, shape });
         }
     }
     Ok(collisions)
@@ -165,17 +189,38 @@ fn joint(element: Element, links: &Links, report: &mut ImportReport) -> Result<J
     let name = element.required("name")?.text().to_owned();
     let kind = kind(element.required("type")?)?;
     let limited = LimitedJoint { element, kind };
+    record_unknown_attributes(element, report);
     Ok(Joint {
         name,
         kind,
         parent: links.link_in_attribute(element.required_child("parent")?)?,
         child: links.link_in_attribute(element.required_child("child")?)?,
-        origin: origin(element)?,
+        origin: origin::read(element, report)?,
         axis: axis(element, kind)?,
         limits: limited.range(report)?,
         max_speed: limited.max_speed(report)?,
         mimic: None,
     })
+}
+
+/// Attributes of the elements whose numbers are read, and those that mean nothing for kinematics.
+const KNOWN_ATTRIBUTES: [(&str, &[&str]); 4] = [
+    ("axis", &["xyz"]),
+    ("limit", &["lower", "upper", "velocity", "effort"]),
+    ("mimic", &["joint", "multiplier", "offset"]),
+    ("origin", &["xyz", "rpy", "quat_xyzw"]),
+];
+
+/// Records what the elements of a joint or a collision shape say in attributes that are not read.
+fn record_unknown_attributes(parent: Element, report: &mut ImportReport) {
+    for (name, known) in KNOWN_ATTRIBUTES {
+        for element in parent.children(name) {
+            for value in element.attributes().filter(|value| !known.contains(&value.name())) {
+                let rule = format!("`{}` of <{name}>", value.name());
+                report.record(Treatment::NotUsed, rule, element.line(), "");
+            }
+        }
+    }
 }
 
 fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
@@ -186,13 +231,7 @@ fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
     })
 }
 
-fn origin(joint: Element) -> Result<Origin, InputError> {
-    let Some(element) = joint.child("origin")? else { return Ok(Origin::default()) };
-    let triple = |name| element.attribute(name).map_or(Ok([0.0; 3]), bounded);
-    Ok(Origin { xyz_m: triple("xyz")?, rpy_rad: triple("rpy")? })
-}
-
-fn bounded(value: XmlAttribute) -> Result<[f64; 3], InputError> {
+pub(super) fn bounded(value: XmlAttribute) -> Result<[f64; 3], InputError> {
     let triple = value.triple()?;
     triple.into_iter().try_for_each(|x| check_bounded(&value, x))?;
     Ok(triple)
