@@ -1,16 +1,42 @@
 //! The common parts of XML readers. Every error has its position in the file.
 
 use std::borrow::Cow;
+use std::path::Path;
 use std::str::FromStr;
 
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_bytes;
 
 /// The maximum number of elements, comments and pieces of text in one file.
 const MAX_NODES: u32 = 1 << 20;
 
 /// The maximum number of prefixes that are declared in place of the file; each costs one more look at it.
 const MAX_UNDECLARED: usize = 16;
+
+/// Returns the text of the XML file at `path`: UTF-8, or UTF-16 if the file begins with its byte order mark.
+pub(super) fn read_xml_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
+    let bytes = read_bytes(path, max_bytes)?;
+    let unit: fn([u8; 2]) -> u16 = match bytes.get(..2) {
+        Some([0xff, 0xfe]) => u16::from_le_bytes,
+        Some([0xfe, 0xff]) => u16::from_be_bytes,
+        _ => return utf8_text(path, bytes),
+    };
+    let units = bytes[2..].chunks(2).map(|pair| unit([pair[0], *pair.get(1).unwrap_or(&0)]));
+    let text: Result<String, _> = char::decode_utf16(units).collect();
+    text.map_err(|_| {
+        let cause = "begins as a text in UTF-16, and is none";
+        InputError::new(path.display(), cause, "save the file as UTF-8")
+    })
+}
+
+fn utf8_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let readable = String::from_utf8_lossy(error.as_bytes());
+        InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
+            .with_byte_offset(&readable, error.utf8_error().valid_up_to())
+    })
+}
 
 /// The text of an XML file in which each prefix is declared.
 ///
@@ -19,6 +45,9 @@ const MAX_UNDECLARED: usize = 16;
 pub(super) struct XmlSource<'a> {
     place: &'a str,
     original: &'a str,
+    /// Number of bytes at the start of the original that are not parsed: byte order marks and blanks, which the
+    /// format forbids before its first line and editors leave there.
+    skipped: usize,
     /// The text that is parsed.
     text: Cow<'a, str>,
     /// The byte at which declarations were inserted.
@@ -37,11 +66,13 @@ pub(super) struct UndeclaredPrefix {
 impl<'a> XmlSource<'a> {
     /// Checks that `text` is XML; `place` is its name in errors.
     pub(super) fn new(place: &'a str, text: &'a str) -> Result<Self, InputError> {
+        let parsed = text.trim_start_matches(|c: char| c == '\u{feff}' || c.is_whitespace());
         let mut source = Self {
             place,
             original: text,
-            text: Cow::Borrowed(text),
-            inserted_at: root_name_end(text).unwrap_or(0),
+            skipped: text.len() - parsed.len(),
+            text: Cow::Borrowed(parsed),
+            inserted_at: root_name_end(parsed).unwrap_or(0),
             undeclared: Vec::new(),
         };
         loop {
@@ -73,7 +104,8 @@ impl<'a> XmlSource<'a> {
         if is_known || prefix.is_empty() || self.undeclared.len() == MAX_UNDECLARED {
             return None;
         }
-        Some(UndeclaredPrefix { prefix: prefix.clone(), place: format!("line {}", at.row) })
+        let place = self.line(offset_of(&self.text, *at));
+        Some(UndeclaredPrefix { prefix: prefix.clone(), place })
     }
 
     fn declare(&mut self, prefix: UndeclaredPrefix) {
@@ -84,17 +116,17 @@ impl<'a> XmlSource<'a> {
 
     /// Returns the position in the original of a position in the text that is parsed.
     fn original_offset(&self, offset: usize) -> usize {
-        let inserted = self.text.len() - self.original.len();
+        let inserted = self.text.len() + self.skipped - self.original.len();
         if offset <= self.inserted_at {
-            return offset;
+            return self.skipped + offset;
         }
-        offset.saturating_sub(inserted).max(self.inserted_at)
+        self.skipped + offset.saturating_sub(inserted).max(self.inserted_at)
     }
 
     /// Returns the line of a position in the text that is parsed, for reports.
     fn line(&self, offset: usize) -> String {
-        // Declarations contain no line breaks.
-        let breaks = self.text.as_bytes()[..offset].iter().filter(|byte| **byte == b'\n');
+        let before = &self.original.as_bytes()[..self.original_offset(offset)];
+        let breaks = before.iter().filter(|byte| **byte == b'\n');
         format!("line {}", breaks.count() + 1)
     }
 
@@ -141,7 +173,7 @@ impl<'a> XmlSource<'a> {
 
 /// Returns the byte after the name of the outermost element, where a declaration can be inserted.
 fn root_name_end(text: &str) -> Option<usize> {
-    let mut rest = text.trim_start_matches('\u{feff}').trim_start();
+    let mut rest = text;
     loop {
         let end = if rest.starts_with("<?") {
             "?>"
@@ -442,6 +474,33 @@ mod tests {
         assert_eq!(error_of("<a>\n<x:b></x:c></a>").line_and_column(), Some((2, 6)));
         let many: String = (0..40).map(|k| format!("<p{k}:b/>")).collect();
         assert!(error_of(&format!("<a>{many}</a>")).remedy().contains("xmlns:p"));
+    }
+
+    #[test]
+    fn what_editors_leave_before_the_first_line_changes_nothing() {
+        let text = "<?xml version='1.0' encoding='UTF-16'?>\n<a n='x'/>";
+        for before in ["\u{feff}", "\u{feff}\u{feff}", "\n", " \r\n\u{feff}"] {
+            let lines = before.matches('\n').count();
+            let text = format!("{before}{text}");
+            let source = XmlSource::new("f.xml", &text).expect("XML");
+            let file = XmlFile::parse(&source).expect("XML");
+            let a = file.root("a").expect("a");
+            let error = a.required("n").and_then(|n| n.number()).expect_err("no number");
+            assert_eq!(error.line_and_column(), Some((2 + lines, 7)), "{error}");
+            assert_eq!(a.line(), format!("line {}", 2 + lines));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("f.xml");
+        let units: Vec<u16> = format!("\u{feff}{text}").encode_utf16().collect();
+        let little: Vec<u8> = units.iter().flat_map(|unit| unit.to_le_bytes()).collect();
+        let big: Vec<u8> = units.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+        for bytes in [little, big, text.as_bytes().to_vec()] {
+            std::fs::write(&path, bytes).expect("written");
+            assert_eq!(read_xml_text(&path, 1 << 10).as_deref(), Ok(text));
+        }
+        std::fs::write(&path, [0xff, 0xfe, 0x00, 0xd8]).expect("written");
+        assert!(read_xml_text(&path, 1 << 10).is_err());
+        assert!(read_xml_text(&path, 3).is_err());
     }
 
     #[test]

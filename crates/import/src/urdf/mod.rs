@@ -24,8 +24,8 @@ pub use shapes::{Collision, Shape, Solid, Solids};
 use std::path::Path;
 
 use crate::ImportReport;
+use crate::xml::read_xml_text;
 use sidestep_kernel::InputError;
-use sidestep_scenario::file::read_text;
 use sidestep_scenario::suggestion;
 
 /// The maximum size of a model in bytes after decompression: some 400 times the longest known.
@@ -146,7 +146,7 @@ impl Model {
         if place.trim_end_matches(".gz").ends_with(".xacro") {
             return Err(InputError::new(&place, xacro::CAUSE, xacro::REMEDY));
         }
-        Self::parse(&place, &read_text(path, MAX_URDF_BYTES)?)
+        Self::parse(&place, &read_xml_text(path, MAX_URDF_BYTES)?)
     }
 
     /// Reads the text of a URDF file; `place` is its name in errors.

@@ -4,9 +4,8 @@
 use std::path::Path;
 
 use super::{MAX_URDF_BYTES, Model};
-use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
+use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource, read_xml_text};
 use sidestep_kernel::InputError;
-use sidestep_scenario::file::read_text;
 use sidestep_scenario::suggestion;
 
 /// The content of an SRDF file for a model.
@@ -75,7 +74,7 @@ impl Semantics {
     /// When the file cannot be read, is not SRDF, or refers to a link, joint or group that does not
     /// exist; with file, line, column and the nearest name.
     pub fn load(path: &Path, model: &Model) -> Result<Self, InputError> {
-        Self::parse(&path.display().to_string(), &read_text(path, MAX_URDF_BYTES)?, model)
+        Self::parse(&path.display().to_string(), &read_xml_text(path, MAX_URDF_BYTES)?, model)
     }
 
     /// Reads the text of an SRDF file; `place` is its name in errors.
