@@ -272,6 +272,8 @@ fn wrong_models_of_arms_are_named() {
     let axis = "<axis xyz=\"0 1 0\"/>";
     let back =
         "<joint name=\"k\" type=\"fixed\"><parent link=\"tip\"/><child link=\"base\"/></joint>";
+    let second = "<link name=\"x\"/><link name=\"y\"/>\
+                  <joint name=\"k\" type=\"fixed\"><parent link=\"x\"/><child link=\"y\"/></joint>";
     for (name, text, said) in [
         ("loop", urdf(axis, back), "a.urdf:"),
         ("missing link", urdf(axis, "").replace("<link name=\"tip\"/>", ""), "`tip`"),
@@ -280,7 +282,7 @@ fn wrong_models_of_arms_are_named() {
         ("xacro", urdf(axis, "<xacro:hand side=\"left\"/>"), "xacro"),
         ("no XML", "not xml".into(), "a.urdf"),
         ("no robot", "<world/>".into(), "a.urdf"),
-        ("two roots", urdf(axis, "<link name=\"alone\"/>"), "connect"),
+        ("two roots", urdf(axis, second), "connect"),
     ] {
         let place = TestFolder::new();
         place.write("c.toml", ARM);

@@ -41,22 +41,23 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     xacro::check(robot, &mut report)?;
     check_version(robot, &mut report);
     let name = robot.required("name")?.text().to_owned();
-    let links = links(robot)?;
+    let all_links = links(robot)?;
     let elements: Vec<_> = robot.children("joint").collect();
     let mut joints = Vec::with_capacity(elements.len());
     let mut names = tree::Names::default();
     for &element in &elements {
-        let joint = joint(element, &links, &mut report)?;
+        let joint = joint(element, &all_links, &mut report)?;
         names.add(&joint.name, joints.len()).map_err(|name| {
             element.error(format!("a second joint `{name}`"), "give each joint a name of its own")
         })?;
         joints.push(joint);
     }
     read_mimics(&elements, &mut joints, &names)?;
-    let root = tree::root(robot, &elements, &links.in_order, &joints)?;
+    let links = all_links.without_separate(&mut joints, &mut report);
+    let root = tree::root(&links.elements, &elements, &links.in_order, &joints)?;
     let mut collisions = Vec::with_capacity(links.in_order.len());
-    for link in robot.children("link") {
-        collisions.push(link_collisions(link, &mut report)?);
+    for link in &links.elements {
+        collisions.push(link_collisions(*link, &mut report)?);
     }
     report.add_kept("links", links.in_order.len());
     report.add_kept("joints", joints.len());
@@ -95,12 +96,43 @@ fn record_other_elements(robot: Element, report: &mut ImportReport) {
 }
 
 /// The links and the positions of their names.
-struct Links {
+struct Links<'a> {
     in_order: Vec<String>,
+    elements: Vec<Element<'a>>,
     names: tree::Names,
 }
 
-impl Links {
+impl Links<'_> {
+    /// Leaves out links that no joint connects to others, and records them. They are no second robot: drawings and
+    /// frames that nobody mounted. A model without joints keeps all.
+    fn without_separate(self, joints: &mut [Joint], report: &mut ImportReport) -> Self {
+        let mut is_kept = vec![joints.is_empty(); self.in_order.len()];
+        for joint in &*joints {
+            is_kept[joint.parent] = true;
+            is_kept[joint.child] = true;
+        }
+        let mut kept =
+            Self { in_order: Vec::new(), elements: Vec::new(), names: tree::Names::default() };
+        let mut new_index = Vec::with_capacity(is_kept.len());
+        for (link, name) in self.in_order.into_iter().enumerate() {
+            let element = self.elements[link];
+            new_index.push(kept.in_order.len());
+            if is_kept[link] {
+                kept.in_order.push(name);
+                kept.elements.push(element);
+                continue;
+            }
+            let rule = "links that no joint connects to the robot";
+            let place = format!("`{name}` at {}", element.line());
+            report.record(Treatment::Dropped, rule, place, "add a joint with it as the child");
+        }
+        for joint in joints {
+            joint.parent = new_index[joint.parent];
+            joint.child = new_index[joint.child];
+        }
+        kept
+    }
+
     fn link_in_attribute(&self, element: Element) -> Result<usize, InputError> {
         let value = element.required("link")?;
         self.names.get(value.text()).ok_or_else(|| {
@@ -111,14 +143,16 @@ impl Links {
     }
 }
 
-fn links(robot: Element) -> Result<Links, InputError> {
-    let mut links = Links { in_order: Vec::new(), names: tree::Names::default() };
+fn links<'a>(robot: Element<'a>) -> Result<Links<'a>, InputError> {
+    let mut links =
+        Links { in_order: Vec::new(), elements: Vec::new(), names: tree::Names::default() };
     for element in robot.children("link") {
         let name = element.required("name")?.text();
         links.names.add(name, links.in_order.len()).map_err(|name| {
             element.error(format!("a second link `{name}`"), "give each link a name of its own")
         })?;
         links.in_order.push(name.to_owned());
+        links.elements.push(element);
     }
     if links.in_order.len() > MAX_LINKS {
         let cause = format!("has {} links, more than {MAX_LINKS}", links.in_order.len());

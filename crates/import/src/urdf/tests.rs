@@ -51,7 +51,6 @@ fn every_wrong_thing_is_named_with_its_place_and_what_would_be_right() {
         ("joint name=\"wrist\"", "joint name=\"shoulder\"", 9, "second joint", "own"),
         ("parent link=\"upper\"", "parent link=\"hand\"", 9, "loop", "base"),
         ("child link=\"hand\"", "child link=\"upper\"", 9, "hangs on joint", "tree"),
-        ("<link name=\"hand\"/>", "<link name=\"hand\"/><link name=\"x\"/>", 1, "`x`", "joints"),
         ("child link=\"hand\"", "child link=\"base\"", 9, "loop", "tree"),
         ("<robot", "<sdf", 13, "closes", "</sdf>"),
         ("xyz=\"1 0 0\"", "xyz=\"1e9 0 0\"", 11, "1e6", "meters"),
@@ -104,6 +103,30 @@ fn other_elements_prefixes_and_missing_meshes_do_not_matter() {
 
 fn findings(model: &Model) -> Vec<String> {
     model.report.findings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn a_link_without_joints_is_left_out_and_said_and_a_second_robot_is_refused() {
+    let arm = Model::parse("f", ARM).expect("a model");
+    let solid = "<link name=\"floor\"><collision><geometry><sphere radius=\"1\"/></geometry></collision></link>";
+    for before in ["<link name=\"base\"/>", "<link name=\"hand\"/>", "<joint name=\"shoulder\""] {
+        let model = Model::parse("f", &ARM.replace(before, &format!("{solid}{before}")));
+        let model = model.expect("a model");
+        let findings = findings(&model);
+        assert!(findings[0].starts_with("dropped: links that no joint connects"), "{findings:?}");
+        assert!(findings[0].contains("`floor` at line"), "{findings:?}");
+        assert_eq!(Model { report: arm.report.clone(), ..model }, arm);
+    }
+    let error = error_of(
+        "</robot>",
+        "<link name=\"x\"/><link name=\"y\"/><joint name=\"j\" type=\"fixed\"><parent link=\"x\"/>\
+         <child link=\"y\"/></joint></robot>",
+    );
+    assert_eq!(error.line_and_column(), Some((13, 1)), "{error}");
+    assert!(error.cause().contains("2 links hang on nothing: `base`, `x`"), "{error}");
+    assert!(error.remedy().contains("joints"), "{error}");
+    let none = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/></robot>";
+    assert!(Model::parse("f", none).is_err());
 }
 
 #[test]

@@ -42,7 +42,7 @@ pub(super) fn has_mimic_cycle(joints: &[Joint], joint: usize) -> bool {
 
 /// Returns the one link without a joint above it, from which all others are reached.
 pub(super) fn root(
-    robot: Element,
+    link_elements: &[Element],
     elements: &[Element],
     links: &[String],
     joints: &[Joint],
@@ -53,12 +53,15 @@ pub(super) fn root(
         [root] => check_connected(root, &above, elements, links, joints).map(|()| root),
         [] => {
             let cause = "every link hangs on another: the joints form a loop";
-            Err(robot.error(cause, "a URDF is a tree: remove the joint that closes the loop"))
+            // Joints are in the order of the file, and the last one may be what closed the loop.
+            let last = elements.last().expect("links hang on joints");
+            Err(last.error(cause, "a URDF is a tree: remove the joint that closes the loop"))
         }
-        _ => {
+        [_, second, ..] => {
             let names = roots.iter().map(|&link| format!("`{}`", links[link]));
             let cause = format!("{} links hang on nothing: {}", roots.len(), quote_names(names));
-            Err(robot.error(cause, "connect all but one to the others with joints"))
+            let remedy = "connect all but one to the others with joints";
+            Err(link_elements[second].error(cause, remedy))
         }
     }
 }
