@@ -2,9 +2,47 @@
 
 use super::read::MAX_COORDINATE;
 use super::{JointKind, Limits};
-use crate::xml::{Element, XmlAttribute};
+use crate::xml::Element;
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
+
+/// The attributes of `<limit>` that are a range.
+const LIMITS: [&str; 2] = ["lower", "upper"];
+
+/// The attributes of `<safety_controller>` that are a range.
+const SOFT_LIMITS: [&str; 2] = ["soft_lower_limit", "soft_upper_limit"];
+
+/// The range in which the controller of a joint keeps it.
+struct SoftLimits<'a> {
+    element: Element<'a>,
+    range: [f64; 2],
+}
+
+impl SoftLimits<'_> {
+    /// Returns what they leave of the limits of the joint. `MoveIt`, TRAC-IK and `ros_control` obey both, so that a
+    /// posture outside is one that the robot refuses.
+    fn narrow(
+        &self,
+        [lower, upper]: [f64; 2],
+        report: &mut ImportReport,
+    ) -> Result<[f64; 2], InputError> {
+        let [soft_lower, soft_upper] = self.range;
+        let narrowed = [lower.max(soft_lower), upper.min(soft_upper)];
+        if narrowed[0] > narrowed[1] {
+            let cause = format!(
+                "the soft limits {soft_lower} to {soft_upper} leave nothing of {lower} to {upper}"
+            );
+            let remedy = "give soft limits inside the limits, or remove <safety_controller>";
+            return Err(self.element.error(cause, remedy));
+        }
+        if narrowed != [lower, upper] {
+            let rule = "soft limits of <safety_controller> narrow the limits, as in MoveIt";
+            let remedy = "remove <safety_controller> for the limits alone";
+            report.record(Treatment::Guessed, rule, self.element.line(), remedy);
+        }
+        Ok(narrowed)
+    }
+}
 
 /// What a reader of limits needs to know of a joint.
 #[derive(Clone, Copy)]
@@ -31,16 +69,52 @@ impl<'a> LimitedJoint<'a> {
             report.record(Treatment::Suspicious, rule, element.line(), remedy);
         }
         let bounds = [bound(element, "lower", report)?, bound(element, "upper", report)?];
-        Ok(closed_range(check_order(element, bounds)?))
+        let mut range = check_order(element, LIMITS, bounds)?;
+        if let Some(soft) = self.soft_limits(report)? {
+            range = soft.narrow(range, report)?;
+        }
+        Ok(closed_range(range))
+    }
+
+    /// Reads the soft limits of a joint, which its own controller keeps; none where it has none that can be kept.
+    fn soft_limits(self, report: &mut ImportReport) -> Result<Option<SoftLimits<'a>>, InputError> {
+        let Some(element) = self.element.child("safety_controller")? else { return Ok(None) };
+        let [lower, upper] = SOFT_LIMITS.map(|name| element.attribute(name));
+        if lower.is_none() && upper.is_none() {
+            // Gains alone: they say nothing about where the joint may be.
+            return Ok(None);
+        }
+        if lower.is_none() || upper.is_none() {
+            let rule = "a soft limit that is not given is 0, as URDF defines it";
+            let remedy =
+                "write soft_lower_limit=\"...\" soft_upper_limit=\"...\" into <safety_controller>";
+            report.record(Treatment::Guessed, rule, element.line(), remedy);
+        }
+        let [lower, upper] = SOFT_LIMITS;
+        let bounds = [bound(element, lower, report)?, bound(element, upper, report)?];
+        if bounds[0] == bounds[1] {
+            let rule = "soft limits that leave one value, which stand where nobody knew them";
+            let remedy = "write type=\"fixed\" if the joint does not move";
+            report.record(Treatment::NotUsed, rule, element.line(), remedy);
+            return Ok(None);
+        }
+        Ok(Some(SoftLimits { element, range: check_order(element, SOFT_LIMITS, bounds)? }))
     }
 
     /// Records limits that a continuous joint has and does not obey, by the definition of the format.
     fn record_unused_range(self, report: &mut ImportReport) -> Result<(), InputError> {
-        let Some(element) = self.element.child("limit")? else { return Ok(()) };
-        let is_bound = |name| element.attribute(name).is_some_and(|value| is_real_bound(&value));
-        if is_bound("lower") || is_bound("upper") {
+        if let Some(element) = self.element.child("limit")?
+            && has_real_bound(element, LIMITS)
+        {
             let rule = "`lower` and `upper` of continuous joints, which turn without end";
             let remedy = "write type=\"revolute\" if they hold";
+            report.record(Treatment::NotUsed, rule, element.line(), remedy);
+        }
+        if let Some(element) = self.element.child("safety_controller")?
+            && has_real_bound(element, SOFT_LIMITS)
+        {
+            let rule = "soft limits of continuous joints, which turn without end";
+            let remedy = "write type=\"revolute\" and a <limit> if they hold";
             report.record(Treatment::NotUsed, rule, element.line(), remedy);
         }
         Ok(())
@@ -73,10 +147,12 @@ impl<'a> LimitedJoint<'a> {
     }
 }
 
-/// Returns whether a bound would narrow the range of a joint. Files have 0 and numbers such as 1e16 where there is none.
-fn is_real_bound(value: &XmlAttribute) -> bool {
-    let bound = value.extended_number();
-    bound.is_ok_and(|bound| bound != 0.0 && bound.abs() <= MAX_COORDINATE)
+/// Returns whether one of these bounds would narrow the range of a joint. Files have 0 and numbers such as 1e16 where
+/// there is none.
+fn has_real_bound(element: Element, names: [&str; 2]) -> bool {
+    let values = names.into_iter().filter_map(|name| element.attribute(name));
+    let mut bounds = values.filter_map(|value| value.extended_number().ok());
+    bounds.any(|bound| bound != 0.0 && bound.abs() <= MAX_COORDINATE)
 }
 
 /// Reads one end of a range, 0 where it is absent; infinite where the file says by a large number that there is none.
@@ -96,11 +172,15 @@ fn bound(
 }
 
 /// Refuses ends that leave nothing between them.
-fn check_order(element: Element, [lower, upper]: [f64; 2]) -> Result<[f64; 2], InputError> {
+fn check_order(
+    element: Element,
+    names: [&str; 2],
+    [lower, upper]: [f64; 2],
+) -> Result<[f64; 2], InputError> {
     let is_empty = lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY;
     if is_empty {
         let cause = format!("lower {lower} is above upper {upper}");
-        return Err(element.error(cause, "write the smaller number into `lower`"));
+        return Err(element.error(cause, format!("write the smaller number into `{}`", names[0])));
     }
     Ok([lower, upper])
 }

@@ -64,8 +64,8 @@ pub struct Joint {
     /// Unit vector in the joint's frame, about or along which it moves; (1, 0, 0) where it has no
     /// axis.
     pub axis: [f64; 3],
-    /// Lowest and highest value, in rad or m; `None` for joints without such limits. An end that the file gives
-    /// as a number beyond 1e6 is no limit, and 1e6 if only one end is so.
+    /// Lowest and highest value, in rad or m; `None` for joints without such limits. The soft limits of a
+    /// `<safety_controller>` narrow them. An end that the file gives as a number beyond 1e6 is no limit, and 1e6 if only one end is so.
     pub limits: Option<Limits>,
     /// Highest speed, in rad/s or m/s; `None` where the file gives none, or what many files have for that: 0, a
     /// negative number or one beyond 1e6.

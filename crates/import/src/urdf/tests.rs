@@ -192,6 +192,65 @@ fn numbers_that_stand_for_no_limit_are_none_and_said() {
 }
 
 #[test]
+fn soft_limits_narrow_the_limits_of_a_joint() {
+    const HARD: &str = "<limit lower=\"-1\" upper=\"2\"/>";
+    let narrowed = "guessed: soft limits of <safety_controller> narrow the limits";
+    let both = |lower: f64, upper: f64| Some(Limits { lower, upper });
+    let cases = [
+        (
+            HARD,
+            "k_position=\"20\" soft_lower_limit=\"-0.5\" soft_upper_limit=\"0.5\"",
+            both(-0.5, 0.5),
+            narrowed,
+        ),
+        (HARD, "soft_lower_limit=\"-0.5\" soft_upper_limit=\"3\"", both(-0.5, 2.0), narrowed),
+        (HARD, "soft_lower_limit=\"-1\" soft_upper_limit=\"2\"", both(-1.0, 2.0), ""),
+        (
+            HARD,
+            "soft_lower_limit=\"-1e16\" soft_upper_limit=\"1e16\"",
+            both(-1.0, 2.0),
+            "repaired: limits",
+        ),
+        (HARD, "k_velocity=\"20\"", both(-1.0, 2.0), ""),
+        (
+            HARD,
+            "soft_lower_limit=\"0\" soft_upper_limit=\"0\"",
+            both(-1.0, 2.0),
+            "not used: soft limits",
+        ),
+        (HARD, "soft_upper_limit=\"1\"", both(0.0, 1.0), "guessed: a soft limit that is not given"),
+        (
+            "<limit lower=\"-1e16\" upper=\"1e16\"/>",
+            "soft_lower_limit=\"-3\" soft_upper_limit=\"3\"",
+            both(-3.0, 3.0),
+            "repaired: limits",
+        ),
+    ];
+    for (hard, soft, limits, finding) in cases {
+        let model = with_limit(&format!("{hard}<safety_controller {soft}/>"));
+        assert_eq!(model.joints[0].limits, limits, "{soft}");
+        let findings = findings(&model);
+        assert!(findings.first().map_or("", String::as_str).starts_with(finding), "{findings:?}");
+        assert_eq!(findings.is_empty(), finding.is_empty(), "{findings:?}");
+    }
+    for (soft, cause) in [
+        ("soft_lower_limit=\"3\" soft_upper_limit=\"4\"", "3 to 4 leave nothing of -1 to 2"),
+        ("soft_lower_limit=\"1\" soft_upper_limit=\"-1\"", "above"),
+    ] {
+        let error = error_of("upper=\"2\"/>", &format!("upper=\"2\"/><safety_controller {soft}/>"));
+        assert!(error.cause().contains(cause), "{error}");
+    }
+    // A continuous joint turns without end.
+    let text = ARM.replace("revolute", "continuous").replace(
+        "lower=\"-1\" upper=\"2\"/>",
+        "/><safety_controller soft_lower_limit=\"-1\" soft_upper_limit=\"1\"/>",
+    );
+    let model = Model::parse("f", &text).expect("a model");
+    assert_eq!(model.joints[0].limits, None);
+    assert!(findings(&model)[0].starts_with("not used: soft limits of continuous joints"));
+}
+
+#[test]
 fn limits_that_do_not_hold_or_are_not_there_are_said() {
     let model = with_limit("<limit effort=\"1\"/>");
     assert_eq!(model.joints[0].limits, Some(Limits { lower: 0.0, upper: 0.0 }));
