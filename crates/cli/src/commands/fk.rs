@@ -16,8 +16,8 @@ Examples:
 
 Values are in rad or m, one for each moving joint from the base to the tip; without any, each is as \
 near to zero as its limits allow. Values outside the limits are computed too, with a warning. The \
-default tip is the leaf with the most moving joints; where that is one of several fingers, it is the \
-frame that is fixed to their hand, or the hand. Connectors are the points that the chain world moves: \
+default tip is the leaf with the most moving joints; where that is a finger or the jaw of a gripper, it \
+is the frame that is fixed to the hand, or the hand. Connectors are the points that the chain world moves: \
 where axes meet or come nearest to each other, and the tip. Positions are in m in the frame of the \
 base. Expand xacro files first.";
 

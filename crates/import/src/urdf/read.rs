@@ -61,7 +61,13 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     }
     report.add_kept("links", links.in_order.len());
     report.add_kept("joints", joints.len());
-    Ok(Model { name, links: links.in_order, collisions, joints, root, report })
+    let unreported = ImportReport::default();
+    let links = links.in_order;
+    let mut model = Model { name, links, collisions, joints, root, report: unreported };
+    // The last finding is about the model itself.
+    model.record_tip(&mut report);
+    model.report = report;
+    Ok(model)
 }
 
 /// Names the version in the report. Files of a version that is not known are read as the latest one that is.

@@ -66,7 +66,8 @@ pub(super) fn root(
     }
 }
 
-fn quote_names(names: impl ExactSizeIterator<Item = String>) -> String {
+/// Returns names as a list for people.
+pub(super) fn quote_names(names: impl ExactSizeIterator<Item = String>) -> String {
     let more = if names.len() > MAX_LISTED { ", ..." } else { "" };
     names.take(MAX_LISTED).collect::<Vec<_>>().join(", ") + more
 }
