@@ -26,6 +26,11 @@ impl<'a> SourceText<'a> {
         InputError::new(self.place, cause, remedy).with_byte_offset(self.text, offset)
     }
 
+    /// Returns the place of a line for a report: `line 7`.
+    pub(super) fn line_name(&self, line: Line<'_>) -> String {
+        format!("line {}", self.text[..line.offset].matches('\n').count() + 1)
+    }
+
     /// Returns the number of bytes of the text before `part`, a piece of that text.
     pub(super) fn offset_of(&self, part: &str) -> usize {
         part.as_ptr() as usize - self.text.as_ptr() as usize

@@ -32,7 +32,7 @@ mod xml;
 #[cfg(test)]
 mod shared_data;
 
-pub use map_file::{GridOptions, load_map, load_pixel_map};
+pub use map_file::{GridOptions, ImportedMap, import_map, load_map, load_pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
 pub use raycast::RayHit;
 pub use report::{ImportReport, Treatment};

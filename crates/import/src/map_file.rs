@@ -5,6 +5,7 @@ use std::path::Path;
 use sidestep_kernel::InputError;
 
 use super::extension::extension;
+use super::report::ImportReport;
 use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
@@ -19,6 +20,36 @@ pub struct GridOptions {
     pub unknown: UnknownPolicy,
 }
 
+/// A map of boxes that was read from a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedMap {
+    /// The boxes.
+    pub map: GridMap,
+    /// What became of the file.
+    pub report: ImportReport,
+}
+
+impl ImportedMap {
+    /// Completes the report of a map that is given in boxes.
+    pub(super) fn of_boxes(map: GridMap, mut report: ImportReport) -> Self {
+        let boxes = map.counts();
+        let size_m = map.box_size_m;
+        report.add_fact("boxes", format!("{} x {} of {size_m} m", map.width(), map.height()));
+        report.add_kept("free boxes", boxes.free);
+        report.add_kept("walls", boxes.wall);
+        report.add_kept("unknown boxes", boxes.unknown);
+        Self { map, report }
+    }
+}
+
+/// Reads the map at `path` into boxes, as [`import_map`] does, without its report.
+///
+/// # Errors
+/// Those of [`import_map`].
+pub fn load_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
+    import_map(path, boxes).map(|imported| imported.map)
+}
+
 /// Reads the map at `path` into boxes. The extension determines the format: `.yaml` and `.yml` for ROS
 /// `map_server`, `.png` and `.pgm` for a plain image (dark is wall, light is free, as in a ROS map without
 /// thresholds), `.map` for MovingAI, `.txt` for characters, each of them also followed by `.gz`.
@@ -28,18 +59,19 @@ pub struct GridOptions {
 /// # Errors
 /// When the extension is another one, a resolution is missing or contradicts the file, and those of
 /// [`rosmap::load`] with [`PixelMap::to_boxes`], [`movingai::load_map`], [`ascii::load`].
-pub fn load_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
-    let map = match load_pixel_map(path, boxes.resolution_m)? {
-        Some(pixels) => pixels.to_boxes(boxes.box_size_m, boxes.unknown)?,
-        None => load_char_map(path, boxes)?,
+pub fn import_map(path: &Path, boxes: GridOptions) -> Result<ImportedMap, InputError> {
+    let Some(pixels) = load_pixel_map(path, boxes.resolution_m)? else {
+        let ImportedMap { map, report } = load_char_map(path, boxes)?;
+        return Ok(ImportedMap { map: map.with_unknown(boxes.unknown), report });
     };
-    Ok(map.with_unknown(boxes.unknown))
+    let map = pixels.to_boxes(boxes.box_size_m, boxes.unknown)?;
+    Ok(ImportedMap { map, report: pixels.into_report() })
 }
 
 /// Reads the file at `path` if it is a map of pixels: a ROS map or a plain image.
 ///
 /// # Errors
-/// Those of [`load_map`].
+/// Those of [`import_map`].
 pub fn load_pixel_map(
     path: &Path,
     resolution_m: Option<f64>,
@@ -70,7 +102,7 @@ fn check_resolution(path: &Path, pixels: PixelMap, given_m: f64) -> Result<Pixel
     Err(InputError::new(path.display(), cause, "leave the resolution out: the file has it"))
 }
 
-fn load_char_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> {
+fn load_char_map(path: &Path, boxes: GridOptions) -> Result<ImportedMap, InputError> {
     let extension = extension(path);
     if !["map", "txt"].contains(&extension.as_str()) {
         return Err(unknown_map_format(path));
@@ -81,7 +113,10 @@ fn load_char_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError>
     }
     match extension.as_str() {
         "map" => movingai::load_map(path, boxes.box_size_m),
-        _ => ascii::load(path, boxes.box_size_m),
+        _ => {
+            let map = ascii::load(path, boxes.box_size_m)?;
+            Ok(ImportedMap::of_boxes(map, ImportReport::new("map in characters")))
+        }
     }
 }
 

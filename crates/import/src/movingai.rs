@@ -1,4 +1,5 @@
-//! MovingAI benchmarks: `.map` grids and `.scen` lists of starts and goals.
+//! MovingAI benchmarks: `.map` grids and `.scen` lists of starts and goals; and the maps of the League of Robot
+//! Runners, which have two symbols of their own.
 //!
 //! The files count rows from the top; all rows here count from the bottom.
 
@@ -7,20 +8,33 @@ use std::str::FromStr;
 
 use sidestep_kernel::InputError;
 
+use super::ImportedMap;
 use super::char_map::{Legend, Line, MAX_TEXT_BYTES, SourceText, map_from_top};
+use super::report::{Finding, ImportReport, MAX_PLACES, Treatment};
 use sidestep_map::{Cell, GridMap, check_box_count};
 use sidestep_scenario::file::read_text;
 
-/// Ground (two characters) and swamp are passable; out of bounds (two characters), trees and water
-/// are not.
+/// Ground (two characters), swamp, and the emitter and service points of warehouses are passable; out of bounds (two
+/// characters), trees and water are not.
 const LEGEND: Legend = Legend {
     cell: |character| match character {
-        '.' | 'G' | 'S' => Some(Cell::Free),
+        '.' | 'G' | 'S' | 'E' => Some(Cell::Free),
         '@' | 'O' | 'T' | 'W' => Some(Cell::Wall),
         _ => None,
     },
-    remedy: "use `.`, `G`, `S` (passable) and `@`, `O`, `T`, `W` (blocked)",
+    remedy: "use `.`, `G`, `S`, `E` (passable) and `@`, `O`, `T`, `W` (blocked)",
 };
+
+/// Symbols that mean more than free or blocked, with what becomes of them. `S` means one thing in games and another in
+/// warehouses, and is passable in both.
+const SYMBOLS: [(char, &str); 3] = [
+    ('E', "the symbol `E` (emitter point, where goods are delivered), read as a free box"),
+    (
+        'S',
+        "the symbol `S` (swamp, or service point, where goods are picked up), read as a free box",
+    ),
+    ('W', "the symbol `W` (water), read as a wall"),
+];
 
 /// The maximum size of a `.scen` file in bytes; those of the benchmark have less than 0.1 MB.
 const MAX_SCEN_BYTES: u64 = 1 << 28;
@@ -79,7 +93,7 @@ impl ScenRow {
 ///
 /// # Errors
 /// Those of [`parse_map`], and a file that cannot be read.
-pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
+pub fn load_map(path: &Path, box_size_m: f64) -> Result<ImportedMap, InputError> {
     parse_map(&path.display().to_string(), &read_text(path, MAX_TEXT_BYTES)?, box_size_m)
 }
 
@@ -88,14 +102,16 @@ pub fn load_map(path: &Path, box_size_m: f64) -> Result<GridMap, InputError> {
 /// # Errors
 /// When the header or a character is wrong, or rows are missing, too many, or not as wide as the
 /// header says.
-pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, InputError> {
+pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<ImportedMap, InputError> {
     let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
     let size = read_header(source, &mut lines)?;
     let [width, height] = size.map(|boxes| boxes as usize);
     let mut cells = Vec::new();
+    let mut report = ImportReport::new("map in characters (MovingAI)");
     for line in lines.by_ref().take(height) {
         LEGEND.read_row(source, line, width, &mut cells)?;
+        record_symbols(&mut report, source, line);
     }
     if cells.len() < width * height {
         let cause = format!("the map ends after {} rows, not {height}", cells.len() / width);
@@ -105,7 +121,34 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<GridMap, In
         let cause = format!("text after the {height} rows of the map");
         return Err(source.error(line.offset, cause, ROWS_REMEDY));
     }
-    map_from_top(place, &cells, width, box_size_m)
+    let map = map_from_top(place, &cells, width, box_size_m)?;
+    Ok(ImportedMap::of_boxes(map, report))
+}
+
+/// Counts the symbols of a row whose meaning is not used.
+fn record_symbols(report: &mut ImportReport, source: SourceText<'_>, line: Line<'_>) {
+    for (symbol, rule) in SYMBOLS {
+        let count = line.text.matches(symbol).count() as u64;
+        if count == 0 {
+            continue;
+        }
+        let known = report.findings.iter_mut().find(|finding| finding.rule == rule);
+        let Some(finding) = known else {
+            report.findings.push(Finding {
+                treatment: Treatment::NotUsed,
+                rule: rule.to_string(),
+                count,
+                places: vec![source.line_name(line)],
+                remedy: String::new(),
+            });
+            continue;
+        };
+        finding.count += count;
+        // Counting lines takes as long as the text before is, so that it is not done for every row.
+        if finding.places.len() < MAX_PLACES {
+            finding.places.push(source.line_name(line));
+        }
+    }
 }
 
 const ROWS_REMEDY: &str = "give as many rows as `height` says";
@@ -285,7 +328,7 @@ mod tests {
 
     #[test]
     fn the_first_row_of_the_file_is_the_top() {
-        let map = parse_map("m", MAP, 1.0).expect("a map");
+        let map = parse_map("m", MAP, 1.0).expect("a map").map;
         assert_eq!((map.width(), map.height()), (7, 2));
         assert_eq!(map.cells()[..7], [Free; 7]);
         assert_eq!(map.cells()[7..], [Free, Free, Free, Wall, Wall, Wall, Wall]);
@@ -295,6 +338,39 @@ mod tests {
     fn line_ends_the_order_of_the_sizes_and_empty_last_lines_do_not_matter() {
         let other = "type octile\r\nwidth 7\r\nheight 2\r\nmap\r\n.GS@OTW\r\n.......\r\n\r\n";
         assert_eq!(parse_map("m", other, 1.0), parse_map("m", MAP, 1.0));
+    }
+
+    /// A warehouse of the League of Robot Runners.
+    const WAREHOUSE: &str = "type octile\nheight 3\nwidth 6\nmap\n@.E..E\n..SS..\n..E..@\n";
+
+    #[test]
+    fn emitter_and_service_points_are_free_and_reported() {
+        let read = parse_map("m", WAREHOUSE, 1.0).expect("a map");
+        assert_eq!((read.map.count(Free), read.map.count(Wall)), (16, 2));
+        let findings: Vec<_> = read.report.findings.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            findings,
+            [
+                "not used: the symbol `E` (emitter point, where goods are delivered), read as a free \
+                 box (3 times), line 5, line 7, ...",
+                "not used: the symbol `S` (swamp, or service point, where goods are picked up), read \
+                 as a free box (2 times), line 6, ...",
+            ]
+        );
+        let plain = parse_map("m", &WAREHOUSE.replace(['E', 'S'], "."), 1.0).expect("a map");
+        assert_eq!(plain.report.findings, []);
+        assert_eq!(plain.map, read.map);
+    }
+
+    #[test]
+    fn the_remedy_for_a_character_names_all_that_mean_something() {
+        let error = parse_map("m", &WAREHOUSE.replace('E', "#"), 1.0).expect_err("a #");
+        let named: Vec<char> =
+            error.remedy().split('`').skip(1).step_by(2).flat_map(str::chars).collect();
+        for symbol in named {
+            let map = parse_map("m", &WAREHOUSE.replace('E', &symbol.to_string()), 1.0);
+            assert!(map.is_ok(), "{symbol}");
+        }
     }
 
     fn map_error(text: &str) -> (usize, usize) {
@@ -341,7 +417,7 @@ mod tests {
 
     #[test]
     fn a_row_of_another_map_is_found_out() {
-        let map = parse_map("m", MAP, 1.0).expect("a map");
+        let map = parse_map("m", MAP, 1.0).expect("a map").map;
         let row = |size: &str, ends: &str| {
             let text = format!("version 1\n0\tm\t{size}\t{ends}\t1\n");
             parse_scen("s", &text).expect("a scenario").remove(0).check_against("s", &map)

@@ -7,6 +7,8 @@ use sidestep_kernel::view::Isometry2;
 
 use sidestep_map::{Cell, CellCounts, GridMap, UnknownPolicy, check_box_count, check_box_size};
 
+use super::report::ImportReport;
+
 pub use super::image::MAX_PIXELS;
 
 /// An occupancy grid from a mapping robot: square pixels, free, occupied or unknown.
@@ -20,6 +22,7 @@ pub struct PixelMap {
     plane: Isometry2,
     /// Row by row from the bottom; length `width * height`.
     pixels: Vec<Cell>,
+    report: ImportReport,
 }
 
 impl PixelMap {
@@ -38,7 +41,25 @@ impl PixelMap {
     ) -> Self {
         assert_eq!(pixels.len(), width as usize * height as usize, "one cell per pixel");
         assert!(resolution_m.is_finite() && resolution_m > 0.0, "a pixel has a positive side");
-        Self { width, height, resolution_m, plane, pixels }
+        let report = ImportReport::default();
+        Self { width, height, resolution_m, plane, pixels, report }
+    }
+
+    /// Returns the same map with the report of its file.
+    #[must_use]
+    pub(super) fn with_report(mut self, report: ImportReport) -> Self {
+        self.report = report;
+        self
+    }
+
+    /// Returns what became of the file of the map; empty where it is from no file.
+    pub fn report(&self) -> &ImportReport {
+        &self.report
+    }
+
+    /// Returns what became of the file of the map, without the map.
+    pub fn into_report(self) -> ImportReport {
+        self.report
     }
 
     /// Number of pixels from west to east.

@@ -25,6 +25,7 @@ use super::PixelMap;
 use super::extension;
 use super::image::Bitmap;
 use super::map_yaml::{MAX_YAML_BYTES, MapMetadata, OccupancyRule};
+use super::report::ImportReport;
 use sidestep_scenario::file::read_text;
 
 /// Reads the map with its YAML file at `path`. YAML file and image may be compressed with gzip; an
@@ -39,7 +40,8 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let text = read_text(path, MAX_YAML_BYTES)?;
     let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
-    Ok(to_pixel_map(meta.resolution_m, meta.plane, meta.reading, &image))
+    let map = to_pixel_map(meta.resolution_m, meta.plane, meta.reading, &image);
+    Ok(with_facts(map, ImportReport::new("ROS map (map_server)")))
 }
 
 /// Reads a plain image as `map_server` would with its usual thresholds: the corner in the southwest is
@@ -55,7 +57,24 @@ pub fn load_image(path: &Path, resolution_m: f64) -> Result<PixelMap, InputError
     }
     let image = Bitmap::load(path)?;
     let plane = Isometry2 { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
-    Ok(to_pixel_map(resolution_m, plane, OccupancyRule::DEFAULT, &image))
+    let map = to_pixel_map(resolution_m, plane, OccupancyRule::DEFAULT, &image);
+    Ok(with_facts(map, ImportReport::new("image")))
+}
+
+/// Completes the report of a map.
+fn with_facts(map: PixelMap, mut report: ImportReport) -> PixelMap {
+    let [width, height] = [map.width(), map.height()];
+    let resolution_m = map.resolution_m();
+    let size_m = [width, height].map(|pixels| f64::from(pixels) * resolution_m);
+    let Isometry2 { origin_m: [x, y], yaw_rad } = map.plane();
+    report.add_fact("pixels", format!("{width} x {height} of {resolution_m} m"));
+    report.add_fact("extent", format!("{:.2} x {:.2} m", size_m[0], size_m[1]));
+    report.add_fact("origin", format!("({x}, {y}) m, turned by {yaw_rad} rad"));
+    let counts = map.counts();
+    report.add_kept("free pixels", counts.free);
+    report.add_kept("occupied pixels", counts.wall);
+    report.add_kept("unknown pixels", counts.unknown);
+    map.with_report(report)
 }
 
 fn to_pixel_map(

@@ -76,7 +76,7 @@ fn check_boxes(name: &str, boxes: &GridMap, expected: &Value) {
 #[test]
 fn every_movingai_map_has_the_expected_boxes() {
     for (name, expected) in maps_or_scens(".map") {
-        let map = movingai::load_map(&shared(&name).expect("the map"), 1.0).expect(&name);
+        let map = movingai::load_map(&shared(&name).expect("the map"), 1.0).expect(&name).map;
         assert_eq!(map.width() as usize, number(&expected, "width"), "{name}");
         assert_eq!(map.height() as usize, number(&expected, "height"), "{name}");
         assert_eq!(map.count(Cell::Free), number(&expected, "passable"), "{name}");
@@ -100,7 +100,7 @@ fn every_movingai_scenario_has_the_expected_lengths() {
         let path = shared(&name).expect("the scenario");
         let rows = movingai::load_scen(&path).expect(&name);
         assert_eq!(rows.len(), number(&expected, "rows"), "{name}");
-        let map = movingai::load_map(&path.with_file_name(&rows[0].map), 1.0).expect(&name);
+        let map = movingai::load_map(&path.with_file_name(&rows[0].map), 1.0).expect(&name).map;
         assert_eq!(rows.iter().find_map(|row| row.check_against(&name, &map).err()), None);
         let free = FreeSpace::from_map(&map);
         let checked = &rows[..number(&expected, "checked")];
