@@ -56,8 +56,18 @@ pub struct ScenRow {
     pub start: (u32, u32),
     /// Goal: column from the west and row from the south.
     pub goal: (u32, u32),
-    /// Length of a shortest path on 8 neighbors without cutting corners, in boxes.
-    pub optimal_length: f64,
+    /// Length of a shortest path on 8 neighbors without cutting corners, in boxes; `None` where the file has -1, as for
+    /// rows that nobody has solved.
+    pub optimal_length: Option<f64>,
+}
+
+/// The content of a `.scen` file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenFile {
+    /// Its rows, in the order of the file.
+    pub rows: Vec<ScenRow>,
+    /// What became of the file.
+    pub report: ImportReport,
 }
 
 impl ScenRow {
@@ -202,27 +212,36 @@ fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
 ///
 /// # Errors
 /// Those of [`parse_scen`], and a file that cannot be read.
-pub fn load_scen(path: &Path) -> Result<Vec<ScenRow>, InputError> {
+pub fn load_scen(path: &Path) -> Result<ScenFile, InputError> {
     parse_scen(&path.display().to_string(), &read_text(path, MAX_SCEN_BYTES)?)
 }
 
-/// Reads `text` as a `.scen` file; errors name `place`.
+/// Reads `text` as a `.scen` file; errors name `place`. Fields are separated with tabs, or with blanks or both where
+/// the map's name has no blanks.
 ///
 /// # Errors
-/// When the first line is not `version 1`, or a row does not have nine fields between tabs, a field
-/// is not a number, or a start or goal is outside the map.
-pub fn parse_scen(place: &str, text: &str) -> Result<Vec<ScenRow>, InputError> {
+/// When the first line is not `version 1`, or a row does not have nine fields, a field is not a number, or a start or
+/// goal is outside the map.
+pub fn parse_scen(place: &str, text: &str) -> Result<ScenFile, InputError> {
     let source = SourceText { place, text };
     let mut lines = source.lines_of(text);
     if !lines.next().is_some_and(|line| is_version_1(line.text)) {
         let remedy = "begin the file with the line `version 1`";
         return Err(source.error(0, "not a MovingAI scenario of version 1", remedy));
     }
-    lines
-        .enumerate()
-        .filter(|(_, line)| !line.text.trim().is_empty())
-        .map(|(i, line)| scen_row(source, i + 2, line))
-        .collect()
+    let mut rows = Vec::new();
+    for (index, line) in lines.enumerate() {
+        if !line.text.trim().is_empty() {
+            rows.push(scen_row(source, index + 2, line)?);
+        }
+    }
+    let mut report = ImportReport::new("list of starts and goals (MovingAI)");
+    report.add_kept("rows", rows.len());
+    let unsolved = rows.iter().filter(|row| row.optimal_length.is_none()).count();
+    if unsolved > 0 {
+        report.add_kept("rows without an optimal length (-1)", unsolved);
+    }
+    Ok(ScenFile { rows, report })
 }
 
 fn is_version_1(line: &str) -> bool {
@@ -231,7 +250,7 @@ fn is_version_1(line: &str) -> bool {
 }
 
 fn scen_row(source: SourceText<'_>, line: usize, text: Line<'_>) -> Result<ScenRow, InputError> {
-    let mut fields = Fields { source, line: text, offset: text.offset, next: Some(text.text) };
+    let mut fields = Fields::of_row(source, text);
     let bucket = fields.number("the bucket")?;
     let map = fields.text("the map's name")?.0.to_owned();
     let width = fields.number("the map's width")?;
@@ -243,10 +262,48 @@ fn scen_row(source: SourceText<'_>, line: usize, text: Line<'_>) -> Result<ScenR
     Ok(ScenRow { line, bucket, map, width, height, start, goal, optimal_length })
 }
 
+/// What programs write as the length of a row that they have not solved.
+const UNSOLVED_LENGTH: f64 = -1.0;
+
+/// Number of fields of a row.
+const FIELD_COUNT: usize = 9;
+
+/// What stands between the fields of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Separator {
+    /// One tab, as in the files of the benchmark: a name may have blanks.
+    Tab,
+    /// Blanks or tabs, any number of them, as other programs write: the benchmark's own reader takes word by word.
+    Whitespace,
+}
+
+impl Separator {
+    /// Nine words are the nine fields, whatever stands between them. Otherwise tabs say where a name with blanks ends.
+    fn of_row(row: &str) -> Self {
+        let is_in_words = row.split_whitespace().count() == FIELD_COUNT;
+        if is_in_words || !row.contains('\t') { Self::Whitespace } else { Self::Tab }
+    }
+
+    /// Splits the first field off the rest of a row, and returns it with what is behind it, if anything.
+    fn split(self, rest: &str) -> (&str, Option<&str>) {
+        match self {
+            Self::Tab => match rest.split_once('\t') {
+                Some((field, next)) => (field, Some(next)),
+                None => (rest, None),
+            },
+            Self::Whitespace => match rest.split_once(char::is_whitespace) {
+                Some((field, next)) => (field, Some(next.trim_start()).filter(|n| !n.is_empty())),
+                None => (rest, None),
+            },
+        }
+    }
+}
+
 /// The fields of a row, taken one by one.
 struct Fields<'a> {
     source: SourceText<'a>,
     line: Line<'a>,
+    separator: Separator,
     /// The byte offset of the rest of the row in the text.
     offset: usize,
     /// The rest of the row; `None` after the last field.
@@ -254,22 +311,28 @@ struct Fields<'a> {
 }
 
 const FIELDS_REMEDY: &str = "write bucket, map, width, height, start x, start y, goal x, goal y and \
-                      optimal length, with a tab between each two";
+                      optimal length, with a tab between each two, or with blanks if the map's name has none";
 
 impl<'a> Fields<'a> {
+    fn of_row(source: SourceText<'a>, line: Line<'a>) -> Self {
+        let separator = Separator::of_row(line.text);
+        let first = match separator {
+            Separator::Tab => line.text,
+            Separator::Whitespace => line.text.trim_start(),
+        };
+        Self { source, line, separator, offset: source.offset_of(first), next: Some(first) }
+    }
+
     /// Reads the next field; returns it with its byte offset.
     fn text(&mut self, name: &str) -> Result<(&'a str, usize), InputError> {
-        let offset = self.offset;
         let rest = self.next.ok_or_else(|| {
             let end = self.line.offset + self.line.text.len();
             self.source.error(end, format!("the row ends before {name}"), FIELDS_REMEDY)
         })?;
-        let (field, next) = match rest.split_once('\t') {
-            Some((field, next)) => (field, Some(next)),
-            None => (rest, None),
-        };
-        self.offset += field.len() + 1;
+        let offset = self.offset;
+        let (field, next) = self.separator.split(rest);
         self.next = next;
+        self.offset = next.map_or(offset + field.len(), |next| self.source.offset_of(next));
         Ok((field, offset))
     }
 
@@ -298,14 +361,17 @@ impl<'a> Fields<'a> {
         Err(self.source.error(offset, cause, "count columns and rows from 0"))
     }
 
-    fn length(&mut self, name: &str) -> Result<f64, InputError> {
+    fn length(&mut self, name: &str) -> Result<Option<f64>, InputError> {
         let offset = self.offset;
         let length: f64 = self.number(name)?;
+        if length == UNSOLVED_LENGTH {
+            return Ok(None);
+        }
         if length.is_finite() && length >= 0.0 {
-            return Ok(length);
+            return Ok(Some(length));
         }
         let cause = format!("{name} is {length}");
-        Err(self.source.error(offset, cause, "give a length of 0 or more"))
+        Err(self.source.error(offset, cause, "give a length of 0 or more, or -1 if it is unknown"))
     }
 
     fn finish(&self) -> Result<(), InputError> {
@@ -401,7 +467,7 @@ mod tests {
     #[test]
     fn a_scenario_counts_rows_from_the_bottom_and_keeps_blanks_in_names() {
         let text = "version 1\n3\ta map.map\t10\t20\t1\t0\t9\t19\t2.5\n\n";
-        let rows = parse_scen("s", text).expect("a scenario");
+        let rows = parse_scen("s", text).expect("a scenario").rows;
         let expected = ScenRow {
             line: 2,
             bucket: 3,
@@ -410,9 +476,38 @@ mod tests {
             height: 20,
             start: (1, 19),
             goal: (9, 0),
-            optimal_length: 2.5,
+            optimal_length: Some(2.5),
         };
         assert_eq!(rows, [expected]);
+    }
+
+    #[test]
+    fn rows_with_blanks_between_the_fields_are_those_with_tabs() {
+        let tabs = "version 1\n0\topen.map\t6\t4\t0\t0\t5\t3\t6.41421356\n";
+        let rows = parse_scen("s", tabs).expect("a scenario");
+        for row in [
+            "0 open.map 6 4 0 0 5 3 6.41421356",
+            " 0  open.map   6 4 0 0 5 3 6.41421356 ",
+            "0\topen.map 6 4\t0 0\t5 3 6.41421356",
+            "0\t\topen.map\t6\t4\t0\t0\t5\t3\t6.41421356\t",
+        ] {
+            assert_eq!(
+                parse_scen("s", &format!("version 1\n{row}\n")).as_ref(),
+                Ok(&rows),
+                "{row}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_row_that_nobody_has_solved_has_no_length() {
+        let text =
+            "version 1\n0 m 6 4 0 0 5 3 -1\n0\tm\t6\t4\t0\t0\t5\t3\t-1.0\n0 m 6 4 0 0 5 3 8\n";
+        let scen = parse_scen("s", text).expect("a scenario");
+        let lengths: Vec<_> = scen.rows.iter().map(|row| row.optimal_length).collect();
+        assert_eq!(lengths, [None, None, Some(8.0)]);
+        let kept: Vec<_> = scen.report.kept.iter().map(|kept| (kept.noun, kept.count)).collect();
+        assert_eq!(kept, [("rows", 3), ("rows without an optimal length (-1)", 2)]);
     }
 
     #[test]
@@ -420,7 +515,7 @@ mod tests {
         let map = parse_map("m", MAP, 1.0).expect("a map").map;
         let row = |size: &str, ends: &str| {
             let text = format!("version 1\n0\tm\t{size}\t{ends}\t1\n");
-            parse_scen("s", &text).expect("a scenario").remove(0).check_against("s", &map)
+            parse_scen("s", &text).expect("a scenario").rows.remove(0).check_against("s", &map)
         };
         assert_eq!(row("7\t2", "0\t0\t6\t1"), Ok(()));
         for wrong in
@@ -455,7 +550,11 @@ mod tests {
     #[test]
     fn errors_of_a_scenario_are_pointed_at() {
         assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3"), (2, 16), "too few fields");
-        assert_eq!(scen_error("0 m 10 20 1 2 3 4 5.0"), (2, 1), "blanks for tabs");
+        assert_eq!(scen_error("0 m 10 20 1 2 3"), (2, 16), "too few words");
+        assert_eq!(scen_error("0 a map 10 20 1 2 3 4 5.0"), (2, 5), "a name with blanks");
+        assert_eq!(scen_error("0 m 10 20 1 2 3 4 5 6"), (2, 21), "ten words");
+        assert_eq!(scen_error("  0 m  10 20  10 2 3 4 5"), (2, 15), "start outside");
+        assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t4\t-2"), (2, 19), "less than nothing");
         assert_eq!(scen_error("0\tm\t10\t20\t1\t-2\t3\t4\t5"), (2, 13), "negative");
         assert_eq!(scen_error("0\tm\t10\t20\t10\t2\t3\t4\t5"), (2, 11), "start outside");
         assert_eq!(scen_error("0\tm\t10\t20\t1\t2\t3\t20\t5"), (2, 15), "goal outside");

@@ -43,8 +43,8 @@ impl Compiler<'_> {
         scen: &Spanned<PathBuf>,
         span: &Range<usize>,
     ) -> Result<BodyGroup, InputError> {
-        let rows = load_scen(&self.source.path(scen.get_ref()));
-        let rows = rows.map_err(|error| self.source.with_key_at(scen.span(), error))?;
+        let list = load_scen(&self.source.path(scen.get_ref()));
+        let rows = list.map_err(|error| self.source.with_key_at(scen.span(), error))?.rows;
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
             let cause = format!("count = {count}, but the list has {} rows", rows.len());
