@@ -56,10 +56,14 @@ impl Bitmap {
         self.0.height()
     }
 
-    /// Returns the result of `read` for each pixel's brightness, row by row from the top. The
-    /// brightness is the mean of the pixel's color channels, from 0 (black) to 255 (white);
-    /// transparency is ignored.
+    /// Returns the result of `read` for each pixel's brightness, row by row from the top, whatever its opacity; see
+    /// [`Shade::brightness`].
     pub fn map_brightness<T>(&self, read: impl Fn(f64) -> T) -> Vec<T> {
+        self.map_shades(|shade| read(shade.brightness))
+    }
+
+    /// Returns the result of `read` for each pixel, row by row from the top.
+    pub fn map_shades<T>(&self, read: impl FnMut(Shade) -> T) -> Vec<T> {
         match &self.0 {
             DynamicImage::ImageLuma8(pixels) => map_channels(pixels, 1, read),
             DynamicImage::ImageLumaA8(pixels) => map_channels(pixels, 1, read),
@@ -67,29 +71,56 @@ impl Bitmap {
             DynamicImage::ImageRgba8(pixels) => map_channels(pixels, 3, read),
             DynamicImage::ImageLuma16(pixels) => map_channels(pixels, 1, read),
             DynamicImage::ImageLumaA16(pixels) => map_channels(pixels, 1, read),
-            other => map_channels(&other.to_rgb16(), 3, read),
+            DynamicImage::ImageRgb16(pixels) => map_channels(pixels, 3, read),
+            DynamicImage::ImageRgba16(pixels) => map_channels(pixels, 3, read),
+            other => map_channels(&other.to_rgba16(), 3, read),
         }
+    }
+
+    /// Returns whether the pixels can be transparent.
+    pub fn has_opacity(&self) -> bool {
+        self.0.color().has_alpha()
+    }
+
+    /// Returns what a pixel consists of, for people; colors of a palette have been looked up.
+    pub fn pixel_type(&self) -> String {
+        let color = self.0.color();
+        let channels = if color.has_color() { "color" } else { "gray" };
+        let opacity = if color.has_alpha() { " with opacity" } else { "" };
+        let bits = color.bits_per_pixel() / u16::from(color.channel_count());
+        format!("{channels}{opacity}, {bits} bits a channel")
     }
 }
 
-/// Returns the result of `read` for the mean of each pixel's first `colors` channels, scaled to
-/// 0..255.
+/// What is seen of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shade {
+    /// The mean of its color channels, from 0 (black) to 255 (white), without regard to its opacity.
+    pub brightness: f64,
+    /// From 0 (transparent) to 1 (opaque).
+    pub opacity: f64,
+}
+
+/// Returns the result of `read` for each pixel: the mean of its first `colors` channels, scaled to 0..255, and the
+/// channel behind them, if any, as its opacity.
 fn map_channels<P, T>(
     image: &ImageBuffer<P, Vec<P::Subpixel>>,
     colors: usize,
-    read: impl Fn(f64) -> T,
+    mut read: impl FnMut(Shade) -> T,
 ) -> Vec<T>
 where
     P: Pixel,
     P::Subpixel: Primitive + Into<f64>,
 {
+    let white: f64 = P::Subpixel::DEFAULT_MAX_VALUE.into();
     // One division of whole numbers below 2^53, so that gray 205 is exactly 205.0 in every format.
-    let steps_per_unit = P::Subpixel::DEFAULT_MAX_VALUE.into() / 255.0;
-    let divisor = colors as f64 * steps_per_unit;
+    let divisor = colors as f64 * (white / 255.0);
     let mut values = Vec::with_capacity(image.width() as usize * image.height() as usize);
     for pixel in image.pixels() {
-        let sum: f64 = pixel.channels()[..colors].iter().map(|&channel| channel.into()).sum();
-        values.push(read(sum / divisor));
+        let channels = pixel.channels();
+        let sum: f64 = channels[..colors].iter().map(|&channel| channel.into()).sum();
+        let opacity = channels.get(colors).map_or(1.0, |&channel| channel.into() / white);
+        values.push(read(Shade { brightness: sum / divisor, opacity }));
     }
     values
 }
@@ -175,11 +206,29 @@ mod tests {
     }
 
     #[test]
-    fn colors_are_averaged_and_transparency_is_ignored() {
+    fn colors_are_averaged_without_regard_to_opacity() {
         let rgba = ImageBuffer::from_pixel(1, 1, Rgba([0u8, 30, 63, 7]));
         let gray = ImageBuffer::from_pixel(1, 1, LumaA([9u8, 0]));
         assert_eq!(brightness(&png(rgba)), [31.0]);
         assert_eq!(brightness(&png(gray)), [9.0]);
+    }
+
+    fn opacity(image: impl Into<DynamicImage>) -> Vec<f64> {
+        let image = Bitmap::decode("test", png(image)).expect("an image");
+        image.map_shades(|shade| shade.opacity)
+    }
+
+    #[test]
+    fn opacity_is_exact_at_both_ends_in_every_png() {
+        let gray = ImageBuffer::from_fn(2, 1, |x, _| LumaA([7u8, x as u8 * 255]));
+        let color = ImageBuffer::from_fn(2, 1, |x, _| Rgba([7u8, 7, 7, x as u8 * 255]));
+        let deep_gray = ImageBuffer::from_fn(2, 1, |x, _| LumaA([7u16, x as u16 * 65535]));
+        let deep = ImageBuffer::from_fn(2, 1, |x, _| Rgba([7u16, 7, 7, x as u16 * 65535]));
+        assert_eq!(opacity(gray), [0.0, 1.0]);
+        assert_eq!(opacity(color), [0.0, 1.0]);
+        assert_eq!(opacity(deep_gray), [0.0, 1.0]);
+        assert_eq!(opacity(deep), [0.0, 1.0]);
+        assert_eq!(opacity(GrayImage::from_pixel(1, 1, Luma([0]))), [1.0]);
     }
 
     #[test]

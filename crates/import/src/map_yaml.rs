@@ -244,6 +244,11 @@ impl OccupancyRule {
         if percent > 100.0 { Cell::Unknown } else { self.occupancy_cell(percent / 100.0) }
     }
 
+    /// Returns the brightness of ground that nothing was drawn on.
+    pub(super) fn ground_brightness(&self) -> f64 {
+        if self.negate { 0.0 } else { 255.0 }
+    }
+
     fn occupancy_cell(&self, occupancy: f64) -> Cell {
         if occupancy > self.occupied_thresh {
             Cell::Wall

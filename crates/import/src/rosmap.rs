@@ -13,8 +13,11 @@
 //! The third number of `origin` rotates the image about its lower-left corner, counterclockwise. Pixels and
 //! boxes stay along the axes of the image; only positions in the world are rotated.
 //!
-//! Transparency is ignored, unlike in `map_server`, where the trinary mode averages it with the
-//! colors. Unknown keys are ignored, as in `map_server`.
+//! Transparency: `map_saver` of Nav2 writes unknown pixels as transparent ones in the mode `scale`, and there they are
+//! unknown, as in `map_server`. In the mode `trinary` and in images without a YAML file it is guessed what they mean:
+//! see [`TransparentGround`]. The mode `raw` does not look at it, as `map_server` does not.
+//!
+//! What is guessed, and what can hardly be right, is in the report of the map.
 
 use std::path::Path;
 
@@ -23,9 +26,10 @@ use sidestep_kernel::view::Isometry2;
 
 use super::PixelMap;
 use super::extension;
-use super::image::Bitmap;
-use super::map_yaml::{MAX_YAML_BYTES, MapMetadata, OccupancyRule};
-use super::report::ImportReport;
+use super::image::{Bitmap, Shade};
+use super::map_yaml::{MAX_YAML_BYTES, MapMetadata, MapMode, OccupancyRule};
+use super::report::{Finding, ImportReport, Treatment};
+use sidestep_map::Cell;
 use sidestep_scenario::file::read_text;
 
 /// Reads the map with its YAML file at `path`. YAML file and image may be compressed with gzip; an
@@ -40,8 +44,11 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let text = read_text(path, MAX_YAML_BYTES)?;
     let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
-    let map = to_pixel_map(meta.resolution_m, meta.plane, meta.reading, &image);
-    Ok(with_facts(map, ImportReport::new("ROS map (map_server)")))
+    let mut report = ImportReport::new("ROS map (map_server)");
+    let cells = cells_from_bottom(&image, meta.reading, &mut report);
+    let size = [image.width(), image.height()];
+    let map = PixelMap::new(size[0], size[1], meta.resolution_m, meta.plane, cells);
+    Ok(with_facts(map, report))
 }
 
 /// Reads a plain image as `map_server` would with its usual thresholds: the corner in the southwest is
@@ -57,8 +64,9 @@ pub fn load_image(path: &Path, resolution_m: f64) -> Result<PixelMap, InputError
     }
     let image = Bitmap::load(path)?;
     let plane = Isometry2 { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
-    let map = to_pixel_map(resolution_m, plane, OccupancyRule::DEFAULT, &image);
-    Ok(with_facts(map, ImportReport::new("image")))
+    let mut report = ImportReport::new("image");
+    let cells = cells_from_bottom(&image, OccupancyRule::DEFAULT, &mut report);
+    Ok(with_facts(PixelMap::new(image.width(), image.height(), resolution_m, plane, cells), report))
 }
 
 /// Completes the report of a map.
@@ -77,25 +85,130 @@ fn with_facts(map: PixelMap, mut report: ImportReport) -> PixelMap {
     map.with_report(report)
 }
 
-fn to_pixel_map(
-    resolution_m: f64,
-    plane: Isometry2,
-    reading: OccupancyRule,
+/// Returns the cells of an image, row by row from the bottom, and records what was guessed.
+fn cells_from_bottom(
     image: &Bitmap,
-) -> PixelMap {
-    let from_top = image.map_brightness(|brightness| reading.cell(brightness));
-    let from_bottom = from_top.rchunks(image.width() as usize).flatten().copied().collect();
-    PixelMap::new(image.width(), image.height(), resolution_m, plane, from_bottom)
+    reading: OccupancyRule,
+    report: &mut ImportReport,
+) -> Vec<Cell> {
+    report.add_fact("image", image.pixel_type());
+    let survey = Survey::of(image, reading);
+    let ground = TransparentGround::of(&survey, reading.mode);
+    let from_top = image.map_shades(|shade| ground.cell(shade, reading));
+    record_transparency(&survey, ground, report);
+    from_top.rchunks(image.width() as usize).flatten().copied().collect()
+}
+
+/// What the pixels of an image are like, before any is read as a cell.
+#[derive(Debug, Default)]
+struct Survey {
+    /// Number of all pixels.
+    pixels: usize,
+    /// Number of pixels that are not opaque.
+    transparent: usize,
+    /// Number of opaque pixels whose brightness is that of free ground.
+    opaque_free: usize,
+}
+
+impl Survey {
+    fn of(image: &Bitmap, reading: OccupancyRule) -> Self {
+        let mut survey = Self::default();
+        image.map_shades(|shade| survey.add(shade, reading));
+        survey
+    }
+
+    fn add(&mut self, shade: Shade, reading: OccupancyRule) {
+        self.pixels += 1;
+        if shade.opacity < 1.0 {
+            self.transparent += 1;
+        } else if reading.cell(shade.brightness) == Cell::Free {
+            self.opaque_free += 1;
+        }
+    }
+
+    /// Returns a number of pixels as a share of all.
+    fn share(&self, pixels: usize) -> String {
+        format!("{:.1} % of all pixels", 100.0 * pixels as f64 / self.pixels as f64)
+    }
+}
+
+/// What the transparent pixels of an image stand for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum TransparentGround {
+    /// Only opacities are looked at, as by `map_server` in the mode `scale`.
+    UnknownByFormat,
+    /// The image shows free ground as well, so that what it leaves out is not free.
+    Unknown,
+    /// Nothing opaque is free: the image is a drawing in ink, which viewers show on white.
+    Free,
+    /// The mode `raw` has no transparency.
+    NotUsed,
+}
+
+impl TransparentGround {
+    fn of(survey: &Survey, mode: MapMode) -> Self {
+        match mode {
+            MapMode::Scale => Self::UnknownByFormat,
+            MapMode::Raw => Self::NotUsed,
+            MapMode::Trinary if survey.opaque_free > 0 => Self::Unknown,
+            MapMode::Trinary => Self::Free,
+        }
+    }
+
+    /// Returns the cell of a pixel. The edges of drawn lines are half transparent: such a pixel is an obstacle where
+    /// it would be one on free ground.
+    fn cell(self, shade: Shade, reading: OccupancyRule) -> Cell {
+        let Shade { brightness, opacity } = shade;
+        if opacity >= 1.0 || self == Self::NotUsed {
+            return reading.cell(brightness);
+        }
+        let on_ground = opacity * brightness + (1.0 - opacity) * reading.ground_brightness();
+        match (self, reading.cell(on_ground)) {
+            (Self::UnknownByFormat, _) => Cell::Unknown,
+            (Self::Unknown, Cell::Free) => Cell::Unknown,
+            (_, cell) => cell,
+        }
+    }
+}
+
+fn record_transparency(survey: &Survey, ground: TransparentGround, report: &mut ImportReport) {
+    if survey.transparent == 0 {
+        return;
+    }
+    let share = survey.share(survey.transparent);
+    report.add_fact("transparent pixels", format!("{} ({share})", survey.transparent));
+    let (treatment, rule, remedy) = match ground {
+        TransparentGround::UnknownByFormat => return,
+        TransparentGround::Unknown => (
+            Treatment::Guessed,
+            format!("transparent pixels are unknown, because opaque ones are free ({share})"),
+            "save the image without transparency, on a white ground, if they are free",
+        ),
+        TransparentGround::Free => (
+            Treatment::Guessed,
+            format!(
+                "transparent pixels are free, because the image has nothing but ink on them ({share})"
+            ),
+            "save the image without transparency, on a gray ground (128), if they are unknown",
+        ),
+        TransparentGround::NotUsed => (
+            Treatment::NotUsed,
+            format!("the transparency of pixels, as in map_server's mode raw ({share})"),
+            "",
+        ),
+    };
+    let count = survey.transparent as u64;
+    let remedy = remedy.to_string();
+    report.findings.push(Finding { treatment, rule, count, places: Vec::new(), remedy });
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
-    use super::super::map_yaml::MapMode;
     use super::*;
+    use ::image::{ImageBuffer, LumaA, Rgba};
     use Cell::{Free, Unknown, Wall};
-    use sidestep_map::Cell;
 
     const READING: OccupancyRule = OccupancyRule::DEFAULT;
 
@@ -191,6 +304,99 @@ mod tests {
         }
         let error = load(&folder.path().join("b.toml")).expect_err("a scenario");
         assert!(error.remedy().contains(".yaml or .yml"), "{error}");
+    }
+
+    /// A map of one row of gray pixels with opacities.
+    fn read_row(head: &str, pixels: &[[u8; 2]]) -> PixelMap {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let image = ImageBuffer::from_fn(pixels.len() as u32, 1, |x, _| LumaA(pixels[x as usize]));
+        image.save(folder.path().join("a.png")).expect("written");
+        let yaml = format!(
+            "{head}\nimage: a.png\nresolution: 0.5\norigin: [1, 2, 0]\noccupied_thresh: 0.65\n\
+             free_thresh: 0.196\n"
+        );
+        let path = folder.path().join("a.yaml");
+        std::fs::write(&path, yaml).expect("written");
+        load(&path).expect("a map")
+    }
+
+    fn findings(map: &PixelMap) -> Vec<String> {
+        map.report().findings.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn ink_on_a_transparent_ground_is_walls_on_free_ground() {
+        // The ground of drawing programs is transparent black or transparent white.
+        let drawing = ImageBuffer::from_fn(12, 8, |x, y| {
+            let is_ink = (2..10).contains(&x) && (y == 1 || y == 6);
+            Rgba([0u8, 0, 0, if is_ink { 255 } else { 0 }])
+        });
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("plan.png");
+        drawing.save(&path).expect("written");
+        let map = load_image(&path, 0.05).expect("a map");
+        let counts = map.counts();
+        assert_eq!((counts.free, counts.wall, counts.unknown), (80, 16, 0));
+        assert_eq!(
+            findings(&map),
+            [
+                "guessed: transparent pixels are free, because the image has nothing but ink on them \
+              (83.3 % of all pixels) (80 times); save the image without transparency, on a gray \
+              ground (128), if they are unknown"
+            ]
+        );
+        let row = read_row("negate: 0", &[[0, 255], [255, 0], [0, 0], [0, 200], [0, 20]]);
+        assert_eq!(row.pixels(), [Wall, Free, Free, Wall, Free]);
+        let light = read_row("negate: 1", &[[255, 255], [255, 0], [0, 0]]);
+        assert_eq!(light.pixels(), [Wall, Free, Free]);
+    }
+
+    #[test]
+    fn beside_free_pixels_transparent_ones_are_unknown() {
+        let row =
+            read_row("negate: 0", &[[0, 255], [254, 255], [127, 0], [0, 0], [0, 200], [0, 20]]);
+        assert_eq!(row.pixels(), [Wall, Free, Unknown, Unknown, Wall, Unknown]);
+        assert_eq!(
+            findings(&row),
+            [
+                "guessed: transparent pixels are unknown, because opaque ones are free (66.7 % of all \
+              pixels) (4 times); save the image without transparency, on a white ground, if they are \
+              free"
+            ]
+        );
+    }
+
+    #[test]
+    fn transparent_pixels_are_unknown_as_map_saver_writes_them_in_the_mode_scale() {
+        // 0.5, transparent: the unknown of map_saver; the file says what it means.
+        let row = read_row("mode: scale\nnegate: 0", &[[0, 255], [255, 255], [127, 0], [0, 254]]);
+        assert_eq!(row.pixels(), [Wall, Free, Unknown, Unknown]);
+        assert!(findings(&row).is_empty());
+        let unexplored = read_row("mode: scale\nnegate: 0", &[[0, 255], [127, 0]]);
+        assert_eq!(unexplored.pixels(), [Wall, Unknown]);
+    }
+
+    #[test]
+    fn the_mode_raw_has_no_transparency_and_the_report_says_so() {
+        let row = read_row("mode: raw\nnegate: 0", &[[0, 0], [100, 0], [255, 0]]);
+        assert_eq!(row.pixels(), [Free, Wall, Unknown]);
+        assert_eq!(row.report().findings[0].treatment, Treatment::NotUsed);
+    }
+
+    #[test]
+    fn remedies_for_transparency_change_what_it_means() {
+        let white = read_row("negate: 0", &[[0, 255], [254, 255], [255, 255]]);
+        assert_eq!((white.pixels(), findings(&white).len()), (&[Wall, Free, Free][..], 0));
+        let gray = read_row("negate: 0", &[[0, 255], [128, 255]]);
+        assert_eq!(gray.pixels(), [Wall, Unknown]);
+    }
+
+    #[test]
+    fn opaque_pixels_with_opacities_are_what_they_are_without_them() {
+        let opaque = [[0, 255], [205, 255], [206, 255], [255, 255]];
+        let row = read_row("negate: 0", &opaque);
+        assert_eq!(row.pixels(), [Wall, Unknown, Free, Free]);
+        assert!(findings(&row).is_empty());
     }
 
     #[test]
