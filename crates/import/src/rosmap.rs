@@ -45,7 +45,7 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
     let mut report = ImportReport::new("ROS map (map_server)");
-    let cells = cells_from_bottom(&image, meta.reading, &mut report);
+    let cells = cells_from_bottom(&image, ThresholdSource::Yaml(meta.reading), &mut report);
     let size = [image.width(), image.height()];
     let map = PixelMap::new(size[0], size[1], meta.resolution_m, meta.plane, cells);
     Ok(with_facts(map, report))
@@ -65,7 +65,7 @@ pub fn load_image(path: &Path, resolution_m: f64) -> Result<PixelMap, InputError
     let image = Bitmap::load(path)?;
     let plane = Isometry2 { origin_m: [0.0, 0.0], yaw_rad: 0.0 };
     let mut report = ImportReport::new("image");
-    let cells = cells_from_bottom(&image, OccupancyRule::DEFAULT, &mut report);
+    let cells = cells_from_bottom(&image, ThresholdSource::Default, &mut report);
     Ok(with_facts(PixelMap::new(image.width(), image.height(), resolution_m, plane, cells), report))
 }
 
@@ -85,22 +85,60 @@ fn with_facts(map: PixelMap, mut report: ImportReport) -> PixelMap {
     map.with_report(report)
 }
 
+/// Where the thresholds of a map come from.
+#[derive(Debug, Clone, Copy)]
+enum ThresholdSource {
+    /// Its YAML file.
+    Yaml(OccupancyRule),
+    /// There is none: the usual thresholds hold.
+    Default,
+}
+
+impl ThresholdSource {
+    fn reading(self) -> OccupancyRule {
+        match self {
+            Self::Yaml(reading) => reading,
+            Self::Default => OccupancyRule::DEFAULT,
+        }
+    }
+
+    /// Returns how to change a threshold: the beginning of a remedy.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Yaml(_) => "set",
+            Self::Default => "write a .yaml file for the image, with",
+        }
+    }
+}
+
 /// Returns the cells of an image, row by row from the bottom, and records what was guessed.
 fn cells_from_bottom(
     image: &Bitmap,
-    reading: OccupancyRule,
+    thresholds: ThresholdSource,
     report: &mut ImportReport,
 ) -> Vec<Cell> {
+    let reading = thresholds.reading();
     report.add_fact("image", image.pixel_type());
     let survey = Survey::of(image, reading);
     let ground = TransparentGround::of(&survey, reading.mode);
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
+    survey.record_grays(thresholds, report);
     from_top.rchunks(image.width() as usize).flatten().copied().collect()
 }
 
+/// The gray that `map_saver` writes for unknown pixels.
+const UNKNOWN_GRAY: usize = 205;
+
+/// Grays from this one on are as bright as free pixels are written (254), with room for noise.
+const MIN_LIGHT_GRAY: usize = 240;
+
+/// Share of the pixels from which a gray is no accident: the edges of lines and the noise of drawings have fewer of
+/// any one gray.
+const MIN_SUSPICIOUS_SHARE: f64 = 0.01;
+
 /// What the pixels of an image are like, before any is read as a cell.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Survey {
     /// Number of all pixels.
     pixels: usize,
@@ -108,11 +146,13 @@ struct Survey {
     transparent: usize,
     /// Number of opaque pixels whose brightness is that of free ground.
     opaque_free: usize,
+    /// Number of those of each whole gray.
+    free_grays: [usize; 256],
 }
 
 impl Survey {
     fn of(image: &Bitmap, reading: OccupancyRule) -> Self {
-        let mut survey = Self::default();
+        let mut survey = Self { pixels: 0, transparent: 0, opaque_free: 0, free_grays: [0; 256] };
         image.map_shades(|shade| survey.add(shade, reading));
         survey
     }
@@ -123,6 +163,41 @@ impl Survey {
             self.transparent += 1;
         } else if reading.cell(shade.brightness) == Cell::Free {
             self.opaque_free += 1;
+            if shade.brightness.fract() == 0.0 {
+                self.free_grays[shade.brightness as usize] += 1;
+            }
+        }
+    }
+
+    /// Records grays between black and white that are read as free, and can hardly be meant so.
+    fn record_grays(&self, thresholds: ThresholdSource, report: &mut ImportReport) {
+        let reading = thresholds.reading();
+        // In the mode raw values are no grays, and with `negate` free pixels are dark.
+        if reading.mode == MapMode::Raw || reading.negate {
+            return;
+        }
+        let min_count = (MIN_SUSPICIOUS_SHARE * self.pixels as f64).max(1.0);
+        for (gray, &count) in self.free_grays.iter().enumerate().take(MIN_LIGHT_GRAY) {
+            if (count as f64) < min_count {
+                continue;
+            }
+            let meaning = match gray {
+                UNKNOWN_GRAY => ", which map_saver writes for unknown,",
+                _ => "",
+            };
+            let rule = format!(
+                "pixels of the gray {gray}{meaning} are free, because free_thresh is {} ({})",
+                reading.free_thresh,
+                self.share(count)
+            );
+            let remedy = format!(
+                "{} `free_thresh: {}` if they are unknown",
+                thresholds.remedy(),
+                thresh_above(gray)
+            );
+            let treatment = Treatment::Suspicious;
+            let places = Vec::new();
+            report.findings.push(Finding { treatment, rule, count: count as u64, places, remedy });
         }
     }
 
@@ -130,6 +205,13 @@ impl Survey {
     fn share(&self, pixels: usize) -> String {
         format!("{:.1} % of all pixels", 100.0 * pixels as f64 / self.pixels as f64)
     }
+}
+
+/// Returns the largest threshold of three digits under which a gray is not free, and lighter ones are; for the gray 205
+/// the one that everybody uses.
+fn thresh_above(gray: usize) -> f64 {
+    let occupancy = (255 - gray) as f64 / 255.0;
+    (occupancy * 1000.0).floor() / 1000.0
 }
 
 /// What the transparent pixels of an image stand for.
@@ -396,7 +478,67 @@ mod tests {
         let opaque = [[0, 255], [205, 255], [206, 255], [255, 255]];
         let row = read_row("negate: 0", &opaque);
         assert_eq!(row.pixels(), [Wall, Unknown, Free, Free]);
-        assert!(findings(&row).is_empty());
+        let is_guessed = |found: &Finding| found.treatment == Treatment::Guessed;
+        assert!(!row.report().findings.iter().any(is_guessed));
+    }
+
+    /// A map of one row of gray pixels under a `free_thresh`.
+    fn read_grays(free_thresh: &str, grays: &[u8]) -> PixelMap {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut image = format!("P5 {} 1 255\n", grays.len()).into_bytes();
+        image.extend_from_slice(grays);
+        std::fs::write(folder.path().join("a.pgm"), image).expect("written");
+        let yaml = format!(
+            "image: a.pgm\nmode: trinary\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n\
+             occupied_thresh: 0.65\nfree_thresh: {free_thresh}\n"
+        );
+        let path = folder.path().join("a.yaml");
+        std::fs::write(&path, yaml).expect("written");
+        load(&path).expect("a map")
+    }
+
+    #[test]
+    fn the_gray_of_unknown_that_the_default_of_nav2_makes_free_is_suspicious() {
+        let grays = [[205; 16], [0; 16], [254; 16], [254; 16]].concat();
+        let map = read_grays("0.25", &grays);
+        assert_eq!(map.counts().free, 48, "as map_server reads it");
+        assert_eq!(
+            findings(&map),
+            [
+                "suspicious: pixels of the gray 205, which map_saver writes for unknown, are free, because \
+              free_thresh is 0.25 (25.0 % of all pixels) (16 times); set `free_thresh: 0.196` if they \
+              are unknown"
+            ]
+        );
+        let corrected = read_grays("0.196", &grays);
+        assert_eq!((corrected.counts().free, corrected.counts().unknown), (32, 16));
+        assert!(findings(&corrected).is_empty());
+    }
+
+    #[test]
+    fn another_gray_that_is_free_is_suspicious_where_it_is_no_accident() {
+        let grays = [[216; 16], [0; 16], [254; 16], [254; 16]].concat();
+        let map = read_grays("0.196", &grays);
+        assert_eq!(
+            findings(&map),
+            [
+                "suspicious: pixels of the gray 216 are free, because free_thresh is 0.196 (25.0 % of all \
+              pixels) (16 times); set `free_thresh: 0.152` if they are unknown"
+            ]
+        );
+        assert_eq!(read_grays("0.152", &grays).counts().unknown, 16);
+        let noise = [vec![216], vec![254; 199]].concat();
+        assert!(findings(&read_grays("0.196", &noise)).is_empty());
+    }
+
+    #[test]
+    fn the_threshold_that_is_advised_for_a_gray_makes_it_unknown_and_lighter_ones_free() {
+        // Darker ones are occupied.
+        for gray in 90..MIN_LIGHT_GRAY {
+            let reading = OccupancyRule { free_thresh: thresh_above(gray), ..READING };
+            assert_ne!(reading.cell(gray as f64), Free, "{gray}");
+            assert_eq!(reading.cell(gray as f64 + 1.0), Free, "{gray}");
+        }
     }
 
     #[test]
