@@ -8,7 +8,7 @@ mod remarks;
 mod robots;
 pub(super) mod unused_keys;
 
-use self::map::{load_map, padded};
+use self::map::{LoadedMap, load_map, padded};
 use self::placer::Placement;
 pub(super) use self::placer::Placer;
 use super::kinds::Kinds;
@@ -144,12 +144,14 @@ impl<'a> Compiler<'a> {
         let (sensors, effectors) = known_tables(&source, &file)?;
         // Where the map is wrong as well, this is the error that is reported.
         check_names(&source, &file, &sensors, &effectors)?;
-        let (map, office_doors) = load_map(&source, &file.map)?;
+        let LoadedMap { map, doors: office_doors, remarks: map_remarks } =
+            load_map(&source, &file.map)?;
         unused_keys::refuse_unused(&source, &file, own, !office_doors.is_empty())?;
         let kinds = Kinds::new(&source, &file)?;
         check_tables(&kinds, &sensors, &effectors)?;
         remarks::refuse_other_boxes(&source, &file, map.box_size_m, &effectors)?;
-        let mut remarks = remarks::effector_remarks(&file, &effectors);
+        let mut remarks = map_remarks;
+        remarks.extend(remarks::effector_remarks(&file, &effectors));
         remarks.extend(remarks::radio_remark(&file));
         let streams = Streams::new(Seed(head.seed));
         let border = border(&file, &effectors);

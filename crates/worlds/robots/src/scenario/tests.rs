@@ -193,6 +193,25 @@ fn an_effector_that_was_learned_for_other_boxes_is_refused() {
 }
 
 #[test]
+fn a_map_file_that_is_probably_meant_otherwise_is_warned_of() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let yaml = "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n\
+                occupied_thresh: 0.65\nfree_thresh: 0.25\n";
+    std::fs::write(folder.path().join("m.yaml"), yaml).expect("written");
+    std::fs::write(folder.path().join("m.pgm"), "P2 4 1 255 205 0 254 254").expect("written");
+    let warehouse = "type octile\nheight 1\nwidth 3\nmap\n.E.\n";
+    std::fs::write(folder.path().join("m.map"), warehouse).expect("written");
+    let of = |name: &str| {
+        let map = format!("[map]\nfile = \"{name}\"\nbox_size_m = 0.5\n[robots]\ncount = 1\n");
+        remarks(&text("", &map), folder.path()).remove(0)
+    };
+    let gray = of("m.yaml");
+    assert_eq!((gray.severity, gray.key.as_str()), (Severity::Warning, "map.file"));
+    assert!(gray.words.contains("(25.0 % of all pixels)"), "{gray:?}");
+    assert_eq!(of("m.map").severity, Severity::Note);
+}
+
+#[test]
 fn an_author_is_told_what_will_surprise() {
     let surprising = "[[robots]]\ncount = 1\neffector = \"wheels\"\nsensors = [\"eye\"]\n\
         [people]\ncount = 1\n[effectors.wheels]\nbox_m = 0.5\n\

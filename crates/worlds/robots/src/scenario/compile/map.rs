@@ -1,21 +1,31 @@
 //! Compilation of the map section to boxes.
 
 use super::*;
-use sidestep_import::GridOptions;
+use sidestep_import::{GridOptions, ImportReport, ImportedMap, Treatment};
 
 /// Longest side of a map: poses are recorded with 15 bits per coordinate, and the border takes some of that on
 /// both sides.
 const MAX_SIDE_BOXES: u32 = (1 << 15) - 2 * MAX_PATH_STEPS as u32;
 
-/// Returns the map of a scenario, and the doors that a generated office has.
+/// The map of a scenario.
+pub(super) struct LoadedMap {
+    pub(super) map: Arc<GridMap>,
+    /// The doors that a generated office has.
+    pub(super) doors: Vec<Rect>,
+    /// What will surprise about the map's file.
+    pub(super) remarks: Vec<Remark>,
+}
+
+/// Returns the map of a scenario.
 ///
 /// # Errors
 /// When the map cannot be read, is absurdly large, or has no free box.
 pub(super) fn load_map(
     source: &Source,
     section: &Spanned<MapSection>,
-) -> Result<(Arc<GridMap>, Vec<Rect>), InputError> {
-    let (map, doors) = read_map(source, section)?;
+) -> Result<LoadedMap, InputError> {
+    let (imported, doors) = read_map(source, section)?;
+    let ImportedMap { map, report } = imported;
     if map.width() > MAX_SIDE_BOXES || map.height() > MAX_SIDE_BOXES {
         let cause = format!("a map of {} x {} boxes", map.width(), map.height());
         let remedy = format!("use larger boxes: at most {MAX_SIDE_BOXES} a side");
@@ -25,13 +35,28 @@ pub(super) fn load_map(
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
         return Err(source.error(section.span(), "the map has no free box", remedy));
     }
-    Ok((Arc::new(map), doors))
+    Ok(LoadedMap { map: Arc::new(map), doors, remarks: file_remarks(&report) })
+}
+
+/// Returns what a scenario's author has to know of the map's file: warnings where the map may be another than meant.
+fn file_remarks(report: &ImportReport) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    for finding in &report.findings {
+        let words = finding.to_string();
+        remarks.push(match finding.treatment {
+            Treatment::Guessed | Treatment::Suspicious => Remark::warning("map.file", words),
+            Treatment::Dropped | Treatment::Repaired | Treatment::NotUsed => {
+                Remark::note("map.file", words)
+            }
+        });
+    }
+    remarks
 }
 
 fn read_map(
     source: &Source,
     section: &Spanned<MapSection>,
-) -> Result<(GridMap, Vec<Rect>), InputError> {
+) -> Result<(ImportedMap, Vec<Rect>), InputError> {
     let s = section.get_ref();
     if let (Some(_), None) = (&s.resolution_m, &s.file) {
         let cause = "`resolution_m` is the side of a pixel, and there is no image";
@@ -47,19 +72,19 @@ fn read_map(
         (Some(file), None, None) => {
             let resolution_m = s.resolution_m.map(f64::from);
             let boxes = GridOptions { box_size_m, resolution_m, unknown: s.unknown };
-            let map = sidestep_import::load_map(&source.path(file.get_ref()), boxes);
-            let map = map.map_err(|error| source.with_key_at(file.span(), error))?;
-            Ok((map, Vec::new()))
+            let imported = sidestep_import::import_map(&source.path(file.get_ref()), boxes);
+            let imported = imported.map_err(|error| source.with_key_at(file.span(), error))?;
+            Ok((imported, Vec::new()))
         }
         (None, Some(art), None) => {
             let place = format!("{} (map.ascii)", source.place);
             let map = sidestep_import::ascii::parse(&place, art, box_size_m)?;
-            Ok((map.with_unknown(s.unknown), Vec::new()))
+            Ok((without_report(map.with_unknown(s.unknown)), Vec::new()))
         }
         (None, None, Some(spec)) => {
             let office = spec.get_ref().build(box_size_m);
             let office = office.map_err(|error| source.error_from(spec.span(), &error))?;
-            Ok((office.map, office.doors))
+            Ok((without_report(office.map), office.doors))
         }
         _ => {
             let cause = "the map needs exactly one of `file`, `ascii` and `office`";
@@ -67,6 +92,11 @@ fn read_map(
             Err(source.error(section.span(), cause, remedy))
         }
     }
+}
+
+/// Returns a map that is from no file.
+fn without_report(map: GridMap) -> ImportedMap {
+    ImportedMap { map, report: ImportReport::default() }
 }
 
 /// Returns the map with its border, one byte per box, in the form in which states start.
