@@ -4,7 +4,7 @@ use crate::console::{Console, terminal_columns};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use sidestep::import::{GridOptions, load_map, load_pixel_map};
+use sidestep::import::{GridOptions, ImportReport, ImportedMap, import_map, load_pixel_map};
 use sidestep::kernel::InputError;
 use sidestep::kernel::view::{Frame, Scenery};
 use sidestep::map::{CellCounts, GridMap, UnknownPolicy};
@@ -23,7 +23,8 @@ Examples:
 Reads ROS map_server (.yaml), images (.png, .pgm: dark is wall, light is free, between is \
 unknown), MovingAI (.map) and character maps (.txt), each also with .gz. \
 In the terminal: # wall, . free, ? unknown, numbers count boxes; a wide map is drawn smaller and \
-loses no wall.";
+loses no wall. What was guessed in the file, is suspicious or not used goes to standard error, and with \
+--json into the field report.";
 
 /// Show a map as the simulator sees it, in the terminal or as PNG.
 #[derive(Debug, Args)]
@@ -86,12 +87,17 @@ struct MapCounts {
     width_boxes: u32,
     height_boxes: u32,
     boxes: CellCounts,
+    /// What became of the file.
+    report: ImportReport,
 }
 
 /// # Errors
 /// When the map is wrong, or the picture cannot be written.
 pub(crate) fn map(args: &MapArgs, console: Console) -> Result<ExitCode, Failure> {
     let (counts, map) = read(args)?;
+    for finding in &counts.report.findings {
+        console.note(format!("note: {finding}"));
+    }
     if let Some(png) = &args.png {
         draw_boxes(&map, &args.file, png)?;
     }
@@ -110,14 +116,18 @@ fn read(args: &MapArgs) -> Result<(MapCounts, GridMap), InputError> {
             resolution_m: args.resolution_m,
             unknown: UnknownPolicy::Keep,
         };
-        let map = load_map(&args.file, options)?;
+        let ImportedMap { map, report } = import_map(&args.file, options)?;
         let pixels = map.counts();
         let map = map.with_unknown(policy);
-        return Ok((counts(&map, (map.width(), map.height()), pixels, map.box_size_m), map));
+        let mut counts = counts(&map, (map.width(), map.height()), pixels, map.box_size_m);
+        counts.report = report;
+        return Ok((counts, map));
     };
     let map = pixels.to_boxes(args.box_size_m, policy)?;
     let size = (pixels.width(), pixels.height());
-    Ok((counts(&map, size, pixels.counts(), pixels.resolution_m()), map))
+    let mut counts = counts(&map, size, pixels.counts(), pixels.resolution_m());
+    counts.report = pixels.into_report();
+    Ok((counts, map))
 }
 
 fn counts(
@@ -139,6 +149,7 @@ fn counts(
         width_boxes: map.width(),
         height_boxes: map.height(),
         boxes: map.counts(),
+        report: ImportReport::default(),
     }
 }
 

@@ -122,6 +122,12 @@ fn map_counts_pixels_and_boxes() {
     assert_eq!(map["boxes"], serde_json::json!({ "free": 0, "wall": 1, "unknown": 1 }));
     let walls = place.json(&["map", "m.yaml", "--box", "1.0", "--unknown", "wall"]);
     assert_eq!(walls["boxes"]["wall"], 2);
+    assert_eq!(walls["report"]["findings"], serde_json::json!([]));
+    place.write("m.pgm", "P2\n4 2\n255\n0 254 254 254\n254 254 216 254\n");
+    let found = place.json(&["map", "m.yaml"])["report"]["findings"][0].clone();
+    assert_eq!((&found["treatment"], &found["count"]), (&"suspicious".into(), &1.into()));
+    let told = place.run(&["map", "m.yaml"]).err();
+    assert!(told.starts_with("note: suspicious: pixels of the gray 216 are free"), "{told}");
 }
 
 #[test]
