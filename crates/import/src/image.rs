@@ -213,6 +213,67 @@ mod tests {
         assert_eq!(brightness(&png(gray)), [9.0]);
     }
 
+    /// The bytes of a PNG of the given header (depth and color type among it) with chunks before its data; each row
+    /// begins with the byte of its filter.
+    fn raw_png(header: [u8; 13], chunks: &[(&[u8; 4], &[u8])], rows: &[u8]) -> Vec<u8> {
+        let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut packed, rows).expect("memory takes all");
+        let data = packed.finish().expect("memory takes all");
+        let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+        let all = [&[(b"IHDR", &header[..])][..], chunks, &[(b"IDAT", &data[..]), (b"IEND", &[])]];
+        for (name, content) in all.concat() {
+            let mut crc = flate2::Crc::new();
+            crc.update(name);
+            crc.update(content);
+            bytes.extend_from_slice(&(content.len() as u32).to_be_bytes());
+            bytes.extend_from_slice(name);
+            bytes.extend_from_slice(content);
+            bytes.extend_from_slice(&crc.sum().to_be_bytes());
+        }
+        bytes
+    }
+
+    /// A header for one row of 8 bits a sample or less.
+    fn header(width: u8, bits: u8, color_type: u8) -> [u8; 13] {
+        [0, 0, 0, width, 0, 0, 0, 1, bits, color_type, 0, 0, 0]
+    }
+
+    fn shades(bytes: Vec<u8>) -> Vec<(f64, f64)> {
+        let image = Bitmap::decode("test", bytes).expect("an image");
+        image.map_shades(|shade| (shade.brightness, shade.opacity))
+    }
+
+    #[test]
+    fn colors_of_a_palette_are_looked_up_with_their_opacity() {
+        // White is the first color and black the second, as no order of indices would have it.
+        let palette: &[u8] = &[254, 254, 254, 0, 0, 0, 205, 205, 205, 30, 60, 90];
+        let chunks: &[(&[u8; 4], &[u8])] = &[(b"PLTE", palette)];
+        let eight_bits = raw_png(header(4, 8, 3), chunks, &[0, 0, 1, 2, 3]);
+        assert_eq!(shades(eight_bits), [(254.0, 1.0), (0.0, 1.0), (205.0, 1.0), (60.0, 1.0)]);
+        let two_bits = raw_png(header(4, 2, 3), chunks, &[0, 0b0001_1011]);
+        assert_eq!(shades(two_bits), [(254.0, 1.0), (0.0, 1.0), (205.0, 1.0), (60.0, 1.0)]);
+        let with_opacity: &[(&[u8; 4], &[u8])] = &[(b"PLTE", palette), (b"tRNS", &[255, 255, 0])];
+        let transparent = raw_png(header(3, 8, 3), with_opacity, &[0, 0, 1, 2]);
+        assert_eq!(shades(transparent), [(254.0, 1.0), (0.0, 1.0), (205.0, 0.0)]);
+    }
+
+    #[test]
+    fn a_gray_that_a_png_declares_transparent_is() {
+        let chunks: &[(&[u8; 4], &[u8])] = &[(b"tRNS", &[0, 205])];
+        let gray = raw_png(header(3, 8, 0), chunks, &[0, 0, 205, 254]);
+        assert_eq!(shades(gray), [(0.0, 1.0), (205.0, 0.0), (254.0, 1.0)]);
+        let deep = raw_png(header(2, 16, 0), &[(b"tRNS", &[205, 205])], &[0, 205, 205, 0, 0]);
+        assert_eq!(shades(deep), [(205.0, 0.0), (0.0, 1.0)]);
+    }
+
+    #[test]
+    fn the_type_of_pixels_is_told() {
+        let told = |bytes| Bitmap::decode("test", bytes).expect("an image").pixel_type();
+        assert_eq!(told(b"P5 1 1 255\n\x00".to_vec()), "gray, 8 bits a channel");
+        let deep = ImageBuffer::from_pixel(1, 1, Rgba([7u16, 7, 7, 9]));
+        assert_eq!(told(png(deep)), "color with opacity, 16 bits a channel");
+    }
+
     fn opacity(image: impl Into<DynamicImage>) -> Vec<f64> {
         let image = Bitmap::decode("test", png(image)).expect("an image");
         image.map_shades(|shade| shade.opacity)

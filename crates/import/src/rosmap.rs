@@ -124,6 +124,9 @@ fn cells_from_bottom(
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
     survey.record_grays(thresholds, report);
+    if reading.mode != MapMode::Raw {
+        record_single_kind(&from_top, &survey, report);
+    }
     from_top.rchunks(image.width() as usize).flatten().copied().collect()
 }
 
@@ -148,17 +151,26 @@ struct Survey {
     opaque_free: usize,
     /// Number of those of each whole gray.
     free_grays: [usize; 256],
+    /// The darkest and the lightest brightness.
+    range: [f64; 2],
 }
 
 impl Survey {
     fn of(image: &Bitmap, reading: OccupancyRule) -> Self {
-        let mut survey = Self { pixels: 0, transparent: 0, opaque_free: 0, free_grays: [0; 256] };
+        let mut survey = Self {
+            pixels: 0,
+            transparent: 0,
+            opaque_free: 0,
+            free_grays: [0; 256],
+            range: [255.0, 0.0],
+        };
         image.map_shades(|shade| survey.add(shade, reading));
         survey
     }
 
     fn add(&mut self, shade: Shade, reading: OccupancyRule) {
         self.pixels += 1;
+        self.range = [self.range[0].min(shade.brightness), self.range[1].max(shade.brightness)];
         if shade.opacity < 1.0 {
             self.transparent += 1;
         } else if reading.cell(shade.brightness) == Cell::Free {
@@ -204,6 +216,23 @@ impl Survey {
     /// Returns a number of pixels as a share of all.
     fn share(&self, pixels: usize) -> String {
         format!("{:.1} % of all pixels", 100.0 * pixels as f64 / self.pixels as f64)
+    }
+}
+
+/// Records that no pixel is free, or none is occupied: such a map is of no use, and mostly read otherwise than meant.
+fn record_single_kind(cells: &[Cell], survey: &Survey, report: &mut ImportReport) {
+    let [darkest, lightest] = survey.range;
+    for (cell, word) in [(Cell::Free, "free"), (Cell::Wall, "occupied")] {
+        if cells.contains(&cell) {
+            continue;
+        }
+        let rule = format!(
+            "no pixel is {word}; the darkest has {darkest:.0} and the lightest {lightest:.0} of 255"
+        );
+        let remedy = "dark pixels have to be walls and light ones free; for the contrary set \
+                      `negate: 1` in the .yaml file, and for values that do not reach from 0 to 255 \
+                      stretch the contrast of the image";
+        report.record(Treatment::Suspicious, rule, "", remedy);
     }
 }
 
@@ -289,7 +318,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use ::image::{ImageBuffer, LumaA, Rgba};
+    use ::image::{ImageBuffer, Luma, LumaA, Rgba};
     use Cell::{Free, Unknown, Wall};
 
     const READING: OccupancyRule = OccupancyRule::DEFAULT;
@@ -527,7 +556,7 @@ mod tests {
             ]
         );
         assert_eq!(read_grays("0.152", &grays).counts().unknown, 16);
-        let noise = [vec![216], vec![254; 199]].concat();
+        let noise = [vec![216, 0], vec![254; 198]].concat();
         assert!(findings(&read_grays("0.196", &noise)).is_empty());
     }
 
@@ -539,6 +568,40 @@ mod tests {
             assert_ne!(reading.cell(gray as f64), Free, "{gray}");
             assert_eq!(reading.cell(gray as f64 + 1.0), Free, "{gray}");
         }
+    }
+
+    #[test]
+    fn an_image_of_16_bits_that_uses_few_of_them_is_suspicious() {
+        // Values from 0 to 255 in 16 bits: as good as black.
+        let image = ImageBuffer::from_fn(4, 1, |x, _| Luma([x as u16 * 85]));
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.png");
+        image.save(&path).expect("written");
+        let map = load_image(&path, 0.5).expect("a map");
+        assert_eq!(map.counts().wall, 4);
+        let found = findings(&map);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with(
+                "suspicious: no pixel is free; the darkest has 0 and the lightest 1 of 255"
+            ),
+            "{found:?}"
+        );
+        let stretched = ImageBuffer::from_fn(4, 1, |x, _| Luma([x as u16 * 21845]));
+        stretched.save(&path).expect("written");
+        let map = load_image(&path, 0.5).expect("a map");
+        assert_eq!(map.pixels(), [Wall, Wall, Unknown, Free]);
+        assert!(findings(&map).is_empty());
+    }
+
+    #[test]
+    fn a_map_without_walls_is_suspicious() {
+        let found = findings(&read_grays("0.196", &[254; 8]));
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with("suspicious: no pixel is occupied; the darkest has 254"),
+            "{found:?}"
+        );
     }
 
     #[test]
