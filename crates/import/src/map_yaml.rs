@@ -28,6 +28,8 @@ pub(super) struct MapMetadata {
     pub(super) plane: Isometry2,
     /// The conversion of pixels into cells.
     pub(super) reading: OccupancyRule,
+    /// Keys that mean nothing to `map_server`, each with its line.
+    pub(super) unused_keys: Vec<(String, usize)>,
 }
 
 impl MapMetadata {
@@ -39,6 +41,7 @@ impl MapMetadata {
             plane: document.plane()?,
             reading: document.occupancy_rule()?,
             image: document.image(folder)?,
+            unused_keys: document.unused_keys(),
         })
     }
 }
@@ -148,9 +151,20 @@ impl<'a> Document<'a> {
         let plain = folder.join(name);
         let compressed = folder.join(format!("{name}.gz"));
         [plain, compressed].into_iter().find(|path| path.is_file()).ok_or_else(|| {
-            let cause = format!("there is no image file `{name}`");
+            let cause = format!("there is no image file `{}`", name.escape_debug());
             self.error(value, cause, "give the image's path, relative to this file's folder")
         })
+    }
+
+    fn unused_keys(&self) -> Vec<(String, usize)> {
+        let mut unused = Vec::new();
+        for (key, _) in self.root.data.as_mapping().into_iter().flatten() {
+            let name = key.data.as_str().unwrap_or("a key that is no text");
+            if !KNOWN_KEYS.contains(&name) {
+                unused.push((name.to_string(), key.span.start.line()));
+            }
+        }
+        unused
     }
 
     fn value(&self, key: &str) -> Result<&MarkedYaml<'a>, InputError> {
@@ -172,6 +186,9 @@ impl<'a> Document<'a> {
         InputError::new(self.place, cause, remedy).with_byte_offset(self.text, offset)
     }
 }
+
+const KNOWN_KEYS: [&str; 7] =
+    ["image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode"];
 
 const KEYS: &str = "write the keys image, resolution, origin, negate, occupied_thresh and \
                     free_thresh, and mode if you like";
@@ -314,8 +331,10 @@ free_thresh: 0.196
 
     #[test]
     fn comments_unknown_keys_and_boolean_negation_are_tolerated() {
-        let meta = with("negate: 0", "frame: map\nnegate: 1   # white is occupied");
-        assert!(meta.expect("read").reading.negate);
+        let meta = with("negate: 0", "frame: map\nnegate: 1   # white is occupied").expect("read");
+        assert!(meta.reading.negate);
+        assert_eq!(meta.unused_keys, [("frame".to_string(), 4)]);
+        assert_eq!(parse(YAML).expect("read").unused_keys, []);
         assert!(with("negate: 0", "negate: true").expect("read").reading.negate);
         assert!(!with("negate: 0", "negate: false").expect("read").reading.negate);
     }

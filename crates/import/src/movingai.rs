@@ -203,7 +203,7 @@ const HEADER_REMEDY: &str = "begin with the lines `type octile`, `height H`, `wi
 /// Reads a size of the header; errors point at the word.
 fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
     word.parse().map_err(|_| {
-        let cause = format!("`{word}` is not a whole number");
+        let cause = format!("`{}` is not a whole number", word.escape_debug());
         source.error(source.offset_of(word), cause, HEADER_REMEDY)
     })
 }

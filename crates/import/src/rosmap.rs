@@ -45,6 +45,10 @@ pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
     let image = Bitmap::load(&meta.image)?;
     let mut report = ImportReport::new("ROS map (map_server)");
+    for (key, line) in meta.unused_keys {
+        let rule = format!("the key `{}`", key.escape_debug());
+        report.record(Treatment::NotUsed, rule, format!("line {line}"), "");
+    }
     let cells = cells_from_bottom(&image, ThresholdSource::Yaml(meta.reading), &mut report);
     let size = [image.width(), image.height()];
     let map = PixelMap::new(size[0], size[1], meta.resolution_m, meta.plane, cells);
@@ -123,6 +127,7 @@ fn cells_from_bottom(
     let ground = TransparentGround::of(&survey, reading.mode);
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
+    survey.record_shades(reading.mode, report);
     survey.record_grays(thresholds, report);
     if reading.mode != MapMode::Raw {
         record_single_kind(&from_top, &survey, report);
@@ -151,6 +156,8 @@ struct Survey {
     opaque_free: usize,
     /// Number of those of each whole gray.
     free_grays: [usize; 256],
+    /// Number of opaque pixels between free and occupied.
+    opaque_between: usize,
     /// The darkest and the lightest brightness.
     range: [f64; 2],
 }
@@ -161,6 +168,7 @@ impl Survey {
             pixels: 0,
             transparent: 0,
             opaque_free: 0,
+            opaque_between: 0,
             free_grays: [0; 256],
             range: [255.0, 0.0],
         };
@@ -173,12 +181,33 @@ impl Survey {
         self.range = [self.range[0].min(shade.brightness), self.range[1].max(shade.brightness)];
         if shade.opacity < 1.0 {
             self.transparent += 1;
-        } else if reading.cell(shade.brightness) == Cell::Free {
-            self.opaque_free += 1;
-            if shade.brightness.fract() == 0.0 {
-                self.free_grays[shade.brightness as usize] += 1;
+            return;
+        }
+        match reading.cell(shade.brightness) {
+            Cell::Wall => {}
+            Cell::Unknown => self.opaque_between += 1,
+            Cell::Free => {
+                self.opaque_free += 1;
+                if shade.brightness.fract() == 0.0 {
+                    self.free_grays[shade.brightness as usize] += 1;
+                }
             }
         }
+    }
+
+    /// Records shades that `map_server` gives an occupancy between free and occupied.
+    fn record_shades(&self, mode: MapMode, report: &mut ImportReport) {
+        if mode != MapMode::Scale || self.opaque_between == 0 {
+            return;
+        }
+        report.findings.push(Finding {
+            treatment: Treatment::NotUsed,
+            rule: "shades between free and occupied of the mode scale, which are unknown"
+                .to_string(),
+            count: self.opaque_between as u64,
+            places: Vec::new(),
+            remedy: String::new(),
+        });
     }
 
     /// Records grays between black and white that are read as free, and can hardly be meant so.
@@ -485,6 +514,20 @@ mod tests {
         assert!(findings(&row).is_empty());
         let unexplored = read_row("mode: scale\nnegate: 0", &[[0, 255], [127, 0]]);
         assert_eq!(unexplored.pixels(), [Wall, Unknown]);
+    }
+
+    #[test]
+    fn shades_and_keys_that_are_not_used_are_reported() {
+        let row =
+            read_row("frame_id: map\nmode: scale\nnegate: 0", &[[0, 255], [100, 255], [255, 255]]);
+        assert_eq!(row.pixels(), [Wall, Unknown, Free]);
+        assert_eq!(
+            findings(&row),
+            [
+                "not used: the key `frame_id`, line 1",
+                "not used: shades between free and occupied of the mode scale, which are unknown",
+            ]
+        );
     }
 
     #[test]
