@@ -47,7 +47,7 @@ impl PixelMap {
 
     /// Returns the same map with the report of its file.
     #[must_use]
-    pub(super) fn with_report(mut self, report: ImportReport) -> Self {
+    pub fn with_report(mut self, report: ImportReport) -> Self {
         self.report = report;
         self
     }

@@ -11,7 +11,7 @@ use super::report::MapComparison;
 use crate::track::{Gaps, Pose2, pose_at};
 use sidestep_import::bag::BagLog;
 use sidestep_import::bag::messages::LaserScan;
-use sidestep_import::{PixelMap, RayHit};
+use sidestep_import::{PixelMap, RayHit, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{atan2, cos, hypot, sin};
 use sidestep_kernel::view;
@@ -60,6 +60,7 @@ pub(super) fn learn(
     report.skipped_by_cause = judged.skipped;
     report.warnings.extend(against.warning(MAX_IN_FRONT_FRACTION));
     report.warnings.extend(mount_warning(log));
+    report.warnings.extend(map_warnings(map));
     report.against_map = Some(against);
     model.profile = with_walls_only(model.profile);
     Ok(model)
@@ -80,6 +81,17 @@ fn mount_warning(log: &BagLog) -> Option<String> {
         "no static transform places the frame `{frame}` of the scans on the robot (/tf_static): the scanner \
          is taken to sit in its middle and to look ahead"
     ))
+}
+
+/// Returns what may make the map another than the one that its author means.
+fn map_warnings(map: &PixelMap) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for finding in &map.report().findings {
+        if matches!(finding.treatment, Treatment::Guessed | Treatment::Suspicious) {
+            warnings.push(format!("the map: {finding}"));
+        }
+    }
+    warnings
 }
 
 /// Returns the options with the fan and the range of the scans, where no others are asked for.
@@ -246,6 +258,7 @@ impl ScannerMount {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::ImportReport;
     use sidestep_import::bag::messages::{Header, Time};
     use sidestep_import::mrclam::StampedPose2;
     use sidestep_kernel::view::Isometry2;
@@ -289,6 +302,15 @@ mod tests {
             scans,
             mount: Some(view::Pose::from_position([0.0; 3])),
         }
+    }
+
+    #[test]
+    fn what_is_suspicious_about_the_map_is_a_warning_and_what_is_not_used_none() {
+        let mut report = ImportReport::new("ROS map");
+        report.record(Treatment::Suspicious, "gray 205 is free", "", "");
+        report.record(Treatment::NotUsed, "the key `frame`", "line 1", "");
+        let map = room().with_report(report);
+        assert_eq!(map_warnings(&map), ["the map: suspicious: gray 205 is free"]);
     }
 
     fn learned(log: &BagLog) -> Result<LearnedSensor, InputError> {
