@@ -268,10 +268,11 @@ mod tests {
 
     #[test]
     fn the_type_of_pixels_is_told() {
-        let told = |bytes| Bitmap::decode("test", bytes).expect("an image").pixel_type();
-        assert_eq!(told(b"P5 1 1 255\n\x00".to_vec()), "gray, 8 bits a channel");
-        let deep = ImageBuffer::from_pixel(1, 1, Rgba([7u16, 7, 7, 9]));
-        assert_eq!(told(png(deep)), "color with opacity, 16 bits a channel");
+        let gray = Bitmap::decode("test", b"P5 1 1 255\n\x00".to_vec()).expect("an image");
+        assert_eq!(gray.pixel_type(), "gray, 8 bits a channel");
+        let deep = png(ImageBuffer::from_pixel(1, 1, Rgba([7u16, 7, 7, 9])));
+        let deep = Bitmap::decode("test", deep).expect("an image");
+        assert_eq!(deep.pixel_type(), "color with opacity, 16 bits a channel");
     }
 
     fn opacity(image: impl Into<DynamicImage>) -> Vec<f64> {

@@ -192,6 +192,11 @@ fn an_effector_that_was_learned_for_other_boxes_is_refused() {
     assert!(error.remedy().contains("--box 0.5"), "{error}");
 }
 
+fn first_remark_on_map(folder: &Path, file: &str) -> Remark {
+    let map = format!("[map]\nfile = \"{file}\"\nbox_size_m = 0.5\n[robots]\ncount = 1\n");
+    remarks(&text("", &map), folder).remove(0)
+}
+
 #[test]
 fn a_map_file_that_is_probably_meant_otherwise_is_warned_of() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -201,14 +206,10 @@ fn a_map_file_that_is_probably_meant_otherwise_is_warned_of() {
     std::fs::write(folder.path().join("m.pgm"), "P2 4 1 255 205 0 254 254").expect("written");
     let warehouse = "type octile\nheight 1\nwidth 3\nmap\n.E.\n";
     std::fs::write(folder.path().join("m.map"), warehouse).expect("written");
-    let of = |name: &str| {
-        let map = format!("[map]\nfile = \"{name}\"\nbox_size_m = 0.5\n[robots]\ncount = 1\n");
-        remarks(&text("", &map), folder.path()).remove(0)
-    };
-    let gray = of("m.yaml");
+    let gray = first_remark_on_map(folder.path(), "m.yaml");
     assert_eq!((gray.severity, gray.key.as_str()), (Severity::Warning, "map.file"));
     assert!(gray.words.contains("(25.0 % of all pixels)"), "{gray:?}");
-    assert_eq!(of("m.map").severity, Severity::Note);
+    assert_eq!(first_remark_on_map(folder.path(), "m.map").severity, Severity::Note);
 }
 
 #[test]
