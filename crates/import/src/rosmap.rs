@@ -15,7 +15,7 @@
 //!
 //! Transparency: `map_saver` of Nav2 writes unknown pixels as transparent ones in the mode `scale`, and there they are
 //! unknown, as in `map_server`. In the mode `trinary` and in images without a YAML file it is guessed what they mean:
-//! see [`TransparentGround`]. The mode `raw` does not look at it, as `map_server` does not.
+//! see `TransparentGround`. The mode `raw` does not look at it, as `map_server` does not.
 //!
 //! What is guessed, and what can hardly be right, is in the report of the map.
 

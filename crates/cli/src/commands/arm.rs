@@ -1,7 +1,7 @@
 //! Arms of robot models: the options that choose one and its posture, and both as text and JSON.
 
 use super::arm_picture::ArmPicture;
-use crate::console::{align_pairs, format_fixed};
+use crate::console::{Console, align_pairs, format_fixed};
 use clap::Args;
 use serde::Serialize;
 use sidestep::arms::kinematics::{
@@ -53,8 +53,11 @@ impl ArmArgs {
     ///
     /// # Errors
     /// When a file, a link, a group, the posture or the values are wrong.
-    pub(crate) fn load(&self) -> Result<Arm, InputError> {
+    pub(crate) fn load(&self, console: Console) -> Result<Arm, InputError> {
         let selection = self.files().load()?;
+        for finding in &selection.model.report.findings {
+            console.note(format!("note: {finding}"));
+        }
         let (place, values) = match &self.joints {
             Some(text) => ("--joints", parse_numbers("--joints", text)?),
             None => ("--posture", selection.named_posture(self.posture.as_deref())?),

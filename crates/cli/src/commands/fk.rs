@@ -36,7 +36,7 @@ pub(crate) struct FkArgs {
 /// # Errors
 /// When a file, a link, the posture or the values are wrong.
 pub(crate) fn fk(args: &FkArgs, console: Console) -> Result<ExitCode, Failure> {
-    let arm = args.arm.load()?;
+    let arm = args.arm.load(console)?;
     let positions = arm.positions(&arm.values);
     if let Some(path) = &args.png {
         positions.picture(None, &[]).write(path)?;

@@ -104,7 +104,7 @@ pub(crate) struct IkArgs {
 /// # Errors
 /// When a file, a link, the posture, the values, the target or an obstacle is wrong.
 pub(crate) fn ik(args: &IkArgs, console: Console) -> Result<ExitCode, Failure> {
-    let arm = args.arm.load()?;
+    let arm = args.arm.load(console)?;
     if let Some(path) = &args.targets {
         return targets::solve_table(path, &arm, &args.goal, console);
     }
