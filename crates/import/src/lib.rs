@@ -12,6 +12,7 @@ pub mod carmen;
 mod char_map;
 mod extension;
 pub mod image;
+mod imported_map;
 pub mod local_plane;
 mod map_file;
 mod map_yaml;
@@ -32,7 +33,8 @@ mod xml;
 #[cfg(test)]
 mod shared_data;
 
-pub use map_file::{GridOptions, ImportedMap, import_map, load_map, load_pixel_map};
+pub use imported_map::ImportedMap;
+pub use map_file::{GridOptions, import_map, load_map, load_pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
 pub use raycast::RayHit;
 pub use report::{ImportReport, Treatment};

@@ -5,6 +5,7 @@ use std::path::Path;
 use sidestep_kernel::InputError;
 
 use super::extension::extension;
+use super::imported_map::ImportedMap;
 use super::report::ImportReport;
 use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
@@ -18,28 +19,6 @@ pub struct GridOptions {
     pub resolution_m: Option<f64>,
     /// The treatment of unknown boxes.
     pub unknown: UnknownPolicy,
-}
-
-/// A map of boxes that was read from a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ImportedMap {
-    /// The boxes.
-    pub map: GridMap,
-    /// What became of the file.
-    pub report: ImportReport,
-}
-
-impl ImportedMap {
-    /// Completes the report of a map that is given in boxes.
-    pub(super) fn of_boxes(map: GridMap, mut report: ImportReport) -> Self {
-        let boxes = map.counts();
-        let size_m = map.box_size_m;
-        report.add_fact("boxes", format!("{} x {} of {size_m} m", map.width(), map.height()));
-        report.add_kept("free boxes", boxes.free);
-        report.add_kept("walls", boxes.wall);
-        report.add_kept("unknown boxes", boxes.unknown);
-        Self { map, report }
-    }
 }
 
 /// Reads the map at `path` into boxes, as [`import_map`] does, without its report.

@@ -1,6 +1,6 @@
 //! Limits of a joint: its range and its highest speed.
 
-use super::read::MAX_COORDINATE;
+use super::numbers::MAX_COORDINATE;
 use super::{JointKind, Limits};
 use crate::xml::Element;
 use crate::{ImportReport, Treatment};

@@ -9,6 +9,7 @@
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
 mod limits;
+mod numbers;
 mod origin;
 mod read;
 mod shapes;

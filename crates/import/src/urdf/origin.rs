@@ -1,7 +1,7 @@
 //! `<origin>`: a frame in another, by angles or by a quaternion.
 
 use super::Origin;
-use super::read::bounded;
+use super::numbers::bounded;
 use crate::xml::{Element, XmlAttribute};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;

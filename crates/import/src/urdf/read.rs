@@ -1,6 +1,7 @@
 //! URDF text -> [`Model`].
 
 use super::limits::LimitedJoint;
+use super::numbers::{MAX_COORDINATE, bounded, bounded_number};
 use super::{Collision, Joint, JointKind, Mimic, Model, Shape};
 use super::{origin, tree, xacro};
 use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
@@ -20,10 +21,6 @@ const JOINT_KINDS: [(&str, JointKind); 6] = [
     ("floating", JointKind::Floating),
     ("planar", JointKind::Planar),
 ];
-
-/// The maximum of a coordinate, and of all other numbers of a joint: no robot has a larger one, and squares must stay
-/// finite.
-pub(super) const MAX_COORDINATE: f64 = 1e6;
 
 /// The maximum number of links, far above that of any known robot.
 const MAX_LINKS: usize = 10_000;
@@ -269,28 +266,6 @@ fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
         let cause = format!("there are no `{}` joints", value.text());
         value.error(cause, suggestion(value.text(), &JOINT_KINDS.map(|(name, _)| name)))
     })
-}
-
-pub(super) fn bounded(value: XmlAttribute) -> Result<[f64; 3], InputError> {
-    let triple = value.triple()?;
-    triple.into_iter().try_for_each(|x| check_bounded(&value, x))?;
-    Ok(triple)
-}
-
-/// Reads one number of a robot's size.
-fn bounded_number(value: XmlAttribute) -> Result<f64, InputError> {
-    let number = value.number()?;
-    check_bounded(&value, number)?;
-    Ok(number)
-}
-
-/// Refuses a number that no robot has, at which lengths would be lost to rounding.
-fn check_bounded(value: &XmlAttribute, x: f64) -> Result<(), InputError> {
-    if x.abs() <= MAX_COORDINATE {
-        return Ok(());
-    }
-    let cause = format!("{x:e} is beyond {MAX_COORDINATE:e}");
-    Err(value.error(cause, "give lengths in meters and angles in radians"))
 }
 
 /// Reads the axis of a joint. Files give fixed joints a zero axis, which means nothing and is not
