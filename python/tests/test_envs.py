@@ -74,7 +74,7 @@ def test_progress_is_what_an_agent_has_come_on(make):
     _, gains, *_ = chain.step(dict(zip(chain.agents, ahead, strict=True)))
     assert list(gains.values()) == chain.sim.observe()["done_share"].tolist()
     with pytest.raises(
-        sidestep.InputError, match="it needs .*`way_points_left`.* or `done_share`, which no agent observes"
+        sidestep.InputError, match="it needs .*way_points_left.* or `done_share`, which no agent observes"
     ):
         make(rewards={"progress": 1.0})
     assert all(term.meaning and term.forms for term in TERMS.values())
