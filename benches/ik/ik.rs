@@ -15,7 +15,9 @@ use sidestep_kernel::Seed;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::math::powf;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
-use sidestep_rods::geometry::{Point, add_scaled, angle_rad, distance, normalized, scaled, sub};
+use sidestep_rods::geometry::{
+    Point, add_scaled, angle_between_rad, distance, normalized, scaled, sub,
+};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Obstacles, Rod};
 
 fn draws(index: u64) -> Draws {
@@ -39,7 +41,7 @@ fn walk<const D: usize>(n: usize, spread: f64, draws: &mut Draws) -> Vec<Point<D
 
 fn chain_of<const D: usize>(points: Vec<Point<D>>) -> Chain<D> {
     let n = points.len();
-    let rods = vec![Rod::fixed(1.0, 0.0); n - 1];
+    let rods = vec![Rod::with_fixed_length(1.0, 0.0); n - 1];
     Chain::new(points, vec![Connector::free(0.0); n], rods).expect("right")
 }
 
@@ -278,7 +280,7 @@ impl<const D: usize> Scene<D> {
             let foot = sidestep_rods::geometry::nearest_on_segment(*c, last, next);
             distance(*c, foot) > r + CONNECTOR_M + 1e-3
         });
-        let bends = into.is_none_or(|v| angle_rad(v, u) <= self.max_bend_rad - 1e-6);
+        let bends = into.is_none_or(|v| angle_between_rad(v, u) <= self.max_bend_rad - 1e-6);
         (clear && bends).then_some(next)
     }
 
@@ -288,7 +290,8 @@ impl<const D: usize> Scene<D> {
             Connector { max_bend_rad: self.max_bend_rad, ..Connector::free(CONNECTOR_M) };
         let mut connectors = vec![connector; n];
         connectors[0].mobility = Mobility::Fixed;
-        Chain::new(points, connectors, vec![Rod::fixed(1.0, ROD_M); n - 1]).expect("right")
+        Chain::new(points, connectors, vec![Rod::with_fixed_length(1.0, ROD_M); n - 1])
+            .expect("right")
     }
 }
 
