@@ -3,7 +3,8 @@
 //!
 //! Every reader accepts its file plain or compressed with gzip, refuses absurd sizes before it
 //! allocates memory for them, and reports errors as an [`InputError`](sidestep_kernel::InputError)
-//! with file, line and column.
+//! with file, line and column. Readers of maps and of URDF files record what they dropped, repaired, guessed or did not
+//! use in an [`ImportReport`] beside their data.
 
 pub mod ascii;
 pub mod bag;

@@ -130,44 +130,39 @@ impl ImportReport {
         let dropped = self.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
         dropped.map(|found| found.count).sum()
     }
-
-    /// Adds the findings of another file that belongs to this one.
-    pub fn add_findings_of(&mut self, other: Self) {
-        for finding in other.findings {
-            let known = self
-                .findings
-                .iter_mut()
-                .find(|own| own.treatment == finding.treatment && own.rule == finding.rule);
-            match known {
-                None => self.findings.push(finding),
-                Some(own) => {
-                    own.count += finding.count;
-                    let room = MAX_PLACES - own.places.len().min(MAX_PLACES);
-                    own.places.extend(finding.places.into_iter().take(room));
-                }
-            }
-        }
-    }
 }
 
 /// One line for each finding, as commands print them.
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.treatment.word(), self.rule)?;
+        write!(f, "{}: {}", self.treatment.word(), printable(&self.rule))?;
         if self.count > 1 {
             write!(f, " ({} times)", self.count)?;
         }
         if !self.places.is_empty() {
-            write!(f, ", {}", self.places.join(", "))?;
+            write!(f, ", {}", printable(&self.places.join(", ")))?;
             if self.count > self.places.len() as u64 {
                 write!(f, ", ...")?;
             }
         }
         if !self.remedy.is_empty() {
-            write!(f, "; {}", self.remedy)?;
+            write!(f, "; {}", printable(&self.remedy))?;
         }
         Ok(())
     }
+}
+
+/// Returns a text with its control characters escaped: names that a file gives must not reach the terminal as commands.
+fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
 }
 
 #[cfg(test)]
@@ -196,15 +191,10 @@ mod tests {
     }
 
     #[test]
-    fn findings_of_a_second_file_are_added_to_those_of_the_first() {
-        let mut first = ImportReport::new("bag");
-        first.record(Treatment::Dropped, "messages", "0.mcap", "");
-        let mut second = ImportReport::new("bag");
-        second.record(Treatment::Dropped, "messages", "1.mcap", "");
-        second.record(Treatment::Suspicious, "clocks that jump", "", "");
-        first.add_findings_of(second);
-        assert_eq!(first.dropped(), 2);
-        assert_eq!(first.findings[0].places, ["0.mcap", "1.mcap"]);
-        assert_eq!(first.findings.len(), 2);
+    fn control_characters_of_a_file_are_shown_and_not_executed() {
+        let mut report = ImportReport::new("URDF");
+        report.record(Treatment::Guessed, "the tip is `\u{1b}[31mhand`", "", "");
+        let line = report.findings[0].to_string();
+        assert_eq!(line, "guessed: the tip is `\\u{1b}[31mhand`");
     }
 }

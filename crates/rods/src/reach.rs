@@ -61,14 +61,14 @@ pub enum ReachOutcome<const D: usize> {
 
 /// A connector that is held, its place before, and its constraint.
 #[derive(Debug, Clone, Copy)]
-struct HeldConnector<const D: usize> {
+struct ConstrainedConnector<const D: usize> {
     k: usize,
     home: Point<D>,
     mobility: Mobility<D>,
     failed: bool,
 }
 
-impl<const D: usize> HeldConnector<D> {
+impl<const D: usize> ConstrainedConnector<D> {
     /// Returns the place to which the connector is to return.
     fn home_position(&self, chain: &Chain<D>) -> Point<D> {
         if self.failed {
@@ -87,7 +87,7 @@ struct ReachSolver<'a, const D: usize> {
     chain: &'a mut Chain<D>,
     obstacles: &'a Obstacles<D>,
     request: &'a ReachRequest<D>,
-    held: &'a [HeldConnector<D>],
+    held: &'a [ConstrainedConnector<D>],
 }
 
 /// Moves a connector to a target while the base keeps its place, bit for bit, and all other held
@@ -131,14 +131,14 @@ pub fn reach_target<const D: usize>(
 fn held_connectors<const D: usize>(
     chain: &Chain<D>,
     request: &ReachRequest<D>,
-) -> Vec<HeldConnector<D>> {
+) -> Vec<ConstrainedConnector<D>> {
     let mut held = Vec::new();
     for (k, connector) in chain.connectors().iter().enumerate() {
         let is_bound = connector.failed || connector.mobility != Mobility::Free;
         if k != request.k && (k == request.base || is_bound) {
             let home = chain.points()[k];
             let Connector { mobility, failed, .. } = *connector;
-            held.push(HeldConnector { k, home, mobility, failed });
+            held.push(ConstrainedConnector { k, home, mobility, failed });
         }
     }
     held

@@ -44,7 +44,7 @@ impl Model {
         }
         let rule = format!("the tip is `{}` where none is given", self.links[tip]);
         let names = others.iter().map(|&link| format!("`{}`", self.links[link]));
-        let remedy = format!("choose with `tip`: other ends are {}", quote_names(names));
+        let remedy = format!("another end can be given as the tip: {}", quote_names(names));
         report.record(Treatment::Guessed, rule, "", &remedy);
     }
 }
@@ -299,7 +299,7 @@ mod tests {
         assert!(said(arm).is_empty());
         let both = said(&format!("{arm}, c frame fixed, c jaw revolute"));
         let expected = "guessed: the tip is `frame` where none is given; \
-                        choose with `tip`: other ends are `jaw`";
+                        another end can be given as the tip: `jaw`";
         assert_eq!(both, [expected]);
         let jaw = said(&format!("{arm}, c jaw revolute"));
         assert!(jaw[0].contains("the tip is `c`") && jaw[0].contains("`jaw`"), "{jaw:?}");

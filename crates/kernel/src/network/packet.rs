@@ -149,7 +149,7 @@ impl<T: ConversationTopic> PacketHeader<T> {
     }
 }
 
-// Both are part of each packet's way in; out of line they take as long as the rest of it.
+// Inlined, because both read the header of each packet: out of line they were 2 % of the instructions of a chain's team.
 #[inline]
 fn read_u64(bytes: &[u8], offset: usize) -> u64 {
     u64::from_le_bytes(std::array::from_fn(|k| bytes[offset + k]))

@@ -119,8 +119,8 @@ impl SafeManeuver {
         })
     }
 
-    /// Returns its position some seconds after the start of a step. Inlined, because the search of an approach asks for
-    /// it twice in each of its steps.
+    /// Returns its position some seconds after the start of a step.
+    // Inlined, because the search of an approach asks for it twice in each of its steps.
     #[inline]
     fn position_in_step(&self, step: usize, t_s: f64) -> Point {
         self.poses[step].step(self.aircraft.v_m_s, self.omegas_rad_s[step], t_s).at
