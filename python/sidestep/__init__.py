@@ -29,6 +29,7 @@ from ._errors import (
     ReplayError,
     SidestepError,
 )
+from ._inspect import Finding, ImportReport, inspect
 from ._native import (
     Arm,
     Batch,
@@ -56,8 +57,10 @@ __all__ = [
     "Comparison",
     "Each",
     "EngineError",
+    "Finding",
     "FkResult",
     "IkResult",
+    "ImportReport",
     "InputError",
     "OrderError",
     "RecordError",
@@ -77,6 +80,7 @@ __all__ = [
     "each",
     "fk",
     "ik",
+    "inspect",
     "learn",
     "read",
     "schema",

@@ -26,6 +26,7 @@ __all__ = [
     "Team",
     "__version__",
     "compare_methods",
+    "inspect",
     "learn_effector",
     "learn_sensor",
     "minimize_objective",
@@ -48,6 +49,7 @@ __all__ = [
     "unpack_scenario",
     "world_facts",
     "worlds",
+    "write_clean",
 ]
 
 _Arrays = dict[str, NDArray[Any]]
@@ -251,6 +253,8 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
 
 def read(folder: str | PathLike[str], tables: Sequence[str] | None = None) -> dict[str, Table]: ...
+def inspect(file: str | PathLike[str]) -> dict[str, Any]: ...
+def write_clean(file: str | PathLike[str], out: str | PathLike[str]) -> None: ...
 def table_names(folder: str | PathLike[str]) -> list[str]: ...
 def sweep_status(folder: str | PathLike[str]) -> SweepStatus: ...
 def schema(world: str | None = None) -> dict[str, Any]: ...

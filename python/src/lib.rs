@@ -6,7 +6,7 @@
 //! blocks.rs      the rows of a long run     batch.rs        many worlds that step together
 //! space.rs       spaces of numbers          policy.rs       functions in Python that decide
 //! table.rs       rows -> Arrow, NumPy       arrays.rs       ids, values and columns of bodies
-//! read.rs        folders -> tables
+//! read.rs        folders -> tables          inspect.rs      files -> import reports
 //! sweep.rs       many runs, by threads or by an executor
 //! arm.rs         kinematics of arms         learn.rs        error models from tables
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
@@ -27,6 +27,7 @@ mod blocks;
 mod choice;
 mod collectives;
 mod error;
+mod inspect;
 mod json;
 mod learn;
 mod notebook;
@@ -66,6 +67,8 @@ fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<space::Team>()?;
     module.add_class::<table::Table>()?;
     module.add_function(wrap_pyfunction!(arrays::rows_by_name, module)?)?;
+    module.add_function(wrap_pyfunction!(inspect::inspect, module)?)?;
+    module.add_function(wrap_pyfunction!(inspect::write_clean, module)?)?;
     module.add_function(wrap_pyfunction!(read::read, module)?)?;
     module.add_function(wrap_pyfunction!(read::table_names, module)?)?;
     module.add_function(wrap_pyfunction!(scenario::schema, module)?)?;

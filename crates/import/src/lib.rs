@@ -12,6 +12,7 @@ pub mod bluesky;
 pub mod carmen;
 mod char_map;
 mod extension;
+mod foreign_file;
 pub mod image;
 mod imported_map;
 pub mod local_plane;
@@ -21,7 +22,6 @@ pub mod movingai;
 pub mod mrclam;
 mod pixel_map;
 mod raycast;
-pub mod report;
 pub mod rosmap;
 pub mod stage;
 pub mod stl;
@@ -34,8 +34,11 @@ mod xml;
 #[cfg(test)]
 mod shared_data;
 
+pub use foreign_file::ForeignFormat;
 pub use imported_map::ImportedMap;
 pub use map_file::{GridOptions, import_map, load_map, load_pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
 pub use raycast::RayHit;
-pub use report::{ImportReport, Treatment};
+pub use sidestep_scenario::import_report as report;
+pub use sidestep_scenario::{ImportReport, Treatment};
+pub use write::clean_map;

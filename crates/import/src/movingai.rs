@@ -506,7 +506,8 @@ mod tests {
         let scen = parse_scen("s", text).expect("a scenario");
         let lengths: Vec<_> = scen.rows.iter().map(|row| row.optimal_length).collect();
         assert_eq!(lengths, [None, None, Some(8.0)]);
-        let kept: Vec<_> = scen.report.kept.iter().map(|kept| (kept.noun, kept.count)).collect();
+        let kept: Vec<_> =
+            scen.report.kept.iter().map(|kept| (kept.noun.as_str(), kept.count)).collect();
         assert_eq!(kept, [("rows", 3), ("rows without an optimal length (-1)", 2)]);
     }
 

@@ -1,25 +1,75 @@
 //! Maps written in the format of `map_server`, so that a run can store the maps that it saw.
 
+use std::path::Path;
+
+use crate::{GridOptions, load_map, load_pixel_map};
+use sidestep_kernel::InputError;
 use sidestep_kernel::view::Isometry2;
-use sidestep_map::Cell;
+use sidestep_map::{Cell, UnknownPolicy};
 
 /// Name of the image to which [`map_files`] refers.
 const IMAGE: &str = "map.pgm";
 
 /// Returns YAML file and image of a map, with their names; rows of cells start at the bottom.
 pub fn map_files(
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     resolution_m: f64,
     plane: Isometry2,
     cells: &[Cell],
 ) -> [(&'static str, Vec<u8>); 2] {
-    let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = plane;
-    let yaml = format!(
-        "# The map as the simulation saw it.\nimage: {IMAGE}\nresolution: {resolution_m:?}\n\
-         origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-    );
-    let image = pgm(width, height, cells.iter().map(|cell| gray(*cell)));
-    [("map.yaml", yaml.into_bytes()), (IMAGE, image)]
+    let heading = "The map as the simulation saw it.";
+    let map = MapToWrite { heading, size, resolution_m, plane, cells };
+    let [yaml, image] = map.files(IMAGE);
+    [("map.yaml", yaml), (IMAGE, image)]
+}
+
+/// Returns the map in the file at `path` as a YAML file and the image that it calls `image_name`. A box of a map in
+/// characters, which has no size in the file, becomes a meter.
+///
+/// # Errors
+/// When the map cannot be read, or is an image without the size of its pixels.
+pub fn clean_map(path: &Path, image_name: &str) -> Result<[Vec<u8>; 2], InputError> {
+    let heading = "A map, written anew by sidestep inspect.";
+    if let Some(map) = load_pixel_map(path, None)? {
+        let size = [map.width(), map.height()];
+        let (resolution_m, plane) = (map.resolution_m(), map.plane());
+        let map = MapToWrite { heading, size, resolution_m, plane, cells: map.pixels() };
+        return Ok(map.files(image_name));
+    }
+    let boxes = GridOptions { box_size_m: 1.0, resolution_m: None, unknown: UnknownPolicy::Keep };
+    let map = load_map(path, boxes)?;
+    let size = [map.width(), map.height()];
+    let (resolution_m, plane) = (map.box_size_m, map.plane);
+    let map = MapToWrite { heading, size, resolution_m, plane, cells: map.cells() };
+    Ok(map.files(image_name))
+}
+
+/// A map for the format of `map_server`.
+struct MapToWrite<'a> {
+    /// The comment at the head of the YAML file.
+    heading: &'a str,
+    size: [u32; 2],
+    resolution_m: f64,
+    plane: Isometry2,
+    /// Row by row from the bottom.
+    cells: &'a [Cell],
+}
+
+impl MapToWrite<'_> {
+    /// Returns the YAML file and the image, which the former calls `image_name`.
+    fn files(&self, image_name: &str) -> [Vec<u8>; 2] {
+        let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = self.plane;
+        // The name as JSON, which is YAML: it may have blanks or colons.
+        let image_name = serde_json::Value::from(image_name);
+        let yaml = format!(
+            "# {}\nimage: {image_name}\nresolution: {:?}\n\
+             origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            self.heading, self.resolution_m
+        );
+        let [width, height] = self.size;
+        let image = pgm(width, height, self.cells.iter().map(|cell| gray(*cell)));
+        [yaml.into_bytes(), image]
+    }
 }
 
 /// Returns the gray value with which `map_saver` of ROS writes a cell.
@@ -45,8 +95,7 @@ pub fn pgm(width: u32, height: u32, grays: impl Iterator<Item = u8>) -> Vec<u8> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GridOptions;
-    use sidestep_map::{GridMap, UnknownPolicy};
+    use sidestep_map::GridMap;
 
     #[test]
     fn the_map_comes_back_as_it_was() {

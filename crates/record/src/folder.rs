@@ -208,6 +208,11 @@ pub struct RunReader {
 }
 
 impl RunReader {
+    /// Returns whether there is a run in a folder, even if it is damaged.
+    pub fn is_at(path: &Path) -> bool {
+        is_run(path)
+    }
+
     /// Opens the folder at `path` without locking it.
     ///
     /// # Errors

@@ -26,7 +26,7 @@ pub use mcap::{
     start_live_server,
 };
 pub use parquet::ParquetRecorder;
-pub use read::{Table, for_each_block, read_table, tables};
+pub use read::{Table, for_each_block, read_table, row_count, tables};
 pub use run_table::LoadedTable;
 pub use schema::Provenance;
 pub use staging::resolve_link;

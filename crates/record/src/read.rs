@@ -125,6 +125,20 @@ pub fn for_each_block<E: From<InputError>>(
     }
 }
 
+/// Returns the number of rows of a table that are complete, from the ends of its files: the rows are not read.
+///
+/// # Errors
+/// Those of [`read_table`].
+pub fn row_count(folder: &Path, name: &str) -> Result<u64, InputError> {
+    let (paths, _) = find_parts(folder, name)?;
+    let mut rows = 0;
+    for path in &paths {
+        let part = PartReader::open(path, name)?;
+        rows += part.file.metadata().file_metadata().num_rows().max(0) as u64;
+    }
+    Ok(rows)
+}
+
 /// Returns the names of the tables in a run folder that have a complete part, sorted.
 ///
 /// # Errors

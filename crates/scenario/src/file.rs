@@ -38,6 +38,15 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
+/// Returns the first bytes of the file at `path`, at most `max_bytes`, decompressed as by [`read_bytes`]: enough to tell
+/// what kind of file it is.
+///
+/// # Errors
+/// When the file cannot be read or decompressed.
+pub fn read_start(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
+    try_read(path, max_bytes).map_err(|e| unreadable(path, &e))
+}
+
 fn try_read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut file = BufReader::new(File::open(path)?);
     let is_compressed = file.fill_buf()?.starts_with(&GZIP_MAGIC);

@@ -18,6 +18,7 @@ pub mod editing;
 mod explain;
 pub mod facts;
 pub mod file;
+pub mod import_report;
 mod keys;
 mod locate;
 mod metric_info;
@@ -37,6 +38,7 @@ pub use edit::{CharEdit, Edit};
 pub use editing::Editing;
 pub use explain::suggestion;
 pub use facts::WorldFacts;
+pub use import_report::{ImportReport, Treatment};
 pub use keys::Key;
 pub use metric_info::{MetricInfo, MetricLabel, metric_label};
 #[doc(hidden)]

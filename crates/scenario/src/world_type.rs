@@ -1,6 +1,8 @@
 //! The interface of a world for programs that run scenarios without knowing any world.
 
-use crate::{Editing, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion};
+use crate::{
+    Editing, ImportReport, MetricInfo, Remark, ResolvedScenario, Source, WorldFacts, suggestion,
+};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{BodyKind, Kinds};
@@ -69,6 +71,15 @@ pub trait WorldType: Send + Sync {
     /// # Errors
     /// When such a file cannot be read.
     fn import_scenario(&self, _: &Path) -> Result<Option<ImportedScenario>, InputError> {
+        Ok(None)
+    }
+
+    /// Returns what is in one of its other files, see [`Self::other_files`]; `None` for files that this world does not
+    /// read.
+    ///
+    /// # Errors
+    /// When such a file cannot be read, or something in it is wrong.
+    fn inspect_other_file(&self, _: &Path) -> Result<Option<ImportReport>, InputError> {
         Ok(None)
     }
 
@@ -143,6 +154,8 @@ pub enum SeedEffect {
 pub struct ImportedScenario {
     /// The scenario's text, or the reason why nothing in the file can be simulated.
     pub scenario: Result<String, InputError>,
+    /// What became of the file.
+    pub report: ImportReport,
     /// The report of the translation, as JSON.
     pub json: serde_json::Value,
     /// The same as lines of text.

@@ -210,6 +210,14 @@ fn file_entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileE
     Some(FileEntry { path: path.to_str()?.into(), name: name.into(), kind, about })
 }
 
+/// Returns whether a file may name any other file of the disk: a scenario or a sweep, unlike a profile.
+pub(crate) fn names_files(path: &Path) -> bool {
+    let header = || Source::read(path, &[]).ok()?.parse::<TomlHeader>().ok();
+    let is_profile =
+        || header().and_then(kind_of_toml).is_some_and(|(kind, _)| kind == FileKind::Profile);
+    has_extension(path, "toml") && !is_profile()
+}
+
 fn kind_of_folder(path: &Path) -> FileKind {
     if path.join("run.json").is_file() {
         FileKind::Run

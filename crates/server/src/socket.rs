@@ -1,5 +1,7 @@
 //! The socket of one page: requests go to sessions, and their messages to the page.
 
+use crate::encode::problem;
+use crate::files::names_files;
 use crate::outbox::{Outbox, OutboxItem};
 use crate::protocol::{
     ClientRequest, OpenTarget, Problem, Reply, ReplyBody, ReplyResult, ServerMethod, SessionId,
@@ -14,6 +16,7 @@ use crate::session::{
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
 use sidestep_scenario::{Source, Worlds};
+use sidestep_session::Error;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -190,6 +193,11 @@ impl SocketSessions {
                 });
                 None
             }
+            ServerMethod::ImportReport { path } => {
+                let deps = self.state.deps.clone();
+                self.answer_in_thread(id, move || import_report(&deps, &path));
+                None
+            }
             ServerMethod::Runs { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || list_sweep_runs(&deps.files.resolve(&folder)?));
@@ -287,6 +295,23 @@ impl SocketSessions {
             let _ = spawn_blocking(move || catch_panic(&outbox, id, || Some(work()))).await;
         });
     }
+}
+
+/// Returns what becomes of a file, as people read it.
+fn import_report(deps: &SessionDeps, path: &str) -> Result<ReplyBody, Problem> {
+    let file = deps.files.resolve(path)?;
+    // A page can write scenarios, and a scenario can name any file of the disk: only opening checks which.
+    if names_files(&file) {
+        let remedy = "open a scenario instead, or choose a map, a profile or traffic";
+        return Err(Problem::new(path.to_string(), "this is no file to import", remedy));
+    }
+    let inspected = sidestep_session::inspect(&deps.worlds, &file).map_err(|e| match e {
+        Error::Input(error) => problem(&error),
+        other => Problem::new(path.to_string(), other.to_string(), "try another file"),
+    })?;
+    let lines = inspected.report.lines();
+    let findings = inspected.report.findings.iter().map(ToString::to_string).collect();
+    Ok(ReplyBody::ImportReport { lines, findings })
 }
 
 /// Returns the JSON Schema of a world's scenarios, and the tools that edit them on the canvas.

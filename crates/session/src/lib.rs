@@ -14,6 +14,7 @@
 //! watcher.rs       progress, and requests to stop       identity.rs      the build that made a run
 //! polling.rs       work that its caller polls           row_store.rs     rows that are kept in memory
 //! files.rs         files written completely or not      fleet.rs         the job of agents as processes
+//! inspect.rs       what any file is, and what becomes of it
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -26,6 +27,7 @@ mod error;
 mod files;
 mod frame_sink;
 mod identity;
+mod inspect;
 mod live;
 mod managed_run;
 mod orders;
@@ -54,6 +56,7 @@ pub use error::Error;
 pub use files::{display_path, write_atomically};
 pub use frame_sink::{EndReason, FrameSink, McapSink};
 pub use identity::VERSION;
+pub use inspect::{InspectedFile, inspect, write_clean};
 pub use live::{LiveControl, ViewerAddress, ViewerOptions, ViewerServer, next_free_port};
 pub use managed_run::{ManagedRun, OutputPaths, RestoreError};
 pub use pacer::Pacer;

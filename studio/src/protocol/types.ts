@@ -37,7 +37,11 @@ export type ServerMethod = { "do": "files",
 /**
  * Its path, as a listing gave it.
  */
-folder: string | null, } | { "do": "open",
+folder: string | null, } | { "do": "import-report",
+/**
+ * Its path, as a listing gave it.
+ */
+path: string, } | { "do": "open",
 /**
  * What to open.
  */
@@ -269,7 +273,15 @@ export type ReplyBody = { "is": "done" } | { "is": "files",
 /**
  * Its entries that can be opened, by name.
  */
-entries: Array<FileEntry>, } | { "is": "opened",
+entries: Array<FileEntry>, } | { "is": "import-report",
+/**
+ * Format, properties and counts, each with its name.
+ */
+lines: Array<[string, string]>,
+/**
+ * What was not taken as it stood, one sentence each.
+ */
+findings: Array<string>, } | { "is": "opened",
 /**
  * Its number.
  */

@@ -328,6 +328,7 @@ export class FakeServer {
 
   #answer(call: ServerMethod, socket: WebSocket): ReplyBody {
     if (call.do === "files") return files(call.folder);
+    if (call.do === "import-report") return importReport(call.path);
     if (call.do === "runs") return runs();
     if (call.do === "open") {
       const { target: what } = call;
@@ -421,6 +422,18 @@ function files(folder: string | null): ReplyBody {
       { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
       { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
     ],
+  };
+}
+
+/** A report on a made-up file: there is something to tell about those whose name says so. */
+function importReport(path: string): ReplyBody {
+  return {
+    is: "import-report",
+    lines: [
+      ["format", "recorded tracks"],
+      ["rows", "120"],
+    ],
+    findings: path.includes("bad") ? ["dropped: rows without a position (7 times), line 3, line 9, line 12, ..."] : [],
   };
 }
 

@@ -34,7 +34,7 @@ pub(crate) struct CheckArgs {
 /// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
     let foreign = worlds().import_scenario(&args.scenario.file)?;
-    if let Some(ImportedScenario { scenario: Err(error), json, lines }) = foreign {
+    if let Some(ImportedScenario { scenario: Err(error), json, lines, .. }) = foreign {
         // The report lists the contents of the file, and the error says why it cannot be run.
         let mut json = json;
         json["no_scenario"] = error.to_string().into();

@@ -11,6 +11,7 @@ mod finish;
 mod fk;
 mod fleet;
 mod ik;
+mod inspect;
 mod learn;
 mod man;
 mod map;
@@ -31,7 +32,7 @@ use clap::Subcommand;
 
 /// The commands by their use, in the order in which people meet them.
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
-    ("Prepare", &["new", "check", "schema", "map", "learn"]),
+    ("Prepare", &["new", "check", "schema", "inspect", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),
     ("Fly on a network", &["fleet", "node"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     New(new::NewArgs),
     /// Write the keys of scenarios as JSON Schema, for editors
     Schema(schema::SchemaArgs),
+    /// Say what a file is, and what becomes of it when it is read
+    Inspect(inspect::InspectArgs),
     /// Show a map as the simulator sees it, in the terminal or as PNG
     Map(map::MapArgs),
     /// Learn error models of sensors and wheels from a robot's logs
@@ -99,6 +102,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Schema(args) => schema::schema(&args, *console),
+        Command::Inspect(args) => inspect::inspect(&args, *console),
         Command::Map(args) => map::map(&args, *console),
         Command::Learn(args) => learn::learn(&args, *console),
         Command::Exact(args) => exact::exact(&args, *console),

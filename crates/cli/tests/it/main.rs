@@ -19,6 +19,7 @@ mod help;
 mod ik;
 mod ik_poses;
 mod input;
+mod inspect;
 mod learn;
 mod names;
 mod output;

@@ -61,6 +61,25 @@ fn comments_outlive_ten_edits_and_saving_and_the_session_goes_on_with_the_file()
 }
 
 #[test]
+fn a_file_to_import_is_reported_as_the_command_does_and_a_scenario_is_not() {
+    let place = TestFolder::new();
+    place.write("a.map", "type octile\nheight 1\nwidth 3\nmap\n.@S\n");
+    let studio = Studio::start(&place, &["."]);
+    let mut page = studio.page();
+    let reply = page.ask(json!({ "do": "import-report", "path": "./a.map" }));
+    assert_eq!(reply["lines"][0], json!(["format", "map in characters (MovingAI)"]), "{reply}");
+    let told = place.json(&["inspect", "a.map"]);
+    assert_eq!(reply["findings"].as_array().map(Vec::len), Some(1), "{reply}");
+    assert!(reply["findings"][0].as_str().expect("words").contains("symbol `S`"), "{reply}");
+    assert_eq!(told["files"][0]["findings"].as_array().map(Vec::len), Some(1), "{told}");
+    // A scenario that a page has written may name any file of the disk.
+    for path in ["./s.toml", "/etc/passwd", "missing.map"] {
+        let reply = page.reply(json!({ "do": "import-report", "path": path }));
+        assert!(reply["problem"].is_object(), "{path}: {reply}");
+    }
+}
+
+#[test]
 fn the_values_of_a_text_and_the_files_that_it_can_name_are_told() {
     let place = TestFolder::new();
     place.write("plan.pgm", "P2 1 1 255 255");

@@ -40,6 +40,13 @@ pub enum ReplyBody {
         /// Its entries that can be opened, by name.
         entries: Vec<FileEntry>,
     },
+    /// What becomes of a file that is read.
+    ImportReport {
+        /// Format, properties and counts, each with its name.
+        lines: Vec<(String, String)>,
+        /// What was not taken as it stood, one sentence each.
+        findings: Vec<String>,
+    },
     /// A session at its start.
     Opened {
         /// Its number.

@@ -37,6 +37,11 @@ pub enum ServerMethod {
         /// Its path, as a listing gave it.
         folder: Option<String>,
     },
+    /// Reads a file and says what becomes of it, as `sidestep inspect` does.
+    ImportReport {
+        /// Its path, as a listing gave it.
+        path: String,
+    },
     /// Opens a scenario or a recording: a new session, which is paused at its start and belongs to the socket.
     Open {
         /// What to open.
@@ -58,7 +63,7 @@ pub enum ServerMethod {
 
 impl ServerMethod {
     /// The names of all methods.
-    pub const NAMES: [&str; 4] = ["files", "open", "runs", "schema"];
+    pub const NAMES: [&str; 5] = ["files", "import-report", "open", "runs", "schema"];
 }
 
 /// A query or a command for a session.

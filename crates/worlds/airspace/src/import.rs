@@ -8,7 +8,7 @@ use sidestep_import::bluesky::{self, ScnFile, UnresolvedPosition};
 use sidestep_import::traffic::{self, RecordedTraffic};
 use sidestep_kernel::InputError;
 use sidestep_kernel::text::{KeyValues, group_thousands};
-use sidestep_scenario::ImportedScenario;
+use sidestep_scenario::{ImportReport, ImportedScenario};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -57,7 +57,7 @@ pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, Input
         let remedy = "give a file that creates aircraft at known places, with speeds";
         InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)
     });
-    Ok(Some(ImportedScenario { scenario, json, lines }))
+    Ok(Some(ImportedScenario { scenario, report: ImportReport::default(), json, lines }))
 }
 
 /// Returns the report on a file; `not_flown` are commands that could be read but not flown.

@@ -1,6 +1,7 @@
 //! The sections of a robots scenario, in the form of the file. Unknown keys are errors.
 
 mod compile;
+mod inspect_profile;
 mod kinds;
 mod located_section;
 mod placement_grid;
@@ -11,6 +12,7 @@ mod values;
 
 pub use crate::world::StorageOrder;
 pub use compile::{Behaviours, Compiled, presets};
+pub(super) use inspect_profile::inspect_profile;
 pub(super) use schema::{profile as profile_schema, sections};
 
 use super::effector::ObstacleRule;

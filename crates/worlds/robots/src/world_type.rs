@@ -7,10 +7,11 @@ use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, Editing, MetricInfo, Remark, ResolvedScenario, SeedEffect,
-    Source, WorldFacts, WorldType,
+    CompiledScenario as AnyCompiled, Editing, ImportReport, MetricInfo, Remark, ResolvedScenario,
+    SeedEffect, Source, WorldFacts, WorldType,
 };
 use std::any::Any;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Situated agents on a grid.
@@ -66,6 +67,10 @@ impl WorldType for Robots {
 
     fn other_files(&self) -> Vec<(&'static str, serde_json::Value)> {
         vec![("profile", super::scenario::profile_schema(self.default_scenario()))]
+    }
+
+    fn inspect_other_file(&self, file: &Path) -> Result<Option<ImportReport>, InputError> {
+        super::scenario::inspect_profile(file)
     }
 
     fn random_quantities(&self) -> &'static str {

@@ -1,7 +1,7 @@
 //! Compilation of the map section to boxes.
 
 use super::*;
-use sidestep_import::{GridOptions, ImportReport, ImportedMap, Treatment};
+use sidestep_import::{GridOptions, ImportReport, ImportedMap};
 
 /// Longest side of a map: poses are recorded with 15 bits per coordinate, and the border takes some of that on
 /// both sides.
@@ -35,22 +35,7 @@ pub(super) fn load_map(
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
         return Err(source.error(section.span(), "the map has no free box", remedy));
     }
-    Ok(LoadedMap { map: Arc::new(map), doors, remarks: file_remarks(&report) })
-}
-
-/// Returns what a scenario's author has to know of the map's file: warnings where the map may be another than meant.
-fn file_remarks(report: &ImportReport) -> Vec<Remark> {
-    let mut remarks = Vec::new();
-    for finding in &report.findings {
-        let words = finding.to_string();
-        remarks.push(match finding.treatment {
-            Treatment::Guessed | Treatment::Suspicious => Remark::warning("map.file", words),
-            Treatment::Dropped | Treatment::Repaired | Treatment::NotUsed => {
-                Remark::note("map.file", words)
-            }
-        });
-    }
-    remarks
+    Ok(LoadedMap { map: Arc::new(map), doors, remarks: report.to_remarks("map.file") })
 }
 
 fn read_map(

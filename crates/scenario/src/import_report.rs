@@ -3,7 +3,9 @@
 //! A reader keeps what it understands, and records here what it did not take as it stood: nothing of a file is dropped,
 //! repaired or guessed in silence. The same report is what people see of a file.
 
+use crate::{Remark, Severity};
 use serde::Serialize;
+use sidestep_kernel::text::{KeyValues, group_thousands};
 
 /// Number of places that a finding names: enough to look at a few by hand.
 pub const MAX_PLACES: usize = 3;
@@ -34,7 +36,7 @@ pub struct ImportFact {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ItemCount {
     /// The noun in the plural: `rows`.
-    pub noun: &'static str,
+    pub noun: String,
     /// The number of items.
     pub count: u64,
 }
@@ -68,6 +70,8 @@ pub enum Treatment {
     NotUsed,
     /// It was kept, but can hardly be right.
     Suspicious,
+    /// It was kept as it stands, and has an effect that its author may not expect.
+    Noted,
 }
 
 impl Treatment {
@@ -79,6 +83,7 @@ impl Treatment {
             Self::Guessed => "guessed",
             Self::NotUsed => "not used",
             Self::Suspicious => "suspicious",
+            Self::Noted => "note",
         }
     }
 }
@@ -95,8 +100,8 @@ impl ImportReport {
     }
 
     /// Adds a number of items that were kept.
-    pub fn add_kept(&mut self, noun: &'static str, count: usize) {
-        self.kept.push(ItemCount { noun, count: count as u64 });
+    pub fn add_kept(&mut self, noun: impl Into<String>, count: usize) {
+        self.kept.push(ItemCount { noun: noun.into(), count: count as u64 });
     }
 
     /// Records that a rule applied at a place; an empty place is not shown.
@@ -125,6 +130,46 @@ impl ImportReport {
         }
     }
 
+    /// Adds the remarks on a valid scenario.
+    pub fn add_remarks(&mut self, remarks: &[Remark]) {
+        for Remark { severity, key, words, .. } in remarks {
+            let treatment = match severity {
+                Severity::Warning => Treatment::Suspicious,
+                Severity::Note => Treatment::Noted,
+            };
+            self.record(treatment, format!("{key}: {words}"), "", "");
+        }
+    }
+
+    /// Returns its findings as remarks on the scenario whose key names the file: warnings where the run may be another
+    /// one than meant.
+    pub fn to_remarks(&self, key: &str) -> Vec<Remark> {
+        let mut remarks = Vec::with_capacity(self.findings.len());
+        for finding in &self.findings {
+            let words = finding.to_string();
+            remarks.push(match finding.treatment {
+                Treatment::Guessed | Treatment::Suspicious => Remark::warning(key, words),
+                Treatment::Dropped
+                | Treatment::Repaired
+                | Treatment::NotUsed
+                | Treatment::Noted => Remark::note(key, words),
+            });
+        }
+        remarks
+    }
+
+    /// Returns format, properties and counts as lines of text, without the findings.
+    pub fn lines(&self) -> KeyValues {
+        let mut lines = vec![("format".to_string(), printable(&self.format))];
+        for fact in &self.facts {
+            lines.push((fact.name.to_string(), printable(&fact.value)));
+        }
+        for item in &self.kept {
+            lines.push((printable(&item.noun), group_thousands(item.count)));
+        }
+        lines
+    }
+
     /// Returns the number of items that were left out.
     pub fn dropped(&self) -> u64 {
         let dropped = self.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
@@ -137,7 +182,7 @@ impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.treatment.word(), printable(&self.rule))?;
         if self.count > 1 {
-            write!(f, " ({} times)", self.count)?;
+            write!(f, " ({} times)", group_thousands(self.count))?;
         }
         if !self.places.is_empty() {
             write!(f, ", {}", printable(&self.places.join(", ")))?;
@@ -153,7 +198,7 @@ impl std::fmt::Display for Finding {
 }
 
 /// Returns a text with its control characters escaped: names that a file gives must not reach the terminal as commands.
-fn printable(text: &str) -> String {
+pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
         if c.is_control() {

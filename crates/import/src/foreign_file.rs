@@ -1,0 +1,182 @@
+//! Files of other programs, told apart by their content and their names, and the report of each.
+
+use std::path::{Path, PathBuf};
+
+use super::extension::extension;
+use super::report::ImportReport;
+use super::{carmen, load_pixel_map, movingai, mrclam, rosmap, stage, stl};
+use crate::urdf::Model;
+use crate::urdf::srdf::Semantics;
+use crate::{GridOptions, ImportedMap, import_map};
+use sidestep_kernel::InputError;
+use sidestep_map::UnknownPolicy;
+use sidestep_scenario::file::read_start;
+
+/// Number of bytes by which a file is recognized: the names of a table's columns, or the first messages of a log.
+const START_BYTES: u64 = 4096;
+/// Side of a box in meters for maps in characters, whose report is in boxes.
+const CHARACTER_M: f64 = 1.0;
+
+/// A kind of file of another program, apart from traffic, which worlds read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForeignFormat {
+    /// A map of ROS: the YAML file beside an image.
+    RosMap,
+    /// An image without the size of its pixels.
+    Image,
+    /// A map in characters: that of MovingAI, or text.
+    CharMap,
+    /// Starts and goals of MovingAI.
+    Scen,
+    /// A robot model.
+    Urdf,
+    /// Groups and postures of a robot model.
+    Srdf,
+    /// A world of the Stage simulator.
+    Stage,
+    /// A mesh.
+    Stl,
+    /// A log of CARMEN.
+    Carmen,
+    /// The folder of a UTIAS MRCLAM data set.
+    Mrclam,
+    /// A bag of ROS 1 or ROS 2.
+    Bag,
+}
+
+impl ForeignFormat {
+    /// Returns the kind of the file or folder at `path`; `None` where it is of no kind in this list.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn recognize(path: &Path) -> Result<Option<Self>, InputError> {
+        if path.is_dir() {
+            return Ok(folder_format(path));
+        }
+        let start = read_start(path, START_BYTES)?;
+        if BAG_MAGICS.iter().any(|magic| start.starts_with(magic)) {
+            return Ok(Some(Self::Bag));
+        }
+        let text = String::from_utf8_lossy(&start);
+        Ok(match extension(path).as_str() {
+            "yaml" | "yml" if text.contains(BAG_METADATA_KEY) => Some(Self::Bag),
+            "yaml" | "yml" => Some(Self::RosMap),
+            "png" | "pgm" | "jpg" | "jpeg" => Some(Self::Image),
+            "map" => Some(Self::CharMap),
+            // Any text may end so; a map in characters has no words.
+            "txt" if !has_carmen_message(&text) => Some(Self::CharMap),
+            "scen" => Some(Self::Scen),
+            "urdf" | "xacro" => Some(Self::Urdf),
+            "srdf" => Some(Self::Srdf),
+            "xml" if text.contains("<robot") => Some(Self::Urdf),
+            "world" | "inc" => Some(Self::Stage),
+            "stl" => Some(Self::Stl),
+            _ if has_carmen_message(&text) => Some(Self::Carmen),
+            _ => None,
+        })
+    }
+
+    /// Returns the report of the file or folder at `path`, which is of this kind.
+    ///
+    /// # Errors
+    /// When it cannot be read, or nothing in it is of use: those of its reader.
+    pub fn inspect(self, path: &Path) -> Result<ImportReport, InputError> {
+        match self {
+            Self::RosMap => Ok(rosmap::load(path)?.into_report()),
+            Self::Image => inspect_image(path),
+            Self::CharMap => {
+                import_map(path, CHARACTER_BOXES).map(|ImportedMap { report, .. }| report)
+            }
+            Self::Scen => movingai::load_scen(path).map(|file| file.report),
+            Self::Urdf => Model::load(path).map(|model| model.report),
+            Self::Srdf => inspect_srdf(path),
+            Self::Stage => stage::load(path).map(|_| ImportReport::new("world of Stage")),
+            Self::Stl => inspect_stl(path),
+            Self::Carmen => carmen::read(path).map(|_| ImportReport::new("log of CARMEN")),
+            Self::Mrclam => mrclam::read(path).map(|_| ImportReport::new("MRCLAM data set")),
+            Self::Bag => Ok(ImportReport::new("bag")),
+        }
+    }
+}
+
+/// First bytes of bags that are one file: MCAP, ROS 1, SQLite.
+const BAG_MAGICS: [&[u8]; 3] = [b"\x89MCAP", b"#ROSBAG V", b"SQLite format 3\0"];
+/// The key of `metadata.yaml` by which it differs from the YAML file of a map.
+const BAG_METADATA_KEY: &str = "rosbag2_bagfile_information";
+/// Messages with which logs of CARMEN begin, after comments.
+const CARMEN_MESSAGES: [&str; 8] =
+    ["PARAM", "SYNC", "NEFF", "ODOM", "FLASER", "RLASER", "ROBOTLASER1", "TRUEPOS"];
+/// Boxes for the report of a map in characters.
+const CHARACTER_BOXES: GridOptions =
+    GridOptions { box_size_m: CHARACTER_M, resolution_m: None, unknown: UnknownPolicy::Keep };
+
+/// Returns whether a text has a line that begins as a message of CARMEN.
+fn has_carmen_message(text: &str) -> bool {
+    let mut firsts = text.lines().filter_map(|line| line.split_ascii_whitespace().next());
+    firsts.any(|word| CARMEN_MESSAGES.contains(&word))
+}
+
+/// Returns the kind of a folder by the names in it.
+fn folder_format(folder: &Path) -> Option<ForeignFormat> {
+    let has = |name: &str| folder.join(name).is_file();
+    if has("Barcodes.dat") || has("Barcodes.dat.gz") {
+        return Some(ForeignFormat::Mrclam);
+    }
+    if has("metadata.yaml") {
+        return Some(ForeignFormat::Bag);
+    }
+    let names = folder.read_dir().ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut extensions = names.map(|path| extension(&path));
+    extensions
+        .any(|extension| extension == "mcap" || extension == "db3")
+        .then_some(ForeignFormat::Bag)
+}
+
+/// Returns the report of an image, in pixels: their size is not in the file.
+fn inspect_image(path: &Path) -> Result<ImportReport, InputError> {
+    let pixels = load_pixel_map(path, Some(1.0))?;
+    let map = pixels.ok_or_else(|| {
+        InputError::new(
+            path.display(),
+            "this is no image of a map",
+            "give a .png, .pgm or .jpg file",
+        )
+    })?;
+    let [width, height] = [map.width(), map.height()];
+    let mut report = map.into_report();
+    report.facts.retain(|fact| !METRIC_FACTS.contains(&fact.name));
+    report.add_fact("pixels", format!("{width} x {height}"));
+    let needs = "the side of a pixel: `--resolution 0.05`, in a scenario `map.resolution_m = 0.05`";
+    report.add_fact("not in the file", needs);
+    Ok(report)
+}
+
+/// Properties of a map that follow from the side of a pixel.
+const METRIC_FACTS: [&str; 3] = ["pixels", "extent", "origin"];
+
+/// Returns the report of an SRDF file, read for the model beside it: `panda.urdf` for `panda.srdf`.
+fn inspect_srdf(path: &Path) -> Result<ImportReport, InputError> {
+    let candidates = ["urdf", "urdf.gz"].map(|extension| path.with_extension(extension));
+    let model: Option<&PathBuf> = candidates.iter().find(|model| model.is_file());
+    let model = model.ok_or_else(|| {
+        let cause = "it is about a robot model, which is not beside it";
+        let remedy = format!("put the model there as {}", candidates[0].display());
+        InputError::new(path.display(), cause, remedy)
+    })?;
+    let semantics = Semantics::load(path, &Model::load(model)?)?;
+    let mut report = ImportReport::new("SRDF");
+    report.add_kept("groups", semantics.groups.len());
+    report.add_fact("model", model.display().to_string());
+    Ok(report)
+}
+
+fn inspect_stl(path: &Path) -> Result<ImportReport, InputError> {
+    let [lo_m, hi_m] = stl::read_bounds(path)?;
+    let mut report = ImportReport::new("mesh (STL)");
+    let size_m = [0, 1, 2].map(|axis| format!("{:.4}", hi_m[axis] - lo_m[axis]));
+    report.add_fact(
+        "extent",
+        format!("{} in the units of the file, meters in a URDF", size_m.join(" x ")),
+    );
+    Ok(report)
+}
