@@ -97,6 +97,8 @@ impl Bitmap {
 pub struct Shade {
     /// The mean of its color channels, from 0 (black) to 255 (white), without regard to its opacity.
     pub brightness: f64,
+    /// The first of its channels alone, gray or red, from 0 to 255.
+    pub first_channel: f64,
     /// From 0 (transparent) to 1 (opaque).
     pub opacity: f64,
 }
@@ -120,7 +122,9 @@ where
         let channels = pixel.channels();
         let sum: f64 = channels[..colors].iter().map(|&channel| channel.into()).sum();
         let opacity = channels.get(colors).map_or(1.0, |&channel| channel.into() / white);
-        values.push(read(Shade { brightness: sum / divisor, opacity }));
+        let first: f64 = channels[0].into();
+        let first_channel = first / (white / 255.0);
+        values.push(read(Shade { brightness: sum / divisor, first_channel, opacity }));
     }
     values
 }

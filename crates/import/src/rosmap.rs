@@ -298,7 +298,7 @@ impl TransparentGround {
     /// Returns the cell of a pixel. The edges of drawn lines are half transparent: such a pixel is an obstacle where
     /// it would be one on free ground.
     fn cell(self, shade: Shade, reading: OccupancyRule) -> Cell {
-        let Shade { brightness, opacity } = shade;
+        let Shade { brightness, opacity, .. } = shade;
         if opacity >= 1.0 || self == Self::NotUsed {
             return reading.cell(brightness);
         }

@@ -1,153 +1,141 @@
 //! [`Item`]s -> [`World`].
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::path::Path;
 
-use super::parse::{self, Entry, Item, MAX_NESTING, ModelBlock, SourcePosition, Value};
-use super::{BoxObstacle, FloorPlan, MAX_WORLD_BYTES, Pose2, Robot, World};
+use super::bitmap::{PlanFrame, floor_plan};
+use super::definitions::{Definition, Definitions, Units, Values};
+use super::files::WorldFiles;
+use super::parse::{Entry, Item, MAX_NESTING, ModelBlock, Value};
+use super::unused::record_unused;
+use super::{BoxObstacle, Pose2, Robot, World};
 use crate::image::Bitmap;
+use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{cos, hypot, sin};
-use sidestep_scenario::file::read_text;
 
-const MAX_FILES: usize = 1000;
 const MAX_MODELS: usize = 100_000;
-/// The size that Stage gives to models without one, in meters.
-const DEFAULT_SIZE_M: f64 = 0.1;
-/// The greatest brightness of a solid pixel, as in Stage; brighter ones are free.
-const MAX_SOLID_BRIGHTNESS: f64 = 127.0;
+
+/// Kinds of models of Stage that are no obstacles: sensors, lamps, tools and windows.
+const OTHER_KINDS: [&str; 11] = [
+    "actuator",
+    "blinkenlight",
+    "blobfinder",
+    "bumper",
+    "camera",
+    "fiducial",
+    "gripper",
+    "lightindicator",
+    "ranger",
+    "sensor",
+    "window",
+];
 
 pub(super) fn world(path: &Path) -> Result<World, InputError> {
-    let mut reader = WorldReader::default();
-    reader.file(path)?;
-    reader.world.not_used = reader.not_used.into_iter().collect();
-    Ok(reader.world)
+    let mut report = ImportReport::new("Stage world");
+    let (files, items) = WorldFiles::read(path, &mut report)?;
+    report.add_fact("files", files.count().to_string());
+    let units = Units::of(&items, &files, &mut report)?;
+    let mut reader = WorldReader {
+        files: &files,
+        values: Values { files: &files, units },
+        definitions: Definitions::new(&files),
+        models: 0,
+        world: World::default(),
+        report,
+    };
+    for item in &items {
+        match item {
+            Item::Include(_) => {}
+            Item::Define { name, model } => {
+                reader.definitions.add(name, model, &mut reader.report);
+            }
+            Item::Entry(Entry::Property { key, value }) => {
+                super::unused::record_setting(key, value, &files, &mut reader.report);
+            }
+            Item::Entry(Entry::Model(model)) => reader.add_model(model, &Parent::WORLD)?,
+        }
+    }
+    Ok(reader.finish())
 }
 
-/// A file that has been read; positions refer to it by its number.
-struct SourceFile {
-    path: PathBuf,
-    text: String,
+/// What models within a model take from it.
+struct Parent {
+    pose: Pose2,
+    name: String,
+    depth: usize,
 }
 
-/// A model with all properties that it inherits.
-#[derive(Debug, Clone, Default)]
-struct Definition {
-    /// The built-in kind at its root.
-    root: String,
-    /// The last value of each property.
-    properties: BTreeMap<String, Value>,
-    children: Vec<ModelBlock>,
+impl Parent {
+    const WORLD: Self =
+        Self { pose: Pose2 { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0 }, name: String::new(), depth: 0 };
 }
 
-#[derive(Default)]
-struct WorldReader {
-    sources: Vec<SourceFile>,
-    /// Files that are being read: each was included by the one before.
-    open: Vec<PathBuf>,
-    definitions: BTreeMap<String, Rc<Definition>>,
+struct WorldReader<'a> {
+    files: &'a WorldFiles,
+    values: Values<'a>,
+    definitions: Definitions<'a>,
     models: usize,
-    not_used: BTreeMap<String, usize>,
     world: World,
+    report: ImportReport,
 }
 
-impl WorldReader {
-    fn file(&mut self, path: &Path) -> Result<(), InputError> {
-        let text = read_text(path, MAX_WORLD_BYTES)?;
-        let canonical = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        self.open.push(canonical);
-        let file = self.sources.len();
-        let items = parse::items(&path.display().to_string(), &text, file)?;
-        self.sources.push(SourceFile { path: path.to_owned(), text });
-        for item in items {
-            match item {
-                Item::Include(name) => self.include(&name)?,
-                Item::Define { name, model } => {
-                    let definition = self.resolve(&model);
-                    self.definitions.insert(name, Rc::new(definition));
-                }
-                Item::Entry(Entry::Property { key, .. }) => self.count_ignored(key),
-                Item::Entry(Entry::Model(model)) => self.add_model(&model, Pose2::default(), 0)?,
+impl<'a> WorldReader<'a> {
+    fn finish(mut self) -> World {
+        let World { floor_plans, boxes, robots, .. } = &self.world;
+        let poses = floor_plans.iter().map(|plan| (plan.pose, plan.size_m));
+        let poses = poses.chain(boxes.iter().map(|body| (body.pose, body.size_m)));
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        for (pose, size_m) in poses.chain(robots.iter().map(|robot| (robot.pose, robot.size_m))) {
+            let half_m = half_extent_m(pose.yaw_rad, size_m);
+            for (i, at) in [pose.x_m, pose.y_m].into_iter().enumerate() {
+                low[i] = low[i].min(at - half_m[i]);
+                high[i] = high[i].max(at + half_m[i]);
             }
         }
-        self.open.pop();
-        Ok(())
-    }
-
-    fn include(&mut self, name: &Value) -> Result<(), InputError> {
-        let path = self.path(name)?;
-        if path.canonicalize().is_ok_and(|path| self.open.contains(&path)) {
-            let cause = format!("{} includes itself", path.display());
-            return Err(self.error(name.at, cause, "leave this `include` out"));
+        if low[0] <= high[0] {
+            // Rounded first: adding 0 turns a negative zero into a positive one.
+            let [x0, y0, x1, y1] =
+                [low[0], low[1], high[0], high[1]].map(|x: f64| (100.0 * x).round() / 100.0 + 0.0);
+            let extent = format!("x {x0:.2} to {x1:.2} m, y {y0:.2} to {y1:.2} m");
+            self.report.add_fact("extent", extent);
         }
-        if self.sources.len() >= MAX_FILES {
-            let cause = format!("more than {MAX_FILES} files are included");
-            return Err(self.error(name.at, cause, "leave this `include` out"));
-        }
-        if !path.is_file() {
-            let cause = format!("there is no file {}", path.display());
-            return Err(self.error(name.at, cause, "put it there, or leave the line out"));
-        }
-        self.file(&path)
+        self.report.add_kept("floor plans", floor_plans.len());
+        self.report.add_kept("boxes", boxes.len());
+        self.report.add_kept("robots", robots.len());
+        World { report: self.report, ..self.world }
     }
 
-    /// Resolves a path in a file, relative to that file.
-    fn path(&self, name: &Value) -> Result<PathBuf, InputError> {
-        let [file] = &name.words[..] else {
-            return Err(self.error(name.at, "a list where a file's name is expected", "give one"));
-        };
-        let folder = self.sources[name.at.file].path.parent();
-        Ok(folder.unwrap_or(Path::new("")).join(file))
+    fn record(&mut self, treatment: Treatment, rule: String, model: &ModelBlock, remedy: &str) {
+        self.report.record(treatment, rule, self.files.place(model.at), remedy);
     }
 
-    fn error(&self, at: SourcePosition, cause: impl Into<String>, remedy: &str) -> InputError {
-        let SourceFile { path, text } = &self.sources[at.file];
-        InputError::new(path.display(), cause, remedy).with_byte_offset(text, at.offset)
-    }
-
-    fn count_ignored(&mut self, name: impl Into<String>) {
-        *self.not_used.entry(name.into()).or_default() += 1;
-    }
-
-    /// Returns the properties of a model, its own before inherited ones.
-    fn resolve(&self, model: &ModelBlock) -> Definition {
-        let mut definition = match self.definitions.get(&model.kind) {
-            Some(base) => (**base).clone(),
-            None => Definition { root: model.kind.clone(), ..Definition::default() },
-        };
-        for entry in &model.entries {
-            match entry {
-                Entry::Property { key, value } => {
-                    definition.properties.insert(key.clone(), value.clone());
-                }
-                Entry::Model(child) => definition.children.push(child.clone()),
-            }
-        }
-        definition
-    }
-
-    fn add_model(
-        &mut self,
-        model: &ModelBlock,
-        parent: Pose2,
-        depth: usize,
-    ) -> Result<(), InputError> {
+    fn add_model(&mut self, model: &'a ModelBlock, parent: &Parent) -> Result<(), InputError> {
         self.models += 1;
-        if self.models > MAX_MODELS || depth > MAX_NESTING {
+        if self.models > MAX_MODELS || parent.depth > MAX_NESTING {
             let cause = format!("more than {MAX_MODELS} models, or {MAX_NESTING} in each other");
-            return Err(self.error(model.at, cause, "use fewer"));
+            return Err(self.files.error(model.at, cause, "use fewer"));
         }
-        let definition = self.resolve(model);
-        match definition.root.as_str() {
+        let definition = self.definitions.resolve(model)?;
+        match definition.root {
             "position" => self.add_robot(model, &definition, parent),
-            "model" => self.add_obstacle(model, &definition, parent, depth),
-            _ if definition.properties.contains_key("bitmap") => {
-                // A floor plan whose definition is in a file that is missing.
-                self.add_obstacle(model, &definition, parent, depth)
+            "model" => self.add_obstacle(model, &definition, parent),
+            root if OTHER_KINDS.contains(&root) => {
+                self.record(Treatment::NotUsed, format!("models of the kind `{root}`"), model, "");
+                Ok(())
+            }
+            root if definition.properties.contains_key("bitmap") => {
+                let rule = format!(
+                    "`{root}`, which nothing defines, is an obstacle because it has a bitmap"
+                );
+                let remedy = format!("write `define {root} model ( )` before it");
+                self.record(Treatment::Guessed, rule, model, &remedy);
+                self.add_obstacle(model, &definition, parent)
             }
             root => {
-                self.count_ignored(root);
+                let rule = format!("models of the kind `{root}`, which nothing defines");
+                let remedy = "include the file that defines it";
+                self.record(Treatment::Dropped, rule, model, remedy);
                 Ok(())
             }
         }
@@ -155,134 +143,135 @@ impl WorldReader {
 
     fn add_robot(
         &mut self,
-        model: &ModelBlock,
-        def: &Definition,
-        parent: Pose2,
+        model: &'a ModelBlock,
+        def: &Definition<'a>,
+        parent: &Parent,
     ) -> Result<(), InputError> {
-        let size_m = self.size_m(def)?;
-        let origin = self.pose(def, "origin")?;
+        let size_m = self.values.size_m(def)?;
+        let origin = self.values.pose(def, "origin")?;
         let robot = Robot {
-            name: self.text(def, "name"),
+            name: self.name(def, parent),
             kind: model.kind.clone(),
-            pose: self.pose(def, "pose")?.transformed_by(parent),
+            pose: self.values.pose(def, "pose")?.transformed_by(parent.pose),
             size_m,
             radius_m: radius_m(size_m, origin),
         };
         self.world.robots.push(robot);
-        self.count_unused(def);
+        if let Some(bitmap) = def.properties.get("bitmap") {
+            let rule = "bitmaps of robots, whose bodies are the box of `size`";
+            self.report.record(Treatment::NotUsed, rule, self.files.place(bitmap.at), "");
+        }
+        self.record_blocks(def);
+        record_unused(def, self.files, &mut self.report);
+        for child in &def.children {
+            let root = self.definitions.resolve(child)?.root;
+            if root != "block" {
+                let rule = format!("models of the kind `{root}` on robots");
+                self.record(Treatment::NotUsed, rule, child, "");
+            }
+        }
         Ok(())
     }
 
     fn add_obstacle(
         &mut self,
-        model: &ModelBlock,
-        def: &Definition,
-        parent: Pose2,
-        depth: usize,
+        model: &'a ModelBlock,
+        def: &Definition<'a>,
+        parent: &Parent,
     ) -> Result<(), InputError> {
-        let pose = self.pose(def, "pose")?.transformed_by(parent);
-        let center = self.pose(def, "origin")?.transformed_by(pose);
-        let size_m = self.size_m(def)?;
-        let name = self.text(def, "name");
-        if let Some(bitmap) = def.properties.get("bitmap") {
-            let has_boundary = self.number(def, "boundary", 0.0)? != 0.0;
-            let plan = self.floor_plan(bitmap)?;
-            let plan = FloorPlan { name, size_m, pose: center, has_boundary, ..plan };
+        let place = self.values.place(def, "pose")?;
+        let pose = place.pose.transformed_by(parent.pose);
+        let center = self.values.pose(def, "origin")?.transformed_by(pose);
+        let size_m = self.values.size_m(def)?;
+        let name = self.name(def, parent);
+        let is_obstacle = self.is_obstacle(model, def)?;
+        if is_obstacle && place.height_m != 0.0 {
+            let rule = "the heights (z) of obstacles, which all stand on the ground";
+            self.record(Treatment::NotUsed, rule.to_owned(), model, "");
+        }
+        if !is_obstacle {
+            // Recorded by then.
+        } else if let Some(bitmap) = def.properties.get("bitmap") {
+            let has_boundary = self.values.number(def, "boundary", 0.0)? != 0.0;
+            let place = self.files.place(bitmap.at);
+            let image = self.image(bitmap)?;
+            let frame = PlanFrame { name: name.clone(), size_m, pose: center, has_boundary, place };
+            let plan = floor_plan(&image, frame, &mut self.report);
             self.world.floor_plans.push(plan);
-        } else if self.is_obstacle(def)? {
-            self.world.boxes.push(BoxObstacle { name, pose: center, size_m });
         } else {
-            self.count_ignored(&model.kind);
+            self.world.boxes.push(BoxObstacle { name: name.clone(), pose: center, size_m });
         }
-        self.count_unused(def);
-        def.children.iter().try_for_each(|child| self.add_model(child, pose, depth + 1))
+        self.record_blocks(def);
+        record_unused(def, self.files, &mut self.report);
+        let here = Parent { pose, name, depth: parent.depth + 1 };
+        let models = def.children.iter().filter(|child| !self.is_block(child));
+        let models: Vec<&'a ModelBlock> = models.copied().collect();
+        models.into_iter().try_for_each(|child| self.add_model(child, &here))
     }
 
-    fn is_obstacle(&self, def: &Definition) -> Result<bool, InputError> {
-        let is_hit = self.number(def, "obstacle_return", 1.0)? != 0.0;
-        Ok(is_hit || self.number(def, "ranger_return", 1.0)? >= 0.0)
+    /// Returns whether a model takes up space, and records where that is a choice or where it does not.
+    fn is_obstacle(&mut self, model: &ModelBlock, def: &Definition) -> Result<bool, InputError> {
+        let has_blocks = def.children.iter().any(|child| self.is_block(child));
+        let has_shape = has_blocks || def.properties.contains_key("bitmap");
+        if self.values.number(def, "noblocks", 0.0)? != 0.0 && !has_shape {
+            let rule = "models without a body (`noblocks 1`)".to_owned();
+            self.record(Treatment::NotUsed, rule, model, "");
+            return Ok(false);
+        }
+        if self.values.number(def, "obstacle_return", 1.0)? != 0.0 {
+            return Ok(true);
+        }
+        if self.values.number(def, "ranger_return", 1.0)? < 0.0 {
+            let rule = "models that neither robots touch nor rangers see \
+                        (`obstacle_return 0`, `ranger_return` below 0)";
+            self.record(Treatment::NotUsed, rule.to_owned(), model, "");
+            return Ok(false);
+        }
+        let rule = "models that rangers see and robots pass (`obstacle_return 0`) are obstacles";
+        let remedy = "write `ranger_return -1` if they are none, `obstacle_return 1` if they are";
+        self.record(Treatment::Guessed, rule.to_owned(), model, remedy);
+        Ok(true)
     }
 
-    /// Reads the pixels of a bitmap, rows from the bottom; its size in meters follows from the model.
-    fn floor_plan(&self, bitmap: &Value) -> Result<FloorPlan, InputError> {
-        let image = Bitmap::load(&self.path(bitmap)?)?;
-        let from_top = image.map_brightness(|brightness| brightness <= MAX_SOLID_BRIGHTNESS);
-        // Image rows run from the top, those of the plan from the bottom.
-        let rows = from_top.rchunks(image.width() as usize);
-        Ok(FloorPlan {
-            name: String::new(),
-            width: image.width(),
-            height: image.height(),
-            solid: rows.flatten().copied().collect(),
-            size_m: [0.0; 2],
-            pose: Pose2::default(),
-            has_boundary: false,
-        })
+    /// Returns whether a part of a model is a shape of it, and no model that has `block` as its name.
+    fn is_block(&self, child: &ModelBlock) -> bool {
+        child.kind == "block" && !self.definitions.contains("block")
     }
 
-    fn count_unused(&mut self, def: &Definition) {
-        for key in def.properties.keys() {
-            if !KNOWN_PROPERTIES.contains(&key.as_str()) {
-                self.count_ignored(key);
+    fn record_blocks(&mut self, def: &Definition) {
+        let has_bitmap = def.properties.contains_key("bitmap");
+        for child in &def.children {
+            if self.is_block(child) {
+                let rule = match has_bitmap {
+                    true => "shapes (`block`) beside a bitmap",
+                    false => "shapes (`block`), for which the box of `size` stands",
+                };
+                self.record(Treatment::NotUsed, rule.to_owned(), child, "");
             }
         }
     }
 
-    fn text(&self, def: &Definition, key: &str) -> String {
-        def.properties.get(key).map(|value| value.words.join(" ")).unwrap_or_default()
-    }
-
-    fn number(&self, def: &Definition, key: &str, default: f64) -> Result<f64, InputError> {
-        let Some(value) = def.properties.get(key) else { return Ok(default) };
-        match self.numbers(value)?[..] {
-            [number] => Ok(number),
-            _ => Err(self.error(value.at, format!("a list for {key}"), "give one number")),
+    /// Returns the name of a model: within that of its parent, unless it begins with a slash.
+    fn name(&self, def: &Definition, parent: &Parent) -> String {
+        let name = self.values.text(def, "name");
+        match name.strip_prefix('/') {
+            Some(global) => global.to_owned(),
+            None if name.is_empty() || parent.name.is_empty() => name,
+            None => format!("{}.{name}", parent.name),
         }
     }
 
-    fn numbers(&self, value: &Value) -> Result<Vec<f64>, InputError> {
-        let mut numbers = Vec::with_capacity(value.words.len());
-        for word in &value.words {
-            match word.parse::<f64>() {
-                Ok(number) if number.is_finite() => numbers.push(number),
-                _ => {
-                    let cause = format!("`{word}` is no number");
-                    return Err(self.error(value.at, cause, "give finite numbers"));
-                }
-            }
-        }
-        Ok(numbers)
-    }
-
-    fn size_m(&self, def: &Definition) -> Result<[f64; 2], InputError> {
-        let Some(value) = def.properties.get("size") else { return Ok([DEFAULT_SIZE_M; 2]) };
-        match self.numbers(value)?[..] {
-            [x, y] | [x, y, _] if x > 0.0 && y > 0.0 => Ok([x, y]),
-            _ => Err(self.error(
-                value.at,
-                "no size",
-                "give three lengths in m, those along x and y above 0",
-            )),
-        }
-    }
-
-    fn pose(&self, def: &Definition, key: &str) -> Result<Pose2, InputError> {
-        let Some(value) = def.properties.get(key) else { return Ok(Pose2::default()) };
-        match self.numbers(value)?[..] {
-            [x_m, y_m, _, yaw_deg] => Ok(Pose2 { x_m, y_m, yaw_rad: yaw_deg.to_radians() }),
-            [x_m, y_m, _] if key == "origin" => Ok(Pose2 { x_m, y_m, yaw_rad: 0.0 }),
-            _ => Err(self.error(
-                value.at,
-                format!("no {key}"),
-                "give four numbers: x, y and z in m, and degrees",
-            )),
-        }
+    fn image(&mut self, bitmap: &Value) -> Result<Bitmap, InputError> {
+        Bitmap::load(&self.files.find(bitmap, &mut self.report)?)
     }
 }
 
-/// The properties that have an effect here; all others are counted as not used.
-const KNOWN_PROPERTIES: [&str; 8] =
-    ["name", "pose", "origin", "size", "bitmap", "boundary", "obstacle_return", "ranger_return"];
+/// Returns half of the extent of a box along the axes of the world.
+fn half_extent_m(yaw_rad: f64, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
+    let s = sin(yaw_rad).abs();
+    let c = cos(yaw_rad).abs();
+    [0.5 * (c * x_m + s * y_m), 0.5 * (s * x_m + c * y_m)]
+}
 
 /// Returns the radius of the smallest disc about a robot's reference point that contains its body, or an upper bound.
 fn radius_m(size_m: [f64; 2], origin: Pose2) -> f64 {
