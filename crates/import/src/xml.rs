@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::str::FromStr;
 
+use super::{ImportReport, Treatment};
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_bytes;
@@ -56,11 +57,11 @@ pub(super) struct XmlSource<'a> {
 }
 
 /// A prefix that the file uses and does not declare.
-pub(super) struct UndeclaredPrefix {
+struct UndeclaredPrefix {
     /// The prefix, without the colon.
-    pub(super) prefix: String,
+    prefix: String,
     /// The place of its first use, for reports.
-    pub(super) place: String,
+    place: String,
 }
 
 impl<'a> XmlSource<'a> {
@@ -87,9 +88,12 @@ impl<'a> XmlSource<'a> {
         }
     }
 
-    /// Returns the prefixes that were declared in place of the file, in the order of their first use.
-    pub(super) fn undeclared(&self) -> &[UndeclaredPrefix] {
-        &self.undeclared
+    /// Records the prefixes that were declared in place of the file, in the order of their first use.
+    pub(super) fn record_undeclared(&self, report: &mut ImportReport) {
+        for undeclared in &self.undeclared {
+            let rule = format!("the prefix `{}:`, which is declared nowhere", undeclared.prefix);
+            report.record(Treatment::Repaired, rule, undeclared.place.clone(), "");
+        }
     }
 
     fn document(&self) -> Result<Document<'_>, roxmltree::Error> {
@@ -460,7 +464,7 @@ mod tests {
         let text = "<?xml version='1.0'?><!-- <x> --><a n='1'>\n<x:b/><y:c x:d='2'/><e f='?'/></a>";
         let source = XmlSource::new("f.xml", text).expect("XML");
         let known: Vec<_> =
-            source.undeclared().iter().map(|u| (u.prefix.as_str(), u.place.as_str())).collect();
+            source.undeclared.iter().map(|u| (u.prefix.as_str(), u.place.as_str())).collect();
         assert_eq!(known, [("x", "line 2"), ("y", "line 2")]);
         let file = XmlFile::parse(&source).expect("XML");
         let a = file.root("a").expect("a");

@@ -2,9 +2,11 @@
 
 use super::body::ArmBody;
 use super::serial::SerialChain;
+use sidestep_import::report::Finding;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_import::urdf::{Model, Solids};
 use sidestep_kernel::InputError;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// The files of a robot model, and the part of it that is the arm. Errors name it by the options of the
@@ -88,11 +90,17 @@ impl ArmModel {
         Ok(self.chain.posture_values(&self.model, &posture))
     }
 
+    /// Returns what was not taken as it stood in its files.
+    pub fn findings(&self) -> impl Iterator<Item = &Finding> {
+        let semantics = self.semantics.iter().flat_map(|semantics| &semantics.report.findings);
+        self.model.report.findings.iter().chain(semantics)
+    }
+
     /// Returns the shapes of its links, and remarks on those that are not among them.
     pub fn body(&self) -> (ArmBody, Vec<String>) {
         let Solids { solids, remarks } = self.model.solids(&self.urdf);
-        let masks = self.semantics.iter().flat_map(|s| &s.disabled_collisions);
-        let may_touch: Vec<_> = masks.map(|mask| mask.links).collect();
+        let links: BTreeSet<usize> = solids.iter().map(|solid| solid.link).collect();
+        let may_touch = self.semantics.as_ref().map_or_else(Vec::new, |s| s.may_touch(&links));
         (ArmBody::new(&self.model, &self.chain, &solids, &may_touch), remarks)
     }
 }

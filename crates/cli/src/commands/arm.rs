@@ -55,7 +55,7 @@ impl ArmArgs {
     /// When a file, a link, a group, the posture or the values are wrong.
     pub(crate) fn load(&self, console: Console) -> Result<Arm, InputError> {
         let selection = self.files().load()?;
-        for finding in &selection.model.report.findings {
+        for finding in selection.findings() {
             console.note(format!("note: {finding}"));
         }
         let (place, values) = match &self.joints {

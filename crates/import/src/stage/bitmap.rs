@@ -28,13 +28,14 @@ pub(super) struct PlanFrame {
 /// only: gray, or red.
 pub(super) fn floor_plan(image: &Bitmap, frame: PlanFrame, report: &mut ImportReport) -> FloorPlan {
     let width = image.width() as usize;
-    let mut transparent = 0;
+    let mut is_transparent = false;
     let from_top = image.map_shades(|shade: Shade| {
-        transparent += usize::from(shade.opacity < 1.0);
-        shade.first_channel < SOLID_BELOW
+        let is_solid = shade.first_channel < SOLID_BELOW;
+        is_transparent |= is_solid && shade.opacity < 1.0;
+        is_solid
     });
-    if transparent > 0 {
-        let rule = "the transparency of bitmaps, as in Stage";
+    if is_transparent {
+        let rule = "the transparency of dark pixels, which are solid as in Stage";
         let remedy = "save the bitmap without transparency, on a white ground";
         report.record(Treatment::NotUsed, rule, frame.place.clone(), remedy);
     }

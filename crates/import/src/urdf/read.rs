@@ -33,7 +33,7 @@ pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let file = XmlFile::parse(&source)?;
     let robot = file.root("robot")?;
     let mut report = ImportReport::new("URDF");
-    record_undeclared_prefixes(&source, &mut report);
+    source.record_undeclared(&mut report);
     record_other_elements(robot, &mut report);
     xacro::check(robot, &mut report)?;
     check_version(robot, &mut report);
@@ -74,13 +74,6 @@ fn check_version(robot: Element, report: &mut ImportReport) {
     if !VERSIONS.contains(&version.text()) {
         let rule = format!("version `{}`, read as 1.1", version.text());
         report.record(Treatment::Suspicious, rule, robot.line(), "");
-    }
-}
-
-fn record_undeclared_prefixes(source: &XmlSource, report: &mut ImportReport) {
-    for undeclared in source.undeclared() {
-        let rule = format!("the prefix `{}:`, which is declared nowhere", undeclared.prefix);
-        report.record(Treatment::Repaired, rule, undeclared.place.clone(), "");
     }
 }
 

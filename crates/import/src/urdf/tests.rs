@@ -2,7 +2,7 @@ use super::srdf::Semantics;
 use super::*;
 use sidestep_testing::{ROBOT_MODELS as SHARED, robot_model as shared};
 
-const ARM: &str = r#"<robot name="arm">
+pub(crate) const ARM: &str = r#"<robot name="arm">
   <link name="base"/>
   <link name="upper"/>
   <link name="hand"/>
@@ -306,44 +306,4 @@ fn the_panda_has_a_mimic_joint_a_posture_and_groups() {
     let ur5 = shared("chain/ur5.urdf").zip(shared("chain/ur5.srdf")).expect("both");
     let model = Model::load(&ur5.0).expect("a model");
     assert_eq!(Semantics::load(&ur5.1, &model).expect("SRDF").disabled_collisions.len(), 10);
-}
-
-const SRDF: &str = r#"<robot name="arm">
-  <virtual_joint name="floor" type="floating" parent_frame="w" child_link="base"/>
-  <group name="all"><chain base_link="base" tip_link="hand"/></group>
-  <group name="both"><group name="all"/><joint name="shoulder"/><link name="hand"/></group>
-  <group_state name="up" group="all">
-    <joint name="floor" value="0 0 0"/><joint name="shoulder" value="1.5"/>
-  </group_state>
-  <end_effector name="tool" parent_link="hand" group="all"/>
-  <disable_collisions link1="base" link2="upper" reason="Adjacent"/>
-</robot>
-"#;
-
-#[test]
-fn an_srdf_is_read_whole_and_its_errors_are_pointed_at() {
-    let arm = Model::parse("arm.urdf", ARM).expect("a model");
-    let semantics = Semantics::parse("arm.srdf", SRDF, &arm).expect("an SRDF");
-    assert_eq!(semantics.groups[0].chains, [(0, 2)]);
-    assert_eq!(semantics.posture("--posture", "up"), Ok(vec![(0, 1.5)]));
-    assert_eq!(semantics.disabled_collisions[0].links, (0, 1));
-    let cases = [
-        ("tip_link=\"hand\"", "tip_link=\"hnd\"", 3, "`hand`?"),
-        (
-            "base_link=\"base\" tip_link=\"hand\"",
-            "base_link=\"hand\" tip_link=\"base\"",
-            3,
-            "base_link",
-        ),
-        ("<group name=\"all\"/>", "<group name=\"al\"/>", 4, "`all`?"),
-        ("name=\"both\"", "name=\"all\"", 4, "own"),
-        ("group=\"all\">", "group=\"alls\">", 5, "`all`?"),
-        ("value=\"1.5\"", "value=\"up\"", 6, "number"),
-        ("link2=\"upper\"", "link2=\"uper\"", 9, "`upper`?"),
-    ];
-    for (old, new, line, remedy) in cases {
-        let error = Semantics::parse("f", &SRDF.replacen(old, new, 1), &arm).expect_err(new);
-        assert_eq!(error.line_and_column().map(|p| p.0), Some(line), "{error}");
-        assert!(error.remedy().contains(remedy), "{error}");
-    }
 }

@@ -15,7 +15,7 @@ const REMEDY_INSIDE: &str = "expand it with ROS: xacro FILE.urdf.xacro > FILE.ur
                              robot's links and joints";
 
 /// Macros that define something for others, and add nothing where they stand.
-const DEFINITIONS: [&str; 3] = ["arg", "macro", "property"];
+pub(super) const DEFINITIONS: [&str; 3] = ["arg", "macro", "property"];
 
 /// Parts of a joint that kinematics reads.
 const KINEMATIC_PARTS: [&str; 7] =
@@ -51,7 +51,7 @@ pub(super) fn is_macro(element: &Element) -> bool {
     prefix == "xacro" || is_address
 }
 
-fn is_expression(value: &XmlAttribute) -> bool {
+pub(super) fn is_expression(value: &XmlAttribute) -> bool {
     value.text().contains("${") || value.text().contains("$(")
 }
 

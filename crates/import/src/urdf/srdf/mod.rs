@@ -1,10 +1,20 @@
 //! SRDF: the data about a robot that a URDF lacks. Groups of joints, named postures, end effectors
 //! and the pairs of links that need no collision check.
+//!
+//! Read as `MoveIt` reads it (`srdfdom`): where that warns and goes on, it is in [`Semantics::report`], with all that
+//! has no meaning here; where it leaves out a group, a posture or an end effector, that is an error.
 
+mod read;
+#[cfg(test)]
+mod tests;
+mod unused;
+
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::{MAX_URDF_BYTES, Model};
-use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource, read_xml_text};
+use crate::ImportReport;
+use crate::xml::read_xml_text;
 use sidestep_kernel::InputError;
 use sidestep_scenario::suggestion;
 
@@ -19,6 +29,12 @@ pub struct Semantics {
     pub end_effectors: Vec<EndEffector>,
     /// Pairs of links that may touch.
     pub disabled_collisions: Vec<DisabledCollision>,
+    /// Links that may touch all others but those of [`Self::enabled_collisions`], as indices of [`Model::links`].
+    pub default_disabled_links: Vec<usize>,
+    /// Pairs of links that must not touch although one of them may touch the others.
+    pub enabled_collisions: Vec<(usize, usize)>,
+    /// What of the file was not taken as it stood.
+    pub report: ImportReport,
 }
 
 /// A part of a robot, given in one or several ways.
@@ -71,10 +87,14 @@ impl Semantics {
     /// Reads the SRDF file at `path` for `model`, plain or compressed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, is not SRDF, or refers to a link, joint or group that does not
+    /// When the file cannot be read, is not SRDF, still has xacro, or refers to a link, joint or group that does not
     /// exist; with file, line, column and the nearest name.
     pub fn load(path: &Path, model: &Model) -> Result<Self, InputError> {
-        Self::parse(&path.display().to_string(), &read_xml_text(path, MAX_URDF_BYTES)?, model)
+        let place = path.display().to_string();
+        if place.trim_end_matches(".gz").ends_with(".xacro") {
+            return Err(InputError::new(place, super::xacro::CAUSE, read::XACRO_REMEDY));
+        }
+        Self::parse(&place, &read_xml_text(path, MAX_URDF_BYTES)?, model)
     }
 
     /// Reads the text of an SRDF file; `place` is its name in errors.
@@ -82,16 +102,26 @@ impl Semantics {
     /// # Errors
     /// Those of [`Semantics::load`], except for reading.
     pub fn parse(place: &str, text: &str, model: &Model) -> Result<Self, InputError> {
-        let source = XmlSource::new(place, text)?;
-        let file = XmlFile::parse(&source)?;
-        let reader = SrdfReader { robot: file.root("robot")?, model };
-        let groups = reader.groups()?;
-        Ok(Self {
-            postures: reader.read_all("group_state", |e| reader.posture(e, &groups))?,
-            end_effectors: reader.read_all("end_effector", |e| reader.end_effector(e))?,
-            disabled_collisions: reader.read_all("disable_collisions", |e| reader.disabled(e))?,
-            groups,
-        })
+        read::semantics(place, text, model)
+    }
+
+    /// Returns the pairs among these links that may touch, each once: those that the file disables, and those of a link
+    /// whose collisions it disables by default, unless it enables them again.
+    pub fn may_touch(&self, links: &BTreeSet<usize>) -> Vec<(usize, usize)> {
+        let ordered = |(a, b): (usize, usize)| (a.min(b), a.max(b));
+        let mut pairs = BTreeSet::new();
+        for &link in self.default_disabled_links.iter().filter(|link| links.contains(link)) {
+            pairs.extend(
+                links.iter().filter(|other| **other != link).map(|&other| ordered((link, other))),
+            );
+        }
+        for &pair in &self.enabled_collisions {
+            pairs.remove(&ordered(pair));
+        }
+        // Last, as in MoveIt: what is disabled by name stays so.
+        let disabled = self.disabled_collisions.iter().map(|pair| ordered(pair.links));
+        pairs.extend(disabled.filter(|(a, b)| links.contains(a) && links.contains(b)));
+        pairs.into_iter().collect()
     }
 
     /// Returns the values of all postures called `name`; later ones replace earlier ones. `place`
@@ -170,128 +200,4 @@ fn path_ends(joints: &[usize], model: &Model) -> Option<(usize, usize)> {
     let tip = model.joints[last].child;
     let path = model.joint_path(base, tip)?;
     joints.iter().all(|joint| path.contains(joint)).then_some((base, tip))
-}
-
-struct SrdfReader<'a> {
-    robot: Element<'a>,
-    model: &'a Model,
-}
-
-impl<'a> SrdfReader<'a> {
-    /// Returns the result of `read` for each element called `name`.
-    fn read_all<T>(
-        &self,
-        name: &'a str,
-        read: impl Fn(Element<'a>) -> Result<T, InputError>,
-    ) -> Result<Vec<T>, InputError> {
-        self.robot.children(name).map(read).collect()
-    }
-
-    fn groups(&self) -> Result<Vec<Group>, InputError> {
-        let groups = self.read_all("group", |element| self.group(element))?;
-        for (i, element) in self.robot.children("group").enumerate() {
-            if groups[..i].iter().any(|earlier| earlier.name == groups[i].name) {
-                let cause = format!("a second group `{}`", groups[i].name);
-                return Err(element.error(cause, "give each group a name of its own"));
-            }
-            for part in element.children("group") {
-                known_group(part.required("name")?, &groups)?;
-            }
-        }
-        Ok(groups)
-    }
-
-    fn group(&self, element: Element<'a>) -> Result<Group, InputError> {
-        let mut group = Group {
-            name: element.required("name")?.text().to_owned(),
-            joints: Vec::new(),
-            links: Vec::new(),
-            chains: Vec::new(),
-            groups: Vec::new(),
-        };
-        for joint in element.children("joint") {
-            group.joints.push(self.joint(joint.required("name")?)?);
-        }
-        for link in element.children("link") {
-            group.links.push(self.link(link.required("name")?)?);
-        }
-        for chain in element.children("chain") {
-            group.chains.push(self.chain(chain)?);
-        }
-        for part in element.children("group") {
-            group.groups.push(part.required("name")?.text().to_owned());
-        }
-        Ok(group)
-    }
-
-    fn chain(&self, element: Element<'a>) -> Result<(usize, usize), InputError> {
-        let base = self.link(element.required("base_link")?)?;
-        let tip_link = element.required("tip_link")?;
-        let tip = self.link(tip_link)?;
-        if self.model.joint_path(base, tip).is_none() {
-            let links = &self.model.links;
-            let cause = format!("`{}` does not hang on `{}`", links[tip], links[base]);
-            return Err(tip_link.error(cause, "write the link nearer to the root as base_link"));
-        }
-        Ok((base, tip))
-    }
-
-    fn posture(&self, element: Element<'a>, groups: &[Group]) -> Result<NamedPosture, InputError> {
-        let group = element.required("group")?;
-        known_group(group, groups)?;
-        let name = element.required("name")?.text().to_owned();
-        let mut values = Vec::new();
-        for joint in element.children("joint") {
-            // The model has no virtual joints, so their values are left out.
-            if !self.is_virtual(joint) {
-                let index = self.joint(joint.required("name")?)?;
-                values.push((index, joint.required("value")?.number()?));
-            }
-        }
-        Ok(NamedPosture { name, group: group.text().to_owned(), values })
-    }
-
-    /// Returns whether a joint exists in the SRDF only, and places the robot in the world.
-    fn is_virtual(&self, joint: Element<'a>) -> bool {
-        let Some(name) = joint.attribute("name") else { return false };
-        self.robot.children("virtual_joint").any(|virtual_joint| {
-            virtual_joint.attribute("name").is_some_and(|other| other.text() == name.text())
-        })
-    }
-
-    fn end_effector(&self, element: Element<'a>) -> Result<EndEffector, InputError> {
-        Ok(EndEffector {
-            name: element.required("name")?.text().to_owned(),
-            parent_link: self.link(element.required("parent_link")?)?,
-            group: element.attribute("group").map_or("", |v| v.text()).to_owned(),
-        })
-    }
-
-    fn disabled(&self, element: Element<'a>) -> Result<DisabledCollision, InputError> {
-        let first = self.link(element.required("link1")?)?;
-        let second = self.link(element.required("link2")?)?;
-        Ok(DisabledCollision {
-            links: (first, second),
-            reason: element.attribute("reason").map_or("", |v| v.text()).to_owned(),
-        })
-    }
-
-    fn link(&self, value: XmlAttribute) -> Result<usize, InputError> {
-        let link = self.model.link("", value.text());
-        link.map_err(|error| value.error(error.cause(), error.remedy()))
-    }
-
-    fn joint(&self, value: XmlAttribute) -> Result<usize, InputError> {
-        let joint = self.model.joint("", value.text());
-        joint.map_err(|error| value.error(error.cause(), error.remedy()))
-    }
-}
-
-fn known_group(value: XmlAttribute, groups: &[Group]) -> Result<(), InputError> {
-    if groups.iter().any(|group| group.name == value.text()) {
-        return Ok(());
-    }
-    let known: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
-    let cause = format!("there is no group `{}`", value.text());
-    Err(value.error(cause, suggestion(value.text(), &known)))
 }
