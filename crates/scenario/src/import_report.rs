@@ -104,6 +104,14 @@ impl ImportReport {
         self.kept.push(ItemCount { noun: noun.into(), count: count as u64 });
     }
 
+    /// Adds one to a number of items that were kept.
+    pub fn count_kept(&mut self, noun: &'static str) {
+        match self.kept.iter_mut().find(|kept| kept.noun == noun) {
+            Some(kept) => kept.count += 1,
+            None => self.add_kept(noun, 1),
+        }
+    }
+
     /// Records that a rule applied at a place; an empty place is not shown.
     pub fn record(
         &mut self,

@@ -1,6 +1,7 @@
 //! Limits of a joint: its range and its highest speed.
 
 use super::numbers::MAX_COORDINATE;
+use super::unused::record_units_of_limits;
 use super::{JointKind, Limits};
 use crate::xml::Element;
 use crate::{ImportReport, Treatment};
@@ -19,13 +20,9 @@ struct SoftLimits<'a> {
 }
 
 impl SoftLimits<'_> {
-    /// Returns what they leave of the limits of the joint. `MoveIt`, TRAC-IK and `ros_control` obey both, so that a
-    /// posture outside is one that the robot refuses.
-    fn narrow(
-        &self,
-        [lower, upper]: [f64; 2],
-        report: &mut ImportReport,
-    ) -> Result<[f64; 2], InputError> {
+    /// Returns what they leave of the limits of the joint. `MoveIt` (`jointBoundsFromURDF`), TRAC-IK and `ros_control`
+    /// obey both, so that a posture outside is one that the robot refuses. The file says so: it is no guess.
+    fn narrow(&self, [lower, upper]: [f64; 2]) -> Result<[f64; 2], InputError> {
         let [soft_lower, soft_upper] = self.range;
         let narrowed = [lower.max(soft_lower), upper.min(soft_upper)];
         if narrowed[0] > narrowed[1] {
@@ -34,11 +31,6 @@ impl SoftLimits<'_> {
             );
             let remedy = "give soft limits inside the limits, or remove <safety_controller>";
             return Err(self.element.error(cause, remedy));
-        }
-        if narrowed != [lower, upper] {
-            let rule = "soft limits of <safety_controller> narrow the limits, as in MoveIt";
-            let remedy = "remove <safety_controller> for the limits alone";
-            report.record(Treatment::Guessed, rule, self.element.line(), remedy);
         }
         Ok(narrowed)
     }
@@ -69,9 +61,14 @@ impl<'a> LimitedJoint<'a> {
             report.record(Treatment::Suspicious, rule, element.line(), remedy);
         }
         let bounds = [bound(element, "lower", report)?, bound(element, "upper", report)?];
+        record_units_of_limits(element, self.kind, bounds, report);
         let mut range = check_order(element, LIMITS, bounds)?;
         if let Some(soft) = self.soft_limits(report)? {
-            range = soft.narrow(range, report)?;
+            let narrowed = soft.narrow(range)?;
+            if narrowed != range {
+                report.count_kept("joints with soft limits inside their limits, which hold");
+            }
+            range = narrowed;
         }
         Ok(closed_range(range))
     }
@@ -85,10 +82,10 @@ impl<'a> LimitedJoint<'a> {
             return Ok(None);
         }
         if lower.is_none() || upper.is_none() {
-            let rule = "a soft limit that is not given is 0, as URDF defines it";
+            let rule = "soft limits of which one is not given, which is 0 then";
             let remedy =
                 "write soft_lower_limit=\"...\" soft_upper_limit=\"...\" into <safety_controller>";
-            report.record(Treatment::Guessed, rule, element.line(), remedy);
+            report.record(Treatment::Suspicious, rule, element.line(), remedy);
         }
         let [lower, upper] = SOFT_LIMITS;
         let bounds = [bound(element, lower, report)?, bound(element, upper, report)?];

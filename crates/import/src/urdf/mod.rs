@@ -18,6 +18,7 @@ pub mod srdf;
 pub(crate) mod tests;
 mod tip;
 mod tree;
+mod unused;
 mod xacro;
 
 pub use shapes::{Collision, Shape, Solid, Solids};

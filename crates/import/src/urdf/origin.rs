@@ -2,6 +2,7 @@
 
 use super::Origin;
 use super::numbers::bounded;
+use super::unused::record_units_of_origin;
 use crate::xml::{Element, XmlAttribute};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
@@ -23,6 +24,7 @@ pub(super) fn read(parent: Element, report: &mut ImportReport) -> Result<Origin,
     let triple = |name| element.attribute(name).map_or(Ok([0.0; 3]), bounded);
     let xyz_m = triple("xyz")?;
     let rpy_rad = triple("rpy")?;
+    record_units_of_origin(element, [xyz_m, rpy_rad], report);
     let Some(value) = element.attribute("quat_xyzw") else { return Ok(Origin { xyz_m, rpy_rad }) };
     if element.attribute("rpy").is_some() {
         let cause = "an origin with both `rpy` and `quat_xyzw`";

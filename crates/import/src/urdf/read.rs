@@ -3,7 +3,7 @@
 use super::limits::LimitedJoint;
 use super::numbers::{MAX_COORDINATE, bounded, bounded_number};
 use super::{Collision, Joint, JointKind, Mimic, Model, Shape};
-use super::{origin, tree, xacro};
+use super::{origin, tree, unused, xacro};
 use crate::xml::{Element, XmlAttribute, XmlFile, XmlSource};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
@@ -28,13 +28,16 @@ const MAX_LINKS: usize = 10_000;
 /// The minimum length of an axis; a shorter one has no reliable direction.
 const MIN_AXIS: f64 = 1e-6;
 
+/// Largest error of the length of an axis with few digits.
+const LENGTH_TOLERANCE: f64 = 1e-2;
+
 pub(super) fn model(place: &str, text: &str) -> Result<Model, InputError> {
     let source = XmlSource::new(place, text)?;
     let file = XmlFile::parse(&source)?;
     let robot = file.root("robot")?;
     let mut report = ImportReport::new("URDF");
     source.record_undeclared(&mut report);
-    record_other_elements(robot, &mut report);
+    unused::record_elements_of_robot(robot, &mut report);
     xacro::check(robot, &mut report)?;
     check_version(robot, &mut report);
     let name = robot.required("name")?.text().to_owned();
@@ -74,20 +77,6 @@ fn check_version(robot: Element, report: &mut ImportReport) {
     if !VERSIONS.contains(&version.text()) {
         let rule = format!("version `{}`, read as 1.1", version.text());
         report.record(Treatment::Suspicious, rule, robot.line(), "");
-    }
-}
-
-/// Records the parts of a robot that are neither links nor joints: simulators, controllers and sensors. Colors are no
-/// news.
-fn record_other_elements(robot: Element, report: &mut ImportReport) {
-    const READ: [&str; 3] = ["link", "joint", "material"];
-    for element in robot.child_elements() {
-        let is_read = element.is_of_format() && READ.contains(&element.name());
-        if !is_read && !xacro::is_macro(&element) {
-            let prefix = element.prefix().map_or(String::new(), |prefix| format!("{prefix}:"));
-            let rule = format!("elements <{prefix}{}>", element.name());
-            report.record(Treatment::NotUsed, rule, element.line(), "");
-        }
     }
 }
 
@@ -162,12 +151,13 @@ fn links<'a>(robot: Element<'a>) -> Result<Links<'a>, InputError> {
 
 /// Reads the shapes of a link that count for collisions.
 fn link_collisions(link: Element, report: &mut ImportReport) -> Result<Vec<Collision>, InputError> {
+    unused::record_link(link, report);
     let mut collisions = Vec::new();
     for element in link.children("collision") {
+        unused::record_collision(element, report);
         // Empty elements, and those of other programs, are no shapes.
         if let Some(kind) = element.child("geometry")?.and_then(Element::first_child) {
             let origin = origin::read(element, report)?;
-            record_unknown_attributes(element, report);
             let shape = shape(kind)?;
             if let Shape::Other { kind: name } = &shape {
                 let rule = format!("collision shapes <{name}>");
@@ -219,38 +209,18 @@ fn joint(element: Element, links: &Links, report: &mut ImportReport) -> Result<J
     let name = element.required("name")?.text().to_owned();
     let kind = kind(element.required("type")?)?;
     let limited = LimitedJoint { element, kind };
-    record_unknown_attributes(element, report);
+    unused::record_joint(element, kind, report);
     Ok(Joint {
         name,
         kind,
         parent: links.link_in_attribute(element.required_child("parent")?)?,
         child: links.link_in_attribute(element.required_child("child")?)?,
         origin: origin::read(element, report)?,
-        axis: axis(element, kind)?,
+        axis: axis(element, kind, report)?,
         limits: limited.range(report)?,
         max_speed: limited.max_speed(report)?,
         mimic: None,
     })
-}
-
-/// Attributes of the elements whose numbers are read, and those that mean nothing for kinematics.
-const KNOWN_ATTRIBUTES: [(&str, &[&str]); 4] = [
-    ("axis", &["xyz"]),
-    ("limit", &["lower", "upper", "velocity", "effort"]),
-    ("mimic", &["joint", "multiplier", "offset"]),
-    ("origin", &["xyz", "rpy", "quat_xyzw"]),
-];
-
-/// Records what the elements of a joint or a collision shape say in attributes that are not read.
-fn record_unknown_attributes(parent: Element, report: &mut ImportReport) {
-    for (name, known) in KNOWN_ATTRIBUTES {
-        for element in parent.children(name) {
-            for value in element.attributes().filter(|value| !known.contains(&value.name())) {
-                let rule = format!("`{}` of <{name}>", value.name());
-                report.record(Treatment::NotUsed, rule, element.line(), "");
-            }
-        }
-    }
 }
 
 fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
@@ -263,7 +233,11 @@ fn kind(value: XmlAttribute) -> Result<JointKind, InputError> {
 
 /// Reads the axis of a joint. Files give fixed joints a zero axis, which means nothing and is not
 /// read.
-fn axis(joint: Element, kind: JointKind) -> Result<[f64; 3], InputError> {
+fn axis(
+    joint: Element,
+    kind: JointKind,
+    report: &mut ImportReport,
+) -> Result<[f64; 3], InputError> {
     const DEFAULT: [f64; 3] = [1.0, 0.0, 0.0];
     if !kind.has_one_value() && kind != JointKind::Planar {
         return Ok(DEFAULT);
@@ -275,6 +249,10 @@ fn axis(joint: Element, kind: JointKind) -> Result<[f64; 3], InputError> {
     if length < MIN_AXIS {
         let cause = "the axis has no direction";
         return Err(value.error(cause, "write a vector that is not zero, e.g. \"0 0 1\""));
+    }
+    if (length - 1.0).abs() > LENGTH_TOLERANCE {
+        let rule = "axes whose length is not 1, of which the direction counts";
+        report.record(Treatment::Repaired, rule, element.line(), "");
     }
     Ok([x / length, y / length, z / length])
 }

@@ -8,7 +8,7 @@ pub(crate) const ARM: &str = r#"<robot name="arm">
   <link name="hand"/>
   <joint name="shoulder" type="revolute">
     <parent link="base"/><child link="upper"/>
-    <axis xyz="0 0 2"/><limit lower="-1" upper="2"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="2"/>
   </joint>
   <joint name="wrist" type="fixed">
     <parent link="upper"/><child link="hand"/>
@@ -40,9 +40,9 @@ fn a_small_arm_is_read_with_all_defaults() {
 fn every_wrong_thing_is_named_with_its_place_and_what_would_be_right() {
     let cases = [
         ("child link=\"hand\"", "child link=\"hnad\"", 10, "hnad", "`hand`?"),
-        ("\"0 0 2\"", "\"0 0 0\"", 7, "no direction", "0 0 1"),
-        ("\"0 0 2\"", "\"0 NaN 1\"", 7, "`NaN`", "number"),
-        ("\"0 0 2\"", "\"0 1\"", 7, "2 numbers", "three"),
+        ("\"0 0 1\"", "\"0 0 0\"", 7, "no direction", "0 0 1"),
+        ("\"0 0 1\"", "\"0 NaN 1\"", 7, "`NaN`", "number"),
+        ("\"0 0 1\"", "\"0 1\"", 7, "2 numbers", "three"),
         ("lower=\"-1\"", "lower=\"3\"", 7, "above", "smaller"),
         ("<limit lower=\"-1\" upper=\"2\"/>", "", 5, "lacks <limit>", "add <limit"),
         ("revolute", "revolut", 5, "revolut", "`revolute`?"),
@@ -55,16 +55,16 @@ fn every_wrong_thing_is_named_with_its_place_and_what_would_be_right() {
         ("<robot", "<sdf", 13, "closes", "</sdf>"),
         ("xyz=\"1 0 0\"", "xyz=\"1e9 0 0\"", 11, "1e6", "meters"),
         ("xyz=\"1 0 0\"", "xyz=\"${x} 0 0\"", 11, "xacro", "xacro FILE"),
-        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"shoulder\"/>", 5, "circle", "<mimic>"),
-        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"wrist\"/>", 7, "cannot move", "value"),
-        ("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"wirst\"/>", 7, "wirst", "`wrist`?"),
+        ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"shoulder\"/>", 5, "circle", "<mimic>"),
+        ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"wrist\"/>", 7, "cannot move", "value"),
+        ("<axis xyz=\"0 0 1\"/>", "<mimic joint=\"wirst\"/>", 7, "wirst", "`wrist`?"),
     ];
     for (old, new, line, cause, remedy) in cases {
         let error = error_of(old, new);
         assert_eq!(error.line_and_column().map(|p| p.0), Some(line), "{error}");
         assert!(error.cause().contains(cause) && error.remedy().contains(remedy), "{error}");
     }
-    assert_eq!(error_of("\"0 0 2\"", "\"0 0 0\"").line_and_column(), Some((7, 16)));
+    assert_eq!(error_of("\"0 0 1\"", "\"0 0 0\"").line_and_column(), Some((7, 16)));
     let circle = ARM.replace("<link name=\"hand\"/>", "").replace("\"hand\"", "\"base\"");
     let error = Model::parse("arm.urdf", &circle).expect_err("no root");
     assert!(error.cause().contains("every link hangs on another"), "{error}");
@@ -96,7 +96,11 @@ fn other_elements_prefixes_and_missing_meshes_do_not_matter() {
     let arm = Model::parse("f", ARM).expect("a model");
     assert_eq!(
         findings(&model),
-        ["not used: elements <gazebo>, line 6", "not used: elements <transmission>, line 6"]
+        [
+            "not used: elements <gazebo>, line 6",
+            "not used: elements <transmission>, line 6",
+            "not used: elements <d:proximity> of links, line 6",
+        ]
     );
     assert_eq!(Model { report: arm.report.clone(), ..model }, arm);
 }
@@ -194,16 +198,15 @@ fn numbers_that_stand_for_no_limit_are_none_and_said() {
 #[test]
 fn soft_limits_narrow_the_limits_of_a_joint() {
     const HARD: &str = "<limit lower=\"-1\" upper=\"2\"/>";
-    let narrowed = "guessed: soft limits of <safety_controller> narrow the limits";
     let both = |lower: f64, upper: f64| Some(Limits { lower, upper });
     let cases = [
         (
             HARD,
             "k_position=\"20\" soft_lower_limit=\"-0.5\" soft_upper_limit=\"0.5\"",
             both(-0.5, 0.5),
-            narrowed,
+            "",
         ),
-        (HARD, "soft_lower_limit=\"-0.5\" soft_upper_limit=\"3\"", both(-0.5, 2.0), narrowed),
+        (HARD, "soft_lower_limit=\"-0.5\" soft_upper_limit=\"3\"", both(-0.5, 2.0), ""),
         (HARD, "soft_lower_limit=\"-1\" soft_upper_limit=\"2\"", both(-1.0, 2.0), ""),
         (
             HARD,
@@ -218,7 +221,7 @@ fn soft_limits_narrow_the_limits_of_a_joint() {
             both(-1.0, 2.0),
             "not used: soft limits",
         ),
-        (HARD, "soft_upper_limit=\"1\"", both(0.0, 1.0), "guessed: a soft limit that is not given"),
+        (HARD, "soft_upper_limit=\"1\"", both(0.0, 1.0), "suspicious: soft limits of which one"),
         (
             "<limit lower=\"-1e16\" upper=\"1e16\"/>",
             "soft_lower_limit=\"-3\" soft_upper_limit=\"3\"",
@@ -262,6 +265,47 @@ fn limits_that_do_not_hold_or_are_not_there_are_said() {
         let model = Model::parse("f", &text).expect("a model");
         assert_eq!(model.joints[0].limits, None);
         assert_eq!(findings(&model).len(), count, "{:?}", findings(&model));
+    }
+}
+
+#[test]
+fn what_a_urdf_says_and_kinematics_does_not_read_is_named() {
+    let joint = |text: &str| ARM.replacen("<axis xyz=\"0 0 1\"/>", text, 1);
+    let link = |text: &str| {
+        ARM.replace("<link name=\"hand\"/>", &format!("<link name=\"hand\">{text}</link>"))
+    };
+    let shape = |text: &str| link(&format!("<collision><geometry>{text}</geometry></collision>"));
+    let mass = |kg: &str| link(&format!("<inertial><mass value=\"{kg}\"/></inertial>"));
+    for (text, expected) in [
+        (joint("<dynamics damping=\"1\"/>"), "not used: elements <dynamics> of joints, line 7"),
+        (joint("<calibration rising=\"1\"/>"), "not used: elements <calibration> of joints"),
+        (joint("<drake:gear/>"), "not used: elements <drake:gear> of joints, line 7"),
+        (joint("<axis xyz=\"0 0 3\"/>"), "repaired: axes whose length is not 1, of which"),
+        (joint("<axis xyz=\"0 0 1\" frame=\"a\"/>"), "not used: `frame` of <axis>, line 7"),
+        (joint("<origin xyz=\"0 0 300\"/>"), "suspicious: origins beyond 100 m, which look like"),
+        (joint("<origin rpy=\"0 0 90\"/>"), "suspicious: angles of more than a turn, which look"),
+        (ARM.replace("upper=\"2\"", "upper=\"180\""), "suspicious: limits of more than ten turns"),
+        (
+            ARM.replace("upper=\"2\"", "upper=\"180\"").replace("revolute", "prismatic"),
+            "suspicious: limits beyond 100 m, which look like millimeters, line 7; URDF has meters",
+        ),
+        (ARM.replace("fixed", "floating"), "not used: the motion of floating joints: what they"),
+        (
+            ARM.replace("fixed", "planar").replace("0 0 0", "0 0 1"),
+            "not used: the motion of planar",
+        ),
+        (link("<contact/>"), "not used: elements <contact> of links, line 4"),
+        (mass("0"), "suspicious: masses of 0, which simulators of forces refuse, line 4"),
+        (mass("-1"), "suspicious: a mass of `-1` kg, line 4"),
+        (mass("nan"), "suspicious: a mass of `nan` kg, line 4"),
+        (shape("<drake:capsule/>"), "not used: collision shapes <drake:capsule>, line 4"),
+        (shape("<capsule radius=\"1\"/>"), "not used: collision shapes <capsule>, line 4"),
+        (shape(""), "dropped: collision shapes that are empty, line 4"),
+        (shape("<sphere radius=\"1\"/><sphere radius=\"2\"/>"), "dropped: a second shape in one"),
+    ] {
+        let model = Model::parse("f", &text).expect(expected);
+        let lines = findings(&model);
+        assert!(lines.iter().any(|line| line.starts_with(expected)), "{lines:?}: {expected}");
     }
 }
 
