@@ -314,7 +314,7 @@ impl IkOptions {
         };
         if is_own && body.as_ref().is_none_or(ArmBody::is_empty) {
             let cause = [&["no link has a collision shape that can be read".into()], &remarks[..]];
-            let remedy = "give the links boxes, cylinders, spheres or STL meshes";
+            let remedy = "give the links boxes, cylinders, spheres or meshes (STL, OBJ, DAE)";
             return Err(argument_error("body", cause.concat().join("; "), remedy));
         }
         let goal = ArmGoal {

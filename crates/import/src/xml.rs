@@ -278,6 +278,11 @@ impl<'a> Element<'a> {
         self.file.source.line(self.node.range().start)
     }
 
+    /// Returns the text at its beginning, up to the first element in it.
+    pub(super) fn text(&self) -> &'a str {
+        self.node.text().unwrap_or_default()
+    }
+
     /// Returns its direct children that are called `name`, without those of other programs.
     pub(super) fn children(self, name: &'a str) -> impl Iterator<Item = Element<'a>> {
         self.child_elements().filter(move |child| child.name() == name && child.is_of_format())

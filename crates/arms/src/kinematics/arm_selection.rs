@@ -4,7 +4,7 @@ use super::body::ArmBody;
 use super::serial::SerialChain;
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::srdf::Semantics;
-use sidestep_import::urdf::{Model, Solids};
+use sidestep_import::urdf::{Model, Shape, Solids};
 use sidestep_kernel::InputError;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -96,11 +96,24 @@ impl ArmModel {
         self.model.report.findings.iter().chain(semantics)
     }
 
-    /// Returns the shapes of its links, and remarks on those that are not among them.
+    /// Returns the shapes of its links, and remarks on those that are not among them or stand as others.
     pub fn body(&self) -> (ArmBody, Vec<String>) {
-        let Solids { solids, remarks } = self.model.solids(&self.urdf);
+        let Solids { solids, report } = self.model.solids(&self.urdf);
         let links: BTreeSet<usize> = solids.iter().map(|solid| solid.link).collect();
         let may_touch = self.semantics.as_ref().map_or_else(Vec::new, |s| s.may_touch(&links));
-        (ArmBody::new(&self.model, &self.chain, &solids, &may_touch), remarks)
+        let body = ArmBody::new(&self.model, &self.chain, &solids, &may_touch);
+        let mut remarks = Vec::new();
+        let hulls = body.hulls();
+        if hulls > 0 {
+            remarks.push(format!("meshes stand as their convex hulls: {hulls}"));
+        }
+        let meshes =
+            solids.iter().filter(|solid| matches!(solid.shape, Shape::Hull { .. })).count();
+        if meshes > hulls {
+            let flat = meshes - hulls;
+            remarks.push(format!("meshes without thickness stand as boxes: {flat}"));
+        }
+        remarks.extend(report.findings.iter().map(ToString::to_string));
+        (body, remarks)
     }
 }

@@ -190,12 +190,13 @@ fn with_shapes(mesh: &str) -> String {
     bars.iter().fold(SIX.to_owned(), |text, (old, new)| text.replace(old, new))
 }
 
-/// A mesh in mm: a triangle from -50 to 50 along x and y, and 100 along z.
+/// A mesh in mm: two triangles, whose hull reaches from -50 to 50 along x and y, and 100 along z.
 const MESH: &str = "solid t\nfacet normal 0 0 1\nouter loop\nvertex -50 -50 0\nvertex 50 50 0\n\
-    vertex 0 0 100\nendloop\nendfacet\nendsolid t\n";
+    vertex 0 0 100\nendloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex -50 50 0\n\
+    vertex 50 -50 0\nvertex 0 0 100\nendloop\nendfacet\nendsolid t\n";
 
 #[test]
-fn shapes_of_links_count_for_obstacles_and_meshes_as_their_boxes() {
+fn shapes_of_links_count_for_obstacles_and_meshes_as_their_hulls() {
     let place = place();
     place.write("tool.stl", MESH);
     place.write("bars.urdf", with_shapes("tool.stl"));
@@ -209,7 +210,7 @@ fn shapes_of_links_count_for_obstacles_and_meshes_as_their_boxes() {
     assert_eq!(blocked.code(), 1, "{}", blocked.out());
     let reason = blocked.json()["reason"].to_string();
     assert!(reason.contains("link `base`") && reason.contains("obstacle 1"), "{reason}");
-    assert_eq!(blocked.json()["remarks"], json!(["meshes stand as their bounding boxes: 1"]));
+    assert_eq!(blocked.json()["remarks"], json!(["meshes stand as their convex hulls: 1"]));
     assert_eq!(ask("bars.urdf", &["--body", "rods"]).code(), 0);
     let lost = ask("lost.urdf", &[]).json()["remarks"].to_string();
     assert!(lost.contains("`l6`") && lost.contains("absent"), "{lost}");

@@ -9,6 +9,7 @@
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
 mod limits;
+mod mesh_files;
 mod numbers;
 mod origin;
 mod read;

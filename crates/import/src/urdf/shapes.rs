@@ -1,8 +1,11 @@
-//! Collision shapes of links, and meshes as their bounding boxes.
+//! Collision shapes of links, and meshes as their convex hulls.
 
+use super::mesh_files::find_mesh;
 use super::{Model, Origin};
-use crate::stl;
-use std::path::{Path, PathBuf};
+use crate::mesh::Mesh;
+use crate::{ImportReport, Treatment};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A shape that is fixed in a link.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +43,11 @@ pub enum Shape {
         /// Factors of its coordinates, which are then in m.
         scale: [f64; 3],
     },
+    /// The convex hull of points, in place of a mesh that was read.
+    Hull {
+        /// The points in m, about the middle of the box around them.
+        points_m: Vec<[f64; 3]>,
+    },
     /// A kind that is not read, such as a capsule.
     Other {
         /// Its name in the file.
@@ -47,109 +55,120 @@ pub enum Shape {
     },
 }
 
-/// A shape that takes up space: a ball, a cylinder about z or a box.
+/// A shape that takes up space: a ball, a cylinder about z, a box or a convex hull.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     /// Index of its link in [`Model::links`].
     pub link: usize,
     /// The frame of the model's shape, in the link's.
     pub origin: Origin,
-    /// Its center in that frame: zero except for the boxes of meshes.
+    /// Its center in that frame: zero except for meshes.
     pub center_m: [f64; 3],
     /// The shape; never a mesh.
     pub shape: Shape,
 }
 
-/// The solids of a model, and remarks on shapes that are not among them.
+/// The solids of a model, and what is said of shapes that are not among them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solids {
     /// All solids, in the order of links.
     pub solids: Vec<Solid>,
-    /// Sentences for people: meshes that became boxes, and shapes that could not be read.
-    pub remarks: Vec<String>,
+    /// Shapes that could not be read, and choices that were made.
+    pub report: ImportReport,
 }
+
+/// The lengths in m beyond which a mesh is in millimeters, and has no scale that says so.
+const MAX_MESH_M: f64 = 50.0;
+
+/// The maximum number of points of all meshes of a model.
+const MAX_POINTS: usize = 1 << 23;
 
 impl Model {
-    /// Returns the solids of all links. Meshes are replaced by their bounding boxes: STL files,
-    /// which are searched for next to `urdf`, the model's own file, and for `package://NAME/REST` in the
-    /// folders above it. A mesh that cannot be read is left out with a remark.
+    /// Returns the solids of all links. Meshes (STL, OBJ and DAE) are replaced by their convex hulls. They are searched
+    /// for next to `urdf`, the model's own file, and for `package://NAME/REST` in the folders above it; they have to lie in
+    /// the package of the model, or in the one that they name. A mesh that cannot be read is left out and said.
     pub fn solids(&self, urdf: &Path) -> Solids {
-        let mut solids = Vec::new();
-        let mut mesh_boxes = 0;
-        let mut left_out = Vec::new();
+        let mut reader = SolidReader {
+            urdf,
+            meshes: BTreeMap::new(),
+            points: 0,
+            solids: Vec::new(),
+            report: ImportReport::new("collision shapes"),
+        };
         for (link, shapes) in self.collisions.iter().enumerate() {
-            for Collision { origin, shape } in shapes {
-                let mut center_m = [0.0; 3];
-                let mut shape = shape.clone();
-                match &shape {
-                    Shape::Mesh { file, scale } => match mesh_box(urdf, file, *scale) {
-                        Ok(mesh_box) => {
-                            mesh_boxes += 1;
-                            center_m = mesh_box.center_m;
-                            shape = Shape::Box { size_m: mesh_box.size_m };
-                        }
-                        Err(reason) => {
-                            left_out.push(format!("`{}` ({file}: {reason})", self.links[link]));
-                            continue;
-                        }
-                    },
-                    Shape::Other { kind } => {
-                        left_out.push(format!("`{}` (a {kind} is not read)", self.links[link]));
-                        continue;
-                    }
-                    Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Box { .. } => {}
-                }
-                solids.push(Solid { link, origin: *origin, center_m, shape });
+            for collision in shapes {
+                reader.add(link, &self.links[link], collision);
             }
         }
-        let mut remarks = Vec::new();
-        if mesh_boxes > 0 {
-            remarks.push(format!("meshes stand as their bounding boxes: {mesh_boxes}"));
+        let SolidReader { solids, mut report, .. } = reader;
+        let hulls = solids.iter().filter(|solid| matches!(solid.shape, Shape::Hull { .. }));
+        report.add_kept("meshes", hulls.count());
+        report.add_kept("shapes", solids.len());
+        Solids { solids, report }
+    }
+}
+
+struct SolidReader<'a> {
+    urdf: &'a Path,
+    /// The meshes that were read, by the names in the model: links share them.
+    meshes: BTreeMap<String, Result<Mesh, String>>,
+    /// Number of points of all solids.
+    points: usize,
+    solids: Vec<Solid>,
+    report: ImportReport,
+}
+
+impl SolidReader<'_> {
+    fn add(&mut self, link: usize, name: &str, collision: &Collision) {
+        let Collision { origin, shape } = collision;
+        let (center_m, shape) = match shape {
+            Shape::Mesh { file, scale } => match self.hull(file, *scale) {
+                Ok(hull) => hull,
+                Err(reason) => {
+                    let place = format!("`{name}` ({file}: {reason})");
+                    let remedy = "put the mesh there, as STL, OBJ or DAE";
+                    let rule = "collision shapes whose mesh is not read";
+                    self.report.record(Treatment::Dropped, rule, place, remedy);
+                    return;
+                }
+            },
+            Shape::Other { kind } => {
+                let place = format!("`{name}` (a {kind} is not read)");
+                let rule = "collision shapes of a kind that is not read";
+                self.report.record(Treatment::Dropped, rule, place, "");
+                return;
+            }
+            known => ([0.0; 3], known.clone()),
+        };
+        self.solids.push(Solid { link, origin: *origin, center_m, shape });
+    }
+
+    /// Returns the convex hull of a mesh and its center, or the reason why there is none.
+    fn hull(&mut self, file: &str, scale: [f64; 3]) -> Result<([f64; 3], Shape), String> {
+        let urdf = self.urdf;
+        let mesh = self.meshes.entry(file.to_owned()).or_insert_with(|| {
+            let path = find_mesh(urdf, file)?;
+            Mesh::load(&path).map_err(|error| error.cause().to_owned())
+        });
+        let mesh = mesh.as_ref().map_err(Clone::clone)?;
+        self.points += mesh.points_m.len();
+        if self.points > MAX_POINTS {
+            return Err(format!("the meshes have more than {MAX_POINTS} points in all"));
         }
-        if !left_out.is_empty() {
-            remarks.push(format!("shapes that are left out: {}", left_out.join(", ")));
+        if let Some(unit_m) = mesh.unit_m {
+            let rule = format!("the unit of a mesh, {unit_m} m, counts as in RViz");
+            let remedy = "save the mesh in meters, because some programs ignore its unit";
+            self.report.record(Treatment::Guessed, rule, format!("`{file}`"), remedy);
         }
-        Solids { solids, remarks }
+        let [low, high] = mesh.bounds_m();
+        let ends = [0, 1, 2].map(|i| [low[i] * scale[i], high[i] * scale[i]]);
+        if ends.iter().any(|[a, b]| (b - a).abs() > MAX_MESH_M) {
+            let rule = format!("meshes larger than {MAX_MESH_M} m, which look like millimeters");
+            let remedy = "write scale=\"0.001 0.001 0.001\" into <mesh>";
+            self.report.record(Treatment::Suspicious, rule, format!("`{file}`"), remedy);
+        }
+        let center_m = ends.map(|[a, b]| 0.5 * (a + b));
+        let place = |point: &[f64; 3]| [0, 1, 2].map(|i| point[i] * scale[i] - center_m[i]);
+        Ok((center_m, Shape::Hull { points_m: mesh.points_m.iter().map(place).collect() }))
     }
-}
-
-/// The bounding box of a mesh, in the frame of its coordinates.
-struct MeshBox {
-    size_m: [f64; 3],
-    center_m: [f64; 3],
-}
-
-/// Returns the bounding box of a mesh, or the reason why there is none.
-fn mesh_box(urdf: &Path, file: &str, scale: [f64; 3]) -> Result<MeshBox, String> {
-    let is_stl = Path::new(file.trim_end_matches(".gz"))
-        .extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("stl"));
-    if !is_stl {
-        return Err("only STL meshes are read".into());
-    }
-    let path = find_mesh(urdf, file).ok_or("the file is absent")?;
-    let [low, high] = stl::read_bounds(&path).map_err(|error| error.cause().to_owned())?;
-    let ends = [0, 1, 2].map(|i| [low[i] * scale[i], high[i] * scale[i]]);
-    // A negative factor mirrors the mesh, and so swaps the ends.
-    let size_m = ends.map(|[a, b]| (b - a).abs());
-    let center_m = ends.map(|[a, b]| 0.5 * (a + b));
-    Ok(MeshBox { size_m, center_m })
-}
-
-/// Returns the path of a mesh of a model, if it exists.
-fn find_mesh(urdf: &Path, file: &str) -> Option<PathBuf> {
-    let folder = urdf.parent().unwrap_or(Path::new(""));
-    if let Some(path) = file.strip_prefix("file://") {
-        return Some(PathBuf::from(path)).filter(|path| path.is_file());
-    }
-    let Some(package_path) = file.strip_prefix("package://") else {
-        return Some(folder.join(file)).filter(|path| path.is_file());
-    };
-    // There is no index of packages without ROS: the package is a folder above the model, or a neighbor of one.
-    let path_in_package = package_path.split_once('/').map_or("", |(_, rest)| rest);
-    let folder = std::path::absolute(folder).ok()?;
-    folder
-        .ancestors()
-        .flat_map(|above| [above.join(package_path), above.join(path_in_package)])
-        .find(|path| path.is_file())
 }

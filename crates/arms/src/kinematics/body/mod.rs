@@ -1,6 +1,7 @@
 //! The body of an arm: the collision shapes of a model's links, and which of them may touch.
 //!
 //! ```text
+//! hull   the convex hulls of meshes
 //! mount  where a link of the model is, at a posture of the arm
 //! pairs  the pairs of parts that must not touch
 //! ```
@@ -9,6 +10,7 @@
 //! arm stands on): they stay where their joints are at rest, unless these follow joints of the arm.
 //! Distances are those of the crate `parry3d-f64`.
 
+mod hull;
 mod mount;
 mod pairs;
 #[cfg(test)]
@@ -19,7 +21,7 @@ use super::transform::{Transform, Vector};
 use mount::LinkMountsOnArm;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
-use parry3d_f64::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
+use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid, Cylinder, Shape as ParryShape};
 use sidestep_import::urdf::{Model, Shape, Solid};
 use sidestep_kernel::geometry::norm;
 
@@ -43,11 +45,12 @@ struct LinkShape {
     radius_m: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum ShapeCore {
     Ball(Ball),
     Cylinder(Cylinder),
     Box(Cuboid),
+    Hull(ConvexPolyhedron),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -94,6 +97,11 @@ impl ArmBody {
     /// Returns whether it has no shapes at all.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
+    }
+
+    /// Returns the number of its parts that are convex hulls of meshes.
+    pub fn hulls(&self) -> usize {
+        self.parts.iter().filter(|part| matches!(part.core, ShapeCore::Hull(_))).count()
     }
 
     /// Returns the pairs of links that must not touch, by name, each once.
@@ -229,6 +237,7 @@ impl ShapeCore {
             Self::Ball(ball) => ball,
             Self::Cylinder(cylinder) => cylinder,
             Self::Box(cuboid) => cuboid,
+            Self::Hull(hull) => hull,
         }
     }
 
@@ -237,6 +246,7 @@ impl ShapeCore {
             Self::Ball(ball) => ball.radius,
             Self::Cylinder(c) => norm([c.half_height, c.radius]),
             Self::Box(cuboid) => norm(point(cuboid.half_extents)),
+            Self::Hull(hull) => hull.points().iter().map(|p| norm(point(*p))).fold(0.0, f64::max),
         }
     }
 
@@ -260,6 +270,11 @@ fn core(shape: &Shape) -> Option<ShapeCore> {
             Some(ShapeCore::Cylinder(Cylinder::new(0.5 * length_m, *radius_m)))
         }
         Shape::Box { size_m } => Some(ShapeCore::Box(Cuboid::new(vector(size_m.map(|x| 0.5 * x))))),
+        Shape::Hull { points_m } => Some(match hull::of_points(points_m) {
+            Some(hull) => ShapeCore::Hull(hull),
+            // Nothing has thickness, or numbers are too near to each other.
+            None => ShapeCore::Box(Cuboid::new(vector(hull::half_extents_m(points_m)))),
+        }),
         // Solids are none of these.
         Shape::Mesh { .. } | Shape::Other { .. } => None,
     }

@@ -150,9 +150,14 @@ fn shared_arms_have_bodies_or_remarks_why_not() {
         let chain = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect(name);
         let solids = model.solids(&path);
         let body = ArmBody::new(&model, &chain, &solids.solids, &[]);
-        assert_eq!(body.len(), parts, "{name}: {:?}", solids.remarks);
+        assert_eq!(body.len(), parts, "{name}: {:?}", solids.report);
         let has_meshes = name != "pendulum5.urdf";
-        assert_eq!(solids.remarks.len(), usize::from(has_meshes), "{name}: {:?}", solids.remarks);
+        assert_eq!(
+            solids.report.findings.len(),
+            usize::from(has_meshes),
+            "{name}: {:?}",
+            solids.report
+        );
     }
     let (Some(urdf), Some(srdf)) = (shared("chain/panda.urdf"), shared("chain/panda.srdf")) else {
         return;

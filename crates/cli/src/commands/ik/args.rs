@@ -140,7 +140,7 @@ impl GoalArgs {
         if is_own && body.is_empty() {
             let cause = ["no link has a collision shape that can be read".to_owned()];
             let cause = [&cause[..], &remarks[..]].concat().join("; ");
-            let remedy = "give the links boxes, cylinders, spheres or STL meshes";
+            let remedy = "give the links boxes, cylinders, spheres or meshes (STL, OBJ, DAE)";
             return Err(InputError::new("--body", cause, remedy));
         }
         Ok((Some(body), remarks))

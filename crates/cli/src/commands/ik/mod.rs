@@ -45,7 +45,7 @@ angle that moves the tip as far at full reach. They are listed by their distance
 moves the joints least.
 
 Obstacles are spheres (center and radius in m) that no link's collision shape may enter: boxes, \
-cylinders, spheres, and STL meshes as their bounding boxes. Links without a shape that can be read \
+cylinders, spheres, and meshes (STL, OBJ, DAE) as their convex hulls. Links without a shape that can be read \
 count as rods between connectors, which are thin lines, so add the arm's thickness to the radius; what \
 is left out is printed. With `--body own` links must not touch each other either, except neighbors \
 and the pairs whose collisions --srdf disables. The answer is a posture; the path to it is not \
@@ -56,7 +56,7 @@ qx,qy,qz,qw, and prints a table with a row for each target, in the order of the 
 
 --json prints reached, error_m, error_rad, reason, target, target_quaternion (x,y,z,w), engine, \
 iterations, starts, solutions (joints, error_m and error_rad of each posture), remarks (meshes that \
-stand as boxes, shapes that are left out), and of the first posture what `sidestep fk --json` prints. \
+stand as hulls, shapes that are left out), and of the first posture what `sidestep fk --json` prints. \
 With --targets it prints targets, reached, joint_names and answers (of each the same, joints and \
 others), and cpu_us_per_target, which is no part of the results.
 

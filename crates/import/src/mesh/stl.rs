@@ -1,68 +1,42 @@
-//! Bounding boxes of STL meshes, binary and ASCII.
+//! STL meshes, binary and ASCII.
 //!
-//! Only the box is needed, for which the format is too simple for a library: 80 bytes of
+//! Only the vertices are needed, for which the format is too simple for a library: 80 bytes of
 //! header, the number of triangles, and 50 bytes for each; or words, of which three numbers follow
 //! each `vertex`.
 
+use super::Mesh;
 use sidestep_kernel::InputError;
-use sidestep_scenario::file::read_bytes;
-use std::path::Path;
 
-/// The maximum size of a mesh in bytes after decompression: some 10 times the largest known.
-const MAX_MESH_BYTES: u64 = 1 << 28;
 /// Bytes before the first triangle: 80 of any text, and the number of triangles.
 const HEADER_BYTES: usize = 84;
 /// Bytes of a triangle: its normal and three vertices, of three 32-bit floats each, and 2 bytes of attributes.
 const TRIANGLE_BYTES: usize = 50;
-/// The maximum of a coordinate: a larger one is damage, and would make all others of the box meaningless.
-const MAX_COORDINATE: f64 = 1e9;
 
-/// Returns the lowest and the highest coordinates of a mesh, in its own unit.
+/// Returns the vertices of the mesh in `bytes`; errors call it `place`.
 ///
 /// # Errors
-/// When the file cannot be read, is cut short, or has no vertex with finite coordinates.
-pub fn read_bounds(path: &Path) -> Result<[[f64; 3]; 2], InputError> {
-    let bytes = read_bytes(path, MAX_MESH_BYTES)?;
-    parse(&path.display().to_string(), &bytes)
+/// When it is no STL mesh, is cut short, or has no vertex with finite coordinates.
+pub fn parse(place: &str, bytes: &[u8]) -> Result<Mesh, InputError> {
+    let points_m = binary(bytes, usize::eq).or_else(|| ascii(bytes));
+    // Some programs leave bytes of their own behind the triangles.
+    let points_m = points_m.or_else(|| binary(bytes, usize::gt));
+    let points_m = points_m.ok_or_else(|| {
+        let remedy = "save the mesh again as binary or ASCII STL";
+        InputError::new(place, "is no STL mesh, or cut short", remedy)
+    })?;
+    Mesh::new(place, points_m)
 }
 
-/// Returns the lowest and the highest coordinates of the mesh in `bytes`; errors call it `place`.
-///
-/// # Errors
-/// Those of [`read_bounds`], except for reading.
-pub fn parse(place: &str, bytes: &[u8]) -> Result<[[f64; 3]; 2], InputError> {
-    let vertices = match binary(bytes) {
-        Some(vertices) => vertices,
-        None => ascii(bytes).ok_or_else(|| invalid_mesh(place, "is no STL mesh, or cut short"))?,
-    };
-    let Some(&first) = vertices.first() else {
-        return Err(invalid_mesh(place, "has no triangles"));
-    };
-    let mut low = first;
-    let mut high = first;
-    for vertex in vertices {
-        if !vertex.iter().all(|x| x.abs() <= MAX_COORDINATE) {
-            return Err(invalid_mesh(place, "has a vertex with an impossible coordinate"));
-        }
-        low = std::array::from_fn(|i| low[i].min(vertex[i]));
-        high = std::array::from_fn(|i| high[i].max(vertex[i]));
-    }
-    Ok([low, high])
-}
-
-fn invalid_mesh(place: &str, cause: &str) -> InputError {
-    InputError::new(place, cause, "save the mesh again as binary or ASCII STL")
-}
-
-/// Reads a binary mesh; `None` if its size is not that of its triangles. Some start with the word
+/// Reads a binary mesh; `None` if its size does not compare so to that of its triangles. Some start with the word
 /// `solid` like ASCII ones, so only the size distinguishes the two.
-fn binary(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
+fn binary(bytes: &[u8], compares: fn(&usize, &usize) -> bool) -> Option<Vec<[f64; 3]>> {
     let count = u32::from_le_bytes(bytes.get(80..HEADER_BYTES)?.try_into().ok()?) as usize;
-    if bytes.len() != count.checked_mul(TRIANGLE_BYTES)?.checked_add(HEADER_BYTES)? {
+    let end = count.checked_mul(TRIANGLE_BYTES)?.checked_add(HEADER_BYTES)?;
+    if count == 0 || !compares(&bytes.len(), &end) {
         return None;
     }
     let mut vertices = Vec::with_capacity(3 * count);
-    for triangle in bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES) {
+    for triangle in bytes[HEADER_BYTES..end].chunks_exact(TRIANGLE_BYTES) {
         // The normal, which many programs do not fill in, is the first of the four.
         vertices.extend([12, 24, 36].map(|offset| read_vertex(&triangle[offset..])));
     }
@@ -77,15 +51,15 @@ fn read_vertex(bytes: &[u8]) -> [f64; 3] {
 fn ascii(bytes: &[u8]) -> Option<Vec<[f64; 3]>> {
     let text = std::str::from_utf8(bytes).ok()?;
     let mut words = text.split_ascii_whitespace();
-    if words.next()? != "solid" {
+    if !words.next()?.eq_ignore_ascii_case("solid") {
         return None;
     }
     let mut vertices = Vec::new();
     // Without the last word the mesh is cut short.
     let mut has_end = false;
     while let Some(word) = words.next() {
-        has_end |= word == "endsolid";
-        if word == "vertex" {
+        has_end |= word.eq_ignore_ascii_case("endsolid");
+        if word.eq_ignore_ascii_case("vertex") {
             let mut number = || words.next()?.parse::<f64>().ok();
             vertices.push([number()?, number()?, number()?]);
         }
@@ -98,7 +72,7 @@ mod tests {
     use super::*;
 
     const ASCII: &str = "solid wedge\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0.5\n   \
-        vertex 1e-1 -2 0\n   vertex 3 0 0\n  endloop\n endfacet\nendsolid wedge\n";
+        vertex 25e-2 -2 0\n   vertex 3 0 0\n  endloop\n endfacet\nendsolid wedge\n";
 
     fn packed(vertices: &[[f32; 3]; 3]) -> Vec<u8> {
         // Exporters write `solid` into headers of binary files.
@@ -111,12 +85,19 @@ mod tests {
         bytes
     }
 
+    fn points(bytes: &[u8]) -> Vec<[f64; 3]> {
+        parse("mesh.stl", bytes).expect("a mesh").points_m
+    }
+
     #[test]
-    fn ascii_and_binary_meshes_have_the_same_box() {
-        let expected = [[0.0, -2.0, 0.0], [3.0, 0.0, 0.5]];
-        assert_eq!(parse("a", ASCII.as_bytes()), Ok(expected));
-        let bytes = packed(&[[0.0, 0.0, 0.5], [0.25, -2.0, 0.0], [3.0, 0.0, 0.0]]);
-        assert_eq!(parse("b", &bytes), Ok(expected));
+    fn ascii_and_binary_meshes_have_the_same_vertices() {
+        let expected = [[0.0, 0.0, 0.5], [0.25, -2.0, 0.0], [3.0, 0.0, 0.0]];
+        assert_eq!(points(ASCII.as_bytes()), expected);
+        assert_eq!(points(ASCII.to_uppercase().as_bytes()), expected);
+        let bytes = packed(&[[0.25, -2.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.5]]);
+        assert_eq!(points(&bytes), expected);
+        let with_more = [&bytes[..], b"made by hand"].concat();
+        assert_eq!(points(&with_more), expected);
     }
 
     #[test]

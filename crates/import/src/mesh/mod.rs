@@ -1,0 +1,83 @@
+//! Meshes as the points of which they are the surface: STL, OBJ and Collada (DAE).
+//!
+//! Only the vertices are read. What takes up space is their convex hull, which needs no triangles.
+
+pub mod dae;
+pub mod obj;
+pub mod stl;
+
+use std::path::Path;
+
+use crate::extension::extension;
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_bytes;
+
+/// The maximum size of a mesh in bytes after decompression: some 10 times the largest known.
+const MAX_MESH_BYTES: u64 = 1 << 28;
+
+/// The maximum of a coordinate: a larger one is damage, and would make all others meaningless.
+const MAX_COORDINATE: f64 = 1e9;
+
+/// The kinds of meshes that are read, by the extensions of their files.
+pub const EXTENSIONS: [&str; 3] = ["stl", "obj", "dae"];
+
+/// The vertices of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    /// Its vertices, each once and in ascending order, in the unit of the file; in meters where that says its unit.
+    pub points_m: Vec<[f64; 3]>,
+    /// The unit that the file says in meters, if it is not one.
+    pub unit_m: Option<f64>,
+}
+
+impl Mesh {
+    /// Returns a mesh in meters.
+    fn new(place: &str, mut points_m: Vec<[f64; 3]>) -> Result<Self, InputError> {
+        let remedy = "save the mesh again as binary STL";
+        if points_m.is_empty() {
+            return Err(InputError::new(place, "has no triangles", remedy));
+        }
+        if points_m.iter().flatten().any(|x| !(x.abs() <= MAX_COORDINATE)) {
+            let cause = "has a vertex with an impossible coordinate";
+            return Err(InputError::new(place, cause, remedy));
+        }
+        points_m.iter_mut().flatten().for_each(|x| *x += 0.0);
+        points_m.sort_unstable_by(|a, b| {
+            let axes = (0..3).map(|i| a[i].total_cmp(&b[i]));
+            axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+        });
+        points_m.dedup();
+        Ok(Self { points_m, unit_m: None })
+    }
+
+    /// Reads the mesh at `path`, also with gzip; its extension is one of [`EXTENSIONS`].
+    ///
+    /// # Errors
+    /// When the extension is another one, or the file cannot be read, is none of that kind, is cut short, or has no
+    /// vertex with finite coordinates.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let place = path.display().to_string();
+        let parse: fn(&str, &[u8]) -> Result<Self, InputError> = match extension(path).as_str() {
+            "stl" => stl::parse,
+            "obj" => obj::parse,
+            "dae" => dae::parse,
+            _ => {
+                let cause = "only STL, OBJ and DAE meshes are read";
+                return Err(InputError::new(place, cause, "save the mesh as binary STL"));
+            }
+        };
+        parse(&place, &read_bytes(path, MAX_MESH_BYTES)?)
+    }
+
+    /// Returns the lowest and the highest coordinates.
+    pub fn bounds_m(&self) -> [[f64; 3]; 2] {
+        let mut bounds = [self.points_m[0]; 2];
+        for point in &self.points_m {
+            for i in 0..3 {
+                bounds[0][i] = bounds[0][i].min(point[i]);
+                bounds[1][i] = bounds[1][i].max(point[i]);
+            }
+        }
+        bounds
+    }
+}
