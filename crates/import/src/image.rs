@@ -1,11 +1,12 @@
-//! Bitmaps: PNG and PNM (PGM among them), binary or ASCII, gray, color or one bit.
+//! Bitmaps: PNG, PNM (PGM among them), JPEG and BMP, binary or ASCII, gray, color or one bit.
 
 use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 
+use ::image::metadata::Orientation;
 use ::image::{
-    DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, ImageResult, Limits, Pixel,
-    Primitive,
+    DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult,
+    Limits, Pixel, Primitive,
 };
 use sidestep_kernel::InputError;
 
@@ -22,13 +23,19 @@ const MAX_DECODED_BYTES: u64 = 8 * MAX_PIXELS;
 
 /// A decoded image.
 #[derive(Debug, Clone)]
-pub struct Bitmap(DynamicImage);
+pub struct Bitmap {
+    pixels: DynamicImage,
+    /// Whether a camera says in the file that the picture is to be turned or mirrored. It is not, as in `map_server`.
+    pub is_turned: bool,
+    /// Whether the file holds the grays of its pixels with errors, as JPEG does.
+    pub is_lossy: bool,
+}
 
 impl Bitmap {
     /// Reads the image at `path` (also with gzip); its first bytes determine the format.
     ///
     /// # Errors
-    /// When the file cannot be read, is not a PNG or PNM image, is damaged or cut short, or has no
+    /// When the file cannot be read, is no PNG, PNM, JPEG or BMP image, is damaged or cut short, or has no
     /// pixel or more than [`MAX_PIXELS`].
     pub fn load(path: &Path) -> Result<Self, InputError> {
         Self::decode(&path.display().to_string(), read_bytes(path, MAX_IMAGE_BYTES)?)
@@ -39,21 +46,24 @@ impl Bitmap {
     /// # Errors
     /// As [`Bitmap::load`], except those of reading the file.
     pub fn decode(place: &str, bytes: Vec<u8>) -> Result<Self, InputError> {
-        let decoder = decoder(bytes).map_err(|error| decoding_error(place, &error))?;
+        let (format, mut decoder) =
+            decoder(bytes).map_err(|error| decoding_error(place, &error))?;
         check_pixel_count(place, decoder.dimensions())?;
-        let image =
+        let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+        let pixels =
             DynamicImage::from_decoder(decoder).map_err(|error| decoding_error(place, &error))?;
-        Ok(Self(image))
+        let is_turned = orientation != Orientation::NoTransforms;
+        Ok(Self { pixels, is_turned, is_lossy: format == Some(ImageFormat::Jpeg) })
     }
 
     /// Number of pixels from left to right.
     pub fn width(&self) -> u32 {
-        self.0.width()
+        self.pixels.width()
     }
 
     /// Number of pixels from top to bottom.
     pub fn height(&self) -> u32 {
-        self.0.height()
+        self.pixels.height()
     }
 
     /// Returns the result of `read` for each pixel's brightness, row by row from the top, whatever its opacity; see
@@ -64,7 +74,7 @@ impl Bitmap {
 
     /// Returns the result of `read` for each pixel, row by row from the top.
     pub fn map_shades<T>(&self, read: impl FnMut(Shade) -> T) -> Vec<T> {
-        match &self.0 {
+        match &self.pixels {
             DynamicImage::ImageLuma8(pixels) => map_channels(pixels, 1, read),
             DynamicImage::ImageLumaA8(pixels) => map_channels(pixels, 1, read),
             DynamicImage::ImageRgb8(pixels) => map_channels(pixels, 3, read),
@@ -79,12 +89,12 @@ impl Bitmap {
 
     /// Returns whether the pixels can be transparent.
     pub fn has_opacity(&self) -> bool {
-        self.0.color().has_alpha()
+        self.pixels.color().has_alpha()
     }
 
     /// Returns what a pixel consists of, for people; colors of a palette have been looked up.
     pub fn pixel_type(&self) -> String {
-        let color = self.0.color();
+        let color = self.pixels.color();
         let channels = if color.has_color() { "color" } else { "gray" };
         let opacity = if color.has_alpha() { " with opacity" } else { "" };
         let bits = color.bits_per_pixel() / u16::from(color.channel_count());
@@ -97,6 +107,9 @@ impl Bitmap {
 pub struct Shade {
     /// The mean of its color channels, from 0 (black) to 255 (white), without regard to its opacity.
     pub brightness: f64,
+    /// The weighted mean of its color channels by Rec. 709, from 0 to 255: what Nav2 takes for the gray of a color. That of
+    /// a gray is the gray itself.
+    pub luma: f64,
     /// The first of its channels alone, gray or red, from 0 to 255.
     pub first_channel: f64,
     /// From 0 (transparent) to 1 (opaque).
@@ -124,17 +137,27 @@ where
         let opacity = channels.get(colors).map_or(1.0, |&channel| channel.into() / white);
         let first: f64 = channels[0].into();
         let first_channel = first / (white / 255.0);
-        values.push(read(Shade { brightness: sum / divisor, first_channel, opacity }));
+        let brightness = sum / divisor;
+        let is_gray = channels[..colors].iter().all(|&channel| channel.into() == first);
+        let luma = if is_gray { brightness } else { luma(channels) / (white / 255.0) };
+        values.push(read(Shade { brightness, luma, first_channel, opacity }));
     }
     values
 }
 
-fn decoder(bytes: Vec<u8>) -> ImageResult<impl ImageDecoder> {
+/// Returns the weighted mean of three color channels by Rec. 709.
+fn luma<S: Primitive + Into<f64>>(channels: &[S]) -> f64 {
+    const WEIGHTS: [f64; 3] = [0.212656, 0.715158, 0.072186];
+    let weighted = channels.iter().zip(WEIGHTS).map(|(&channel, weight)| weight * channel.into());
+    weighted.sum()
+}
+
+fn decoder(bytes: Vec<u8>) -> ImageResult<(Option<ImageFormat>, impl ImageDecoder)> {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     reader.limits(limits);
-    reader.into_decoder()
+    Ok((reader.format(), reader.into_decoder()?))
 }
 
 fn check_pixel_count(place: &str, (width, height): (u32, u32)) -> Result<(), InputError> {
@@ -157,7 +180,7 @@ fn decoding_error(place: &str, error: &ImageError) -> InputError {
         ImageError::Unsupported(_) => InputError::new(
             place,
             format!("no image of a kind that is read ({error})"),
-            "give a PNG or a PGM (P2 or P5) image",
+            "give a PNG, a PGM (P2 or P5), a JPEG or a BMP image",
         ),
         _ => InputError::new(
             place,
@@ -170,7 +193,7 @@ fn decoding_error(place: &str, error: &ImageError) -> InputError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::image::{GrayImage, ImageFormat, Luma, LumaA, Rgb, Rgba};
+    use ::image::{GrayImage, Luma, LumaA, Rgb, Rgba};
     use proptest::prelude::*;
 
     fn brightness(bytes: &[u8]) -> Vec<f64> {
@@ -178,9 +201,49 @@ mod tests {
     }
 
     fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
+        encoded(image, ImageFormat::Png)
+    }
+
+    fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
-        image.into().write_to(&mut bytes, ImageFormat::Png).expect("memory takes all");
+        image.into().write_to(&mut bytes, format).expect("memory takes all");
         bytes.into_inner()
+    }
+
+    #[test]
+    fn jpeg_and_bmp_are_read_and_a_camera_that_turns_a_picture_is_noticed() {
+        let image = GrayImage::from_fn(16, 8, |x, _| Luma([255 * u8::from(x < 8)]));
+        let jpeg = encoded(image.clone(), ImageFormat::Jpeg);
+        let read = Bitmap::decode("test", jpeg.clone()).expect("a JPEG");
+        assert_eq!(
+            (read.width(), read.height(), read.is_lossy, read.is_turned),
+            (16, 8, true, false)
+        );
+        let grays = read.map_brightness(|v| v);
+        assert!(grays[..8].iter().all(|v| *v > 250.0) && grays[8..16].iter().all(|v| *v < 5.0));
+        let bmp = Bitmap::decode("test", encoded(image, ImageFormat::Bmp)).expect("a BMP");
+        assert_eq!(
+            (bmp.is_lossy, bmp.map_brightness(|v| v)[..9].to_vec()),
+            (false, [[255.0; 8].to_vec(), vec![0.0]].concat())
+        );
+        // A segment of EXIF behind the first marker: one entry, orientation 6.
+        let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+        let turned = [&jpeg[..2], exif, &jpeg[2..]].concat();
+        assert!(Bitmap::decode("test", turned).expect("a JPEG").is_turned);
+        for end in [3, 30, jpeg.len() / 2] {
+            let _ = Bitmap::decode("test", jpeg[..end].to_vec());
+        }
+    }
+
+    #[test]
+    fn the_weights_of_colors_leave_grays_alone() {
+        let image = ImageBuffer::from_fn(3, 1, |x, _| {
+            [Rgb([205u8; 3]), Rgb([255, 0, 0]), Rgb([0, 255, 0])][x as usize]
+        });
+        let image = Bitmap::decode("test", png(image)).expect("an image");
+        let lumas: Vec<f64> = image.map_shades(|shade| shade.luma);
+        assert_eq!(lumas[0], 205.0);
+        assert!((lumas[1] - 54.2).abs() < 0.1 && (lumas[2] - 182.4).abs() < 0.1, "{lumas:?}");
     }
 
     #[test]
@@ -330,7 +393,7 @@ mod tests {
                 bytes[at % length] = value;
             }
             // Damage may make a huge header, which is tested elsewhere and slow to allocate.
-            let is_small = decoder(bytes.clone()).is_ok_and(|d| d.dimensions().0.max(d.dimensions().1) < 5000);
+            let is_small = decoder(bytes.clone()).is_ok_and(|(_, d)| d.dimensions().0.max(d.dimensions().1) < 5000);
             if is_small && let Ok(image) = Bitmap::decode("test", bytes) {
                 let pixels = image.map_brightness(|v| v);
                 prop_assert!(pixels.iter().all(|v| (0.0..=255.0).contains(v)));

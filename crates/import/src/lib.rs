@@ -21,6 +21,7 @@ mod map_yaml;
 pub mod mesh;
 pub mod movingai;
 pub mod mrclam;
+mod named_file;
 mod pixel_map;
 mod raycast;
 pub mod rosmap;
@@ -36,7 +37,7 @@ mod shared_data;
 
 pub use foreign_file::ForeignFormat;
 pub use imported_map::ImportedMap;
-pub use map_file::{GridOptions, import_map, load_map, load_pixel_map};
+pub use map_file::{GridOptions, IMAGE_ENDINGS, import_map, load_map, load_pixel_map};
 pub use pixel_map::{MAX_PIXELS, PixelMap};
 pub use raycast::RayHit;
 pub use sidestep_scenario::import_report as report;

@@ -10,6 +10,9 @@ use super::report::ImportReport;
 use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
+/// Endings of the names of images, in lower case: files that do not say the side of their pixels, which has to be given.
+pub const IMAGE_ENDINGS: &[&str] = &[".png", ".pgm", ".jpg", ".jpeg", ".bmp"];
+
 /// The conversion of a file into boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridOptions {
@@ -30,7 +33,7 @@ pub fn load_map(path: &Path, boxes: GridOptions) -> Result<GridMap, InputError> 
 }
 
 /// Reads the map at `path` into boxes. The extension determines the format: `.yaml` and `.yml` for ROS
-/// `map_server`, `.png` and `.pgm` for a plain image (dark is wall, light is free, as in a ROS map without
+/// `map_server`, [`IMAGE_ENDINGS`] for a plain image (dark is wall, light is free, as in a ROS map without
 /// thresholds), `.map` for MovingAI, `.txt` for characters, each of them also followed by `.gz`.
 ///
 /// Pixels are resampled to boxes; in the last two formats a character is a box.
@@ -60,8 +63,10 @@ pub fn load_pixel_map(
         ("yaml" | "yml", Some(given_m)) => {
             check_resolution(path, rosmap::load(path)?, given_m).map(Some)
         }
-        ("png" | "pgm", Some(resolution_m)) => rosmap::load_image(path, resolution_m).map(Some),
-        ("png" | "pgm", None) => {
+        (image, Some(resolution_m)) if is_image(image) => {
+            rosmap::load_image(path, resolution_m).map(Some)
+        }
+        (image, None) if is_image(image) => {
             let cause = "an image does not have the size of its pixels";
             let remedy = "give the side of a pixel in meters: `--resolution 0.05`, in a scenario \
                           `map.resolution_m = 0.05`";
@@ -69,6 +74,11 @@ pub fn load_pixel_map(
         }
         _ => Ok(None),
     }
+}
+
+/// Returns whether an extension is that of a plain image.
+fn is_image(extension: &str) -> bool {
+    IMAGE_ENDINGS.iter().any(|ending| ending[1..] == *extension)
 }
 
 fn check_resolution(path: &Path, pixels: PixelMap, given_m: f64) -> Result<PixelMap, InputError> {
@@ -103,8 +113,8 @@ fn unknown_map_format(path: &Path) -> InputError {
     InputError::new(
         path.display(),
         "the extension is not that of a map",
-        "give a .yaml or .yml (ROS map_server), a .png or .pgm (image), a .map (MovingAI) or a .txt \
-         (characters) file, each also with .gz",
+        "give a .yaml or .yml (ROS map_server), a .png, .pgm, .jpg, .jpeg or .bmp (image), a .map \
+         (MovingAI) or a .txt (characters) file, each also with .gz",
     )
 }
 
@@ -172,9 +182,9 @@ mod tests {
 
     #[test]
     fn an_unknown_extension_lists_what_is_read() {
-        for name in ["map.bmp", "map", "map.gz", ".gz"] {
+        for name in ["map.gif", "map", "map.gz", ".gz"] {
             let error = read(name, "").expect_err(name);
-            for known in [".yaml", ".yml", ".png", ".pgm", ".map", ".txt", ".gz"] {
+            for known in [&[".yaml", ".yml", ".map", ".txt", ".gz"], IMAGE_ENDINGS].concat() {
                 assert!(error.remedy().contains(known), "{error}");
             }
         }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::named_file::{allowed_folder, is_inside};
+use super::report::{ImportReport, Treatment};
 use saphyr::{LoadableYamlNode, MarkedYaml, Scalar, ScanError, YamlData};
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::Isometry2;
@@ -13,6 +15,9 @@ pub(super) const MAX_YAML_BYTES: u64 = 64 << 10;
 /// The maximum length of a line in bytes. A list within a list starts further right, so the limit
 /// bounds their depth, and with it the stack that the parser's recursive tree takes.
 const MAX_LINE_BYTES: usize = 1000;
+
+/// The largest side of a pixel in meters that is no mistake.
+const MAX_PIXEL_M: f64 = 2.0;
 
 /// The largest rotation of an image in radians: a whole turn, with room for rounding.
 const MAX_YAW_RAD: f64 = std::f64::consts::TAU + 1e-3;
@@ -28,20 +33,23 @@ pub(super) struct MapMetadata {
     pub(super) plane: Isometry2,
     /// The conversion of pixels into cells.
     pub(super) reading: OccupancyRule,
-    /// Keys that mean nothing to `map_server`, each with its line.
-    pub(super) unused_keys: Vec<(String, usize)>,
 }
 
 impl MapMetadata {
-    /// Parses `text`; the image's path is relative to `folder`.
-    pub(super) fn parse(place: &str, text: &str, folder: &Path) -> Result<Self, InputError> {
-        let document = Document::parse(place, text)?;
+    /// Parses `text`, that of the file at `path`; the image's path is relative to its folder.
+    pub(super) fn parse(
+        path: &Path,
+        text: &str,
+        report: &mut ImportReport,
+    ) -> Result<Self, InputError> {
+        let place = path.display().to_string();
+        let document = Document::parse(&place, text)?;
+        document.record_unused_keys(report);
         Ok(Self {
-            resolution_m: document.resolution_m()?,
+            resolution_m: document.resolution_m(report)?,
             plane: document.plane()?,
             reading: document.occupancy_rule()?,
-            image: document.image(folder)?,
-            unused_keys: document.unused_keys(),
+            image: document.image(path, report)?,
         })
     }
 }
@@ -64,9 +72,15 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn resolution_m(&self) -> Result<f64, InputError> {
+    fn resolution_m(&self, report: &mut ImportReport) -> Result<f64, InputError> {
         let value = self.value("resolution")?;
         let resolution_m = self.number(value, "resolution")?;
+        if resolution_m > MAX_PIXEL_M {
+            let rule = format!("pixels of {resolution_m} m");
+            let remedy = "`resolution` is the side of a pixel in meters, such as 0.05";
+            let line = format!("line {}", value.span.start.line());
+            report.record(Treatment::Suspicious, rule, line, remedy);
+        }
         if resolution_m > 0.0 {
             return Ok(resolution_m);
         }
@@ -134,37 +148,58 @@ impl<'a> Document<'a> {
 
     fn negate(&self) -> Result<bool, InputError> {
         let value = self.value("negate")?;
-        match (value.data.as_bool(), number_of(value)) {
-            (Some(negate), _) => Ok(negate),
-            (None, Some(0.0)) => Ok(false),
-            (None, Some(1.0)) => Ok(true),
+        // The words of YAML 1.1, which map_server reads.
+        let word = value.data.as_str().unwrap_or_default().to_ascii_lowercase();
+        match (value.data.as_bool(), number_of(value), word.as_str()) {
+            (Some(negate), ..) => Ok(negate),
+            (None, Some(0.0), _) | (None, None, "no" | "off" | "n" | "false") => Ok(false),
+            (None, Some(1.0), _) | (None, None, "yes" | "on" | "y" | "true") => Ok(true),
             _ => Err(self.error(value, "`negate` is neither 0 nor 1", "write 0 or 1")),
         }
     }
 
-    /// Returns the path of the image, or of the same name with `.gz` where only that exists.
-    fn image(&self, folder: &Path) -> Result<PathBuf, InputError> {
+    /// Returns the path of the image, or of the same name with `.gz` where only that exists. An image that lies elsewhere,
+    /// or no longer does, is searched for beside the file: `map_saver` writes whole paths of the robot it runs on.
+    fn image(&self, path: &Path, report: &mut ImportReport) -> Result<PathBuf, InputError> {
         let value = self.value("image")?;
         let name = value.data.as_str().filter(|name| !name.is_empty()).ok_or_else(|| {
             self.error(value, "`image` is not a file name", "write the image's name, in quotes")
         })?;
-        let plain = folder.join(name);
-        let compressed = folder.join(format!("{name}.gz"));
-        [plain, compressed].into_iter().find(|path| path.is_file()).ok_or_else(|| {
-            let cause = format!("there is no image file `{}`", name.escape_debug());
-            self.error(value, cause, "give the image's path, relative to this file's folder")
-        })
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let named = with_gz(folder, name);
+        if let Some(image) = &named
+            && is_inside(image, &allowed_folder(path))
+        {
+            return Ok(image.clone());
+        }
+        let own_name = name.rsplit(['/', '\\']).next().unwrap_or(name);
+        let shown = name.escape_debug();
+        if let Some(beside) = with_gz(folder, own_name) {
+            let why = if named.is_some() { "lies elsewhere" } else { "is not there" };
+            let rule = format!("the image `{shown}` {why}, and the one beside the file is read");
+            let line = format!("line {}", value.span.start.line());
+            report.record(Treatment::Guessed, rule, line, "write its name without a folder");
+            return Ok(beside);
+        }
+        if named.is_some() {
+            let cause = format!("the image `{shown}` is outside of the map's folder");
+            let remedy = "copy the image beside this file, and write its name without a folder";
+            return Err(self.error(value, cause, remedy));
+        }
+        let cause = format!("there is no image file `{shown}`");
+        Err(self.error(value, cause, "give the image's path, relative to this file's folder"))
     }
 
-    fn unused_keys(&self) -> Vec<(String, usize)> {
-        let mut unused = Vec::new();
+    /// Records keys that mean nothing to `map_server`.
+    fn record_unused_keys(&self, report: &mut ImportReport) {
         for (key, _) in self.root.data.as_mapping().into_iter().flatten() {
             let name = key.data.as_str().unwrap_or("a key that is no text");
             if !KNOWN_KEYS.contains(&name) {
-                unused.push((name.to_string(), key.span.start.line()));
+                let rule = format!("the key `{}`", name.escape_debug());
+                let line = format!("line {}", key.span.start.line());
+                report.record(Treatment::NotUsed, rule, line, "");
             }
         }
-        unused
     }
 
     fn value(&self, key: &str) -> Result<&MarkedYaml<'a>, InputError> {
@@ -192,6 +227,11 @@ const KNOWN_KEYS: [&str; 7] =
 
 const KEYS: &str = "write the keys image, resolution, origin, negate, occupied_thresh and \
                     free_thresh, and mode if you like";
+
+/// Returns the path of a file in a folder, or of the same name with `.gz`, if one of them is there.
+fn with_gz(folder: &Path, name: &str) -> Option<PathBuf> {
+    [folder.join(name), folder.join(format!("{name}.gz"))].into_iter().find(|path| path.is_file())
+}
 
 /// Returns a value as a finite number; also in quotes, as `map_server` accepts it.
 fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
@@ -247,6 +287,19 @@ impl OccupancyRule {
     pub(super) const DEFAULT: Self =
         Self { mode: MapMode::Trinary, negate: false, occupied_thresh: 0.65, free_thresh: 0.196 };
 
+    /// Returns whether the occupancy of a brightness is one of the thresholds, where ROS 1 and Nav2 differ.
+    pub(super) fn is_at_threshold(&self, brightness: f64) -> bool {
+        let shade = if self.negate { brightness } else { 255.0 - brightness };
+        let occupancy = shade / 255.0;
+        occupancy == self.occupied_thresh || occupancy == self.free_thresh
+    }
+
+    /// Returns whether a raw value is neither free, occupied nor unknown by itself, so that the thresholds decide.
+    pub(super) fn is_between_raw(&self, brightness: f64) -> bool {
+        let value = if self.negate { 255.0 - brightness } else { brightness };
+        (1.0..100.0).contains(&value)
+    }
+
     pub(super) fn cell(&self, brightness: f64) -> Cell {
         let shade = if self.negate { brightness } else { 255.0 - brightness };
         match self.mode {
@@ -292,8 +345,15 @@ free_thresh: 0.196
 
     /// The metadata of `text`, with this crate's sources for images.
     fn parse(text: &str) -> Result<MapMetadata, InputError> {
+        parse_with_report(text).map(|(meta, _)| meta)
+    }
+
+    fn parse_with_report(text: &str) -> Result<(MapMetadata, Vec<String>), InputError> {
         let text = text.replace("map.rs", "map_yaml.rs");
-        MapMetadata::parse("m.yaml", &text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/m.yaml");
+        let mut report = ImportReport::new("test");
+        let meta = MapMetadata::parse(&path, &text, &mut report)?;
+        Ok((meta, report.findings.iter().map(ToString::to_string).collect()))
     }
 
     /// The metadata of the usual file with one piece of it replaced.
@@ -333,10 +393,18 @@ free_thresh: 0.196
     fn comments_unknown_keys_and_boolean_negation_are_tolerated() {
         let meta = with("negate: 0", "frame: map\nnegate: 1   # white is occupied").expect("read");
         assert!(meta.reading.negate);
-        assert_eq!(meta.unused_keys, [("frame".to_string(), 4)]);
-        assert_eq!(parse(YAML).expect("read").unused_keys, []);
-        assert!(with("negate: 0", "negate: true").expect("read").reading.negate);
-        assert!(!with("negate: 0", "negate: false").expect("read").reading.negate);
+        let unused = YAML.replace("negate: 0", "frame: map\nnegate: 0");
+        assert_eq!(
+            parse_with_report(&unused).expect("read").1,
+            ["not used: the key `frame`, line 4"]
+        );
+        assert_eq!(parse_with_report(YAML).expect("read").1, [""; 0]);
+        for word in ["true", "yes", "On", "'1'", "1.0", "TRUE", "y"] {
+            assert!(with("negate: 0", &format!("negate: {word}")).expect(word).reading.negate);
+        }
+        for word in ["false", "no", "OFF", "'0'", "False", "n"] {
+            assert!(!with("negate: 0", &format!("negate: {word}")).expect(word).reading.negate);
+        }
     }
 
     #[test]
@@ -376,12 +444,41 @@ free_thresh: 0.196
                 "{wrong}"
             );
         }
-        assert_eq!(error("negate: 0", "negate: 2").line_and_column(), Some((4, 9)));
+        for wrong in ["2", "-1", "not", "[]", ""] {
+            let error = error("negate: 0", &format!("negate: {wrong}"));
+            assert_eq!(error.line_and_column().map(|p| p.0), Some(4), "{wrong}");
+        }
         assert_eq!(error("0.65", "65").line_and_column(), Some((5, 18)));
         assert_eq!(error("0.196", "0.7").line_and_column(), Some((6, 14)), "above occupied_thresh");
         assert_eq!(error("map.rs", "none.pgm").line_and_column(), Some((1, 8)));
         assert_eq!(error("map.rs", "''").line_and_column(), Some((1, 8)));
         assert_eq!(error("map.rs", "7").line_and_column(), Some((1, 8)));
+    }
+
+    #[test]
+    fn an_image_that_lies_elsewhere_or_nowhere_is_searched_for_beside_the_file() {
+        let beside = |name: &str| {
+            let (meta, said) = parse_with_report(&YAML.replace("map.rs", name)).expect(name);
+            assert!(meta.image.ends_with("src/lib.rs"), "{:?}", meta.image);
+            said
+        };
+        assert_eq!(beside("./lib.rs"), [""; 0]);
+        assert_eq!(beside("../src/lib.rs"), [""; 0]);
+        let whole = format!("{}/src/lib.rs", env!("CARGO_MANIFEST_DIR"));
+        assert_eq!(beside(&whole), [""; 0]);
+        let guessed = "guessed: the image `/robot/maps/lib.rs` is not there, and the one beside the file is read, \
+                       line 1; write its name without a folder";
+        assert_eq!(beside("/robot/maps/lib.rs"), [guessed]);
+        assert!(beside("C:\\maps\\lib.rs")[0].contains("is not there"));
+        assert!(beside("../../kernel/src/lib.rs")[0].contains("lies elsewhere"));
+        let outside = error("map.rs", "../../kernel/src/world.rs");
+        assert!(outside.cause().contains("outside of the map's folder"), "{outside}");
+    }
+
+    #[test]
+    fn pixels_as_large_as_rooms_are_said() {
+        let (_, said) = parse_with_report(&YAML.replace("0.05", "5")).expect("read");
+        assert!(said[0].starts_with("suspicious: pixels of 5 m, line 2"), "{said:?}");
     }
 
     #[test]
@@ -398,7 +495,7 @@ free_thresh: 0.196
         for text in ["", "# nothing\n", "- 1\n", "text", "a: [1", "a: 1\na: 2\n", "\ta: 1", "*x"] {
             assert!(parse(text).is_err(), "{text:?}");
         }
-        assert_eq!(parse("a: 1\nb: [1, 2\nc: }\n").expect_err("broken").place(), "m.yaml");
+        assert!(parse("a: 1\nb: [1, 2\nc: }\n").expect_err("broken").place().ends_with("m.yaml"));
     }
 
     #[test]

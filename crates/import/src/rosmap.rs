@@ -40,15 +40,10 @@ use sidestep_scenario::file::read_text;
 /// missing or has an invalid value.
 pub fn load(path: &Path) -> Result<PixelMap, InputError> {
     extension::check(path, "a map of ROS", &["yaml", "yml"])?;
-    let place = path.display().to_string();
     let text = read_text(path, MAX_YAML_BYTES)?;
-    let meta = MapMetadata::parse(&place, &text, path.parent().unwrap_or(Path::new("")))?;
-    let image = Bitmap::load(&meta.image)?;
     let mut report = ImportReport::new("ROS map (map_server)");
-    for (key, line) in meta.unused_keys {
-        let rule = format!("the key `{}`", key.escape_debug());
-        report.record(Treatment::NotUsed, rule, format!("line {line}"), "");
-    }
+    let meta = MapMetadata::parse(path, &text, &mut report)?;
+    let image = Bitmap::load(&meta.image)?;
     let cells = cells_from_bottom(&image, ThresholdSource::Yaml(meta.reading), &mut report);
     let size = [image.width(), image.height()];
     let map = PixelMap::new(size[0], size[1], meta.resolution_m, meta.plane, cells);
@@ -122,11 +117,17 @@ fn cells_from_bottom(
     report: &mut ImportReport,
 ) -> Vec<Cell> {
     let reading = thresholds.reading();
-    report.add_fact("image", image.pixel_type());
+    let lossy = if image.is_lossy { ", with the errors of JPEG" } else { "" };
+    report.add_fact("image", image.pixel_type() + lossy);
     let survey = Survey::of(image, reading);
     let ground = TransparentGround::of(&survey, reading.mode);
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
+    if image.is_turned {
+        let rule = "the orientation that the camera wrote into the image, as in map_server";
+        report.record(Treatment::NotUsed, rule, "", "turn the image, and save it as PNG");
+    }
+    survey.record_choices(reading, report);
     survey.record_shades(reading.mode, report);
     survey.record_grays(thresholds, report);
     if reading.mode != MapMode::Raw {
@@ -158,6 +159,12 @@ struct Survey {
     free_grays: [usize; 256],
     /// Number of opaque pixels between free and occupied.
     opaque_between: usize,
+    /// Number of opaque colored pixels that Nav2 reads otherwise.
+    colored: usize,
+    /// Number of opaque pixels whose occupancy is a threshold.
+    at_threshold: usize,
+    /// Number of pixels between free and occupied of the mode raw.
+    raw_between: usize,
     /// The darkest and the lightest brightness.
     range: [f64; 2],
 }
@@ -169,6 +176,9 @@ impl Survey {
             transparent: 0,
             opaque_free: 0,
             opaque_between: 0,
+            colored: 0,
+            at_threshold: 0,
+            raw_between: 0,
             free_grays: [0; 256],
             range: [255.0, 0.0],
         };
@@ -179,9 +189,17 @@ impl Survey {
     fn add(&mut self, shade: Shade, reading: OccupancyRule) {
         self.pixels += 1;
         self.range = [self.range[0].min(shade.brightness), self.range[1].max(shade.brightness)];
+        if reading.mode == MapMode::Raw {
+            self.raw_between += usize::from(reading.is_between_raw(shade.brightness));
+        }
         if shade.opacity < 1.0 {
             self.transparent += 1;
             return;
+        }
+        if reading.mode != MapMode::Raw {
+            let is_other = reading.cell(shade.luma) != reading.cell(shade.brightness);
+            self.colored += usize::from(is_other);
+            self.at_threshold += usize::from(reading.is_at_threshold(shade.brightness));
         }
         match reading.cell(shade.brightness) {
             Cell::Wall => {}
@@ -192,6 +210,33 @@ impl Survey {
                     self.free_grays[shade.brightness as usize] += 1;
                 }
             }
+        }
+    }
+
+    /// Records pixels that the map servers of ROS 1 and of Nav2 read in different ways.
+    fn record_choices(&self, reading: OccupancyRule, report: &mut ImportReport) {
+        let colored = "colored pixels count by the mean of their channels as in ROS 1; Nav2 weighs the channels, and \
+                       reads them as other cells";
+        let at_threshold = "pixels whose occupancy is a threshold are unknown as in ROS 1; in Nav2 they are free or \
+                            occupied";
+        let raw = "values of the mode raw between 0 and 100 are compared with the thresholds, and map_server hands them on";
+        let choices = [
+            (self.colored, colored, "save the image in grays"),
+            (self.at_threshold, at_threshold, "give the threshold another digit"),
+            (self.raw_between, raw, "write 0, 100 and 255 alone for free, occupied and unknown"),
+        ];
+        for (count, rule, remedy) in choices.into_iter().filter(|(count, ..)| *count > 0) {
+            report.findings.push(Finding {
+                treatment: Treatment::Guessed,
+                rule: format!("{rule} ({})", self.share(count)),
+                count: count as u64,
+                places: Vec::new(),
+                remedy: remedy.to_string(),
+            });
+        }
+        if reading.mode == MapMode::Raw && reading.negate {
+            let rule = "`negate` turns the values of the mode raw around, as in ROS 1; Nav2 does not obey it";
+            report.record(Treatment::Guessed, rule, "", "set `negate: 0`, and negate the image");
         }
     }
 
@@ -347,7 +392,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use ::image::{ImageBuffer, Luma, LumaA, Rgba};
+    use ::image::{ImageBuffer, Luma, LumaA, Rgb, Rgba};
     use Cell::{Free, Unknown, Wall};
 
     const READING: OccupancyRule = OccupancyRule::DEFAULT;
@@ -535,6 +580,53 @@ mod tests {
         let row = read_row("mode: raw\nnegate: 0", &[[0, 0], [100, 0], [255, 0]]);
         assert_eq!(row.pixels(), [Free, Wall, Unknown]);
         assert_eq!(row.report().findings[0].treatment, Treatment::NotUsed);
+    }
+
+    #[test]
+    fn pixels_that_ros_and_nav2_read_in_different_ways_are_said() {
+        let raw = read_row("mode: raw\nnegate: 1", &[[255, 255], [205, 255], [155, 255]]);
+        assert_eq!(raw.pixels(), [Free, Unknown, Wall]);
+        let said = findings(&raw);
+        assert!(
+            said[0].starts_with("guessed: values of the mode raw between 0 and 100"),
+            "{said:?}"
+        );
+        assert!(
+            said[1].starts_with("guessed: `negate` turns the values of the mode raw"),
+            "{said:?}"
+        );
+        let plain = read_row("mode: raw\nnegate: 0", &[[0, 255], [100, 255], [255, 255]]);
+        assert_eq!(findings(&plain), [""; 0]);
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let row = |name: &str, pixels: &[[u8; 3]]| {
+            let image =
+                ImageBuffer::from_fn(pixels.len() as u32, 1, |x, _| Rgb(pixels[x as usize]));
+            let path = folder.path().join(name);
+            image.save(&path).expect("written");
+            load_image(&path, 1.0).expect("a map")
+        };
+        // Red has the mean 85 and the weighted mean 54; both are walls. Green has 182.
+        let red = row("red.png", &[[255, 0, 0], [255; 3]]);
+        assert_eq!((red.pixels(), findings(&red)), (&[Wall, Free][..], Vec::new()));
+        let green = row("green.png", &[[0, 255, 0], [255; 3]]);
+        assert_eq!(green.pixels(), [Wall, Free]);
+        assert!(findings(&green)[0].starts_with("guessed: colored pixels count by the mean"));
+        let photo = row("photo.jpg", &[[0; 3], [0; 3], [255; 3], [255; 3]]);
+        assert!(photo.report().facts[0].value.contains("JPEG"), "{:?}", photo.report());
+    }
+
+    #[test]
+    fn an_occupancy_that_is_a_threshold_is_unknown_and_said() {
+        let row = read_row("negate: 0", &[[0, 255], [255, 255]]);
+        assert_eq!(findings(&row), [""; 0]);
+        let (folder, path) = written("a.pgm", b"P5 1 2 255\n\xff\x00");
+        let text = std::fs::read_to_string(&path).expect("written").replace("0.65", "1.0");
+        std::fs::write(&path, text).expect("written");
+        let map = load(&path).expect("a map");
+        assert_eq!(map.pixels(), [Unknown, Free]);
+        let said = findings(&map);
+        assert!(said[0].starts_with("guessed: pixels whose occupancy is a threshold"), "{said:?}");
+        drop(folder);
     }
 
     #[test]

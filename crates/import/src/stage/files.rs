@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::MAX_WORLD_BYTES;
 use super::parse::{self, Item, SourcePosition, Value};
+use crate::named_file::{allowed_folder, folder_of, is_inside};
 use crate::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
@@ -90,24 +91,12 @@ impl WorldFiles {
     }
 
     fn check_inside(&self, name: &Value, path: PathBuf) -> Result<PathBuf, InputError> {
-        let world = folder_of(&self.sources[0].path);
-        let folder = std::fs::canonicalize(world).unwrap_or_else(|_| world.to_owned());
-        let allowed = folder.parent().unwrap_or(&folder);
-        let is_inside = path.canonicalize().is_ok_and(|real| real.starts_with(allowed));
-        if is_inside {
+        if is_inside(&path, &allowed_folder(&self.sources[0].path)) {
             return Ok(path);
         }
         let cause = format!("{} is outside of the world's folder", path.display());
         let remedy = "copy the file beside the world, and write its name without a folder";
         Err(self.error(name.at, cause, remedy))
-    }
-}
-
-/// Returns the folder of a file; the present one where its path has none.
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
     }
 }
 

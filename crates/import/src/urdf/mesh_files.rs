@@ -1,5 +1,6 @@
 //! The files of meshes that a model names.
 
+use crate::named_file::is_inside;
 use std::path::{Path, PathBuf};
 
 /// The number of folders above the model's that are searched for a package.
@@ -56,14 +57,6 @@ fn find_in_packages(folder: &Path, package_path: &str) -> Result<PathBuf, String
     }
     Err(if is_outside { "the file is outside of its package" } else { "the file is absent" }
         .to_owned())
-}
-
-/// Returns whether a file really lies in a folder, whatever links and `..` say.
-fn is_inside(path: &Path, folder: &Path) -> bool {
-    match (path.canonicalize(), folder.canonicalize()) {
-        (Ok(path), Ok(folder)) => path.starts_with(folder),
-        _ => false,
-    }
 }
 
 #[cfg(test)]
