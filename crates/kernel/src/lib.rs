@@ -20,6 +20,7 @@
 //! - [`view`]: the scenery and the frames of any world; reading them changes no run.
 //! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
 //! - [`network`]: the messages between agents, and their faults.
+//! - [`terminal`], [`shell`]: text of unknown origin on a terminal, and commands to paste.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
 
 pub mod batch;
@@ -39,9 +40,11 @@ pub mod network;
 pub mod ports;
 pub mod run;
 pub mod run_config;
+pub mod shell;
 pub mod simulation;
 pub mod space;
 pub mod stream;
+pub mod terminal;
 pub mod text;
 pub mod units;
 pub mod view;

@@ -1,6 +1,8 @@
 //! Texts of a world for people, as data: the caller that prints them decides on the layout.
 
+use crate::terminal::{display_cols, escape_controls_in_lines, pad_end};
 use serde_json::Value;
+use std::ops::Range;
 
 /// Names and values, one per line.
 pub type KeyValues = Vec<(String, String)>;
@@ -50,18 +52,24 @@ pub const LINE_COLS: usize = 80;
 /// Returns lines of names and values, the values below each other and broken into lines of
 /// [`LINE_COLS`] columns where they have spaces. A command, which people copy, stays whole.
 pub fn align_pairs(rows: &[(String, String)]) -> String {
-    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    let rows: Vec<(String, String)> = rows.iter().map(printable_pair).collect();
+    let width = rows.iter().map(|(name, _)| display_cols(name)).max().unwrap_or(0);
     // Two spaces before the name, and two before the value.
     let indent = width + 4;
     let line_break = format!("\n{:indent$}", "");
     let mut text = String::new();
-    for (name, value) in rows {
+    for (name, value) in &rows {
         let is_command = value.starts_with(COMMAND_PREFIX);
         let cols = if is_command { usize::MAX } else { LINE_COLS.saturating_sub(indent) };
         let value = wrap_text(value, cols).join(&line_break);
-        text.push_str(&format!("  {name:<width$}  {value}\n"));
+        text.push_str(&format!("  {}  {value}\n", pad_end(name, width)));
     }
     text
+}
+
+/// Returns a line with its controls as escapes: names and values may come from a file.
+fn printable_pair((name, value): &(String, String)) -> (String, String) {
+    (escape_controls_in_lines(name).into_owned(), escape_controls_in_lines(value).into_owned())
 }
 
 /// Returns text in lines of at most `cols` columns, broken at spaces; a longer word is a line. Text
@@ -71,13 +79,13 @@ pub fn wrap_text(text: &str, cols: usize) -> Vec<String> {
 }
 
 fn wrap_line(text: &str, cols: usize) -> Vec<String> {
-    if text.chars().count() <= cols {
+    if display_cols(text) <= cols {
         return vec![text.into()];
     }
     let mut lines: Vec<String> = Vec::new();
     for word in split_at_spaces(text) {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= cols => {
+            Some(line) if display_cols(line) + 1 + display_cols(word) <= cols => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -87,18 +95,28 @@ fn wrap_line(text: &str, cols: usize) -> Vec<String> {
     lines
 }
 
-/// Splits text at its spaces, except one before a percent sign: a number keeps its unit.
+/// Splits text at its spaces, except one before a percent sign, because a number keeps its unit, and those of a command in
+/// backticks, which people copy.
 fn split_at_spaces(text: &str) -> Vec<&str> {
+    let commands = quoted_commands(text);
     let mut words = Vec::new();
     let mut start = 0;
     for (space, _) in text.match_indices(' ') {
-        if !text[space + 1..].starts_with('%') {
+        let is_in_command = commands.iter().any(|command| command.contains(&space));
+        if !is_in_command && !text[space + 1..].starts_with('%') {
             words.push(&text[start..space]);
             start = space + 1;
         }
     }
     words.push(&text[start..]);
     words
+}
+
+/// Returns the ranges of the commands in backticks.
+fn quoted_commands(text: &str) -> Vec<Range<usize>> {
+    let ticks: Vec<usize> = text.match_indices('`').map(|(at, _)| at).collect();
+    let pairs = ticks.chunks_exact(2).map(|pair| pair[0] + 1..pair[1]);
+    pairs.filter(|quoted| text[quoted.clone()].starts_with(COMMAND_PREFIX)).collect()
 }
 
 #[cfg(test)]
@@ -131,6 +149,18 @@ mod tests {
         );
         assert_eq!(wrap_text(&"x".repeat(99), 80), ["x".repeat(99)], "a word is never broken");
         assert_eq!(wrap_text("a  b\nc", 80), ["a  b", "c"]);
+    }
+
+    #[test]
+    fn a_command_in_backticks_stays_on_one_line() {
+        let lines = wrap_text("it ended; `sidestep resume 'a b'` goes on with `a b`", 16);
+        assert_eq!(lines, ["it ended;", "`sidestep resume 'a b'`", "goes on with `a", "b`"]);
+    }
+
+    #[test]
+    fn names_of_a_file_stand_in_line_and_do_not_act_on_a_terminal() {
+        let rows = [key_value_pair("東", "\x1b[31m1"), key_value_pair("long", "2\n3")];
+        assert_eq!(align_pairs(&rows), "  東    \\u{1b}[31m1\n  long  2\n        3\n");
     }
 
     #[test]
