@@ -1,7 +1,8 @@
 //! The settings of a BlueSky file that hold for all its aircraft: those that are flown, and those
 //! that cannot be.
 
-use super::{KNOT_M_S, aircraft_at_flying_speed};
+use super::KNOT_M_S;
+use super::bluesky::aircraft_at_flying_speed;
 use sidestep_import::bluesky::{ResolutionMethod, ScnAircraft, ScnFile, Traffic, Wind};
 use sidestep_kernel::{InputError, math};
 

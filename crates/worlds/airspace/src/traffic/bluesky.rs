@@ -1,0 +1,406 @@
+//! Conversion of BlueSky `.scn` files to scenarios.
+//!
+//! Aircraft fly their routes, and follow the commands on the way (`HDG`, `SPD`, `ALT`, `LNAV ON`, `DEL`). One without a
+//! destination flies half an hour ahead, and one that is created without a speed enters when it gets one. A true
+//! airspeed stays as it is until the next `SPD`, also in climbs. Settings are rules of the scenario or refused by name
+//! (`import_settings.rs`); `not_flown` counts all other commands.
+
+use super::import_settings::{ImportedScenarioSettings, import_settings};
+use super::{DT_S, FOOT_M, NAUTICAL_MILE_M, banked_turn_deg_s, callsign, header_text, origin};
+use crate::flight::{Point, SeparationMinima};
+use crate::flight_plan::CLIMB_M_S;
+use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft, ScnFile};
+use sidestep_import::local_plane::LocalPlane;
+use sidestep_kernel::{InputError, math};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Time in seconds for which an airplane without a destination flies ahead.
+const UNROUTED_FLIGHT_S: f64 = 1800.0;
+/// Smallest speed in meters per second at which an aircraft counts as in the air.
+const MIN_SPEED_M_S: f64 = 1.0;
+
+/// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
+pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
+    let traffic = &file.traffic;
+    let rules = &settings_from_bluesky(name, file);
+    let aircraft: Vec<FlyableScnAircraft> =
+        traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
+    let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
+    let zone = SeparationMinima {
+        gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
+        vertical_m: traffic.zone_half_height_ft * FOOT_M,
+    };
+    let more = settings_text(rules) + &origin(&plane);
+    let mut text = header_text(name, zone, rules.look_ahead_s, &more);
+    for one in &aircraft {
+        write_aircraft(&mut text, &one.0, &plane);
+    }
+    Some(text)
+}
+
+/// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
+/// fly among them.
+pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScenarioSettings {
+    let mut rules = import_settings(place, file, DT_S);
+    let never_moving =
+        file.traffic.aircraft.iter().filter(|one| aircraft_at_flying_speed(one).is_none());
+    for ScnAircraft { id, .. } in never_moving {
+        let cause = format!("aircraft {id} is never given a speed, and is left out");
+        let error =
+            InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
+        rules.refused.push(error);
+    }
+    rules
+}
+
+/// An aircraft from the time when it starts to move.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FlyableScnAircraft(ScnAircraft);
+
+impl FlyableScnAircraft {
+    /// Returns the smallest speed that it has or is given.
+    pub(super) fn min_speed_m_s(&self) -> f64 {
+        let mut min_m_s = self.0.speed.true_airspeed_mps(self.0.altitude_ft);
+        for (_, command) in commands_from_changes(&self.0, false) {
+            if let FlightCommand::Speed(v_m_s) = command {
+                min_m_s = min_m_s.min(v_m_s);
+            }
+        }
+        min_m_s
+    }
+}
+
+/// Returns an aircraft as it is when it gets a speed: at its creation, or later, then with the
+/// heading and level that it was given until then. `None` for one that never gets a speed.
+pub(super) fn aircraft_at_flying_speed(aircraft: &ScnAircraft) -> Option<FlyableScnAircraft> {
+    let mut one = aircraft.clone();
+    if is_flying_speed(one.speed, one.altitude_ft) {
+        return Some(FlyableScnAircraft(one));
+    }
+    for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
+        match change {
+            AircraftCommand::HeadingDeg(deg) => one.heading_deg = deg,
+            AircraftCommand::AltitudeFt(ft) => one.altitude_ft = ft,
+            AircraftCommand::Speed(speed) if is_flying_speed(speed, one.altitude_ft) => {
+                one.speed = speed;
+                one.created_s = at_s;
+                one.changes.drain(..=k);
+                return one
+                    .deleted_s
+                    .is_none_or(|end_s| end_s > at_s)
+                    .then_some(FlyableScnAircraft(one));
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+fn is_flying_speed(speed: Airspeed, altitude_ft: f64) -> bool {
+    speed.true_airspeed_mps(altitude_ft) >= MIN_SPEED_M_S
+}
+
+/// Returns the settings of a scenario that follow from rules.
+fn settings_text(rules: &ImportedScenarioSettings) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    if let Some(method) = rules.method {
+        let _ = writeln!(text, "method = {method:?}");
+    }
+    if let Some(s) = rules.look_ahead_s {
+        // BlueSky's own method looks as far ahead as the predictions of others, wherever it is chosen.
+        let _ = writeln!(text, "mvp = {{ look_ahead_s = {s:?} }}");
+    }
+    if rules.is_bare {
+        text.push_str("shield = \"off\"\n");
+    }
+    if let Some(wind_m_s) = rules.wind_m_s {
+        let _ = writeln!(text, "wind_m_s = {wind_m_s:?}");
+    }
+    text
+}
+
+/// Returns the commands of a BlueSky file that the scenario leaves out, with counts.
+pub(crate) fn omitted_commands(file: &ScnFile) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    let mut count = |what: &str, n: usize| {
+        if n > 0 {
+            *counts.entry(what.to_string()).or_default() += n as u64;
+        }
+    };
+    for aircraft in &file.traffic.aircraft {
+        let points = &aircraft.way_points;
+        count("ADDWPT altitude", points.iter().filter(|p| p.altitude_ft.is_some()).count());
+        count("ADDWPT speed", points.iter().filter(|p| p.speed.is_some()).count());
+        let given = |is: fn(&AircraftCommand) -> bool| {
+            aircraft.changes.iter().filter(|(_, command)| is(command)).count()
+        };
+        count("VNAV", given(|c| matches!(c, AircraftCommand::VerticalNavigation(_))));
+        count("LNAV OFF", given(|c| matches!(c, AircraftCommand::LateralNavigation(false))));
+        // Without a change of level, a vertical speed has no effect.
+        if given(|c| matches!(c, AircraftCommand::AltitudeFt(_))) == 0 {
+            count("VS", given(|c| matches!(c, AircraftCommand::VerticalSpeedFpm(_))));
+        }
+    }
+    counts
+}
+
+/// A command to an airplane, in the scenario's terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum FlightCommand {
+    /// Degrees counterclockwise from east.
+    Heading(f64),
+    Speed(f64),
+    /// Meters, and meters per second.
+    Altitude(f64, f64),
+    Proceed,
+    Leave,
+}
+
+impl FlightCommand {
+    fn text(self) -> String {
+        match self {
+            Self::Heading(deg) => format!("heading_deg = {deg:?}"),
+            Self::Speed(v_m_s) => format!("speed_m_s = {v_m_s:?}"),
+            Self::Altitude(altitude_m, climb_m_s) => {
+                format!("altitude_m = {altitude_m:?}, climb_m_s = {climb_m_s:?}")
+            }
+            Self::Proceed => "proceeds = true".into(),
+            Self::Leave => "leaves = true".into(),
+        }
+    }
+}
+
+fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane) {
+    let at_m = plane.to_plane_m(aircraft.position());
+    let heading_deg = 90.0 - aircraft.heading_deg;
+    let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
+    let mut way_points_m: Vec<Point> =
+        aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
+    let orders = flight_commands(aircraft, !way_points_m.is_empty());
+    if way_points_m.is_empty() {
+        let heading_rad = heading_deg.to_radians();
+        let ahead_m = UNROUTED_FLIGHT_S * v_m_s;
+        let goal = [
+            at_m[0] + ahead_m * math::cos(heading_rad),
+            at_m[1] + ahead_m * math::sin(heading_rad),
+        ];
+        way_points_m.push(goal);
+    }
+    let ordered_m_s = orders.iter().filter_map(|(_, command)| match command {
+        FlightCommand::Speed(v_m_s) => Some(*v_m_s),
+        _ => None,
+    });
+    let omega_deg_s = banked_turn_deg_s(ordered_m_s.fold(v_m_s, f64::max));
+    let altitude_m = aircraft.altitude_ft * FOOT_M;
+    let appears_s = aircraft.created_s;
+    // Writing to a string cannot fail.
+    let _ = write!(
+        text,
+        "\n[[airplanes]]\n{}at_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
+         way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
+         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
+        callsign(&aircraft.id)
+    );
+    if orders.is_empty() {
+        return;
+    }
+    text.push_str("orders = [\n");
+    for (at_s, command) in orders {
+        let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", command.text());
+    }
+    text.push_str("]\n");
+}
+
+/// Returns the commands to an aircraft in flight, by rising time.
+fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
+    let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
+    let mut routed_s: Vec<f64> = route_command_times_s(aircraft);
+    if has_route && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + DT_S) {
+        orders.push((aircraft.created_s, FlightCommand::Heading(90.0 - aircraft.heading_deg)));
+    }
+    routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
+    // An aircraft that gets a way-point flies there, regardless of earlier headings.
+    orders.extend(routed_s.into_iter().map(|at_s| (at_s, FlightCommand::Proceed)));
+    orders.extend(commands_from_changes(aircraft, has_route));
+    orders.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut keeps_heading = false;
+    // Proceeding changes nothing for an airplane that is already doing so.
+    orders.retain(|(_, command)| match command {
+        FlightCommand::Heading(_) => {
+            keeps_heading = true;
+            true
+        }
+        FlightCommand::Proceed => std::mem::take(&mut keeps_heading),
+        _ => true,
+    });
+    let last_s = orders.last().map_or(aircraft.created_s, |(at_s, _)| *at_s);
+    let ends_s = aircraft.deleted_s.or(keeps_heading.then_some(last_s + UNROUTED_FLIGHT_S));
+    if let Some(ends_s) = ends_s {
+        orders.retain(|(at_s, _)| *at_s < ends_s);
+        orders.push((ends_s, FlightCommand::Leave));
+    }
+    orders
+}
+
+/// Returns the times of an aircraft's commands about where to go, rising.
+fn route_command_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
+    let known = aircraft.way_points.iter().filter(|p| p.place.position().is_some());
+    let destination = aircraft.destination.as_ref().filter(|place| place.position().is_some());
+    let destination_s = destination.and(aircraft.destination_s);
+    let mut all: Vec<f64> = known.map(|p| p.added_s).chain(destination_s).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+fn commands_from_changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
+    let mut altitude_ft = aircraft.altitude_ft;
+    let mut climb_m_s = CLIMB_M_S;
+    let mut commands: Vec<(f64, FlightCommand)> = Vec::new();
+    for &(at_s, change) in &aircraft.changes {
+        match change {
+            AircraftCommand::HeadingDeg(deg) => {
+                commands.push((at_s, FlightCommand::Heading(90.0 - deg)))
+            }
+            AircraftCommand::Speed(speed) => {
+                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(MIN_SPEED_M_S);
+                commands.push((at_s, FlightCommand::Speed(v_m_s)));
+            }
+            AircraftCommand::AltitudeFt(to_ft) => {
+                altitude_ft = to_ft;
+                commands.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
+            }
+            AircraftCommand::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
+                climb_m_s = fpm.abs() * FOOT_M / 60.0;
+                // A rate after an `ALT` of the same time belongs to that command.
+                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = commands.last_mut()
+                    && *last_s == at_s
+                {
+                    *rate_m_s = climb_m_s;
+                }
+            }
+            AircraftCommand::LateralNavigation(true) if has_route => {
+                commands.push((at_s, FlightCommand::Proceed))
+            }
+            _ => {}
+        }
+    }
+    commands
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::airspace_run;
+    use crate::scenario::CompiledAirspace;
+    use sidestep_import::bluesky::parse;
+    use sidestep_kernel::Simulation;
+    use sidestep_scenario::Source;
+
+    #[test]
+    fn two_head_on_aircraft_of_a_bluesky_file_pass_each_other() {
+        let file = parse(
+            &"two.scn",
+            "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,250\n\
+             00:00:00.00>CRE B2,B744,0,0.4,270,FL200,250\n\
+             00:00:00.00>CRE C3,B744,0.01,0.0,180,FL300,250\n\
+             00:00:00.00>DEST A1 0,0.4\n00:00:00.00>DEST B2 0,-0.4\n",
+        );
+        let text = from_bluesky("two", &file).expect("it has aircraft");
+        let mut run = airspace_run(&Source::new("two", text, ""), 1).expect("valid");
+        assert_eq!(run.agent_count(), 3);
+        run.advance(200);
+        let metrics = run.metrics();
+        assert_eq!(metrics.losses_of_separation, 0);
+        assert!(metrics.min_separation_m.is_some_and(|d| d < 20_000.0), "they have met");
+    }
+
+    fn compiled(commands: &str) -> CompiledAirspace {
+        let line = |command: &str| format!("00:00:00.00>{command}\n");
+        let text: String = commands.lines().map(line).collect();
+        let text = from_bluesky("bluesky", &parse(&"bluesky.scn", &text)).expect("it has aircraft");
+        CompiledAirspace::new(&Source::new("bluesky", text, "")).expect("a scenario")
+    }
+
+    #[test]
+    fn the_method_that_flies_looks_as_far_ahead_as_the_file_says_and_check_tells_it() {
+        let flights = "CRE A1,B744,0,-0.4,90,FL200,250\nCRE B2,B744,0,0.4,270,FL200,250\n";
+        for (settings, s) in [
+            ("RESO MVP\nDTLOOK 60", 60.0),
+            ("RESO MVP\nDTLOOK 1200", 1200.0),
+            ("RESO MVP", 300.0),
+            ("DTLOOK 120", 120.0),
+            ("", 300.0),
+        ] {
+            let compiled = compiled(&format!("{flights}{settings}"));
+            assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
+            assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
+            let contents = crate::text::describe_scenario(&compiled).text;
+            assert!(
+                contents.contains(&format!("decides every 10 s, looks {s} s ahead")),
+                "{contents}"
+            );
+        }
+        // MVP that is chosen by `--set` instead of the file looks as far.
+        assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
+    }
+
+    #[test]
+    fn an_imported_flight_that_begins_late_in_a_long_day_is_flown_to_its_end() {
+        let short = compiled("CRE A1,A320,52,4,90,FL300,270");
+        let thrice_ahead = 530..=540;
+        assert!(thrice_ahead.contains(&short.cycles), "{}", short.cycles);
+        let text = "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n\
+                    13:00:00.00>CRE B2,A320,52.0,5.0,90,FL300,270\n";
+        let text = from_bluesky("day", &parse(&"day.scn", text)).expect("it has aircraft");
+        let mut run = airspace_run(&Source::new("day", text, ""), 1).expect("a scenario");
+        run.advance(run.config().cycles);
+        let metrics = run.metrics();
+        assert_eq!((metrics.arrived, metrics.not_appeared), (2, 0));
+    }
+
+    #[test]
+    fn any_name_of_a_file_is_the_name_of_its_scenario() {
+        let file = parse(&"f.scn", "00:00:00.00>CRE A1,A320,52.0,4.0,90,FL300,270\n");
+        for name in ["cafe\u{301}", "a \"b\" \\ 'c'", "tab\tline\nend", "\u{feff}\u{7f}\u{0}", ""] {
+            let text = from_bluesky(name, &file).expect("it has aircraft");
+            let compiled = CompiledAirspace::new(&Source::new(name, text, "")).expect("a scenario");
+            assert_eq!(compiled.name, name);
+        }
+    }
+
+    #[test]
+    fn check_tells_how_far_orca_looks_ahead() {
+        let text = "format = 1\nworld = \"airspace\"\nairspace.method = \"orca\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 3\n";
+        let compiled = CompiledAirspace::new(&Source::new("o", text, "")).expect("a scenario");
+        let contents = crate::text::describe_scenario(&compiled).text;
+        assert!(contents.contains("looks 45 s ahead"), "{contents}");
+    }
+
+    #[test]
+    fn a_flight_created_at_speed_0_flies_as_far_as_the_speed_that_it_gets_takes_it() {
+        let file = parse(
+            &"late.scn",
+            "00:00:00.00>CRE A1,B744,0,-0.4,90,FL200,0\n\
+             00:00:30.00>HDG A1 180\n00:01:00.00>SPD A1 250\n\
+             00:00:00.00>CRE B2,B744,1,0.4,270,FL200,250\n\
+             00:00:00.00>CRE C3,B744,2,0.4,270,FL200,0\n",
+        );
+        let rules = settings_from_bluesky("late.scn", &file);
+        let [stands] = &rules.refused[..] else { panic!("{:?}", rules.refused) };
+        assert!(stands.cause().contains("C3 is never given a speed"), "{stands}");
+        let text = from_bluesky("late", &file).expect("two fly");
+        let mut run = airspace_run(&Source::new("late", text, ""), 1).expect("valid");
+        run.advance(400);
+        let world = run.world().clone();
+        assert_eq!(world.airplanes[0].appears_s, 60.0);
+        for id in 0..2 {
+            let flown = crate::metrics::airplane_metrics(&world, run.state(), id);
+            let (s, delay) = (flown.flown_s, flown.delay_percent);
+            assert!(s.is_some_and(|s| s > 0.95 * UNROUTED_FLIGHT_S), "{id}: {s:?}");
+            assert!(delay.is_some_and(|percent| percent.abs() < 1.0), "{id}: {delay:?}");
+        }
+    }
+}
