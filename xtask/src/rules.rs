@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Packages that only some crates may depend on: each is heavy, or the one way to a format or a network.
 /// `cargo deny` could hold them, but not everybody who runs the tests has it.
 const RESERVED: [(&str, &[&str]); 9] = [
-    ("parquet", &["sidestep-record"]),
+    ("parquet", &["sidestep-record", "sidestep-import"]),
     ("mcap", &["sidestep-record", "sidestep-import"]),
     ("foxglove", &["sidestep-record"]),
     ("arrow-array", &["sidestep-python"]),

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use super::report::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_scenario::file::read_text;
 
@@ -119,7 +120,9 @@ pub fn rows<'a, const N: usize>(
 
 /// A CSV file with a header row, whose columns are found by name.
 ///
-/// Separator `,`, quotes `"`, blanks around fields ignored, lines that start with `#` skipped.
+/// The separator is the one of `,`, `;` and tab that the header has most of, or the one that a first line `sep=;` names;
+/// quotes `"`, blanks around fields ignored, lines that start with `#` skipped. Numbers may have decimal commas where no
+/// number of the table has a decimal point.
 #[derive(Debug)]
 pub struct CsvTable {
     place: String,
@@ -132,6 +135,27 @@ pub struct CsvTable {
     fields: String,
     /// The end of each field in `fields`; as many per row as the header has.
     ends: Vec<u32>,
+    separator: char,
+    has_decimal_commas: bool,
+    misfits: Vec<MisfitRow>,
+}
+
+/// Rows of a table whose number of fields is not that of the header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MisfitRow {
+    /// Its line, from 1.
+    pub line: usize,
+    /// Number of lines that it takes: more than one where a quote is not closed.
+    pub line_count: usize,
+    /// Number of its fields.
+    pub field_count: usize,
+}
+
+/// What becomes of rows with another number of fields than the header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MisfitRule {
+    Refuse,
+    LeaveOut,
 }
 
 impl CsvTable {
@@ -149,11 +173,31 @@ impl CsvTable {
     /// When a row has another number of fields than the header, there is no header, or the text
     /// is longer than [`MAX_CSV_BYTES`].
     pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<Self, InputError> {
+        Self::parse_rows(place, text, MisfitRule::Refuse)
+    }
+
+    /// Parses the text of a recording: rows with another number of fields than the header are left out, see
+    /// [`misfits`](Self::misfits).
+    ///
+    /// # Errors
+    /// When there is no header, or the text is longer than [`MAX_CSV_BYTES`].
+    pub fn parse_recording(place: &dyn fmt::Display, text: &str) -> Result<Self, InputError> {
+        Self::parse_rows(place, text, MisfitRule::LeaveOut)
+    }
+
+    fn parse_rows(
+        place: &dyn fmt::Display,
+        text: &str,
+        misfit_rule: MisfitRule,
+    ) -> Result<Self, InputError> {
         if text.len() as u64 > MAX_CSV_BYTES {
             let cause = format!("the table has more than {MAX_CSV_BYTES} bytes");
-            return Err(InputError::new(place, cause, "learn from a part of it"));
+            return Err(InputError::new(place, cause, "give a part of it"));
         }
+        let (separator, text) = separator_of(text);
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter(separator)
+            .flexible(true)
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
@@ -169,20 +213,119 @@ impl CsvTable {
             lines: Vec::new(),
             fields: String::new(),
             ends: Vec::new(),
+            separator: char::from(separator),
+            has_decimal_commas: false,
+            misfits: Vec::new(),
         };
         let mut record = csv::StringRecord::new();
         while reader.read_record(&mut record).map_err(|e| csv_error(place, text, &e))? {
-            table.push(text, &record);
+            if table.fits(&record, misfit_rule) {
+                table.push(text, &record);
+                continue;
+            }
+            let misfit = misfit_row(text, &record);
+            if misfit_rule == MisfitRule::Refuse {
+                return Err(table.misfit_error(misfit));
+            }
+            table.misfits.push(misfit);
         }
+        table.replace_decimal_commas();
         Ok(table)
+    }
+
+    /// Returns whether a record has one field per column. Separators at the end of a row of a recording mean nothing.
+    fn fits(&self, record: &csv::StringRecord, misfit_rule: MisfitRule) -> bool {
+        let columns = self.header.len();
+        if misfit_rule == MisfitRule::Refuse {
+            return record.len() == columns;
+        }
+        // A quote that is not closed takes the lines after it into one field.
+        record.len() >= columns
+            && record.iter().skip(columns).all(str::is_empty)
+            && !record.iter().any(|field| field.contains('\n'))
     }
 
     fn push(&mut self, text: &str, record: &csv::StringRecord) {
         self.lines.push(record.position().map_or(0, |p| line_of(text, p) as u32));
-        for field in record {
+        for field in record.iter().take(self.header.len()) {
             self.fields.push_str(field);
             // The text has at most MAX_CSV_BYTES, which fit into 32 bits.
             self.ends.push(self.fields.len() as u32);
+        }
+    }
+
+    fn misfit_error(&self, misfit: MisfitRow) -> InputError {
+        let columns = self.header.len();
+        let cause = format!("the row has {} fields, the header {columns}", misfit.field_count);
+        let remedy = format!(
+            "give every row one field per column of the header, separated by `{}`",
+            self.separator.escape_debug()
+        );
+        InputError::new(&self.place, cause, remedy).with_position(misfit.line, 1)
+    }
+
+    /// Turns decimal commas into points, where the numbers of the table have commas and none has a point: with both,
+    /// one of them separates thousands, and nothing tells which.
+    fn replace_decimal_commas(&mut self) {
+        let mut starts = Vec::new();
+        let mut start = 0;
+        for &end in &self.ends {
+            match decimal_mark(&self.fields[start..end as usize]) {
+                Some(b',') => starts.push(start..end as usize),
+                Some(_) => return,
+                None => {}
+            }
+            start = end as usize;
+        }
+        if starts.is_empty() {
+            return;
+        }
+        self.has_decimal_commas = true;
+        let mut bytes = std::mem::take(&mut self.fields).into_bytes();
+        for range in starts {
+            for byte in &mut bytes[range] {
+                if *byte == b',' {
+                    *byte = b'.';
+                }
+            }
+        }
+        self.fields = String::from_utf8(bytes).expect("one ASCII character in place of another");
+    }
+
+    /// Returns the character between fields.
+    pub fn separator(&self) -> char {
+        self.separator
+    }
+
+    /// Returns whether commas in numbers were read as decimal commas: `1,5` as 1.5.
+    pub fn has_decimal_commas(&self) -> bool {
+        self.has_decimal_commas
+    }
+
+    /// Returns the rows that a recording has with another number of fields than the header, in the order of the file.
+    pub fn misfits(&self) -> &[MisfitRow] {
+        &self.misfits
+    }
+
+    /// Returns the names of the columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// Returns the line of the header, from 1.
+    pub fn header_line(&self) -> usize {
+        self.header_line
+    }
+
+    /// Records how fields and numbers are separated, where the table is not the usual one of commas and points.
+    pub fn record_separators(&self, report: &mut ImportReport) {
+        if self.separator != ',' {
+            report.add_fact("separator", format!("`{}`", self.separator.escape_debug()));
+        }
+        if self.has_decimal_commas {
+            let rule = "commas in numbers are decimal commas: 1,5 is 1.5";
+            let remedy = "write numbers without separators of thousands";
+            report.record(Treatment::Guessed, rule, "", remedy);
         }
     }
 
@@ -239,11 +382,19 @@ impl<'a> CsvRow<'a> {
         assert!(index < self.table.header.len(), "a column of the header");
         // Quotes and trimmed blanks are not kept, so the column may be off by these.
         let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
-        let line = self.table.lines[self.index] as usize;
-        Token { text: self.text(index), line, column: before + 1 }
+        Token { text: self.text(index), line: self.line(), column: before + 1 }
     }
 
-    fn text(&self, index: usize) -> &'a str {
+    /// Returns the line of the row, from 1.
+    pub fn line(&self) -> usize {
+        self.table.lines[self.index] as usize
+    }
+
+    /// Returns the text in the column at `index`, without its position in the file.
+    ///
+    /// # Panics
+    /// When the header has no such column.
+    pub fn text(&self, index: usize) -> &'a str {
         let slot = self.index * self.table.header.len() + index;
         let start = slot.checked_sub(1).map_or(0, |previous| self.table.ends[previous]);
         &self.table.fields[start as usize..self.table.ends[slot] as usize]
@@ -283,14 +434,59 @@ fn line_of(text: &str, position: &csv::Position) -> usize {
 
 fn csv_error(place: &dyn fmt::Display, text: &str, error: &csv::Error) -> InputError {
     let line = error.position().map_or(1, |p| line_of(text, p));
-    let cause = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("the row has {len} fields, the header {expected_len}")
+    let remedy = "give every row one field per column of the header";
+    InputError::new(place, error.to_string(), remedy).with_position(line, 1)
+}
+
+fn misfit_row(text: &str, record: &csv::StringRecord) -> MisfitRow {
+    let line_ends: usize = record.iter().map(|field| field.matches('\n').count()).sum();
+    MisfitRow {
+        line: record.position().map_or(1, |p| line_of(text, p)),
+        line_count: 1 + line_ends,
+        field_count: record.len(),
+    }
+}
+
+/// Characters that separate fields, the usual one first.
+const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+
+/// Returns the separator of a table, and its text: without a first line `sep=;`, which spreadsheets write, but with the
+/// end of that line, so that lines are counted as in the file.
+fn separator_of(text: &str) -> (u8, &str) {
+    let first = text.lines().next().unwrap_or("");
+    if let Some([separator]) = first.trim_end().strip_prefix("sep=").map(str::as_bytes)
+        && SEPARATORS.contains(separator)
+    {
+        return (*separator, &text[first.len()..]);
+    }
+    let header = data_lines(text).next().map_or("", |(_, line)| line);
+    let mut best = SEPARATORS[0];
+    for separator in SEPARATORS {
+        if unquoted_count(header, separator) > unquoted_count(header, best) {
+            best = separator;
         }
-        _ => error.to_string(),
-    };
-    InputError::new(place, cause, "give every row one field per column of the header")
-        .with_position(line, 1)
+    }
+    (best, text)
+}
+
+/// Returns how often a line has a character outside of quotes.
+fn unquoted_count(line: &str, wanted: u8) -> usize {
+    let mut is_quoted = false;
+    let mut count = 0;
+    for byte in line.bytes() {
+        is_quoted ^= byte == b'"';
+        count += usize::from(byte == wanted && !is_quoted);
+    }
+    count
+}
+
+/// Returns the mark, a comma or a point, within a number of plain digits; `None` for other texts.
+fn decimal_mark(text: &str) -> Option<u8> {
+    let digits = text.strip_prefix(['-', '+']).unwrap_or(text).as_bytes();
+    let at = digits.iter().position(|byte| !byte.is_ascii_digit())?;
+    let (before, after) = (&digits[..at], &digits[at + 1..]);
+    let is_number = !before.is_empty() && !after.is_empty() && after.iter().all(u8::is_ascii_digit);
+    (is_number && matches!(digits[at], b',' | b'.')).then_some(digits[at])
 }
 
 #[cfg(test)]
@@ -356,5 +552,53 @@ mod tests {
         let wide = (0..40).map(|k| format!("c{k}")).collect::<Vec<_>>().join(",");
         let error = CsvTable::parse(&"f.csv", &wide).unwrap().columns(["a"]).unwrap_err();
         assert!(error.cause().ends_with("`c15` and 24 more"), "{}", error.cause());
+    }
+
+    fn values(text: &str) -> Vec<f64> {
+        let table = CsvTable::parse(&"f.csv", text).unwrap();
+        let row = table.rows().next().unwrap();
+        (0..table.header().len()).map(|k| row.field(k).number(&"f.csv").unwrap()).collect()
+    }
+
+    #[test]
+    fn tables_of_semicolons_and_tabs_are_read_with_decimal_commas_or_points() {
+        assert_eq!(values("a;b\n1,5;-2\n"), [1.5, -2.0]);
+        assert_eq!(values("a;b\n1.5;-2\n"), [1.5, -2.0]);
+        assert_eq!(values("a\tb\n1,5\t+0,25\n"), [1.5, 0.25]);
+        assert_eq!(values("sep=;\r\na;b\r\n1,5;2\r\n"), [1.5, 2.0]);
+        assert_eq!(values("\"a;x\",b\n\"1,5\",2\n"), [1.5, 2.0]);
+    }
+
+    #[test]
+    fn where_commas_may_separate_thousands_they_are_no_part_of_a_number() {
+        let table = CsvTable::parse(&"f.csv", "alt;lat\n35,000;47.25\n").unwrap();
+        let error = table.rows().next().unwrap().field(0).number(&"f.csv").unwrap_err();
+        assert!(error.cause().contains("35,000"), "{error}");
+        assert!(!table.has_decimal_commas());
+    }
+
+    #[test]
+    fn the_report_names_the_separator_and_the_decimal_commas() {
+        let table = CsvTable::parse(&"f.csv", "a;b\n1,5;2\n").unwrap();
+        let mut report = ImportReport::new("CSV");
+        table.record_separators(&mut report);
+        assert_eq!(report.facts[0].value, "`;`");
+        assert_eq!(report.findings[0].treatment, Treatment::Guessed);
+        let mut usual = ImportReport::new("CSV");
+        CsvTable::parse(&"f.csv", "a,b\n1.5,2\n").unwrap().record_separators(&mut usual);
+        assert_eq!(usual, ImportReport::new("CSV"));
+    }
+
+    #[test]
+    fn a_recording_goes_on_after_rows_that_do_not_fit() {
+        let text = "a,b\n1,2,\n1\n\"3,4\n5,6\n7,8\n";
+        let table = CsvTable::parse_recording(&"f.csv", text).unwrap();
+        assert_eq!(table.rows().count(), 1, "a separator at the end of a row means nothing");
+        let short = MisfitRow { line: 3, line_count: 1, field_count: 1 };
+        assert_eq!(table.misfits()[0], short);
+        let swallowed: usize = table.misfits().iter().map(|row| row.line_count).sum();
+        assert!(swallowed >= 4, "{:?}", table.misfits());
+        let error = CsvTable::parse(&"f.csv", "a;b\n1,5\n").unwrap_err();
+        assert!(error.remedy().contains("separated by `;`"), "{error}");
     }
 }

@@ -1,0 +1,409 @@
+//! Rows of all aircraft, put together as flights.
+
+use super::options::TrafficOptions;
+use super::plausibility::{self, Suspicion, distance_m, likely_unit, suspicions};
+use super::rows::{CheckedRows, Row, RowCollector};
+use super::summary::describe;
+use super::time::format_utc;
+use super::{MAX_SPEED_M_S, RecordedTraffic, Track};
+use crate::report::{ImportReport, MAX_PLACES, Treatment};
+use sidestep_kernel::InputError;
+use std::collections::BTreeMap;
+
+/// The longest time in s on the ground, between two rows in the air, within one flight: a flag that was wrong for a
+/// moment ends no flight.
+const MAX_TOUCH_S: f64 = 60.0;
+
+/// The shortest time in s for which an aircraft has another call sign, between two rows of one.
+const MIN_CALLSIGN_S: f64 = 60.0;
+
+/// What reported speeds may differ from those of rows, before their unit is in doubt.
+const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
+
+const LEAVE_OUT: &str = "add `--set import.leave_out_suspicious=true` to leave them out";
+
+/// Returns the flights of all rows, with the report.
+///
+/// # Errors
+/// When too many rows are bad, or no flight remains.
+pub(super) fn into_traffic(
+    collector: RowCollector,
+    options: &TrafficOptions,
+) -> Result<RecordedTraffic, InputError> {
+    let CheckedRows { place, noun, rows, row_count, report } = collector.finish()?;
+    let mut builder = FlightBuilder { options, noun, report, repeated_rows: 0 };
+    let mut flights = Vec::new();
+    for rows in builder.by_aircraft(rows) {
+        let rows = builder.sort_by_time(rows);
+        let (rows, ends) = builder.leave_out_ground(rows);
+        for part in
+            split(rows, |before, row| ends.contains(&row.number) || builder.is_gap(before, row))
+        {
+            flights.extend(builder.split_at_callsigns(part));
+        }
+    }
+    let ratio = builder.check_speed_unit(&flights);
+    let mut parts = Vec::new();
+    for flight in flights {
+        let (rows, jumps) = builder.check_positions(flight, ratio);
+        parts.extend(split(rows, |before, row| {
+            jumps.contains(&row.number) || builder.is_gap(before, row)
+        }));
+    }
+    builder.count_gaps(&parts);
+    let is_snapshot = !parts.is_empty() && parts.iter().all(|rows| rows.len() == 1);
+    let tracks: Vec<Track> =
+        parts.into_iter().filter_map(|rows| builder.track(rows, is_snapshot)).collect();
+    if tracks.is_empty() {
+        return Err(builder.nothing_left(&place, row_count));
+    }
+    let FlightBuilder { mut report, repeated_rows, .. } = builder;
+    describe(&mut report, &tracks);
+    if is_snapshot {
+        let rule = "aircraft of one instant fly straight on, at their speed and level";
+        report.record(Treatment::Guessed, rule, "", "give rows of several instants");
+    }
+    Ok(RecordedTraffic { tracks, rows: row_count, repeated_rows, is_snapshot, report })
+}
+
+struct FlightBuilder<'a> {
+    options: &'a TrafficOptions,
+    noun: &'static str,
+    report: ImportReport,
+    repeated_rows: usize,
+}
+
+impl FlightBuilder<'_> {
+    fn record(&mut self, treatment: Treatment, rule: &str, row: &Row, remedy: &str) {
+        let known = self
+            .report
+            .findings
+            .iter()
+            .find(|finding| finding.treatment == treatment && finding.rule == rule);
+        let has_places = known.is_some_and(|finding| finding.places.len() >= MAX_PLACES);
+        let place = if has_places { String::new() } else { self.place(row) };
+        self.report.record(treatment, rule, place, remedy);
+    }
+
+    /// Returns a row as people find it: its line, aircraft, time and position.
+    fn place(&self, row: &Row) -> String {
+        let name = [&row.callsign, &row.address, &row.flight_id];
+        let name = name.into_iter().find(|name| !name.is_empty()).map_or("", String::as_str);
+        let at = row.sample.position;
+        let utc = format_utc(row.sample.time_s);
+        format!(
+            "{} {} ({name} at {utc}, {:.4} {:.4})",
+            self.noun, row.number, at.lat_deg, at.lon_deg
+        )
+    }
+
+    /// Returns the rows by aircraft, in the order of their keys, each in the order of the file.
+    fn by_aircraft(&mut self, rows: Vec<Row>) -> Vec<Vec<Row>> {
+        let mut by_key: BTreeMap<[String; 2], Vec<Row>> = BTreeMap::new();
+        for mut row in rows {
+            row.callsign = row.callsign.to_ascii_uppercase();
+            let key = aircraft_key(&row);
+            let of_aircraft = by_key.entry(key).or_default();
+            if let Some(first) = of_aircraft.first()
+                && first.address != row.address
+            {
+                let rule = "addresses in several spellings are one aircraft's";
+                self.record(Treatment::Repaired, rule, &row, "");
+            }
+            of_aircraft.push(row);
+        }
+        by_key.into_values().collect()
+    }
+
+    /// Sorts rows by time; of several at one instant the first is kept.
+    fn sort_by_time(&mut self, mut rows: Vec<Row>) -> Vec<Row> {
+        let mut latest_s = f64::NEG_INFINITY;
+        for row in &rows {
+            if row.sample.time_s < latest_s {
+                let rule = "rows out of order are sorted by time";
+                self.record(Treatment::Repaired, rule, row, "");
+            }
+            latest_s = latest_s.max(row.sample.time_s);
+        }
+        // A stable sort, so that the first row of an instant in the file stays the first.
+        rows.sort_by(|a, b| a.sample.time_s.total_cmp(&b.sample.time_s));
+        let mut kept: Vec<Row> = Vec::with_capacity(rows.len());
+        for row in rows {
+            let Some(last) = kept.last().filter(|last| last.sample.time_s == row.sample.time_s)
+            else {
+                kept.push(row);
+                continue;
+            };
+            self.repeated_rows += 1;
+            let is_same = last.sample.position == row.sample.position
+                && last.sample.altitude_ft == row.sample.altitude_ft;
+            if is_same {
+                self.record(Treatment::Repaired, "rows given twice are kept once", &row, "");
+            } else {
+                let rule = "rows with another position at the instant of an earlier row";
+                self.record(Treatment::Dropped, rule, &row, "");
+            }
+        }
+        kept
+    }
+
+    /// Leaves out rows on the ground. Returns those in the air, and the numbers of rows before which the aircraft was on
+    /// the ground for long.
+    fn leave_out_ground(&mut self, rows: Vec<Row>) -> (Vec<Row>, Vec<usize>) {
+        let limit_kt = self.options.ground_speed_kt;
+        let slow = format!(
+            "rows without a flag for the ground, slower than {limit_kt} kt: taken as on the ground"
+        );
+        let mut kept: Vec<Row> = Vec::with_capacity(rows.len());
+        let mut ends = Vec::new();
+        let mut has_landed = false;
+        for row in rows {
+            let is_slow = row.sample.ground_speed_kt.is_some_and(|kt| kt < limit_kt);
+            match row.is_on_ground {
+                Some(true) => {
+                    let rule = "rows of aircraft on the ground, which are no traffic";
+                    self.record(Treatment::Dropped, rule, &row, "");
+                }
+                None if is_slow => {
+                    let remedy = "add `--set import.ground_speed_kt=0` to keep them";
+                    self.record(Treatment::Dropped, &slow, &row, remedy);
+                }
+                _ => {
+                    let last_s = kept.last().map_or(f64::INFINITY, |last| last.sample.time_s);
+                    if has_landed && row.sample.time_s - last_s > MAX_TOUCH_S {
+                        ends.push(row.number);
+                    }
+                    has_landed = false;
+                    kept.push(row);
+                    continue;
+                }
+            }
+            has_landed = true;
+        }
+        (kept, ends)
+    }
+
+    fn is_gap(&self, before: &Row, row: &Row) -> bool {
+        row.sample.time_s - before.sample.time_s > self.options.max_gap_s
+    }
+
+    /// Names the gaps between flights of one aircraft.
+    fn count_gaps(&mut self, parts: &[Vec<Row>]) {
+        let rule = format!(
+            "gaps of more than {} s end a flight, and nothing is flown in them",
+            self.options.max_gap_s
+        );
+        for pair in parts.windows(2) {
+            let (Some(before), Some(row)) = (pair[0].last(), pair[1].first()) else { continue };
+            if aircraft_key(before) == aircraft_key(row) && self.is_gap(before, row) {
+                let remedy = "add `--set import.max_gap_s=SECONDS` for another limit";
+                self.record(Treatment::Guessed, &rule, row, remedy);
+            }
+        }
+    }
+
+    /// Returns rows without gaps by their call signs.
+    fn split_at_callsigns(&mut self, mut rows: Vec<Row>) -> Vec<Vec<Row>> {
+        fill_callsigns(&mut rows);
+        let mut runs = split(rows, |before, row| before.callsign != row.callsign);
+        if runs.len() > 2 && returns_to_a_callsign(&runs) {
+            if is_two_aircraft(&runs) {
+                return self.separate_aircraft(runs);
+            }
+            self.relabel_short_runs(&mut runs);
+            runs = split(runs.into_iter().flatten().collect(), |before, row| {
+                before.callsign != row.callsign
+            });
+        }
+        for run in runs.iter().skip(1) {
+            self.record(Treatment::Repaired, "changes of call sign end a flight", &run[0], "");
+        }
+        runs
+    }
+
+    /// Returns the rows of two aircraft with one address, whose call signs tell them apart.
+    fn separate_aircraft(&mut self, runs: Vec<Vec<Row>>) -> Vec<Vec<Row>> {
+        let mut by_callsign: BTreeMap<String, Vec<Row>> = BTreeMap::new();
+        for row in runs.into_iter().flatten() {
+            by_callsign.entry(row.callsign.clone()).or_default().push(row);
+        }
+        for rows in by_callsign.values().skip(1) {
+            let rule = "aircraft that have the address of another one at the same time, told apart by call sign";
+            self.record(Treatment::Suspicious, rule, &rows[0], "");
+        }
+        by_callsign.into_values().collect()
+    }
+
+    /// Gives rows with another call sign for a moment that of the rows around them.
+    fn relabel_short_runs(&mut self, runs: &mut [Vec<Row>]) {
+        for k in 1..runs.len() - 1 {
+            let [first, last] = [&runs[k][0], &runs[k][runs[k].len() - 1]];
+            let is_short = last.sample.time_s - first.sample.time_s < MIN_CALLSIGN_S;
+            let around = runs[k - 1][0].callsign.clone();
+            if !is_short || around != runs[k + 1][0].callsign {
+                continue;
+            }
+            let rule = "rows with another call sign for less than a minute";
+            let row = runs[k][0].clone();
+            self.record(Treatment::Repaired, rule, &row, "");
+            runs[k].iter_mut().for_each(|row| row.callsign.clone_from(&around));
+        }
+    }
+
+    /// Returns the factor from reported speeds to those of the rows, which it names where it is far from 1.
+    fn check_speed_unit(&mut self, flights: &[Vec<Row>]) -> f64 {
+        let ratio = plausibility::speed_ratio(flights.iter()).unwrap_or(1.0);
+        if SPEED_RATIOS.contains(&ratio) {
+            return 1.0;
+        }
+        let rule = format!(
+            "rows move at {ratio:.2} times of the speeds that they report: the column may have {}",
+            likely_unit(ratio)
+        );
+        let remedy = "write the speeds in the unit of the column";
+        self.report.record(Treatment::Suspicious, rule, "", remedy);
+        ratio
+    }
+
+    /// Names rows that can hardly be right, and leaves them out where that is wanted. Returns the others, and the numbers
+    /// of rows at which the flight goes on elsewhere.
+    fn check_positions(&mut self, rows: Vec<Row>, ratio: f64) -> (Vec<Row>, Vec<usize>) {
+        let leaves_out = self.options.leaves_out_suspicious;
+        let found = suspicions(&rows, ratio);
+        let mut kept = Vec::with_capacity(rows.len());
+        let mut jumps = Vec::new();
+        for (row, suspicion) in rows.into_iter().zip(found) {
+            let Some(suspicion) = suspicion else {
+                kept.push(row);
+                continue;
+            };
+            let rule = match suspicion {
+                Suspicion::Frozen => {
+                    "rows with the position of an earlier row, while the aircraft flies"
+                }
+                Suspicion::Far => {
+                    "rows that the reported speed does not lead to, from the rows around them"
+                }
+                Suspicion::Jump => {
+                    "flights that go on elsewhere, where the reported speed does not lead"
+                }
+            };
+            match (leaves_out, suspicion) {
+                (false, _) => self.record(Treatment::Suspicious, rule, &row, LEAVE_OUT),
+                (true, Suspicion::Jump) => {
+                    self.record(Treatment::Repaired, &format!("{rule}: split there"), &row, "");
+                    jumps.push(row.number);
+                }
+                (true, _) => {
+                    self.record(Treatment::Dropped, rule, &row, "");
+                    continue;
+                }
+            }
+            kept.push(row);
+        }
+        (self.leave_out_impossible(kept), jumps)
+    }
+
+    /// Leaves out rows that nothing reaches from the row before.
+    fn leave_out_impossible(&mut self, rows: Vec<Row>) -> Vec<Row> {
+        let mut kept: Vec<Row> = Vec::with_capacity(rows.len());
+        for row in rows {
+            let is_possible = kept.last().is_none_or(|last| {
+                let length_m = distance_m(last.sample.position, row.sample.position);
+                // The plane of the simulation stretches distances far from its center.
+                length_m < 0.1 * MAX_SPEED_M_S * (row.sample.time_s - last.sample.time_s)
+            });
+            if is_possible {
+                kept.push(row);
+            } else {
+                let rule = "rows with a position that nothing reaches from the row before";
+                self.record(Treatment::Dropped, rule, &row, "");
+            }
+        }
+        kept
+    }
+
+    /// Returns a flight; `None` for one that leads nowhere.
+    fn track(&mut self, rows: Vec<Row>, is_snapshot: bool) -> Option<Track> {
+        let first = rows.first()?;
+        let sample = &first.sample;
+        if !is_snapshot && rows.len() < 2 {
+            self.record(Treatment::Dropped, "flights of a single row", first, "");
+            return None;
+        }
+        if is_snapshot && (sample.ground_speed_kt.is_none() || sample.track_deg.is_none()) {
+            let rule = "aircraft of one instant without a speed or a direction";
+            self.record(Treatment::Dropped, rule, first, "");
+            return None;
+        }
+        Some(Track {
+            icao24: first.address.to_ascii_lowercase(),
+            callsign: first.callsign.clone(),
+            flight_id: first.flight_id.clone(),
+            samples: rows.iter().map(|row| row.sample).collect(),
+        })
+    }
+
+    fn nothing_left(&self, place: &str, row_count: usize) -> InputError {
+        let dropped =
+            self.report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+        let rules: Vec<String> = dropped.map(ToString::to_string).collect();
+        let cause = format!("no flight remains of {row_count} rows: {}", rules.join("; "));
+        let remedy = "give a recording of aircraft in the air, each in two rows at least";
+        InputError::new(place, cause, remedy)
+    }
+}
+
+/// Returns what tells aircraft apart: the address, which has no case and no leading zeros, or else a name; and the
+/// flight, where the file names it.
+fn aircraft_key(row: &Row) -> [String; 2] {
+    let address = row.address.to_ascii_lowercase();
+    let address = address.strip_prefix("0x").unwrap_or(&address).trim_start_matches('0');
+    let flight = row.flight_id.clone();
+    if row.address.is_empty() && flight.is_empty() {
+        return [format!("callsign {}", row.callsign), flight];
+    }
+    [address.to_string(), flight]
+}
+
+/// Gives rows without a call sign that of the row before, or else that of the row after.
+fn fill_callsigns(rows: &mut [Row]) {
+    let first = rows.iter().find(|row| !row.callsign.is_empty()).map(|row| row.callsign.clone());
+    let Some(mut known) = first else { return };
+    for row in rows {
+        if row.callsign.is_empty() {
+            row.callsign.clone_from(&known);
+        } else {
+            known.clone_from(&row.callsign);
+        }
+    }
+}
+
+fn returns_to_a_callsign(runs: &[Vec<Row>]) -> bool {
+    let mut callsigns: Vec<&str> = runs.iter().map(|run| run[0].callsign.as_str()).collect();
+    callsigns.sort_unstable();
+    callsigns.windows(2).any(|pair| pair[0] == pair[1])
+}
+
+/// Returns whether most changes of call sign lead to a place that the reported speed does not.
+fn is_two_aircraft(runs: &[Vec<Row>]) -> bool {
+    let mut far = 0;
+    for pair in runs.windows(2) {
+        let (Some(before), Some(after)) = (pair[0].last(), pair[1].first()) else { continue };
+        let step = [before.clone(), after.clone()];
+        far += usize::from(suspicions(&step, 1.0).iter().any(Option::is_some));
+    }
+    far * 2 > runs.len() - 1
+}
+
+/// Returns rows in parts; a part ends before a row where `ends` says so, of the row before and the row.
+fn split(rows: Vec<Row>, ends: impl Fn(&Row, &Row) -> bool) -> Vec<Vec<Row>> {
+    let mut parts: Vec<Vec<Row>> = Vec::new();
+    for row in rows {
+        match parts.last_mut() {
+            Some(part) if !part.last().is_some_and(|before| ends(before, &row)) => part.push(row),
+            _ => parts.push(vec![row]),
+        }
+    }
+    parts
+}

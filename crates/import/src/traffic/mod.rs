@@ -1,0 +1,183 @@
+//! Recorded air traffic: one row per aircraft and instant, from the sources that people have.
+//!
+//! | source | told by | units |
+//! |-|-|-|
+//! | this program | `time_s`, `lat_deg`, `lon_deg`, `alt_ft`, ... | in the names |
+//! | OpenSky Network, state vectors (CSV, JSON) | `velocity`, `baroaltitude` or `geoaltitude`; `states` | m/s, m |
+//! | library `traffic` (CSV, Parquet) | `timestamp`, `latitude`, `longitude`, `altitude`, `groundspeed` or `flight_id` | kt, ft, ft/min |
+//! | Flightradar24 (CSV) | `Timestamp`, `Position`, `Direction` | kt, ft |
+//! | EUROCONTROL so6, m1 and m3 | 20 fields a line | flight levels, minutes of arc |
+//! | DAIDALUS (.daa) | a line of names, a line of units | in the second line |
+//! | any other table | names with units: `alt_m`, `gs_m_s` | in the names |
+//!
+//! Tables have commas, semicolons or tabs, decimal points or commas, and times as ISO 8601 or as seconds, milliseconds,
+//! microseconds or nanoseconds since 1970. Files may be compressed with gzip.
+//!
+//! Rows without a position are left out. The rows of an aircraft become flights: they are split at gaps, at changes of
+//! call sign and at stops on the ground, whose rows are no traffic. Rows that can hardly be right are named; see
+//! [`TrafficOptions`]. All of it stands in the report.
+
+mod clean;
+mod columns;
+mod csv_source;
+mod daa;
+mod flights;
+mod json_source;
+mod options;
+mod parquet_source;
+#[cfg(test)]
+mod parquet_tests;
+mod plausibility;
+mod rows;
+mod so6;
+mod summary;
+#[cfg(test)]
+mod tests;
+mod time;
+mod value;
+
+use super::local_plane::LatLon;
+use super::report::ImportReport;
+use rows::RowCollector;
+use sidestep_kernel::InputError;
+use sidestep_scenario::file::read_bytes;
+use std::fmt;
+use std::path::Path;
+
+pub use clean::to_csv;
+pub use options::TrafficOptions;
+pub use time::format_utc;
+
+/// All flights of one file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedTraffic {
+    /// The flights, by address and time.
+    pub tracks: Vec<Track>,
+    /// Number of rows of the file, without the header.
+    pub rows: usize,
+    /// Number of rows that repeat the instant of an earlier row of the same aircraft; they are left out.
+    pub repeated_rows: usize,
+    /// Whether the file shows one instant: every flight has one sample, with its speed and direction.
+    pub is_snapshot: bool,
+    /// What was found in the file, what was kept, and what was not taken as it stood.
+    pub report: ImportReport,
+}
+
+/// One flight of an aircraft, without gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Address of the transponder as the flight's first row has it, in lower case; empty where the file has none.
+    pub icao24: String,
+    /// The call sign; empty where there is none.
+    pub callsign: String,
+    /// The name of the flight, where the file gives one.
+    pub flight_id: String,
+    /// The samples, with strictly increasing times: at least two, or one of a snapshot.
+    pub samples: Vec<Sample>,
+}
+
+/// An aircraft at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time in s since the start of 1970, UTC.
+    pub time_s: f64,
+    /// Its position on the earth, as the transponder reports it.
+    pub position: LatLon,
+    /// Altitude in ft: above standard pressure where the file has that, so not the height above ground.
+    pub altitude_ft: f64,
+    /// Speed over the ground in kt, not negative.
+    pub ground_speed_kt: Option<f64>,
+    /// Direction of motion over the ground in degrees, clockwise from true north, in [0, 360).
+    pub track_deg: Option<f64>,
+    /// Vertical speed in ft/min, positive upward.
+    pub vertical_speed_fpm: Option<f64>,
+}
+
+/// The greatest speed between two rows, in m/s: beyond it one of the two positions is wrong. The simulator bounds
+/// airplanes by it as well.
+pub const MAX_SPEED_M_S: f64 = 1e6;
+
+/// The maximum size of a file in bytes after decompression.
+pub const MAX_TRAFFIC_BYTES: u64 = super::table::MAX_CSV_BYTES;
+
+/// Ends of names, without `.gz`, of files that hold recorded traffic.
+const EXTENSIONS: [&str; 6] = [".csv", ".tsv", ".json", ".parquet", ".so6", ".daa"];
+
+/// Returns whether a file holds recorded traffic, by its name.
+pub fn has_extension(file: &Path) -> bool {
+    let name = file.to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    EXTENSIONS.iter().any(|extension| name.ends_with(extension))
+}
+
+/// Reads a file, plain or compressed with gzip.
+///
+/// # Errors
+/// When it cannot be read, its source is unknown, more than half of its rows are bad, or nothing remains.
+pub fn read(path: &Path) -> Result<RecordedTraffic, InputError> {
+    read_with(path, &TrafficOptions::default())
+}
+
+/// Reads a file like [`read`], with options.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_with(path: &Path, options: &TrafficOptions) -> Result<RecordedTraffic, InputError> {
+    let bytes = read_bytes(path, MAX_TRAFFIC_BYTES)?;
+    from_bytes(&path.display(), bytes, options)
+}
+
+/// Parses text; `place` is its name in errors.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse(place: &dyn fmt::Display, text: &str) -> Result<RecordedTraffic, InputError> {
+    parse_with(place, text, &TrafficOptions::default())
+}
+
+/// Parses text like [`parse`], with options.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse_with(
+    place: &dyn fmt::Display,
+    text: &str,
+    options: &TrafficOptions,
+) -> Result<RecordedTraffic, InputError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut collector = RowCollector::new(place, "line");
+    let start = text.trim_start();
+    if start.starts_with(['{', '[']) {
+        json_source::collect(&mut collector, text)?;
+    } else if so6::is_so6(text) {
+        so6::collect(&mut collector, text);
+    } else if daa::is_daa(text) {
+        daa::collect(&mut collector, text)?;
+    } else {
+        csv_source::collect(&mut collector, text)?;
+    }
+    flights::into_traffic(collector, options)
+}
+
+/// Parses the content of a file, text or Parquet; `place` is its name in errors.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn from_bytes(
+    place: &dyn fmt::Display,
+    bytes: Vec<u8>,
+    options: &TrafficOptions,
+) -> Result<RecordedTraffic, InputError> {
+    if parquet_source::is_parquet(&bytes) {
+        let mut collector = RowCollector::new(place, "row");
+        parquet_source::collect(&mut collector, bytes)?;
+        return flights::into_traffic(collector, options);
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let cause = "is neither a text (UTF-8) nor a Parquet file";
+        let readable = String::from_utf8_lossy(error.as_bytes());
+        InputError::new(place, cause, "save the file as UTF-8")
+            .with_byte_offset(&readable, error.utf8_error().valid_up_to())
+    })?;
+    parse_with(place, &text, options)
+}

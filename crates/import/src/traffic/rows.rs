@@ -1,0 +1,382 @@
+//! The rows of a file, each checked: those with a position at a time are kept, all others counted.
+
+use super::columns::{Field, Layout, Source};
+use super::time::{UnixUnit, WrittenTime, parse_time};
+use super::value::{NotANumber, Value};
+use super::{LatLon, Sample};
+use crate::report::{ImportReport, MAX_PLACES, Treatment};
+use sidestep_kernel::InputError;
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// The range of altitudes in ft: beyond it the column must hold another quantity.
+const ALTITUDES_FT: RangeInclusive<f64> = -5_000.0..=200_000.0;
+
+/// The range of speeds in kt.
+const SPEEDS_KT: RangeInclusive<f64> = 0.0..=10_000.0;
+
+/// The longest time in s between the middle row and any other: no recording takes 30 years.
+const MAX_DURATION_S: f64 = 1e9;
+
+/// A row of one aircraft.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    /// Its number in the file.
+    pub(super) number: usize,
+    /// The address, as written.
+    pub(super) address: String,
+    pub(super) callsign: String,
+    pub(super) flight_id: String,
+    /// Whether it is on the ground, where the file tells.
+    pub(super) is_on_ground: Option<bool>,
+    /// The time in s for which its position was not received anew, where the file tells.
+    pub(super) position_age_s: f64,
+    pub(super) sample: Sample,
+}
+
+/// A row whose time waits for its unit.
+#[derive(Debug)]
+struct TimedRow {
+    row: Row,
+    time: WrittenTime,
+    position_time: Option<WrittenTime>,
+}
+
+/// A row as its file holds it.
+pub(super) trait RowValues {
+    /// Returns the cell in a column.
+    fn value(&self, column: usize) -> Value<'_>;
+}
+
+/// What is read from a file.
+#[derive(Debug)]
+pub(super) struct RowCollector {
+    place: String,
+    /// What a row is called in the report: `line`.
+    noun: &'static str,
+    rows: Vec<TimedRow>,
+    row_count: usize,
+    bad_count: usize,
+    first_bad: Option<usize>,
+    pub(super) report: ImportReport,
+}
+
+impl RowCollector {
+    /// Returns a collector without rows; `place` is the file's name in errors.
+    pub(super) fn new(place: &dyn fmt::Display, noun: &'static str) -> Self {
+        Self {
+            place: place.to_string(),
+            noun,
+            rows: Vec::new(),
+            row_count: 0,
+            bad_count: 0,
+            first_bad: None,
+            report: ImportReport::new(""),
+        }
+    }
+
+    /// Returns the name of the file in errors.
+    pub(super) fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// Sets the word for a row.
+    pub(super) fn set_noun(&mut self, noun: &'static str) {
+        self.noun = noun;
+    }
+
+    /// Names the source of the rows, and what is not used of it.
+    pub(super) fn describe_source(&mut self, layout: &Layout, format: &str) {
+        let (name, units) = layout.source.describe();
+        self.report.format = format!("{name} ({format})");
+        self.report.add_fact("units", units);
+        if layout.column(Field::Altitude).is_none() {
+            let rule = "the only altitude is the geometric one, and levels are compared by it";
+            self.report.record(Treatment::Guessed, rule, "", "");
+        }
+        for name in &layout.unused {
+            self.report.record(Treatment::NotUsed, "columns", format!("`{name:.40}`"), "");
+        }
+    }
+
+    /// Counts rows that are left out.
+    pub(super) fn leave_out(&mut self, number: usize, count: usize, rule: &str) {
+        self.row_count += count;
+        self.bad_count += count;
+        self.first_bad.get_or_insert(number);
+        let place = self.row_place(rule, number);
+        self.report.record(Treatment::Dropped, rule, place, "");
+        for _ in 1..count {
+            self.report.record(Treatment::Dropped, rule, "", "");
+        }
+    }
+
+    /// Returns the place of a row, as long as the rule needs places.
+    fn row_place(&self, rule: &str, number: usize) -> String {
+        let known = self.report.findings.iter().find(|finding| finding.rule == rule);
+        if known.is_some_and(|finding| finding.places.len() >= MAX_PLACES) {
+            return String::new();
+        }
+        format!("{} {number}", self.noun)
+    }
+
+    /// Reads a row; one that cannot be used is left out.
+    pub(super) fn push(&mut self, number: usize, layout: &Layout, values: &dyn RowValues) {
+        let reader = RowReader { layout, values };
+        match reader.row(number) {
+            Ok(row) => self.push_row(row),
+            Err(rule) => self.leave_out(number, 1, rule),
+        }
+    }
+
+    fn push_row(&mut self, read: ReadRow) {
+        self.row_count += 1;
+        let number = read.timed.row.number;
+        for rule in read.bad_cells.into_iter().flatten() {
+            let place = self.row_place(rule, number);
+            self.report.record(Treatment::Dropped, rule, place, "");
+        }
+        self.rows.push(read.timed);
+    }
+
+    /// Returns all usable rows, in the order of the file.
+    ///
+    /// # Errors
+    /// When there is none, or more than half of all are bad.
+    pub(super) fn finish(mut self) -> Result<CheckedRows, InputError> {
+        let unit = self.unix_unit();
+        let mut zoneless = 0;
+        let mut rows = Vec::with_capacity(self.rows.len());
+        for timed in std::mem::take(&mut self.rows) {
+            let TimedRow { mut row, time, position_time } = timed;
+            zoneless += usize::from(matches!(time, WrittenTime::Calendar { has_zone: false, .. }));
+            row.sample.time_s = seconds(time, unit);
+            let received_s = position_time.map_or(row.sample.time_s, |time| seconds(time, unit));
+            row.position_age_s = row.sample.time_s - received_s;
+            rows.push(row);
+        }
+        if zoneless > 0 {
+            let rule = "times without a zone are UTC";
+            self.report.record(Treatment::Guessed, rule, "", "write `Z` or the offset behind them");
+        }
+        if unit != UnixUnit::Seconds {
+            let rule = format!("times are {} since 1970, by their size", unit.name());
+            self.report.record(Treatment::Guessed, rule, "", "");
+        }
+        self.leave_out_far_times(&mut rows);
+        self.check_counts(rows.len())?;
+        Ok(CheckedRows {
+            place: self.place,
+            noun: self.noun,
+            rows,
+            row_count: self.row_count,
+            report: self.report,
+        })
+    }
+
+    /// Returns the unit of numbers since 1970: that of the middle one.
+    fn unix_unit(&self) -> UnixUnit {
+        let mut sizes = Vec::new();
+        for timed in &self.rows {
+            if let WrittenTime::Unix(value) = timed.time {
+                sizes.push(value);
+            }
+        }
+        median(&mut sizes).map_or(UnixUnit::Seconds, UnixUnit::of_size)
+    }
+
+    /// Leaves out rows whose time is decades from that of the middle row.
+    fn leave_out_far_times(&mut self, rows: &mut Vec<Row>) {
+        let mut times: Vec<f64> = rows.iter().map(|row| row.sample.time_s).collect();
+        let Some(middle_s) = median(&mut times) else { return };
+        let mut far = Vec::new();
+        rows.retain(|row| {
+            let is_near = (row.sample.time_s - middle_s).abs() <= MAX_DURATION_S;
+            if !is_near {
+                far.push(row.number);
+            }
+            is_near
+        });
+        // These were counted as rows when they were read.
+        self.row_count -= far.len();
+        for number in far {
+            self.leave_out(number, 1, "rows with a time decades from that of the others");
+        }
+    }
+
+    fn check_counts(&self, kept: usize) -> Result<(), InputError> {
+        if kept > 0 && self.bad_count * 2 <= self.row_count {
+            return Ok(());
+        }
+        if self.row_count == 0 {
+            let remedy = "give a recording with one row per aircraft and instant";
+            return Err(InputError::new(&self.place, "has no rows", remedy));
+        }
+        let dropped =
+            self.report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+        let rules: Vec<String> = dropped.map(|found| found.to_string()).collect();
+        let cause = format!(
+            "{} of {} rows cannot be used: {}",
+            self.bad_count,
+            self.row_count,
+            rules.join("; ")
+        );
+        let remedy = "restore these rows, or delete them and read the rest";
+        let error = InputError::new(&self.place, cause, remedy);
+        Err(match self.first_bad {
+            Some(line) if self.noun == "line" => error.with_position(line, 1),
+            _ => error,
+        })
+    }
+}
+
+/// Rows of a file that can be used, and what became of the others.
+#[derive(Debug)]
+pub(super) struct CheckedRows {
+    pub(super) place: String,
+    pub(super) noun: &'static str,
+    pub(super) rows: Vec<Row>,
+    pub(super) row_count: usize,
+    pub(super) report: ImportReport,
+}
+
+/// Returns the middle one of some numbers, which it sorts.
+pub(super) fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn seconds(time: WrittenTime, unit: UnixUnit) -> f64 {
+    match time {
+        WrittenTime::Unix(value) => value / unit.per_s(),
+        WrittenTime::Calendar { utc_s, .. } => utc_s,
+    }
+}
+
+/// A row, and the rules by which cells of it were left out.
+struct ReadRow {
+    timed: TimedRow,
+    bad_cells: [Option<&'static str>; 3],
+}
+
+/// Reads the cells of one row.
+struct RowReader<'a> {
+    layout: &'a Layout,
+    values: &'a dyn RowValues,
+}
+
+/// The rule by which a row is left out.
+type Rule = &'static str;
+
+impl RowReader<'_> {
+    fn row(&self, number: usize) -> Result<ReadRow, Rule> {
+        let time = self.time(Field::Time).ok_or("rows without a time")?;
+        let position = self.position()?;
+        let altitude_ft = self.altitude_ft()?;
+        let (ground_speed_kt, bad_speed) = self.optional(Field::GroundSpeed, SPEEDS_KT);
+        let (track_deg, bad_track) = self.optional(Field::Track, -360.0..=360.0);
+        let (vertical_speed_fpm, bad_climb) =
+            self.optional(Field::VerticalSpeed, f64::MIN..=f64::MAX);
+        let row = Row {
+            number,
+            address: self.name(Field::Address),
+            callsign: self.name(Field::Callsign),
+            flight_id: self.name(Field::FlightId),
+            is_on_ground: self.is_on_ground(altitude_ft),
+            position_age_s: 0.0,
+            sample: Sample {
+                time_s: 0.0,
+                position,
+                altitude_ft,
+                ground_speed_kt,
+                track_deg: track_deg.map(|deg| deg.rem_euclid(360.0) % 360.0),
+                vertical_speed_fpm,
+            },
+        };
+        let is_named = [&row.address, &row.callsign, &row.flight_id].iter().any(|n| !n.is_empty());
+        if !is_named && self.layout.source != Source::Flightradar24 {
+            return Err("rows without the name of an aircraft");
+        }
+        let position_time = self.time(Field::PositionTime);
+        Ok(ReadRow {
+            timed: TimedRow { row, time, position_time },
+            bad_cells: [
+                bad_speed.then_some("cells with a speed that is none"),
+                bad_track.then_some("cells with a direction that is none"),
+                bad_climb.then_some("cells with a vertical speed that is none"),
+            ],
+        })
+    }
+
+    fn value(&self, field: Field) -> Value<'_> {
+        self.layout.column(field).map_or(Value::Missing, |column| self.values.value(column.index))
+    }
+
+    fn name(&self, field: Field) -> String {
+        self.value(field).name()
+    }
+
+    fn time(&self, field: Field) -> Option<WrittenTime> {
+        match self.value(field) {
+            Value::Number(value) if value.is_finite() => Some(WrittenTime::Unix(value)),
+            Value::Text(text) => parse_time(text),
+            _ => None,
+        }
+    }
+
+    fn position(&self) -> Result<LatLon, Rule> {
+        const NONE: Rule = "rows without a position";
+        let (lat, lon) = match self.value(Field::Position) {
+            Value::Text(text) => {
+                let (lat, lon) = text.split_once(',').ok_or(NONE)?;
+                (Value::from_text(lat).number(), Value::from_text(lon).number())
+            }
+            _ => (self.scaled(Field::Latitude), self.scaled(Field::Longitude)),
+        };
+        const NO_NUMBER: Rule = "rows with a position that is no number";
+        let lat_deg = lat.map_err(|NotANumber| NO_NUMBER)?.ok_or(NONE)?;
+        let lon_deg = lon.map_err(|NotANumber| NO_NUMBER)?.ok_or(NONE)?;
+        let is_on_earth = (-90.0..=90.0).contains(&lat_deg) && (-180.0..=360.0).contains(&lon_deg);
+        if !is_on_earth {
+            return Err("rows with a position that is not on the earth");
+        }
+        let lon_deg = if lon_deg > 180.0 { lon_deg - 360.0 } else { lon_deg };
+        Ok(LatLon { lat_deg, lon_deg })
+    }
+
+    /// Returns a number in the unit of its field.
+    fn scaled(&self, field: Field) -> Result<Option<f64>, NotANumber> {
+        let Some(column) = self.layout.column(field) else { return Ok(None) };
+        let value = self.values.value(column.index).number()?;
+        Ok(value.map(|value| value * column.factor))
+    }
+
+    fn altitude_ft(&self) -> Result<f64, Rule> {
+        const NONE: Rule = "rows without an altitude";
+        let column = self.layout.altitude().ok_or(NONE)?;
+        let value = self.values.value(column.index).number();
+        let value = value.map_err(|NotANumber| "rows with an altitude that is no number")?;
+        let altitude_ft = value.ok_or(NONE)? * column.factor;
+        if !ALTITUDES_FT.contains(&altitude_ft) {
+            return Err("rows with an altitude that no aircraft has");
+        }
+        Ok(altitude_ft)
+    }
+
+    /// Returns a quantity that a row may lack, and whether its cell is wrong.
+    fn optional(&self, field: Field, range: RangeInclusive<f64>) -> (Option<f64>, bool) {
+        match self.scaled(field) {
+            Ok(None) => (None, false),
+            Ok(Some(value)) if range.contains(&value) => (Some(value), false),
+            _ => (None, true),
+        }
+    }
+
+    fn is_on_ground(&self, altitude_ft: f64) -> Option<bool> {
+        // Flightradar24 writes altitude 0 for an aircraft on the ground, whatever the airport's elevation.
+        if self.layout.source == Source::Flightradar24 && altitude_ft == 0.0 {
+            return Some(true);
+        }
+        self.value(Field::OnGround).flag()
+    }
+}

@@ -1,0 +1,266 @@
+//! Times of recordings: seconds and their fractions since 1970, and dates with times of day.
+
+/// Seconds of a day.
+const DAY_S: f64 = 86_400.0;
+
+/// A time as a file writes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum WrittenTime {
+    /// A number since the start of 1970, in a unit that its size tells.
+    Unix(f64),
+    /// A date and a time of day, in s since the start of 1970.
+    Calendar {
+        /// The time, as UTC.
+        utc_s: f64,
+        /// Whether the text has an offset from UTC.
+        has_zone: bool,
+    },
+}
+
+/// A unit of numbers since the start of 1970.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum UnixUnit {
+    Seconds,
+    Milliseconds,
+    Microseconds,
+    Nanoseconds,
+}
+
+impl UnixUnit {
+    /// Returns the unit in which a number of this size is a time of the present: 1e9 s are in the year 2001.
+    pub(super) fn of_size(value: f64) -> Self {
+        match value.abs() {
+            size if size < 1e11 => Self::Seconds,
+            size if size < 1e14 => Self::Milliseconds,
+            size if size < 1e17 => Self::Microseconds,
+            _ => Self::Nanoseconds,
+        }
+    }
+
+    /// Returns the number of units in a second.
+    pub(super) fn per_s(self) -> f64 {
+        match self {
+            Self::Seconds => 1.0,
+            Self::Milliseconds => 1e3,
+            Self::Microseconds => 1e6,
+            Self::Nanoseconds => 1e9,
+        }
+    }
+
+    /// Returns its name in the plural.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Seconds => "seconds",
+            Self::Milliseconds => "milliseconds",
+            Self::Microseconds => "microseconds",
+            Self::Nanoseconds => "nanoseconds",
+        }
+    }
+}
+
+/// Reads a number, or a date and a time of day as ISO 8601 and its relatives write them: `2018-08-01T09:00:00Z`,
+/// `2018-08-01 09:00:00.5+02:00`, `2018/08/01 09:00`.
+pub(super) fn parse_time(text: &str) -> Option<WrittenTime> {
+    if let Ok(value) = text.parse::<f64>() {
+        return value.is_finite().then_some(WrittenTime::Unix(value));
+    }
+    if !text.is_ascii() || text.len() < 10 {
+        return None;
+    }
+    let (date, rest) = text.split_at(10);
+    let day = parse_date(date)?;
+    let rest = rest.strip_prefix(['T', 't', ' ']).unwrap_or(rest).trim();
+    let (clock, offset_s) = split_zone(rest)?;
+    let time_s = day as f64 * DAY_S + parse_clock(clock)?;
+    Some(WrittenTime::Calendar {
+        utc_s: time_s - offset_s.unwrap_or(0.0),
+        has_zone: offset_s.is_some(),
+    })
+}
+
+/// Returns the days since 1970-01-01 of `YYYY-MM-DD`, with `-` or `/`.
+fn parse_date(text: &str) -> Option<i64> {
+    let bytes = text.as_bytes();
+    if !matches!((bytes[4], bytes[7]), (b'-', b'-') | (b'/', b'/')) {
+        return None;
+    }
+    days_since_1970(digits(&text[..4])?, digits(&text[5..7])?, digits(&text[8..])?)
+}
+
+/// Returns the days from 1970-01-01 to a date of the Gregorian calendar; `None` where there is no such date.
+pub(super) fn days_since_1970(year: u32, month: u32, day: u32) -> Option<i64> {
+    let is_leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
+    let days_of_month = match month {
+        2 => 28 + u32::from(is_leap),
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => return None,
+    };
+    if !(1..=days_of_month).contains(&day) {
+        return None;
+    }
+    // Years that begin in March have their leap day at the end.
+    let shifted_year = i64::from(year) - i64::from(month <= 2);
+    let month_from_march = i64::from((month + 9) % 12);
+    let day_of_year = (153 * month_from_march + 2) / 5 + i64::from(day) - 1;
+    let era = shifted_year.div_euclid(400);
+    let year_of_era = shifted_year.rem_euclid(400);
+    let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
+    Some(era * 146_097 + day_of_era - 719_468)
+}
+
+/// Returns a clock without its offset from UTC, and the offset in s; `None` for an offset that is none.
+fn split_zone(text: &str) -> Option<(&str, Option<f64>)> {
+    if let Some(clock) = text.strip_suffix(['Z', 'z']).or_else(|| text.strip_suffix("UTC")) {
+        return Some((clock.trim_end(), Some(0.0)));
+    }
+    let Some(at) = text.rfind(['+', '-']) else {
+        return Some((text, None));
+    };
+    let sign = if text.as_bytes()[at] == b'-' { -1.0 } else { 1.0 };
+    let offset = &text[at + 1..];
+    let (hours, minutes) = match offset.len() {
+        2 => (offset, "00"),
+        4 => offset.split_at(2),
+        5 if offset.as_bytes()[2] == b':' => (&offset[..2], &offset[3..]),
+        _ => return None,
+    };
+    let offset_s = f64::from(digits(hours)?) * 3600.0 + f64::from(digits(minutes)?) * 60.0;
+    Some((text[..at].trim_end(), Some(sign * offset_s)))
+}
+
+/// Returns the seconds since midnight of `HH:MM`, `HH:MM:SS` or `HH:MM:SS.fff`; 0 for an empty text.
+fn parse_clock(text: &str) -> Option<f64> {
+    if text.is_empty() {
+        return Some(0.0);
+    }
+    let mut parts = text.split(':');
+    let hours = digits(parts.next()?)?;
+    let minutes = digits(parts.next()?)?;
+    let seconds: f64 = match parts.next() {
+        None => 0.0,
+        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => {
+            text.replace(',', ".").parse().ok()?
+        }
+        Some(_) => return None,
+    };
+    let is_clock = hours <= 24 && minutes < 60 && (0.0..61.0).contains(&seconds);
+    (is_clock && parts.next().is_none())
+        .then(|| f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0 + seconds)
+}
+
+/// Returns a number of one to four digits.
+fn digits(text: &str) -> Option<u32> {
+    let is_number = (1..=4).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| text.parse().ok()).flatten()
+}
+
+/// Returns a time in s since 1970 as ISO 8601 in UTC: `2018-08-01T09:00:00Z`, with tenths of a second where it has any.
+pub fn format_utc(time_s: f64) -> String {
+    let tenths = (time_s * 10.0).round();
+    if !(tenths.abs() < 1e14) {
+        return format!("{time_s:e} s since 1970");
+    }
+    let tenths = tenths as i64;
+    let days = tenths.div_euclid(864_000);
+    let of_day = tenths.rem_euclid(864_000);
+    let [year, month, day] = date_of_day(days);
+    let seconds = of_day / 10;
+    let [h, m, s] = [seconds / 3600, seconds / 60 % 60, seconds % 60];
+    let fraction = match of_day % 10 {
+        0 => String::new(),
+        tenth => format!(".{tenth}"),
+    };
+    format!("{year:04}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}{fraction}Z")
+}
+
+/// Returns year, month and day of the day that is so many days after 1970-01-01.
+fn date_of_day(days: i64) -> [i64; 3] {
+    let shifted = days + 719_468;
+    let era = shifted.div_euclid(146_097);
+    let day_of_era = shifted.rem_euclid(146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    [year_of_era + era * 400 + i64::from(month <= 2), month, day]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn utc_s(text: &str) -> Option<f64> {
+        match parse_time(text)? {
+            WrittenTime::Calendar { utc_s, .. } => Some(utc_s),
+            WrittenTime::Unix(_) => None,
+        }
+    }
+
+    #[test]
+    fn one_instant_has_many_spellings() {
+        for text in [
+            "2018-08-01T09:00:00Z",
+            "2018-08-01 09:00:00+00:00",
+            "2018-08-01 11:00:00+0200",
+            "2018-08-01T04:30:00.000-04:30",
+            "2018-08-01T09:00:00,0Z",
+            "2018/08/01 09:00",
+            "2018-08-01 09:00:00 UTC",
+        ] {
+            assert_eq!(utc_s(text), Some(1_533_114_000.0), "{text}");
+        }
+        assert_eq!(parse_time("1533114000.5"), Some(WrittenTime::Unix(1_533_114_000.5)));
+        let without = parse_time("2018-08-01 09:00:00");
+        assert!(matches!(without, Some(WrittenTime::Calendar { has_zone: false, .. })));
+    }
+
+    #[test]
+    fn what_is_no_time_is_none() {
+        for text in [
+            "",
+            "x",
+            "nan",
+            "inf",
+            "2018-13-01T00:00:00Z",
+            "2018-02-29T00:00:00Z",
+            "2018-08-01T25:00:00Z",
+            "2018-08-01T09:61:00Z",
+            "2018-08-01T09:00:99Z",
+            "2018-08-01Tx",
+            "2018-08-01T09:00:-1",
+            "2018-08-01T09:00:00+1:0",
+            "2018-08-0\u{e9}T09",
+            "09:00:00",
+        ] {
+            assert_eq!(parse_time(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_unit_of_a_number_is_that_in_which_it_is_a_time_of_the_present() {
+        for unit in [
+            UnixUnit::Seconds,
+            UnixUnit::Milliseconds,
+            UnixUnit::Microseconds,
+            UnixUnit::Nanoseconds,
+        ] {
+            assert_eq!(UnixUnit::of_size(1_533_114_000.0 * unit.per_s()), unit);
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn a_time_that_is_written_is_read_back(tenths in -600_000_000_000_i64..600_000_000_000) {
+            let time_s = tenths as f64 / 10.0;
+            proptest::prop_assert_eq!(utc_s(&format_utc(time_s)), Some(time_s));
+        }
+
+        #[test]
+        fn any_text_is_a_time_or_none(text in "\\PC{0,30}") {
+            let _ = parse_time(&text);
+        }
+    }
+}
