@@ -33,8 +33,9 @@ pub struct Estimate {
     pub of: f64,
     /// `count / of`, without smoothing.
     pub probability: f64,
-    /// Wilson's 95 % interval of that probability.
-    pub interval: Interval,
+    /// Wilson's 95 % interval of that probability; `None` where too many samples were left out for a reason that
+    /// nothing explains, see [`max_unexplained`](crate::EstimateOptions::max_unexplained).
+    pub interval: Option<Interval>,
 }
 
 /// A row that rests on few counts.
@@ -63,6 +64,13 @@ impl CountTable {
     /// cells.
     pub fn add(&mut self, row: usize, column: usize, weight: f64) {
         self.cells[row][column] += weight;
+    }
+
+    /// Adds the counts of a table of the same shape, each times `weight`.
+    pub(crate) fn add_table(&mut self, other: &Self, weight: f64) {
+        for (row, added) in self.cells.iter_mut().zip(&other.cells) {
+            row.iter_mut().zip(added).for_each(|(cell, count)| *cell += weight * count);
+        }
     }
 
     /// Returns the name under which reports and profiles list the table.
@@ -119,7 +127,7 @@ impl CountTable {
             count,
             of,
             probability: count / of,
-            interval: wilson(count, of),
+            interval: Some(wilson(count, of)),
         }
     }
 
@@ -241,7 +249,7 @@ mod tests {
             (estimates[0].count, estimates[0].of, estimates[0].probability),
             (3.0, 4.0, 0.75)
         );
-        assert_eq!(estimates[0].interval, wilson(3.0, 4.0));
+        assert_eq!(estimates[0].interval, Some(wilson(3.0, 4.0)));
         let thin = small().low_count_rows(4);
         assert_eq!((thin.len(), thin[0].row.as_str(), thin[0].count), (1, "b", 0.0));
         assert_eq!(small().low_count_rows(5).len(), 2);

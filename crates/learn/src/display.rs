@@ -2,7 +2,7 @@
 
 use std::fmt::{Formatter, Result};
 
-use super::holdout::HoldoutTest;
+use super::holdout::{HoldoutTest, Split};
 use super::{Estimate, LowCountRow};
 use sidestep_kernel::text::{LINE_COLS, format_fixed, wrap_text};
 use sidestep_statistics::{Moments, holm};
@@ -77,10 +77,14 @@ pub(super) fn write_estimates(
 fn write_estimate(f: &mut Formatter<'_>, e: &Estimate) -> Result {
     // Counts of events that are spread over outcomes are fractional.
     let decimals = if e.count.fract() == 0.0 { 0 } else { 2 };
+    let interval = match e.interval {
+        Some(interval) => format!("[{:.5}, {:.5}]", interval.low, interval.high),
+        None => "none: see the warning".to_string(),
+    };
     writeln!(
         f,
-        "  {:12} {:13} {:>10.decimals$} {:>7.0}  {:>11.5}  [{:.5}, {:.5}]",
-        e.row, e.column, e.count, e.of, e.probability, e.interval.low, e.interval.high
+        "  {:12} {:13} {:>10.decimals$} {:>7.0}  {:>11.5}  {interval}",
+        e.row, e.column, e.count, e.of, e.probability
     )
 }
 
@@ -128,7 +132,7 @@ fn write_holdout_test(f: &mut Formatter<'_>, fit: &HoldoutTest) -> Result {
     writeln!(
         f,
         "  {:18} {:>8.0} {:>8.0} {:>8} {:>4} {:>7} {:>9} {:>9}",
-        fit.table,
+        name_of(fit),
         fit.trained_on,
         fit.held_out,
         chi_square,
@@ -137,6 +141,14 @@ fn write_holdout_test(f: &mut Formatter<'_>, fit: &HoldoutTest) -> Result {
         format_loss(fit.log_loss),
         format_loss(fit.log_loss_floor)
     )
+}
+
+/// Returns a test's table, with the way in which the log was cut where that is not every k-th event.
+fn name_of(fit: &HoldoutTest) -> String {
+    match fit.split {
+        Split::Alternate => fit.table.clone(),
+        Split::Time | Split::Robot => format!("{} ({})", fit.table, fit.split.name()),
+    }
 }
 
 fn format_loss(loss: Option<f64>) -> String {
@@ -154,15 +166,7 @@ fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
     let differs =
         tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < SIGNIFICANCE_LEVEL));
     let mut words: Vec<String> = differs
-        .map(|(fit, _)| {
-            warning_line(&format!(
-                "{}: the parts of the log differ by more than chance (p {}). What was learned may \
-                 not hold elsewhere: the robot or its place changed meanwhile, or events depend on \
-                 each other.",
-                fit.table,
-                format_p(fit.p_value)
-            ))
-        })
+        .map(|(fit, _)| warning_line(&difference_words(fit)))
         .collect();
     let untested = fits.len() - tested.len();
     if words.is_empty() && !tested.is_empty() {
@@ -172,6 +176,43 @@ fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
         words.push(format!("Too few counts to test: {untested} of {} tables.", fits.len()));
     }
     words
+}
+
+/// Largest number of odd robots that a sentence lists.
+const MAX_LISTED_ROBOTS: usize = 12;
+
+/// Returns the sentence on a table whose parts differ.
+fn difference_words(fit: &HoldoutTest) -> String {
+    let table = &fit.table;
+    let p = format_p(fit.p_value);
+    match fit.split {
+        Split::Alternate => format!(
+            "{table}: the parts of the log differ by more than chance (p {p}). What was learned may \
+             not hold elsewhere: the robot or its place changed meanwhile, or events depend on \
+             each other."
+        ),
+        Split::Time => format!(
+            "{table}: the quarters of the log differ by more than chance (p {p}). The errors change in \
+             time, or events depend on each other: one table is the mean of several, and its intervals \
+             hold for none of them. Learn from the stretches before and after the change by themselves."
+        ),
+        Split::Robot => format!(
+            "{table}: the {} robots differ by more than chance (p {p}){}. One table is the mean of \
+             several, and its intervals hold for none of them: learn robots that are alike by themselves.",
+            fit.parts,
+            odd_words(&fit.odd_parts)
+        ),
+    }
+}
+
+/// Returns the robots that differ from the others, as a part of a sentence.
+fn odd_words(robots: &[String]) -> String {
+    match robots.len() {
+        0 => String::new(),
+        n if n > MAX_LISTED_ROBOTS => format!(", {n} of them far from the others"),
+        1 => format!(", robot {} far from the others", robots[0]),
+        _ => format!(", robots {} far from the others", robots.join(", ")),
+    }
 }
 
 /// Probabilities below it are not told apart, and none of them is 0.
@@ -193,6 +234,9 @@ mod tests {
     fn fit(p_value: f64, degrees_of_freedom: usize) -> HoldoutTest {
         HoldoutTest {
             table: "moves".into(),
+            split: Split::Alternate,
+            parts: 2,
+            odd_parts: Vec::new(),
             trained_on: 100.0,
             held_out: 100.0,
             chi_square: 1.0,
@@ -213,6 +257,18 @@ mod tests {
         assert_eq!(told(&[fit(1.0, 0)]), "Too few counts to test: 1 of 1 tables.");
         let lines = told(&[HoldoutTest { table: "a_table_of_turns".into(), ..fit(0.00001, 4) }]);
         assert!(lines.lines().all(|line| line.chars().count() <= 80), "{lines}");
+    }
+
+    #[test]
+    fn robots_that_differ_and_errors_that_change_are_told_apart() {
+        let odd_parts = ["3", "7"].map(String::from).to_vec();
+        let robots = HoldoutTest { split: Split::Robot, parts: 9, odd_parts, ..fit(1e-9, 8) };
+        let told = verdicts(&[robots, HoldoutTest { split: Split::Time, ..fit(1e-9, 3) }]).join("\n");
+        let words = told.replace('\n', " ");
+        assert!(words.contains("the 9 robots differ") && words.contains("robots 3, 7 far"), "{told}");
+        assert!(words.contains("quarters of the log differ"), "{told}");
+        let name = name_of(&HoldoutTest { split: Split::Robot, ..fit(0.5, 1) });
+        assert_eq!(name, "moves (robot)");
     }
 
     #[test]

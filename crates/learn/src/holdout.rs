@@ -1,5 +1,7 @@
 //! A test of how well a part of the events predicts the rest.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::counts::{CountTable, smooth};
@@ -10,12 +12,42 @@ use sidestep_statistics::chi_square_p_value;
 /// the chi-square distribution only where expected counts are not small; 5 is the customary bound (Cochran 1954).
 const MIN_EXPECTED_COUNT: f64 = 5.0;
 
+/// The way in which a log is cut into parts that are to follow one law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// Every k-th event is held out.
+    Alternate,
+    /// Each quarter of the log is held out in turn: shows errors that change in time.
+    Time,
+    /// Each robot is held out in turn: shows robots that differ.
+    Robot,
+}
+
+impl Split {
+    /// Returns its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Alternate => "alternate",
+            Self::Time => "time",
+            Self::Robot => "robot",
+        }
+    }
+}
+
 /// The agreement of held-out events with the table learned from the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HoldoutTest {
     /// Name of the table of counts.
     pub table: String,
-    /// Number of events used for learning.
+    /// The way in which the log was cut into parts.
+    pub split: Split,
+    /// Number of parts that were compared.
+    pub parts: usize,
+    /// Robots that differ from the others far beyond chance (p < 0.0001 for each), the oddest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub odd_parts: Vec<String>,
+    /// Number of events used for learning. Where each part is held out in turn, that of all events.
     pub trained_on: f64,
     /// Number of events held out, which the learned table is to predict.
     pub held_out: f64,
@@ -52,11 +84,14 @@ pub fn split<T>(events: &[T], every: usize) -> (Vec<&T>, Vec<&T>) {
 pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> HoldoutTest {
     let n_rows = trained.rows().len();
     let tests: Vec<(f64, usize)> =
-        (0..n_rows).map(|row| homogeneity(trained.row(row), held.row(row))).collect();
+        (0..n_rows).map(|row| homogeneity(&[trained.row(row), held.row(row)])).collect();
     let chi_square = tests.iter().map(|test| test.0).sum();
     let degrees_of_freedom = tests.iter().map(|test| test.1).sum();
     HoldoutTest {
         table: trained.name().to_owned(),
+        split: Split::Alternate,
+        parts: 2,
+        odd_parts: Vec::new(),
         trained_on: (0..n_rows).map(|row| trained.total(row)).sum(),
         held_out: (0..n_rows).map(|row| held.total(row)).sum(),
         chi_square,
@@ -67,21 +102,22 @@ pub fn holdout_test(trained: &CountTable, held: &CountTable, alpha: f64) -> Hold
     }
 }
 
-/// Returns chi-square statistic and degrees of freedom of Pearson's test of homogeneity: "two samples, one law".
-fn homogeneity(a: &[f64], b: &[f64]) -> (f64, usize) {
-    let n_a: f64 = a.iter().sum();
-    let n_b: f64 = b.iter().sum();
-    if n_a <= 0.0 || n_b <= 0.0 {
+/// Returns chi-square statistic and degrees of freedom of Pearson's test of homogeneity: "some samples, one law".
+fn homogeneity(samples: &[&[f64]]) -> (f64, usize) {
+    let sizes: Vec<f64> = samples.iter().map(|sample| sample.iter().sum()).collect();
+    let total: f64 = sizes.iter().sum();
+    let smallest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    if samples.len() < 2 || smallest <= 0.0 {
         return (0.0, 0);
     }
-    // A cell's expected count is least in the smaller sample, so that one decides what is pooled.
-    let share_of_smaller = n_a.min(n_b) / (n_a + n_b);
-    let cells = pool_rare(a, b, MIN_EXPECTED_COUNT / share_of_smaller);
-    let statistic = cells.iter().map(|&(in_a, in_b)| {
-        let share = (in_a + in_b) / (n_a + n_b);
-        relative_deviation(in_a, n_a * share) + relative_deviation(in_b, n_b * share)
+    // A cell's expected count is least in the smallest sample, so that one decides what is pooled.
+    let cells = pool_rare(samples, MIN_EXPECTED_COUNT * total / smallest);
+    let statistic = cells.iter().map(|cell| {
+        let share = cell.iter().sum::<f64>() / total;
+        let parts = cell.iter().zip(&sizes);
+        parts.map(|(&observed, size)| relative_deviation(observed, size * share)).sum::<f64>()
     });
-    (statistic.sum(), cells.len() - 1)
+    (statistic.sum(), (cells.len() - 1) * (samples.len() - 1))
 }
 
 /// Returns a cell's part of Pearson's statistic.
@@ -89,25 +125,176 @@ fn relative_deviation(observed: f64, expected: f64) -> f64 {
     (observed - expected) * (observed - expected) / expected
 }
 
-/// Returns the cells of two samples, the rarest joined until each holds `least` counts.
-fn pool_rare(a: &[f64], b: &[f64], least: f64) -> Vec<(f64, f64)> {
-    let mut cells: Vec<(f64, f64)> = a.iter().copied().zip(b.iter().copied()).collect();
-    cells.sort_by(|x, y| (x.0 + x.1).total_cmp(&(y.0 + y.1)));
-    let mut pooled: Vec<(f64, f64)> = Vec::new();
-    let mut open = (0.0, 0.0);
+/// Returns the cells of some samples, each with its count in every sample, the rarest joined until each holds `least`
+/// counts.
+fn pool_rare(samples: &[&[f64]], least: f64) -> Vec<Vec<f64>> {
+    let columns = samples.first().map_or(0, |sample| sample.len());
+    let counts = |column: usize| samples.iter().map(|sample| sample[column]).collect::<Vec<f64>>();
+    let mut cells: Vec<Vec<f64>> = (0..columns).map(counts).collect();
+    let sum = |cell: &[f64]| cell.iter().sum::<f64>();
+    cells.sort_by(|x, y| sum(x).total_cmp(&sum(y)));
+    let mut pooled: Vec<Vec<f64>> = Vec::new();
+    let mut open = vec![0.0; samples.len()];
     for cell in cells {
-        open = (open.0 + cell.0, open.1 + cell.1);
-        if open.0 + open.1 >= least {
-            pooled.push(open);
-            open = (0.0, 0.0);
+        add_counts(&mut open, &cell);
+        if sum(&open) >= least {
+            pooled.push(std::mem::replace(&mut open, vec![0.0; samples.len()]));
         }
     }
     // What is left over holds too few counts for a cell of its own, so it joins the last one.
     match pooled.last_mut() {
-        Some(last) => *last = (last.0 + open.0, last.1 + open.1),
+        Some(last) => add_counts(last, &open),
         None => pooled.push(open),
     }
     pooled
+}
+
+fn add_counts(to: &mut [f64], counts: &[f64]) {
+    to.iter_mut().zip(counts).for_each(|(to, count)| *to += count);
+}
+
+/// Returns the tests that hold out each quarter of the time and, where there are several, each robot in turn, as far as
+/// there are enough events to test anything. `events` are in the order of time; `count` makes their table.
+pub(crate) fn tests_by_parts<T>(
+    events: &[T],
+    robot_of: impl Fn(&T) -> u32,
+    count: impl Fn(&[&T]) -> CountTable,
+    alpha: f64,
+) -> Vec<HoldoutTest> {
+    let robots: Vec<u32> = events.iter().map(robot_of).collect();
+    let time: Vec<u32> = quarters(&robots).into_iter().map(|quarter| quarter as u32).collect();
+    let mut tests = Vec::new();
+    for (split, part_of) in [(Split::Time, time), (Split::Robot, robots)] {
+        let mut parts: BTreeMap<u32, Vec<&T>> = BTreeMap::new();
+        for (event, part) in events.iter().zip(part_of) {
+            parts.entry(part).or_default().push(event);
+        }
+        let tables = parts.iter().map(|(part, events)| (part.to_string(), count(events)));
+        let test = parts_test(&tables.collect::<Vec<_>>(), split, alpha);
+        tests.extend(test.filter(|test| test.degrees_of_freedom > 0));
+    }
+    tests
+}
+
+/// Number of parts of a log that are compared to find errors that change in time: also a change that is undone before
+/// the end makes a quarter differ.
+const TIME_PARTS: usize = 4;
+/// A part with fewer events in a row is left out of its test: it would force all cells to be pooled.
+const MIN_PART_EVENTS: f64 = 20.0;
+/// Among more parts no odd ones are searched, because each is compared with all others again and again.
+const MAX_SEARCHED_PARTS: usize = 256;
+/// A part is odd when its own statistic against the others would be reached by chance in one of so many.
+const ODD_P: f64 = 1e-4;
+
+/// Returns the quarter of its robot's events in which each event lies; `robots` has the robot of each event, in the
+/// order of time. Quarters of each robot by itself, so that robots that differ do not look like a change.
+fn quarters(robots: &[u32]) -> Vec<usize> {
+    let mut totals: BTreeMap<u32, usize> = BTreeMap::new();
+    robots.iter().for_each(|robot| *totals.entry(*robot).or_insert(0) += 1);
+    let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut quarters = Vec::with_capacity(robots.len());
+    for robot in robots {
+        let before = seen.entry(*robot).or_insert(0);
+        quarters.push(*before * TIME_PARTS / totals[robot]);
+        *before += 1;
+    }
+    quarters
+}
+
+/// Compares the parts of a log, each held out in turn; `parts` are tables of one shape with their names.
+fn parts_test(parts: &[(String, CountTable)], split: Split, alpha: f64) -> Option<HoldoutTest> {
+    let (_, first) = parts.first()?;
+    let rows = 0..first.rows().len();
+    let tests: Vec<(f64, usize)> = rows.map(|row| row_homogeneity(parts, row)).collect();
+    let chi_square = tests.iter().map(|test| test.0).sum();
+    let degrees_of_freedom = tests.iter().map(|test| test.1).sum();
+    let all = sum_of(first, parts.iter().map(|(_, table)| table));
+    let events = (0..first.rows().len()).map(|row| all.total(row)).sum();
+    Some(HoldoutTest {
+        table: first.name().to_owned(),
+        split,
+        parts: parts.len(),
+        odd_parts: if split == Split::Robot { odd_parts(parts, &all) } else { Vec::new() },
+        trained_on: events,
+        held_out: events,
+        chi_square,
+        degrees_of_freedom,
+        p_value: chi_square_p_value(chi_square, degrees_of_freedom),
+        log_loss: mean_loss(parts, |table| log_loss(&difference(&all, table), table, alpha)),
+        log_loss_floor: mean_loss(parts, |table| log_loss(table, table, 0.0)),
+    })
+}
+
+/// Returns the test of one row over the parts that have enough events in it.
+fn row_homogeneity(parts: &[(String, CountTable)], row: usize) -> (f64, usize) {
+    let enough = parts.iter().filter(|(_, table)| table.total(row) >= MIN_PART_EVENTS);
+    let samples: Vec<&[f64]> = enough.map(|(_, table)| table.row(row)).collect();
+    homogeneity(&samples)
+}
+
+/// Returns the names of the parts that differ from all others together far beyond chance: the oddest first, which then
+/// counts no longer among the others, and so on up to half of the parts.
+fn odd_parts(parts: &[(String, CountTable)], all: &CountTable) -> Vec<String> {
+    if parts.len() > MAX_SEARCHED_PARTS {
+        return Vec::new();
+    }
+    let mut rest: Vec<&(String, CountTable)> = parts.iter().collect();
+    let mut of_rest = all.clone();
+    let mut odd = Vec::new();
+    while odd.len() < parts.len() / 2 {
+        let deviations = rest.iter().map(|(_, table)| deviation(table, &of_rest)).enumerate();
+        let oddest = deviations.max_by(|a, b| (a.1).0.total_cmp(&(b.1).0));
+        let Some((index, (chi_square, df))) = oddest else { break };
+        if chi_square_p_value(chi_square, df) >= ODD_P {
+            break;
+        }
+        let (name, table) = rest.remove(index);
+        of_rest = difference(&of_rest, table);
+        odd.push(name.clone());
+    }
+    odd
+}
+
+/// Returns chi-square statistic and degrees of freedom of a part against all others.
+fn deviation(part: &CountTable, all: &CountTable) -> (f64, usize) {
+    let others = difference(all, part);
+    let mut sum = (0.0, 0);
+    for row in 0..part.rows().len() {
+        if part.total(row) >= MIN_PART_EVENTS {
+            let (chi_square, df) = homogeneity(&[part.row(row), others.row(row)]);
+            sum = (sum.0 + chi_square, sum.1 + df);
+        }
+    }
+    sum
+}
+
+fn sum_of<'t>(shape: &CountTable, tables: impl Iterator<Item = &'t CountTable>) -> CountTable {
+    let mut sum = CountTable::new(shape.name(), shape.rows(), shape.columns());
+    tables.for_each(|table| sum.add_table(table, 1.0));
+    sum
+}
+
+fn difference(all: &CountTable, part: &CountTable) -> CountTable {
+    let mut rest = all.clone();
+    rest.add_table(part, -1.0);
+    rest
+}
+
+/// Returns the mean over the events of all parts of a loss per event of each; `None` where one has none.
+fn mean_loss(
+    parts: &[(String, CountTable)],
+    loss: impl Fn(&CountTable) -> Option<f64>,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    let mut events = 0.0;
+    for (_, table) in parts {
+        let n: f64 = (0..table.rows().len()).map(|row| table.total(row)).sum();
+        if n > 0.0 {
+            sum += n * loss(table)?;
+            events += n;
+        }
+    }
+    (events > 0.0).then(|| sum / events)
 }
 
 fn log_loss(trained: &CountTable, held: &CountTable, alpha: f64) -> Option<f64> {
@@ -155,6 +342,39 @@ mod tests {
         assert!((fit.p_value - 0.045_500).abs() < 1e-6);
         assert!((fit.log_loss_floor.unwrap() - 0.673_012).abs() < 1e-6);
         assert!(fit.log_loss.unwrap() > fit.log_loss_floor.unwrap());
+    }
+
+    fn named(parts: &[&[f64]]) -> Vec<(String, CountTable)> {
+        parts.iter().enumerate().map(|(k, cells)| (k.to_string(), table(cells))).collect()
+    }
+
+    #[test]
+    fn robots_that_differ_are_found_and_the_odd_ones_named() {
+        let mut parts: Vec<&[f64]> = vec![&[600.0, 400.0]; 10];
+        parts.extend([&[880.0, 120.0][..]; 3]);
+        let test = parts_test(&named(&parts), Split::Robot, 0.5).unwrap();
+        assert_eq!((test.parts, test.degrees_of_freedom), (13, 12));
+        assert!(test.p_value < 1e-9 && test.log_loss > test.log_loss_floor);
+        let mut odd = test.odd_parts.clone();
+        odd.sort();
+        assert_eq!(odd, ["10", "11", "12"]);
+        let alike = parts_test(&named(&parts[..10]), Split::Robot, 0.5).unwrap();
+        assert_eq!((alike.chi_square, alike.odd_parts.len()), (0.0, 0));
+        assert_eq!(parts_test(&[], Split::Robot, 0.5), None);
+    }
+
+    #[test]
+    fn a_part_with_few_events_does_not_hide_the_others() {
+        let parts: [&[f64]; 3] = [&[300.0, 100.0], &[100.0, 300.0], &[3.0, 1.0]];
+        let test = parts_test(&named(&parts), Split::Time, 0.5).unwrap();
+        assert_eq!(test.degrees_of_freedom, 1);
+        assert!(test.p_value < 1e-9);
+    }
+
+    #[test]
+    fn quarters_are_of_each_robot_by_itself() {
+        assert_eq!(quarters(&[7, 7, 3, 7, 7, 3]), [0, 1, 0, 2, 3, 2]);
+        assert_eq!(quarters(&[1; 8]), [0, 0, 1, 1, 2, 2, 3, 3]);
     }
 
     #[test]

@@ -7,6 +7,7 @@ pub mod sensor;
 mod counts;
 mod display;
 pub mod holdout;
+mod left_out;
 pub mod profile;
 mod track;
 
@@ -14,6 +15,7 @@ mod track;
 mod oracle;
 
 pub use counts::{CountMatrix, CountTable, Estimate, LowCountRow};
+pub use left_out::LeftOut;
 
 use serde::Serialize;
 
@@ -33,12 +35,15 @@ pub struct EstimateOptions {
     pub thin_below: u32,
     /// Every `hold_out_every`-th event is held out; 2 compares odd with even.
     pub hold_out_every: usize,
+    /// Greatest share of samples, from 0 to 1, that may be left out for a reason that nothing explains; above it no
+    /// interval is given.
+    pub max_unexplained: f64,
 }
 
 impl Default for EstimateOptions {
     fn default() -> Self {
         // With 30 counts the 95 % interval of a probability of one half is still a third wide.
-        Self { alpha: 0.5, thin_below: 30, hold_out_every: 2 }
+        Self { alpha: 0.5, thin_below: 30, hold_out_every: 2, max_unexplained: 0.05 }
     }
 }
 
@@ -46,7 +51,8 @@ impl EstimateOptions {
     /// Checks that the options are valid.
     ///
     /// # Errors
-    /// When `alpha` is negative or above [`MAX_ALPHA`], or `hold_out_every` is below 2.
+    /// When `alpha` is negative or above [`MAX_ALPHA`], `hold_out_every` is below 2, or `max_unexplained` is not from
+    /// 0 to 1.
     pub fn check(&self) -> Result<(), InputError> {
         if !(0.0..=MAX_ALPHA).contains(&self.alpha) {
             let cause = format!("{:?} cannot be added to a count", self.alpha);
@@ -56,6 +62,10 @@ impl EstimateOptions {
         if self.hold_out_every < 2 {
             let cause = format!("holding out every {}th event leaves none", self.hold_out_every);
             return Err(InputError::new("hold-out", cause, "give 2 or more"));
+        }
+        if !(0.0..=1.0).contains(&self.max_unexplained) {
+            let cause = format!("a share of {:?} of the samples", self.max_unexplained);
+            return Err(InputError::new("max-unexplained", cause, "give a share from 0 to 1, such as 0.05"));
         }
         Ok(())
     }
@@ -72,6 +82,7 @@ mod tests {
             EstimateOptions { alpha: f64::NAN, ..Default::default() },
             EstimateOptions { alpha: 1e308, ..Default::default() },
             EstimateOptions { hold_out_every: 1, ..Default::default() },
+            EstimateOptions { max_unexplained: 5.0, ..Default::default() },
         ];
         assert!(refused.iter().all(|options| options.check().is_err()));
         assert!(EstimateOptions::default().check().is_ok());

@@ -66,7 +66,7 @@ pub use recorded_run::RecordedRun;
 pub use replay::{ReplayReport, replay_all, replay_to};
 pub use row_store::RowSelection;
 pub use run_recorder::RunRecorder;
-pub use run_tables::{csv_table, read_summary};
+pub use run_tables::{RecordedCsv, csv_table, read_summary};
 pub use scenario::{GivenScenario, problems, read_scenario};
 pub use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 pub use summary::{Phases, RunStatus, Summary};

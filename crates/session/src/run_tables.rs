@@ -36,12 +36,21 @@ pub(crate) fn read_trails(
     Ok(trails)
 }
 
+/// A recorded table as CSV, with what the recording says of all of its rows.
+#[derive(Debug)]
+pub struct RecordedCsv {
+    /// The rows.
+    pub table: CsvTable,
+    /// Facts by name, such as `box_m`.
+    pub facts: Vec<(String, String)>,
+}
+
 /// Returns the table `name` of the run in `folder`; runs record it with `record.calibration =
 /// true`.
 ///
 /// # Errors
 /// When the run has no such table, or it is damaged.
-pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
+pub fn csv_table(folder: &Path, name: &str) -> Result<RecordedCsv, InputError> {
     let table = read_table(folder, name, ..).map_err(|e| {
         if folder.join(name).exists() {
             return e;
@@ -49,7 +58,8 @@ pub fn csv_table(folder: &Path, name: &str) -> Result<CsvTable, InputError> {
         let remedy = "record the run with --set record.calibration=true";
         InputError::new(e.place(), e.cause(), remedy)
     })?;
-    CsvTable::parse(&folder.join(name).display(), &to_csv(&table))
+    let csv = CsvTable::parse(&folder.join(name).display(), &to_csv(&table))?;
+    Ok(RecordedCsv { table: csv, facts: table.schema.about })
 }
 
 /// Returns a table as CSV: a heading, then one line per row (a beam or an action).

@@ -7,9 +7,11 @@ use serde::Serialize;
 use sidestep::import::bag::{PoseTopic, TopicSelection};
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
-use sidestep::learn::effector::{self, LearnedEffector};
+use sidestep::learn::effector::{self, EffectorOptions, EffectorProfile, LearnedEffector};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, LearnedSensor, Scanner, SensorOptions, SensorProfile};
+use sidestep::learn::sensor::{
+    self, LearnedSensor, RunSensorOptions, Scanner, SensorOptions, SensorProfile,
+};
 use sidestep::scenario::file::read_text;
 use sidestep_session::{csv_table, write_atomically};
 use std::fmt::Display;
@@ -33,7 +35,7 @@ Examples:
   sidestep learn sensor --mrclam logs/hall --edges 2,4 --classes near,medium,far
   sidestep learn sensor --csv readings.csv --range 3.75 \\
       --profile my.toml --name sonar
-  sidestep learn sensor --run runs/hall --edges 0.3,1.5 --classes near,mid,far
+  sidestep learn sensor --run runs/hall --sensor sonar-ring
   sidestep learn sensor --bag hall.mcap --truth /amcl_pose --odom /odom \\
       --scan /scan --map hall.yaml
 
@@ -42,7 +44,8 @@ PoseWithCovarianceStamped, TransformStamped or, with two frames, a TFMessage top
 map: /tf:map:base_link. The scanner's place on the robot is read from /tf_static.
 
 CSV columns: true, reported (one word each; `nothing` for no observation), and true_distance_m, \
-reported_distance_m, or true_class, reported_class.";
+reported_distance_m, or true_class, reported_class; sensor and robot where you have them. A run knows the \
+distance classes, bearings and range of its sensors.";
 
 /// Usage as it would be made, but in lines that fit.
 const SENSOR_USAGE: &str = "\
@@ -61,11 +64,12 @@ Examples:
       --odom /odom --truth /vicon/pose
   sidestep learn effector --bag run/ --odom /tf:odom:base_link \\
       --truth /tf:map:base_link
-  sidestep learn effector --csv motions.csv --json
+  sidestep learn effector --csv motions.csv --box 0.25 --json
   sidestep learn effector --run runs/hall
+  sidestep learn effector --run runs/mixed --effector nomad --robots 0,1,2
 
-CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg. Moves that an \
-obstacle cut short are left out: record logs in an open place. A run is recorded with \
+CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg; contact, robot, effector \
+and box_m where you have them. Moves that an obstacle cut short are left out: record logs in an open place. A run is recorded with \
 --set record.calibration=true. A bag is an MCAP file or a folder of `ros2 bag record`; poses are of type \
 Odometry, PoseStamped, PoseWithCovarianceStamped, TransformStamped or TFMessage.";
 
@@ -160,10 +164,19 @@ struct EffectorArgs {
     #[command(flatten)]
     topics: TopicArgs,
 
-    /// Side of a box in meters, for --mrclam [default: 0.25] and --bag [default: 1] (other logs
-    /// give moves in boxes)
+    /// Side of a box in meters [default: 0.25 for --mrclam, 1 for --bag; a run knows its own; unknown for --csv and
+    /// --carmen, which give moves in boxes]
     #[arg(long = "box", value_name = "B")]
     box_size_m: Option<f64>,
+
+    /// Name of the effector, if the table has several (with --csv, --run)
+    #[arg(long, value_name = "EFFECTOR", conflicts_with_all = ["mrclam", "carmen", "bag"])]
+    effector: Option<String>,
+
+    /// Learn from these robots only (with --csv, --run)
+    #[arg(long, value_name = "ID,...", value_delimiter = ',')]
+    #[arg(conflicts_with_all = ["mrclam", "carmen", "bag"])]
+    robots: Vec<u32>,
 
     #[command(flatten)]
     estimate: EstimateArgs,
@@ -227,6 +240,11 @@ struct EstimateArgs {
     /// Hold out every N-th event to test the fit
     #[arg(long, value_name = "N", default_value_t = EstimateOptions::default().hold_out_every)]
     hold_out: usize,
+
+    /// Give no intervals if a greater share of samples is left out for a reason that nothing explains
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(default_value_t = EstimateOptions::default().max_unexplained)]
+    max_unexplained: f64,
 }
 
 impl EstimateArgs {
@@ -234,6 +252,7 @@ impl EstimateArgs {
         EstimateOptions {
             alpha: self.alpha,
             hold_out_every: self.hold_out,
+            max_unexplained: self.max_unexplained,
             ..EstimateOptions::default()
         }
     }
@@ -264,11 +283,12 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
             print_report(&model.report, &written, &assumptions, console)?;
         }
         LearnCommand::Effector(args) => {
-            let model = learn_effector(args, console)?;
+            let model = learn_effector(args)?;
             let written = args.target.add("effectors", |place, text, name| {
                 profile::with_effector(place, text, name, &model)
             })?;
-            print_report(&model.report, &written, &smoothing(&args.estimate), console)?;
+            let assumptions = [box_note(&model.profile), smoothing(&args.estimate)].concat();
+            print_report(&model.report, &written, &assumptions, console)?;
         }
     }
     Ok(ExitCode::Done)
@@ -304,6 +324,14 @@ fn assumptions(profile: &SensorProfile) -> String {
     text
 }
 
+/// Returns the line on a profile that does not say for which boxes it is.
+fn box_note(profile: &EffectorProfile) -> String {
+    if profile.box_m.is_some() {
+        return String::new();
+    }
+    indented("It does not say for which boxes it is, so every scenario that uses it warns: give --box.")
+}
+
 /// Returns the line on how probabilities of the profile differ from shares of counts.
 fn smoothing(estimate: &EstimateArgs) -> String {
     let alpha = estimate.alpha;
@@ -334,9 +362,22 @@ fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
         (Some(folder), ..) => sensor::from_mrclam(folder, &options),
         (_, Some(bag), ..) => learn_scanner(args, bag, &options),
         (_, _, Some(file), _) => sensor::from_csv(file, &options),
-        (.., Some(folder)) => sensor::learn_csv(&csv_table(folder, "readings")?, &options),
+        (.., Some(folder)) => learn_recorded_sensor(args, folder),
         (None, None, None, None) => Err(no_log()),
     }
+}
+
+fn learn_recorded_sensor(args: &SensorArgs, folder: &Path) -> Result<LearnedSensor, InputError> {
+    let recorded = csv_table(folder, "readings")?;
+    let options = RunSensorOptions {
+        estimate: args.estimate.options(),
+        sensor: args.sensor.clone(),
+        distance_edges_m: args.edges.clone(),
+        distance_classes: args.classes.clone(),
+        bearings_deg: args.bearings.clone(),
+        range_m: args.range,
+    };
+    sensor::learn_run(&recorded.table, &recorded.facts, &options)
 }
 
 fn learn_scanner(
@@ -358,24 +399,33 @@ const MRCLAM_BOX_M: f64 = 0.25;
 /// Default side of a box for bags: moves are in meters.
 const BAG_BOX_M: f64 = 1.0;
 
-fn learn_effector(args: &EffectorArgs, console: Console) -> Result<LearnedEffector, InputError> {
-    let options = args.estimate.options();
+fn learn_effector(args: &EffectorArgs) -> Result<LearnedEffector, InputError> {
+    let estimate = args.estimate.options();
     let log = &args.log;
-    if args.box_size_m.is_some() && log.mrclam.is_none() && log.bag.is_none() {
-        console.warn("--box has no effect: this log gives moves in command units");
-    }
+    let options = EffectorOptions {
+        estimate,
+        box_m: args.box_size_m,
+        effector: args.effector.clone(),
+        robots: args.robots.clone(),
+    };
     match (&log.mrclam, &log.carmen, &log.bag, &log.csv, &log.run) {
         (Some(folder), ..) => {
             let box_m = args.box_size_m.unwrap_or(MRCLAM_BOX_M);
-            effector::from_mrclam(folder, box_m, &options)
+            effector::from_mrclam(folder, box_m, &estimate)
         }
-        (_, Some(file), ..) => effector::from_carmen(file, &options),
+        (_, Some(file), ..) => {
+            let learned = effector::from_carmen(file, &estimate)?;
+            args.box_size_m.map_or(Ok(learned.clone()), |box_m| learned.with_box(box_m))
+        }
         (_, _, Some(bag), ..) => {
             let box_m = args.box_size_m.unwrap_or(BAG_BOX_M);
-            effector::from_bag(bag, &args.topics.topic_selection(None)?, box_m, &options)
+            effector::from_bag(bag, &args.topics.topic_selection(None)?, box_m, &estimate)
         }
         (.., Some(file), _) => effector::from_csv(file, &options),
-        (.., Some(folder)) => effector::learn_csv(&csv_table(folder, "motions")?, &options),
+        (.., Some(folder)) => {
+            let recorded = csv_table(folder, "motions")?;
+            effector::learn_run(&recorded.table, &recorded.facts, &options)
+        }
         (None, None, None, None, None) => Err(no_log()),
     }
 }

@@ -132,6 +132,7 @@ impl ScanPair {
 
     fn as_move(&self) -> MoveEvent {
         MoveEvent {
+            robot: 0,
             ahead_boxes: self.corrected.ahead_m / self.claimed.ahead_m,
             left_boxes: self.corrected.left_m / self.claimed.ahead_m,
             turn_error_rad: wrap_angle(self.corrected.turn_rad - self.claimed.turn_rad),

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::LearnedEffector;
+use super::rows::{self, MeasuredDisplacement, ParsedRows};
+use super::{EffectorOptions, LearnedEffector};
 use super::events::{Events, MoveEvent, TurnEvent, nearest_turn};
 use super::grid_displacement::{
     FORWARD_CLASSES, GridDisplacement, OTHER_CLASS, forward_class, grid_displacements,
@@ -12,30 +13,15 @@ use super::transitions::{
     EffectorProfile, ProfileTransition, certain_transition, from_outcomes, intended_displacement,
     label,
 };
-use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
 use crate::{CountTable, EstimateOptions};
 use sidestep_error_models::effector::STANDARD_ACTIONS;
-use sidestep_import::table::{CsvRow, CsvTable, Token};
+use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
-
-/// A longer displacement is not a single action; two such make the longest path of a profile.
-const MAX_BOXES: f64 = 8.0;
-/// A wider turn is not a single action either.
-const MAX_TURN_DEG: f64 = 360.0;
 
 /// The rule by which events become transitions.
 const RULE: &str = "counts of measured displacements, phase-averaged where they are no whole \
     boxes or quarter turns; every outcome that was seen, plus alpha";
-
-/// The end of one action, in the frame of its start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct MeasuredDisplacement {
-    /// Index in [`STANDARD_ACTIONS`].
-    action: usize,
-    ahead_boxes: f64,
-    left_boxes: f64,
-    turn_deg: f64,
-}
 
 impl MeasuredDisplacement {
     /// Returns where it ends; turns that end alike, such as 270 and -90 degrees, are one outcome.
@@ -50,6 +36,7 @@ impl MeasuredDisplacement {
 
     fn as_move(&self) -> MoveEvent {
         MoveEvent {
+            robot: self.robot,
             ahead_boxes: self.ahead_boxes,
             left_boxes: self.left_boxes,
             turn_error_rad: nearest_turn(0.0, self.turn_deg.to_radians()),
@@ -60,27 +47,34 @@ impl MeasuredDisplacement {
     fn as_turn(&self) -> TurnEvent {
         let commanded_deg =
             f64::from(90 * intended_displacement(STANDARD_ACTIONS[self.action]).quarters);
-        TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None)
+        let turn =
+            TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None);
+        TurnEvent { robot: self.robot, ..turn }
     }
 }
 
 pub(super) fn learn(
     table: &CsvTable,
-    options: &EstimateOptions,
+    options: &EffectorOptions,
 ) -> Result<LearnedEffector, InputError> {
-    let (free, n_cut) = parse(table)?;
+    let ParsedRows { free, rejected, damage, effector, box_m } = rows::parse(table, options)?;
     let by_action: Vec<ActionLog> = (0..STANDARD_ACTIONS.len())
         .map(|action| ActionLog::from_displacements(&free, action))
         .collect();
-    let mut report = report(table.place(), &by_action, options);
-    if n_cut > 0 {
-        report.rejected.insert("contact".to_string(), n_cut);
+    let estimate = &options.estimate;
+    let mut report = report(table.place(), &by_action, estimate);
+    report.effector = effector;
+    report.box_m = box_m;
+    report.rejected = rejected;
+    if let Some(n_cut) = report.rejected.get("contact") {
         report.warnings.push(format!(
             "{n_cut} actions met an obstacle and were left out: near obstacles the outcomes that \
              lead into them are seen too rarely, so learn in the open"
         ));
     }
-    Ok(LearnedEffector { report, profile: profile(&by_action, options) })
+    report.warnings.extend(damage);
+    report.judge_left_out(free.len() as u64);
+    Ok(LearnedEffector { report, profile: EffectorProfile { box_m, ..profile(&by_action, estimate) } })
 }
 
 /// The events of one action and the outcomes they had.
@@ -117,11 +111,13 @@ impl ActionLog {
         counts
     }
 
-    fn holdout_test(&self, options: &EstimateOptions) -> HoldoutTest {
+    fn holdout_tests(&self, options: &EstimateOptions) -> Vec<HoldoutTest> {
         let (train, held) = split(&self.events, options.hold_out_every);
-        let mut fit = holdout_test(&self.counts(train), &self.counts(held), options.alpha);
-        fit.table = self.action.to_string();
-        fit
+        let mut fits = vec![holdout_test(&self.counts(train), &self.counts(held), options.alpha)];
+        let count = |events: &[&MeasuredDisplacement]| self.counts(events.iter().copied());
+        fits.extend(tests_by_parts(&self.events, |e| e.robot, count, options.alpha));
+        fits.iter_mut().for_each(|fit| fit.table = self.action.to_string());
+        fits
     }
 
     fn transitions(&self, alpha: f64, assumed: &mut Vec<String>) -> Vec<ProfileTransition> {
@@ -160,7 +156,7 @@ fn report(source: &str, logs: &[ActionLog], options: &EstimateOptions) -> Effect
         actions: tables.iter().map(by_name).collect(),
         probabilities: tables.iter().flat_map(CountTable::estimates).collect(),
         thin: tables.iter().flat_map(|table| table.low_count_rows(options.thin_below)).collect(),
-        hold_out: seen.iter().map(|log| log.holdout_test(options)).collect(),
+        hold_out: seen.iter().flat_map(|log| log.holdout_tests(options)).collect(),
         ..events.report(source, options)
     }
 }
@@ -185,88 +181,6 @@ fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
     EffectorProfile { box_m: None, actions, assumed, rule: RULE.to_string() }
 }
 
-/// Returns the rows without contact, and the number of those with contact.
-fn parse(table: &CsvTable) -> Result<(Vec<MeasuredDisplacement>, u64), InputError> {
-    let place = table.place();
-    let columns = DisplacementColumns::find(table)?;
-    let mut free = Vec::new();
-    let mut n_cut = 0;
-    for row in table.rows() {
-        let displacement = columns.displacement(place, row)?;
-        if columns.has_contact(place, row)? {
-            n_cut += 1;
-        } else {
-            free.push(displacement);
-        }
-    }
-    if free.is_empty() {
-        let cause = "the file has no displacements without contact";
-        return Err(InputError::new(place, cause, "write one a row"));
-    }
-    Ok((free, n_cut))
-}
-
-struct DisplacementColumns {
-    action: usize,
-    ahead: usize,
-    left: usize,
-    turn: usize,
-    contact: Option<usize>,
-}
-
-impl DisplacementColumns {
-    fn find(table: &CsvTable) -> Result<Self, InputError> {
-        let [action, ahead, left, turn] =
-            table.columns(["action", "ahead_boxes", "left_boxes", "turn_deg"])?;
-        Ok(Self { action, ahead, left, turn, contact: table.find("contact") })
-    }
-
-    fn displacement(
-        &self,
-        place: &str,
-        row: CsvRow<'_>,
-    ) -> Result<MeasuredDisplacement, InputError> {
-        Ok(MeasuredDisplacement {
-            action: action(place, row.field(self.action))?,
-            ahead_boxes: parse_limited(place, row.field(self.ahead), MAX_BOXES)?,
-            left_boxes: parse_limited(place, row.field(self.left), MAX_BOXES)?,
-            turn_deg: parse_limited(place, row.field(self.turn), MAX_TURN_DEG)?,
-        })
-    }
-
-    fn has_contact(&self, place: &str, row: CsvRow<'_>) -> Result<bool, InputError> {
-        let Some(contact) = self.contact.map(|column| row.field(column)) else { return Ok(false) };
-        match contact.text {
-            "no" => Ok(false),
-            "yes" => Ok(true),
-            other => Err(contact.error(&place, format!("contact is `{other}`"), "write yes or no")),
-        }
-    }
-}
-
-/// Returns an action by its name, or by the number that a recording gives it.
-fn action(place: &str, word: Token<'_>) -> Result<usize, InputError> {
-    if let Some(id) = STANDARD_ACTIONS.iter().position(|name| *name == word.text) {
-        return Ok(id);
-    }
-    if let Ok(id) = word.text.parse()
-        && id < STANDARD_ACTIONS.len()
-    {
-        return Ok(id);
-    }
-    let cause = format!("`{}` is not an action", word.text);
-    Err(word.error(&place, cause, &format!("use one of {}", STANDARD_ACTIONS.join(", "))))
-}
-
-fn parse_limited(place: &str, word: Token<'_>, max: f64) -> Result<f64, InputError> {
-    let value = word.number(&place)?;
-    if value.abs() <= max {
-        return Ok(value);
-    }
-    let cause = format!("{value} is more than one action moves");
-    Err(word.error(&place, cause, &format!("give a number from -{max} to {max}")))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -274,8 +188,16 @@ mod tests {
     const HEAD: &str = "action,ahead_boxes,left_boxes,turn_deg\n";
 
     fn learned(rows: &str, alpha: f64) -> Result<LearnedEffector, InputError> {
-        let options = EstimateOptions { alpha, ..Default::default() };
-        learn(&CsvTable::parse(&"f.csv", &format!("{HEAD}{rows}"))?, &options)
+        learned_table(&format!("{HEAD}{rows}"), alpha, |options| options)
+    }
+
+    fn learned_table(
+        text: &str,
+        alpha: f64,
+        change: impl FnOnce(EffectorOptions) -> EffectorOptions,
+    ) -> Result<LearnedEffector, InputError> {
+        let options = EstimateOptions { alpha, ..Default::default() }.into();
+        learn(&CsvTable::parse(&"f.csv", text)?, &change(options))
     }
 
     #[test]
@@ -331,7 +253,7 @@ mod tests {
         let text = "cycle,robot,action,ahead_boxes,left_boxes,turn_deg,contact\n\
             0,0,0,1,0,0,no\n1,0,0,0,0,0,yes\n2,0,1,0,0,90,no\n3,0,1,0,0,270,no\n4,0,1,0,0,-90,no\n";
         let table = CsvTable::parse(&"f.csv", text).unwrap();
-        let report = learn(&table, &EstimateOptions::default()).unwrap().report;
+        let report = learn(&table, &EffectorOptions::default()).unwrap().report;
         assert_eq!((report.events, report.rejected["contact"]), (1, 1));
         assert!(report.warnings[0].contains("learn in the open"));
         assert_eq!(report.actions["left"]["turn -90"], 2.0, "270 degrees to the left end alike");

@@ -10,13 +10,15 @@ use super::report::{EffectorReport, ForwardShares, TurnReport};
 use super::transitions::{
     self, EffectorProfile, ProfileTransition, TURN_CLASSES, intended_displacement, turn_class,
 };
-use crate::holdout::{HoldoutTest, holdout_test, split};
+use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
 use crate::{CountTable, EstimateOptions};
 use sidestep_statistics::Moments;
 
 /// One commanded box ahead, and the motion that followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MoveEvent {
+    /// Number of the robot; 0 where the log is of one.
+    pub(super) robot: u32,
     pub(super) ahead_boxes: f64,
     pub(super) left_boxes: f64,
     /// True turn minus commanded turn.
@@ -28,6 +30,8 @@ pub(super) struct MoveEvent {
 /// One commanded turn, and the motion that followed; both in rad, + to the left.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TurnEvent {
+    /// Number of the robot; 0 where the log is of one.
+    pub(super) robot: u32,
     pub(super) commanded_rad: f64,
     pub(super) true_rad: f64,
     /// `None` where the log does not say.
@@ -37,7 +41,8 @@ pub(super) struct TurnEvent {
 impl TurnEvent {
     /// Creates a turn; see [`nearest_turn`].
     pub(super) fn new(commanded_rad: f64, true_rad: f64, duration_s: Option<f64>) -> Self {
-        Self { commanded_rad, true_rad: nearest_turn(commanded_rad, true_rad), duration_s }
+        let true_rad = nearest_turn(commanded_rad, true_rad);
+        Self { robot: 0, commanded_rad, true_rad, duration_s }
     }
 
     fn ratio(&self) -> f64 {
@@ -136,7 +141,11 @@ impl Events {
         let (train, held) = split(&self.turns, options.hold_out_every);
         let train = turn_counts(train.into_iter());
         let held = turn_counts(held.into_iter());
-        vec![moves, holdout_test(&train, &held, options.alpha)]
+        let mut tests = vec![moves, holdout_test(&train, &held, options.alpha)];
+        tests.extend(tests_by_parts(&self.moves, |m| m.robot, forward_counts, options.alpha));
+        let turns = |turns: &[&TurnEvent]| turn_counts(turns.iter().copied());
+        tests.extend(tests_by_parts(&self.turns, |turn| turn.robot, turns, options.alpha));
+        tests
     }
 
     fn turn_counts(&self) -> CountTable {
@@ -259,7 +268,7 @@ mod tests {
 
     fn turn(ratio: f64, side: f64) -> TurnEvent {
         let commanded_rad = side * FRAC_PI_4;
-        TurnEvent { commanded_rad, true_rad: commanded_rad * ratio, duration_s: None }
+        TurnEvent { robot: 0, commanded_rad, true_rad: commanded_rad * ratio, duration_s: None }
     }
 
     #[test]

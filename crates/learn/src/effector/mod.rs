@@ -25,6 +25,7 @@ mod events;
 pub mod grid_displacement;
 mod mrclam;
 mod report;
+mod rows;
 mod transitions;
 
 pub use report::{EffectorReport, ForwardShares, TurnReport};
@@ -58,6 +59,19 @@ pub struct LearnedEffector {
     pub profile: EffectorProfile,
 }
 
+impl LearnedEffector {
+    /// Returns the same for boxes of `box_m` meters, for a log that does not say how long its moves are.
+    ///
+    /// # Errors
+    /// When `box_m` is not from 0.001 to 1000 m.
+    pub fn with_box(mut self, box_m: f64) -> Result<Self, InputError> {
+        check_box(box_m)?;
+        self.report.box_m = Some(box_m);
+        self.profile.box_m = Some(box_m);
+        Ok(self)
+    }
+}
+
 /// Learns moves of `box_m` meters and turns of 90 degrees from an MRCLAM folder.
 ///
 /// # Errors
@@ -70,7 +84,14 @@ pub fn from_mrclam(
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let dataset = sidestep_import::mrclam::read(folder)?;
-    mrclam::learn(&folder.display().to_string(), &dataset, box_m, options)
+    mrclam::learn(&folder.display().to_string(), &dataset, box_m, options).map(judged)
+}
+
+/// Judges a model by the events and the windows of its log that were rejected.
+fn judged(mut model: LearnedEffector) -> LearnedEffector {
+    let turns = model.report.turns.as_ref().map_or(0, |turns| turns.n as u64);
+    model.report.judge_left_out(model.report.events + turns);
+    model
 }
 
 /// Learns moves and turns from a corrected CARMEN log, in units of the commanded move.
@@ -83,7 +104,7 @@ pub fn from_mrclam(
 pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let log = sidestep_import::carmen::read(file)?;
-    carmen::learn(&file.display().to_string(), &log, options)
+    carmen::learn(&file.display().to_string(), &log, options).map(judged)
 }
 
 /// Learns moves and turns from odometry and true poses in a ROS 2 bag.
@@ -104,7 +125,33 @@ pub fn from_bag(
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let log = sidestep_import::bag::read(path, wanted)?;
-    bag::learn(&path.display().to_string(), &log, box_m, options)
+    bag::learn(&path.display().to_string(), &log, box_m, options).map(judged)
+}
+
+/// Options of learning an effector from a table of displacements.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EffectorOptions {
+    /// The rule by which counts become probabilities.
+    pub estimate: EstimateOptions,
+    /// Side in meters of the boxes in which the table gives displacements; `None` where that is unknown.
+    pub box_m: Option<f64>,
+    /// Name of the effector to learn, for a table with several.
+    pub effector: Option<String>,
+    /// Numbers of the robots to learn from; all where empty.
+    pub robots: Vec<u32>,
+}
+
+impl From<EstimateOptions> for EffectorOptions {
+    fn from(estimate: EstimateOptions) -> Self {
+        Self { estimate, ..Self::default() }
+    }
+}
+
+impl EffectorOptions {
+    fn check(&self) -> Result<(), InputError> {
+        self.estimate.check()?;
+        self.box_m.map_or(Ok(()), check_box)
+    }
 }
 
 /// Learns any actions from a CSV file.
@@ -113,26 +160,76 @@ pub fn from_bag(
 /// - `action`: `forward`, `left`, `right` or `stay`, or 0 to 3 in that order;
 /// - `ahead_boxes`, `left_boxes`: displacement in boxes in the start frame, at most 8;
 /// - `turn_deg`: turn in degrees, + to the left;
-/// - optional `contact`, `yes` or `no`: whether an obstacle stopped it; such rows are left out.
+/// - optional `contact`, `yes` or `no`: whether an obstacle stopped it; such rows are left out;
+/// - optional `robot`: number of the robot, by which robots that differ are found;
+/// - optional `effector`: its name; with several in one file, [`EffectorOptions::effector`] chooses;
+/// - optional `box_m`: side of the boxes in meters.
 ///
-/// The table `motions` that a simulated run records for calibration has these columns.
+/// Rows are in the order of time. The table `motions` that a simulated run records for calibration has these columns.
+/// A damaged row is left out and counted.
 ///
 /// Whole boxes and multiples of 90 degrees are counted as they are, others are phase-averaged.
 ///
 /// # Errors
-/// When the file is missing or damaged, holds no row, or `options` are not valid.
-pub fn from_csv(file: &Path, options: &EstimateOptions) -> Result<LearnedEffector, InputError> {
+/// When the file is missing or damaged, holds no row, more than half of its rows are damaged, it has several effectors
+/// and none is chosen, or `options` are not valid.
+pub fn from_csv(file: &Path, options: &EffectorOptions) -> Result<LearnedEffector, InputError> {
     learn_csv(&CsvTable::read(file)?, options)
 }
 
 /// Learns from a CSV table that was already read, see [`from_csv`].
 ///
 /// # Errors
-/// When the table is damaged or `options` are not valid.
+/// Those of [`from_csv`] that do not concern the file.
 pub fn learn_csv(
     table: &CsvTable,
-    options: &EstimateOptions,
+    options: &EffectorOptions,
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
-    csv::learn(table, options)
+    let mut model = csv::learn(table, options)?;
+    if model.profile.box_m.is_none() {
+        model.report.warnings.push(NO_BOX.to_string());
+    }
+    Ok(model)
+}
+
+/// The warning on a table that does not say how long a box is.
+const NO_BOX: &str = "the table gives displacements in boxes and does not say how long a box is, so that a scenario \
+    with boxes of another size takes these slips for its own: give the side in meters with --box";
+
+/// Learns from the table `motions` of a recorded run; `facts` are what the recording says of all of its rows, by name.
+///
+/// The run knows its box (`box_m`), and whether its wheels erred at all (`regime`, `obstacle_rule`).
+///
+/// # Errors
+/// Those of [`learn_csv`]; when [`EffectorOptions::box_m`] is another box than that of the run.
+pub fn learn_run(
+    table: &CsvTable,
+    facts: &[(String, String)],
+    options: &EffectorOptions,
+) -> Result<LearnedEffector, InputError> {
+    let fact = |name: &str| facts.iter().find(|(known, _)| known == name).map(|(_, v)| v.as_str());
+    let recorded_m = fact("box_m").and_then(|side| side.parse::<f64>().ok());
+    if let (Some(asked_m), Some(recorded_m)) = (options.box_m, recorded_m)
+        && (asked_m - recorded_m).abs() > 1e-9 * recorded_m
+    {
+        let cause = format!("the run was recorded with boxes of {recorded_m} m, not {asked_m} m");
+        return Err(InputError::new(table.place(), cause, "leave out --box"));
+    }
+    let options = EffectorOptions { box_m: recorded_m.or(options.box_m), ..options.clone() };
+    let mut model = learn_csv(table, &options)?;
+    let warnings = &mut model.report.warnings;
+    if let Some(regime @ ("reliable" | "sensors")) = fact("regime") {
+        warnings.push(format!(
+            "the run was recorded with regime = \"{regime}\", in which wheels never err, whatever their tables say"
+        ));
+    }
+    if fact("obstacle_rule") == Some("renormalise") {
+        warnings.push(
+            "the run was recorded with obstacle_rule = \"renormalise\", which strikes out slips that are blocked \
+             without a contact: near obstacles they are seen too rarely, and nothing marks those moves"
+                .to_string(),
+        );
+    }
+    Ok(model)
 }

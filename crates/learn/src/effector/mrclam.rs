@@ -34,9 +34,10 @@ pub(super) fn learn(
     check_box(box_m)?;
     let mut events = Events::default();
     let mut rejected = BTreeMap::new();
-    for robot in dataset.robots.values() {
-        events.moves.extend(moves(robot, box_m, &mut rejected));
-        events.turns.extend(turns(robot));
+    for (&robot, log) in &dataset.robots {
+        let moves = moves(log, box_m, &mut rejected);
+        events.moves.extend(moves.into_iter().map(|m| MoveEvent { robot, ..m }));
+        events.turns.extend(turns(log).into_iter().map(|turn| TurnEvent { robot, ..turn }));
     }
     if events.moves.is_empty() {
         let cause = format!("no commanded path ahead is {box_m} m long");
@@ -115,6 +116,7 @@ fn reject(rejected: &mut BTreeMap<String, u64>, cause: &str) {
 
 fn as_move(window: &CommandWindow, motion: &Displacement2, end_secs: f64, box_m: f64) -> MoveEvent {
     MoveEvent {
+        robot: 0,
         ahead_boxes: motion.ahead_m / box_m,
         left_boxes: motion.left_m / box_m,
         turn_error_rad: wrap_angle(motion.turn_rad - window.turn_rad),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::grid_displacement::FORWARD_CLASSES;
 use crate::display::{self, TableHeading};
 use crate::holdout::HoldoutTest;
-use crate::{Estimate, EstimateOptions, LowCountRow};
+use crate::{Estimate, EstimateOptions, LeftOut, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned effector. Displayed as readable tables, serialized for programs.
@@ -18,8 +18,13 @@ pub struct EffectorReport {
     pub source: String,
     /// Side of a box in meters; `None` where displacements are in units of the commanded move.
     pub box_m: Option<f64>,
+    /// Name of the effector, where the table names it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effector: Option<String>,
     /// Number of moves of one box ahead.
     pub events: u64,
+    /// Number of samples, and of those that are in no table; `rejected` has them by cause.
+    pub left_out: LeftOut,
     /// Number of windows that were not used, by cause.
     pub rejected: BTreeMap<String, u64>,
     /// The results of a move ahead, phase-averaged; `None` without such moves.
@@ -108,7 +113,10 @@ pub struct TurnReport {
 
 impl fmt::Display for EffectorReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Effector learned from {}", self.source)?;
+        match &self.effector {
+            Some(name) => writeln!(f, "Effector `{name}` learned from {}", self.source)?,
+            None => writeln!(f, "Effector learned from {}", self.source)?,
+        }
         let unit = self.box_m.map_or("one commanded move".to_string(), |m| format!("{m} m"));
         writeln!(f, "{} moves of one box ({unit}) ahead", self.events)?;
         for (cause, count) in &self.rejected {
@@ -128,6 +136,14 @@ impl fmt::Display for EffectorReport {
 }
 
 impl EffectorReport {
+    /// Counts the samples that were left out beside those `used`, and takes the intervals back where there are too many.
+    pub(super) fn judge_left_out(&mut self, used: u64) {
+        self.left_out = LeftOut::new(used, &self.rejected);
+        let Some(warning) = self.left_out.warning(&self.estimate) else { return };
+        self.warnings.insert(0, warning);
+        self.probabilities.iter_mut().for_each(|estimate| estimate.interval = None);
+    }
+
     fn named_moments(&self) -> Vec<(String, Option<Moments>)> {
         let mut named: Vec<(String, Option<Moments>)> =
             self.moments.iter().map(|(name, moments)| (name.clone(), Some(*moments))).collect();

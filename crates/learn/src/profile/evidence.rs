@@ -8,7 +8,7 @@ use super::{implicit, words};
 use crate::effector::LearnedEffector;
 use crate::holdout::HoldoutTest;
 use crate::sensor::LearnedSensor;
-use crate::{Estimate, EstimateOptions, LowCountRow};
+use crate::{Estimate, EstimateOptions, LeftOut, LowCountRow};
 
 pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     let report = &model.report;
@@ -17,6 +17,7 @@ pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     table["rule"] = value(&model.profile.rule);
     table["sightings"] = count(report.sightings as f64).into();
     table["skipped"] = count(report.skipped as f64).into();
+    write_left_out(&mut table, &report.left_out, &report.skipped_by_cause);
     table["correct"] = count(report.correct as f64).into();
     let certainty = Certainty {
         options: &report.estimate,
@@ -31,6 +32,15 @@ pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     table
 }
 
+/// Writes the number of samples, the shares of them that are in no table, and their number by cause.
+fn write_left_out(table: &mut Table, left_out: &LeftOut, by_cause: &BTreeMap<String, u64>) {
+    table["samples"] = count(left_out.samples as f64).into();
+    table["left_out_share"] = value(round_to_six(left_out.share()));
+    table["unexplained_share"] = value(round_to_six(left_out.unexplained_share()));
+    let causes = by_cause.iter().map(|(cause, n)| (cause.as_str(), count(*n as f64)));
+    table["left_out"] = value(InlineTable::from_iter(causes));
+}
+
 /// Returns whether an estimate is about kinds; `confusion` is about subjects where kinds are known.
 fn is_about_kinds(model: &LearnedSensor, estimate: &Estimate) -> bool {
     model.report.kinds.is_none() || estimate.table != "confusion"
@@ -41,7 +51,11 @@ pub(super) fn effector_evidence(model: &LearnedEffector) -> Table {
     let mut table = Table::new();
     table["source"] = value(&report.source);
     table["rule"] = value(&model.profile.rule);
+    if let Some(effector) = &report.effector {
+        table["effector"] = value(effector);
+    }
     table["events"] = count(report.events as f64).into();
+    write_left_out(&mut table, &report.left_out, &report.rejected);
     if let Some(turns) = &report.turns {
         table["turns"] = count(turns.n as f64).into();
     }
@@ -110,12 +124,14 @@ fn estimates(rows: &BTreeMap<&str, Vec<&Estimate>>) -> Table {
 }
 
 fn estimate(estimate: &Estimate) -> InlineTable {
-    let interval = [estimate.interval.low, estimate.interval.high].map(round_to_six);
     let mut fields = InlineTable::new();
     fields.insert("count", count(estimate.count));
     fields.insert("of", count(estimate.of));
     fields.insert("p", round_to_six(estimate.probability).into());
-    fields.insert("interval", Array::from_iter(interval).into());
+    if let Some(interval) = estimate.interval {
+        let ends = [interval.low, interval.high].map(round_to_six);
+        fields.insert("interval", Array::from_iter(ends).into());
+    }
     fields
 }
 
@@ -130,6 +146,7 @@ fn low_count_row(row: &LowCountRow) -> InlineTable {
 fn holdout_table(fit: &HoldoutTest) -> Table {
     let mut table = Table::new();
     table["table"] = value(&fit.table);
+    table["split"] = value(fit.split.name());
     table["trained_on"] = count(fit.trained_on).into();
     table["held_out"] = count(fit.held_out).into();
     table["chi_square"] = value(round_to_six(fit.chi_square));

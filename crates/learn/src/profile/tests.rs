@@ -1,8 +1,7 @@
 //! Promise: the rows of a profile are distributions, and adding to one leaves the rest of its text as it is.
 
 use super::*;
-use crate::EstimateOptions;
-use crate::effector::from_csv as effector_from;
+use crate::effector::{EffectorOptions, from_csv as effector_from};
 use crate::sensor::{SensorOptions, from_csv as sensor_from};
 
 const READINGS: &str = "true,reported,true_distance_m,reported_distance_m\n\
@@ -24,7 +23,7 @@ fn sensor_model() -> LearnedSensor {
 
 fn effector_model() -> LearnedEffector {
     let folder = tempfile::tempdir().unwrap();
-    effector_from(&file(&folder, MOTIONS), &EstimateOptions::default()).unwrap()
+    effector_from(&file(&folder, MOTIONS), &EffectorOptions::default()).unwrap()
 }
 
 fn both() -> String {

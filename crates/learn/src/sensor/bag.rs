@@ -218,6 +218,7 @@ impl<'a> BeamEvaluator<'a> {
 
     fn reading(&self, expected_m: Option<f64>, reported_m: Option<f64>) -> LabeledReading {
         LabeledReading {
+            robot: 0,
             truth: usize::from(expected_m.is_some()),
             reported: usize::from(reported_m.is_some()),
             true_at: expected_m.map(|range_m| self.distance(range_m)),

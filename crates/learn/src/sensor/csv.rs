@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::LearnedSensor;
 use super::camera::{NOTHING, NamedRow, SensorProfile, certain_row, distance_rows};
 use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
-use super::readings::{LabeledReading, read};
+use super::readings::{LabeledReading, ParsedReadings, read};
 use super::report::{ErrorMoments, SensorReport};
-use crate::holdout::{HoldoutTest, holdout_test, split};
-use crate::{CountMatrix, CountTable};
+use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
+use crate::{CountMatrix, CountTable, LeftOut};
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 use sidestep_statistics::Moments;
@@ -19,8 +19,20 @@ pub(super) fn learn(
     options: &SensorOptions,
     classes: &DistanceClasses,
 ) -> Result<LearnedSensor, InputError> {
-    let (observations, readings) = read(table, options.sensor.as_deref(), classes)?;
-    Ok(ReadingLog { observations, classes, readings, rule: RULE }.model(table.place(), options))
+    let ParsedReadings { observations, readings, damaged, first_error } =
+        read(table, options.sensor.as_deref(), classes)?;
+    let log = ReadingLog { observations, classes, readings, rule: RULE };
+    let mut model = log.model(table.place(), options);
+    if let Some(error) = first_error {
+        let report = &mut model.report;
+        report.measurements += damaged;
+        report.skipped = damaged;
+        report.skipped_by_cause.insert("damaged_row".to_string(), damaged);
+        report
+            .warnings
+            .push(format!("{damaged} damaged rows were left out, the first: {error}"));
+    }
+    Ok(model)
 }
 
 /// The rule by which counts become rows.
@@ -60,6 +72,7 @@ impl ReadingLog<'_> {
             nearest_agrees: None,
             unknown_codes: BTreeMap::new(),
             kinds: None,
+            left_out: LeftOut::default(),
             distance_edges_m: self.classes.edges_from_zero_m(),
             distance_classes: self.classes.names.clone(),
             distance_counts_robots: None,
@@ -155,10 +168,15 @@ impl ReadingLog<'_> {
     fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
         let alpha = options.estimate.alpha;
         let (train, held) = split(&self.readings, options.estimate.hold_out_every);
-        vec![
+        let mut tests = vec![
             holdout_test(&self.confusion(&train), &self.confusion(&held), alpha),
             holdout_test(&self.distance(&train), &self.distance(&held), alpha),
-        ]
+        ];
+        let confusion = |readings: &[&LabeledReading]| self.confusion(readings);
+        tests.extend(tests_by_parts(&self.readings, |r| r.robot, confusion, alpha));
+        let distance = |readings: &[&LabeledReading]| self.distance(readings);
+        tests.extend(tests_by_parts(&self.readings, |r| r.robot, distance, alpha));
+        tests
     }
 
     fn profile(&self, options: &SensorOptions) -> SensorProfile {

@@ -22,6 +22,7 @@ mod detection;
 mod mrclam;
 mod options;
 mod readings;
+mod recorded;
 mod report;
 mod sighting;
 mod tables;
@@ -29,6 +30,7 @@ mod tables;
 pub use camera::{NamedRow, SensorProfile};
 pub use detection::Detection;
 pub use options::SensorOptions;
+pub use recorded::{RunSensorOptions, learn_run};
 pub use report::{ErrorMoments, MapComparison, SensorReport};
 
 use std::path::Path;
@@ -53,7 +55,13 @@ pub struct LearnedSensor {
 pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
     let dataset = sidestep_import::mrclam::read(folder)?;
-    mrclam::learn(&folder.display().to_string(), &dataset, options, &classes)
+    mrclam::learn(&folder.display().to_string(), &dataset, options, &classes).map(judged)
+}
+
+/// Judges a model by the readings of its log that were skipped.
+fn judged(mut model: LearnedSensor) -> LearnedSensor {
+    model.report.judge_left_out();
+    model
 }
 
 /// The map by which scans are judged, and the scanner that the profile gets.
@@ -93,7 +101,7 @@ pub fn from_bag(
     };
     let options = bag::scan_options(options, scan, scanner.range_m, scanner.bearings_deg);
     let classes = options.check()?;
-    bag::learn(&source, &log, &map, &options, &classes)
+    bag::learn(&source, &log, &map, &options, &classes).map(judged)
 }
 
 /// Learns a sensor from a CSV file.
@@ -105,12 +113,15 @@ pub fn from_bag(
 ///   `reported_class` (names out of [`SensorOptions::distance_classes`]); empty or `beyond`
 ///   where there is nothing;
 /// - optional `sensor`: the name of the sensor; with several in one file,
-///   [`SensorOptions::sensor`] chooses.
+///   [`SensorOptions::sensor`] chooses. A column `sensor_name` comes before it;
+/// - optional `robot`: number of the robot, by which robots that differ are found.
+///
+/// Rows are in the order of time. A damaged row is left out and counted.
 ///
 /// The table `readings` that a simulated run records for calibration has these columns.
 ///
 /// # Errors
-/// When the file is missing or damaged, or `options` are not valid.
+/// When the file is missing or damaged, more than half of its rows are, or `options` are not valid.
 pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     learn_csv(&CsvTable::read(file)?, options)
 }
@@ -121,5 +132,5 @@ pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, I
 /// When the table is damaged or `options` are not valid.
 pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
-    csv::learn(table, options, &classes)
+    csv::learn(table, options, &classes).map(judged)
 }

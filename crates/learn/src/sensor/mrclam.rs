@@ -9,8 +9,8 @@ use super::options::{DistanceClasses, SensorOptions, THREE_EDGES_M};
 use super::report::{ErrorMoments, SensorReport};
 use super::sighting::{Sighting, SkipReason, associate_all};
 use super::tables::{LANDMARK, ROBOT, SubjectLabels, beyond, distance};
-use crate::holdout::{HoldoutTest, holdout_test, split};
-use crate::{CountMatrix, CountTable, Estimate};
+use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
+use crate::{CountMatrix, CountTable, Estimate, LeftOut};
 use sidestep_import::mrclam::Dataset;
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::wrap_angle;
@@ -91,6 +91,7 @@ impl<'a> AssociatedLog<'a> {
                 s.nearest.is_some() && s.nearest == s.decoded
             })),
             unknown_codes: self.unknown_codes(),
+            left_out: LeftOut::default(),
             distance_edges_m: self.classes.edges_from_zero_m(),
             distance_classes: self.classes.names.clone(),
             distance_counts_robots: Some(self.distance_counts(ROBOT)),
@@ -149,11 +150,17 @@ impl<'a> AssociatedLog<'a> {
         let (train_views, held_views) = split(&self.views, every);
         let train_detection = Detection::from_views(train_views, 0, self.classes);
         let held_detection = Detection::from_views(held_views, 0, self.classes);
-        vec![
+        let mut tests = vec![
             holdout_test(&train_kinds, &held_kinds, alpha),
             holdout_test(&train_distances, &held_distances, alpha),
             holdout_test(&train_detection.all, &held_detection.all, alpha),
-        ]
+        ];
+        let kinds = |seen: &[&Sighting]| self.labels.kinds(seen.iter().copied());
+        tests.extend(tests_by_parts(&self.sightings, |s| s.observer, kinds, alpha));
+        let distances =
+            |seen: &[&Sighting]| distance("distance", seen.iter().copied(), self.classes);
+        tests.extend(tests_by_parts(&self.sightings, |s| s.observer, distances, alpha));
+        tests
     }
 }
 

@@ -13,6 +13,8 @@ const MAX_OBSERVATIONS: usize = 250;
 /// One reading, and what it should have been.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LabeledReading {
+    /// Number of the robot; 0 where the log is of one.
+    pub(super) robot: u32,
     /// Index of the true observation; 0 is `nothing`.
     pub(super) truth: usize,
     /// Index of the reported one.
@@ -45,19 +47,59 @@ pub(super) struct Distance {
     pub(super) range_m: Option<f64>,
 }
 
-/// Returns the observations of a table, `nothing` first and the others by name, and its readings of
-/// the sensor `wanted`.
+/// The readings of a table as far as it can be read.
+pub(super) struct ParsedReadings {
+    /// `nothing` first and the others by name.
+    pub(super) observations: Vec<String>,
+    /// In the order of the table, which is that of time.
+    pub(super) readings: Vec<LabeledReading>,
+    /// Number of damaged rows, which are left out.
+    pub(super) damaged: u64,
+    /// The error of the first of them.
+    pub(super) first_error: Option<InputError>,
+}
+
+/// Returns the readings of the sensor `wanted`.
 pub(super) fn read(
     table: &CsvTable,
     wanted: Option<&str>,
     classes: &DistanceClasses,
-) -> Result<(Vec<String>, Vec<LabeledReading>), InputError> {
+) -> Result<ParsedReadings, InputError> {
     let columns = ReadingColumns::find(table)?;
     let rows = rows_of_sensor(table, wanted)?;
     let observations = observations(table.place(), &rows, &columns)?;
     let parser = RowParser { place: table.place(), columns, observations, classes };
-    let readings = rows.iter().map(|row| parser.reading(row)).collect::<Result<_, _>>()?;
-    Ok((parser.observations, readings))
+    let mut readings = Vec::with_capacity(rows.len());
+    let mut damaged = 0;
+    let mut first_error = None;
+    for row in &rows {
+        match parser.reading(row) {
+            Ok(reading) => readings.push(reading),
+            Err(error) => {
+                damaged += 1;
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    match first_error {
+        Some(error) if 2 * damaged > rows.len() as u64 => Err(error),
+        first_error => {
+            Ok(ParsedReadings { observations: parser.observations, readings, damaged, first_error })
+        }
+    }
+}
+
+/// Returns the name of the only sensor of a table, if there is only one that has a name.
+pub(super) fn only_sensor(table: &CsvTable) -> Option<String> {
+    let column = sensor_column(table)?;
+    let names: BTreeSet<&str> = table.rows().map(|row| row.field(column).text).collect();
+    (names.len() == 1).then(|| names.into_iter().next().map(String::from))?
+}
+
+/// Returns the column that tells sensors apart: by name, else by any word. A number is one on its own robot, so that
+/// the same number may be two sensors on two robots.
+fn sensor_column(table: &CsvTable) -> Option<usize> {
+    table.find("sensor_name").or_else(|| table.find("sensor"))
 }
 
 struct ReadingColumns {
@@ -65,6 +107,7 @@ struct ReadingColumns {
     reported: usize,
     true_at: usize,
     reported_at: usize,
+    robot: Option<usize>,
     /// Whether distances are given in meters, else by class.
     in_meters: bool,
 }
@@ -79,7 +122,8 @@ impl ReadingColumns {
         };
         let [truth, reported, true_at, reported_at] =
             table.columns(["true", "reported", true_at, reported_at])?;
-        Ok(Self { truth, reported, true_at, reported_at, in_meters })
+        let robot = table.find("robot");
+        Ok(Self { truth, reported, true_at, reported_at, robot, in_meters })
     }
 }
 
@@ -88,12 +132,14 @@ fn rows_of_sensor<'t>(
     table: &'t CsvTable,
     wanted: Option<&str>,
 ) -> Result<Vec<CsvRow<'t>>, InputError> {
-    let column = table.find("sensor");
+    let column = sensor_column(table);
     let names: BTreeSet<&str> = table.rows().map(|row| sensor_name(&row, column)).collect();
     let listed = names.iter().copied().collect::<Vec<_>>().join(", ");
     if wanted.is_none() && names.len() > 1 {
         let cause = format!("the file has readings of several sensors: {listed}");
-        return Err(InputError::new(table.place(), cause, "choose one of them"));
+        let first = names.first().copied().unwrap_or_default();
+        let remedy = format!("choose one of them, e.g. --sensor {first}");
+        return Err(InputError::new(table.place(), cause, remedy));
     }
     let rows: Vec<CsvRow> = table
         .rows()
@@ -125,8 +171,7 @@ fn observations(
     let mut names = BTreeSet::new();
     for word in words {
         if word.text.is_empty() {
-            let remedy = "give an observation; `nothing` where there is none";
-            return Err(word.error(&place, "the observation is empty".to_string(), remedy));
+            continue;
         }
         names.insert(word.text);
         if names.len() >= MAX_OBSERVATIONS {
@@ -148,12 +193,14 @@ struct RowParser<'a> {
 
 impl RowParser<'_> {
     fn reading(&self, row: &CsvRow<'_>) -> Result<LabeledReading, InputError> {
-        let truth = self.observation(row.field(self.columns.truth));
-        let reported = self.observation(row.field(self.columns.reported));
+        let truth = self.observation(row.field(self.columns.truth))?;
+        let reported = self.observation(row.field(self.columns.reported))?;
+        let robot = self.columns.robot.map_or(Ok(0), |at| row.field(at).integer(&self.place))?;
         // A distance beside `nothing` is ignored, but it must still be a valid distance.
         let true_at = self.distance(row.field(self.columns.true_at))?;
         let reported_at = self.distance(row.field(self.columns.reported_at))?;
         Ok(LabeledReading {
+            robot,
             truth,
             reported,
             true_at: true_at.filter(|_| truth != 0),
@@ -161,9 +208,11 @@ impl RowParser<'_> {
         })
     }
 
-    fn observation(&self, word: Token<'_>) -> usize {
-        let found = self.observations.iter().position(|name| name == word.text);
-        found.expect("every observation of the file was collected")
+    fn observation(&self, word: Token<'_>) -> Result<usize, InputError> {
+        self.observations.iter().position(|name| name == word.text).ok_or_else(|| {
+            let remedy = "give an observation; `nothing` where there is none";
+            word.error(&self.place, "the observation is empty".to_string(), remedy)
+        })
     }
 
     fn distance(&self, word: Token<'_>) -> Result<Option<Distance>, InputError> {

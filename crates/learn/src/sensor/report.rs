@@ -9,7 +9,7 @@ use super::detection::Detection;
 use super::sighting::is_consistent;
 use crate::display::{self, TableHeading};
 use crate::holdout::HoldoutTest;
-use crate::{CountMatrix, CountTable, Estimate, EstimateOptions, LowCountRow};
+use crate::{CountMatrix, CountTable, Estimate, EstimateOptions, LeftOut, LowCountRow};
 use sidestep_statistics::Moments;
 
 /// The report on a learned sensor. Displayed as readable tables, serialized for programs.
@@ -25,6 +25,8 @@ pub struct SensorReport {
     pub skipped: u64,
     /// The same by cause.
     pub skipped_by_cause: BTreeMap<String, u64>,
+    /// Number of readings, and of those that are in no table, with those among them that nothing explains.
+    pub left_out: LeftOut,
     /// Number of sightings whose report is what was truly there.
     pub correct: u64,
     /// Number of sightings with a report that agrees with the subject that geometry alone would choose.
@@ -151,6 +153,16 @@ impl fmt::Display for MapComparison {
             writeln!(f, "  {n:>9} {percent:>6.2} %  {what}")?;
         }
         Ok(())
+    }
+}
+
+impl SensorReport {
+    /// Counts the readings that were left out, and takes the intervals back where nothing explains too many.
+    pub(super) fn judge_left_out(&mut self) {
+        self.left_out = LeftOut::new(self.sightings, &self.skipped_by_cause);
+        let Some(warning) = self.left_out.warning(&self.estimate) else { return };
+        self.warnings.insert(0, warning);
+        self.probabilities.iter_mut().for_each(|estimate| estimate.interval = None);
     }
 }
 

@@ -5,7 +5,8 @@
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{ColumnSpec, ColumnValues, MemoryRecorder, TableSchema};
 use sidestep::learn::sensor::SensorOptions;
-use sidestep::learn::{Estimate, EstimateOptions, effector, profile, sensor};
+use sidestep::learn::effector::{self, EffectorOptions};
+use sidestep::learn::{Estimate, profile, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::exact::markov_model;
 use sidestep::worlds::robots::robots_run;
@@ -106,7 +107,7 @@ fn assert_recovered(estimates: &[Estimate], table: &str, known: &[(&str, &str, f
 fn an_effector_comes_back_from_the_log_of_its_run() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let csv = record(&halls(), 40, "motions", folder.path());
-    let learned = effector::from_csv(&csv, &EstimateOptions::default()).unwrap();
+    let learned = effector::from_csv(&csv, &EffectorOptions::default()).unwrap();
     assert!(learned.report.rejected.is_empty(), "{:?}", learned.report.rejected);
     let known = [
         ("forward", "F", 0.80),

@@ -3,7 +3,8 @@
 use sidestep::kernel::InputError;
 use sidestep::learn::profile::{empty, with_effector, with_sensor};
 use sidestep::learn::sensor::{self, SensorOptions};
-use sidestep::learn::{EstimateOptions, effector};
+use sidestep::learn::EstimateOptions;
+use sidestep::learn::effector::{self, EffectorOptions};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::world::Role;
@@ -27,7 +28,7 @@ fn sensor_model() -> sensor::LearnedSensor {
 
 fn effector_model() -> effector::LearnedEffector {
     let folder = tempfile::tempdir().unwrap();
-    effector::from_csv(&file(&folder, MOTIONS), &EstimateOptions::default()).unwrap()
+    effector::from_csv(&file(&folder, MOTIONS), &EffectorOptions::default()).unwrap()
 }
 
 fn both() -> String {

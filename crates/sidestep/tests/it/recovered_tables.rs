@@ -5,7 +5,8 @@ use sidestep::import::table::CsvTable;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
 use sidestep::learn::sensor::{self, SensorOptions};
-use sidestep::learn::{Estimate, EstimateOptions, effector};
+use sidestep::learn::Estimate;
+use sidestep::learn::effector::{self, EffectorOptions};
 use sidestep::scenario::Source;
 use sidestep::statistics::chi_square_p_value;
 use sidestep::worlds::robots::robots_run;
@@ -95,7 +96,8 @@ fn assert_recovered(estimates: &[Estimate], table: &str, known: &[(&str, &str, f
             .iter()
             .find(|e| e.table == table && e.row == *row && e.column == *column)
             .unwrap_or_else(|| panic!("{row} {column} was not learned"));
-        let width = found.interval.high - found.interval.low;
+        let interval = found.interval.expect("nothing was left out");
+        let width = interval.high - interval.low;
         assert!((found.probability - p).abs() < width, "{found:?} instead of {p}");
         let (expected, fit) = (found.of * p, rows.entry(row).or_default());
         fit.0 += (found.count - expected) * (found.count - expected) / expected;
@@ -137,7 +139,7 @@ fn the_sensor_of_a_simulated_run_is_recovered() {
 
 #[test]
 fn the_effector_of_a_simulated_run_is_recovered() {
-    let learned = effector::learn_csv(&recorded("motions"), &EstimateOptions::default()).unwrap();
+    let learned = effector::learn_csv(&recorded("motions"), &EffectorOptions::default()).unwrap();
     let known = [
         ("forward", "F", 0.8),
         ("forward", "stay", 0.07),

@@ -13,6 +13,7 @@ use sidestep_kernel::ports::{
 };
 use sidestep_kernel::view::{EventBuffer, Isometry2};
 use sidestep_kernel::{Cycle, EntityId};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Number of poses kept before they must be recorded: as many as fit a processor's cache,
@@ -91,21 +92,59 @@ fn event_table(world: &RobotsWorld) -> Table<Event> {
         )
 }
 
+/// Returns the notes of [`box_notes`], and the laws of the scenario on which the errors in a table depend.
+fn error_notes(world: &RobotsWorld) -> Vec<(String, String)> {
+    let mut about = box_notes(world);
+    about.push(("regime".into(), world.regime.name().into()));
+    about.push(("obstacle_rule".into(), world.obstacle_rule.name().into()));
+    about
+}
+
+/// Returns the shape of each sensor, without which its classes of distance mean nothing.
+fn sensor_notes(world: &RobotsWorld) -> Vec<(String, String)> {
+    let mut about = Vec::new();
+    let mut noted = BTreeSet::new();
+    for sensor in world.sensors() {
+        if !noted.insert(sensor.name.as_str()) {
+            continue;
+        }
+        let designates = world.kinds.iter().zip(&sensor.designates).skip(1);
+        let taken = designates.map(|(kind, &of)| (kind, &sensor.observations[usize::from(of)]));
+        let taken = taken.filter(|(kind, observation)| kind != observation);
+        let notes = [
+            ("range_m", sensor.range_m.to_string()),
+            ("bearings_deg", comma_list(&sensor.bearings_deg)),
+            ("distance_edges_m", comma_list(&sensor.distance_edges_m)),
+            ("distance_classes", sensor.distance_classes.join(",")),
+            ("designates", comma_list(&taken.map(|(kind, seen)| format!("{kind}={seen}")).collect::<Vec<_>>())),
+        ];
+        about.extend(notes.map(|(key, note)| (format!("sensor.{}.{key}", sensor.name), note)));
+    }
+    about
+}
+
+fn comma_list<T: ToString>(items: &[T]) -> String {
+    items.iter().map(T::to_string).collect::<Vec<_>>().join(",")
+}
+
 /// The true and the reported reading of a beam, each an observation and a class of distance.
 struct ReadingRow {
     cycle: Cycle,
     robot: EntityId,
     sensor: u16,
+    /// Index of its name among those of [`ReadingLabels`].
+    sensor_name: u32,
     truth: [u32; 2],
     reported: [u32; 2],
 }
 
 fn reading_table(
     world: &RobotsWorld,
-    ReadingLabels { observations, classes }: ReadingLabels,
+    ReadingLabels { observations, classes, sensors }: ReadingLabels,
 ) -> Table<ReadingRow> {
+    let about = [error_notes(world), sensor_notes(world)].concat();
     Table::new("readings")
-        .with_about(box_notes(world))
+        .with_about(about)
         .u64("cycle", CYCLE_DESCRIPTION, |r: &ReadingRow| r.cycle)
         .u32("robot", "entity id", |r| r.robot)
         .u32("sensor", "number of the sensor on its robot", |r| u32::from(r.sensor))
@@ -113,12 +152,21 @@ fn reading_table(
         .label("true_class", "its true distance class", classes.clone(), |r| r.truth[1])
         .label("reported", "what the sensor reported", observations, |r| r.reported[0])
         .label("reported_class", "the reported distance class", classes, |r| r.reported[1])
+        .label("sensor_name", "name of the sensor in the scenario", sensors, |r| r.sensor_name)
 }
 
 fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
     let action = "action tried: 0 forward, 1 left, 2 right, 3 stay, then the effector's own";
+    let effectors = effector_names(world);
+    let label_of_type: Vec<u32> = world
+        .types
+        .iter()
+        .map(|ty| effector_name(&ty.role).map_or(0, |name| label_index(&effectors, name)))
+        .collect();
+    let of_robot: Vec<u32> =
+        world.bodies.iter().map(|body| label_of_type[usize::from(body.ty)]).collect();
     Table::new("motions")
-        .with_about(box_notes(world))
+        .with_about(error_notes(world))
         .u64("cycle", CYCLE_DESCRIPTION, |s: &MotionSample| s.cycle)
         .u32("robot", "entity id", |s| s.robot)
         .u32("action", action, |s| u32::from(s.action))
@@ -129,6 +177,22 @@ fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
             90 * if quarters == 3 { -1 } else { quarters }
         })
         .label("contact", "whether an obstacle cut it", ["no", "yes"], |s| u32::from(s.contact))
+        .label("effector", "name of the robot's effector in the scenario", effectors, move |s| {
+            of_robot[s.robot as usize]
+        })
+}
+
+/// Returns the names of the effectors of all robots, each once, sorted.
+fn effector_names(world: &RobotsWorld) -> Vec<String> {
+    let names = world.types.iter().filter_map(|ty| effector_name(&ty.role));
+    names.collect::<BTreeSet<_>>().into_iter().map(String::from).collect()
+}
+
+fn effector_name(role: &Role) -> Option<&str> {
+    match role {
+        Role::Robot(model) => Some(&model.body.effector.name),
+        Role::Mover(_) | Role::Door(_) => None,
+    }
 }
 
 /// The tables, and their rows until they are recorded.
@@ -321,21 +385,24 @@ fn pose_columns(world: &RobotsWorld, frames: &PoseBuffer, span: Range<Cycle>) ->
 struct ReadingLabels {
     observations: Vec<String>,
     classes: Vec<String>,
+    sensors: Vec<String>,
 }
 
 impl ReadingLabels {
     fn from_world(world: &RobotsWorld) -> Self {
         let mut observations = Vec::new();
         let mut classes = vec!["beyond".to_string()];
+        let mut sensors = Vec::new();
         for sensor in world.sensors() {
             observations.extend(sensor.observations.iter().cloned());
             classes.extend(sensor.distance_classes.iter().cloned());
+            sensors.push(sensor.name.clone());
         }
-        for names in [&mut observations, &mut classes] {
+        for names in [&mut observations, &mut classes, &mut sensors] {
             names.sort_unstable();
             names.dedup();
         }
-        Self { observations, classes }
+        Self { observations, classes, sensors }
     }
 
     /// Returns the row of a sample; `None` for a body without sensors.
@@ -346,6 +413,7 @@ impl ReadingLabels {
             cycle: sample.cycle,
             robot: sample.robot,
             sensor: sample.sensor,
+            sensor_name: label_index(&self.sensors, &sensor.name),
             truth: self.indices(sensor.names_of(sample.truth)),
             reported: self.indices(sensor.names_of(sample.reported)),
         })
