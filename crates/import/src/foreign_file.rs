@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::extension::extension;
-use super::report::ImportReport;
-use super::{carmen, load_pixel_map, movingai, mrclam, rosmap, stage, stl};
+use super::mesh::Mesh;
+use super::report::{ImportReport, Treatment};
+use super::{carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
@@ -35,7 +36,7 @@ pub enum ForeignFormat {
     /// A world of the Stage simulator.
     Stage,
     /// A mesh.
-    Stl,
+    Mesh,
     /// A log of CARMEN.
     Carmen,
     /// The folder of a UTIAS MRCLAM data set.
@@ -70,7 +71,7 @@ impl ForeignFormat {
             "srdf" => Some(Self::Srdf),
             "xml" if text.contains("<robot") => Some(Self::Urdf),
             "world" | "inc" => Some(Self::Stage),
-            "stl" => Some(Self::Stl),
+            kind if mesh::EXTENSIONS.contains(&kind) => Some(Self::Mesh),
             _ if has_carmen_message(&text) => Some(Self::Carmen),
             _ => None,
         })
@@ -90,8 +91,8 @@ impl ForeignFormat {
             Self::Scen => movingai::load_scen(path).map(|file| file.report),
             Self::Urdf => Model::load(path).map(|model| model.report),
             Self::Srdf => inspect_srdf(path),
-            Self::Stage => stage::load(path).map(|_| ImportReport::new("world of Stage")),
-            Self::Stl => inspect_stl(path),
+            Self::Stage => stage::load(path).map(|world| world.report),
+            Self::Mesh => inspect_mesh(path),
             Self::Carmen => carmen::read(path).map(|_| ImportReport::new("log of CARMEN")),
             Self::Mrclam => mrclam::read(path).map(|_| ImportReport::new("MRCLAM data set")),
             Self::Bag => Ok(ImportReport::new("bag")),
@@ -164,19 +165,24 @@ fn inspect_srdf(path: &Path) -> Result<ImportReport, InputError> {
         InputError::new(path.display(), cause, remedy)
     })?;
     let semantics = Semantics::load(path, &Model::load(model)?)?;
-    let mut report = ImportReport::new("SRDF");
-    report.add_kept("groups", semantics.groups.len());
+    let mut report = semantics.report;
     report.add_fact("model", model.display().to_string());
     Ok(report)
 }
 
-fn inspect_stl(path: &Path) -> Result<ImportReport, InputError> {
-    let [lo_m, hi_m] = stl::read_bounds(path)?;
-    let mut report = ImportReport::new("mesh (STL)");
+fn inspect_mesh(path: &Path) -> Result<ImportReport, InputError> {
+    let mesh = Mesh::load(path)?;
+    let mut report = ImportReport::new(format!("mesh ({})", extension(path).to_uppercase()));
+    let [lo_m, hi_m] = mesh.bounds_m();
     let size_m = [0, 1, 2].map(|axis| format!("{:.4}", hi_m[axis] - lo_m[axis]));
-    report.add_fact(
-        "extent",
-        format!("{} in the units of the file, meters in a URDF", size_m.join(" x ")),
-    );
+    report.add_fact("extent", format!("{} m", size_m.join(" x ")));
+    match mesh.unit_m {
+        Some(unit_m) => report.add_fact("unit of the file", format!("{unit_m} m")),
+        None => {
+            let rule = "the unit is the meter: the file says none";
+            report.record(Treatment::Guessed, rule, "", "give `scale` where a URDF names it");
+        }
+    }
+    report.add_kept("vertices", mesh.points_m.len());
     Ok(report)
 }

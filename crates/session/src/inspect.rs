@@ -4,7 +4,7 @@ use crate::{Error, write_atomically};
 use serde::Serialize;
 use serde_json::Value;
 use sidestep_experiment::sweep::Sweep;
-use sidestep_import::{ForeignFormat, clean_map};
+use sidestep_import::{ForeignFormat, clean_map, traffic};
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::SweepFolder;
 use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, row_count, tables};
@@ -169,7 +169,7 @@ fn scenario_report(worlds: &Worlds, path: &Path) -> Result<ImportReport, InputEr
 }
 
 /// Writes what was kept of a file to `out`, and returns the paths of the files written: a map of any kind as the YAML
-/// file `out` and an image beside it.
+/// file `out` and an image beside it, recorded traffic as CSV.
 ///
 /// # Errors
 /// When the file cannot be read, is of a kind that is not written, or `out` cannot be written.
@@ -182,6 +182,11 @@ pub fn write_clean(path: &Path, out: &Path) -> Result<Vec<PathBuf>, Error> {
             write_atomically(&image, |file| file.write_all(&pgm))?;
             write_atomically(out, |file| file.write_all(&yaml))?;
             Ok(vec![out.to_path_buf(), image])
+        }
+        None if traffic::has_extension(path) => {
+            let text = traffic::to_csv(&traffic::read(path)?);
+            write_atomically(out, |file| file.write_all(text.as_bytes()))?;
+            Ok(vec![out.to_path_buf()])
         }
         _ => Err(not_written(path)),
     }
