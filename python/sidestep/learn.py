@@ -31,20 +31,36 @@ __all__ = ["Learned", "effector", "sensor"]
 #: Columns of a table, or the folder of a run that recorded it.
 Columns = Mapping[str, Any] | str | os.PathLike[str] | Any
 
-MOTIONS = ("action", "ahead_boxes", "left_boxes", "turn_deg", "contact")
+MOTIONS = (
+    "cycle", "robot", "action", "ahead_boxes", "left_boxes", "turn_deg", "contact", "effector", "box_m",
+)  # fmt: skip
 READINGS = (
-    "sensor", "true", "reported", "true_distance_m", "reported_distance_m", "true_class", "reported_class", "bearing_error_deg",
+    "cycle", "robot", "sensor", "sensor_name", "true", "reported", "true_distance_m", "reported_distance_m", "true_class",
+    "reported_class", "bearing_error_deg",
 )  # fmt: skip
 
 
-def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learned:
+def effector(
+    moves: Columns,
+    *,
+    box_m: float | None = None,
+    name: str | None = None,
+    robots: Sequence[int] = (),
+    alpha: float = 0.5,
+    hold_out: int = 2,
+    max_unexplained: float = 0.05,
+) -> Learned:
     """Learns the outcomes of an effector's actions.
 
     ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
     of the start, ``turn_deg``, positive to the left, and optionally ``contact`` (``"yes"`` where an obstacle stopped it: such rows
-    are skipped). Or the folder of a run with ``record.calibration = true``. ``alpha`` is added to every count before rows
-    become probabilities; every ``hold_out``-th move is held out to test the model.
+    are skipped), ``robot``, a number by which robots that differ are found, and ``effector``. Or the folder of a run with
+    ``record.calibration = true``, which knows its box. ``box_m`` is the side of a box in meters: without it, a scenario that
+    uses the result warns. ``name`` chooses one of several effectors, ``robots`` some robots. ``alpha`` is added to every count
+    before rows become probabilities; every ``hold_out``-th move is held out to test the model, and so is each quarter of the
+    time and each robot. No interval is given where a greater share of rows than ``max_unexplained`` is left out for a reason
+    that nothing explains, such as damage.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
@@ -57,7 +73,8 @@ def effector(moves: Columns, *, alpha: float = 0.5, hold_out: int = 2) -> Learne
     >>> "[effectors.mine]" in learned.profile("mine")
     True
     """
-    return _native.learn_effector(_options(moves, MOTIONS, alpha, hold_out))
+    choice = {"box_m": box_m, "effector": name, "robots": [int(robot) for robot in robots]}
+    return _native.learn_effector(_options(moves, MOTIONS, alpha, hold_out, max_unexplained), choice)
 
 
 def sensor(
@@ -68,8 +85,10 @@ def sensor(
     bearings_deg: Sequence[float] | None = None,
     range_m: float | None = None,
     name: str | None = None,
+    beam: bool = False,
     alpha: float = 0.5,
     hold_out: int = 2,
+    max_unexplained: float = 0.05,
 ) -> Learned:
     """Learns the reports of a sensor.
 
@@ -77,7 +96,9 @@ def sensor(
     (``"nothing"`` for no observation), and ``true_distance_m`` and ``reported_distance_m``, or ``true_class`` and
     ``reported_class``. Or the folder of a run with ``record.calibration = true``, with ``name`` if it has several sensors.
     ``edges_m`` divide distances into ``classes``, near to far, one more than edges; ``bearings_deg`` of the beams, positive
-    to the left, and ``range_m`` are for the profile. ``alpha`` and ``hold_out`` are as for :func:`effector`.
+    to the left, and ``range_m`` are for the profile; a run knows all four. With ``beam`` the four-part beam model (hit, short,
+    max, random) is fitted to ranges in meters, too, as it always is to those of a run; it is the sensor ``NAME-beam`` of the
+    profile. ``alpha``, ``hold_out`` and ``max_unexplained`` are as for :func:`effector`.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
@@ -95,13 +116,18 @@ def sensor(
         "bearings_deg": None if bearings_deg is None else [float(b) for b in bearings_deg],
         "range_m": range_m,
         "sensor": name,
+        "beam": beam,
     }
-    return _native.learn_sensor(_options(readings, READINGS, alpha, hold_out), shape)
+    return _native.learn_sensor(_options(readings, READINGS, alpha, hold_out, max_unexplained), shape)
 
 
-def _options(columns: Columns, known: Sequence[str], alpha: float, hold_out: int) -> dict[str, Any]:
+def _options(
+    columns: Columns, known: Sequence[str], alpha: float, hold_out: int, max_unexplained: float
+) -> dict[str, Any]:
     """Returns a table, as CSV text or as the folder that contains it, and how to learn from it."""
-    options: dict[str, Any] = {"text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out}
+    options: dict[str, Any] = {
+        "text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out, "max_unexplained": max_unexplained,
+    }  # fmt: skip
     if isinstance(columns, str | os.PathLike):
         options["run"] = os.fspath(columns)
     else:

@@ -6,11 +6,11 @@ use pyo3::prelude::*;
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
-use sidestep::learn::effector::{self, LearnedEffector};
+use sidestep::learn::effector::{self, EffectorOptions, LearnedEffector};
 use sidestep::learn::profile;
-use sidestep::learn::sensor::{self, LearnedSensor, SensorOptions};
+use sidestep::learn::sensor::{self, LearnedSensor, RunSensorOptions, SensorOptions};
 use sidestep_session::csv_table;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A learned error model: its counts, probabilities with intervals, and its form in a profile.
 #[pyclass(module = "sidestep", frozen)]
@@ -82,28 +82,46 @@ pub(crate) struct LearnOptions {
     run: Option<PathBuf>,
     alpha: f64,
     hold_out_every: usize,
+    max_unexplained: f64,
 }
 
 impl LearnOptions {
-    /// Returns the table; `name` is its name among those of a run.
-    fn read_table(&self, name: &str) -> Result<CsvTable, InputError> {
-        match &self.run {
-            Some(run) => csv_table(run, name),
-            None => CsvTable::parse(&name, self.text.as_deref().unwrap_or_default()),
-        }
+    /// Returns the table that was passed as text; `name` stands for it in errors.
+    fn parse_table(&self, name: &str) -> Result<CsvTable, InputError> {
+        CsvTable::parse(&name, self.text.as_deref().unwrap_or_default())
     }
 
     fn estimate(&self) -> EstimateOptions {
-        let Self { alpha, hold_out_every, .. } = *self;
-        EstimateOptions { alpha, hold_out_every, ..EstimateOptions::default() }
+        let Self { alpha, hold_out_every, max_unexplained, .. } = *self;
+        EstimateOptions { alpha, hold_out_every, max_unexplained, ..EstimateOptions::default() }
     }
+}
+
+/// The effector to learn, as passed by `sidestep.learn.effector`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct EffectorChoice {
+    box_m: Option<f64>,
+    effector: Option<String>,
+    robots: Vec<u32>,
 }
 
 /// Learns an effector: the native part of `sidestep.learn.effector`.
 #[pyfunction]
-pub(crate) fn learn_effector(py: Python<'_>, options: LearnOptions) -> PyResult<Learned> {
-    let estimate = options.estimate();
-    let learned = py.detach(|| effector::learn_csv(&options.read_table("motions")?, &estimate));
+pub(crate) fn learn_effector(
+    py: Python<'_>,
+    options: LearnOptions,
+    choice: EffectorChoice,
+) -> PyResult<Learned> {
+    let EffectorChoice { box_m, effector, robots } = choice;
+    let chosen = EffectorOptions { estimate: options.estimate(), box_m, effector, robots };
+    let learned = py.detach(|| match &options.run {
+        Some(run) => {
+            let recorded = csv_table(run, "motions")?;
+            effector::learn_run(&recorded.table, &recorded.facts, &chosen)
+        }
+        None => effector::learn_csv(&options.parse_table("motions")?, &chosen),
+    });
     let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Effector(Box::new(model))))
 }
@@ -117,6 +135,7 @@ pub(crate) struct SensorShape {
     bearings_deg: Option<Vec<f64>>,
     range_m: Option<f64>,
     sensor: Option<String>,
+    beam: bool,
 }
 
 /// Learns a sensor: the native part of `sidestep.learn.sensor`.
@@ -126,17 +145,43 @@ pub(crate) fn learn_sensor(
     options: LearnOptions,
     shape: SensorShape,
 ) -> PyResult<Learned> {
-    let default = SensorOptions::default();
-    let sensor_options = SensorOptions {
-        estimate: options.estimate(),
-        distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
-        distance_classes: shape.classes,
-        bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
-        range_m: shape.range_m.unwrap_or(default.range_m),
-        sensor: shape.sensor,
-    };
-    let learned =
-        py.detach(|| sensor::learn_csv(&options.read_table("readings")?, &sensor_options));
+    let learned = py.detach(|| match &options.run {
+        Some(run) => learn_recorded_sensor(run, options.estimate(), shape),
+        None => {
+            let default = SensorOptions::default();
+            let sensor_options = SensorOptions {
+                estimate: options.estimate(),
+                distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
+                distance_classes: shape.classes,
+                bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
+                range_m: shape.range_m.unwrap_or(default.range_m),
+                sensor: shape.sensor,
+                beam: shape.beam,
+            };
+            sensor::learn_csv(&options.parse_table("readings")?, &sensor_options)
+        }
+    });
     let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Sensor(Box::new(model))))
+}
+
+fn learn_recorded_sensor(
+    run: &Path,
+    estimate: EstimateOptions,
+    shape: SensorShape,
+) -> Result<LearnedSensor, InputError> {
+    let mut recorded = csv_table(run, "readings")?;
+    let table = sensor::recorded_table(&recorded.table, &recorded.facts, shape.sensor.as_deref());
+    if table != "readings" {
+        recorded = csv_table(run, table)?;
+    }
+    let run_options = RunSensorOptions {
+        estimate,
+        sensor: shape.sensor,
+        distance_edges_m: shape.edges_m,
+        distance_classes: shape.classes,
+        bearings_deg: shape.bearings_deg,
+        range_m: shape.range_m,
+    };
+    sensor::learn_run(&recorded.table, &recorded.facts, &run_options)
 }

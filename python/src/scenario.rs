@@ -213,6 +213,7 @@ fn load_any(
                     let cause = format!("{given} is no path, dict or Scenario");
                     argument_error("scenario", cause, "give a path or a dict, or text=...")
                 })?;
+                refuse_text_as_path(&path)?;
                 let read = run_interruptible(py, || {
                     sidestep_session::read_scenario(worlds::list(), &path, &[])
                 })?;
@@ -225,6 +226,21 @@ fn load_any(
             Err(argument_error("Scenario", "it needs one scenario", remedy))
         }
     }
+}
+
+/// Refuses a path of several lines, which is the content of a file, in words that do not repeat all of it.
+fn refuse_text_as_path(path: &Path) -> PyResult<()> {
+    let text = path.to_string_lossy();
+    let lines = text.lines().count();
+    if lines < 2 {
+        return Ok(());
+    }
+    let cause = format!("a text of {lines} lines was given where a path belongs");
+    Err(argument_error(
+        "scenario",
+        cause,
+        "pass the content of a file as text=...: sidestep.Scenario(text=...)",
+    ))
 }
 
 /// Returns the scenario of a dict, in which `format` may be left out.

@@ -1,6 +1,7 @@
 #![deny(clippy::disallowed_methods)]
 #![doc = include_str!("../README.md")]
 
+pub mod beam;
 pub mod effector;
 mod policy;
 pub mod ray;

@@ -4,10 +4,14 @@
 //! classes with a confusion matrix of their own). Both draws, observation and class, are
 //! independent given the true pair, so they are one draw from their joint distribution.
 
+use super::beam::BeamModel;
 use super::ray::reaches;
 
 /// Index of the observation `nothing`, always the first.
 pub const NOTHING: u8 = 0;
+
+/// Index of the observation of a sensor that measures ranges: something, whatever it is.
+pub const ANYTHING: u8 = 1;
 
 /// The kind of an empty box.
 pub const FREE: u8 = 0;
@@ -44,6 +48,9 @@ pub struct SensorModel {
     pub distance_confusion: Vec<Vec<f64>>,
     /// True observation of each kind of the scenario.
     pub designates: Vec<u8>,
+    /// The model of ranges of a sensor that measures in meters: its reports come from there, and its matrices report
+    /// the truth. Such a sensor has two observations: nothing, and anything.
+    pub beam: Option<BeamModel>,
 }
 
 impl SensorModel {
@@ -80,6 +87,27 @@ impl SensorModel {
         row
     }
 
+    /// Returns `P(reported | true)` of a sensor with a beam model, where something stands at `true_m`, or nothing within
+    /// its range; `None` for a sensor with tables.
+    pub fn ranged_row(&self, true_m: Option<f64>) -> Option<Vec<(Reading, f64)>> {
+        let beam = self.beam?;
+        let mut row = vec![(self.nothing(), beam.no_echo_probability(true_m))];
+        for class in 0..self.distance_classes.len() {
+            let from_m = class.checked_sub(1).map_or(0.0, |below| self.distance_edges_m[below]);
+            let to_m = self.distance_edges_m.get(class).copied().unwrap_or(f64::INFINITY);
+            let reading = Reading { observation: ANYTHING, class: class as u8 };
+            row.push((reading, beam.probability_between(true_m, [from_m, to_m], self.range_m)));
+        }
+        Some(row)
+    }
+
+    /// Returns the reading that a measured range stands for, `None` being no echo.
+    pub fn reading_of_range(&self, range_m: Option<f64>) -> Reading {
+        let Some(range_m) = range_m else { return self.nothing() };
+        let class = self.distance_edges_m.iter().filter(|&&edge_m| range_m >= edge_m).count();
+        Reading { observation: ANYTHING, class: class as u8 }
+    }
+
     /// Returns the names of a reading's observation and class.
     pub fn names_of(&self, reading: Reading) -> (&str, &str) {
         let observation = &self.observations[usize::from(reading.observation)];
@@ -109,6 +137,7 @@ mod tests {
             distance_edges_m,
             distance_confusion: Vec::new(),
             designates: Vec::new(),
+            beam: None,
         }
     }
 

@@ -45,23 +45,26 @@ impl<'a> MountedBeam<'a> {
 
     /// Returns `P(reading | pose)`; readings of probability 0 are left out.
     pub(super) fn readings(&self, robot: &SingleRobot, pose: GridPose) -> Vec<(Reading, f64)> {
-        let mut row = self.sensor.reading_row(self.truth(robot, pose), self.reliable);
+        let (truth, true_m) = self.truth(robot, pose);
+        let ranged = if self.reliable { None } else { self.sensor.ranged_row(true_m) };
+        let mut row = ranged.unwrap_or_else(|| self.sensor.reading_row(truth, self.reliable));
         row.retain(|reading| reading.1 > 0.0);
         row
     }
 
-    /// The first box along the beam that is not free decides the true reading.
-    fn truth(&self, robot: &SingleRobot, pose: GridPose) -> Reading {
+    /// The first box along the beam that is not free decides the true reading, and its distance in meters.
+    fn truth(&self, robot: &SingleRobot, pose: GridPose) -> (Reading, Option<f64>) {
         let crossed = self.crossed[usize::from(pose.heading)].iter();
         let mut met = crossed.map(|c| (c, robot.kind_at(pose.col + c.dx, pose.row + c.dy)));
         let first = met.find(|(_, kind)| *kind != FREE);
-        let Some((crossing, kind)) = first else { return self.sensor.nothing() };
+        let Some((crossing, kind)) = first else { return (self.sensor.nothing(), None) };
         match self.sensor.designates[usize::from(kind)] {
             // A kind that reads as nothing still hides what stands behind it.
-            NOTHING => self.sensor.nothing(),
+            NOTHING => (self.sensor.nothing(), None),
             observation => {
-                let class = self.sensor.class_of(crossing.distance, robot.map.box_size_m);
-                Reading { observation, class }
+                let box_m = robot.map.box_size_m;
+                let class = self.sensor.class_of(crossing.distance, box_m);
+                (Reading { observation, class }, Some(crossing.distance * box_m))
             }
         }
     }

@@ -24,6 +24,7 @@ unary! {
     ln = log, "Natural logarithm.";
     log2 = log2, "Logarithm to base 2.";
     log10 = log10, "Logarithm to base 10.";
+    erfc = erfc, "Complementary error function: 1 - erf.";
 }
 
 /// Sine and cosine of an angle in radians, for less than two separate calls cost.

@@ -165,9 +165,8 @@ fn verdicts(fits: &[HoldoutTest]) -> Vec<String> {
     let adjusted = holm(&tested.iter().map(|fit| Some(fit.p_value)).collect::<Vec<_>>());
     let differs =
         tested.iter().zip(adjusted).filter(|(_, p)| p.is_some_and(|p| p < SIGNIFICANCE_LEVEL));
-    let mut words: Vec<String> = differs
-        .map(|(fit, _)| warning_line(&difference_words(fit)))
-        .collect();
+    let mut words: Vec<String> =
+        differs.map(|(fit, _)| warning_line(&difference_words(fit))).collect();
     let untested = fits.len() - tested.len();
     if words.is_empty() && !tested.is_empty() {
         words.push("Both parts of the log agree as far as these counts can show.".into());
@@ -263,9 +262,13 @@ mod tests {
     fn robots_that_differ_and_errors_that_change_are_told_apart() {
         let odd_parts = ["3", "7"].map(String::from).to_vec();
         let robots = HoldoutTest { split: Split::Robot, parts: 9, odd_parts, ..fit(1e-9, 8) };
-        let told = verdicts(&[robots, HoldoutTest { split: Split::Time, ..fit(1e-9, 3) }]).join("\n");
+        let told =
+            verdicts(&[robots, HoldoutTest { split: Split::Time, ..fit(1e-9, 3) }]).join("\n");
         let words = told.replace('\n', " ");
-        assert!(words.contains("the 9 robots differ") && words.contains("robots 3, 7 far"), "{told}");
+        assert!(
+            words.contains("the 9 robots differ") && words.contains("robots 3, 7 far"),
+            "{told}"
+        );
         assert!(words.contains("quarters of the log differ"), "{told}");
         let name = name_of(&HoldoutTest { split: Split::Robot, ..fit(0.5, 1) });
         assert_eq!(name, "moves (robot)");

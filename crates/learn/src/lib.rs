@@ -4,6 +4,7 @@
 pub mod effector;
 pub mod sensor;
 
+mod beam_information;
 mod counts;
 mod display;
 pub mod holdout;
@@ -65,7 +66,11 @@ impl EstimateOptions {
         }
         if !(0.0..=1.0).contains(&self.max_unexplained) {
             let cause = format!("a share of {:?} of the samples", self.max_unexplained);
-            return Err(InputError::new("max-unexplained", cause, "give a share from 0 to 1, such as 0.05"));
+            return Err(InputError::new(
+                "max-unexplained",
+                cause,
+                "give a share from 0 to 1, such as 0.05",
+            ));
         }
         Ok(())
     }

@@ -54,6 +54,10 @@ fn parse_override(override_text: &str) -> Result<Override<'_>, InputError> {
     if let Ok(value) = text.parse() {
         return Ok(Override { place, key, value });
     }
+    if !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit()) {
+        let cause = format!("`{text}` is larger than any whole number of a file");
+        return Err(InputError::new(place, cause, format!("give at most {}", i64::MAX)));
+    }
     // As text, it would be refused later, where it is no longer clear that a number was meant.
     if overflows_to_infinity(text) {
         let cause = format!("`{text}` is larger than any number that can be held (1.8e308)");

@@ -2,7 +2,7 @@
 
 use super::explain::{explain, keys_of};
 use super::locate::{dotted_path, locate};
-use crate::Spanned;
+use crate::{Integer, Spanned};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -59,12 +59,15 @@ pub struct Head {
     /// Name of the scenario; may be empty.
     #[serde(default)]
     pub name: String,
-    /// The seed; 1 by default.
-    #[serde(default = "default_seed")]
+    /// The seed; 1 by default. At most 2^63 - 1: files have no larger whole numbers, and a run writes its seed into one.
+    #[serde(default = "default_seed", deserialize_with = "Integer::<0, MAX_SEED>::read")]
     pub seed: u64,
     /// Number of cycles to run, if given.
     pub cycles: Option<u64>,
 }
+
+/// Largest seed, which is the largest whole number of TOML.
+const MAX_SEED: u64 = i64::MAX as u64;
 
 fn default_seed() -> u64 {
     1

@@ -116,6 +116,10 @@ struct SensorArgs {
     #[arg(long, value_name = "SENSOR", conflicts_with_all = ["mrclam", "bag"])]
     sensor: Option<String>,
 
+    /// Also fit the four-part beam model to ranges in meters (with --csv; scans, and runs with ranges, always are)
+    #[arg(long, requires = "csv")]
+    beam: bool,
+
     #[command(flatten)]
     topics: TopicArgs,
 
@@ -279,7 +283,9 @@ pub(crate) fn learn(args: &LearnArgs, console: Console) -> Result<ExitCode, Fail
             let written = args.target.add("sensors", |place, text, name| {
                 profile::with_sensor(place, text, name, &model)
             })?;
-            let assumptions = [assumptions(&model.profile), smoothing(&args.estimate)].concat();
+            let beam = beam_note(&model, &args.target.name);
+            let assumptions =
+                [assumptions(&model.profile), smoothing(&args.estimate), beam].concat();
             print_report(&model.report, &written, &assumptions, console)?;
         }
         LearnCommand::Effector(args) => {
@@ -324,12 +330,25 @@ fn assumptions(profile: &SensorProfile) -> String {
     text
 }
 
+/// Returns the line on the sensor that has the beam model.
+fn beam_note(model: &LearnedSensor, name: &str) -> String {
+    if model.report.beam.is_none() {
+        return String::new();
+    }
+    let beam = profile::beam_name(name);
+    indented(&format!(
+        "Its beam model is the sensor `{beam}`, which draws ranges in place of classes."
+    ))
+}
+
 /// Returns the line on a profile that does not say for which boxes it is.
 fn box_note(profile: &EffectorProfile) -> String {
     if profile.box_m.is_some() {
         return String::new();
     }
-    indented("It does not say for which boxes it is, so every scenario that uses it warns: give --box.")
+    indented(
+        "It does not say for which boxes it is, so every scenario that uses it warns: give --box.",
+    )
 }
 
 /// Returns the line on how probabilities of the profile differ from shares of counts.
@@ -356,6 +375,7 @@ fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
         bearings_deg: args.bearings.clone().unwrap_or(default.bearings_deg),
         range_m: args.range.unwrap_or(default.range_m),
         sensor: args.sensor.clone(),
+        beam: args.beam,
     };
     let log = &args.log;
     match (&log.mrclam, &log.bag, &log.csv, &log.run) {
@@ -368,7 +388,12 @@ fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
 }
 
 fn learn_recorded_sensor(args: &SensorArgs, folder: &Path) -> Result<LearnedSensor, InputError> {
-    let recorded = csv_table(folder, "readings")?;
+    let mut recorded = csv_table(folder, "readings")?;
+    let sensor = args.sensor.as_deref();
+    let table = sensor::recorded_table(&recorded.table, &recorded.facts, sensor);
+    if table != "readings" {
+        recorded = csv_table(folder, table)?;
+    }
     let options = RunSensorOptions {
         estimate: args.estimate.options(),
         sensor: args.sensor.clone(),

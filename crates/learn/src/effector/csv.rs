@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use super::rows::{self, MeasuredDisplacement, ParsedRows};
-use super::{EffectorOptions, LearnedEffector};
 use super::events::{Events, MoveEvent, TurnEvent, nearest_turn};
 use super::grid_displacement::{
     FORWARD_CLASSES, GridDisplacement, OTHER_CLASS, forward_class, grid_displacements,
 };
 use super::report::{EffectorReport, ForwardShares};
+use super::rows::{self, MeasuredDisplacement, ParsedRows};
 use super::transitions::{
     EffectorProfile, ProfileTransition, certain_transition, from_outcomes, intended_displacement,
     label,
 };
+use super::{EffectorOptions, LearnedEffector};
 use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
 use crate::{CountTable, EstimateOptions};
 use sidestep_error_models::effector::STANDARD_ACTIONS;
@@ -47,8 +47,7 @@ impl MeasuredDisplacement {
     fn as_turn(&self) -> TurnEvent {
         let commanded_deg =
             f64::from(90 * intended_displacement(STANDARD_ACTIONS[self.action]).quarters);
-        let turn =
-            TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None);
+        let turn = TurnEvent::new(commanded_deg.to_radians(), self.turn_deg.to_radians(), None);
         TurnEvent { robot: self.robot, ..turn }
     }
 }
@@ -74,7 +73,10 @@ pub(super) fn learn(
     }
     report.warnings.extend(damage);
     report.judge_left_out(free.len() as u64);
-    Ok(LearnedEffector { report, profile: EffectorProfile { box_m, ..profile(&by_action, estimate) } })
+    Ok(LearnedEffector {
+        report,
+        profile: EffectorProfile { box_m, ..profile(&by_action, estimate) },
+    })
 }
 
 /// The events of one action and the outcomes they had.

@@ -192,7 +192,11 @@ impl DisplacementColumns {
                 && (own_m - other_m).abs() > 1e-9 * other_m
             {
                 let cause = format!("a box of {own_m} m beside one of {other_m} m");
-                return Err(word.error(&table.place(), cause, "learn from one size of boxes at a time"));
+                return Err(word.error(
+                    &table.place(),
+                    cause,
+                    "learn from one size of boxes at a time",
+                ));
             }
             side_m = Some(own_m);
         }
@@ -200,7 +204,9 @@ impl DisplacementColumns {
     }
 
     fn read(&self, place: &str, row: CsvRow<'_>) -> Result<Row, InputError> {
-        let Some(action) = action(place, row.field(self.action))? else { return Ok(Row::OwnAction) };
+        let Some(action) = action(place, row.field(self.action))? else {
+            return Ok(Row::OwnAction);
+        };
         let displacement = MeasuredDisplacement {
             robot: self.robot.map_or(Ok(0), |column| row.field(column).integer(&place))?,
             action,

@@ -7,7 +7,7 @@ use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, Value, value};
 use super::{implicit, words};
 use crate::effector::LearnedEffector;
 use crate::holdout::HoldoutTest;
-use crate::sensor::LearnedSensor;
+use crate::sensor::{BeamFit, LearnedSensor};
 use crate::{Estimate, EstimateOptions, LeftOut, LowCountRow};
 
 pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
@@ -31,6 +31,37 @@ pub(super) fn sensor_evidence(model: &LearnedSensor) -> Table {
     certainty.write(&mut table);
     table
 }
+
+pub(super) fn beam_evidence(model: &LearnedSensor, fit: &BeamFit) -> Table {
+    let report = &model.report;
+    let mut table = Table::new();
+    table["source"] = value(&report.source);
+    table["rule"] = value(BEAM_RULE);
+    write_left_out(&mut table, &report.left_out, &report.skipped_by_cause);
+    table["readings"] = count(fit.readings as f64).into();
+    table["fitted"] = count(fit.fitted as f64).into();
+    table["scans"] = count(fit.scans as f64).into();
+    table["steps"] = count(fit.steps as f64).into();
+    table["has_converged"] = value(fit.has_converged);
+    table["largest_deviation"] = value(round_to_six(fit.largest_deviation));
+    table["warnings"] = words(&report.warnings);
+    let mut parameters = Table::new();
+    for parameter in &fit.parameters {
+        let mut fields = InlineTable::new();
+        fields.insert("value", round_to_six(parameter.value).into());
+        if let Some(interval) = parameter.interval {
+            let ends = [interval.low, interval.high].map(round_to_six);
+            fields.insert("interval", Array::from_iter(ends).into());
+        }
+        parameters[parameter.name] = value(fields);
+    }
+    table["parameters"] = Item::Table(parameters);
+    table
+}
+
+/// The rule by which ranges become a beam model.
+const BEAM_RULE: &str = "expectation and maximization of the beam model (Thrun, Burgard, Fox 2005, table 6.2) until \
+    the mean log-likelihood rises by less than 1e-9; 95 % intervals of Fisher's information, scores summed by scan";
 
 /// Writes the number of samples, the shares of them that are in no table, and their number by cause.
 fn write_left_out(table: &mut Table, left_out: &LeftOut, by_cause: &BTreeMap<String, u64>) {

@@ -10,7 +10,7 @@ mod evidence;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
 
 use super::effector::{LearnedEffector, ProfileTransition};
-use super::sensor::{LearnedSensor, NamedRow};
+use super::sensor::{BeamFit, LearnedSensor, NamedRow, SensorProfile};
 use sidestep_kernel::InputError;
 use sidestep_scenario::FORMAT;
 
@@ -22,8 +22,8 @@ pub fn empty(name: &str) -> String {
     document.to_string()
 }
 
-/// Returns the profile `text` with the sensor `name` added, or replaced; `place` names the text in
-/// errors.
+/// Returns the profile `text` with the sensor `name` added, or replaced, and where ranges were learned with the sensor
+/// [`beam_name`], which has their beam model; `place` names the text in errors.
 ///
 /// # Errors
 /// When `text` is not a profile or `name` is empty.
@@ -33,7 +33,19 @@ pub fn with_sensor(
     name: &str,
     model: &LearnedSensor,
 ) -> Result<String, InputError> {
-    with_section(place, text, ["sensors", name], sensor(model))
+    let text = with_section(place, text, ["sensors", name], sensor(model))?;
+    match &model.report.beam {
+        Some(fit) => {
+            let section = beam_sensor(model, fit);
+            with_section(place, &text, ["sensors", &beam_name(name)], section)
+        }
+        None => Ok(text),
+    }
+}
+
+/// Returns the name of the sensor of a profile that has the beam model beside the tables of the sensor `name`.
+pub fn beam_name(name: &str) -> String {
+    format!("{name}-beam")
 }
 
 /// Returns the profile `text` with the effector `name` added, or replaced; `place` names the text
@@ -100,8 +112,8 @@ fn implicit() -> Table {
     table
 }
 
-fn sensor(model: &LearnedSensor) -> Table {
-    let profile = &model.profile;
+/// Returns the keys of a sensor that do not concern its errors.
+fn shape(profile: &SensorProfile) -> Table {
     let mut section = Table::new();
     section["bearings_deg"] = numbers(&profile.bearings_deg);
     section["range_m"] = value(profile.range_m);
@@ -112,6 +124,12 @@ fn sensor(model: &LearnedSensor) -> Table {
     }
     section["distance_edges_m"] = numbers(&profile.distance_edges_m);
     section["distance_classes"] = words(&profile.distance_classes);
+    section
+}
+
+fn sensor(model: &LearnedSensor) -> Table {
+    let profile = &model.profile;
+    let mut section = shape(profile);
     section["confusion"] = rows(&profile.confusion);
     if !profile.confusion_by_class.is_empty() {
         let mut by_class = implicit();
@@ -122,6 +140,18 @@ fn sensor(model: &LearnedSensor) -> Table {
     }
     section["distance_confusion"] = rows(&profile.distance_confusion);
     section["evidence"] = Item::Table(evidence::sensor_evidence(model));
+    section
+}
+
+/// Returns the same sensor with its beam model in place of the rows.
+fn beam_sensor(model: &LearnedSensor, fit: &BeamFit) -> Table {
+    let mut section = shape(&model.profile);
+    let mut beam = InlineTable::new();
+    for (name, number) in fit.rounded_parameters() {
+        beam.insert(name, number.into());
+    }
+    section["beam"] = value(beam);
+    section["evidence"] = Item::Table(evidence::beam_evidence(model, fit));
     section
 }
 

@@ -63,6 +63,8 @@ pub(super) fn learn(
     report.warnings.extend(map_warnings(map));
     report.against_map = Some(against);
     model.profile = with_walls_only(model.profile);
+    let least_m = log.scans.first().map_or(0.0, |scan| f64::from(scan.range_min_m));
+    model.fit_beam(&log_of.readings, [least_m.max(0.0), options.range_m]);
     Ok(model)
 }
 
@@ -157,14 +159,16 @@ impl<'a> BeamEvaluator<'a> {
 
     fn evaluate_all(&self) -> EvaluatedBeams {
         let mut judged = EvaluatedBeams::default();
-        for scan in &self.log.scans {
+        for (number, scan) in self.log.scans.iter().enumerate() {
             let Some(pose) = self.pose_at(scan.header.stamp.secs()) else {
                 judged.skip("no_true_pose", scan.ranges_m.len());
                 continue;
             };
             for beam in 0..scan.ranges_m.len() {
                 match self.evaluate_beam(scan, beam, &pose) {
-                    Ok(reading) => judged.readings.push(reading),
+                    Ok(reading) => {
+                        judged.readings.push(LabeledReading { scan: number as u32, ..reading });
+                    }
                     Err(cause) => judged.skip(cause, 1),
                 }
             }
@@ -219,6 +223,7 @@ impl<'a> BeamEvaluator<'a> {
     fn reading(&self, expected_m: Option<f64>, reported_m: Option<f64>) -> LabeledReading {
         LabeledReading {
             robot: 0,
+            scan: 0,
             truth: usize::from(expected_m.is_some()),
             reported: usize::from(reported_m.is_some()),
             true_at: expected_m.map(|range_m| self.distance(range_m)),

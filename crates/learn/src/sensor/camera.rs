@@ -67,6 +67,7 @@ impl SensorProfile {
             distance_classes: self.distance_classes.clone(),
             distance_confusion: rows_of(&self.distance_confusion, &classes),
             designates: kinds.iter().map(|kind| self.designated_observation(kind)).collect(),
+            beam: None,
         }
     }
 

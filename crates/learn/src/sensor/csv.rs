@@ -28,11 +28,28 @@ pub(super) fn learn(
         report.measurements += damaged;
         report.skipped = damaged;
         report.skipped_by_cause.insert("damaged_row".to_string(), damaged);
-        report
-            .warnings
-            .push(format!("{damaged} damaged rows were left out, the first: {error}"));
+        report.warnings.push(format!("{damaged} damaged rows were left out, the first: {error}"));
+    }
+    if options.beam {
+        refuse_kinds_of_things(table, &log)?;
+        model.fit_beam(&log.readings, [0.0, options.range_m]);
     }
     Ok(model)
+}
+
+/// Refuses a table to which no beam model can be fitted.
+fn refuse_kinds_of_things(table: &CsvTable, log: &ReadingLog<'_>) -> Result<(), InputError> {
+    let cause = if log.observations.len() > 2 {
+        let listed = log.observations.join(", ");
+        format!("a beam model knows ranges only, and the table has the observations {listed}")
+    } else if log.readings.iter().all(|reading| reading.ranges_m() == (None, None)) {
+        "a beam model needs ranges in meters".to_string()
+    } else {
+        return Ok(());
+    };
+    let remedy =
+        "give true_distance_m and reported_distance_m, and one observation beside `nothing`";
+    Err(InputError::new(table.place(), cause, remedy))
 }
 
 /// The rule by which counts become rows.
@@ -83,6 +100,7 @@ impl ReadingLog<'_> {
             per_observer: BTreeMap::new(),
             detection: None,
             against_map: None,
+            beam: None,
             probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
             thin: tables
                 .iter()

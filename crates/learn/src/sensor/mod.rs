@@ -16,6 +16,7 @@
 //! - L4, detection: per second, whether a subject in view was read; see [`Detection`].
 
 mod bag;
+mod beam_fit;
 mod camera;
 mod csv;
 mod detection;
@@ -27,10 +28,11 @@ mod report;
 mod sighting;
 mod tables;
 
+pub use beam_fit::{BeamFit, BeamParameter};
 pub use camera::{NamedRow, SensorProfile};
 pub use detection::Detection;
 pub use options::SensorOptions;
-pub use recorded::{RunSensorOptions, learn_run};
+pub use recorded::{RunSensorOptions, learn_run, recorded_table};
 pub use report::{ErrorMoments, MapComparison, SensorReport};
 
 use std::path::Path;
@@ -46,6 +48,19 @@ pub struct LearnedSensor {
     pub report: SensorReport,
     /// The same in the form that a scenario loads.
     pub profile: SensorProfile,
+}
+
+impl LearnedSensor {
+    /// Fits the beam model to readings of a sensor that measures from `limits_m` first to last.
+    fn fit_beam(&mut self, readings: &[readings::LabeledReading], limits_m: [f64; 2]) {
+        let fit = BeamFit::from_readings(readings, limits_m);
+        self.report.warnings.extend(fit.iter().flat_map(BeamFit::warnings));
+        if fit.is_none() {
+            let words = "too few ranges for a beam model: it needs 100";
+            self.report.warnings.push(words.to_string());
+        }
+        self.report.beam = fit;
+    }
 }
 
 /// Learns a camera from an MRCLAM folder.

@@ -113,6 +113,7 @@ impl<'a> AssociatedLog<'a> {
             distance_counts: CountMatrix(all_distances.clone()),
             detection: Some(detection.clone()),
             against_map: None,
+            beam: None,
             kinds: Some(kinds.clone()),
             confusion,
         }

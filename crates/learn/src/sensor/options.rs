@@ -22,6 +22,9 @@ pub struct SensorOptions {
     pub range_m: f64,
     /// Name of the sensor to learn, for a CSV file with several.
     pub sensor: Option<String>,
+    /// Whether a table of ranges in meters, with one observation beside `nothing`, is also described by the four-part
+    /// beam model; scans always are.
+    pub beam: bool,
 }
 
 impl Default for SensorOptions {
@@ -34,6 +37,7 @@ impl Default for SensorOptions {
             bearings_deg: vec![-30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0],
             range_m: 6.5,
             sensor: None,
+            beam: false,
         }
     }
 }

@@ -15,6 +15,8 @@ const MAX_OBSERVATIONS: usize = 250;
 pub(super) struct LabeledReading {
     /// Number of the robot; 0 where the log is of one.
     pub(super) robot: u32,
+    /// Number of the scan, or of whatever was read at once; readings of one are not independent.
+    pub(super) scan: u32,
     /// Index of the true observation; 0 is `nothing`.
     pub(super) truth: usize,
     /// Index of the reported one.
@@ -72,9 +74,17 @@ pub(super) fn read(
     let mut readings = Vec::with_capacity(rows.len());
     let mut damaged = 0;
     let mut first_error = None;
+    let cycle = table.find("cycle");
+    let mut scan = 0;
+    let mut before = None;
     for row in &rows {
+        // Rows of one robot and cycle are one scan; where no cycle is given, each row is one.
+        let here =
+            cycle.map(|column| (row.field(column).text, parser.robot(row).map(|word| word.text)));
+        scan += u32::from(here.is_none() || here != before);
+        before = here;
         match parser.reading(row) {
-            Ok(reading) => readings.push(reading),
+            Ok(reading) => readings.push(LabeledReading { scan, ..reading }),
             Err(error) => {
                 damaged += 1;
                 first_error.get_or_insert(error);
@@ -195,17 +205,22 @@ impl RowParser<'_> {
     fn reading(&self, row: &CsvRow<'_>) -> Result<LabeledReading, InputError> {
         let truth = self.observation(row.field(self.columns.truth))?;
         let reported = self.observation(row.field(self.columns.reported))?;
-        let robot = self.columns.robot.map_or(Ok(0), |at| row.field(at).integer(&self.place))?;
+        let robot = self.robot(row).map_or(Ok(0), |word| word.integer(&self.place))?;
         // A distance beside `nothing` is ignored, but it must still be a valid distance.
         let true_at = self.distance(row.field(self.columns.true_at))?;
         let reported_at = self.distance(row.field(self.columns.reported_at))?;
         Ok(LabeledReading {
             robot,
+            scan: 0,
             truth,
             reported,
             true_at: true_at.filter(|_| truth != 0),
             reported_at: reported_at.filter(|_| reported != 0),
         })
+    }
+
+    fn robot<'t>(&self, row: &CsvRow<'t>) -> Option<Token<'t>> {
+        self.columns.robot.map(|column| row.field(column))
     }
 
     fn observation(&self, word: Token<'_>) -> Result<usize, InputError> {

@@ -33,6 +33,8 @@ pub(super) struct RecordedShape {
     distance_classes: Vec<String>,
     /// Kinds that it takes for something else.
     designates: Vec<(String, String)>,
+    /// Whether its reports are ranges in meters, which another table has.
+    measures_ranges: bool,
 }
 
 impl RecordedShape {
@@ -52,6 +54,7 @@ impl RecordedShape {
             distance_edges_m: edges_m,
             distance_classes: if are_named { classes } else { Vec::new() },
             designates: fact("designates").map(pairs).unwrap_or_default(),
+            measures_ranges: fact("table") == Some("ranges"),
         }
     }
 }
@@ -70,7 +73,19 @@ fn pairs(list: &str) -> Vec<(String, String)> {
     pairs.map(|(kind, seen)| (kind.to_string(), seen.to_string())).collect()
 }
 
-/// Learns from the table `readings` of a recorded run; `facts` are what the recording says of all of its rows, by name.
+/// Returns the table of a recorded run from which a sensor is learned: `ranges` where it measures them, else `readings`.
+/// `table` and `facts` are those of `readings`.
+pub fn recorded_table(
+    table: &CsvTable,
+    facts: &[(String, String)],
+    sensor: Option<&str>,
+) -> &'static str {
+    let name = sensor.map(String::from).or_else(|| only_sensor(table));
+    let shape = name.map(|name| RecordedShape::from_facts(&name, facts)).unwrap_or_default();
+    if shape.measures_ranges { "ranges" } else { "readings" }
+}
+
+/// Learns from the table `readings` or `ranges` of a recorded run, see [`recorded_table`]; `facts` are what the recording says of all of its rows, by name.
 ///
 /// The run knows the bearings, the range and the distance classes of its sensors, and whether they erred at all.
 ///
@@ -85,7 +100,10 @@ pub fn learn_run(
     let shape = name.map(|name| RecordedShape::from_facts(&name, facts)).unwrap_or_default();
     let mut model = super::learn_csv(table, &full_options(table.place(), options, &shape)?)?;
     if !shape.designates.is_empty() {
-        model.profile.designates.retain(|(kind, _)| shape.designates.iter().all(|(k, _)| k != kind));
+        model
+            .profile
+            .designates
+            .retain(|(kind, _)| shape.designates.iter().all(|(k, _)| k != kind));
         model.profile.designates.extend(shape.designates);
         model.profile.designates.retain(|(_, seen)| model.profile.observations.contains(seen));
     }
@@ -105,7 +123,12 @@ fn full_options(
     shape: &RecordedShape,
 ) -> Result<SensorOptions, InputError> {
     let default = SensorOptions::default();
-    refuse_other(place, "--edges", options.distance_edges_m.as_ref(), shape.distance_edges_m.as_ref())?;
+    refuse_other(
+        place,
+        "--edges",
+        options.distance_edges_m.as_ref(),
+        shape.distance_edges_m.as_ref(),
+    )?;
     let own_classes = Some(&options.distance_classes).filter(|classes| !classes.is_empty());
     let classes = Some(&shape.distance_classes).filter(|classes| !classes.is_empty());
     refuse_other(place, "--classes", own_classes, classes)?;
@@ -121,6 +144,7 @@ fn full_options(
             .unwrap_or(default.bearings_deg),
         range_m: options.range_m.or(shape.range_m).unwrap_or(default.range_m),
         sensor: options.sensor.clone(),
+        beam: shape.measures_ranges,
     })
 }
 
@@ -133,8 +157,13 @@ fn refuse_other<T: PartialEq + std::fmt::Debug>(
 ) -> Result<(), InputError> {
     match (given, recorded) {
         (Some(given), Some(recorded)) if given != recorded => {
-            let cause = format!("{option} is {given:?}, and the run was recorded with {recorded:?}");
-            Err(InputError::new(place, cause, format!("leave out {option}: the recording knows it")))
+            let cause =
+                format!("{option} is {given:?}, and the run was recorded with {recorded:?}");
+            Err(InputError::new(
+                place,
+                cause,
+                format!("leave out {option}: the recording knows it"),
+            ))
         }
         _ => Ok(()),
     }

@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::beam_fit::BeamFit;
 use super::detection::Detection;
 use super::sighting::is_consistent;
 use crate::display::{self, TableHeading};
@@ -61,6 +62,9 @@ pub struct SensorReport {
     /// Counts of beams by how they agree with a map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub against_map: Option<MapComparison>,
+    /// The four-part beam model that describes the ranges best, of sensors that measure ranges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beam: Option<BeamFit>,
     /// Every estimated probability with its count and interval. Of `confusion`, only the cells with
     /// counts.
     pub probabilities: Vec<Estimate>,
@@ -163,6 +167,8 @@ impl SensorReport {
         let Some(warning) = self.left_out.warning(&self.estimate) else { return };
         self.warnings.insert(0, warning);
         self.probabilities.iter_mut().for_each(|estimate| estimate.interval = None);
+        let parameters = self.beam.iter_mut().flat_map(|fit| &mut fit.parameters);
+        parameters.for_each(|parameter| parameter.interval = None);
     }
 }
 
@@ -191,7 +197,29 @@ impl fmt::Display for SensorReport {
             &self.probabilities,
             &TableHeading { row: "true", column: "reported" },
         )?;
+        if let Some(fit) = &self.beam {
+            write!(f, "{fit}")?;
+        }
         display::write_low_count_rows(f, &self.thin, self.estimate.thin_below)?;
         display::write_holdout_tests(f, &self.hold_out)
+    }
+}
+
+impl fmt::Display for BeamFit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\nbeam model, of {} readings in {} scans", self.fitted, self.scans)?;
+        if self.fitted < self.readings {
+            writeln!(f, "  (taken evenly from {})", self.readings)?;
+        }
+        writeln!(f, "  {:20} {:>11}  95 % interval", "parameter", "value")?;
+        for parameter in &self.parameters {
+            let interval = match parameter.interval {
+                Some(interval) => format!("[{:.5}, {:.5}]", interval.low, interval.high),
+                None => "none".to_string(),
+            };
+            writeln!(f, "  {:20} {:>11.5}  {interval}", parameter.name, parameter.value)?;
+        }
+        let percent = 100.0 * self.largest_deviation;
+        writeln!(f, "  {} steps; shares of ranges differ by {percent:.1} % at most", self.steps)
     }
 }

@@ -4,8 +4,8 @@
 
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{ColumnSpec, ColumnValues, MemoryRecorder, TableSchema};
-use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::effector::{self, EffectorOptions};
+use sidestep::learn::sensor::SensorOptions;
 use sidestep::learn::{Estimate, profile, sensor};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::exact::markov_model;

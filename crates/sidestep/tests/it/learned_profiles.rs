@@ -1,10 +1,10 @@
 //! Promise: a profile holds the learned numbers in the form that a scenario loads.
 
 use sidestep::kernel::InputError;
-use sidestep::learn::profile::{empty, with_effector, with_sensor};
-use sidestep::learn::sensor::{self, SensorOptions};
 use sidestep::learn::EstimateOptions;
 use sidestep::learn::effector::{self, EffectorOptions};
+use sidestep::learn::profile::{empty, with_effector, with_sensor};
+use sidestep::learn::sensor::{self, SensorOptions};
 use sidestep::scenario::Source;
 use sidestep::worlds::robots::scenario::{Behaviours, Compiled, StorageOrder};
 use sidestep::worlds::robots::world::Role;

@@ -4,9 +4,9 @@
 use sidestep::import::table::CsvTable;
 use sidestep::kernel::Simulation;
 use sidestep::kernel::ports::{ColumnSpec, MemoryRecorder, TableSchema};
-use sidestep::learn::sensor::{self, SensorOptions};
 use sidestep::learn::Estimate;
 use sidestep::learn::effector::{self, EffectorOptions};
+use sidestep::learn::sensor::{self, SensorOptions};
 use sidestep::scenario::Source;
 use sidestep::statistics::chi_square_p_value;
 use sidestep::worlds::robots::robots_run;

@@ -34,6 +34,7 @@ mod odometry;
 mod perceive;
 pub mod policy;
 mod purpose;
+mod ranges;
 mod remarks;
 pub mod rows;
 pub mod scenario;
@@ -106,6 +107,23 @@ pub struct SensorSample {
     pub reported: Reading,
 }
 
+/// The range of one beam of a sensor that measures ranges, kept where a log for learning is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RangeSample {
+    /// Cycle of the reading.
+    pub cycle: Cycle,
+    /// The robot that carries the sensor.
+    pub robot: EntityId,
+    /// Number of the sensor on its robot, from 0.
+    pub sensor: u16,
+    /// Number of the beam, from 0 in the order of the sensor's bearings.
+    pub beam: u16,
+    /// Distance in meters to the first obstacle that the beam meets; `None` without one in range.
+    pub true_m: Option<f64>,
+    /// The range in meters that the robot perceived; `None` for no echo.
+    pub reported_m: Option<f64>,
+}
+
 /// The result of one action, kept where a log for learning is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionSample {
@@ -142,6 +160,7 @@ pub struct Scratch {
     keep_motions: bool,
     events: Vec<Event>,
     sensor_samples: Vec<SensorSample>,
+    range_samples: Vec<RangeSample>,
     motion_samples: Vec<MotionSample>,
 }
 

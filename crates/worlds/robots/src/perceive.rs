@@ -6,6 +6,7 @@ use super::alias_table::RowIndex;
 use super::cycle_context::{CycleContext, are_free, box_index};
 use super::decide::{Decision, Memory, Percept, ReceivedMessage, Sector, TripEvent, UNSEEN};
 use super::purpose;
+use super::ranges::{RangeReadings, RangeSensor};
 use super::sensor::Reading;
 use super::state::{BodyState, Facing, Intent, PackedPose};
 use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
@@ -131,6 +132,14 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             first = beams.end;
             let readings = &mut readings[beams.clone()];
             let sectors = &model.body.sectors[beams];
+            if let Some(beam) = sensor.erring_beam() {
+                let samples = scratch
+                    .keep_readings
+                    .then_some((&mut scratch.sensor_samples, &mut scratch.range_samples));
+                let into = RangeReadings { readings, sectors, nearest: &mut nearest, samples };
+                self.sense_ranges(&RangeSensor { sensor, beam, number }, body, into);
+                continue;
+            }
             cast_beams(self, sensor, body, truths);
             sample_reports(
                 sensor,

@@ -6,7 +6,7 @@ use super::scenario::RecordSection;
 use super::sensor::SensorModel;
 use super::state::{PoseBuffer, RobotsState};
 use super::world::{RobotsWorld, Role};
-use super::{Event, EventKind, MotionSample, Scratch, SensorSample};
+use super::{Event, EventKind, MotionSample, RangeSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
     ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnValues, RecordError, Recorder, Table,
     TableBuffer, TableBuffers, TableRowsBuffer, TableSchema,
@@ -111,12 +111,17 @@ fn sensor_notes(world: &RobotsWorld) -> Vec<(String, String)> {
         let designates = world.kinds.iter().zip(&sensor.designates).skip(1);
         let taken = designates.map(|(kind, &of)| (kind, &sensor.observations[usize::from(of)]));
         let taken = taken.filter(|(kind, observation)| kind != observation);
+        let table = if sensor.beam.is_some() { "ranges" } else { "readings" };
         let notes = [
+            ("table", table.to_string()),
             ("range_m", sensor.range_m.to_string()),
             ("bearings_deg", comma_list(&sensor.bearings_deg)),
             ("distance_edges_m", comma_list(&sensor.distance_edges_m)),
             ("distance_classes", sensor.distance_classes.join(",")),
-            ("designates", comma_list(&taken.map(|(kind, seen)| format!("{kind}={seen}")).collect::<Vec<_>>())),
+            (
+                "designates",
+                comma_list(&taken.map(|(kind, seen)| format!("{kind}={seen}")).collect::<Vec<_>>()),
+            ),
         ];
         about.extend(notes.map(|(key, note)| (format!("sensor.{}.{key}", sensor.name), note)));
     }
@@ -153,6 +158,33 @@ fn reading_table(
         .label("reported", "what the sensor reported", observations, |r| r.reported[0])
         .label("reported_class", "the reported distance class", classes, |r| r.reported[1])
         .label("sensor_name", "name of the sensor in the scenario", sensors, |r| r.sensor_name)
+}
+
+/// The true and the reported range of a beam of a sensor that measures ranges.
+struct RangeRow {
+    sample: RangeSample,
+    sensor_name: u32,
+    /// Indices of the true and the reported observation.
+    seen: [u32; 2],
+}
+
+/// Returns the table of ranges; `None` where no sensor measures any.
+fn range_table(world: &RobotsWorld) -> Option<Table<RangeRow>> {
+    world.sensors().find(|sensor| sensor.beam.is_some())?;
+    let about = [error_notes(world), sensor_notes(world)].concat();
+    let ReadingLabels { observations, sensors, .. } = ReadingLabels::from_world(world);
+    let beam = "number of the beam, in the order of the sensor's bearings";
+    let table = Table::new("ranges")
+        .with_about(about)
+        .u64("cycle", CYCLE_DESCRIPTION, |r: &RangeRow| r.sample.cycle)
+        .u32("robot", "entity id", |r| r.sample.robot)
+        .label("sensor_name", "name of the sensor in the scenario", sensors, |r| r.sensor_name)
+        .u32("beam", beam, |r| u32::from(r.sample.beam))
+        .label("true", "what the beam met", observations.clone(), |r| r.seen[0])
+        .f64("true_distance_m", "distance to it, empty for nothing", |r| r.sample.true_m)
+        .label("reported", "what the sensor reported", observations, |r| r.seen[1])
+        .f64("reported_distance_m", "its range, empty without an echo", |r| r.sample.reported_m);
+    Some(table)
 }
 
 fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
@@ -202,15 +234,22 @@ struct RowBuffers {
     events: TableRowsBuffer<Event>,
     readings: TableRowsBuffer<ReadingRow>,
     motions: TableRowsBuffer<MotionSample>,
+    ranges: TableRowsBuffer<RangeRow>,
 }
 
 impl TableBuffers for RowBuffers {
     fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
-        vec![&self.trajectories, &self.events, &self.readings, &self.motions]
+        vec![&self.trajectories, &self.events, &self.readings, &self.motions, &self.ranges]
     }
 
     fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
-        vec![&mut self.trajectories, &mut self.events, &mut self.readings, &mut self.motions]
+        vec![
+            &mut self.trajectories,
+            &mut self.events,
+            &mut self.readings,
+            &mut self.motions,
+            &mut self.ranges,
+        ]
     }
 }
 
@@ -229,6 +268,7 @@ pub struct Collector {
     /// The pose that each robot's wheels report, by id, while odometry is watched.
     odometry: Option<Vec<DeadReckoning>>,
     sensor_samples: Vec<SensorSample>,
+    range_samples: Vec<RangeSample>,
     motion_samples: Vec<MotionSample>,
 }
 
@@ -247,6 +287,7 @@ impl Collector {
             record.calibration.then(|| reading_table(world, ReadingLabels::from_world(world))),
         );
         self.rows.motions.set_table(record.calibration.then(|| motion_table(world)));
+        self.rows.ranges.set_table(record.calibration.then(|| range_table(world)).flatten());
         if record.trajectories {
             let bodies = world.bodies.len();
             let target = (TARGET_BUFFER_POSES / bodies).max(MIN_BUFFER_CYCLES);
@@ -294,6 +335,7 @@ impl Collector {
     pub(super) fn collect(&mut self, scratch: &mut Scratch) {
         self.gathered.append(&mut scratch.events);
         self.sensor_samples.append(&mut scratch.sensor_samples);
+        self.range_samples.append(&mut scratch.range_samples);
         self.motion_samples.append(&mut scratch.motion_samples);
     }
 
@@ -337,6 +379,12 @@ impl Collector {
             self.rows
                 .readings
                 .extend(samples.filter_map(|sample| labels.reading_row(world, &sample)));
+        }
+        self.range_samples.sort_by_key(|sample| (sample.cycle, sample.robot));
+        if !self.range_samples.is_empty() {
+            let labels = ReadingLabels::from_world(world);
+            let samples = self.range_samples.drain(..);
+            self.rows.ranges.extend(samples.filter_map(|sample| labels.range_row(world, sample)));
         }
         self.recorded = now;
         self.rows.record(recorder)
@@ -417,6 +465,17 @@ impl ReadingLabels {
             truth: self.indices(sensor.names_of(sample.truth)),
             reported: self.indices(sensor.names_of(sample.reported)),
         })
+    }
+
+    /// Returns the row of a range; `None` for a body without sensors.
+    fn range_row(&self, world: &RobotsWorld, sample: RangeSample) -> Option<RangeRow> {
+        let Role::Robot(model) = &world.type_of(sample.robot).role else { return None };
+        let sensor = &model.body.sensors[usize::from(sample.sensor)].model;
+        let seen = [sample.true_m, sample.reported_m].map(|range| {
+            let reading = sensor.reading_of_range(range);
+            label_index(&self.observations, &sensor.observations[usize::from(reading.observation)])
+        });
+        Some(RangeRow { sample, sensor_name: label_index(&self.sensors, &sensor.name), seen })
     }
 
     /// Returns the numbers of the labels of a reading's observation and class.

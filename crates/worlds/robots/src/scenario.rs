@@ -107,8 +107,9 @@ pub(super) struct SensorSection {
     pub(super) observations: Spanned<Vec<String>>,
     #[serde(default)]
     pub(super) designates: BTreeMap<Spanned<String>, Spanned<String>>,
-    /// Probability of each report, one row for each true observation.
-    pub(super) confusion: Spanned<MatrixRows>,
+    /// Probability of each report, one row for each true observation; needed unless `beam` is given.
+    #[serde(default)]
+    pub(super) confusion: Option<Spanned<MatrixRows>>,
     #[serde(default)]
     pub(super) confusion_by_class: BTreeMap<Spanned<String>, Spanned<MatrixRows>>,
     #[serde(default)]
@@ -118,10 +119,30 @@ pub(super) struct SensorSection {
     pub(super) distance_classes: Option<Spanned<Vec<String>>>,
     #[serde(default)]
     pub(super) distance_confusion: Option<Spanned<MatrixRows>>,
+    /// The beam model of a sensor that measures ranges, in place of the three kinds of rows.
+    pub(super) beam: Option<Spanned<BeamSection>>,
     /// Counts and sources of a learned table; nothing depends on them.
     #[serde(default, rename = "evidence")]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     _evidence: toml::Table,
+}
+
+/// The four-part beam model; the weights of its parts sum to 1.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BeamSection {
+    /// Weight of ranges of what is there.
+    pub(super) hit: Fraction,
+    /// Weight of ranges of something unexpected before it.
+    pub(super) short: Fraction,
+    /// Weight of no echo.
+    pub(super) max: Fraction,
+    /// Weight of ranges that are random.
+    pub(super) random: Fraction,
+    /// Standard deviation of the Gaussian noise of hits.
+    pub(super) sigma_hit_m: Positive,
+    /// Rate of the exponential density of short ranges, in 1/m.
+    pub(super) lambda_short_per_m: Positive,
 }
 
 /// Probabilities of all reports, by the name of what is truly there.

@@ -8,6 +8,7 @@ use super::policy::ConflictPolicy;
 use super::sensor::{Reading, SensorModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sidestep_error_models::beam::BeamModel;
 use sidestep_error_models::ray::{Crossing, EPSILON, crossings, turn_crossing};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::control::AgentTeams;
@@ -241,6 +242,8 @@ pub struct MountedSensor {
     /// The row of each beam's report when it meets nothing.
     pub(super) nothing_row: RowIndex,
     pub(super) nothing: Reading,
+    /// Side of a box in meters.
+    pub(super) box_size_m: f64,
 }
 
 /// Consecutive boxes along a beam.
@@ -290,7 +293,8 @@ impl MountedSensor {
         let table = AliasTable::new(&model, reliable)?;
         let nothing = model.nothing();
         let nothing_row = table.row(nothing);
-        Ok(Self { model, table, boxes, distances, ends: ends.into(), nothing_row, nothing })
+        let ends = ends.into();
+        Ok(Self { model, table, boxes, distances, ends, nothing_row, nothing, box_size_m })
     }
 
     /// Returns whether every reading is the truth.
@@ -302,8 +306,15 @@ impl MountedSensor {
     pub(super) fn is_error_free(&self) -> bool {
         let model = &self.model;
         self.is_reliable()
-            || is_identity(&model.distance_confusion)
+            || model.beam.is_none()
+                && is_identity(&model.distance_confusion)
                 && model.confusion.iter().all(|matrix| is_identity(matrix))
+    }
+
+    /// Returns the model by which its reports are drawn, where it measures ranges and errs.
+    #[inline]
+    pub(super) fn erring_beam(&self) -> Option<&BeamModel> {
+        self.model.beam.as_ref().filter(|_| !self.table.reliable)
     }
 
     /// Returns 0, which is nothing, where the sensor does not see the kind.

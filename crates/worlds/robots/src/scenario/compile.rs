@@ -1,6 +1,7 @@
 //! Compilation of a scenario's text to an immutable world and the start of every body.
 
 mod bodies;
+mod effectless;
 mod map;
 mod people_and_doors;
 mod placer;
@@ -8,6 +9,7 @@ mod remarks;
 mod robots;
 pub(super) mod unused_keys;
 
+use self::effectless::{Given, Shadowed, effectless_remarks};
 use self::map::{LoadedMap, load_map, padded};
 use self::placer::Placement;
 pub(super) use self::placer::Placer;
@@ -141,7 +143,7 @@ impl<'a> Compiler<'a> {
     fn new(source: &Source, own: &'a Behaviours) -> Result<Self, InputError> {
         let source = Arc::new(source.clone());
         let (head, file) = source.parse_world::<RobotsFile>()?;
-        let (sensors, effectors) = known_tables(&source, &file)?;
+        let KnownTables { sensors, effectors, shadowed } = known_tables(&source, &file)?;
         // Where the map is wrong as well, this is the error that is reported.
         check_names(&source, &file, &sensors, &effectors)?;
         let LoadedMap { map, doors: office_doors, remarks: map_remarks } =
@@ -153,6 +155,14 @@ impl<'a> Compiler<'a> {
         let mut remarks = map_remarks;
         remarks.extend(remarks::effector_remarks(&file, &effectors));
         remarks.extend(remarks::radio_remark(&file));
+        remarks.extend(effectless_remarks(&Given {
+            source: &source,
+            file: &file,
+            sensors: &sensors,
+            effectors: &effectors,
+            shadowed: &shadowed,
+            own,
+        }));
         let streams = Streams::new(Seed(head.seed));
         let border = border(&file, &effectors);
         Ok(Self {
@@ -351,41 +361,80 @@ fn find_named<'m, T>(
     })
 }
 
-/// Returns the sensors and effectors that a scenario may name: ours, those of its profiles, its own.
-fn known_tables(
-    source: &Arc<Source>,
-    file: &RobotsFile,
-) -> Result<(Sensors, Effectors), InputError> {
-    let mut sensors = BTreeMap::new();
-    let mut effectors = BTreeMap::new();
-    // Later ones replace earlier ones of the same name, so the scenario's own come last.
-    let presets = Source::new("presets", include_str!("../presets.toml"), "");
-    add_profile(Arc::new(presets), &mut sensors, &mut effectors)?;
-    for named in &file.profiles {
-        let profile = Source::read(&source.path(named.get_ref()), &[]);
-        let added = profile
-            .and_then(|profile| add_profile(Arc::new(profile), &mut sensors, &mut effectors));
-        added.map_err(|error| source.with_key_at(named.span(), error))?;
-    }
-    add_all(source, &file.sensors, &mut sensors);
-    add_all(source, &file.effectors, &mut effectors);
-    Ok((sensors, effectors))
+/// The sensors and effectors that a scenario may name.
+#[derive(Default)]
+struct KnownTables {
+    sensors: Sensors,
+    effectors: Effectors,
+    shadowed: Vec<Shadowed>,
 }
 
-fn add_profile(
-    source: Arc<Source>,
-    sensors: &mut Sensors,
-    effectors: &mut Effectors,
-) -> Result<(), InputError> {
-    let file: ProfileFile = source.parse()?;
-    if *file.format.get_ref() != sidestep_scenario::FORMAT {
-        let cause = format!("profile format {} is not known", file.format.get_ref());
-        let remedy = "learn the profile again, or write `format = 1`";
-        return Err(source.error(file.format.span(), cause, remedy));
+/// Name of the presets in errors.
+const PRESETS: &str = "presets";
+
+/// Returns the sensors and effectors that a scenario may name: ours, those of its profiles, its own.
+fn known_tables(source: &Arc<Source>, file: &RobotsFile) -> Result<KnownTables, InputError> {
+    let mut known = KnownTables::default();
+    // Later ones replace earlier ones of the same name, so the scenario's own come last.
+    let presets = Source::new(PRESETS, include_str!("../presets.toml"), "");
+    known.add_profile(Arc::new(presets))?;
+    let mut profiles: Vec<String> = Vec::new();
+    for named in &file.profiles {
+        let profile = Source::read(&source.path(named.get_ref()), &[]);
+        let before = known.places();
+        let added = profile.and_then(|profile| {
+            profiles.push(profile.place.clone());
+            known.add_profile(Arc::new(profile))
+        });
+        added.map_err(|error| source.with_key_at(named.span(), error))?;
+        known.note_shadowed(&before, &profiles);
     }
-    add_all(&source, &file.sensors, sensors);
-    add_all(&source, &file.effectors, effectors);
-    Ok(())
+    let before = known.places();
+    add_all(source, &file.sensors, &mut known.sensors);
+    add_all(source, &file.effectors, &mut known.effectors);
+    known.note_shadowed(&before, &profiles);
+    Ok(known)
+}
+
+/// The text that has a table, by what it is and its name.
+type TablePlaces = BTreeMap<(&'static str, String), String>;
+
+impl KnownTables {
+    fn add_profile(&mut self, source: Arc<Source>) -> Result<(), InputError> {
+        let file: ProfileFile = source.parse()?;
+        if *file.format.get_ref() != sidestep_scenario::FORMAT {
+            let cause = format!("profile format {} is not known", file.format.get_ref());
+            let remedy = "learn the profile again, or write `format = 1`";
+            return Err(source.error(file.format.span(), cause, remedy));
+        }
+        add_all(&source, &file.sensors, &mut self.sensors);
+        add_all(&source, &file.effectors, &mut self.effectors);
+        Ok(())
+    }
+
+    fn places(&self) -> TablePlaces {
+        let sensors = self
+            .sensors
+            .iter()
+            .map(|(name, at)| (("sensor", name.clone()), at.source.place.clone()));
+        let effectors = self.effectors.iter();
+        let effectors =
+            effectors.map(|(name, at)| (("effector", name.clone()), at.source.place.clone()));
+        sensors.chain(effectors).collect()
+    }
+
+    /// Notes the tables of profiles that were replaced since `before`.
+    fn note_shadowed(&mut self, before: &TablePlaces, profiles: &[String]) {
+        for ((what, name), by) in self.places() {
+            let Some(place) = before.get(&(what, name.clone())).filter(|place| **place != by)
+            else {
+                continue;
+            };
+            if let Some(profile) = profiles.iter().position(|known| known == place) {
+                self.shadowed.push(Shadowed { profile, what, name, by });
+            }
+        }
+    }
 }
 
 fn add_all<T: Clone>(

@@ -5,6 +5,7 @@ use super::located_section::LocatedSection;
 use super::{EffectorSection, MatrixRows, SensorSection, TransitionSection};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
+use sidestep_error_models::beam::BeamModel;
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_probability_row;
 use sidestep_scenario::{Spanned, suggestion};
@@ -34,10 +35,12 @@ pub(super) fn sensor(
         let remedy = "give 1 to 1024 finite bearings in degrees";
         return Err(at.error(s.bearings_deg.span(), cause, remedy));
     }
+    let beam = beam(name, at)?;
     Ok(SensorModel {
         name: name.into(),
         bearings_deg: bearings.clone(),
         range_m: s.range_m.get(),
+        beam,
         confusion: confusion(at, &observations, &classes)?,
         designates: designates(name, at, kinds, is_mounted)?,
         distance_confusion: distance_confusion(at, &classes)?,
@@ -47,15 +50,58 @@ pub(super) fn sensor(
     })
 }
 
+/// Checks the beam model of a sensor that measures ranges, and that it has no rows beside it.
+fn beam(name: &str, at: &LocatedSection<SensorSection>) -> Result<Option<BeamModel>, InputError> {
+    let s = at.section.get_ref();
+    let Some(section) = &s.beam else { return Ok(None) };
+    let rows = [&s.confusion, &s.distance_confusion].into_iter().flatten().map(Spanned::span);
+    let by_class = s.confusion_by_class.keys().map(Spanned::span);
+    if let Some(span) = rows.chain(by_class).next() {
+        let cause = format!("sensor `{name}` has rows beside its beam model, which do nothing");
+        return Err(at.error(span, cause, "leave out the rows, or `beam`"));
+    }
+    if s.observations.get_ref().len() != 2 {
+        let cause = format!("sensor `{name}` measures ranges, which do not tell things apart");
+        let remedy = "write observations = [\"nothing\", \"wall\"], and with `designates` that each kind is a wall";
+        return Err(at.error(s.observations.span(), cause, remedy));
+    }
+    let b = section.get_ref();
+    let model = BeamModel {
+        hit: b.hit.get(),
+        short: b.short.get(),
+        max: b.max.get(),
+        random: b.random.get(),
+        sigma_hit_m: b.sigma_hit_m.get(),
+        lambda_short_per_m: b.lambda_short_per_m.get(),
+    };
+    let normalized = model.normalized().map_err(|cause| {
+        let remedy = "give four weights that sum to 1, and a positive noise and rate";
+        at.error(section.span(), format!("the beam model of sensor `{name}`: {cause}"), remedy)
+    });
+    normalized.map(Some)
+}
+
 /// Returns one matrix for each distance class and one beyond; a class without rows of its own has
-/// those that hold anywhere.
+/// those that hold anywhere. That of a beam model reports the truth.
 fn confusion(
     at: &LocatedSection<SensorSection>,
     observations: &[String],
     classes: &[String],
 ) -> Result<Vec<Vec<Vec<f64>>>, InputError> {
     let s = at.section.get_ref();
-    let everywhere = matrix(at, &s.confusion, observations, observations)?;
+    let everywhere = match (&s.confusion, &s.beam) {
+        (Some(rows), _) => matrix(at, rows, observations, observations)?,
+        (None, Some(_)) => {
+            let n = observations.len();
+            (0..n).map(|observation| certain_row(observation, n)).collect()
+        }
+        (None, None) => {
+            let cause = "the sensor has no `confusion`";
+            let remedy =
+                "give one row per observation, or `beam` for a sensor that measures ranges";
+            return Err(at.error(at.section.span(), cause, remedy));
+        }
+    };
     let mut confusion = vec![everywhere; classes.len() + 1];
     for (class, rows) in &s.confusion_by_class {
         let mut names = classes.iter().map(String::as_str).chain(["beyond"]);

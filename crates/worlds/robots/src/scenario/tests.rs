@@ -223,9 +223,10 @@ fn an_author_is_told_what_will_surprise() {
     );
     let told = remarks(&text("", &(surprising.to_string() + &eye)), Path::new(""));
     let keys: Vec<&str> = told.iter().map(|remark| remark.key.as_str()).collect();
-    assert_eq!(keys, ["robots.0.effector", "sensors.eye", "sensors.eye"]);
+    assert_eq!(keys, ["robots.0.effector", "effectors.wheels", "sensors.eye", "sensors.eye"]);
     let parts = [
         "`forward` of `wheels` mostly comes to a turn of -90 degrees (60 %)",
+        "its turns never err",
         "does not see person",
         "at the distance class class2",
     ];

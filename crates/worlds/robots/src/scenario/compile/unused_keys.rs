@@ -1,7 +1,7 @@
 //! Keys that are given and do nothing, or lists that are given and empty: refused, because their
 //! author expects something of them.
 
-use super::super::{DoorSection, MoverSection, RobotSection, RobotsFile};
+use super::super::{DoorSection, MoverSection, PeriodicSection, RobotSection, RobotsFile};
 use super::*;
 
 /// The built-in behaviors, and the keys that each reads beside `kind`.
@@ -28,6 +28,13 @@ pub(super) fn refuse_unused(
 ) -> Result<(), InputError> {
     if !file.kind_order.is_empty() && file.conflict_policy != ConflictPolicy::ByKind {
         return Err(source.unused_key("kind_order", "unless conflict_policy is \"by_kind\""));
+    }
+    for (k, kind) in file.kind_order.iter().enumerate() {
+        let is_twice = file.kind_order[..k].iter().any(|other| other.get_ref() == kind.get_ref());
+        if is_twice {
+            let cause = format!("`{}` stands twice in kind_order", kind.get_ref());
+            return Err(source.error(kind.span(), cause, "name each kind once"));
+        }
     }
     // By its text, because a value that is not given is the default.
     let has_unknown = source.keys("map").iter().any(|key| key.name == "unknown");
@@ -136,7 +143,18 @@ fn check_doors(
     let sizes_places = !s.office || !s.at.is_empty();
     let beside_office = [("size", s.size.is_some(), sizes_places)];
     let because = "beside `office`, whose doors have sizes";
-    source.refuse_unused_keys(section.span(), &beside_office, because)
+    source.refuse_unused_keys(section.span(), &beside_office, because)?;
+    let Some(periodic) = &s.periodic else { return Ok(()) };
+    let PeriodicSection { open, closed, phase } = *periodic.get_ref();
+    let total = open.saturating_add(closed);
+    match phase {
+        Some(phase) if total > 0 && phase >= total => {
+            let cause = format!("phase = {phase}, with a period of {total}");
+            let remedy = format!("give 0 to {}, the cycles of the period that are over", total - 1);
+            Err(source.error(periodic.span(), cause, remedy))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a phase beyond the period, which would be another one.
