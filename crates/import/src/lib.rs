@@ -3,7 +3,7 @@
 //!
 //! Every reader accepts its file plain or compressed with gzip, refuses absurd sizes before it
 //! allocates memory for them, and reports errors as an [`InputError`](sidestep_kernel::InputError)
-//! with file, line and column. Readers of maps and of URDF files record what they dropped, repaired, guessed or did not
+//! with file, line and column. Readers of maps, URDF files, bags and logs record what they dropped, repaired, guessed or did not
 //! use in an [`ImportReport`] beside their data.
 
 pub mod ascii;
@@ -27,6 +27,7 @@ mod raycast;
 pub mod rosmap;
 pub mod stage;
 pub mod table;
+pub mod track;
 pub mod traffic;
 pub mod urdf;
 pub mod write;

@@ -1,12 +1,45 @@
-//! CDR, the encoding of ROS 2 messages: values one after the other, each aligned to its own size.
+//! CDR, the encoding of ROS 2 messages: values one after the other, each aligned to its own size; and that of ROS 1.
 //!
-//! The first four bytes of a message give the encoding and the byte order; alignment is relative to the byte
-//! after them. The fields of a message are listed once, by `message!`, for reading and writing.
+//! The first four bytes of a message in CDR give the encoding and the byte order; alignment is relative to the byte
+//! after them. Messages of ROS 1 have neither such a head nor gaps, texts without a zero at their end, and a counter
+//! before each header. The fields of a message are listed once, by `message!`, for reading and writing.
 
 /// The first four bytes of messages that are written here: plain CDR, little-endian.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Reads one message from its bytes, the header included.
+/// How messages are encoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// CDR, as in ROS 2.
+    Cdr,
+    /// The encoding of ROS 1.
+    Ros1,
+}
+
+/// Reads one message of an encoding from its bytes.
+///
+/// # Errors
+/// Those of [`decode`]; in ROS 1, where lengths alone tell one value from the next, also when bytes are left over.
+pub fn decode_as<T: Cdr>(encoding: Encoding, bytes: &[u8]) -> Result<T, CdrError> {
+    if encoding == Encoding::Cdr {
+        return decode(bytes);
+    }
+    let mut reader = Reader { body: bytes, offset: 0, is_little: true, is_ros1: true };
+    let message = T::read(&mut reader)?;
+    if reader.offset < bytes.len() {
+        return Err(CdrError::LeftOver { at: reader.offset });
+    }
+    Ok(message)
+}
+
+/// Returns a message as bytes of ROS 1.
+pub fn encode_ros1<T: Cdr>(message: &T) -> Vec<u8> {
+    let mut writer = Writer { bytes: Vec::new(), head: 0, is_ros1: true };
+    message.write(&mut writer);
+    writer.bytes
+}
+
+/// Reads one message from its bytes in CDR, the head included.
 ///
 /// # Errors
 /// When the encoding is another one, or the bytes end too early.
@@ -17,12 +50,13 @@ pub fn decode<T: Cdr>(bytes: &[u8]) -> Result<T, CdrError> {
         [0, 1] => true,
         _ => return Err(CdrError::Encoding([head[0], head[1]])),
     };
-    T::read(&mut Reader { body, offset: 0, is_little })
+    T::read(&mut Reader { body, offset: 0, is_little, is_ros1: false })
 }
 
 /// Returns a message as bytes, the header included.
 pub fn encode<T: Cdr>(message: &T) -> Vec<u8> {
-    let mut writer = Writer { bytes: LITTLE_ENDIAN.to_vec() };
+    let head = LITTLE_ENDIAN.len();
+    let mut writer = Writer { bytes: LITTLE_ENDIAN.to_vec(), head, is_ros1: false };
     message.write(&mut writer);
     writer.bytes
 }
@@ -42,6 +76,11 @@ pub enum CdrError {
         /// The offset of the text, after the header.
         at: usize,
     },
+    /// There are bytes after the last value: the message has another definition.
+    LeftOver {
+        /// The offset of the first of them.
+        at: usize,
+    },
 }
 
 impl std::fmt::Display for CdrError {
@@ -50,6 +89,7 @@ impl std::fmt::Display for CdrError {
             Self::Encoding([a, b]) => write!(f, "its encoding is {a:02x}{b:02x}, not plain CDR"),
             Self::Cut { at } => write!(f, "it ends before its value at byte {at}"),
             Self::Text { at } => write!(f, "the text at byte {at} is damaged"),
+            Self::LeftOver { at } => write!(f, "it goes on after its last value, at byte {at}"),
         }
     }
 }
@@ -76,12 +116,18 @@ pub struct Reader<'a> {
     /// The offset of the next value in `body`.
     offset: usize,
     is_little: bool,
+    is_ros1: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads the next bytes, which start at a multiple of `alignment`.
+    /// Returns whether the message is of ROS 1.
+    pub(super) fn is_ros1(&self) -> bool {
+        self.is_ros1
+    }
+
+    /// Reads the next bytes, which in CDR start at a multiple of `alignment`.
     fn read_bytes(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
-        let start = self.offset.next_multiple_of(alignment);
+        let start = if self.is_ros1 { self.offset } else { self.offset.next_multiple_of(alignment) };
         let bytes = self.body.get(start..).and_then(|rest| rest.get(..n));
         let bytes = bytes.ok_or(CdrError::Cut { at: start })?;
         self.offset = start + n;
@@ -101,12 +147,20 @@ impl<'a> Reader<'a> {
 /// The bytes of a message that is being written.
 pub struct Writer {
     bytes: Vec<u8>,
+    /// The number of bytes before the first value.
+    head: usize,
+    is_ros1: bool,
 }
 
 impl Writer {
+    /// Returns whether the message is of ROS 1.
+    pub(super) fn is_ros1(&self) -> bool {
+        self.is_ros1
+    }
+
     fn number<const N: usize>(&mut self, bytes: [u8; N]) {
-        let body = self.bytes.len() - LITTLE_ENDIAN.len();
-        let padding = body.next_multiple_of(N) - body;
+        let body = self.bytes.len() - self.head;
+        let padding = if self.is_ros1 { 0 } else { body.next_multiple_of(N) - body };
         self.bytes.extend(std::iter::repeat_n(0, padding));
         self.bytes.extend(bytes);
     }
@@ -142,6 +196,9 @@ impl Cdr for String {
         let length = u32::read(reader)? as usize;
         let at = reader.offset;
         let bytes = reader.read_bytes(length, 1)?;
+        if reader.is_ros1 {
+            return std::str::from_utf8(bytes).map(Self::from).map_err(|_| CdrError::Text { at });
+        }
         // Some programs write an empty text without the zero at its end.
         let Some((&0, text)) = bytes.split_last() else {
             return if bytes.is_empty() { Ok(Self::new()) } else { Err(CdrError::Text { at }) };
@@ -150,9 +207,10 @@ impl Cdr for String {
     }
 
     fn write(&self, writer: &mut Writer) {
-        writer.write_length(self.len() + 1);
+        let zeros = usize::from(!writer.is_ros1);
+        writer.write_length(self.len() + zeros);
         writer.bytes.extend(self.as_bytes());
-        writer.bytes.push(0);
+        writer.bytes.extend(std::iter::repeat_n(0, zeros));
     }
 }
 
@@ -284,7 +342,26 @@ mod tests {
         assert_eq!(text(b"\xff\0"), Err(CdrError::Text { at: 4 }));
     }
 
+    #[test]
+    fn messages_of_ros_1_have_no_gaps_and_are_read_to_their_end() {
+        let bytes = encode_ros1(&sample());
+        assert_eq!(bytes.len(), 4 + 8 + 4 + 2 + 4 + 2 * 4 + 2 * 8);
+        assert_eq!(decode_as(Encoding::Ros1, &bytes), Ok(sample()));
+        let longer = [&bytes[..], &[0]].concat();
+        let found = decode_as::<Sample>(Encoding::Ros1, &longer);
+        assert_eq!(found, Err(CdrError::LeftOver { at: bytes.len() }));
+        for end in 0..bytes.len() {
+            let found = decode_as::<Sample>(Encoding::Ros1, &bytes[..end]);
+            assert!(matches!(found, Err(CdrError::Cut { .. })), "{end}: {found:?}");
+        }
+    }
+
     proptest::proptest! {
+        #[test]
+        fn any_bytes_are_a_message_of_ros_1_or_an_error(bytes: Vec<u8>) {
+            let _ = decode_as::<Vec<Sample>>(Encoding::Ros1, &bytes);
+        }
+
         #[test]
         fn any_bytes_are_a_message_or_an_error(mut bytes: Vec<u8>, is_little: bool) {
             bytes.splice(0..0, [0, u8::from(is_little), 0, 0]);

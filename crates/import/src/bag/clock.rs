@@ -1,74 +1,229 @@
 //! The clocks by which messages are stamped.
+//!
+//! Topics share a clock. Where it is set back, the messages after it belong to another epoch: epochs are moved apart by
+//! whole seconds, the same for all topics, so that stamps in an epoch stay as they are and nothing reaches across.
 
 use sidestep_kernel::InputError;
 
 use super::messages::LaserScan;
 use super::poses::StampedPose;
-use crate::mrclam::StampedPose2;
+use crate::report::{ImportReport, Treatment};
+use crate::track::StampedPose2;
 
 /// Messages on a network may overtake each other by up to this; a stamp further back is from a clock that was set back.
 const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
-/// A stamp further ahead of the previous one is from a clock that was set forward, such as from 1970 to the present.
+/// A stamp further ahead of the previous one, without as much time in between, is from a clock that was set forward,
+/// such as from 1970 to the present.
 const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
+/// The time between epochs: nothing is interpolated across it.
+const EPOCH_GAP_SECS: f64 = 10.0;
+/// Maximum number of epochs: more are a recording without any clock.
+const MAX_EPOCHS: usize = 1000;
 
 /// A value of a message with a stamp.
 pub(super) trait HasStamp {
     /// Returns the time in s.
     fn t_secs(&self) -> f64;
-    /// Returns the number of its message on its topic from 1, which errors give.
+    /// Returns the time of the recording in s.
+    fn log_secs(&self) -> f64;
+    /// Returns the number of its message on its topic from 1, which reports give.
     fn message(&self) -> u64;
+    /// Sets the time.
+    fn set_t_secs(&mut self, t_secs: f64);
 }
 
-impl HasStamp for &StampedPose {
+impl HasStamp for StampedPose {
     fn t_secs(&self) -> f64 {
         self.t_secs
+    }
+
+    fn log_secs(&self) -> f64 {
+        self.log_secs
     }
 
     fn message(&self) -> u64 {
         self.message
     }
+
+    fn set_t_secs(&mut self, t_secs: f64) {
+        self.t_secs = t_secs;
+    }
 }
 
-impl HasStamp for (u64, LaserScan) {
+/// A scan, and when it was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RecordedScan {
+    pub(super) message: u64,
+    pub(super) log_secs: f64,
+    pub(super) scan: LaserScan,
+}
+
+impl HasStamp for RecordedScan {
     fn t_secs(&self) -> f64 {
-        self.1.header.stamp.secs()
+        self.scan.header.stamp.secs()
+    }
+
+    fn log_secs(&self) -> f64 {
+        self.log_secs
     }
 
     fn message(&self) -> u64 {
-        self.0
+        self.message
+    }
+
+    fn set_t_secs(&mut self, t_secs: f64) {
+        self.scan.header.stamp = super::messages::Time::from_secs(t_secs);
     }
 }
 
-/// Returns messages, given as they were recorded, in the order of their stamps.
+/// The messages of one source in the order of the recording.
+pub(super) struct Stream<'a> {
+    /// Its name for people: `/odom`.
+    pub(super) name: String,
+    pub(super) items: Vec<&'a mut dyn HasStamp>,
+}
+
+/// A message at which the clock was set.
+struct Jump {
+    item: usize,
+    log_secs: f64,
+    step_secs: f64,
+}
+
+/// Gives the messages of all streams times on one axis that never goes back between epochs.
 ///
 /// # Errors
-/// When the clock jumps.
-pub(super) fn sort_by_stamp<T: HasStamp>(
-    place: &str,
-    mut all: Vec<T>,
-) -> Result<Vec<T>, InputError> {
+/// When a clock is set more than a thousand times.
+pub(super) fn align(
+    bag: &str,
+    streams: &mut [Stream<'_>],
+    report: &mut ImportReport,
+) -> Result<(), InputError> {
+    for stream in streams.iter_mut() {
+        replace_unset_stamps(stream, report);
+    }
+    let mut all_jumps = Vec::new();
+    for stream in streams.iter() {
+        let jumps = backward_jumps(stream);
+        record_jumps(stream, &jumps, report);
+        record_forward_jumps(stream, report);
+        all_jumps.push(jumps);
+    }
+    let Some(most) = all_jumps.iter().max_by_key(|jumps| jumps.len()) else { return Ok(()) };
+    let bounds: Vec<f64> = most.iter().map(|jump| jump.log_secs).collect();
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    if bounds.len() >= MAX_EPOCHS {
+        let cause = format!("its stamps go back {} times", bounds.len());
+        let remedy = "stamp the messages by one clock, and record the bag again";
+        return Err(InputError::new(bag, cause, remedy));
+    }
+    let epochs: Vec<Vec<usize>> = streams
+        .iter()
+        .zip(&all_jumps)
+        .map(|(stream, jumps)| epochs_of(stream, jumps, &bounds))
+        .collect();
+    shift_epochs(streams, &epochs, bounds.len() + 1);
+    Ok(())
+}
+
+/// Replaces stamps that no program has set by the times of the recording.
+fn replace_unset_stamps(stream: &mut Stream<'_>, report: &mut ImportReport) {
+    let is_unset = stream.items.len() > 1 && stream.items.iter().all(|item| item.t_secs() == 0.0);
+    if !is_unset {
+        return;
+    }
+    for item in &mut stream.items {
+        let t_secs = item.log_secs();
+        item.set_t_secs(t_secs);
+    }
+    let rule = format!("the stamps of {} are all 0: the times of the recording are used", stream.name);
+    report.record(Treatment::Guessed, rule, "", "set header.stamp in the program that publishes it");
+}
+
+fn backward_jumps(stream: &Stream<'_>) -> Vec<Jump> {
+    let mut jumps = Vec::new();
     let mut latest = f64::NEG_INFINITY;
-    for stamped in &all {
+    for (item, stamped) in stream.items.iter().enumerate() {
         let step_secs = stamped.t_secs() - latest;
-        let is_first = latest == f64::NEG_INFINITY;
-        if !is_first && !(-MAX_BACKWARD_STEP_SECS..=MAX_FORWARD_STEP_SECS).contains(&step_secs) {
-            return Err(clock_jump(place, stamped.message(), step_secs));
+        if step_secs < -MAX_BACKWARD_STEP_SECS {
+            jumps.push(Jump { item, log_secs: stamped.log_secs(), step_secs });
+            latest = stamped.t_secs();
         }
         latest = latest.max(stamped.t_secs());
     }
-    all.sort_by(|a, b| a.t_secs().total_cmp(&b.t_secs()));
-    Ok(all)
+    jumps
 }
 
-fn clock_jump(place: &str, message: u64, step_secs: f64) -> InputError {
-    let direction = if step_secs < 0.0 { "before" } else { "after" };
-    let cause = format!(
-        "the clock jumps: message {message} is stamped {:.3} s {direction} an earlier one",
-        step_secs.abs()
-    );
-    let remedy = "cut the bag at the jump, or record it again once the clock is set; a bag that was played in \
-                  a loop has to be recorded once only";
-    InputError::new(place, cause, remedy)
+fn record_jumps(stream: &Stream<'_>, jumps: &[Jump], report: &mut ImportReport) {
+    for jump in jumps {
+        let place = format!(
+            "message {} is stamped {:.3} s before an earlier one",
+            stream.items[jump.item].message(),
+            -jump.step_secs
+        );
+        let rule = format!("stamps of {} that go back: the time after is a part of its own", stream.name);
+        report.record(Treatment::Repaired, rule, place, "");
+    }
+}
+
+fn record_forward_jumps(stream: &Stream<'_>, report: &mut ImportReport) {
+    for pair in stream.items.windows(2) {
+        let step_secs = pair[1].t_secs() - pair[0].t_secs();
+        let recorded_secs = pair[1].log_secs() - pair[0].log_secs();
+        if step_secs > MAX_FORWARD_STEP_SECS && recorded_secs < 0.5 * step_secs {
+            let place =
+                format!("message {} is stamped {step_secs:.3} s after the one before", pair[1].message());
+            let rule =
+                format!("stamps of {} that jump ahead: the time after is a part of its own", stream.name);
+            report.record(Treatment::Repaired, rule, place, "");
+        }
+    }
+}
+
+/// Returns the epoch of each message: by the jumps of its own stream where it has them all, else by the times of the
+/// recording.
+fn epochs_of(stream: &Stream<'_>, jumps: &[Jump], bounds: &[f64]) -> Vec<usize> {
+    let mut epochs = Vec::with_capacity(stream.items.len());
+    let mut epoch = 0;
+    for (k, item) in stream.items.iter().enumerate() {
+        if jumps.len() == bounds.len() {
+            epoch += usize::from(jumps.get(epoch).is_some_and(|jump| jump.item == k));
+        } else {
+            epoch = bounds.partition_point(|bound| *bound <= item.log_secs());
+        }
+        epochs.push(epoch);
+    }
+    epochs
+}
+
+/// Moves each epoch by whole seconds behind the one before it, where it does not follow by itself.
+fn shift_epochs(streams: &mut [Stream<'_>], epochs: &[Vec<usize>], n: usize) {
+    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
+    for (stream, epochs) in streams.iter().zip(epochs) {
+        for (item, epoch) in stream.items.iter().zip(epochs) {
+            let [first, last] = &mut ranges[*epoch];
+            *first = first.min(item.t_secs());
+            *last = last.max(item.t_secs());
+        }
+    }
+    let mut shifts = Vec::with_capacity(n);
+    let mut end_secs = f64::NEG_INFINITY;
+    for [first, last] in ranges {
+        let needed = end_secs + EPOCH_GAP_SECS - first;
+        let shift = if needed.is_finite() { needed.ceil().max(0.0) } else { 0.0 };
+        end_secs = end_secs.max(last + shift);
+        shifts.push(shift);
+    }
+    for (stream, epochs) in streams.iter_mut().zip(epochs) {
+        for (item, epoch) in stream.items.iter_mut().zip(epochs) {
+            if shifts[*epoch] > 0.0 {
+                let t_secs = item.t_secs() + shifts[*epoch];
+                item.set_t_secs(t_secs);
+            }
+        }
+    }
 }
 
 /// Returns the times of the first and the last pose, in s.

@@ -6,9 +6,8 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::view::Pose;
 
 use super::PoseTopic;
-use super::clock::sort_by_stamp;
 use super::poses::{StampedPose, compose};
-use crate::mrclam::StampedPose2;
+use crate::track::StampedPose2;
 
 /// Maximum number of frames between two frames: more than any robot has, so more are a cycle.
 const MAX_DEPTH: usize = 64;
@@ -23,10 +22,10 @@ pub(super) struct Trajectory {
     pub(super) child: String,
 }
 
-/// Returns the trajectory of the frames of `source`, from the poses on its topic in the order of the recording.
+/// Returns the trajectory of the frames of `source`, from the poses on its topic.
 ///
 /// # Errors
-/// When the frames are missing, `source` gives none and there are several, or the clock jumps.
+/// When the frames are missing, or `source` gives none and there are several.
 pub(super) fn trajectory(
     bag: &str,
     source: &PoseTopic,
@@ -35,13 +34,13 @@ pub(super) fn trajectory(
     let place = format!("{bag}: {}", source.topic);
     let edges = by_child(all);
     let pairs: BTreeSet<(&str, &str)> =
-        all.iter().map(|pose| (pose.parent.as_str(), pose.child.as_str())).collect();
+        all.iter().map(|pose| (&*pose.parent, &*pose.child)).collect();
     if pairs.is_empty() {
         let cause = "its messages hold no transforms";
         return Err(InputError::new(place, cause, "give another topic"));
     }
     let chain = match &source.frames {
-        Some((parent, child)) => chain(&edges, parent, child).ok_or_else(|| {
+        Some((parent, child)) => chain(&edges, frame(parent), frame(child)).ok_or_else(|| {
             let cause = format!("no transforms lead from `{parent}` to `{child}`");
             InputError::new(&place, cause, format!("it has {}", describe_pairs(&pairs)))
         })?,
@@ -52,10 +51,8 @@ pub(super) fn trajectory(
             return Err(InputError::new(place, cause, remedy));
         }
     };
-    let links: Vec<Vec<&StampedPose>> = chain
-        .iter()
-        .map(|child| sort_by_stamp(&place, edges[child].clone()))
-        .collect::<Result<_, _>>()?;
+    let links: Vec<Vec<&StampedPose>> =
+        chain.iter().map(|child| by_stamp(edges[child].clone())).collect();
     let child = chain.last().map_or_else(String::new, |child| (*child).to_owned());
     Ok(Trajectory { poses: compose_chain(&links), child })
 }
@@ -70,7 +67,7 @@ pub(super) fn mount(statics: &[StampedPose], child: &str, ends: &[&str]) -> Opti
     let mut link = edges.get(child)?.last()?;
     let mut pose = link.pose;
     for _ in 0..MAX_DEPTH {
-        let parent = link.parent.as_str();
+        let parent = &*link.parent;
         if ends.contains(&parent) {
             break;
         }
@@ -80,6 +77,17 @@ pub(super) fn mount(statics: &[StampedPose], child: &str, ends: &[&str]) -> Opti
         link = next;
     }
     Some(pose)
+}
+
+/// Returns the name of a frame as it is compared, see [`frame_name`](super::poses::frame_name).
+fn frame(name: &str) -> &str {
+    name.strip_prefix('/').unwrap_or(name)
+}
+
+/// Returns poses by their stamps: messages on a network overtake each other.
+fn by_stamp(mut poses: Vec<&StampedPose>) -> Vec<&StampedPose> {
+    poses.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
+    poses
 }
 
 fn by_child(all: &[StampedPose]) -> BTreeMap<&str, Vec<&StampedPose>> {

@@ -36,15 +36,34 @@ message!(
     }
 );
 
-message!(
-    /// The time and the frame of reference of a message.
-    Header {
-        /// The time of the measurement.
-        stamp: Time,
-        /// The frame of reference.
-        frame_id: String,
+/// The time and the frame of reference of a message.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// The time of the measurement.
+    pub stamp: Time,
+    /// The frame of reference.
+    pub frame_id: String,
+}
+
+impl Cdr for Header {
+    const MIN_BYTES: usize = Time::MIN_BYTES + String::MIN_BYTES;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        // Headers of ROS 1 begin with a counter of messages, which means nothing here.
+        if reader.is_ros1() {
+            u32::read(reader)?;
+        }
+        Ok(Self { stamp: Cdr::read(reader)?, frame_id: Cdr::read(reader)? })
     }
-);
+
+    fn write(&self, writer: &mut Writer) {
+        if writer.is_ros1() {
+            0_u32.write(writer);
+        }
+        self.stamp.write(writer);
+        self.frame_id.write(writer);
+    }
+}
 
 message!(
     /// Position and orientation.
@@ -163,6 +182,13 @@ impl Time {
     pub fn from_ns(ns: u64) -> Self {
         let sec = i32::try_from(ns / 1_000_000_000).unwrap_or(i32::MAX);
         Self { sec, nanosec: (ns % 1_000_000_000) as u32 }
+    }
+
+    /// Returns the time of a moment given in seconds, to the nanosecond.
+    pub fn from_secs(secs: f64) -> Self {
+        let whole = secs.floor();
+        let nanosec = ((secs - whole) * 1e9).round().min(999_999_999.0) as u32;
+        Self { sec: whole as i32, nanosec }
     }
 
     /// Returns the moment in seconds.

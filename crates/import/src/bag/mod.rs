@@ -1,22 +1,33 @@
-//! ROS 2 bags in MCAP: the poses and scans of a robot as it records them.
+//! Bags of ROS 2 and ROS 1: the poses and scans of a robot as it records them.
 //!
-//! A bag is one `.mcap` file or the folder of `ros2 bag record`; chunks may be compressed with zstd or lz4. Supported
-//! are `nav_msgs/msg/Odometry`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped` and `TransformStamped`,
-//! `tf2_msgs/msg/TFMessage` and `sensor_msgs/msg/LaserScan`, encoded as CDR.
+//! A bag is a file in MCAP, in SQLite (`.db3`) or of ROS 1 (`.bag`, version 2.0), or a folder of `ros2 bag record` or its
+//! `metadata.yaml`. Chunks may be compressed with zstd, lz4 or bz2, files and messages with zstd, files with gzip.
+//! Supported are `nav_msgs/msg/Odometry`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped` and
+//! `TransformStamped`, `tf2_msgs/msg/TFMessage` and `sensor_msgs/msg/LaserScan`, encoded as CDR or by ROS 1.
+//!
+//! A message that cannot be read is skipped and counted; a topic of which more than half is bad is an error. A bag is
+//! read message by message, so that beside one record (at most 256 MB) only poses, some 110 bytes each, and at most
+//! four million ranges of scans are in memory, whatever its size.
 //!
 //! Times are the stamps of the headers, not those of the recording, which are late by the latency of the network.
-//! Messages that have overtaken each other by up to half a second are sorted; stamps further back, or an hour
-//! ahead, are from a clock that jumps, and an error.
+//! Messages that have overtaken each other by up to half a second are sorted. Where stamps go further back the clock was
+//! set: the time after is a part of its own. Tracks are cut where the robot cannot have moved from one pose to the next,
+//! see [`SpeedRule`]. Scans follow REP 117, whatever their driver writes, see [`NoEcho`].
 
 pub mod cdr;
 pub mod messages;
 
+mod clean;
 mod clock;
+mod content;
 mod frames;
+mod inspect;
 mod poses;
+mod scans;
 mod storage;
 #[cfg(test)]
 mod tests;
+mod topics;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,86 +35,49 @@ use std::path::Path;
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::Pose;
 
-use self::frames::Trajectory;
-use self::messages::{LaserScan, Message, TfMessage};
-use self::poses::StampedPose;
-use self::storage::{RawMessage, Topic};
-use crate::mrclam::StampedPose2;
-
-/// Maximum number of topics that an error lists.
-const MAX_LISTED: usize = 20;
-/// Maximum number of beams of a scan: as many as a message of a megabyte holds.
-const MAX_BEAMS: usize = 1 << 18;
-
-/// A topic with poses, and a pair of frames for a topic that has several.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PoseTopic {
-    /// The name of the topic.
-    pub topic: String,
-    /// The parent frame and the child frame.
-    pub frames: Option<(String, String)>,
-}
-
-impl PoseTopic {
-    /// Parses `TOPIC` or `TOPIC:PARENT:CHILD`; names of topics have no colons.
-    ///
-    /// # Errors
-    /// When it is neither.
-    pub fn parse(text: &str) -> Result<Self, InputError> {
-        match text.split(':').collect::<Vec<_>>()[..] {
-            [topic] if !topic.is_empty() => Ok(Self { topic: topic.into(), frames: None }),
-            [topic, parent, child] if ![topic, parent, child].contains(&"") => {
-                Ok(Self { topic: topic.into(), frames: Some((parent.into(), child.into())) })
-            }
-            _ => {
-                let remedy =
-                    "give a topic such as /odom, or a topic and two frames: /tf:map:base_link";
-                Err(InputError::new(text, "this is not a topic", remedy))
-            }
-        }
-    }
-}
-
-/// The topics of a bag to read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TopicSelection {
-    /// The robot's pose by odometry.
-    pub odometry: Option<PoseTopic>,
-    /// Its true pose.
-    pub truth: PoseTopic,
-    /// The measurements of its scanner.
-    pub scans: Option<String>,
-}
+pub use self::clean::write_clean;
+use self::content::BagContent;
+pub use self::inspect::inspect;
+use self::messages::LaserScan;
+pub use self::scans::NoEcho;
+pub use self::topics::{PoseTopic, TopicSelection};
+use crate::report::ImportReport;
+use crate::track::{SpeedRule, Track, cut_and_report};
 
 /// The content that was read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct BagLog {
-    /// The poses by odometry, by time; empty where none are selected.
-    pub odometry: Vec<StampedPose2>,
-    /// The true poses, by time.
-    pub truth: Vec<StampedPose2>,
-    /// The scans, by time.
+    /// The poses by odometry; empty where none are selected.
+    pub odometry: Track,
+    /// The true poses.
+    pub truth: Track,
+    /// The scans, by time, as REP 117 has them.
     pub scans: Vec<LaserScan>,
-    /// The pose of the scanner on the robot; `None` where the bag does not have it.
-    pub mount: Option<Pose>,
+    /// The pose on the robot of each frame of scans that the bag places.
+    pub mounts: BTreeMap<String, Pose>,
+    /// What was found in the bag.
+    pub report: ImportReport,
 }
 
 /// Reads a bag.
 ///
 /// # Errors
-/// When the bag is missing, damaged or of another kind; a topic is missing or of another type; a message is
-/// damaged; a clock jumps, or odometry and truth have no time in common.
+/// When the bag is missing, damaged altogether or of another kind; a topic is missing or of another type, or more than
+/// half of its messages are bad; or odometry and truth have no time in common.
 pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputError> {
     let bag = path.display().to_string();
-    let mut content = BagContent::default();
-    // Static transforms too: they give the pose of the scanner on the robot.
-    let is_read = |topic: &str| selection.contains(topic) || topic.ends_with(STATIC_TF_SUFFIX);
-    let topics =
-        storage::read(path, is_read, |message| content.add_message(&bag, selection, &message))?;
-    selection.check(&bag, &topics)?;
-    let truth = content.trajectory(&bag, &selection.truth)?;
+    let mut content = BagContent::new(&bag, selection);
+    let storage =
+        storage::read(path, &|topic| selection.is_read(topic), &mut |message| content.add(&message))?;
+    selection.check(&bag, &storage.topics)?;
+    content.check(&storage.topics)?;
+    let mut report = storage.report;
+    topics::add_facts(&storage.topics, &mut report);
+    content.report(&mut report);
+    content.align_clocks(&mut report)?;
+    let truth = content.trajectory(&selection.truth)?;
     let odometry = match &selection.odometry {
-        Some(topic) => Some(content.trajectory(&bag, topic)?),
+        Some(topic) => Some(content.trajectory(topic)?),
         None => None,
     };
     if let (Some(topic), Some(odometry)) = (&selection.odometry, &odometry) {
@@ -113,139 +87,18 @@ pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputErro
             [(&*topic.topic, &*odometry.poses), (truth_topic, &*truth.poses)],
         )?;
     }
-    let scans = content.take_scans(&bag, selection)?;
     let bodies = [Some(&truth), odometry.as_ref()].into_iter().flatten();
     let body_frames: Vec<&str> =
         bodies.map(|body| &*body.child).filter(|frame| !frame.is_empty()).collect();
-    let mount = scans.first().and_then(|scan| content.mount(&scan.header.frame_id, &body_frames));
-    Ok(BagLog {
-        odometry: odometry.map_or_else(Vec::new, |odometry| odometry.poses),
-        truth: truth.poses,
-        scans,
-        mount,
-    })
-}
-
-/// The suffix of topics with static transforms.
-const STATIC_TF_SUFFIX: &str = "tf_static";
-
-impl TopicSelection {
-    fn pose_topics(&self) -> impl Iterator<Item = &PoseTopic> {
-        self.odometry.iter().chain([&self.truth])
-    }
-
-    fn contains(&self, topic: &str) -> bool {
-        self.scans.as_deref() == Some(topic)
-            || self.pose_topics().any(|source| source.topic == topic)
-    }
-
-    /// Checks that every selected topic exists and has messages.
-    fn check(&self, bag: &str, topics: &BTreeMap<String, Topic>) -> Result<(), InputError> {
-        for name in self.pose_topics().map(|source| &source.topic).chain(&self.scans) {
-            let problem = match topics.get(name) {
-                Some(topic) if topic.messages > 0 => continue,
-                Some(_) => "has no messages",
-                None => "is not there",
-            };
-            let cause = format!("the topic {name} {problem}");
-            return Err(InputError::new(bag, cause, describe_topics(topics)));
-        }
-        Ok(())
-    }
-}
-
-fn describe_topics(topics: &BTreeMap<String, Topic>) -> String {
-    let listed: Vec<String> = topics
-        .iter()
-        .take(MAX_LISTED)
-        .map(|(name, topic)| format!("{name} ({}, {} messages)", topic.schema, topic.messages))
-        .collect();
-    match topics.len() {
-        0 => "the bag has no topics: record it again".into(),
-        n if n > MAX_LISTED => {
-            format!("the bag has {} and {} more", listed.join(", "), n - MAX_LISTED)
-        }
-        _ => format!("the bag has {}", listed.join(", ")),
-    }
-}
-
-/// The messages of the selected topics, in the order of the recording.
-#[derive(Default)]
-struct BagContent {
-    poses: BTreeMap<String, Vec<StampedPose>>,
-    statics: Vec<StampedPose>,
-    scans: Vec<(u64, LaserScan)>,
-}
-
-impl BagContent {
-    fn add_message(
-        &mut self,
-        bag: &str,
-        selection: &TopicSelection,
-        raw: &RawMessage<'_>,
-    ) -> Result<(), InputError> {
-        let damaged = |cause: String| {
-            let place = format!("{bag}: {}, message {}", raw.topic, raw.number);
-            InputError::new(place, cause, "record the bag again, or give another topic")
-        };
-        if selection.scans.as_deref() == Some(raw.topic) {
-            check_type(bag, raw, &[LaserScan::NAME])?;
-            let scan: LaserScan = cdr::decode(raw.bytes).map_err(|e| damaged(e.to_string()))?;
-            self.scans.push((raw.number, checked_scan(scan).map_err(damaged)?));
-        } else if selection.contains(raw.topic) {
-            check_type(bag, raw, &poses::SCHEMAS)?;
-            let poses = poses::decode_poses(raw.schema, raw.number, raw.bytes).map_err(damaged)?;
-            self.poses.entry(raw.topic.into()).or_default().extend(poses);
-        } else if raw.schema == TfMessage::NAME {
-            let poses = poses::decode_poses(raw.schema, raw.number, raw.bytes).map_err(damaged)?;
-            self.statics.extend(poses);
-        }
-        Ok(())
-    }
-
-    fn trajectory(&self, bag: &str, source: &PoseTopic) -> Result<Trajectory, InputError> {
-        let poses = self.poses.get(&source.topic).map_or(&[][..], Vec::as_slice);
-        frames::trajectory(bag, source, poses)
-    }
-
-    /// Moves the scans out, by time.
-    fn take_scans(
-        &mut self,
-        bag: &str,
-        selection: &TopicSelection,
-    ) -> Result<Vec<LaserScan>, InputError> {
-        let place = format!("{bag}: {}", selection.scans.as_deref().unwrap_or_default());
-        let sorted = clock::sort_by_stamp(&place, std::mem::take(&mut self.scans))?;
-        Ok(sorted.into_iter().map(|(_, scan)| scan).collect())
-    }
-
-    fn mount(&self, scanner: &str, ends: &[&str]) -> Option<Pose> {
-        frames::mount(&self.statics, scanner, ends)
-    }
-}
-
-fn check_type(bag: &str, raw: &RawMessage<'_>, known: &[&str]) -> Result<(), InputError> {
-    if known.contains(&raw.schema) {
-        return Ok(());
-    }
-    let cause = format!("its messages are of type `{}`", raw.schema);
-    let remedy = format!("give a topic of type {}", known.join(", "));
-    Err(InputError::new(format!("{bag}: {}", raw.topic), cause, remedy))
-}
-
-/// Checks that a scan's bearings and limits are valid.
-fn checked_scan(scan: LaserScan) -> Result<LaserScan, String> {
-    let n = scan.ranges_m.len();
-    let bearings = [scan.angle_min_rad, scan.angle_increment_rad];
-    let limits = [scan.range_min_m, scan.range_max_m];
-    if n == 0 || n > MAX_BEAMS {
-        return Err(format!("its scan has {n} beams"));
-    }
-    if !bearings.iter().all(|angle| angle.is_finite()) {
-        return Err("its bearings are not finite".into());
-    }
-    if limits.iter().any(|limit| limit.is_nan()) || limits[0] < 0.0 || limits[1] <= limits[0] {
-        return Err(format!("it measures ranges from {} to {} m", limits[0], limits[1]));
-    }
-    Ok(scan)
+    let scans = content.take_scans(&mut report);
+    let mounts = content.mounts(&scans, &body_frames);
+    let odometry = odometry.map_or_else(Vec::new, |odometry| odometry.poses);
+    let rule = SpeedRule::for_tracks(selection.max_speed_mps, &[&truth.poses, &odometry]);
+    let truth = cut_and_report(&selection.truth.topic, truth.poses, &rule, &mut report);
+    let odometry_topic = selection.odometry.as_ref().map_or("odometry", |source| &*source.topic);
+    let odometry = cut_and_report(odometry_topic, odometry, &rule, &mut report);
+    report.add_kept("true poses", truth.len());
+    report.add_kept("poses of odometry", odometry.len());
+    report.add_kept("scans", scans.len());
+    Ok(BagLog { odometry, truth, scans, mounts, report })
 }

@@ -1,14 +1,16 @@
 //! Poses in messages: odometry, motion capture, localization, transforms.
 
+use std::sync::Arc;
+
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::view::Pose as Pose3;
 
-use super::cdr::{CdrError, decode};
+use super::cdr::{CdrError, Encoding, decode_as};
 use super::messages::{
     Header, Message, Odometry, Pose, PoseStamped, PoseWithCovarianceStamped, TfMessage,
     TransformStamped,
 };
-use crate::mrclam::StampedPose2;
+use crate::track::StampedPose2;
 
 /// The types of messages that hold poses.
 pub(super) const SCHEMAS: [&str; 5] = [
@@ -26,10 +28,12 @@ const MIN_NORM: f64 = 1e-3;
 pub(super) struct StampedPose {
     /// The number of its message on its topic, from 1.
     pub(super) message: u64,
+    /// When it was recorded.
+    pub(super) log_secs: f64,
     pub(super) t_secs: f64,
-    pub(super) parent: String,
+    pub(super) parent: Arc<str>,
     /// Empty where the message does not give it.
-    pub(super) child: String,
+    pub(super) child: Arc<str>,
     pub(super) pose: Pose3,
 }
 
@@ -37,7 +41,8 @@ impl StampedPose {
     fn new(header: Header, child: String, pose: Pose) -> Self {
         let t_secs = header.stamp.secs();
         let pose = Pose3 { at_m: pose.position, turn: pose.orientation };
-        Self { message: 0, t_secs, parent: header.frame_id, child, pose }
+        let [parent, child] = [&header.frame_id, &child].map(|name| frame_name(name));
+        Self { message: 0, log_secs: 0.0, t_secs, parent, child, pose }
     }
 
     fn from_transform(transform: TransformStamped) -> Self {
@@ -67,34 +72,45 @@ impl StampedPose {
     }
 }
 
-/// Returns the poses in message number `message` of its topic, which is of one of [`SCHEMAS`].
-pub(super) fn decode_poses(
-    schema: &str,
-    message: u64,
-    bytes: &[u8],
-) -> Result<Vec<StampedPose>, String> {
-    let poses = decode_message(schema, bytes).map_err(|e| e.to_string())?;
-    let numbered = poses.into_iter().map(|pose| StampedPose { message, ..pose });
-    Ok(numbered.map(StampedPose::checked).collect::<Result<_, _>>()?)
+/// Returns the name of a frame: in ROS 1 it may begin with a slash, which means nothing.
+pub(super) fn frame_name(name: &str) -> Arc<str> {
+    name.strip_prefix('/').unwrap_or(name).into()
 }
 
-fn decode_message(schema: &str, bytes: &[u8]) -> Result<Vec<StampedPose>, CdrError> {
+/// Returns the poses in a message, which is of one of [`SCHEMAS`], each valid or with the reason why it is not.
+///
+/// # Errors
+/// When the message cannot be decoded.
+pub(super) fn decode_poses(
+    schema: &str,
+    encoding: Encoding,
+    bytes: &[u8],
+) -> Result<Vec<Result<StampedPose, &'static str>>, String> {
+    let poses = decode_message(schema, encoding, bytes).map_err(|e| e.to_string())?;
+    Ok(poses.into_iter().map(StampedPose::checked).collect())
+}
+
+fn decode_message(
+    schema: &str,
+    encoding: Encoding,
+    bytes: &[u8],
+) -> Result<Vec<StampedPose>, CdrError> {
     Ok(match SCHEMAS.iter().position(|known| *known == schema) {
         Some(0) => {
-            let message: Odometry = decode(bytes)?;
+            let message: Odometry = decode_as(encoding, bytes)?;
             vec![StampedPose::new(message.header, message.child_frame_id, message.pose.pose)]
         }
         Some(1) => {
-            let message: PoseStamped = decode(bytes)?;
+            let message: PoseStamped = decode_as(encoding, bytes)?;
             vec![StampedPose::new(message.header, String::new(), message.pose)]
         }
         Some(2) => {
-            let message: PoseWithCovarianceStamped = decode(bytes)?;
+            let message: PoseWithCovarianceStamped = decode_as(encoding, bytes)?;
             vec![StampedPose::new(message.header, String::new(), message.pose.pose)]
         }
-        Some(3) => vec![StampedPose::from_transform(decode(bytes)?)],
+        Some(3) => vec![StampedPose::from_transform(decode_as(encoding, bytes)?)],
         _ => {
-            let message: TfMessage = decode(bytes)?;
+            let message: TfMessage = decode_as(encoding, bytes)?;
             message.transforms.into_iter().map(StampedPose::from_transform).collect()
         }
     })

@@ -1,0 +1,175 @@
+//! What is in a bag, without what is learned from it: every topic, every message that can be read, every clock.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use sidestep_kernel::InputError;
+
+use super::content::{Tally, decode_scan, log_secs};
+use super::messages::{LaserScan, Message};
+use super::poses;
+use super::scans::RangeCounts;
+use super::storage::{self, RawMessage};
+use super::topics;
+use crate::report::{ImportReport, Treatment};
+
+/// Stamps further back than this are from a clock that was set back.
+const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
+
+/// Reads a bag message by message and reports what is in it. Nothing of it is kept, whatever its size.
+///
+/// # Errors
+/// When the bag is missing, damaged altogether or of another kind, or more than half of the messages of known types are
+/// bad.
+pub fn inspect(path: &Path) -> Result<ImportReport, InputError> {
+    let mut findings = TopicFindings::default();
+    let storage = storage::read(path, &|_| true, &mut |message| {
+        findings.add(&message);
+        Ok(())
+    })?;
+    let mut report = storage.report;
+    topics::add_facts(&storage.topics, &mut report);
+    findings.report(&path.display().to_string(), &mut report)?;
+    let messages: u64 = storage.topics.values().map(|topic| topic.messages).sum();
+    report.add_kept("topics", storage.topics.len());
+    report.add_kept("messages", usize::try_from(messages - findings.bad()).unwrap_or(usize::MAX));
+    Ok(report)
+}
+
+/// Checks one message of a bag: `Err` says why it cannot be read. Messages of other types are not looked into.
+pub(super) fn check(raw: &RawMessage<'_>) -> Result<Checked, String> {
+    let bytes = raw.payload.clone()?;
+    let Some(encoding) = raw.info.encoding() else { return Ok(Checked::Other) };
+    if raw.info.schema == LaserScan::NAME {
+        return Ok(Checked::Scan(Box::new(decode_scan(raw, encoding)?)));
+    }
+    if !poses::SCHEMAS.contains(&&*raw.info.schema) {
+        return Ok(Checked::Other);
+    }
+    let mut first_secs = None;
+    for pose in poses::decode_poses(&raw.info.schema, encoding, bytes)? {
+        first_secs = first_secs.or(Some(pose?.t_secs));
+    }
+    Ok(first_secs.map_or(Checked::Other, Checked::Poses))
+}
+
+/// A message that can be read.
+pub(super) enum Checked {
+    Scan(Box<LaserScan>),
+    /// Poses, and the stamp of the first in s.
+    Poses(f64),
+    Other,
+}
+
+/// What was found on each topic.
+#[derive(Default)]
+struct TopicFindings {
+    tallies: BTreeMap<String, Tally>,
+    ranges: BTreeMap<String, RangeCounts>,
+    clocks: BTreeMap<String, ClockFindings>,
+    recorded_secs: Option<[f64; 2]>,
+}
+
+/// The stamps of a topic.
+struct ClockFindings {
+    stamps: u64,
+    first_secs: f64,
+    last_secs: f64,
+    latest_secs: f64,
+    backward_steps: Vec<String>,
+    backward: u64,
+}
+
+impl TopicFindings {
+    fn add(&mut self, raw: &RawMessage<'_>) {
+        let secs = log_secs(raw);
+        let [first, last] = self.recorded_secs.unwrap_or([secs; 2]);
+        self.recorded_secs = Some([first.min(secs), last.max(secs)]);
+        let checked = check(raw);
+        if !self.tallies.contains_key(raw.topic) {
+            self.tallies.insert(raw.topic.into(), Tally::default());
+        }
+        let tally = self.tallies.get_mut(raw.topic).expect("it was inserted");
+        match checked {
+            Err(cause) => tally.add_bad(raw.number, &cause),
+            Ok(Checked::Other) => tally.good += 1,
+            Ok(Checked::Poses(t_secs)) => {
+                tally.good += 1;
+                // Transforms of several programs share a topic, and not their time.
+                if !raw.topic.contains("tf") {
+                    self.add_stamp(raw, t_secs);
+                }
+            }
+            Ok(Checked::Scan(scan)) => {
+                tally.good += 1;
+                self.ranges.entry(raw.topic.into()).or_default().add(&scan);
+                self.add_stamp(raw, scan.header.stamp.secs());
+            }
+        }
+    }
+
+    fn add_stamp(&mut self, raw: &RawMessage<'_>, t_secs: f64) {
+        let Some(clock) = self.clocks.get_mut(raw.topic) else {
+            let clock = ClockFindings {
+                stamps: 1,
+                first_secs: t_secs,
+                last_secs: t_secs,
+                latest_secs: t_secs,
+                backward_steps: Vec::new(),
+                backward: 0,
+            };
+            self.clocks.insert(raw.topic.into(), clock);
+            return;
+        };
+        clock.stamps += 1;
+        let back_secs = clock.latest_secs - t_secs;
+        if back_secs > MAX_BACKWARD_STEP_SECS {
+            clock.backward += 1;
+            if clock.backward_steps.len() < crate::report::MAX_PLACES {
+                clock.backward_steps.push(format!("message {}: {back_secs:.3} s", raw.number));
+            }
+            clock.latest_secs = t_secs;
+        }
+        clock.latest_secs = clock.latest_secs.max(t_secs);
+        clock.first_secs = clock.first_secs.min(t_secs);
+        clock.last_secs = clock.last_secs.max(t_secs);
+    }
+
+    fn bad(&self) -> u64 {
+        self.tallies.values().map(Tally::bad).sum()
+    }
+
+    fn report(&self, bag: &str, report: &mut ImportReport) -> Result<(), InputError> {
+        if let Some([first, last]) = self.recorded_secs {
+            report.add_fact("recorded", format!("from {first:.3} to {last:.3} s since 1970, {:.3} s", last - first));
+        }
+        let all = self.tallies.values().fold(Tally::default(), Tally::sum);
+        all.check(bag, "all topics", 0)?;
+        for (topic, tally) in &self.tallies {
+            tally.report(topic, report);
+        }
+        for (topic, clock) in &self.clocks {
+            clock.report(topic, report);
+        }
+        for (topic, counts) in &self.ranges {
+            counts.convention(topic, None, report);
+        }
+        Ok(())
+    }
+}
+
+impl ClockFindings {
+    fn report(&self, topic: &str, report: &mut ImportReport) {
+        let Self { first_secs, last_secs, .. } = self;
+        report.add_fact("stamps", format!("{topic}: from {first_secs:.3} to {last_secs:.3} s"));
+        let rule = format!("stamps of {topic} that go back");
+        for k in 0..self.backward {
+            let place = self.backward_steps.get(k as usize).cloned().unwrap_or_default();
+            report.record(Treatment::Suspicious, rule.clone(), place, "");
+        }
+        if self.stamps > 1 && *first_secs == 0.0 && *last_secs == 0.0 {
+            let rule = format!("the stamps of {topic} are all 0: the times of the recording are used");
+            report.record(Treatment::Guessed, rule, "", "");
+        }
+    }
+}

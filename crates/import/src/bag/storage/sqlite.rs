@@ -1,0 +1,156 @@
+//! Bags of ROS 2 in SQLite (`.db3`), row by row.
+//!
+//! SQLite itself reads the file, page by page and without a change to it. What the file defines beside the two tables
+//! of a bag (views, virtual tables, functions in them) is not run.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rusqlite::limits::Limit;
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, OpenFlags};
+use sidestep_kernel::InputError;
+
+use super::sink::{MAX_RECORD_BYTES, Sink, Topic, ros2_name};
+
+/// The first bytes of a file.
+pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// Only data are read: no function of a trusted schema is called, and damage of a page is found.
+const SETTINGS: &str = "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;";
+
+/// Hands the topics and messages of a file to `sink`; `file` is its name for people. Rows after a damaged page are
+/// lost.
+///
+/// # Errors
+/// When it is no bag; those of the sink.
+pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), InputError> {
+    let opened = open(path).and_then(|database| Ok((read_topics(&database)?, database)));
+    let (topics, database) = opened.map_err(|error| {
+        let cause = format!("is no readable bag in SQLite: {error}");
+        InputError::new(file, cause, "give a bag of `ros2 bag record`, or copy it again")
+    })?;
+    for (name, topic) in topics.values() {
+        sink.declare(name, topic.clone());
+    }
+    let read = read_messages(&database, &topics, sink);
+    match read {
+        Ok(()) => Ok(()),
+        Err(ReadError::Sink(error)) => Err(error),
+        Err(ReadError::Database(error)) => {
+            sink.damaged_part("the rest of a file that is damaged", format!("{file} ({error})"));
+            Ok(())
+        }
+    }
+}
+
+/// The end of reading rows before the last.
+enum ReadError {
+    Database(rusqlite::Error),
+    Sink(InputError),
+}
+
+impl From<rusqlite::Error> for ReadError {
+    fn from(error: rusqlite::Error) -> Self {
+        Self::Database(error)
+    }
+}
+
+fn open(path: &Path) -> rusqlite::Result<Connection> {
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let plain = Connection::open_with_flags(path, flags).and_then(prepared);
+    // A bag whose recorder was killed has a journal; in a folder that cannot be written only the file itself is read.
+    plain.or_else(|_| {
+        let uri = format!("file:{}?immutable=1", uri_path(path));
+        Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI).and_then(prepared)
+    })
+}
+
+fn prepared(database: Connection) -> rusqlite::Result<Connection> {
+    database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_RECORD_BYTES as i32)?;
+    database.execute_batch(SETTINGS)?;
+    let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages') \
+                  AND sql NOT LIKE '%VIRTUAL%' AND sql NOT LIKE '%GENERATED%' AND sql NOT LIKE '% AS %'";
+    let n: i64 = database.query_row(tables, [], |row| row.get(0))?;
+    if n == 2 { Ok(database) } else { Err(rusqlite::Error::QueryReturnedNoRows) }
+}
+
+/// Returns a path as it stands in a URI.
+fn uri_path(path: &Path) -> String {
+    let mut text = String::new();
+    for byte in path.to_string_lossy().bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => text.push(byte.into()),
+            other => text.push_str(&format!("%{other:02X}")),
+        }
+    }
+    text
+}
+
+/// Returns the topics by their numbers.
+fn read_topics(database: &Connection) -> rusqlite::Result<BTreeMap<i64, (String, Topic)>> {
+    let definitions = read_definitions(database).unwrap_or_default();
+    let mut statement = database.prepare("SELECT id, name, type, serialization_format FROM topics")?;
+    let mut rows = statement.query([])?;
+    let mut topics = BTreeMap::new();
+    while let Some(row) = rows.next()? {
+        let schema = ros2_name(&row.get::<_, String>(2)?);
+        let (definition_encoding, definition) = definitions.get(&schema).cloned().unwrap_or_default();
+        let topic = Topic {
+            schema,
+            encoding: row.get(3)?,
+            definition: definition.into_bytes(),
+            definition_encoding,
+            ..Topic::default()
+        };
+        topics.insert(row.get(0)?, (row.get(1)?, topic));
+    }
+    Ok(topics)
+}
+
+/// Returns the language and the definition of types, which bags have since ROS 2 Iron.
+fn read_definitions(database: &Connection) -> rusqlite::Result<BTreeMap<String, (String, String)>> {
+    let query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions";
+    let mut statement = database.prepare(query)?;
+    let rows = statement.query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?;
+    rows.collect()
+}
+
+fn read_messages(
+    database: &Connection,
+    topics: &BTreeMap<i64, (String, Topic)>,
+    sink: &mut Sink<'_>,
+) -> Result<(), ReadError> {
+    let mut wanted = Vec::new();
+    for (id, (name, _)) in topics {
+        if sink.is_read(name) {
+            wanted.push(id.to_string());
+        }
+    }
+    // Messages on other topics are counted without their data, which are most of the file.
+    let others = format!("SELECT topic_id FROM messages WHERE topic_id NOT IN ({})", wanted.join(","));
+    let mut statement = database.prepare(&others)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        if let Some((name, _)) = topics.get(&row.get(0)?) {
+            sink.count(name);
+        }
+    }
+    let query = format!(
+        "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) ORDER BY rowid",
+        wanted.join(",")
+    );
+    let mut statement = database.prepare(&query)?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let Some((name, _)) = topics.get(&row.get(0)?) else { continue };
+        let time_ns = row.get::<_, i64>(1).unwrap_or(0);
+        let bytes = match row.get_ref(2)? {
+            ValueRef::Blob(bytes) => Ok(bytes),
+            _ => Err("it has no data".to_owned()),
+        };
+        let time_ns = u64::try_from(time_ns).unwrap_or(0);
+        sink.deliver(name, time_ns, bytes).map_err(ReadError::Sink)?;
+    }
+    Ok(())
+}
