@@ -37,8 +37,11 @@ pub(crate) const TARGETS: &[Target] = &[
     ("srdf", |data| text(data, srdf)),
     ("stl", |data| drop(stl::parse("f", data))),
     ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
-    ("traffic", |data| text(data, |t| drop(traffic::parse(&"f", t)))),
-    ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data)))),
+    ("traffic", |data| text(data, recorded)),
+    ("traffic_parquet", |data| {
+        drop(traffic::from_bytes(&"f", data.to_vec(), &Default::default()));
+    }),
+    ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data), &Default::default()))),
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
     ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
     ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),
@@ -121,6 +124,14 @@ fn messages(data: &[u8]) {
     drop(bag::cdr::decode::<bag::messages::Odometry>(data));
     drop(bag::cdr::decode::<bag::messages::LaserScan>(data));
     drop(bag::cdr::decode::<bag::messages::TfMessage>(data));
+}
+
+/// Reads a recording of any source; what is written of it is read again.
+fn recorded(text: &str) {
+    if let Ok(recorded) = traffic::parse(&"f", text) {
+        let again = traffic::parse(&"f", &traffic::to_csv(&recorded));
+        assert_eq!(again.map(|again| again.tracks.len()), Ok(recorded.tracks.len()));
+    }
 }
 
 fn learned(text: &str) {

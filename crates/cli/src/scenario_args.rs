@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// The scenario, and the options that change it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScenarioArgs {
-    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv; gzip is fine)
+    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv, .json, .parquet, .so6; gzip is fine)
     #[arg(value_name = "SCENARIO")]
     pub(crate) file: PathBuf,
 

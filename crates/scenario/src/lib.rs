@@ -51,4 +51,6 @@ pub use remark::{Remark, Severity};
 pub use sections::Sections;
 pub use source::{FORMAT, Head, Preamble, Source};
 pub use spanned::Spanned;
-pub use world_type::{CompiledScenario, ImportedScenario, SeedEffect, WorldType, Worlds};
+pub use world_type::{
+    CompiledScenario, ImportOptions, ImportedScenario, SeedEffect, WorldType, Worlds,
+};

@@ -70,7 +70,11 @@ pub trait WorldType: Send + Sync {
     ///
     /// # Errors
     /// When such a file cannot be read.
-    fn import_scenario(&self, _: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    fn import_scenario(
+        &self,
+        _: &Path,
+        _: &ImportOptions,
+    ) -> Result<Option<ImportedScenario>, InputError> {
         Ok(None)
     }
 
@@ -147,6 +151,38 @@ pub enum SeedEffect {
     /// Draws decide the run; also the answer of a world that cannot say.
     #[default]
     Decide,
+}
+
+/// Choices of a translation that the file of another program does not tell: overrides of the keys `import.*`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ImportOptions {
+    /// The key without its prefix, and the value, in the order in which they were given.
+    pairs: Vec<(String, String)>,
+}
+
+impl ImportOptions {
+    const PREFIX: &str = "import.";
+
+    /// Returns those among overrides `key=value` of a scenario.
+    pub fn from_overrides(overrides: &[String]) -> Self {
+        let mut pairs = Vec::new();
+        for text in overrides.iter().filter(|text| Self::is_option(text)) {
+            let text = text.trim_start().trim_start_matches(Self::PREFIX);
+            let (key, value) = text.split_once('=').unwrap_or((text, ""));
+            pairs.push((key.trim().to_owned(), value.trim().trim_matches('"').to_owned()));
+        }
+        Self { pairs }
+    }
+
+    /// Returns whether an override is an option of a translation.
+    pub fn is_option(text: &str) -> bool {
+        text.trim_start().starts_with(Self::PREFIX)
+    }
+
+    /// Returns the options, as keys and values.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.pairs.iter().map(|(key, value)| (key.as_str(), value.as_str()))
+    }
 }
 
 /// A file of another program, translated.
@@ -237,10 +273,14 @@ impl Worlds {
     /// Translates a file of another program; `None` for scenario files.
     ///
     /// # Errors
-    /// When it cannot be read.
-    pub fn import_scenario(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+    /// When it cannot be read, or an option does not fit.
+    pub fn import_scenario(
+        &self,
+        file: &Path,
+        options: &ImportOptions,
+    ) -> Result<Option<ImportedScenario>, InputError> {
         for world in self.iter() {
-            if let Some(foreign) = world.import_scenario(file)? {
+            if let Some(foreign) = world.import_scenario(file, options)? {
                 return Ok(Some(foreign));
             }
         }
@@ -288,5 +328,13 @@ mod tests {
     fn added_code_is_part_of_the_build() {
         let worlds = Worlds::new("1+a").with_added_code("0123456789abcdef");
         assert_eq!(worlds.build(), "1+a.own-0123456789ab");
+    }
+
+    #[test]
+    fn options_of_an_import_are_told_from_other_overrides() {
+        let overrides = ["import.max_gap_s=60", "seed=3", " import.navdata = \"a b\""];
+        let options = ImportOptions::from_overrides(&overrides.map(str::to_owned));
+        let found: Vec<(&str, &str)> = options.iter().collect();
+        assert_eq!(found, [("max_gap_s", "60"), ("navdata", "a b")]);
     }
 }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 use sidestep_kernel::InputError;
-use sidestep_scenario::{Source, Worlds};
+use sidestep_scenario::{ImportOptions, Source, Worlds};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -249,7 +249,7 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
     if *foreign > MAX_FOREIGN_FILES {
         return None;
     }
-    let imported = worlds.import_scenario(path).ok()??;
+    let imported = worlds.import_scenario(path, &ImportOptions::default()).ok()??;
     imported.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
 }
 

@@ -2,7 +2,7 @@
 
 use sidestep_experiment as experiment;
 use sidestep_kernel::InputError;
-use sidestep_scenario::{CompiledScenario, ImportedScenario, Source, Worlds};
+use sidestep_scenario::{CompiledScenario, ImportOptions, ImportedScenario, Source, Worlds};
 use std::path::Path;
 
 /// Reads a scenario, applies `key=value` overrides and compiles it.
@@ -14,7 +14,7 @@ pub fn read_scenario(
     file: &Path,
     overrides: &[String],
 ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
-    GivenScenario::read(worlds, file)?.compile(worlds, overrides)
+    GivenScenario::read(worlds, file, overrides)?.compile(worlds, overrides)
 }
 
 /// Returns all problems of a scenario and its overrides, see [`GivenScenario::problems`].
@@ -26,7 +26,7 @@ pub fn problems(
     file: &Path,
     overrides: &[String],
 ) -> Result<Vec<InputError>, InputError> {
-    GivenScenario::read(worlds, file)?.problems(worlds, overrides)
+    GivenScenario::read(worlds, file, overrides)?.problems(worlds, overrides)
 }
 
 /// Returns the scenario in a file, or the one that a file of another format represents, with
@@ -39,7 +39,9 @@ pub(crate) fn read_source(
     file: &Path,
     overrides: &[String],
 ) -> Result<Source, InputError> {
-    GivenScenario::read(worlds, file)?.source.with_overrides(overrides)
+    let given = GivenScenario::read(worlds, file, overrides)?;
+    let overrides = given.scenario_overrides(overrides);
+    given.source.with_overrides(&overrides)
 }
 
 /// A scenario as it was given: in a file of its own format or another one, or as a text; without overrides.
@@ -48,26 +50,38 @@ pub struct GivenScenario {
     source: Source,
     /// The report about the file of another program that the text was made from.
     import: Option<ImportedScenario>,
+    /// The options by which that file was read.
+    options: ImportOptions,
 }
 
 impl From<Source> for GivenScenario {
     fn from(source: Source) -> Self {
-        Self { source, import: None }
+        Self { source, import: None, options: ImportOptions::default() }
     }
 }
 
 impl GivenScenario {
-    /// Reads the scenario in a file, or the one that a file of another format represents.
+    /// Reads the scenario in a file, or the one that a file of another format represents: by those of the overrides
+    /// that are options of an import.
     ///
     /// # Errors
     /// When the file cannot be read, or nothing in it can be simulated.
-    pub fn read(worlds: &Worlds, file: &Path) -> Result<Self, InputError> {
-        let Some(import) = worlds.import_scenario(file)? else {
+    pub fn read(worlds: &Worlds, file: &Path, overrides: &[String]) -> Result<Self, InputError> {
+        let options = ImportOptions::from_overrides(overrides);
+        let Some(import) = worlds.import_scenario(file, &options)? else {
             return Ok(Source::read(file, &[])?.into());
         };
         let text = import.scenario.clone()?;
         let source = Source::new(file.display().to_string(), text, "");
-        Ok(Self { source, import: Some(import) })
+        Ok(Self { source, import: Some(import), options })
+    }
+
+    /// Returns the overrides without the options by which the file was read; others stay, and are unknown keys.
+    fn scenario_overrides(&self, overrides: &[String]) -> Vec<String> {
+        let is_used =
+            self.import.is_some() && ImportOptions::from_overrides(overrides) == self.options;
+        let is_kept = |text: &&String| !(is_used && ImportOptions::is_option(text));
+        overrides.iter().filter(is_kept).cloned().collect()
     }
 
     /// The text, and the folder that its paths are relative to.
@@ -89,6 +103,7 @@ impl GivenScenario {
         worlds: &Worlds,
         overrides: &[String],
     ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
+        let overrides = &self.scenario_overrides(overrides);
         let source = self.source.clone().with_overrides(overrides)?;
         let error = match worlds.compile(&source) {
             Ok(compiled) => return Ok((source, compiled)),
@@ -272,5 +287,31 @@ mod tests {
         let error = of(&["airspace.dt_s=4"]);
         assert_eq!((error.line_and_column(), error.cause()), (Some((5, 5)), "n = -4"));
         assert!(error.place().ends_with("s.toml"), "{error}");
+    }
+
+    #[test]
+    fn options_of_an_import_change_what_is_read_and_are_no_keys_of_a_scenario() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("t.csv");
+        let row = |k: u32, minutes: u32| {
+            let time_s = 60 * minutes + 10 * k;
+            format!("{time_s},a,47.0,{:.2},35000\n", 7.0 + 0.03 * f64::from(k))
+        };
+        let rows: String = (0..6).map(|k| row(k, if k < 3 { 0 } else { 5 })).collect();
+        std::fs::write(&file, format!("time_s,icao24,lat_deg,lon_deg,alt_ft\n{rows}"))
+            .expect("written");
+        let bodies = |overrides: &[&str]| {
+            let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+            read_scenario(&WORLDS, &file, &overrides).map(|(_, compiled)| compiled.body_count())
+        };
+        assert_eq!(bodies(&[]), Ok(1));
+        assert_eq!(bodies(&["import.max_gap_s=60", "seed=3"]), Ok(2));
+        let error = bodies(&["import.gap=60"]).expect_err("no such option");
+        assert!(error.remedy().contains("max_gap_s"), "{error}");
+        let toml = folder.path().join("s.toml");
+        let text = "format = 1\nworld = \"airspace\"\n[airspace.generator]\n\
+                    kind = \"superconflict\"\nn = 3\n";
+        std::fs::write(&toml, text).expect("written");
+        assert!(read_scenario(&WORLDS, &toml, &["import.max_gap_s=60".into()]).is_err());
     }
 }

@@ -9,7 +9,7 @@ use serde_json::Value;
 use sidestep::experiment::MAX_PROBLEMS;
 use sidestep::kernel::InputError;
 use sidestep::kernel::text::JsonTextReport;
-use sidestep::scenario::{CompiledScenario, ImportedScenario, Remark, Source};
+use sidestep::scenario::{CompiledScenario, ImportOptions, ImportedScenario, Remark, Source};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -33,7 +33,8 @@ pub(crate) struct CheckArgs {
 /// # Errors
 /// When one thing is wrong with the scenario. Several are printed, and reported by the exit code alone.
 pub(crate) fn check(args: &CheckArgs, console: Console) -> Result<ExitCode, Failure> {
-    let foreign = worlds().import_scenario(&args.scenario.file)?;
+    let options = ImportOptions::from_overrides(&args.scenario.all_overrides());
+    let foreign = worlds().import_scenario(&args.scenario.file, &options)?;
     if let Some(ImportedScenario { scenario: Err(error), json, lines, .. }) = foreign {
         // The report lists the contents of the file, and the error says why it cannot be run.
         let mut json = json;

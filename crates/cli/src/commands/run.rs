@@ -11,7 +11,7 @@ use crate::sweep::ReplicationArgs;
 use crate::worlds;
 use clap::{ArgGroup, Args};
 use sidestep::kernel::{Cycle, InputError};
-use sidestep::scenario::{Remark, Severity};
+use sidestep::scenario::{ImportOptions, Remark, Severity};
 use sidestep_session::{ManagedRun, OutputPaths, ViewerAddress};
 use std::path::PathBuf;
 
@@ -93,7 +93,8 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     args.many.check_single_run()?;
     let (source, compiled) = args.scenario.compile()?;
     print_warnings(&compiled.remarks(), console);
-    let import = worlds().import_scenario(&args.scenario.file)?;
+    let options = ImportOptions::from_overrides(&args.scenario.all_overrides());
+    let import = worlds().import_scenario(&args.scenario.file, &options)?;
     let workers = args.workers.count();
     let paths = OutputPaths {
         folder: args.out.as_deref(),

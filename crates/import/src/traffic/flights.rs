@@ -20,6 +20,9 @@ const MIN_CALLSIGN_S: f64 = 60.0;
 /// What reported speeds may differ from those of rows, before their unit is in doubt.
 const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
 
+/// The rule by which flights of a single row are left out.
+pub const SINGLE_ROW_RULE: &str = "flights of a single row";
+
 const LEAVE_OUT: &str = "add `--set import.leave_out_suspicious=true` to leave them out";
 
 /// Returns the flights of all rows, with the report.
@@ -328,7 +331,7 @@ impl FlightBuilder<'_> {
         let first = rows.first()?;
         let sample = &first.sample;
         if !is_snapshot && rows.len() < 2 {
-            self.record(Treatment::Dropped, "flights of a single row", first, "");
+            self.record(Treatment::Dropped, SINGLE_ROW_RULE, first, "");
             return None;
         }
         if is_snapshot && (sample.ground_speed_kt.is_none() || sample.track_deg.is_none()) {

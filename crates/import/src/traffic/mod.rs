@@ -45,6 +45,7 @@ use std::fmt;
 use std::path::Path;
 
 pub use clean::to_csv;
+pub use flights::SINGLE_ROW_RULE;
 pub use options::TrafficOptions;
 pub use time::format_utc;
 

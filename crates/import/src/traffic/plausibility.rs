@@ -51,22 +51,54 @@ pub(super) fn distance_m(a: LatLon, b: LatLon) -> f64 {
 
 /// Returns the ratio of the speeds at which rows move to those that they report; `None` where too few do either.
 pub(super) fn speed_ratio<'a>(flights: impl Iterator<Item = &'a Vec<Row>>) -> Option<f64> {
-    /// Fewer rows tell nothing about a unit.
-    const MIN_PAIRS: usize = 8;
+    /// Fewer stretches tell nothing about a unit.
+    const MIN_STRETCHES: usize = 4;
     let mut ratios = Vec::new();
     for rows in flights {
+        let mut stretch = Stretch::default();
         for pair in rows.windows(2) {
-            let duration_s = pair[1].sample.time_s - pair[0].sample.time_s;
-            let length_m = distance_m(pair[0].sample.position, pair[1].sample.position);
-            let reported_m_s = reported_m_s(&pair[0]).zip(reported_m_s(&pair[1]));
-            let Some((from_m_s, to_m_s)) = reported_m_s else { continue };
-            let mean_m_s = (from_m_s + to_m_s) / 2.0;
-            if duration_s <= 60.0 && length_m > 200.0 && mean_m_s > 1.0 {
-                ratios.push(length_m / duration_s / mean_m_s);
+            stretch.push(pair);
+            if stretch.duration_s >= MIN_STRETCH_S {
+                ratios.extend(std::mem::take(&mut stretch).ratio());
             }
         }
     }
-    if ratios.len() < MIN_PAIRS { None } else { median(&mut ratios) }
+    if ratios.len() < MIN_STRETCHES { None } else { median(&mut ratios) }
+}
+
+/// The shortest time in s over which speeds are compared: positions may be repeated for some seconds.
+const MIN_STRETCH_S: f64 = 30.0;
+
+/// Successive rows of a flight.
+#[derive(Debug, Default)]
+struct Stretch {
+    duration_s: f64,
+    length_m: f64,
+    /// The length by the reported speeds.
+    reported_m: f64,
+    is_incomplete: bool,
+}
+
+impl Stretch {
+    fn push(&mut self, pair: &[Row]) {
+        let duration_s = pair[1].sample.time_s - pair[0].sample.time_s;
+        self.duration_s += duration_s;
+        self.length_m += distance_m(pair[0].sample.position, pair[1].sample.position);
+        match reported_m_s(&pair[0]).zip(reported_m_s(&pair[1])) {
+            Some((from_m_s, to_m_s)) => self.reported_m += duration_s * (from_m_s + to_m_s) / 2.0,
+            None => self.is_incomplete = true,
+        }
+    }
+
+    /// Returns the ratio of both lengths; `None` where one of them says nothing: within a gap an aircraft may turn, and
+    /// a short way is mostly noise.
+    fn ratio(self) -> Option<f64> {
+        let is_telling = !self.is_incomplete
+            && self.duration_s <= 4.0 * MIN_STRETCH_S
+            && self.length_m > TOLERANCE_M
+            && self.reported_m > 0.0;
+        is_telling.then(|| self.length_m / self.reported_m)
+    }
 }
 
 fn reported_m_s(row: &Row) -> Option<f64> {

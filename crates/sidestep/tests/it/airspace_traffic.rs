@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use sidestep::import::{bluesky, traffic};
 use sidestep::kernel::Simulation;
 use sidestep::scenario::Source;
-use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks, has_enough_samples};
+use sidestep::worlds::airspace::traffic::{from_bluesky, from_tracks};
 use sidestep::worlds::airspace::{AirspaceRun, airspace_run};
 use sidestep_testing::shared_data as shared;
 use std::collections::{BTreeMap, BTreeSet};
@@ -368,12 +368,7 @@ fn expected_losses() -> BTreeMap<String, f64> {
 fn the_recording_over_switzerland_replays_with_its_losses_and_is_flown_anew_with_fewer() {
     let Some(path) = shared("airspace/opensky/switzerland_20180801_dev.csv") else { return };
     let recorded = traffic::read(&path).expect("a table");
-    let names: Vec<&str> = recorded
-        .tracks
-        .iter()
-        .filter(|t| has_enough_samples(t))
-        .map(|t| t.icao24.as_str())
-        .collect();
+    let names: Vec<&str> = recorded.tracks.iter().map(|t| t.icao24.as_str()).collect();
     let text = from_tracks("ch", &recorded).expect("it has tracks");
     let source = Source::new("ch", text, "");
     let mut replayed = run(&source, 2);

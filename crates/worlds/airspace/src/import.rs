@@ -1,14 +1,13 @@
 //! Traffic in other programs' files, read as scenarios.
 
-use super::traffic::{
-    from_bluesky, from_tracks, has_enough_samples, omitted_commands, settings_from_bluesky,
-};
+use super::traffic::{from_bluesky, from_tracks, omitted_commands, settings_from_bluesky};
 use serde_json::{Value, json};
 use sidestep_import::bluesky::{self, ScnFile, UnresolvedPosition};
-use sidestep_import::traffic::{self, RecordedTraffic};
+use sidestep_import::report::{Finding, ImportReport};
+use sidestep_import::traffic::{self, RecordedTraffic, TrafficOptions};
 use sidestep_kernel::InputError;
 use sidestep_kernel::text::{KeyValues, group_thousands};
-use sidestep_scenario::{ImportReport, ImportedScenario};
+use sidestep_scenario::{ImportOptions, ImportedScenario};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -24,7 +23,7 @@ fn traffic_file_format(file: &Path) -> TrafficFileFormat {
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     if name.ends_with(".scn") {
         TrafficFileFormat::Bluesky
-    } else if name.ends_with(".csv") {
+    } else if traffic::has_extension(file) {
         TrafficFileFormat::Tracks
     } else {
         TrafficFileFormat::Other
@@ -34,19 +33,24 @@ fn traffic_file_format(file: &Path) -> TrafficFileFormat {
 /// Returns the scenario of a file of another form, and a report on the rest of the file.
 ///
 /// # Errors
-/// When the file cannot be read.
-pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, InputError> {
+/// When the file cannot be read, or an option does not fit.
+pub(super) fn import_file(
+    file: &Path,
+    options: &ImportOptions,
+) -> Result<Option<ImportedScenario>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let (scenario, (mut json, lines)) = match traffic_file_format(file) {
+    let (scenario, report, (mut json, lines)) = match traffic_file_format(file) {
         TrafficFileFormat::Other => return Ok(None),
         TrafficFileFormat::Bluesky => {
+            refuse_options(file, options)?;
             let scn = bluesky::read(file)?;
             let rules = settings_from_bluesky(&file.display().to_string(), &scn);
-            (from_bluesky(&name, &scn), bluesky_report(&scn, &rules.refused))
+            let report = ImportReport::new("BlueSky scenario");
+            (from_bluesky(&name, &scn), report, bluesky_report(&scn, &rules.refused))
         }
         TrafficFileFormat::Tracks => {
-            let tracks = traffic::read(file)?;
-            (from_tracks(&name, &tracks), track_import_report(&tracks))
+            let tracks = traffic::read_with(file, &traffic_options(file, options)?)?;
+            (from_tracks(&name, &tracks), tracks.report.clone(), track_import_report(&tracks))
         }
     };
     if scenario.is_none() {
@@ -57,7 +61,7 @@ pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, Input
         let remedy = "give a file that creates aircraft at known places, with speeds";
         InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)
     });
-    Ok(Some(ImportedScenario { scenario, report: ImportReport::default(), json, lines }))
+    Ok(Some(ImportedScenario { scenario, report, json, lines }))
 }
 
 /// Returns the report on a file; `not_flown` are commands that could be read but not flown.
@@ -132,27 +136,68 @@ fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
     texts
 }
 
-fn track_import_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
-    let rows = recorded.rows as u64;
-    let repeated = recorded.repeated_rows as u64;
-    let single = recorded.tracks.iter().filter(|track| !has_enough_samples(track)).count() as u64;
-    let json = json!({
-        "rows": rows,
-        "aircraft": recorded.tracks.len(),
-        "repeated_rows": repeated,
-        "aircraft_of_one_row": single,
-    });
-    let aircraft = group_thousands(recorded.tracks.len() as u64);
-    let mut lines =
-        vec![("rows".to_string(), format!("{} of {aircraft} aircraft", group_thousands(rows)))];
-    let mut left_out = |name: &str, n: u64| {
-        if n > 0 {
-            lines.push((name.to_string(), format!("{}, left out", group_thousands(n))));
+/// Refuses options of an import for files that have none.
+fn refuse_options(file: &Path, options: &ImportOptions) -> Result<(), InputError> {
+    match options.iter().next() {
+        None => Ok(()),
+        Some((key, _)) => {
+            let cause = format!("`import.{key}` is no option of a BlueSky file");
+            Err(InputError::new(file.display(), cause, "leave it out").with_key(key))
         }
+    }
+}
+
+fn traffic_options(file: &Path, options: &ImportOptions) -> Result<TrafficOptions, InputError> {
+    let mut chosen = TrafficOptions::default();
+    for (key, value) in options.iter() {
+        let place = format!("{} with --set import.{key}={value}", file.display());
+        chosen.set(&place, key, value)?;
+    }
+    Ok(chosen)
+}
+
+fn track_import_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
+    let report = &recorded.report;
+    let count_of = |rule: &str| {
+        let found = report.findings.iter().find(|finding| finding.rule == rule);
+        found.map_or(0, |finding| finding.count)
     };
-    left_out("repeated rows", repeated);
-    left_out("aircraft of one row", single);
-    (json, lines)
+    let json = json!({
+        "rows": recorded.rows,
+        "aircraft": recorded.tracks.len(),
+        "repeated_rows": recorded.repeated_rows,
+        "aircraft_of_one_row": count_of(traffic::SINGLE_ROW_RULE),
+        "import": report,
+    });
+    (json, report_lines(recorded.rows, report))
+}
+
+/// Returns the report of a file of so many rows as lines: what was found in it, what was kept, and what was not taken as
+/// it stood.
+fn report_lines(rows: usize, report: &ImportReport) -> KeyValues {
+    let mut lines = vec![("read as".to_string(), report.format.clone())];
+    lines.extend(report.facts.iter().map(|fact| (fact.name.to_string(), fact.value.clone())));
+    let count = |noun: &str| {
+        let kept = report.kept.iter().find(|kept| kept.noun == noun);
+        group_thousands(kept.map_or(0, |kept| kept.count))
+    };
+    let kept = format!(
+        "{} of {} kept, in {} flights",
+        count("rows"),
+        group_thousands(rows as u64),
+        count("flights")
+    );
+    lines.push(("rows".to_string(), kept));
+    lines.extend(report.findings.iter().map(finding_line));
+    lines
+}
+
+/// Returns a finding as a line: what was done as its name, the rest as its value.
+fn finding_line(finding: &Finding) -> (String, String) {
+    let name = finding.treatment.word();
+    let text = finding.to_string();
+    let rest = text.strip_prefix(name).and_then(|rest| rest.strip_prefix(": "));
+    (name.to_string(), rest.unwrap_or(&text).to_string())
 }
 
 /// Returns names with their counts on one line; no line for none.

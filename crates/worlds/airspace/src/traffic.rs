@@ -13,7 +13,7 @@ mod recorded;
 
 pub use bluesky::from_bluesky;
 pub(crate) use bluesky::{omitted_commands, settings_from_bluesky};
-pub use recorded::{from_tracks, has_enough_samples};
+pub use recorded::from_tracks;
 
 use super::flight::SeparationMinima;
 use sidestep_import::local_plane::{LatLon, LocalPlane};

@@ -7,8 +7,8 @@ use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, Editing, ImportedScenario, MetricInfo, ResolvedScenario,
-    SeedEffect, Source, WorldFacts, WorldType,
+    CompiledScenario as AnyCompiled, Editing, ImportOptions, ImportedScenario, MetricInfo,
+    ResolvedScenario, SeedEffect, Source, WorldFacts, WorldType,
 };
 use std::any::Any;
 use std::path::Path;
@@ -76,8 +76,12 @@ impl WorldType for Airspace {
         super::facts::editing_tools()
     }
 
-    fn import_scenario(&self, file: &Path) -> Result<Option<ImportedScenario>, InputError> {
-        import::import_file(file)
+    fn import_scenario(
+        &self,
+        file: &Path,
+        options: &ImportOptions,
+    ) -> Result<Option<ImportedScenario>, InputError> {
+        import::import_file(file, options)
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {
