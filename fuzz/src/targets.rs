@@ -6,7 +6,7 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ascii, bag, bluesky, carmen, image::Bitmap, movingai, mrclam, rosmap, stage, stl, traffic,
+    ascii, bag, bluesky, carmen, image::Bitmap, mesh, movingai, mrclam, rosmap, stage, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -35,7 +35,9 @@ pub(crate) const TARGETS: &[Target] = &[
     ("stage", |data| drop(stage::load(&file("f.world", data)))),
     ("urdf", |data| text(data, |t| drop(Model::parse("f", t)))),
     ("srdf", |data| text(data, srdf)),
-    ("stl", |data| drop(stl::parse("f", data))),
+    ("stl", |data| drop(mesh::stl::parse("f", data))),
+    ("obj", |data| drop(mesh::obj::parse("f", data))),
+    ("dae", |data| drop(mesh::dae::parse("f", data))),
     ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
     ("traffic", |data| text(data, recorded)),
     ("traffic_parquet", |data| {

@@ -1,6 +1,7 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
 use super::kinematics::{ArmGoal, ConnectorTargetSolver, SerialChain, Skeleton, Vector};
+use sidestep_import::report::Finding;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
@@ -26,6 +27,8 @@ pub struct Arm {
     pub values: Vec<f64>,
     /// Finds joint values that follow its connectors.
     pub follower: ConnectorTargetSolver,
+    /// What was not taken as it stood in its files; none where it is of no file.
+    pub findings: Vec<Finding>,
 }
 
 impl Arm {
@@ -33,7 +36,8 @@ impl Arm {
     pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
         let skeleton = serial.skeleton();
         let follower = ConnectorTargetSolver::new(&serial, &skeleton);
-        Self { values: follower.clamp(values), skeleton, serial, at_m, follower }
+        let values = follower.clamp(values);
+        Self { values, skeleton, serial, at_m, follower, findings: Vec::new() }
     }
 
     /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if

@@ -120,8 +120,12 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<ImportedMap
     let mut cells = Vec::new();
     let mut report = ImportReport::new("map in characters (MovingAI)");
     for line in lines.by_ref().take(height) {
-        LEGEND.read_row(source, line, width, &mut cells)?;
-        record_symbols(&mut report, source, line);
+        let row = Line { text: line.text.trim_end(), ..line };
+        if row.text.len() < line.text.len() {
+            record_rule(&mut report, (Treatment::Repaired, BLANKS, 1), source, line);
+        }
+        LEGEND.read_row(source, row, width, &mut cells)?;
+        record_symbols(&mut report, source, row);
     }
     if cells.len() < width * height {
         let cause = format!("the map ends after {} rows, not {height}", cells.len() / width);
@@ -135,29 +139,41 @@ pub fn parse_map(place: &str, text: &str, box_size_m: f64) -> Result<ImportedMap
     Ok(ImportedMap::of_boxes(map, report))
 }
 
+/// The rule about blanks behind a row.
+const BLANKS: &str = "blanks at the ends of rows, which mean nothing";
+
 /// Counts the symbols of a row whose meaning is not used.
 fn record_symbols(report: &mut ImportReport, source: SourceText<'_>, line: Line<'_>) {
     for (symbol, rule) in SYMBOLS {
         let count = line.text.matches(symbol).count() as u64;
-        if count == 0 {
-            continue;
+        if count > 0 {
+            record_rule(report, (Treatment::NotUsed, rule, count), source, line);
         }
-        let known = report.findings.iter_mut().find(|finding| finding.rule == rule);
-        let Some(finding) = known else {
-            report.findings.push(Finding {
-                treatment: Treatment::NotUsed,
-                rule: rule.to_string(),
-                count,
-                places: vec![source.line_name(line)],
-                remedy: String::new(),
-            });
-            continue;
-        };
-        finding.count += count;
-        // Counting lines takes as long as the text before is, so that it is not done for every row.
-        if finding.places.len() < MAX_PLACES {
-            finding.places.push(source.line_name(line));
-        }
+    }
+}
+
+/// Records a rule that applied some times in a row.
+fn record_rule(
+    report: &mut ImportReport,
+    (treatment, rule, count): (Treatment, &str, u64),
+    source: SourceText<'_>,
+    line: Line<'_>,
+) {
+    let known = report.findings.iter_mut().find(|finding| finding.rule == rule);
+    let Some(finding) = known else {
+        report.findings.push(Finding {
+            treatment,
+            rule: rule.to_string(),
+            count,
+            places: vec![source.line_name(line)],
+            remedy: String::new(),
+        });
+        return;
+    };
+    finding.count += count;
+    // Counting lines takes as long as the text before is, so that it is not done for every row.
+    if finding.places.len() < MAX_PLACES {
+        finding.places.push(source.line_name(line));
     }
 }
 
@@ -171,14 +187,21 @@ fn read_header<'a>(
     let mut is_octile = false;
     let mut width = None;
     let mut height = None;
-    // In any order, each once.
+    // In any order, each once; words in any case, and empty lines between.
     for line in lines {
-        let mut words = line.text.split_whitespace();
-        match (words.next(), words.next(), words.next()) {
-            (Some("type"), Some("octile"), None) if !is_octile => is_octile = true,
-            (Some("width"), Some(n), None) if width.is_none() => width = Some(size(source, n)?),
-            (Some("height"), Some(n), None) if height.is_none() => height = Some(size(source, n)?),
-            (Some("map"), None, None) => {
+        let words = line.text.split_whitespace();
+        let words: Vec<String> = words.map(str::to_ascii_lowercase).collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        match words[..] {
+            [] => {}
+            ["type", "octile"] if !is_octile => is_octile = true,
+            ["type", kind] if !is_octile => {
+                let cause = format!("a map of type `{}`, not octile", kind.escape_debug());
+                return Err(source.error(line.offset, cause, HEADER_REMEDY));
+            }
+            ["width", _] if width.is_none() => width = Some(size(source, line)?),
+            ["height", _] if height.is_none() => height = Some(size(source, line)?),
+            ["map"] => {
                 let (Some(width), Some(height)) = (width, height) else {
                     let cause = "the header lacks the map's size";
                     return Err(source.error(line.offset, cause, HEADER_REMEDY));
@@ -200,8 +223,9 @@ fn read_header<'a>(
 
 const HEADER_REMEDY: &str = "begin with the lines `type octile`, `height H`, `width W` and `map`";
 
-/// Reads a size of the header; errors point at the word.
-fn size(source: SourceText<'_>, word: &str) -> Result<u64, InputError> {
+/// Reads the size that is the second word of a line of the header; errors point at the word.
+fn size(source: SourceText<'_>, line: Line<'_>) -> Result<u64, InputError> {
+    let word = line.text.split_whitespace().nth(1).unwrap_or_default();
     word.parse().map_err(|_| {
         let cause = format!("`{}` is not a whole number", word.escape_debug());
         source.error(source.offset_of(word), cause, HEADER_REMEDY)
@@ -224,16 +248,15 @@ pub fn load_scen(path: &Path) -> Result<ScenFile, InputError> {
 /// goal is outside the map.
 pub fn parse_scen(place: &str, text: &str) -> Result<ScenFile, InputError> {
     let source = SourceText { place, text };
-    let mut lines = source.lines_of(text);
-    if !lines.next().is_some_and(|line| is_version_1(line.text)) {
+    let numbered = source.lines_of(text).enumerate();
+    let mut lines = numbered.filter(|(_, line)| !line.text.trim().is_empty());
+    if !lines.next().is_some_and(|(_, line)| is_version_1(line.text)) {
         let remedy = "begin the file with the line `version 1`";
         return Err(source.error(0, "not a MovingAI scenario of version 1", remedy));
     }
     let mut rows = Vec::new();
-    for (index, line) in lines.enumerate() {
-        if !line.text.trim().is_empty() {
-            rows.push(scen_row(source, index + 2, line)?);
-        }
+    for (index, line) in lines {
+        rows.push(scen_row(source, index + 1, line)?);
     }
     let mut report = ImportReport::new("list of starts and goals (MovingAI)");
     report.add_kept("rows", rows.len());
@@ -437,6 +460,22 @@ mod tests {
             let map = parse_map("m", &WAREHOUSE.replace('E', &symbol.to_string()), 1.0);
             assert!(map.is_ok(), "{symbol}");
         }
+    }
+
+    #[test]
+    fn case_empty_lines_and_blanks_change_nothing_and_blanks_behind_rows_are_said() {
+        let odd = "\n Type  Octile \nHEIGHT\t2\n\nwidth 7 \nMAP\n.GS@OTW \n.......\t\n \n";
+        let read = parse_map("m", odd, 1.0).expect("a map");
+        let plain = parse_map("m", MAP, 1.0).expect("a map");
+        assert_eq!(read.map, plain.map);
+        let blanks = read.report.findings[0].to_string();
+        assert!(blanks.starts_with("repaired: blanks at the ends of rows"), "{blanks}");
+        assert!(blanks.contains("(2 times), line 7, line 8"), "{blanks}");
+        let tiles = parse_map("m", "type tile\n", 1.0).expect_err("tiles");
+        assert!(tiles.cause().contains("of type `tile`, not octile"), "{tiles}");
+        let rows = "version 1\n0 m 6 4 0 0 5 3 8\n";
+        let odd = parse_scen("s", &format!("\n\n{rows}")).expect("a scenario").rows;
+        assert_eq!((odd[0].line, odd.len()), (4, 1));
     }
 
     fn map_error(text: &str) -> (usize, usize) {

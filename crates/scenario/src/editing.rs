@@ -209,8 +209,21 @@ pub struct FileUse {
     pub is_list: bool,
     /// Keys that it replaces.
     pub replaces: &'static [&'static str],
-    /// Numbers of keys that are set with it, unless the text has them.
-    pub defaults: &'static [(&'static str, f64)],
+    /// What such a file is, for people: `image: dark is wall`.
+    pub about: &'static str,
+    /// Numbers that the file does not say. The page asks for them as the commands do, unless the text has them.
+    pub asks: &'static [AskedNumber],
+}
+
+/// A number that is asked for with a file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AskedNumber {
+    /// The key that gets it.
+    pub key: &'static str,
+    /// Its name for people: `Side of a pixel`.
+    pub name: &'static str,
+    /// Its unit. The number is above 0.
+    pub unit: &'static str,
 }
 
 /// The kind of a file that holds no scenario.

@@ -149,21 +149,9 @@ impl ImportReport {
         }
     }
 
-    /// Returns its findings as remarks on the scenario whose key names the file: warnings where the run may be another
-    /// one than meant.
-    pub fn to_remarks(&self, key: &str) -> Vec<Remark> {
-        let mut remarks = Vec::with_capacity(self.findings.len());
-        for finding in &self.findings {
-            let words = finding.to_string();
-            remarks.push(match finding.treatment {
-                Treatment::Guessed | Treatment::Suspicious => Remark::warning(key, words),
-                Treatment::Dropped
-                | Treatment::Repaired
-                | Treatment::NotUsed
-                | Treatment::Noted => Remark::note(key, words),
-            });
-        }
-        remarks
+    /// Returns what the author of a scenario has to know of the file that it names under `key`.
+    pub fn remarks(&self, key: &str) -> Vec<Remark> {
+        self.findings.iter().map(|finding| finding.remark(key)).collect()
     }
 
     /// Returns format, properties and counts as lines of text, without the findings.
@@ -182,6 +170,20 @@ impl ImportReport {
     pub fn dropped(&self) -> u64 {
         let dropped = self.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
         dropped.map(|found| found.count).sum()
+    }
+}
+
+impl Finding {
+    /// Returns it as a remark on a scenario whose `key` names the file: a warning where the file may be another than
+    /// meant.
+    pub fn remark(&self, key: &str) -> Remark {
+        let words = self.to_string();
+        match self.treatment {
+            Treatment::Guessed | Treatment::Suspicious => Remark::warning(key, words),
+            Treatment::Dropped | Treatment::Repaired | Treatment::NotUsed => {
+                Remark::note(key, words)
+            }
+        }
     }
 }
 

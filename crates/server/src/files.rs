@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 use sidestep_kernel::InputError;
+use sidestep_scenario::editing::{FileUse, UsedFile};
 use sidestep_scenario::{ImportOptions, Source, Worlds};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -44,16 +45,6 @@ struct TomlHeader {
     scenario: Option<IgnoredAny>,
     profile: Option<String>,
 }
-
-/// Extensions of maps and images of floors, with a description.
-const MAP_EXTENSIONS: [(&str, &str); 6] = [
-    ("yaml", "map of ROS"),
-    ("yml", "map of ROS"),
-    ("map", "map of MovingAI"),
-    ("png", "image: dark is wall"),
-    ("pgm", "image: dark is wall"),
-    ("world", "world of Stage"),
-];
 
 impl AllowedFiles {
     /// Returns the files that may be read: everything below these folders, and these files.
@@ -234,6 +225,10 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
         let megabytes = bytes as f64 / 1e6;
         return Some((FileKind::Recording, format!("{megabytes:.1} MB")));
     }
+    // Of a map only the name is looked at, so that it may be large.
+    if let Some(about) = map_description(path, worlds) {
+        return Some((FileKind::Map, about.to_owned()));
+    }
     if bytes > MAX_FILE_BYTES {
         return None;
     }
@@ -241,16 +236,22 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
         let header: TomlHeader = Source::read(path, &[]).ok()?.parse().ok()?;
         return kind_of_toml(header);
     }
-    if let Some((_, about)) = MAP_EXTENSIONS.iter().find(|(ending, _)| has_extension(path, ending))
-    {
-        return Some((FileKind::Map, (*about).into()));
-    }
     *foreign += 1;
     if *foreign > MAX_FOREIGN_FILES {
         return None;
     }
     let imported = worlds.import_scenario(path, &ImportOptions::default()).ok()??;
     imported.scenario.is_ok().then(|| (FileKind::Foreign, String::new()))
+}
+
+/// Returns what a file is for the first world that uses it as a map.
+fn map_description(path: &Path, worlds: &Worlds) -> Option<&'static str> {
+    let name = path.file_name()?.to_str()?.to_lowercase();
+    let mut uses = worlds.iter().flat_map(|world| world.editing().files);
+    let is_used = |file: &FileUse| {
+        file.kind == UsedFile::Map && file.endings.iter().any(|ending| name.ends_with(ending))
+    };
+    uses.find(is_used).map(|file| file.about)
 }
 
 fn has_extension(path: &Path, extension: &str) -> bool {

@@ -60,8 +60,17 @@ export interface FileUse {
   is_list: boolean;
   /** Keys that it replaces. */
   replaces: string[];
-  /** Numbers of keys that the text may lack. */
-  defaults: [string, number][];
+  /** What such a file is. */
+  about: string;
+  /** Numbers that the file does not say. */
+  asks: AskedNumber[];
+}
+
+/** A number above 0 that is asked for with a file. */
+export interface AskedNumber {
+  key: string;
+  name: string;
+  unit: string;
 }
 
 /** A new scenario with an empty floor of a chosen size within walls. */

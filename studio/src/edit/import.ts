@@ -1,7 +1,7 @@
 /** Foreign files that a scenario uses: maps, and sensors and effectors learned from logs. */
 
 import type { Edit, FileEntry } from "../protocol";
-import { valueOf, type Editing, type FileUse } from "./editing";
+import { valueOf, type AskedNumber, type Editing, type FileUse } from "./editing";
 import { partsOf, type TomlTable } from "./keypath";
 import { insert, remove, set } from "./tools/item";
 
@@ -26,8 +26,21 @@ export function useOf(editing: Editing, { kind, name }: FileEntry): FileUse | un
   return editing.files.find((use) => use.kind === kind && fits(use));
 }
 
-/** The edits that make a scenario use a file: in place of another, or beside others in a list. */
-export function importEdits(model: TomlTable, use: FileUse, path: string): Edit[] {
+/** The numbers that a file does not say, and that the scenario does not have either. */
+export function asksOf(model: TomlTable, use: FileUse): AskedNumber[] {
+  return use.asks.filter(({ key }) => valueOf(model, key) === undefined);
+}
+
+/**
+ * The edits that make a scenario use a file: in place of another, or beside others in a list. `answers` are the numbers
+ * that were asked for, by their keys.
+ */
+export function importEdits(
+  model: TomlTable,
+  use: FileUse,
+  path: string,
+  answers: ReadonlyMap<string, number> = new Map(),
+): Edit[] {
   const key = partsOf(use.key);
   if (use.is_list) {
     const known = valueOf(model, use.key);
@@ -35,10 +48,9 @@ export function importEdits(model: TomlTable, use: FileUse, path: string): Edit[
     return known.includes(path) ? [] : [insert(key, path)];
   }
   const replaced = use.replaces.filter((other) => valueOf(model, other) !== undefined);
-  const missing = use.defaults.filter(([other]) => valueOf(model, other) === undefined);
   return [
     ...replaced.map((other) => remove(partsOf(other))),
     set(key, path),
-    ...missing.map(([other, value]) => set(partsOf(other), value)),
+    ...[...answers].map(([other, value]) => set(partsOf(other), value)),
   ];
 }

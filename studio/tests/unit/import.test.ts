@@ -2,7 +2,7 @@
 
 import { expect, test } from "vitest";
 import type { TomlTable } from "../../src/edit/keypath";
-import { folderOf, importEdits, relativePath, useOf } from "../../src/edit/import";
+import { asksOf, folderOf, importEdits, relativePath, useOf } from "../../src/edit/import";
 import { declaredEditing } from "../fake/editing";
 import type { FileEntry } from "../../src/protocol";
 
@@ -22,13 +22,14 @@ test("each world accepts its kinds of files", () => {
     [
       entry("map", "a.yaml"),
       entry("map", "b.png"),
+      entry("map", "B.JPEG"),
       entry("map", "c.world"),
       entry("profile", "d.toml"),
       entry("scenario", "e.toml"),
     ]
       .filter((one) => useOf(declaredEditing(world), one))
       .map(({ name }) => name);
-  expect(names("robots")).toEqual(["a.yaml", "b.png", "d.toml"]);
+  expect(names("robots")).toEqual(["a.yaml", "b.png", "B.JPEG", "d.toml"]);
   expect(names("chain")).toEqual(["a.yaml", "c.world"]);
   expect(names("airspace")).toEqual([]);
 });
@@ -44,11 +45,6 @@ test("a map replaces the previous one, and a profile is added to others", () => 
     "set map.file",
   ]);
   expect(keys(editsFor(drawn, "robots", entry("map", "a.png")))).toEqual(["remove map.ascii", "set map.file"]);
-  expect(editsFor({}, "robots", entry("map", "a.png")).at(-1)).toEqual({
-    op: "set",
-    key: "map.resolution_m",
-    value: 0.05,
-  });
   expect(keys(editsFor({ ground: { corridor: {}, unknown: "solid" } }, "chain", entry("map", "a.world")))).toEqual([
     "remove ground.corridor",
     "remove ground.unknown",
@@ -61,4 +57,14 @@ test("a map replaces the previous one, and a profile is added to others", () => 
     { op: "insert", key: "profiles", at: null, value: "p.toml" },
   ]);
   expect(editsFor({ profiles: ["p.toml"] }, "robots", entry("profile", "p.toml"))).toEqual([]);
+});
+
+test("the side of an image's pixels is asked for, unless the scenario has it", () => {
+  const use = useOf(declaredEditing("robots"), entry("map", "a.png"))!;
+  const asked = asksOf({}, use);
+  expect(asked).toEqual([{ key: "map.resolution_m", name: "Side of a pixel", unit: "m" }]);
+  expect(asksOf({ map: { resolution_m: 0.1 } }, use)).toEqual([]);
+  expect(asksOf({}, useOf(declaredEditing("robots"), entry("map", "a.yaml"))!)).toEqual([]);
+  const answers = new Map([["map.resolution_m", 0.02]]);
+  expect(importEdits({}, use, "a.png", answers).at(-1)).toEqual({ op: "set", key: "map.resolution_m", value: 0.02 });
 });

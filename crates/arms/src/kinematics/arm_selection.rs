@@ -35,6 +35,7 @@ pub struct ArmModel {
     /// The joints from base to tip.
     pub chain: SerialChain,
     urdf: PathBuf,
+    is_tip_given: bool,
 }
 
 impl ArmFiles {
@@ -46,7 +47,8 @@ impl ArmFiles {
         let model = Model::load(&self.urdf)?;
         let semantics = self.srdf.as_ref().map(|path| Semantics::load(path, &model)).transpose()?;
         let chain = self.chain(&model, semantics.as_ref())?;
-        Ok(ArmModel { model, semantics, chain, urdf: self.urdf.clone() })
+        let is_tip_given = self.tip.is_some() || self.group.is_some();
+        Ok(ArmModel { model, semantics, chain, urdf: self.urdf.clone(), is_tip_given })
     }
 
     fn chain(
@@ -91,9 +93,12 @@ impl ArmModel {
     }
 
     /// Returns what was not taken as it stood in its files.
-    pub fn findings(&self) -> impl Iterator<Item = &Finding> {
+    pub fn findings(&self) -> Vec<&Finding> {
         let semantics = self.semantics.iter().flat_map(|semantics| &semantics.report.findings);
-        self.model.report.findings.iter().chain(semantics)
+        if self.is_tip_given {
+            return self.model.findings_with_tip().chain(semantics).collect();
+        }
+        self.model.report.findings.iter().chain(semantics).collect()
     }
 
     /// Returns the shapes of its links, and remarks on those that are not among them or stand as others.

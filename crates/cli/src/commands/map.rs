@@ -20,8 +20,8 @@ Examples:
   sidestep map arena.map --width 60
   sidestep map building.yaml --box 0.5 --json
 
-Reads ROS map_server (.yaml), images (.png, .pgm: dark is wall, light is free, between is \
-unknown), MovingAI (.map) and character maps (.txt), each also with .gz. \
+Reads ROS map_server (.yaml), images (.png, .pgm, .jpg, .bmp: dark is wall, light is free, between \
+is unknown), MovingAI (.map) and character maps (.txt), each also with .gz. \
 In the terminal: # wall, . free, ? unknown, numbers count boxes; a wide map is drawn smaller and \
 loses no wall. What was guessed in the file, is suspicious or not used goes to standard error, and with \
 --json into the field report.";

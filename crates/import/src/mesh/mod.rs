@@ -81,3 +81,69 @@ impl Mesh {
         bounds
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_extension_says_how_to_read() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("A.OBJ"), "v 1 2 3\nv 0 0 -0\n").expect("written");
+        let mesh = Mesh::load(&path("A.OBJ")).expect("a mesh");
+        assert_eq!(mesh.points_m, [[0.0; 3], [1.0, 2.0, 3.0]]);
+        assert_eq!(mesh.bounds_m(), [[0.0; 3], [1.0, 2.0, 3.0]]);
+        assert!(Mesh::load(&path("a.ply")).expect_err("ply").cause().contains("STL, OBJ and DAE"));
+        assert!(Mesh::load(&path("none.stl")).is_err());
+    }
+
+    /// Pieces of files of all three kinds.
+    fn piece() -> impl Strategy<Value = &'static str> {
+        prop_oneof![
+            Just("solid "),
+            Just("vertex "),
+            Just("1 2 3 "),
+            Just("endsolid "),
+            Just("\nv "),
+            Just("\n"),
+            Just("nan "),
+            Just("-1e300 "),
+            Just("<COLLADA>"),
+            Just("</COLLADA>"),
+            Just("<node id='a'>"),
+            Just("</node>"),
+            Just("<library_visual_scenes><visual_scene>"),
+            Just("<matrix>"),
+            Just("</matrix>"),
+            Just("</visual_scene></library_visual_scenes>"),
+            Just("<instance_node url='#a'/>"),
+            Just("<instance_geometry url='#g'/>"),
+            Just("<geometry id='g'><mesh><vertices>"),
+            Just("<input semantic='POSITION' source='#s'/>"),
+            Just("</vertices></mesh></geometry>"),
+            Just("<source id='s'><float_array>"),
+            Just("</float_array></source>"),
+            Just("<rotate>"),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_and_no_bytes_panic_the_readers(
+            pieces in proptest::collection::vec(piece(), 0..40),
+            bytes in proptest::collection::vec(any::<u8>(), 0..300),
+        ) {
+            let text = pieces.concat();
+            let whole = format!("<COLLADA>{text}</COLLADA>");
+            for data in [text.as_bytes(), whole.as_bytes(), &bytes] {
+                for parse in [stl::parse, obj::parse, dae::parse] {
+                    if let Ok(mesh) = parse("f", data) {
+                        prop_assert!(mesh.points_m.iter().flatten().all(|x| x.is_finite()));
+                    }
+                }
+            }
+        }
+    }
+}

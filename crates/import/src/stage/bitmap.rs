@@ -66,11 +66,8 @@ impl SolidPart {
     fn of(from_top: &[bool], width: usize) -> Option<Self> {
         let mut part: Option<Self> = None;
         for (y, row) in from_top.chunks(width).enumerate() {
-            let (Some(first), Some(last)) =
-                (row.iter().position(|solid| *solid), row.iter().rposition(|solid| *solid))
-            else {
-                continue;
-            };
+            let Some(first) = row.iter().position(|solid| *solid) else { continue };
+            let last = row.iter().rposition(|solid| *solid).unwrap_or(first);
             let so_far = part.unwrap_or(Self { columns: [first, last], rows: [y, y] });
             let columns = [so_far.columns[0].min(first), so_far.columns[1].max(last)];
             part = Some(Self { columns, rows: [so_far.rows[0], y] });

@@ -111,6 +111,11 @@ struct IncludeReader<'a> {
 impl IncludeReader<'_> {
     fn read(&mut self, path: &Path) -> Result<(), InputError> {
         let text = read_text(path, MAX_WORLD_BYTES)?;
+        if text.trim_start().starts_with('<') {
+            let cause = "is XML, as worlds of Gazebo are, and no world of Stage";
+            let remedy = "give a map of ROS (.yaml) of the same place, or a world of Stage";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
         let canonical = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         self.open.push(canonical);
         let file = self.files.sources.len();

@@ -242,9 +242,10 @@ impl<'a> WorldReader<'a> {
         let has_bitmap = def.properties.contains_key("bitmap");
         for child in &def.children {
             if self.is_block(child) {
-                let rule = match has_bitmap {
-                    true => "shapes (`block`) beside a bitmap",
-                    false => "shapes (`block`), for which the box of `size` stands",
+                let rule = if has_bitmap {
+                    "shapes (`block`) beside a bitmap"
+                } else {
+                    "shapes (`block`), for which the box of `size` stands"
                 };
                 self.record(Treatment::NotUsed, rule.to_owned(), child, "");
             }

@@ -219,6 +219,12 @@ fn wrong_syntax_and_values_are_pointed_at() {
 }
 
 #[test]
+fn a_world_of_gazebo_is_told_from_one_of_stage() {
+    let told = error("\n<?xml version=\"1.0\"?><sdf version=\"1.6\"/>");
+    assert!(told.cause().contains("worlds of Gazebo"), "{told}");
+}
+
+#[test]
 fn files_that_include_themselves_are_refused() {
     let loop_of_two = [("a.world", "include \"b.inc\""), ("b.inc", "\ninclude \"a.world\"")];
     let error = read(&loop_of_two).expect_err("a loop");

@@ -160,6 +160,10 @@ impl SolidReader<'_> {
             let remedy = "save the mesh in meters, because some programs ignore its unit";
             self.report.record(Treatment::Guessed, rule, format!("`{file}`"), remedy);
         }
+        if scale.contains(&0.0) {
+            let rule = "meshes with a scale of 0, which have no inside";
+            self.report.record(Treatment::Suspicious, rule, format!("`{file}`"), "");
+        }
         let [low, high] = mesh.bounds_m();
         let ends = [0, 1, 2].map(|i| [low[i] * scale[i], high[i] * scale[i]]);
         if ends.iter().any(|[a, b]| (b - a).abs() > MAX_MESH_M) {
@@ -170,5 +174,76 @@ impl SolidReader<'_> {
         let center_m = ends.map(|[a, b]| 0.5 * (a + b));
         let place = |point: &[f64; 3]| [0, 1, 2].map(|i| point[i] * scale[i] - center_m[i]);
         Ok((center_m, Shape::Hull { points_m: mesh.points_m.iter().map(place).collect() }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OBJ: &str = "v 0 0 0\nv 1000 0 0\nv 0 2000 0\nv 0 0 4000\n";
+    const DAE: &str = "<COLLADA><asset><unit meter='0.001'/></asset><geometry id='g'><mesh>\
+        <source id='s'><float_array>0 0 0 1000 0 0 0 2000 0 0 0 4000</float_array></source>\
+        <vertices><input semantic='POSITION' source='#s'/></vertices></mesh></geometry>\
+        <library_visual_scenes><visual_scene><node><instance_geometry url='#g'/></node></visual_scene>\
+        </library_visual_scenes></COLLADA>";
+
+    /// The solids of a link with these shapes, in a folder with meshes.
+    fn solids(shapes: &str) -> (Vec<Solid>, Vec<String>) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for (name, text) in [("a.obj", OBJ), ("a.dae", DAE), ("cut.stl", "solid"), ("a.ply", "")] {
+            std::fs::write(folder.path().join(name), text).expect("written");
+        }
+        let text = format!("<robot name='r'><link name='l'>{shapes}</link></robot>");
+        let model = Model::parse("r.urdf", &text).expect("a model");
+        let Solids { solids, report } = model.solids(&folder.path().join("r.urdf"));
+        (solids, report.findings.iter().map(ToString::to_string).collect())
+    }
+
+    fn mesh(file: &str, scale: &str) -> String {
+        format!(
+            "<collision><geometry><mesh filename='{file}' scale='{scale}'/></geometry></collision>"
+        )
+    }
+
+    #[test]
+    fn a_mesh_is_the_hull_of_its_points_about_their_middle_in_the_scale_of_the_model() {
+        let (solids, said) = solids(&mesh("a.obj", "0.001 0.001 -0.001"));
+        let [Solid { center_m, shape: Shape::Hull { points_m }, .. }] = &solids[..] else {
+            panic!("{solids:?}")
+        };
+        assert_eq!(*center_m, [0.5, 1.0, -2.0]);
+        assert_eq!(points_m.len(), 4);
+        assert!(points_m.contains(&[-0.5, -1.0, -2.0]), "{points_m:?}");
+        assert_eq!(said, [""; 0]);
+    }
+
+    #[test]
+    fn what_is_odd_about_a_mesh_is_said() {
+        let (found, said) = solids(&mesh("a.dae", "1 1 1"));
+        assert_eq!(found[0].center_m, [0.5, 1.0, 2.0]);
+        assert!(said[0].starts_with("guessed: the unit of a mesh, 0.001 m, counts"), "{said:?}");
+        let (_, said) = solids(&mesh("a.obj", "1 1 1"));
+        assert!(said[0].starts_with("suspicious: meshes larger than 50 m"), "{said:?}");
+        let (_, said) = solids(&mesh("a.obj", "0 0.001 0.001"));
+        assert!(said[0].starts_with("suspicious: meshes with a scale of 0"), "{said:?}");
+    }
+
+    #[test]
+    fn shapes_that_are_not_read_are_named_with_the_reason() {
+        let missing = mesh("package://no/such.stl", "1 1 1");
+        let other = mesh("a.ply", "1 1 1");
+        let capsule = "<collision><geometry><capsule radius='1'/></geometry></collision>";
+        let (solids, said) =
+            solids(&[&missing, &other, &mesh("cut.stl", "1 1 1"), capsule].concat());
+        assert!(solids.is_empty());
+        assert!(
+            said[0].starts_with("dropped: collision shapes whose mesh is not read (3 times)"),
+            "{said:?}"
+        );
+        for reason in ["such.stl: the file is absent", "only STL, OBJ and DAE", "cut short"] {
+            assert!(said[0].contains(reason), "{said:?}");
+        }
+        assert!(said[1].contains("`l` (a capsule is not read)"), "{said:?}");
     }
 }

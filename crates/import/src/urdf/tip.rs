@@ -2,7 +2,10 @@
 
 use super::Model;
 use super::tree::quote_names;
-use crate::{ImportReport, Treatment};
+use crate::report::{Finding, ImportReport, Treatment};
+
+/// The end of the rule about a tip that is chosen.
+const TIP_RULE_END: &str = "where none is given";
 
 /// Words in the names of the parts of a gripper that move: no goal of an arm is meant for them.
 const JAW_WORDS: [&str; 5] = ["jaw", "finger", "knuckle", "claw", "pincer"];
@@ -35,6 +38,11 @@ impl Model {
         search.frame_beside_last_joint(&path).unwrap_or(leaf)
     }
 
+    /// Returns what of the report holds where the tip is given: all but the choice of one.
+    pub fn findings_with_tip(&self) -> impl Iterator<Item = &Finding> {
+        self.report.findings.iter().filter(|finding| !finding.rule.ends_with(TIP_RULE_END))
+    }
+
     /// Records the tip where the file leaves a choice.
     pub(super) fn record_tip(&self, report: &mut ImportReport) {
         let tip = self.default_tip();
@@ -42,7 +50,7 @@ impl Model {
         if others.is_empty() {
             return;
         }
-        let rule = format!("the tip is `{}` where none is given", self.links[tip]);
+        let rule = format!("the tip is `{}` {TIP_RULE_END}", self.links[tip]);
         let names = others.iter().map(|&link| format!("`{}`", self.links[link]));
         let remedy = format!("another end can be given as the tip: {}", quote_names(names));
         report.record(Treatment::Guessed, rule, "", &remedy);

@@ -6,13 +6,22 @@ use sidestep_arms::kinematics::JointMotionKind;
 use sidestep_rods::Mobility;
 use sidestep_scenario::Remark;
 
-/// Returns remarks on joints, then on the network, then on rules without effect.
+/// Returns remarks on files, then on joints, on the network, and on rules without effect.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
+    let ground = compiled.recipe.iter().flat_map(|recipe| recipe.ground_remarks.iter().cloned());
     let mut chains = compiled.world.chains.iter().enumerate();
+    let files = chains.clone().flat_map(|(k, spec)| arm_file_remarks(k, spec));
     let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds_remark(k, spec));
     // One of them is enough: all chains talk over the same network.
     let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
-    unlimited.chain(slow).chain(unused_rules(compiled)).collect()
+    let of_files = ground.chain(files);
+    of_files.chain(unlimited).chain(slow).chain(unused_rules(compiled)).collect()
+}
+
+/// Returns what was not taken as it stood in the files of an arm.
+fn arm_file_remarks<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Vec<Remark> {
+    let Some(arm) = &spec.arm else { return Vec::new() };
+    arm.findings.iter().map(|finding| finding.remark(&format!("chains.{k}.arm"))).collect()
 }
 
 /// Returns notes on rules that are given and have no effect.
@@ -98,7 +107,7 @@ fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_scenario::Source;
+    use sidestep_scenario::{Severity, Source};
 
     /// Hinges that all turn about one direction, by their number.
     fn planar(hinges: usize) -> String {
@@ -152,6 +161,43 @@ mod tests {
         let held = "[[chains.limits]]\nconnector = 2\nmobility = \"fixed\"\n";
         assert_eq!(keys_of(rules, held), [by, speed, ahead]);
         assert!(keys_of("", "").is_empty());
+    }
+
+    #[test]
+    fn what_was_not_taken_as_it_stood_in_a_file_is_told_at_its_key() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let yaml = "image: floor.pgm\nresolution: 1.0\norigin: [0, 0, 0]\nnegate: 0\n\
+                    occupied_thresh: 0.65\nfree_thresh: 0.25\n";
+        let arm = planar(3).replace("<link name=\"l0\"/>", "<link name=\"l0\"/><gazebo/>");
+        for (name, text) in [
+            ("floor.pgm", "P2 2 1 255 255 205"),
+            ("floor.yaml", yaml),
+            ("a.world", "speedup 3\nmodel ( obstacle_return 0 pose [9 9 0 0] )"),
+            ("arm.urdf", &arm),
+        ] {
+            std::fs::write(folder.path().join(name), text).expect("written");
+        }
+        let source = |text: &str| {
+            Source::new("s.toml", format!("format = 1\nworld = \"chain\"\n{text}"), folder.path())
+        };
+        let told = |ground: &str| {
+            let text = format!(
+                "[[chains]]\nconnectors = 3\nrod_m = 0.1\nradius_m = 0.01\nat_m = [0.2, 0.5]\n\
+                 tasks = [{{ kind = \"rest\" }}]\n[ground]\n{ground}\n"
+            );
+            remarks(&ChainScenario::<2>::new(&source(&text)).expect("valid"))
+        };
+        let floor = told("map = \"floor.yaml\"");
+        assert!(floor.iter().all(|told| told.key == "ground.map"), "{floor:?}");
+        assert!(floor[0].words.starts_with("suspicious: pixels of the gray 205"), "{floor:?}");
+        let world = told("stage = \"a.world\"");
+        assert!(world.iter().all(|told| told.key == "ground.stage"), "{world:?}");
+        assert_eq!((world.len(), world[1].severity), (2, Severity::Warning));
+        let text = "[chain]\ndimensions = 3\n[[chains]]\narm = { urdf = \"arm.urdf\" }\nradius_m = 0.02\n\
+                    tasks = [{ kind = \"rest\" }]\n";
+        let arm = remarks(&ChainScenario::<3>::new(&source(text)).expect("valid"));
+        assert_eq!(arm[0].key, "chains.0.arm");
+        assert!(arm[0].words.starts_with("not used: elements <gazebo>"), "{arm:?}");
     }
 
     #[test]

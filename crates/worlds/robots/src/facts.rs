@@ -4,14 +4,12 @@
 use super::decide::External;
 use serde_json::json;
 use sidestep_scenario::editing::{
-    EditAction, EditItems, EditNote, EditTool, Editing, FileUse, NewDrawing, PaintArea, UsedFile,
+    AskedNumber, EditAction, EditItems, EditNote, EditTool, Editing, FileUse, NewDrawing,
+    PaintArea, UsedFile,
 };
 use sidestep_scenario::facts::{
     GroupSizes, PositionUnit, RecordedPositions, RewardMeasure, RewardTerm, WorldFacts,
 };
-
-/// Side of an image's pixels unless the scenario gives it, in meters: that of most maps of ROS.
-const PIXEL_M: f64 = 0.05;
 
 pub(crate) const FACTS: WorldFacts = WorldFacts {
     default_order: Some(External::ACTION),
@@ -134,24 +132,40 @@ pub(crate) fn editing() -> Editing {
                 key: "profiles",
                 is_list: true,
                 replaces: &[],
-                defaults: &[],
+                about: "",
+                asks: &[],
             },
             FileUse {
                 kind: UsedFile::Map,
-                endings: &[".png", ".pgm"],
+                endings: sidestep_import::IMAGE_ENDINGS,
                 key: "map.file",
                 is_list: false,
                 replaces: &["map.ascii", "map.office", "map.file"],
-                defaults: &[("map.resolution_m", PIXEL_M)],
+                about: "image: dark is wall",
+                asks: &[AskedNumber {
+                    key: "map.resolution_m",
+                    name: "Side of a pixel",
+                    unit: "m",
+                }],
             },
             // These give the side of their boxes themselves.
             FileUse {
                 kind: UsedFile::Map,
-                endings: &[".yaml", ".yml", ".map"],
+                endings: &[".yaml", ".yml"],
                 key: "map.file",
                 is_list: false,
                 replaces: &["map.ascii", "map.office", "map.file", "map.resolution_m"],
-                defaults: &[],
+                about: "map of ROS",
+                asks: &[],
+            },
+            FileUse {
+                kind: UsedFile::Map,
+                endings: &[".map"],
+                key: "map.file",
+                is_list: false,
+                replaces: &["map.ascii", "map.office", "map.file", "map.resolution_m"],
+                about: "map of MovingAI",
+                asks: &[],
             },
         ],
         about_files: "A map replaces the scenario's own. A profile adds sensors and effectors that robots can use.",

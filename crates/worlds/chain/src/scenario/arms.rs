@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::SerialChain;
+use sidestep_import::report::Finding;
 use sidestep_import::urdf::Model;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_kernel::InputError;
@@ -56,11 +57,17 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);
             return Err(self.source.error(at, cause, "give another base or another tip"));
         }
-        let values = self.values(s, &model, &serial, at.clone())?;
+        let mut findings: Vec<Finding> = match &s.tip {
+            Some(_) => model.findings_with_tip().cloned().collect(),
+            None => model.report.findings.clone(),
+        };
+        let semantics = self.semantics(s, &model, at.clone())?;
+        findings.extend(semantics.iter().flat_map(|semantics| semantics.report.findings.clone()));
+        let values = self.values(s, (&model, &serial), semantics.as_ref(), at.clone())?;
         serial
             .check_limits("joints", &values)
             .map_err(|error| self.invalid_posture_error(at, &error))?;
-        Ok(Arm::new(serial, at_m, values))
+        Ok(Arm { findings, ..Arm::new(serial, at_m, values) })
     }
 
     /// Returns the link that a key names; errors point at that key.
@@ -102,24 +109,34 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         }
     }
 
+    /// Returns the postures of an arm, if it names a file of them.
+    fn semantics(
+        &self,
+        s: &ArmSection,
+        model: &Model,
+        at: Range<usize>,
+    ) -> Result<Option<Semantics>, InputError> {
+        let Some(file) = &s.srdf else { return Ok(None) };
+        let semantics = Semantics::load(&self.source.path(file.as_ref()), model);
+        self.source.with_file_key(at, "srdf", semantics).map(Some)
+    }
+
     /// Returns the joint values at the start: given, of a named posture, or at rest.
     fn values(
         &self,
         s: &ArmSection,
-        model: &Model,
-        serial: &SerialChain,
+        (model, serial): (&Model, &SerialChain),
+        semantics: Option<&Semantics>,
         at: Range<usize>,
     ) -> Result<Vec<f64>, InputError> {
-        match (&s.joints, &s.posture, &s.srdf) {
+        match (&s.joints, &s.posture, semantics) {
             (Some(values), None, None) => {
                 serial
                     .check_joint_values("joints", values)
                     .map_err(|error| self.invalid_posture_error(at, &error))?;
                 Ok(values.clone())
             }
-            (None, Some(name), Some(srdf)) => {
-                let semantics = Semantics::load(&self.source.path(srdf.as_ref()), model);
-                let semantics = self.source.with_file_key(at.clone(), "srdf", semantics)?;
+            (None, Some(name), Some(semantics)) => {
                 let posture = semantics
                     .posture("posture", name)
                     .map_err(|error| self.invalid_posture_error(at, &error))?;

@@ -14,7 +14,7 @@ use sidestep_kernel::{InputError, Seed, math};
 use sidestep_map::UnknownPolicy;
 use sidestep_rods::geometry::{Aabb, ConvexCore, Cuboid, Point};
 use sidestep_rods::{Chain, Obstacle, Obstacles, outline_walls};
-use sidestep_scenario::{NumberRange, Spanned};
+use sidestep_scenario::{NumberRange, Remark, Spanned};
 use std::ops::{Range, RangeInclusive};
 
 /// Default distance of generated obstacles from chains at the start, meters.
@@ -188,8 +188,10 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Ok(all)
     }
 
-    /// Returns the floors of a map or of a Stage world, if the scenario names one.
-    pub(super) fn compile_ground_map(&self) -> Result<Option<GroundMap>, InputError> {
+    /// Returns the floors of a map or of a Stage world, if the scenario names one, with remarks on its file.
+    pub(super) fn compile_ground_map(
+        &self,
+    ) -> Result<Option<(GroundMap, Vec<Remark>)>, InputError> {
         let Some(section) = &self.file.ground else { return Ok(None) };
         let s = section.get_ref();
         let at = section.span();
@@ -212,14 +214,15 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Ok(match (&s.map, &s.stage) {
             (Some(map), _) => {
                 let map = rosmap::load(&self.source.path(map.as_ref()));
-                Some(GroundMap::from_pixel_map(
-                    &self.source.with_file_key(at, "map", map)?,
-                    unknown,
-                ))
+                let map = self.source.with_file_key(at, "map", map)?;
+                let remarks = map.report().remarks("ground.map");
+                Some((GroundMap::from_pixel_map(&map, unknown), remarks))
             }
             (_, Some(world)) => {
                 let world = stage::load(&self.source.path(world.as_ref()));
-                Some(GroundMap::from_stage_world(&self.source.with_file_key(at, "stage", world)?))
+                let world = self.source.with_file_key(at, "stage", world)?;
+                let remarks = world.report.remarks("ground.stage");
+                Some((GroundMap::from_stage_world(&world), remarks))
             }
             _ => None,
         })

@@ -6,7 +6,7 @@ use crate::own_parts::CustomBehaviors;
 use crate::world::ChainWorld;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
-use sidestep_scenario::{Head, Source};
+use sidestep_scenario::{Head, Remark, Source};
 use std::sync::Arc;
 
 /// The sections of a scenario, and the ground that they name.
@@ -16,6 +16,8 @@ pub(crate) struct ScenarioSpec<const D: usize> {
     head: Head,
     file: ChainScenarioFile<D>,
     site: Option<GroundMap>,
+    /// What its author has to know of the file of the ground.
+    pub(crate) ground_remarks: Vec<Remark>,
     /// Drivers and reactions beside the built-in ones.
     own: CustomBehaviors,
 }
@@ -39,8 +41,9 @@ impl<const D: usize> ScenarioSpec<D> {
             known: None,
             own,
         };
-        let site = compiler.compile_ground_map()?;
-        Ok(Self { source: source.clone(), head, file, site, own: own.clone() })
+        let (site, ground_remarks) = compiler.compile_ground_map()?.unzip();
+        let ground_remarks = ground_remarks.unwrap_or_default();
+        Ok(Self { source: source.clone(), head, file, site, ground_remarks, own: own.clone() })
     }
 
     /// Returns whether the seed decides anything at the start: obstacles, or the place of a chain.

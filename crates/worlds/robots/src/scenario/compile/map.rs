@@ -35,7 +35,7 @@ pub(super) fn load_map(
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
         return Err(source.error(section.span(), "the map has no free box", remedy));
     }
-    Ok(LoadedMap { map: Arc::new(map), doors, remarks: report.to_remarks("map.file") })
+    Ok(LoadedMap { map: Arc::new(map), doors, remarks: report.remarks("map.file") })
 }
 
 fn read_map(
