@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::extension::extension;
 use super::mesh::Mesh;
 use super::report::{ImportReport, Treatment};
-use super::{carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
+use super::{bag, carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
@@ -93,9 +93,9 @@ impl ForeignFormat {
             Self::Srdf => inspect_srdf(path),
             Self::Stage => stage::load(path).map(|world| world.report),
             Self::Mesh => inspect_mesh(path),
-            Self::Carmen => carmen::read(path).map(|_| ImportReport::new("log of CARMEN")),
-            Self::Mrclam => mrclam::read(path).map(|_| ImportReport::new("MRCLAM data set")),
-            Self::Bag => Ok(ImportReport::new("bag")),
+            Self::Carmen => carmen::read(path, None).map(|log| log.report),
+            Self::Mrclam => mrclam::read(path, None).map(|data| data.report),
+            Self::Bag => bag::inspect(path),
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use crate::{Remark, Severity};
 use serde::Serialize;
+use sidestep_kernel::terminal::escape_controls;
 use sidestep_kernel::text::{KeyValues, group_thousands};
 
 /// Number of places that a finding names: enough to look at a few by hand.
@@ -156,12 +157,12 @@ impl ImportReport {
 
     /// Returns format, properties and counts as lines of text, without the findings.
     pub fn lines(&self) -> KeyValues {
-        let mut lines = vec![("format".to_string(), printable(&self.format))];
+        let mut lines = vec![("format".to_string(), escape_controls(&self.format).into_owned())];
         for fact in &self.facts {
-            lines.push((fact.name.to_string(), printable(&fact.value)));
+            lines.push((fact.name.to_string(), escape_controls(&fact.value).into_owned()));
         }
         for item in &self.kept {
-            lines.push((printable(&item.noun), group_thousands(item.count)));
+            lines.push((escape_controls(&item.noun).into_owned(), group_thousands(item.count)));
         }
         lines
     }
@@ -180,7 +181,7 @@ impl Finding {
         let words = self.to_string();
         match self.treatment {
             Treatment::Guessed | Treatment::Suspicious => Remark::warning(key, words),
-            Treatment::Dropped | Treatment::Repaired | Treatment::NotUsed => {
+            Treatment::Dropped | Treatment::Repaired | Treatment::NotUsed | Treatment::Noted => {
                 Remark::note(key, words)
             }
         }
@@ -190,34 +191,21 @@ impl Finding {
 /// One line for each finding, as commands print them.
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.treatment.word(), printable(&self.rule))?;
+        write!(f, "{}: {}", self.treatment.word(), escape_controls(&self.rule))?;
         if self.count > 1 {
             write!(f, " ({} times)", group_thousands(self.count))?;
         }
         if !self.places.is_empty() {
-            write!(f, ", {}", printable(&self.places.join(", ")))?;
+            write!(f, ", {}", escape_controls(&self.places.join(", ")))?;
             if self.count > self.places.len() as u64 {
                 write!(f, ", ...")?;
             }
         }
         if !self.remedy.is_empty() {
-            write!(f, "; {}", printable(&self.remedy))?;
+            write!(f, "; {}", escape_controls(&self.remedy))?;
         }
         Ok(())
     }
-}
-
-/// Returns a text with its control characters escaped: names that a file gives must not reach the terminal as commands.
-pub fn printable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_control() {
-            shown.extend(c.escape_default());
-        } else {
-            shown.push(c);
-        }
-    }
-    shown
 }
 
 #[cfg(test)]

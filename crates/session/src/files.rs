@@ -34,16 +34,33 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> std::result::Result<(), Error> {
+    replace_atomically(path, |partial| {
+        write_file(partial, write).map_err(|e| Error::cannot_write(path, &e))
+    })
+}
+
+/// Replaces the file at `path` by the one that `make` makes at the path that it is given: an earlier file stays until
+/// the new one is complete.
+///
+/// # Errors
+/// Those of `make`; an I/O error.
+pub(crate) fn replace_atomically<T>(
+    path: &Path,
+    make: impl FnOnce(&Path) -> std::result::Result<T, Error>,
+) -> std::result::Result<T, Error> {
     // Beside the target, because a file is renamed in one step only within its file system; with the process id,
     // because two processes may write the same file at once.
     let mut partial = path.as_os_str().to_owned();
     partial.push(format!(".{}.partial", std::process::id()));
     let partial = Path::new(&partial);
-    let written = write_file(partial, write).and_then(|()| std::fs::rename(partial, path));
-    if written.is_err() {
+    let made = make(partial).and_then(|made| {
+        std::fs::rename(partial, path).map_err(|e| Error::cannot_write(path, &e))?;
+        Ok(made)
+    });
+    if made.is_err() {
         let _ = std::fs::remove_file(partial);
     }
-    written.map_err(|e| Error::cannot_write(path, &e))
+    made
 }
 
 /// Fills a file, in a folder that is created if there is none.

@@ -1,14 +1,15 @@
 //! What any file or folder that this program reads is, and what becomes of it when it is read.
 
+use crate::files::replace_atomically;
 use crate::{Error, write_atomically};
 use serde::Serialize;
 use serde_json::Value;
 use sidestep_experiment::sweep::Sweep;
-use sidestep_import::{ForeignFormat, clean_map, traffic};
+use sidestep_import::{ForeignFormat, bag, carmen, clean_map, traffic};
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::SweepFolder;
 use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, row_count, tables};
-use sidestep_scenario::{ImportReport, Source, Treatment, Worlds};
+use sidestep_scenario::{ImportOptions, ImportReport, Source, Treatment, Worlds};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -45,7 +46,7 @@ fn report(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
     if let Some(format) = ForeignFormat::recognize(path)? {
         return Ok(format.inspect(path)?);
     }
-    if let Some(imported) = worlds.import_scenario(path)? {
+    if let Some(imported) = worlds.import_scenario(path, &ImportOptions::default())? {
         return match imported.scenario {
             Ok(_) => Ok(imported.report),
             Err(error) => Err(error.into()),
@@ -182,6 +183,14 @@ pub fn write_clean(path: &Path, out: &Path) -> Result<Vec<PathBuf>, Error> {
             write_atomically(&image, |file| file.write_all(&pgm))?;
             write_atomically(out, |file| file.write_all(&yaml))?;
             Ok(vec![out.to_path_buf(), image])
+        }
+        Some(ForeignFormat::Carmen) => {
+            replace_atomically(out, |partial| Ok(carmen::write_clean(path, partial)?))?;
+            Ok(vec![out.to_path_buf()])
+        }
+        Some(ForeignFormat::Bag) => {
+            replace_atomically(out, |partial| Ok(bag::write_clean(path, partial)?))?;
+            Ok(vec![out.to_path_buf()])
         }
         None if traffic::has_extension(path) => {
             let text = traffic::to_csv(&traffic::read(path)?);

@@ -6,7 +6,7 @@ use crate::worlds;
 use clap::Args;
 use serde_json::json;
 use sidestep::kernel::InputError;
-use sidestep::scenario::import_report::printable;
+use sidestep::kernel::terminal::escape_controls;
 use sidestep_session::{InspectedFile, display_path, inspect as inspect_file, write_clean};
 use std::path::PathBuf;
 
@@ -101,7 +101,7 @@ fn end(mut failures: Vec<Failure>, console: Console) -> Result<ExitCode, Failure
 /// Returns a report as text: the file, what was found in it, and what was not taken as it stood.
 fn format_report(inspected: &InspectedFile) -> String {
     let report = &inspected.report;
-    let mut text = format!("{}\n{}", printable(&inspected.file), align_pairs(&report.lines()));
+    let mut text = format!("{}\n{}", escape_controls(&inspected.file), align_pairs(&report.lines()));
     if report.findings.is_empty() {
         text.push_str("  Nothing was dropped, repaired or guessed\n");
     }

@@ -197,7 +197,7 @@ impl LogContent {
             report.add_fact("time", format!("from {first:.3} to {last:.3} s, {:.3} s", last - first));
         }
         for (name, n) in &self.counts {
-            report.add_kept(name, *n);
+            report.add_kept(*name, *n);
         }
         for k in 0..self.n_damaged {
             let place = self.damaged.get(k as usize).map_or_else(String::new, |error| {
