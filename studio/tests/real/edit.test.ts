@@ -310,6 +310,28 @@ describe.skipIf(BINARY === "")("the real program", () => {
     expect(consoleErrors).toEqual([]);
   });
 
+  test("what becomes of a map is told before it is imported, and the side of a pixel is asked for", async () => {
+    // The symbols E and S are those of the League of Robot Runners.
+    writeFileSync(join(folder, "depot.map"), "type octile\nheight 3\nwidth 4\nmap\n.S..\n.@@.\n....\n");
+    writeFileSync(join(folder, "plan.pgm"), "P2 4 3 255 254 254 254 254 254 0 0 254 254 254 254 254\n");
+    await open();
+    await edit();
+    const dialog = page.getByRole("dialog");
+    await page.getByRole("button", { name: "Import…" }).click();
+    await dialog.getByRole("button", { name: /^depot\.map/ }).click();
+    const report = dialog.getByRole("region", { name: "Import report" });
+    await report.getByText("map in characters (MovingAI)").waitFor();
+    await report.getByText(/not used: the symbol `S`.*line 5/).waitFor();
+    await report.getByRole("button", { name: "Choose another file" }).click();
+    await dialog.getByRole("button", { name: /^plan\.pgm/ }).click();
+    await dialog.getByRole("spinbutton").fill("0.5");
+    await dialog.getByRole("button", { name: "Import", exact: true }).click();
+    const text = await saved();
+    expect(text).toContain('file = "plan.pgm"');
+    expect(text).toContain("resolution_m = 0.5");
+    expect(consoleErrors).toEqual([]);
+  });
+
   /** Runs to the end and returns the displayed digest. */
   async function digest(): Promise<string> {
     await page.getByLabel("Speed", { exact: true }).selectOption("fastest");
