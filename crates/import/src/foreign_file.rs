@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::extension::extension;
 use super::mesh::Mesh;
 use super::report::{ImportReport, Treatment};
+use super::table::{CsvTable, data_lines};
 use super::{bag, carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
@@ -18,7 +19,7 @@ const START_BYTES: u64 = 4096;
 /// Side of a box in meters for maps in characters, whose report is in boxes.
 const CHARACTER_M: f64 = 1.0;
 
-/// A kind of file of another program, apart from traffic, which worlds read.
+/// A kind of file of another program, apart from traffic, which worlds read; and of tables that people make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForeignFormat {
     /// A map of ROS: the YAML file beside an image.
@@ -43,6 +44,50 @@ pub enum ForeignFormat {
     Mrclam,
     /// A bag of ROS 1 or ROS 2.
     Bag,
+    /// A table for this program: readings or motions to learn from, or targets of an arm.
+    Table(TableKind),
+}
+
+/// What the rows of a table are, by the names of its columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableKind {
+    /// What a sensor reported, and what was there.
+    Readings,
+    /// How a robot moved.
+    Motions,
+    /// Where the tip of an arm is to go.
+    Targets,
+}
+
+impl TableKind {
+    /// The kinds with the columns that all tables of a kind have, and the format of its report.
+    const ALL: [(Self, &[&str], &str); 3] = [
+        (
+            Self::Readings,
+            &["true", "reported"],
+            "table of a sensor's readings (learn sensor --csv)",
+        ),
+        (
+            Self::Motions,
+            &["action", "ahead_boxes"],
+            "table of a robot's motions (learn effector --csv)",
+        ),
+        (Self::Targets, &["x", "y", "z"], "table of an arm's targets (ik --targets)"),
+    ];
+
+    /// Returns the kind of the table that begins with this text.
+    fn of_text(text: &str) -> Option<Self> {
+        let (_, header) = data_lines(text).next()?;
+        let names: Vec<&str> =
+            header.split([',', ';', '\t']).map(|name| name.trim().trim_matches('"')).collect();
+        let has_all = |columns: &[&str]| columns.iter().all(|column| names.contains(column));
+        Self::ALL.iter().find(|(_, columns, _)| has_all(columns)).map(|(kind, ..)| *kind)
+    }
+
+    fn format(self) -> &'static str {
+        let own = Self::ALL.iter().find(|(kind, ..)| *kind == self);
+        own.map_or("table", |(.., format)| format)
+    }
 }
 
 impl ForeignFormat {
@@ -67,6 +112,7 @@ impl ForeignFormat {
             // Any text may end so; a map in characters has no words.
             "txt" if !has_carmen_message(&text) => Some(Self::CharMap),
             "scen" => Some(Self::Scen),
+            "csv" | "tsv" => TableKind::of_text(&text).map(Self::Table),
             "urdf" | "xacro" => Some(Self::Urdf),
             "srdf" => Some(Self::Srdf),
             "xml" if text.contains("<robot") => Some(Self::Urdf),
@@ -96,6 +142,7 @@ impl ForeignFormat {
             Self::Carmen => carmen::read(path, None).map(|log| log.report),
             Self::Mrclam => mrclam::read(path, None).map(|data| data.report),
             Self::Bag => bag::inspect(path),
+            Self::Table(kind) => inspect_table(path, kind),
         }
     }
 }
@@ -167,6 +214,15 @@ fn inspect_srdf(path: &Path) -> Result<ImportReport, InputError> {
     let semantics = Semantics::load(path, &Model::load(model)?)?;
     let mut report = semantics.report;
     report.add_fact("model", model.display().to_string());
+    Ok(report)
+}
+
+fn inspect_table(path: &Path, kind: TableKind) -> Result<ImportReport, InputError> {
+    let table = CsvTable::read(path)?;
+    let mut report = ImportReport::new(kind.format());
+    report.add_fact("columns", table.header().join(", "));
+    table.record_separators(&mut report);
+    report.add_kept("rows", table.rows().count());
     Ok(report)
 }
 

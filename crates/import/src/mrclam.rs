@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use super::table::{MAX_TEXT_BYTES, Token, find_file, rows};
 use super::report::{ImportReport, Treatment};
+use super::table::{MAX_TEXT_BYTES, Token, find_file, rows};
 pub use super::track::StampedPose2;
 use super::track::{SpeedRule, Track, cut_and_report};
 use sidestep_kernel::InputError;
@@ -75,11 +75,8 @@ pub struct Measurement {
 /// # Errors
 /// When a file is missing or not as described in the [module](self).
 pub fn read(folder: &Path, max_speed_mps: Option<f64>) -> Result<Dataset, InputError> {
-    let mut reader = FolderReader {
-        folder,
-        max_speed_mps,
-        report: ImportReport::new("MRCLAM data set"),
-    };
+    let mut reader =
+        FolderReader { folder, max_speed_mps, report: ImportReport::new("MRCLAM data set") };
     let (place, text) = read_file(folder, "Barcodes.dat")?;
     let subject_of_barcode = parse_barcodes(&place, &text)?;
     let (place, text) = read_file(folder, "Landmark_Groundtruth.dat")?;
@@ -111,12 +108,14 @@ pub fn inspect(folder: &Path) -> Result<ImportReport, InputError> {
 }
 
 fn add_counts(report: &mut ImportReport, robots: &BTreeMap<u32, RobotLog>, landmarks: usize) {
-    let times = robots.values().flat_map(|robot| [robot.truth.first(), robot.truth.last()]).flatten();
+    let times =
+        robots.values().flat_map(|robot| [robot.truth.first(), robot.truth.last()]).flatten();
     let range = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], pose| {
         [first.min(pose.t_secs), last.max(pose.t_secs)]
     });
     if range[0] <= range[1] {
-        let value = format!("from {:.3} to {:.3} s, {:.3} s", range[0], range[1], range[1] - range[0]);
+        let value =
+            format!("from {:.3} to {:.3} s, {:.3} s", range[0], range[1], range[1] - range[0]);
         report.add_fact("motion capture", value);
     }
     report.add_kept("robots", robots.len());
@@ -177,7 +176,12 @@ fn parse_stream<T, const N: usize>(
                 damaged += 1;
                 let line = error.line_and_column().map_or(0, |(line, _)| line);
                 let found = format!("{place}, line {line}: {}", error.cause());
-                report.record(Treatment::Dropped, "rows that are damaged", found, "restore the rows");
+                report.record(
+                    Treatment::Dropped,
+                    "rows that are damaged",
+                    found,
+                    "restore the rows",
+                );
                 first_error = first_error.or(Some(error));
             }
         }
@@ -233,7 +237,10 @@ fn parse_pose(place: &str, [t, x, y, heading]: [Token<'_>; 4]) -> Result<Stamped
     })
 }
 
-fn parse_command(place: &str, [t, forward, turn]: [Token<'_>; 3]) -> Result<VelocityCommand, InputError> {
+fn parse_command(
+    place: &str,
+    [t, forward, turn]: [Token<'_>; 3],
+) -> Result<VelocityCommand, InputError> {
     Ok(VelocityCommand {
         t_secs: t.number(&place)?,
         forward_mps: forward.number(&place)?,
@@ -306,7 +313,9 @@ mod tests {
         assert_eq!((data.robots[&1].truth.len(), data.robots[&1].truth.cuts()), (35, 1));
         let lines: Vec<String> = data.report.findings.iter().map(ToString::to_string).collect();
         assert!(lines[0].contains("line 41: `x` is not a finite number"), "{lines:?}");
-        assert!(lines[1].starts_with("repaired: jumps of robot 1, at which its track is cut (2 times)"));
+        assert!(
+            lines[1].starts_with("repaired: jumps of robot 1, at which its track is cut (2 times)")
+        );
         assert_eq!(data.report.dropped(), 6);
     }
 

@@ -95,7 +95,11 @@ impl SpeedRule {
     /// not exceed, at least 1 m/s. Of several tracks the slower counts, as jumps make a track faster.
     pub fn for_tracks(max_speed_mps: Option<f64>, tracks: &[&[StampedPose2]]) -> Self {
         let slowest = |of: fn(&[StampedPose2]) -> f64| {
-            tracks.iter().map(|track| of(track)).filter(|usual| *usual > 0.0).fold(f64::INFINITY, f64::min)
+            tracks
+                .iter()
+                .map(|track| of(track))
+                .filter(|usual| *usual > 0.0)
+                .fold(f64::INFINITY, f64::min)
         };
         let limit = |usual: f64, least: f64| {
             if usual.is_finite() { (SPEED_FACTOR * usual).max(least) } else { least }

@@ -238,6 +238,16 @@ mod tests {
                 "version 1\n0\ta.map\t2\t1\t0\t0\t1\t0\t1\n",
                 "list of starts and goals (MovingAI)",
             ),
+            (
+                "r.csv",
+                "true;reported;true_distance_m\nwall;wall;1,5\n",
+                "table of a sensor's readings (learn sensor --csv)",
+            ),
+            (
+                "m.csv",
+                "action,ahead_boxes,left_boxes,turn_deg\n",
+                "table of a robot's motions (learn effector --csv)",
+            ),
             ("a.xml", "<robot name=\"r\"><link name=\"a\"/></robot>", "URDF"),
         ];
         let folder = folder_with(&files.map(|(name, text, _)| (name, text)));

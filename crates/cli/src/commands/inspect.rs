@@ -101,7 +101,8 @@ fn end(mut failures: Vec<Failure>, console: Console) -> Result<ExitCode, Failure
 /// Returns a report as text: the file, what was found in it, and what was not taken as it stood.
 fn format_report(inspected: &InspectedFile) -> String {
     let report = &inspected.report;
-    let mut text = format!("{}\n{}", escape_controls(&inspected.file), align_pairs(&report.lines()));
+    let mut text =
+        format!("{}\n{}", escape_controls(&inspected.file), align_pairs(&report.lines()));
     if report.findings.is_empty() {
         text.push_str("  Nothing was dropped, repaired or guessed\n");
     }

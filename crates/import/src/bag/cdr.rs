@@ -127,7 +127,8 @@ impl<'a> Reader<'a> {
 
     /// Reads the next bytes, which in CDR start at a multiple of `alignment`.
     fn read_bytes(&mut self, n: usize, alignment: usize) -> Result<&'a [u8], CdrError> {
-        let start = if self.is_ros1 { self.offset } else { self.offset.next_multiple_of(alignment) };
+        let start =
+            if self.is_ros1 { self.offset } else { self.offset.next_multiple_of(alignment) };
         let bytes = self.body.get(start..).and_then(|rest| rest.get(..n));
         let bytes = bytes.ok_or(CdrError::Cut { at: start })?;
         self.offset = start + n;

@@ -138,8 +138,14 @@ fn replace_unset_stamps(stream: &mut Stream<'_>, report: &mut ImportReport) {
         let t_secs = item.log_secs();
         item.set_t_secs(t_secs);
     }
-    let rule = format!("the stamps of {} are all 0: the times of the recording are used", stream.name);
-    report.record(Treatment::Guessed, rule, "", "set header.stamp in the program that publishes it");
+    let rule =
+        format!("the stamps of {} are all 0: the times of the recording are used", stream.name);
+    report.record(
+        Treatment::Guessed,
+        rule,
+        "",
+        "set header.stamp in the program that publishes it",
+    );
 }
 
 fn backward_jumps(stream: &Stream<'_>) -> Vec<Jump> {
@@ -163,7 +169,8 @@ fn record_jumps(stream: &Stream<'_>, jumps: &[Jump], report: &mut ImportReport) 
             stream.items[jump.item].message(),
             -jump.step_secs
         );
-        let rule = format!("stamps of {} that go back: the time after is a part of its own", stream.name);
+        let rule =
+            format!("stamps of {} that go back: the time after is a part of its own", stream.name);
         report.record(Treatment::Repaired, rule, place, "");
     }
 }
@@ -173,10 +180,14 @@ fn record_forward_jumps(stream: &Stream<'_>, report: &mut ImportReport) {
         let step_secs = pair[1].t_secs() - pair[0].t_secs();
         let recorded_secs = pair[1].log_secs() - pair[0].log_secs();
         if step_secs > MAX_FORWARD_STEP_SECS && recorded_secs < 0.5 * step_secs {
-            let place =
-                format!("message {} is stamped {step_secs:.3} s after the one before", pair[1].message());
-            let rule =
-                format!("stamps of {} that jump ahead: the time after is a part of its own", stream.name);
+            let place = format!(
+                "message {} is stamped {step_secs:.3} s after the one before",
+                pair[1].message()
+            );
+            let rule = format!(
+                "stamps of {} that jump ahead: the time after is a part of its own",
+                stream.name
+            );
             report.record(Treatment::Repaired, rule, place, "");
         }
     }

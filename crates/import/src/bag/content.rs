@@ -56,7 +56,8 @@ impl Tally {
         if bad <= self.good {
             return Ok(());
         }
-        let first = self.places.first().map_or_else(String::new, |place| format!(", first {place}"));
+        let first =
+            self.places.first().map_or_else(String::new, |place| format!(", first {place}"));
         let cause = format!("{bad} of {} messages cannot be read{first}", bad + self.good);
         let remedy = "record the bag again, or give another topic";
         Err(InputError::new(format!("{bag}: {topic}"), cause, remedy))
@@ -131,7 +132,8 @@ impl<'a> BagContent<'a> {
     }
 
     fn unknown_encoding(&self, raw: &RawMessage<'_>) -> InputError {
-        let cause = format!("its messages are encoded as `{}`, not as cdr or ros1", raw.info.encoding);
+        let cause =
+            format!("its messages are encoded as `{}`, not as cdr or ros1", raw.info.encoding);
         let remedy = "give a bag of ROS 2 or ROS 1";
         InputError::new(format!("{}: {}", self.bag, raw.topic), cause, remedy)
     }
@@ -208,7 +210,8 @@ impl<'a> BagContent<'a> {
 
     fn keep_pose(&mut self, raw: &RawMessage<'_>, pose: StampedPose, is_selected: bool) {
         let [parent, child] = [&pose.parent, &pose.child].map(|name| self.frame(name));
-        let pose = StampedPose { message: raw.number, log_secs: log_secs(raw), parent, child, ..pose };
+        let pose =
+            StampedPose { message: raw.number, log_secs: log_secs(raw), parent, child, ..pose };
         if raw.info.schema == TfMessage::NAME {
             if is_static(raw.topic) {
                 self.statics.push(pose.clone());
@@ -303,8 +306,11 @@ impl<'a> BagContent<'a> {
     pub(super) fn take_scans(&mut self, report: &mut ImportReport) -> Vec<LaserScan> {
         let Some(topic) = &self.selection.scans else { return Vec::new() };
         let mut recorded = std::mem::take(&mut self.scans);
-        let blank: Vec<u64> =
-            recorded.iter().filter(|scan| scans::is_blank(&scan.scan)).map(|scan| scan.message).collect();
+        let blank: Vec<u64> = recorded
+            .iter()
+            .filter(|scan| scans::is_blank(&scan.scan))
+            .map(|scan| scan.message)
+            .collect();
         if blank.len() as f64 <= MAX_BLANK_FRACTION * recorded.len() as f64 {
             recorded.retain(|scan| !scans::is_blank(&scan.scan));
             let rule = format!("scans on {topic} in which every range is NaN or 0");

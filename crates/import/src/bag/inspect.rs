@@ -141,7 +141,10 @@ impl TopicFindings {
 
     fn report(&self, bag: &str, report: &mut ImportReport) -> Result<(), InputError> {
         if let Some([first, last]) = self.recorded_secs {
-            report.add_fact("recorded", format!("from {first:.3} to {last:.3} s since 1970, {:.3} s", last - first));
+            report.add_fact(
+                "recorded",
+                format!("from {first:.3} to {last:.3} s since 1970, {:.3} s", last - first),
+            );
         }
         let all = self.tallies.values().fold(Tally::default(), Tally::sum);
         all.check(bag, "all topics", 0)?;
@@ -168,7 +171,8 @@ impl ClockFindings {
             report.record(Treatment::Suspicious, rule.clone(), place, "");
         }
         if self.stamps > 1 && *first_secs == 0.0 && *last_secs == 0.0 {
-            let rule = format!("the stamps of {topic} are all 0: the times of the recording are used");
+            let rule =
+                format!("the stamps of {topic} are all 0: the times of the recording are used");
             report.record(Treatment::Guessed, rule, "", "");
         }
     }

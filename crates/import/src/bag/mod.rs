@@ -67,8 +67,9 @@ pub struct BagLog {
 pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputError> {
     let bag = path.display().to_string();
     let mut content = BagContent::new(&bag, selection);
-    let storage =
-        storage::read(path, &|topic| selection.is_read(topic), &mut |message| content.add(&message))?;
+    let storage = storage::read(path, &|topic| selection.is_read(topic), &mut |message| {
+        content.add(&message)
+    })?;
     selection.check(&bag, &storage.topics)?;
     content.check(&storage.topics)?;
     let mut report = storage.report;

@@ -173,7 +173,11 @@ impl RangeCounts {
         let no_echo = given.or_else(|| self.guess()).unwrap_or(NoEcho::Infinite);
         let convention = ScanConvention {
             no_echo,
-            measured_limit_m: if self.is_limit_measured() { self.max_m.map(|[_, high]| high) } else { None },
+            measured_limit_m: if self.is_limit_measured() {
+                self.max_m.map(|[_, high]| high)
+            } else {
+                None
+            },
             is_maximum_no_echo: no_echo == NoEcho::Maximum
                 || given.is_none() && self.is_maximum_repeated(),
         };
@@ -204,7 +208,13 @@ impl RangeCounts {
         convention: &ScanConvention,
         report: &mut ImportReport,
     ) {
-        let percent = |n: u64| format!("{n} of {} ranges, {:.2} %", self.beams, 100.0 * n as f64 / self.beams.max(1) as f64);
+        let percent = |n: u64| {
+            format!(
+                "{n} of {} ranges, {:.2} %",
+                self.beams,
+                100.0 * n as f64 / self.beams.max(1) as f64
+            )
+        };
         let no_echo = convention.no_echo;
         let n = self.count_of(no_echo);
         if !is_given && no_echo != NoEcho::Infinite && n > 0 {
@@ -223,19 +233,29 @@ impl RangeCounts {
             );
             report.record(Treatment::Guessed, rule, "", "");
         }
-        let others = [(NoEcho::NotANumber, self.not_a_number, "NaN"), (NoEcho::Zero, self.zero, "0 or negative")];
+        let others = [
+            (NoEcho::NotANumber, self.not_a_number, "NaN"),
+            (NoEcho::Zero, self.zero, "0 or negative"),
+        ];
         for (kind, n, name) in others {
             if n > 0 && kind != no_echo {
-                let rule = format!("ranges on {topic} that are {name}: no measurement ({})", percent(n));
+                let rule =
+                    format!("ranges on {topic} that are {name}: no measurement ({})", percent(n));
                 report.record(Treatment::NotUsed, rule, "", "");
             }
         }
         if convention.is_maximum_no_echo && no_echo != NoEcho::Maximum {
-            let rule = format!("ranges on {topic} equal to range_max: no echo ({})", percent(self.at_maximum));
+            let rule = format!(
+                "ranges on {topic} equal to range_max: no echo ({})",
+                percent(self.at_maximum)
+            );
             report.record(Treatment::Guessed, rule, "", "");
         }
         if self.beyond_maximum > 0 && no_echo != NoEcho::Maximum {
-            let rule = format!("ranges on {topic} above range_max: no echo ({})", percent(self.beyond_maximum));
+            let rule = format!(
+                "ranges on {topic} above range_max: no echo ({})",
+                percent(self.beyond_maximum)
+            );
             report.record(Treatment::Guessed, rule, "", "");
         }
     }
@@ -284,9 +304,9 @@ impl ScanConvention {
 /// Returns whether a scan has neither an echo nor a range of another meaning than "no measurement": the scanner was
 /// still starting.
 pub(super) fn is_blank(scan: &LaserScan) -> bool {
-    scan.ranges_m.iter().all(|range_m| {
-        matches!(kind_of(*range_m, scan), RangeKind::NotANumber | RangeKind::Zero)
-    })
+    scan.ranges_m
+        .iter()
+        .all(|range_m| matches!(kind_of(*range_m, scan), RangeKind::NotANumber | RangeKind::Zero))
 }
 
 #[cfg(test)]
@@ -357,17 +377,27 @@ mod tests {
         let (scans, said) = read(&[scan(8.0, &[1.0, NAN])], Some(NoEcho::Infinite));
         assert!(same(&scans[0].ranges_m, &[1.0, NAN]));
         assert!(said[0].starts_with("not used: ranges on /scan that are NaN"), "{said:?}");
-        assert_eq!(["inf", "nan", "zero", "max", "x"].map(NoEcho::from_name).map(|n| n.is_some()), [true, true, true, true, false]);
+        assert_eq!(
+            ["inf", "nan", "zero", "max", "x"].map(NoEcho::from_name).map(|n| n.is_some()),
+            [true, true, true, true, false]
+        );
     }
 
     #[test]
     fn a_limit_that_is_the_greatest_range_of_its_own_scan_is_an_echo() {
-        let all = [scan(5.5, &[1.0, 5.5, 2.0]), scan(6.25, &[6.25, INF, 2.0]), scan(4.0, &[1.0, 4.0, 3.0])];
+        let all = [
+            scan(5.5, &[1.0, 5.5, 2.0]),
+            scan(6.25, &[6.25, INF, 2.0]),
+            scan(4.0, &[1.0, 4.0, 3.0]),
+        ];
         let (scans, said) = read(&all, None);
         assert!(scans.iter().all(|scan| scan.range_max_m == 6.25));
         assert_eq!(scans[0].ranges_m, [1.0, 5.5, 2.0]);
         assert_eq!(scans[1].ranges_m, [6.25, INF, 2.0]);
-        assert!(said[0].contains("range_max of each scan on /scan is its own greatest range: 6.25 m"), "{said:?}");
+        assert!(
+            said[0].contains("range_max of each scan on /scan is its own greatest range: 6.25 m"),
+            "{said:?}"
+        );
     }
 
     #[test]
@@ -375,7 +405,10 @@ mod tests {
         let all = [scan(5.0, &[1.0, 5.0, 5.0, 5.0]), scan(8.0, &[8.0, 8.0, 8.0, 6.0])];
         let (scans, _) = read(&all, None);
         assert_eq!(scans[0].ranges_m, [1.0, INF, INF, INF]);
-        assert_eq!((scans[1].range_max_m, &scans[1].ranges_m[..]), (8.0, &[INF, INF, INF, 6.0][..]));
+        assert_eq!(
+            (scans[1].range_max_m, &scans[1].ranges_m[..]),
+            (8.0, &[INF, INF, INF, 6.0][..])
+        );
     }
 
     #[test]

@@ -274,7 +274,8 @@ fn a_damaged_chunk_is_left_out_and_its_messages_are_counted() {
 #[test]
 fn a_clock_that_is_set_back_starts_a_part_of_its_own_and_messages_that_overtake_are_sorted() {
     let stamps = |stamps: &[u64]| {
-        let entries: Vec<Entry> = stamps.iter().map(|t_ms| truth(*t_ms, *t_ms as f64 / 1e4)).collect();
+        let entries: Vec<Entry> =
+            stamps.iter().map(|t_ms| truth(*t_ms, *t_ms as f64 / 1e4)).collect();
         let wanted = TopicSelection { odometry: None, ..wanted("/truth", None) };
         read_all(&entries, &wanted).unwrap()
     };
@@ -285,7 +286,11 @@ fn a_clock_that_is_set_back_starts_a_part_of_its_own_and_messages_that_overtake_
     assert_eq!(found.treatment, Treatment::Repaired);
     assert!(found.places[0].contains("message 3 is stamped 0.600 s before"), "{found}");
     let ahead = stamps(&[0, 4_000_000]);
-    assert!(ahead.report.findings[0].to_string().contains("4000.000 s after"), "{:?}", ahead.report);
+    assert!(
+        ahead.report.findings[0].to_string().contains("4000.000 s after"),
+        "{:?}",
+        ahead.report
+    );
     let sorted = stamps(&[0, 1000, 700, 2000]);
     assert_eq!(times(&sorted), [0.0, 0.7, 1.0, 2.0]);
     assert_eq!(sorted.report.findings, []);
@@ -314,7 +319,9 @@ fn stamps_that_nobody_has_set_are_those_of_the_recording() {
     let wanted = TopicSelection { odometry: None, ..wanted("/truth", None) };
     let log = read_all(&entries, &wanted).unwrap();
     assert_eq!(log.truth[3].t_secs, 3e-9);
-    assert!(log.report.findings[0].to_string().starts_with("guessed: the stamps of /truth are all 0"));
+    assert!(
+        log.report.findings[0].to_string().starts_with("guessed: the stamps of /truth are all 0")
+    );
 }
 
 #[test]
@@ -368,7 +375,10 @@ fn a_scan_without_beams_or_limits_is_left_out() {
     assert_eq!((log.scans.len(), log.report.dropped()), (11, 2));
     let lines: Vec<String> = log.report.findings.iter().map(ToString::to_string).collect();
     assert!(lines[0].ends_with("message 1: its scan has 0 beams"), "{lines:?}");
-    assert!(lines[1].contains("scans on /scan in which every range is NaN or 0, message 13"), "{lines:?}");
+    assert!(
+        lines[1].contains("scans on /scan in which every range is NaN or 0, message 13"),
+        "{lines:?}"
+    );
 }
 
 #[test]
@@ -381,7 +391,8 @@ fn an_orientation_of_another_length_is_the_turn_that_it_points_to() {
 
 #[test]
 fn files_of_other_kinds_are_refused() {
-    for bytes in [&b"t,x,y\n0,1,2\n"[..], b"", b"#ROSBAG V1.2\n", b"SQLite format 3\0 and no more"] {
+    for bytes in [&b"t,x,y\n0,1,2\n"[..], b"", b"#ROSBAG V1.2\n", b"SQLite format 3\0 and no more"]
+    {
         let (_folder, path) = stored(bytes);
         assert!(read(&path, &wanted("/truth", None)).is_err(), "{bytes:?}");
     }
@@ -406,7 +417,9 @@ fn messages_files_and_both_that_are_packed_read_the_same() {
         .map(|(topic, schema, bytes)| (topic, schema, zstd::encode_all(&bytes[..], 3).unwrap()))
         .collect();
     let log = read_all(&packed, &wanted("/truth", None)).unwrap();
-    assert!(log.report.facts.iter().any(|fact| fact.value == "zstd, message by message (40 messages)"));
+    assert!(
+        log.report.facts.iter().any(|fact| fact.value == "zstd, message by message (40 messages)")
+    );
     assert_eq!(content(log), plain());
     let bytes = bytes_of(&drive(), None);
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
@@ -437,7 +450,9 @@ fn write_sqlite(path: &Path, entries: &[Entry]) {
             next
         });
         let row = rusqlite::params![id, k, data];
-        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", row).unwrap();
+        database
+            .execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", row)
+            .unwrap();
     }
 }
 
@@ -450,7 +465,8 @@ fn a_bag_in_sqlite_reads_the_same_as_file_as_folder_by_metadata_and_packed() {
     assert_eq!(read_at(&path), plain());
     assert_eq!(read_at(folder.path()), plain());
     let metadata = folder.path().join("metadata.yaml");
-    fs::write(&metadata, "rosbag2_bagfile_information: {relative_file_paths: [hall_0.db3]}\n").unwrap();
+    fs::write(&metadata, "rosbag2_bagfile_information: {relative_file_paths: [hall_0.db3]}\n")
+        .unwrap();
     assert_eq!(read_at(&metadata), plain());
     let packed = folder.path().join("hall_0.db3.zstd");
     fs::write(&packed, zstd::encode_all(&fs::read(&path).unwrap()[..], 3).unwrap()).unwrap();
@@ -497,7 +513,8 @@ fn ros1_bytes(entries: &[(&str, &str, Vec<u8>)], compression: &str) -> Vec<u8> {
     for (k, (topic, kind, data)) in (0_u32..).zip(entries) {
         let next = u32::try_from(topics.len()).unwrap();
         let id = *topics.entry(topic).or_insert_with(|| {
-            let publisher = ros1_record(&[("topic", topic.as_bytes()), ("type", kind.as_bytes())], b"");
+            let publisher =
+                ros1_record(&[("topic", topic.as_bytes()), ("type", kind.as_bytes())], b"");
             let fields: [(&str, &[u8]); 3] =
                 [("op", &[7]), ("conn", &next.to_le_bytes()), ("topic", topic.as_bytes())];
             // The data of a connection are a header of their own.
@@ -506,7 +523,8 @@ fn ros1_bytes(entries: &[(&str, &str, Vec<u8>)], compression: &str) -> Vec<u8> {
             next
         });
         let time = [0_u32.to_le_bytes(), k.to_le_bytes()].concat();
-        let fields: [(&str, &[u8]); 3] = [("op", &[2]), ("conn", &id.to_le_bytes()), ("time", &time)];
+        let fields: [(&str, &[u8]); 3] =
+            [("op", &[2]), ("conn", &id.to_le_bytes()), ("time", &time)];
         chunk.extend(ros1_record(&fields, data));
     }
     let packed = match compression {

@@ -76,7 +76,11 @@ impl TopicSelection {
     }
 
     /// Checks that every selected topic exists and has messages.
-    pub(super) fn check(&self, bag: &str, topics: &BTreeMap<String, Topic>) -> Result<(), InputError> {
+    pub(super) fn check(
+        &self,
+        bag: &str,
+        topics: &BTreeMap<String, Topic>,
+    ) -> Result<(), InputError> {
         for name in self.pose_topics().map(|source| &source.topic).chain(&self.scans) {
             let problem = match topics.get(name) {
                 Some(topic) if topic.messages > 0 => continue,

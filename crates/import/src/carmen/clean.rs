@@ -34,5 +34,8 @@ pub fn write_clean(path: &Path, out: &Path) -> Result<ImportReport, InputError> 
 /// Returns the numbers of lines with damaged messages, from 1.
 fn damaged_lines(text: &str) -> Vec<usize> {
     let lines = data_lines(text);
-    lines.filter(|(line, words)| messages::parse("", *line, words).is_err()).map(|(line, _)| line).collect()
+    lines
+        .filter(|(line, words)| messages::parse("", *line, words).is_err())
+        .map(|(line, _)| line)
+        .collect()
 }

@@ -96,11 +96,7 @@ pub fn read(path: &Path, max_speed_mps: Option<f64>) -> Result<CarmenLog, InputE
 ///
 /// # Errors
 /// When more than half of its messages are damaged, or it has no poses to compare odometry with.
-pub fn parse(
-    place: &str,
-    text: &str,
-    max_speed_mps: Option<f64>,
-) -> Result<CarmenLog, InputError> {
+pub fn parse(place: &str, text: &str, max_speed_mps: Option<f64>) -> Result<CarmenLog, InputError> {
     let content = LogContent::parse(place, text)?;
     let mut report = content.report();
     let motion = motion::choose(place, &content, max_speed_mps, &mut report)?;
@@ -194,7 +190,8 @@ impl LogContent {
     fn report(&self) -> ImportReport {
         let mut report = ImportReport::new("CARMEN log");
         if let Some([first, last]) = self.time_range() {
-            report.add_fact("time", format!("from {first:.3} to {last:.3} s, {:.3} s", last - first));
+            report
+                .add_fact("time", format!("from {first:.3} to {last:.3} s, {:.3} s", last - first));
         }
         for (name, n) in &self.counts {
             report.add_kept(*name, *n);
@@ -204,7 +201,12 @@ impl LogContent {
                 let line = error.line_and_column().map_or(0, |(line, _)| line);
                 format!("line {line}: {}", error.cause())
             });
-            report.record(Treatment::Dropped, "messages that are damaged", place, "restore the lines");
+            report.record(
+                Treatment::Dropped,
+                "messages that are damaged",
+                place,
+                "restore the lines",
+            );
         }
         for (name, n) in &self.others {
             let rule = format!("messages {name}, {n} of them");

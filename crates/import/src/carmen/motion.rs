@@ -36,8 +36,12 @@ pub(super) fn choose(
         return Ok(tracks(&true_poses(content), max_speed_mps, report));
     }
     let Some(kind) = scan_kind(content) else {
-        let cause = format!("the log has no two poses to compare odometry with; it has {}", content.describe());
-        let remedy = "give a log with ODOM and corrected FLASER or ROBOTLASER1 messages, or with TRUEPOS";
+        let cause = format!(
+            "the log has no two poses to compare odometry with; it has {}",
+            content.describe()
+        );
+        let remedy =
+            "give a log with ODOM and corrected FLASER or ROBOTLASER1 messages, or with TRUEPOS";
         return Err(InputError::new(place, cause, remedy));
     };
     let other = if kind == ScanKind::Flaser { ScanKind::Robotlaser } else { ScanKind::Flaser };
@@ -225,7 +229,10 @@ fn check_corrected(
     }
     let n = log.scans.len();
     let cause = if has_odometry {
-        format!("the poses of its {n} {} messages are those of odometry: no program has corrected it", kind.name())
+        format!(
+            "the poses of its {n} {} messages are those of odometry: no program has corrected it",
+            kind.name()
+        )
     } else {
         format!("the log has {n} {} messages and no odometry (ODOM)", kind.name())
     };

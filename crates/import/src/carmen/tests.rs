@@ -7,7 +7,6 @@ const SMALL: &str = "# head\nPARAM a b\nODOM 0 0 0 0 0 0 0.1 h 0.1\n\
     ODOM 0 0 0.5 0 0 0 1e-42 h 0\nODOM 1 0 0.5 0 0 0 1.9 h 1.9\n\
     FLASER 2 1.5 2 1 0.1 0.5 1 0.1 0.5 2.0 h 2.0\n";
 
-
 fn read_text(text: &str) -> CarmenLog {
     parse("f.log", text, None).unwrap()
 }
@@ -81,7 +80,11 @@ fn true_poses_are_compared_with_the_odometry_beside_them() {
     let mut text = String::new();
     for k in 0..40 {
         let x_m = 0.1 * f64::from(k);
-        text += &format!("TRUEPOS {x_m:.4} 0 0 {:.4} 0 0 {:.3} host 0\n", 0.97 * x_m, 0.3 * f64::from(k));
+        text += &format!(
+            "TRUEPOS {x_m:.4} 0 0 {:.4} 0 0 {:.3} host 0\n",
+            0.97 * x_m,
+            0.3 * f64::from(k)
+        );
     }
     let [odometry, truth] = tracks(&text);
     assert!((truth[39].position_m[0] - 3.9).abs() < 1e-9);
@@ -89,10 +92,14 @@ fn true_poses_are_compared_with_the_odometry_beside_them() {
     let both = format!("{text}{}", robotlaser(40, 0.97));
     assert!(lines(&read_text(&both).report)[0].contains("ROBOTLASER1, 40 of them, beside TRUEPOS"));
     // A body that is lost for a while, and a clock that is set back.
-    let lost = text.replace("TRUEPOS 2.0000 0 0", "TRUEPOS 0 0 0").replace("11.400 host", "0.100 host");
+    let lost =
+        text.replace("TRUEPOS 2.0000 0 0", "TRUEPOS 0 0 0").replace("11.400 host", "0.100 host");
     let log = read_text(&lost);
     let said = lines(&log.report);
-    assert!(said[0].contains("stamps that go back") && said[1].contains("jumps of the true poses"), "{said:?}");
+    assert!(
+        said[0].contains("stamps that go back") && said[1].contains("jumps of the true poses"),
+        "{said:?}"
+    );
     assert_eq!(log.report.dropped(), 1);
 }
 
@@ -125,7 +132,10 @@ fn damaged_messages_are_skipped_and_counted() {
     let report = read_text(&text).report;
     assert_eq!(report.dropped(), 2);
     let said = lines(&report);
-    assert!(said[0].contains("line 9: the ODOM message has 4 words instead of 10, line 10"), "{said:?}");
+    assert!(
+        said[0].contains("line 9: the ODOM message has 4 words instead of 10, line 10"),
+        "{said:?}"
+    );
     let folder = tempfile::tempdir().unwrap();
     let [path, out] = ["a.log", "b.log"].map(|name| folder.path().join(name));
     std::fs::write(&path, &text).unwrap();

@@ -22,7 +22,11 @@ const DAMAGED_CHUNKS: &str = "chunks that are damaged";
 ///
 /// # Errors
 /// Those of the sink, and of reading from the disk.
-pub(super) fn read(file: &str, stream: &mut dyn Read, sink: &mut Sink<'_>) -> Result<(), InputError> {
+pub(super) fn read(
+    file: &str,
+    stream: &mut dyn Read,
+    sink: &mut Sink<'_>,
+) -> Result<(), InputError> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_emit_chunks(true)
@@ -47,7 +51,10 @@ pub(super) fn read(file: &str, stream: &mut dyn Read, sink: &mut Sink<'_>) -> Re
             }
             Err(McapError::UnexpectedEof | McapError::UnexpectedEoc) => break,
             Err(error) => {
-                sink.damaged_part("the rest of a file that is damaged", format!("{file} ({error})"));
+                sink.damaged_part(
+                    "the rest of a file that is damaged",
+                    format!("{file} ({error})"),
+                );
                 return Ok(());
             }
         }

@@ -204,7 +204,8 @@ mod tests {
         assert_eq!(read.topics, [("/odom".into(), 60), ("/scan".into(), 7)]);
         let flow = "{rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap, 'a_1.mcap']}}";
         assert_eq!(Metadata::parse("m", flow).unwrap().files, read.files);
-        let json = r#"{"rosbag2_bagfile_information": {"relative_file_paths": ["a_0.mcap", "a_1.mcap"]}}"#;
+        let json =
+            r#"{"rosbag2_bagfile_information": {"relative_file_paths": ["a_0.mcap", "a_1.mcap"]}}"#;
         assert_eq!(Metadata::parse("m", json).unwrap().files, read.files);
     }
 

@@ -47,7 +47,11 @@ pub(super) fn read(
     }
     let damage = sink.report.findings.first();
     if let (true, Some(damage)) = (sink.topics.is_empty(), damage) {
-        let cause = format!("nothing of the bag can be read: {}, {}", damage.rule, damage.places.join(", "));
+        let cause = format!(
+            "nothing of the bag can be read: {}, {}",
+            damage.rule,
+            damage.places.join(", ")
+        );
         return Err(InputError::new(path.display(), cause, "copy it again, or give another bag"));
     }
     if sink.packed_messages > 0 {
@@ -108,7 +112,11 @@ impl Format {
             let first_line = String::from_utf8_lossy(head);
             let version = first_line.lines().next().unwrap_or_default().escape_debug().to_string();
             let cause = format!("is a bag of ROS 1 of another version than 2.0: {version}");
-            Err(InputError::new(place, cause, "give a bag of version 2.0, which ROS 1 has written since 2010"))
+            Err(InputError::new(
+                place,
+                cause,
+                "give a bag of version 2.0, which ROS 1 has written since 2010",
+            ))
         } else {
             let remedy = "give a bag of `ros2 bag record` (MCAP or SQLite) or of ROS 1 (.bag)";
             Err(InputError::new(place, "is no bag", remedy))
@@ -139,7 +147,11 @@ impl BagFiles {
     fn find(path: &Path) -> Result<Self, InputError> {
         if path.is_dir() {
             let metadata = path.join("metadata.yaml");
-            return if metadata.is_file() { Self::listed(&metadata) } else { Self::in_folder(path) };
+            return if metadata.is_file() {
+                Self::listed(&metadata)
+            } else {
+                Self::in_folder(path)
+            };
         }
         if path.extension().is_some_and(|extension| extension == "yaml") {
             return Self::listed(path);
@@ -188,13 +200,18 @@ impl BagFiles {
     }
 
     /// Checks that at least half of the messages that metadata give were in the files.
-    fn check_counts(&self, path: &Path, topics: &BTreeMap<String, Topic>) -> Result<(), InputError> {
+    fn check_counts(
+        &self,
+        path: &Path,
+        topics: &BTreeMap<String, Topic>,
+    ) -> Result<(), InputError> {
         let listed: u64 = self.counts.iter().map(|(_, n)| n).sum();
         let stored: u64 = topics.values().map(|topic| topic.messages).sum();
         if stored >= listed.div_ceil(2) {
             return Ok(());
         }
-        let cause = format!("{stored} of the {listed} messages that metadata.yaml gives are in the files");
+        let cause =
+            format!("{stored} of the {listed} messages that metadata.yaml gives are in the files");
         Err(InputError::new(path.display(), cause, "copy the bag again, with all of its files"))
     }
 }

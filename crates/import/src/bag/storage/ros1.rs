@@ -22,8 +22,13 @@ const CONNECTION: u8 = 7;
 ///
 /// # Errors
 /// When the file is encrypted; those of the sink.
-pub(super) fn read(file: &str, stream: &mut dyn Read, sink: &mut Sink<'_>) -> Result<(), InputError> {
-    let mut content = FileContent { file, connections: BTreeMap::new(), chunks: 0, is_chunk_lost: false };
+pub(super) fn read(
+    file: &str,
+    stream: &mut dyn Read,
+    sink: &mut Sink<'_>,
+) -> Result<(), InputError> {
+    let mut content =
+        FileContent { file, connections: BTreeMap::new(), chunks: 0, is_chunk_lost: false };
     if skip_magic(stream).is_err() {
         sink.cut_off(file);
         return Ok(());
@@ -33,7 +38,10 @@ pub(super) fn read(file: &str, stream: &mut dyn Read, sink: &mut Sink<'_>) -> Re
             Ok(Some(record)) => content.add_record(&record.view(), sink)?,
             Ok(None) => return Ok(()),
             Err(error) if error.kind() == io::ErrorKind::InvalidData => {
-                sink.damaged_part("the rest of a file that is damaged", format!("{file} ({error})"));
+                sink.damaged_part(
+                    "the rest of a file that is damaged",
+                    format!("{file} ({error})"),
+                );
                 return Ok(());
             }
             Err(_) => {
@@ -115,7 +123,8 @@ impl<'a> HeaderFields<'a> {
     fn get(&self, name: &str) -> Option<&'a [u8]> {
         let mut rest = self.0;
         while let Some((field, after)) = next_block(rest) {
-            let value = field.strip_prefix(name.as_bytes()).and_then(|rest| rest.strip_prefix(b"="));
+            let value =
+                field.strip_prefix(name.as_bytes()).and_then(|rest| rest.strip_prefix(b"="));
             if value.is_some() {
                 return value;
             }
@@ -138,7 +147,8 @@ impl<'a> HeaderFields<'a> {
 
     /// Returns the time of a message in nanoseconds.
     fn time_ns(&self) -> u64 {
-        let Some((secs, rest)) = self.get("time").and_then(|time| time.split_first_chunk::<4>()) else {
+        let Some((secs, rest)) = self.get("time").and_then(|time| time.split_first_chunk::<4>())
+        else {
             return 0;
         };
         let nanosecs = rest.first_chunk::<4>().map_or(0, |nanosecs| u32::from_le_bytes(*nanosecs));
@@ -156,7 +166,11 @@ struct FileContent<'f> {
 }
 
 impl FileContent<'_> {
-    fn add_record(&mut self, record: &RecordView<'_>, sink: &mut Sink<'_>) -> Result<(), InputError> {
+    fn add_record(
+        &mut self,
+        record: &RecordView<'_>,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), InputError> {
         match record.fields.kind() {
             Some(BAG_HEADER) => self.check_encryption(&record.fields)?,
             Some(CONNECTION) => self.add_connection(record, sink),
@@ -201,7 +215,11 @@ impl FileContent<'_> {
         sink.deliver(topic, record.fields.time_ns(), Ok(record.data))
     }
 
-    fn add_chunk(&mut self, record: &RecordView<'_>, sink: &mut Sink<'_>) -> Result<(), InputError> {
+    fn add_chunk(
+        &mut self,
+        record: &RecordView<'_>,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), InputError> {
         self.chunks += 1;
         let unpacked = unpack_chunk(record);
         self.is_chunk_lost = unpacked.is_err();

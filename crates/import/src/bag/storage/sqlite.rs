@@ -17,7 +17,8 @@ use super::sink::{MAX_RECORD_BYTES, Sink, Topic, ros2_name};
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
 
 /// Only data are read: no function of a trusted schema is called, and damage of a page is found.
-const SETTINGS: &str = "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;";
+const SETTINGS: &str =
+    "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;";
 
 /// Hands the topics and messages of a file to `sink`; `file` is its name for people. Rows after a damaged page are
 /// lost.
@@ -80,7 +81,9 @@ fn uri_path(path: &Path) -> String {
     let mut text = String::new();
     for byte in path.to_string_lossy().bytes() {
         match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => text.push(byte.into()),
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => {
+                text.push(byte.into())
+            }
             other => text.push_str(&format!("%{other:02X}")),
         }
     }
@@ -90,12 +93,14 @@ fn uri_path(path: &Path) -> String {
 /// Returns the topics by their numbers.
 fn read_topics(database: &Connection) -> rusqlite::Result<BTreeMap<i64, (String, Topic)>> {
     let definitions = read_definitions(database).unwrap_or_default();
-    let mut statement = database.prepare("SELECT id, name, type, serialization_format FROM topics")?;
+    let mut statement =
+        database.prepare("SELECT id, name, type, serialization_format FROM topics")?;
     let mut rows = statement.query([])?;
     let mut topics = BTreeMap::new();
     while let Some(row) = rows.next()? {
         let schema = ros2_name(&row.get::<_, String>(2)?);
-        let (definition_encoding, definition) = definitions.get(&schema).cloned().unwrap_or_default();
+        let (definition_encoding, definition) =
+            definitions.get(&schema).cloned().unwrap_or_default();
         let topic = Topic {
             schema,
             encoding: row.get(3)?,
@@ -128,7 +133,8 @@ fn read_messages(
         }
     }
     // Messages on other topics are counted without their data, which are most of the file.
-    let others = format!("SELECT topic_id FROM messages WHERE topic_id NOT IN ({})", wanted.join(","));
+    let others =
+        format!("SELECT topic_id FROM messages WHERE topic_id NOT IN ({})", wanted.join(","));
     let mut statement = database.prepare(&others)?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
