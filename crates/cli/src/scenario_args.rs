@@ -34,7 +34,8 @@ pub(crate) struct ChangeArgs {
     #[arg(long, value_name = "R", value_parser = ["reliable", "effectors", "sensors", "both"])]
     pub(crate) regime: Option<String>,
 
-    /// Override a key of the scenario, e.g. robots.count=20; repeatable
+    /// Override a key of the scenario, e.g. robots.count=20, or set an option of the import of recorded traffic:
+    /// import.max_gap_s=600, import.ground_speed_kt=30, import.leave_out_suspicious=true; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) overrides: Vec<String>,
 }
