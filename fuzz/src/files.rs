@@ -45,6 +45,14 @@ pub(crate) fn mrclam_folder(data: &[u8]) -> &'static Path {
     folder()
 }
 
+/// A folder of tables of places, each of which is the same input.
+pub(crate) fn navdata_folder(data: &[u8]) -> &'static Path {
+    for name in ["airports.dat", "fix.dat", "nav.dat"] {
+        file(name, data);
+    }
+    folder()
+}
+
 /// A run folder with this manifest, and nothing else that a reader needs before it.
 pub(crate) fn run_folder(data: &[u8]) -> &'static Path {
     file("scenario.toml", b"format = 1\n");

@@ -1,6 +1,6 @@
 //! The list of all targets, and those that read files and texts.
 
-use crate::files::{beside_an_image, file, folder, mrclam_folder, run_folder};
+use crate::files::{beside_an_image, file, folder, mrclam_folder, navdata_folder, run_folder};
 use crate::packets;
 use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
@@ -44,6 +44,8 @@ pub(crate) const TARGETS: &[Target] = &[
         drop(traffic::from_bytes(&"f", data.to_vec(), &Default::default()));
     }),
     ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data), &Default::default()))),
+    ("bluesky_call", |data| drop(bluesky::read(&file("f.scn", data)))),
+    ("navdata", |data| drop(bluesky::NavigationData::read(navdata_folder(data)))),
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
     ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
     ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),

@@ -17,6 +17,36 @@ pub(crate) struct ScenarioArgs {
 
     #[command(flatten)]
     pub(crate) changes: ChangeArgs,
+
+    #[command(flatten)]
+    pub(crate) import: ImportArgs,
+}
+
+/// The options for a file of another program.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct ImportArgs {
+    /// Folder with airports.dat, fix.dat and nav.dat of BlueSky, for the places that a .scn file names
+    #[arg(long, value_name = "DIR")]
+    navdata: Option<PathBuf>,
+}
+
+impl ImportArgs {
+    /// Returns the options as overrides, `key=value`.
+    fn settings(&self) -> Option<String> {
+        self.navdata.as_ref().map(|folder| format!("import.navdata={}", folder.display()))
+    }
+
+    /// Refuses the options for a command that has no use for them.
+    ///
+    /// # Errors
+    /// When one is given.
+    pub(crate) fn check_none(&self, because: &str) -> Result<(), InputError> {
+        if self.navdata.is_none() {
+            return Ok(());
+        }
+        let remedy = "run the file once with --navdata and --out DIR, then give DIR/scenario.toml";
+        Err(InputError::new("--navdata", because, remedy))
+    }
 }
 
 /// The options that change a scenario.
@@ -79,6 +109,7 @@ impl ScenarioArgs {
     /// Returns all overrides, as `key=value`.
     pub(crate) fn all_overrides(&self) -> Vec<String> {
         let mut all = self.changes.settings();
+        all.extend(self.import.settings());
         all.extend(self.changes.seed.map(|seed| format!("seed={seed}")));
         all
     }

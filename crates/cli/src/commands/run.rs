@@ -80,7 +80,8 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             let cause = "a sweep has no single recording, and its folder is never overwritten";
             return Err(InputError::new("--mcap or --replace", cause, remedy).into());
         }
-        let ScenarioArgs { file, changes } = &args.scenario;
+        let ScenarioArgs { file, changes, import } = &args.scenario;
+        import.check_none("a sweep reads no navigation database")?;
         let request = SweepRequest {
             file,
             changes,

@@ -1,53 +1,34 @@
 //! The effects of the commands of a scenario.
 
-use std::collections::BTreeMap;
-use std::fmt;
+mod aircraft;
+mod calling;
+mod conflict;
+mod place;
+mod reason;
+mod route;
+mod setting;
 
-use super::lines::Command;
-use super::values::{
-    Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, heading_deg, is_latitude, number,
-    on_off, positive, speed, vertical_speed_fpm, zone_size,
-};
-use super::{
-    AircraftCommand, Airspeed, MAX_AIRCRAFT, MAX_WAY_POINTS, PositionRef, ResolutionMethod,
-    ScnAircraft, ScnFile, UnplacedAircraft, UnresolvedPosition, WayPoint, Wind, synthetic,
-};
+use super::calls::CallFolder;
+use super::lines::{CommandFile, CommandText};
+use super::navdata::NavigationData;
+use super::schedule::Schedule;
+use super::traffic::{ScnAircraft, UnplacedAircraft};
+use super::values::Arguments;
+use super::{DISPLAY_RULE, ScnFile, UnusedCommand};
 use crate::local_plane::LatLon;
+use crate::report::{ImportReport, Treatment};
 use crate::table::Token;
+use reason::{canonical_name, is_aircraft_command, is_command, is_display, reason_without_effect};
+use setting::SettingDefaults;
 use sidestep_kernel::InputError;
-
-/// Commands to one aircraft; its identifier may precede them.
-const AIRCRAFT_COMMANDS: [&str; 27] = [
-    "ADDWPT", "AFTER", "ALT", "AT", "ATALT", "ATDIST", "ATSPD", "BEFORE", "DEL", "DELETE",
-    "DELRTE", "DELWPT", "DEST", "DIRECT", "HDG", "HEADING", "LISTRTE", "LNAV", "MOVE", "ORIG",
-    "POS", "SPD", "SPEED", "SWTOC", "TURN", "VNAV", "VS",
-];
-
-/// Commands that change or query a display.
-const DISPLAY_COMMANDS: [&str; 12] = [
-    "ECHO",
-    "FILTERALT",
-    "LABEL",
-    "LISTRTE",
-    "PAN",
-    "POS",
-    "SSD",
-    "SWRAD",
-    "SYMBOL",
-    "TRAIL",
-    "TRAILS",
-    "ZOOM",
-];
-
-/// Modes that `ADDWPT` takes in place of a way-point. Airplanes here fly by all way-points, so both have no
-/// effect.
-const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
+use std::collections::BTreeMap;
+use std::rc::Rc;
 
 /// The result of a command.
 enum CommandOutcome {
     Done,
-    /// It has no effect, and is counted under this name.
-    NotUnderstood(String),
+    /// It has no effect, is counted under this name, and this is the reason.
+    NotUnderstood(String, &'static str),
 }
 
 /// The reason why a command had no effect.
@@ -69,431 +50,227 @@ struct AircraftBuilder {
     aircraft: ScnAircraft,
     /// The name of its start, where the position of that is not known.
     unresolved_start: Option<String>,
+    /// Vertical speed at its creation in ft/min.
+    vertical_speed_fpm: f64,
+    /// Whether it is gone before any time has passed.
+    is_void: bool,
 }
 
 /// Carries out commands in their order.
-pub(super) struct Interpreter<'p> {
-    place: &'p dyn fmt::Display,
-    file: ScnFile,
+pub(super) struct Interpreter {
+    folder: CallFolder,
+    navdata: NavigationData,
+    schedule: Schedule,
+    result: ScnFile,
     builders: Vec<AircraftBuilder>,
     /// The last builder with each identifier.
     by_id: BTreeMap<String, usize>,
     /// The way-points that `DEFWPT` has defined.
     defined: BTreeMap<String, LatLon>,
+    /// The place from which places of the same name are told apart.
+    reference: LatLon,
+    defaults: SettingDefaults,
+    /// Commands for each new aircraft (`CRECMD`).
+    creation_commands: Vec<CommandText>,
+    calls: u64,
+    now_s: f64,
+    /// The file of the present command.
+    source: Rc<CommandFile>,
+    /// The line of the present command.
+    line: usize,
+    /// The place of the present command in reports.
+    place: String,
 }
 
-impl<'p> Interpreter<'p> {
-    pub(super) fn new(place: &'p dyn fmt::Display, file: ScnFile) -> Self {
-        Self { place, file, builders: Vec::new(), by_id: BTreeMap::new(), defined: BTreeMap::new() }
+impl Interpreter {
+    pub(super) fn new(folder: CallFolder, navdata: NavigationData) -> Self {
+        let source = CommandFile { name: String::new(), prefix: String::new(), depth: 0 };
+        Self {
+            folder,
+            navdata,
+            schedule: Schedule::default(),
+            result: ScnFile::default(),
+            builders: Vec::new(),
+            by_id: BTreeMap::new(),
+            defined: BTreeMap::new(),
+            reference: LatLon { lat_deg: 0.0, lon_deg: 0.0 },
+            defaults: SettingDefaults::default(),
+            creation_commands: Vec::new(),
+            calls: 0,
+            now_s: 0.0,
+            source: Rc::new(source),
+            line: 1,
+            place: String::new(),
+        }
     }
 
-    /// Carries out `commands`, which are sorted by time.
-    pub(super) fn run(mut self, commands: Vec<Command>) -> ScnFile {
-        for command in commands {
-            self.execute(command);
+    /// Carries out the commands of a text, which is `name` in errors.
+    pub(super) fn run(mut self, name: &str, text: &str) -> ScnFile {
+        self.result.report = ImportReport::new("BlueSky scenario (.scn)");
+        let file = CommandFile { name: name.to_string(), prefix: String::new(), depth: 0 };
+        self.add_file(Rc::new(file), text, &[], 0.0);
+        while let Some(command) = self.schedule.next() {
+            self.execute(&command);
         }
-        for AircraftBuilder { aircraft, unresolved_start } in self.builders {
+        self.finish()
+    }
+
+    fn finish(mut self) -> ScnFile {
+        self.result.unparsed.sort_by_key(InputError::line_and_column);
+        for builder in self.builders.into_iter().filter(|builder| !builder.is_void) {
+            let AircraftBuilder { aircraft, unresolved_start, .. } = builder;
             match unresolved_start {
-                None => self.file.traffic.aircraft.push(aircraft),
+                None => self.result.traffic.aircraft.push(aircraft),
                 Some(place) => {
-                    self.file.traffic.unplaced.push(UnplacedAircraft { place, aircraft });
+                    self.result.traffic.unplaced.push(UnplacedAircraft { place, aircraft });
                 }
             }
         }
-        self.file
+        let file = &mut self.result;
+        add_facts(&mut file.report, &file.traffic.aircraft);
+        file.report.add_kept("command lines", file.command_lines as usize);
+        file.report.add_kept("aircraft", file.traffic.aircraft.len());
+        if file.short_lines > 0 {
+            let rule = format!("{} lines of fewer than 10 characters", file.short_lines);
+            file.report.record(Treatment::NotUsed, rule, "", "the simulator skips them as well");
+        }
+        self.result
     }
 
-    fn execute(&mut self, command: Command) {
-        let time_s = command.time_s;
-        let (name, mut arguments) = self.name_and_arguments(command.words);
-        count(&mut self.file.commands, name.clone());
-        self.file.last_lines.insert(name.clone(), arguments.command.line);
+    fn execute(&mut self, command: &CommandText) {
+        self.now_s = command.time_s;
+        self.source = Rc::clone(&command.file);
+        self.line = command.line();
+        self.place = command.place();
+        let source = Rc::clone(&command.file);
+        let (name, mut arguments) = self.name_and_arguments(&source.name, command.words());
+        count(&mut self.result.commands, name.clone());
         if is_display(&name) {
-            return count(&mut self.file.ignored, name);
+            self.note_unused(&name, "it changes or asks a display only");
+            self.note(Treatment::NotUsed, DISPLAY_RULE, "");
+            return count(&mut self.result.ignored, name);
         }
-        match self.dispatch(&name, time_s, &mut arguments) {
-            Ok(CommandOutcome::Done) => {}
-            Ok(CommandOutcome::NotUnderstood(what)) => count(&mut self.file.not_understood, what),
-            Err(CommandError::Unparsed(error)) => self.file.unparsed.push(error),
-            Err(CommandError::Refused(error)) => self.file.refused.push(error),
+        match self.dispatch(&name, command, &mut arguments) {
+            Ok(CommandOutcome::Done) => self.note_further_arguments(&name, &arguments),
+            Ok(CommandOutcome::NotUnderstood(what, reason)) => {
+                self.note_unused(&name, reason);
+                self.note(Treatment::NotUsed, &format!("{what}: {reason}"), "");
+                count(&mut self.result.not_understood, what);
+            }
+            Err(CommandError::Unparsed(error)) => {
+                self.note_unused(&name, error.cause());
+                self.note(Treatment::Dropped, "commands that cannot be read", "see each error");
+                self.result.unparsed.push(error);
+            }
+            Err(CommandError::Refused(error)) => {
+                self.note_unused(&name, error.cause());
+                self.note(
+                    Treatment::Dropped,
+                    "commands that cannot be carried out",
+                    "see each error",
+                );
+                self.result.refused.push(error);
+            }
         }
     }
 
     /// Splits a command into its name and its arguments; an aircraft before the name becomes the first argument.
-    fn name_and_arguments<'a>(&self, mut words: Vec<Token<'a>>) -> (String, Arguments<'a>)
-    where
-        'p: 'a,
-    {
+    fn name_and_arguments<'a>(
+        &self,
+        file_name: &'a String,
+        mut words: Vec<Token<'a>>,
+    ) -> (String, Arguments<'a>) {
         let first = upper(words[0]);
         let second = words.get(1).map(|word| upper(*word));
         // An aircraft that a command without effect here has created, such as MCRE, is recognized by its command.
         let is_aircraft = self.by_id.contains_key(&first)
             || (!is_command(&first)
-                && second.as_ref().is_some_and(|name| AIRCRAFT_COMMANDS.contains(&&**name)));
+                && second.as_ref().is_some_and(|name| is_aircraft_command(name)));
         let (name, command) = match (is_aircraft, second) {
             (false, _) => (first, words.remove(0)),
             (true, Some(name)) => (name, words.remove(1)),
             (true, None) => ("POS".to_string(), words[0]),
         };
-        (name, Arguments::new(self.place, command, words))
+        (name, Arguments::new(file_name, command, words))
     }
 
-    fn dispatch(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        match name {
-            "CRE" | "CREATE" => self.create(time_s, arguments),
-            "DEL" | "DELETE" => self.delete(time_s, arguments),
-            "DEFWPT" => self.define(arguments),
-            "ADDWPT" => self.add_way_point(time_s, arguments),
-            "AFTER" => self.add_way_point_after(time_s, arguments),
-            "ORIG" | "DEST" => self.set_endpoint(name, time_s, arguments),
-            "HDG" | "HEADING" | "TURN" | "SPD" | "SPEED" | "ALT" | "VS" | "LNAV" | "VNAV" => {
-                self.change(name, time_s, arguments)
-            }
-            "SYN" => self.synthesize(time_s, arguments),
-            "ASAS" | "CDMETHOD" | "RESO" | "ZONER" | "ZONEDH" | "DTLOOK" | "NOISE" => {
-                self.set(name, arguments)
-            }
-            "WIND" => self.add_wind(arguments),
-            "" => {
-                let cause = "the command has no name".to_string();
-                Err(arguments.command.error(self.place, cause, "remove the comma").into())
-            }
-            _ => Ok(CommandOutcome::NotUnderstood(name.to_string())),
-        }
-    }
-
-    /// `CRE aircraft,type,place[,heading[,altitude[,speed]]]`
-    fn create(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        let id = arguments.required("an aircraft")?;
-        let kind = arguments.next().map_or(String::new(), |word| word.text.to_owned());
-        let place = self.place(arguments)?;
-        let aircraft = ScnAircraft {
-            id: upper(id),
-            kind,
-            created_s: time_s,
-            lat_deg: place.position().map_or(0.0, |position| position.lat_deg),
-            lon_deg: place.position().map_or(0.0, |position| position.lon_deg),
-            heading_deg: arguments.optional(heading_deg)?.unwrap_or(0.0),
-            altitude_ft: arguments.optional(altitude_ft)?.unwrap_or(0.0),
-            speed: arguments.optional(speed)?.unwrap_or(Airspeed::CasKt(0.0)),
-            way_points: Vec::new(),
-            origin: None,
-            destination: None,
-            destination_s: None,
-            changes: Vec::new(),
-            deleted_s: None,
-        };
-        let unresolved_start = match &place {
-            PositionRef::Unresolved(name) => Some(name.clone()),
-            _ => None,
-        };
-        self.add_aircraft(id, AircraftBuilder { aircraft, unresolved_start })?;
-        self.add_unresolved(arguments.command, Some(id.text), &place);
-        Ok(CommandOutcome::Done)
-    }
-
-    /// Adds a new aircraft; errors point at `word`. An identifier may be used again once its aircraft is deleted.
-    fn add_aircraft(&mut self, word: Token, builder: AircraftBuilder) -> Result<(), CommandError> {
-        if self.builders.len() >= MAX_AIRCRAFT {
-            let cause = format!("this is more than {MAX_AIRCRAFT} aircraft");
-            return Err(self.refusal(word, cause, "create fewer"));
-        }
-        let id = builder.aircraft.id.clone();
-        if let Some(&earlier) = self.by_id.get(&id)
-            && self.builders[earlier].aircraft.deleted_s.is_none()
-        {
-            let cause = format!("aircraft {id} exists already");
-            return Err(self.refusal(word, cause, "delete it first, or take another identifier"));
-        }
-        self.by_id.insert(id, self.builders.len());
-        self.builders.push(builder);
-        Ok(())
-    }
-
-    /// `DEL aircraft,...` or `DEL WIND`
-    fn delete(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        if arguments.peek().is_some_and(|word| word.eq_ignore_ascii_case("WIND")) {
-            self.file.traffic.wind.clear();
-            return Ok(CommandOutcome::Done);
-        }
-        loop {
-            let index = self.existing_aircraft(arguments)?;
-            self.builders[index].aircraft.deleted_s = Some(time_s);
-            if arguments.remaining() == 0 {
-                return Ok(CommandOutcome::Done);
-            }
-        }
-    }
-
-    /// Returns the next argument, which must be an existing aircraft.
-    fn existing_aircraft(&self, arguments: &mut Arguments) -> Result<usize, CommandError> {
-        let word = arguments.required("an aircraft")?;
-        let problem = match self.by_id.get(&upper(word)).copied() {
-            Some(index) if self.builders[index].aircraft.deleted_s.is_none() => return Ok(index),
-            Some(_) => "was deleted before",
-            None => "was not created before",
-        };
-        let cause = format!("aircraft {} {problem}", word.text);
-        Err(self.refusal(word, cause, "check the identifier and the times"))
-    }
-
-    /// `DEFWPT name,place`
-    fn define(&mut self, arguments: &mut Arguments) -> CommandResult {
-        let name = arguments.required("a name")?;
-        let place = self.place(arguments)?;
-        if let Some(position) = place.position() {
-            self.defined.insert(upper(name), position);
-        }
-        self.add_unresolved(arguments.command, None, &place);
-        Ok(CommandOutcome::Done)
-    }
-
-    /// `ADDWPT aircraft,place[,altitude[,speed[,after]]]`
-    fn add_way_point(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        let id = arguments.peek();
-        let index = self.existing_aircraft(arguments)?;
-        let mode = arguments.peek().unwrap_or("").to_ascii_uppercase();
-        if TURN_MODES.contains(&&*mode) {
-            return Ok(CommandOutcome::Done);
-        }
-        let way_point = self.way_point(time_s, arguments)?;
-        let after = arguments.next();
-        let slot = self.route_slot(index, after, arguments.command)?;
-        self.add_unresolved(arguments.command, id, &way_point.place);
-        self.builders[index].aircraft.way_points.insert(slot, way_point);
-        Ok(CommandOutcome::Done)
-    }
-
-    /// `AFTER aircraft,after,ADDWPT,place[,altitude[,speed]]`
-    fn add_way_point_after(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        let id = arguments.peek();
-        let index = self.existing_aircraft(arguments)?;
-        let after = arguments.required("a way-point of the route")?;
-        let variant = upper(arguments.required("ADDWPT")?);
-        if variant != "ADDWPT" {
-            return Ok(CommandOutcome::NotUnderstood(format!("AFTER {variant}")));
-        }
-        let way_point = self.way_point(time_s, arguments)?;
-        let slot = self.route_slot(index, Some(after), arguments.command)?;
-        self.add_unresolved(arguments.command, id, &way_point.place);
-        self.builders[index].aircraft.way_points.insert(slot, way_point);
-        Ok(CommandOutcome::Done)
-    }
-
-    fn way_point(&self, added_s: f64, arguments: &mut Arguments) -> Result<WayPoint, InputError> {
-        Ok(WayPoint {
-            place: self.place(arguments)?,
-            altitude_ft: arguments.optional(altitude_ft)?,
-            speed: arguments.optional(speed)?,
-            added_s,
-        })
-    }
-
-    /// Returns the position of a new way-point in an aircraft's route: after the last one called `after`, or at the
-    /// end.
-    fn route_slot(
-        &self,
-        index: usize,
-        after: Option<Token>,
-        command: Token,
-    ) -> Result<usize, CommandError> {
-        let route = &self.builders[index].aircraft.way_points;
-        if route.len() >= MAX_WAY_POINTS {
-            let cause = format!("the route has more than {MAX_WAY_POINTS} way-points");
-            return Err(self.refusal(command, cause, "write fewer"));
-        }
-        let Some(after) = after else { return Ok(route.len()) };
-        let name = upper(after);
-        match route.iter().rposition(|earlier| earlier.place.name() == Some(&name)) {
-            Some(earlier) => Ok(earlier + 1),
-            None => {
-                let cause = format!("no way-point {name} is on the route");
-                Err(self.refusal(after, cause, "add that one first"))
-            }
-        }
-    }
-
-    /// `ORIG aircraft,place` and `DEST aircraft,place`
-    fn set_endpoint(
+    fn dispatch(
         &mut self,
         name: &str,
-        time_s: f64,
+        command: &CommandText,
         arguments: &mut Arguments,
     ) -> CommandResult {
-        let id = arguments.peek();
-        let index = self.existing_aircraft(arguments)?;
-        // Without a place the command is a query.
-        if arguments.remaining() == 0 {
-            return Ok(CommandOutcome::Done);
+        match canonical_name(name) {
+            "CRE" => self.create(arguments),
+            "CRECMD" => self.add_creation_command(command, arguments),
+            "CRECONFS" => self.create_conflict(arguments),
+            "DEL" => self.delete(arguments),
+            "DEFWPT" => self.define(arguments),
+            "ADDWPT" => self.add_way_point(arguments),
+            "AFTER" | "BEFORE" => self.add_way_point_beside(name, arguments),
+            "AT" => self.constrain_way_point(arguments),
+            "RTA" => self.require_time(arguments),
+            "ORIG" | "DEST" => self.set_endpoint(name, arguments),
+            "HDG" | "SPD" | "ALT" | "VS" | "LNAV" | "VNAV" => self.change(arguments, name),
+            "SYN" => self.synthesize(arguments),
+            "ZONER" | "ZONEDH" => self.set_zone(arguments, name),
+            "NORESO" | "RESOOFF" => self.toggle_avoidance(arguments, name),
+            "ASAS" | "CDMETHOD" | "RESO" | "DTLOOK" | "NOISE" | "RFACH" | "RMETHH" | "RMETHV"
+            | "PRIORULES" => self.set(arguments, name),
+            "WIND" => self.add_wind(arguments),
+            "PCALL" => self.call(arguments),
+            "IC" => self.load(arguments),
+            "SCHEDULE" | "DELAY" => self.schedule_command(command, arguments, name),
+            "RESET" => self.reset(),
+            "QUIT" => self.quit(),
+            "" => {
+                let cause = "the command has no name".to_string();
+                Err(arguments.error(arguments.command, cause, "remove the comma").into())
+            }
+            _ => Ok(CommandOutcome::NotUnderstood(name.to_string(), reason_without_effect(name))),
         }
-        let place = self.place(arguments)?;
-        self.add_unresolved(arguments.command, id, &place);
-        let aircraft = &mut self.builders[index].aircraft;
-        if name == "ORIG" {
-            aircraft.origin = Some(place);
-        } else {
-            aircraft.destination = Some(place);
-            aircraft.destination_s = Some(time_s);
-        }
-        Ok(CommandOutcome::Done)
     }
 
-    /// `HDG aircraft,heading` and similar commands. Without a value they are queries and change
-    /// nothing.
-    fn change(&mut self, name: &str, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        let index = self.existing_aircraft(arguments)?;
-        let change = match name {
-            "HDG" | "HEADING" | "TURN" => {
-                arguments.optional(heading_deg)?.map(AircraftCommand::HeadingDeg)
-            }
-            "SPD" | "SPEED" => arguments.optional(speed)?.map(AircraftCommand::Speed),
-            "ALT" => arguments.optional(altitude_ft)?.map(AircraftCommand::AltitudeFt),
-            "LNAV" => arguments.optional(on_off)?.map(AircraftCommand::LateralNavigation),
-            "VNAV" => arguments.optional(on_off)?.map(AircraftCommand::VerticalNavigation),
-            _ => arguments.optional(vertical_speed_fpm)?.map(AircraftCommand::VerticalSpeedFpm),
+    /// Adds a finding at the present command.
+    fn note(&mut self, treatment: Treatment, rule: &str, remedy: &str) {
+        let place = self.place.clone();
+        self.result.report.record(treatment, rule, place, remedy);
+    }
+
+    /// Lists the present command as one without effect.
+    fn note_unused(&mut self, name: &str, reason: &str) {
+        let one = UnusedCommand {
+            place: self.place.clone(),
+            command: name.to_string(),
+            reason: reason.to_string(),
         };
-        // ALT may have the vertical speed as a further argument.
-        let climb = if name == "ALT" { arguments.optional(vertical_speed_fpm)? } else { None };
-        let changes = change.into_iter().chain(climb.map(AircraftCommand::VerticalSpeedFpm));
-        self.builders[index].aircraft.changes.extend(changes.map(|change| (time_s, change)));
-        Ok(CommandOutcome::Done)
+        self.result.unused.push(one);
     }
 
-    /// `SYN SUPER n`, `SYN WALL`, `SYN MATRIX n`
-    fn synthesize(&mut self, time_s: f64, arguments: &mut Arguments) -> CommandResult {
-        let variant = arguments.required("SUPER, WALL or MATRIX")?;
-        let spacing_nm = self.file.traffic.zone_radius_nm;
-        let aircraft = match upper(variant).as_str() {
-            "SUPER" => synthetic::super_conflict(self.pattern_size(arguments, 1)?, time_s),
-            "WALL" => synthetic::wall(spacing_nm, time_s),
-            "MATRIX" => synthetic::matrix(self.pattern_size(arguments, 4)?, spacing_nm, time_s),
-            other => return Ok(CommandOutcome::NotUnderstood(format!("SYN {other}"))),
-        };
-        if aircraft.iter().any(|one| one.lat_deg.abs() > 90.0 || one.lon_deg.abs() > 180.0) {
-            let cause = "the pattern is larger than the earth".to_string();
-            return Err(self.refusal(variant, cause, "take a smaller number or a smaller ZONER"));
+    /// Names the arguments that a command has not read.
+    fn note_further_arguments(&mut self, name: &str, arguments: &Arguments) {
+        if arguments.has_further() {
+            let rule = format!("further arguments of {name}");
+            self.note(Treatment::NotUsed, &rule, "leave them out");
         }
-        for aircraft in aircraft {
-            self.add_aircraft(variant, AircraftBuilder { aircraft, unresolved_start: None })?;
-        }
-        Ok(CommandOutcome::Done)
     }
+}
 
-    /// Returns the size of a pattern that has `per_size` aircraft for each unit of size.
-    fn pattern_size(
-        &self,
-        arguments: &mut Arguments,
-        per_size: usize,
-    ) -> Result<u32, CommandError> {
-        let word = arguments.required("a number of aircraft")?;
-        let size = word.integer(&self.place)?;
-        if size == 0 || (size as usize).saturating_mul(per_size) > MAX_AIRCRAFT {
-            let cause = format!("a pattern has 1 to {MAX_AIRCRAFT} aircraft");
-            return Err(self.refusal(word, cause, "take another number"));
-        }
-        Ok(size)
+/// Adds the extent of the aircraft's starts in space and time.
+fn add_facts(report: &mut ImportReport, aircraft: &[ScnAircraft]) {
+    let bounds = |number: fn(&ScnAircraft) -> f64| {
+        let numbers = || aircraft.iter().map(number);
+        [numbers().fold(f64::INFINITY, f64::min), numbers().fold(f64::NEG_INFINITY, f64::max)]
+    };
+    if aircraft.is_empty() {
+        return;
     }
-
-    /// A setting. Without a value it is a query and changes nothing.
-    fn set(&mut self, name: &str, arguments: &mut Arguments) -> CommandResult {
-        if arguments.peek().is_none() {
-            return Ok(CommandOutcome::Done);
-        }
-        let value = arguments.required("a value")?;
-        let place = self.place;
-        if name == "RESO" {
-            self.file.traffic.resolution = Some(self.resolution(value)?);
-            return Ok(CommandOutcome::Done);
-        }
-        let traffic = &mut self.file.traffic;
-        match name {
-            "ZONER" => traffic.zone_radius_nm = zone_size(place, value, &ZONE_RADII_NM, "NM")?,
-            "ZONEDH" => {
-                traffic.zone_half_height_ft = zone_size(place, value, &ZONE_HALF_HEIGHTS_FT, "ft")?;
-            }
-            "DTLOOK" => traffic.lookahead_s = positive(place, value)?,
-            "NOISE" => traffic.noise = on_off(place, value)?,
-            _ if upper(value) == "STATEBASED" => traffic.detection = Some(true),
-            _ => traffic.detection = Some(on_off(place, value)?),
-        }
-        Ok(CommandOutcome::Done)
-    }
-
-    fn resolution(&self, word: Token) -> Result<ResolutionMethod, CommandError> {
-        match upper(word).as_str() {
-            "OFF" => Ok(ResolutionMethod::Off),
-            "MVP" => Ok(ResolutionMethod::Mvp),
-            "SSD" => Ok(ResolutionMethod::Ssd),
-            "EBY" => Ok(ResolutionMethod::Eby),
-            other => {
-                let cause = format!("no resolution method `{other}` is known");
-                Err(self.refusal(word, cause, "take OFF, MVP, SSD or EBY"))
-            }
-        }
-    }
-
-    /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for
-    /// each altitude, where the altitude may be left out.
-    fn add_wind(&mut self, arguments: &mut Arguments) -> CommandResult {
-        let place = self.place(arguments)?;
-        let has_altitudes = arguments.remaining() != 2;
-        let mut winds = Vec::new();
-        let position = place.position().unwrap_or(LatLon { lat_deg: 0.0, lon_deg: 0.0 });
-        loop {
-            let altitude_ft = if has_altitudes { arguments.optional(altitude_ft)? } else { None };
-            let from = arguments.required("the direction the wind blows from")?;
-            let speed = arguments.required("the wind's speed in kt")?;
-            winds.push(Wind {
-                position,
-                altitude_ft,
-                from_deg: heading_deg(self.place, from)?,
-                speed_kt: number(self.place, speed)?,
-            });
-            if arguments.remaining() == 0 {
-                break;
-            }
-        }
-        self.add_unresolved(arguments.command, None, &place);
-        if place.position().is_some() {
-            self.file.traffic.wind.append(&mut winds);
-        }
-        Ok(CommandOutcome::Done)
-    }
-
-    /// Reads a latitude and a longitude, a defined way-point, or a name with or without a runway.
-    fn place(&self, arguments: &mut Arguments) -> Result<PositionRef, InputError> {
-        let next = arguments.peek().unwrap_or("").to_ascii_uppercase();
-        if let Some(&position) = self.defined.get(&next) {
-            arguments.next();
-            return Ok(PositionRef::Defined { name: next, position });
-        }
-        if is_latitude(&next) {
-            return Ok(PositionRef::At(arguments.lat_lon()?));
-        }
-        let mut name = upper(arguments.required("a place")?);
-        let runway = arguments.peek().unwrap_or("").to_ascii_uppercase();
-        if is_runway(&runway) {
-            arguments.next();
-            name = format!("{name} {runway}");
-        }
-        Ok(PositionRef::Unresolved(name))
-    }
-
-    /// Adds a place without a known position to the list.
-    fn add_unresolved(&mut self, command: Token, aircraft: Option<&str>, place: &PositionRef) {
-        if let PositionRef::Unresolved(name) = place {
-            self.file.unresolved_places.push(UnresolvedPosition {
-                name: name.clone(),
-                command: upper(command),
-                aircraft: aircraft.map(str::to_ascii_uppercase),
-                line: command.line,
-            });
-        }
-    }
-
-    fn refusal(&self, word: Token, cause: String, remedy: &str) -> CommandError {
-        CommandError::Refused(word.error(self.place, cause, remedy))
-    }
+    let [south, north] = bounds(|one| one.lat_deg);
+    let [west, east] = bounds(|one| one.lon_deg);
+    let [first_s, last_s] = bounds(|one| one.created_s);
+    report.add_fact("units", "degrees, feet, knots, nautical miles");
+    report.add_fact("starts", format!("latitude {south} to {north}, longitude {west} to {east}"));
+    report.add_fact("created", format!("{first_s} to {last_s} s"));
 }
 
 fn upper(word: Token) -> String {
@@ -504,23 +281,6 @@ fn count(counts: &mut BTreeMap<String, u64>, name: String) {
     *counts.entry(name).or_default() += 1;
 }
 
-/// Returns whether a command affects the display only: a name of the list, or zooming with `+` and `-`.
-fn is_display(name: &str) -> bool {
-    let is_zoom = !name.is_empty() && name.chars().all(|c| "+-=".contains(c));
-    is_zoom || DISPLAY_COMMANDS.contains(&name)
-}
-
-/// Returns whether the first word is a command, not an aircraft.
-fn is_command(name: &str) -> bool {
-    const OTHER_COMMANDS: [&str; 12] = [
-        "ASAS", "CDMETHOD", "CRE", "CREATE", "DEFWPT", "DTLOOK", "NOISE", "RESO", "SYN", "WIND",
-        "ZONEDH", "ZONER",
-    ];
-    is_display(name) || AIRCRAFT_COMMANDS.contains(&name) || OTHER_COMMANDS.contains(&name)
-}
-
-/// `RW18L` or `RWY18L`.
-fn is_runway(name: &str) -> bool {
-    let number = name.strip_prefix("RWY").or_else(|| name.strip_prefix("RW"));
-    number.is_some_and(|number| number.starts_with(|c: char| c.is_ascii_digit()))
+fn refusal(arguments: &Arguments, word: Token, cause: String, remedy: &str) -> CommandError {
+    CommandError::Refused(arguments.error(word, cause, remedy))
 }

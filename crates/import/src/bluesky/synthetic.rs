@@ -6,7 +6,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Airspeed, KNOT_MPS, PositionRef, ScnAircraft};
+use super::speed::{Airspeed, KNOT_MPS};
+use super::traffic::{PositionRef, ScnAircraft};
 use crate::local_plane::LatLon;
 use sidestep_kernel::math;
 
@@ -117,6 +118,7 @@ impl Pattern {
             destination: Some(PositionRef::At(goal)),
             destination_s: Some(self.created_s),
             changes: Vec::new(),
+            settings: Vec::new(),
             deleted_s: None,
         }
     }

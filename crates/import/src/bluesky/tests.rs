@@ -6,7 +6,7 @@ use sidestep_testing::shared_data as shared;
 use serde_json::Value;
 
 use super::*;
-use crate::local_plane::LocalPlane;
+use crate::local_plane::{LatLon, LocalPlane};
 
 /// A scenario with these commands at time 0, one per line.
 fn scenario(commands: &str) -> ScnFile {
@@ -94,12 +94,18 @@ fn routes_use_defined_way_points_and_coordinates() {
     );
     let aircraft = &file.traffic.aircraft[0];
     let home = PositionRef::Defined { name: "HOME".to_string(), position: at(52.0, 4.0) };
-    let way_point =
-        |place, altitude_ft, speed| WayPoint { place, altitude_ft, speed, added_s: 0.0 };
+    let way_point = |name: &str, place, altitude_ft, speed| WayPoint {
+        name: name.to_string(),
+        place,
+        altitude_ft,
+        speed,
+        required_s: None,
+        added_s: 0.0,
+    };
     let expected = [
-        way_point(home.clone(), Some(10_000.0), Some(Airspeed::Mach(0.7))),
-        way_point(PositionRef::At(at(50.5, 4.25)), Some(3000.0), None),
-        way_point(PositionRef::At(at(51.0, 4.5)), None, Some(Airspeed::CasKt(220.0))),
+        way_point("HOME", home.clone(), Some(10_000.0), Some(Airspeed::Mach(0.7))),
+        way_point("A002", PositionRef::At(at(50.5, 4.25)), Some(3000.0), None),
+        way_point("A001", PositionRef::At(at(51.0, 4.5)), None, Some(Airspeed::CasKt(220.0))),
     ];
     assert_eq!(aircraft.way_points, expected);
     assert_eq!(aircraft.origin, Some(PositionRef::At(at(0.0, 1.0))));
@@ -140,36 +146,290 @@ fn places_of_a_navigation_database_are_kept_and_listed() {
     assert_eq!(listed, expected);
 }
 
+/// The settings of a file, with their times and commands.
+fn settings(file: &ScnFile) -> Vec<(f64, &'static str, Setting)> {
+    let all = file.traffic.settings.iter();
+    all.map(|timed| (timed.at_s, timed.command, timed.setting)).collect()
+}
+
 #[test]
-fn settings_are_read_and_the_last_one_holds() {
-    let quiet = good("").traffic;
-    assert_eq!((quiet.zone_radius_nm, quiet.zone_half_height_ft), (5.0, 1000.0));
-    assert_eq!((quiet.lookahead_s, quiet.detection, quiet.resolution), (300.0, None, None));
-    let file = good(
-        "ZONER 3;ZONER 5.5;zonedh 900;DTLOOK 120;noise on;ASAS OFF;CDMETHOD STATEBASED
-        RESO OFF;RESO eby;ZONER
-        WIND 0,1,,180,25
-        WIND 0,1,70,60
-        WIND 52 4 FL100 270 20 20000 280T 30",
+fn settings_have_their_times_and_their_places() {
+    let text = "\
+        00:00:00>ZONER 3;PZR 5.5;zonedh 900;DTLOOK 2:00;noise on;ASAS OFF\n\
+        00:20:00>RESO OFF; ZONER\n\
+        00:10:00>reso eby;CDMETHOD STATEBASED;RFACH 1.1\n";
+    let file = parse(&"f.scn", text);
+    assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
+    let expected = [
+        (0.0, "ZONER", Setting::ZoneRadiusNm(3.0)),
+        (0.0, "ZONER", Setting::ZoneRadiusNm(5.5)),
+        (0.0, "ZONEDH", Setting::ZoneHalfHeightFt(900.0)),
+        (0.0, "DTLOOK", Setting::LookAheadS(120.0)),
+        (0.0, "NOISE", Setting::Noise(true)),
+        (0.0, "ASAS", Setting::Detection(false)),
+        (600.0, "RESO", Setting::Resolution(ResolutionMethod::Eby)),
+        (600.0, "CDMETHOD", Setting::Detection(true)),
+        (600.0, "RFACH", Setting::ResolutionFactor(1.1)),
+        (1200.0, "RESO", Setting::Resolution(ResolutionMethod::Off)),
+    ];
+    assert_eq!(settings(&file), expected);
+    let last = &file.traffic.settings[9];
+    assert_eq!((last.file.as_str(), last.line), ("f.scn", 2));
+}
+
+#[test]
+fn settings_of_one_aircraft_are_its_own() {
+    let file = scenario(
+        "CRE A B744 52 4 0 FL200 250;CRE B B744 53 4 0 FL200 250
+        ZONER 4;ZONER 3 A;A RESOOFF;RESOOFF A B
+        ZONER 6;CRE C B744 54 4 0 FL200 250
+        ZONEDH 500 A;NORESO A B;ZONER 3 CCC3",
     );
-    let traffic = file.traffic;
-    assert_eq!((traffic.zone_radius_nm, traffic.zone_half_height_ft), (5.5, 900.0));
-    assert_eq!((traffic.lookahead_s, traffic.noise, traffic.detection), (120.0, true, Some(true)));
-    assert_eq!(traffic.resolution, Some(ResolutionMethod::Eby));
-    let wind = |position, altitude_ft, from_deg, speed_kt| Wind {
-        position,
-        altitude_ft,
-        from_deg,
-        speed_kt,
+    assert_eq!(settings(&file), [(0.0, "ZONER", Setting::ZoneRadiusNm(4.0))]);
+    let own = |k: usize| -> Vec<AircraftSetting> {
+        file.traffic.aircraft[k].settings.iter().map(|(_, own)| *own).collect()
+    };
+    use AircraftSetting::{Avoids, ZoneRadiusNm};
+    assert_eq!(own(0), [ZoneRadiusNm(3.0), Avoids(false), Avoids(true)]);
+    assert_eq!(own(1), [Avoids(false)]);
+    // After the first zone of its own, ZONER is for new aircraft, as in BlueSky.
+    assert_eq!(own(2), [ZoneRadiusNm(6.0)]);
+    assert_eq!(file.report.findings[0].treatment, crate::Treatment::Guessed);
+    assert_eq!(file.not_understood, counts(&[("ZONEDH aircraft", 1), ("NORESO", 1)]));
+    assert!(file.refused[0].cause().contains("CCC3 was not created"), "{:?}", file.refused);
+}
+
+#[test]
+fn winds_come_and_go() {
+    let file = good("WIND 0,1,,180,25;WIND 52 4 FL100 270 20 20000 280T 30;DEL WIND");
+    let wind = |position, altitude_ft, from_deg, speed_kt| {
+        (0.0, "WIND", Setting::AddedWind(Wind { position, altitude_ft, from_deg, speed_kt }))
     };
     let expected = [
         wind(at(0.0, 1.0), None, 180.0, 25.0),
-        wind(at(0.0, 1.0), None, 70.0, 60.0),
         wind(at(52.0, 4.0), Some(10_000.0), 270.0, 20.0),
         wind(at(52.0, 4.0), Some(20_000.0), 280.0, 30.0),
+        (0.0, "WIND", Setting::NoWind),
     ];
-    assert_eq!(traffic.wind, expected);
-    assert_eq!(scenario("WIND 0,1,,180,25\nDEL WIND").traffic.wind, []);
+    assert_eq!(settings(&file), expected);
+}
+
+#[test]
+fn limits_of_resolutions_that_are_not_flown_are_named() {
+    let file = scenario(
+        "RMETHH HDG;RMETHV OFF;PRIORULES OFF;PRIORULES ON FF1
+        RMETHH BOTH;RMETHV ON;PRIORULES ON FF2;RFACV 1.2;CRE A B744 0 0 0 0 100;DTLOOK 20 A",
+    );
+    let expected = [
+        ("RMETHH BOTH", 1),
+        ("RMETHV ON", 1),
+        ("PRIORULES FF2", 1),
+        ("RFACV", 1),
+        ("DTLOOK aircraft", 1),
+    ];
+    assert_eq!(file.not_understood, counts(&expected));
+    assert!(file.unused.iter().all(|one| one.place == "line 2" && !one.reason.is_empty()));
+    assert_eq!(file.unused.len(), 5);
+}
+
+#[test]
+fn constraints_of_way_points_are_kept_and_named_as_not_flown_yet() {
+    let file = scenario(
+        "DEFWPT HOME 52 5;CRE A B744 52 4 0 FL200 250
+        ADDWPT A HOME;ADDWPT A 52 6 FL100 250;VNAV A ON
+        A AT HOME FL090/240;AT A A001 ALT FL110;A AT A001 DEL SPD;A RTA HOME 00:05:05
+        A AT HOME DO ALT FL200",
+    );
+    assert_eq!((&file.unparsed, &file.refused), (&vec![], &vec![]));
+    let [home, second] = &file.traffic.aircraft[0].way_points[..] else { panic!("{file:?}") };
+    assert_eq!((home.altitude_ft, home.speed), (Some(9000.0), Some(Airspeed::CasKt(240.0))));
+    assert_eq!(home.required_s, Some(305.0));
+    assert_eq!((second.altitude_ft, second.speed), (Some(11_000.0), None));
+    let rules: Vec<String> = file.report.findings.iter().map(ToString::to_string).collect();
+    for (rule, line) in [
+        ("altitudes at way-points: not flown yet (3 times), line 2, line 3, line 3", 2),
+        ("speeds at way-points: not flown yet (2 times), line 2, line 3", 2),
+        ("times at way-points (RTA): not flown yet, line 3", 3),
+        ("VNAV ON: altitudes and speeds of a route are not flown yet, line 2", 2),
+        ("AT DO: commands at a way-point are not flown yet, line 4", 4),
+    ] {
+        assert!(rules.iter().any(|found| found.contains(rule)), "{line}: {rule}\n{rules:#?}");
+    }
+}
+
+#[test]
+fn a_reset_ends_all_flights_and_all_that_waits() {
+    let text = "\
+        00:00:00>CRE A B744 52 4 0 FL200 250;DEFWPT HOME 52 4;ZONER 3\n\
+        00:02:00>RESET\n\
+        00:02:00>CRE C B744 52 4 0 FL200 250;ADDWPT C HOME\n\
+        00:03:00>CRE D B744 52 4 0 FL200 250\n";
+    let file = parse(&"f.scn", text);
+    let lives: Vec<_> = file
+        .traffic
+        .aircraft
+        .iter()
+        .map(|one| (one.id.as_str(), one.created_s, one.deleted_s))
+        .collect();
+    assert_eq!(lives, [("A", 0.0, Some(120.0)), ("C", 120.0, None)]);
+    assert_eq!(file.unresolved_places[0].name, "HOME", "the way-point is gone, too");
+    assert_eq!(settings(&file)[1], (120.0, "RESET", Setting::Reset));
+    let [dropped] = &file.unused[..] else { panic!("{:?}", file.unused) };
+    assert_eq!((dropped.place.as_str(), dropped.command.as_str()), ("line 4", "CRE"));
+    assert!(dropped.reason.contains("RESET at line 2"), "{dropped:?}");
+}
+
+#[test]
+fn a_quit_ends_the_run_and_a_hold_does_not() {
+    let text = "\
+        00:00:00>CRE A B744 52 4 0 FL200 250\n\
+        00:01:00>HOLD ON\n\
+        00:02:00>CRE B B744 52 4 0 FL200 250\n\
+        00:10:00>QUIT NOW\n\
+        00:20:00>CRE C B744 52 4 0 FL200 250\n";
+    let file = parse(&"f.scn", text);
+    assert_eq!((file.traffic.ends_s, file.traffic.aircraft.len()), (Some(600.0), 2));
+    let reasons: Vec<_> = file.unused.iter().map(|one| one.place.as_str()).collect();
+    assert_eq!(reasons, ["line 2", "line 5"]);
+}
+
+#[test]
+fn commands_are_given_at_a_time_after_a_time_and_on_creation() {
+    let text = "\
+        00:01:00>SCHEDULE 00:05:00 DELAY 60 A ALT FL300\n\
+        00:00:00>CRECMD SPD 300\n\
+        00:00:30>CRE A B744 52 4 0 FL200 250\n";
+    let file = parse(&"f.scn", text);
+    assert_eq!((&file.unparsed, &file.refused, &file.unused), (&vec![], &vec![], &vec![]));
+    let expected = [
+        (30.0, AircraftCommand::Speed(Airspeed::CasKt(300.0))),
+        (360.0, AircraftCommand::AltitudeFt(30_000.0)),
+    ];
+    assert_eq!(file.traffic.aircraft[0].changes, expected);
+}
+
+/// Arguments with latitude, longitude, heading and altitude of the new aircraft.
+const CONFLICTS: [(&str, f64, f64, f64, f64); 5] = [
+    ("90 1 120 0 0 300", 52.390059, 3.743150, 120.0, 30_000.0),
+    ("180 0 300", 53.019433, 4.955996, 210.0, 30_000.0),
+    ("45 2 200 1500 60", 52.261690, 3.605599, 75.0, 31_500.0),
+    ("270 6 100 -2000 50 M.8", 52.146394, 4.430565, 300.0, 28_000.0),
+    ("10 3 60", 52.008217, 3.839348, 40.0, 30_000.0),
+];
+
+/// Positions, heading and speed of BlueSky 1.1.1 for the same commands (`traf.lat`, `traf.lon`, `traf.hdg`, `traf.alt`).
+#[test]
+fn conflicts_are_created_where_bluesky_creates_them() {
+    for (arguments, lat_deg, lon_deg, heading_deg, altitude_ft) in CONFLICTS {
+        let file = good(&format!(
+            "CRE KL204 B744 52 4 30 FL300 250\nCRECONFS KL205 B744 KL204 {arguments}"
+        ));
+        let made = &file.traffic.aircraft[1];
+        assert!((made.lat_deg - lat_deg).abs() < 1e-4, "{arguments}: {made:?}");
+        assert!((made.lon_deg - lon_deg).abs() < 1e-4, "{arguments}: {made:?}");
+        assert!((made.heading_deg - heading_deg).abs() < 1e-6, "{arguments}: {made:?}");
+        assert!((made.altitude_ft - altitude_ft).abs() < 1e-6, "{arguments}: {made:?}");
+    }
+    let later = parse(
+        &"f.scn",
+        "00:00:00>CRE A B744 52 4 90 FL300 250\n00:01:00>CRECONFS B B744 A 180 0 60\n\
+         00:01:00>HDG A 180\n00:02:00>CRECONFS C B744 A 180 0 60\n",
+    );
+    assert_eq!(later.traffic.aircraft[1].created_s, 60.0);
+    assert!(later.traffic.aircraft[1].lon_deg > 4.2, "{later:?}");
+    assert!(later.refused[0].cause().contains("depends on its flight"), "{:?}", later.refused);
+}
+
+/// A folder of scenarios, which ends with the value.
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        std::fs::write(path, text).expect("written");
+    }
+    folder
+}
+
+#[test]
+fn a_called_file_is_read_with_its_arguments_at_the_time_of_the_call() {
+    let sub = "00:00:00.00>CRE %0,A320,52.0,%1,090,FL300,270\n00:00:10.00>ADDWPT %0,52.0,8.0\n";
+    let folder = folder(&[
+        (
+            "a.scn",
+            "00:00:00.00>PCALL sub.scn KL001 4.0\n00:01:00.00>CALL SUB KL002 4.5\n\
+             00:00:00.00>CRE KL003,A320,52.5,4.0,90,FL300,270\n\
+             00:02:00.00>KL003 CALL deeper/proc\n00:00:00.00>PCALL sub.scn KL003 4.0\n",
+        ),
+        ("sub.scn", sub),
+        ("deeper/proc.SCN", "00:00:05.00>%0 HDG 180\n"),
+    ]);
+    let file = read(&folder.path().join("a.scn")).expect("a scenario");
+    let created: Vec<_> = file
+        .traffic
+        .aircraft
+        .iter()
+        .map(|one| (one.id.as_str(), one.created_s, one.lon_deg))
+        .collect();
+    assert_eq!(created, [("KL001", 0.0, 4.0), ("KL003", 0.0, 4.0), ("KL002", 60.0, 4.5)]);
+    let added: Vec<_> = file.traffic.aircraft.iter().map(|one| one.way_points[0].added_s).collect();
+    assert_eq!(added, [10.0, 10.0, 70.0]);
+    let turned = [(125.0, AircraftCommand::HeadingDeg(180.0))];
+    assert_eq!(file.traffic.aircraft[1].changes, turned);
+    // The aircraft of the last call is there already.
+    assert_eq!(file.unused[0].place, "sub.scn line 1");
+    assert!(file.refused[0].place().ends_with("sub.scn"), "{}", file.refused[0]);
+}
+
+#[test]
+fn calls_stay_in_their_folder_and_end() {
+    let text = |name: &str| format!("00:00:00.00>PCALL {name} 4.0\n");
+    let own = "00:00:00.00>PCALL a.scn\n00:00:00.00>PCALL a.scn\n00:00:01.00>PCALL a.scn\n";
+    let folder = folder(&[
+        ("outside.scn", "00:00:00.00>CRE A,A320,52.0,4.0,090,FL300,270\n"),
+        ("in/a.scn", own),
+        ("in/b.scn", &text("../outside.scn")),
+        ("in/c.scn", &text("nowhere")),
+        ("in/d.scn", &text("in/e")),
+        ("in/e.scn", "00:00:00.00>CRE A,A320,52.0,4.0,090,FL300,270\n"),
+    ]);
+    let read = |name: &str| super::read(&folder.path().join("in").join(name)).expect("a scenario");
+    let endless = read("a.scn");
+    assert!(endless.refused[0].cause().contains("8 files that call each other"), "{endless:?}");
+    for (name, cause) in [("b.scn", "outside of the scenario's folder"), ("c.scn", "is not in")] {
+        let file = read(name);
+        assert!(file.refused[0].cause().contains(cause), "{name}: {:?}", file.refused);
+        assert_eq!(file.traffic.aircraft, []);
+    }
+    // The simulator starts one folder above.
+    assert_eq!(read("d.scn").traffic.aircraft.len(), 1);
+    let absolute = folder.path().join("outside.scn");
+    std::fs::write(folder.path().join("in/f.scn"), text(&absolute.display().to_string()))
+        .expect("written");
+    assert_eq!(read("f.scn").traffic.aircraft, []);
+    assert!(parse(&"f.scn", &text("e")).refused[0].cause().contains("has no folder"));
+}
+
+#[test]
+fn tables_of_places_are_those_of_the_user() {
+    let folder = folder(&[
+        (
+            "a.scn",
+            "00:00:00>CRE A B744 EHAM RW18L 0 FL200 250\n00:00:00>ADDWPT A SPY\n\
+                   00:00:00>ADDWPT A X1\n",
+        ),
+        ("nav/airports.dat", "# airports\nEHAM, SCHIPHOL, 52.309, 4.764, Large, 12467, NL\n"),
+        ("nav/fix.dat", " 52.5 4.8 SPY\n-10.0 4.8 SPY\n"),
+    ]);
+    let options = ScnOptions { navdata: Some(folder.path().join("nav")) };
+    let file = read_with(&folder.path().join("a.scn"), &options).expect("a scenario");
+    let aircraft = &file.traffic.aircraft[0];
+    assert_eq!((aircraft.lat_deg, aircraft.lon_deg), (52.309, 4.764));
+    assert_eq!(aircraft.known_goals().collect::<Vec<_>>(), [at(52.5, 4.8)]);
+    assert_eq!(file.unresolved_places[0].name, "X1");
+    let empty = ScnOptions { navdata: Some(folder.path().to_path_buf()) };
+    let error = read_with(&folder.path().join("a.scn"), &empty).expect_err("no tables");
+    assert!(error.remedy().contains("navdata"), "{error}");
 }
 
 #[test]
@@ -411,9 +671,12 @@ fn only_the_shared_demonstration_holds_commands_that_cannot_be_carried_out() {
 fn the_shared_scenarios_of_each_kind_are_read_to_the_end() {
     let Some(file) = shared_scenario("ASAS__ASAS-SUPER8-WIND.scn") else { return };
     let wind = Wind { position: at(0.0, 0.0), altitude_ft: None, from_deg: 315.0, speed_kt: 100.0 };
-    assert_eq!((file.traffic.wind, file.traffic.aircraft.len()), (vec![wind], 8));
-    assert_eq!(file.traffic.resolution, Some(ResolutionMethod::Mvp));
-    assert_eq!(file.not_understood, counts(&[("AREA", 1), ("RMETHH", 1), ("RMETHV", 1)]));
+    let given: Vec<Setting> = file.traffic.settings.iter().map(|timed| timed.setting).collect();
+    assert!(given.contains(&Setting::AddedWind(wind)), "{given:?}");
+    assert!(given.contains(&Setting::Resolution(ResolutionMethod::Mvp)), "{given:?}");
+    assert_eq!(file.traffic.aircraft.len(), 8);
+    let named: Vec<&str> = file.not_understood.keys().map(String::as_str).collect();
+    assert_eq!(named, ["AREA", "RMETHH BOTH"]);
 
     let route = shared_scenario("ASAS__ASAS-06.scn").expect("shared").traffic.aircraft;
     assert_eq!(route.iter().map(|one| one.way_points.len()).collect::<Vec<_>>(), [13, 12]);

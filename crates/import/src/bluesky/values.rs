@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use super::Airspeed;
+use super::speed::Airspeed;
 use crate::local_plane::{LatLon, wrap_deg};
 use crate::table::Token;
 use sidestep_kernel::InputError;
@@ -39,8 +39,28 @@ impl<'a> Arguments<'a> {
         })
     }
 
+    /// Takes the next argument, also one that is left out; `None` where the line ends.
+    pub(super) fn take(&mut self) -> Option<Token<'a>> {
+        self.words.next()
+    }
+
     pub(super) fn remaining(&self) -> usize {
         self.words.len()
+    }
+
+    /// Returns whether an argument follows that is not left out.
+    pub(super) fn has_further(&self) -> bool {
+        self.words.as_slice().iter().any(|word| !word.text.is_empty() && word.text != "*")
+    }
+
+    /// Takes all arguments, where a command has used their text.
+    pub(super) fn skip_all(&mut self) {
+        self.words = Vec::new().into_iter();
+    }
+
+    /// Returns an error that points at a word.
+    pub(super) fn error(&self, word: Token, cause: String, remedy: &str) -> InputError {
+        word.error(self.place, cause, remedy)
     }
 
     /// Returns the next argument without taking it.
@@ -243,6 +263,27 @@ pub(super) fn zone_size(
     let cause = format!("a zone of {value:?} {unit}");
     Err(word.error(place, cause, &format!("write {} to {} {unit}", range.start(), range.end())))
 }
+
+/// Reads a time in s: `90`, `1:30` or `0:01:30`.
+pub(super) fn duration_s(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {
+    parse_duration_s(word.text).ok_or_else(|| {
+        let cause = format!("`{}` is no time", word.text);
+        word.error(place, cause, "write seconds such as 90, or 00:01:30")
+    })
+}
+
+fn parse_duration_s(text: &str) -> Option<f64> {
+    let mut value_s = 0.0;
+    for (k, part) in text.split(':').rev().enumerate() {
+        let unit_s = *[1.0, 60.0, 3600.0].get(k)?;
+        let number = if k > 0 && part.is_empty() { 0.0 } else { part.parse::<f64>().ok()? };
+        value_s += number * unit_s;
+    }
+    (0.0..=MAX_DURATION_S).contains(&value_s).then_some(value_s)
+}
+
+/// The longest time that a command may give, in s: six weeks.
+const MAX_DURATION_S: f64 = 1000.0 * 3600.0;
 
 /// Reads any number.
 pub(super) fn number(place: &dyn fmt::Display, word: Token) -> Result<f64, InputError> {

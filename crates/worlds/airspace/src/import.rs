@@ -1,10 +1,13 @@
 //! Traffic in other programs' files, read as scenarios.
 
-use super::traffic::{from_bluesky, from_tracks, omitted_commands, settings_from_bluesky};
+use super::traffic::{
+    ImportedScenarioSettings, from_bluesky, from_tracks, omitted_commands, settings_from_bluesky,
+};
 use serde_json::{Value, json};
-use sidestep_import::bluesky::{self, ScnFile, UnresolvedPosition};
+use sidestep_import::bluesky::{self, DISPLAY_RULE, ScnFile, ScnOptions, UnresolvedPosition};
 use sidestep_import::report::{Finding, ImportReport};
 use sidestep_import::traffic::{self, RecordedTraffic, TrafficOptions};
+use sidestep_import::Treatment;
 use sidestep_kernel::InputError;
 use sidestep_kernel::text::{KeyValues, group_thousands};
 use sidestep_scenario::{ImportOptions, ImportedScenario};
@@ -42,11 +45,10 @@ pub(super) fn import_file(
     let (scenario, report, (mut json, lines)) = match traffic_file_format(file) {
         TrafficFileFormat::Other => return Ok(None),
         TrafficFileFormat::Bluesky => {
-            refuse_options(file, options)?;
-            let scn = bluesky::read(file)?;
-            let rules = settings_from_bluesky(&file.display().to_string(), &scn);
-            let report = ImportReport::new("BlueSky scenario");
-            (from_bluesky(&name, &scn), report, bluesky_report(&scn, &rules.refused))
+            let scn = bluesky::read_with(file, &bluesky_options(file, options)?)?;
+            let settings = settings_from_bluesky(&file.display().to_string(), &scn);
+            let report = full_report(&scn, &settings);
+            (from_bluesky(&name, &scn), report.clone(), bluesky_report(&scn, &settings, &report))
         }
         TrafficFileFormat::Tracks => {
             let tracks = traffic::read_with(file, &traffic_options(file, options)?)?;
@@ -64,10 +66,22 @@ pub(super) fn import_file(
     Ok(Some(ImportedScenario { scenario, report, json, lines }))
 }
 
-/// Returns the report on a file; `not_flown` are commands that could be read but not flown.
-fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues) {
+/// Largest number of commands without effect that a report lists one by one.
+const MAX_LISTED_COMMANDS: usize = 1000;
+
+/// Rules of findings whose errors are listed one by one.
+const RULES_WITH_ERRORS: [&str; 2] =
+    ["lines that cannot be read", "commands that cannot be carried out"];
+
+/// Returns the report on a file.
+fn bluesky_report(
+    scn: &ScnFile,
+    settings: &ImportedScenarioSettings,
+    report: &ImportReport,
+) -> (Value, KeyValues) {
     let words = |errors: &[InputError]| errors.iter().map(ToString::to_string).collect::<Vec<_>>();
-    let refused = [&scn.refused[..], not_flown].concat();
+    let refused = [&scn.refused[..], &settings.refused].concat();
+    let listed = &scn.unused[..scn.unused.len().min(MAX_LISTED_COMMANDS)];
     let json = json!({
         "command_lines": scn.command_lines,
         "unparsed_lines": scn.unparsed.len(),
@@ -77,20 +91,45 @@ fn bluesky_report(scn: &ScnFile, not_flown: &[InputError]) -> (Value, KeyValues)
         "not_understood": scn.not_understood,
         "not_flown": omitted_commands(scn),
         "ignored": scn.ignored,
+        "unused": listed,
+        "unused_commands": scn.unused.len(),
+        "import_report": report,
         "unresolved_places": scn.unresolved_places.len(),
         "unresolved_names": unresolved_destinations(scn).keys().collect::<Vec<_>>(),
         "unresolved": unresolved_destinations(scn).into_values().flatten().map(unresolved_place_json).collect::<Vec<_>>(),
         "aircraft_without_place": unresolved_start_positions(scn),
     });
     let mut lines = vec![("command lines".to_string(), group_thousands(scn.command_lines))];
-    lines.extend(count_line("not acted on", &scn.not_understood));
-    lines.extend(count_line("not flown", &omitted_commands(scn)));
     lines.extend(count_line("display only", &scn.ignored));
     lines.extend(first_names_line("left out, place unknown", &unresolved_start_positions(scn)));
     lines.extend(first_names_line("unknown way-points", &unresolved_uses(scn)));
+    for finding in &report.findings {
+        if !RULES_WITH_ERRORS.contains(&finding.rule.as_str()) && finding.rule != DISPLAY_RULE {
+            lines.push(("import".to_string(), finding.to_string()));
+        }
+    }
     lines.extend(error_lines("unparsed", &scn.unparsed));
     lines.extend(error_lines("not carried out", &refused));
     (json, lines)
+}
+
+/// Returns the report on a file with what became of it in the scenario.
+fn full_report(scn: &ScnFile, settings: &ImportedScenarioSettings) -> ImportReport {
+    let mut report = scn.report.clone();
+    for guess in &settings.guesses {
+        report.record(
+            Treatment::Guessed,
+            guess.as_str(),
+            "",
+            "choose with --set airspace.method=...",
+        );
+    }
+    for error in &settings.refused {
+        let place =
+            error.line_and_column().map_or(String::new(), |(line, _)| format!("line {line}"));
+        report.record(Treatment::Dropped, RULES_WITH_ERRORS[1], place, "see each error");
+    }
+    report
 }
 
 /// Returns the aircraft that start at places known only to a navigation database, with the names of
@@ -136,15 +175,18 @@ fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
     texts
 }
 
-/// Refuses options of an import for files that have none.
-fn refuse_options(file: &Path, options: &ImportOptions) -> Result<(), InputError> {
-    match options.iter().next() {
-        None => Ok(()),
-        Some((key, _)) => {
+/// Returns the options of an import for a BlueSky file.
+fn bluesky_options(file: &Path, options: &ImportOptions) -> Result<ScnOptions, InputError> {
+    let mut chosen = ScnOptions::default();
+    for (key, value) in options.iter() {
+        if key != "navdata" {
             let cause = format!("`import.{key}` is no option of a BlueSky file");
-            Err(InputError::new(file.display(), cause, "leave it out").with_key(key))
+            let remedy = "its only option is `import.navdata`, the folder of a navigation database";
+            return Err(InputError::new(file.display(), cause, remedy).with_key(key));
         }
+        chosen.navdata = Some(value.into());
     }
+    Ok(chosen)
 }
 
 fn traffic_options(file: &Path, options: &ImportOptions) -> Result<TrafficOptions, InputError> {

@@ -90,10 +90,21 @@ impl Phases for AirspaceWorld {
     }
 
     fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups: &ConflictGroups) {
-        join::join(context, bodies, groups);
+        join::join(&mut under_rules_of_now(context), bodies, groups);
     }
 
     fn act(context: &mut PhaseContext<'_>, group: &mut [EntitySlot]) {
-        act::act(context, group);
+        act::act(&mut under_rules_of_now(context), group);
+    }
+}
+
+/// Returns a worker's turn under the rules that hold in its cycle.
+fn under_rules_of_now<'a>(context: &'a mut PhaseContext<'_>) -> PhaseContext<'a> {
+    PhaseContext {
+        world: context.world.with_rules_of(context.now),
+        state: context.state,
+        now: context.now,
+        clock: context.clock,
+        scratch: context.scratch,
     }
 }

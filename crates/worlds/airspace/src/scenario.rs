@@ -4,6 +4,7 @@ mod airplanes;
 mod compile;
 mod network;
 mod optimizer;
+mod rule_changes;
 mod start_groups;
 
 use super::flight::AirplaneStart;
@@ -19,7 +20,8 @@ use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
 use network::NetworkSection;
-use optimizer::{LegsSection, OnOffSwitch, ReactiveSection, TimeList};
+use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};
+use rule_changes::RuleChangeSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -70,6 +72,8 @@ struct AirspaceSection {
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<Number<Decision>>>,
     dtau_s: Option<Spanned<Number<Step>>>,
+    /// Seconds between two looks of mvp, orca and none, in place of dt_s and dtau_s.
+    look_every_s: Option<Spanned<Number<Step>>>,
     horizon_s: Option<Spanned<Number<LookAhead>>>,
     /// The former key, which counted points; only its error is left.
     #[schemars(skip)]
@@ -80,7 +84,9 @@ struct AirspaceSection {
     inflation: Option<Number<Inflation>>,
     holds_s: TimeList,
     legs: Option<Spanned<LegsSection>>,
-    mvp: ReactiveSection,
+    /// Rules that change on the way.
+    changes: Vec<Spanned<RuleChangeSection>>,
+    mvp: MvpSection,
     orca: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
@@ -192,8 +198,14 @@ impl CompiledAirspace {
             return Compiler::with_seed(&self.recipe, seed, &self.world).compile();
         }
         let fingerprint = fingerprint(&self.recipe.source.text, seed);
-        let world = AirspaceWorld { streams, fingerprint, ..(*self.world).clone() };
-        let world = Arc::new(world);
+        let reseeded = |world: &AirspaceWorld| AirspaceWorld {
+            streams: streams.clone(),
+            fingerprint,
+            ..world.clone()
+        };
+        let later = self.world.later_rules.iter().map(|(from, later)| (*from, reseeded(later)));
+        let later_rules = Arc::new(later.collect());
+        let world = Arc::new(AirspaceWorld { later_rules, ..reseeded(&self.world) });
         Ok(Self { world, seed, ..self.clone() })
     }
 

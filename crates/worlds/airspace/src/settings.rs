@@ -71,6 +71,8 @@ pub struct ReactiveSettings {
     pub look_ahead_s: f64,
     /// Factor on separations when avoiding.
     pub margin: f64,
+    /// Further factor on the zone out of which a conflict is moved; only MVP has it.
+    pub resolution_factor: f64,
 }
 
 /// A deployment of the optimizer.

@@ -197,7 +197,9 @@ impl AirspaceState {
     /// Returns the state that a snapshot describes; what is missing in it is empty.
     pub(super) fn restore(world: &AirspaceWorld, snapshot: &Snapshot) -> Self {
         let n = snapshot.airplanes.len();
-        let max_range_m = (0..n).map(|i| world.interaction_range_m(i, i)).fold(1.0, f64::max);
+        let ranges_m =
+            world.all_rules().flat_map(|rules| (0..n).map(|i| rules.interaction_range_m(i, i)));
+        let max_range_m = ranges_m.fold(1.0, f64::max);
         let airplanes: Box<[AirplaneState]> = (0..n).map(|_| AirplaneState::default()).collect();
         for (airplane, record) in airplanes.iter().zip(&snapshot.airplanes) {
             airplane.restore(record);

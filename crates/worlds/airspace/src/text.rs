@@ -1,5 +1,6 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the pose of every airplane.
 
+use super::decide::DecisionStrategy;
 use super::metrics::{ErrorBoundViolation, Metrics, UnprotectedPair};
 use super::scenario::CompiledAirspace;
 use super::state::Snapshot;
@@ -29,6 +30,8 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
         "deployment": world.deployment.name(),
         "shield": shield,
         "dt_s": world.timing.dt_s,
+        "look_every_s": world.timing.dtau_s,
+        "rule_changes_s": rule_change_times_s(world),
         "horizon_s": world.timing.horizon_s(),
         "cycles": compiled.cycles,
         "seed": compiled.seed,
@@ -57,6 +60,11 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
     JsonTextReport { json, text: align_pairs(&lines) }
 }
 
+/// Returns the times at which rules change.
+fn rule_change_times_s(world: &AirspaceWorld) -> Vec<f64> {
+    world.later_rules.iter().map(|(from, _)| world.cycle_start_s(*from)).collect()
+}
+
 /// Returns how often the airplanes decide, and for how long they fly.
 fn scenario_timing_text(compiled: &CompiledAirspace) -> KeyValues {
     let dt_s = compiled.world.timing.dt_s;
@@ -64,12 +72,28 @@ fn scenario_timing_text(compiled: &CompiledAirspace) -> KeyValues {
     let duration_s = compiled.cycles as f64 * dt_s;
     let look_ahead_s = compiled.world.reactive_settings().look_ahead_s;
     vec![
-        key_value_pair("time", format!("decides every {dt_s} s, looks {look_ahead_s} s ahead")),
+        key_value_pair(
+            "time",
+            format!(
+                "decides every {dt_s} s, looks {look_ahead_s} s ahead{}",
+                look_interval(compiled)
+            ),
+        ),
         key_value_pair(
             "run",
             format!("at most {cycles} cycles ({duration_s} s), seed {}", compiled.seed),
         ),
     ]
+}
+
+/// Returns how often methods look that look anew in each step, and not only when they decide.
+fn look_interval(compiled: &CompiledAirspace) -> String {
+    let looks_each_step = compiled.world.all_rules().any(DecisionStrategy::is_reactive);
+    if looks_each_step {
+        format!(", anew every {} s", compiled.world.timing.dtau_s)
+    } else {
+        String::new()
+    }
 }
 
 /// Returns the position of the origin on earth, if it has one.
@@ -100,6 +124,19 @@ fn abilities_text(world: &AirspaceWorld) -> KeyValues {
         ),
         key_value_pair("method", format!("{method}, {deployment}, shield {shield}")),
     ]
+    .into_iter()
+    .chain(rule_changes_text(world))
+    .collect()
+}
+
+/// Returns the first changes of rules, and the number of others.
+fn rule_changes_text(world: &AirspaceWorld) -> Option<(String, String)> {
+    let names = first_names(&world.later_rules, |(from, rules)| {
+        let shield = if rules.shield { "on" } else { "off" };
+        let at_s = world.cycle_start_s(*from);
+        format!("{}, shield {shield} at {at_s} s", rules.method.name())
+    })?;
+    Some(key_value_pair("rules change", names))
 }
 
 /// Returns a number that all have, or the smallest and the largest, to a tenth.

@@ -13,6 +13,7 @@ mod recorded;
 
 pub use bluesky::from_bluesky;
 pub(crate) use bluesky::{omitted_commands, settings_from_bluesky};
+pub(crate) use import_settings::ImportedScenarioSettings;
 pub use recorded::from_tracks;
 
 use super::flight::SeparationMinima;
@@ -23,9 +24,11 @@ const FOOT_M: f64 = 0.3048;
 const KNOT_M_S: f64 = NAUTICAL_MILE_M / 3600.0;
 /// The turn rate at 25 degrees of bank is this over the airspeed: g tan 25.
 const BANKED_TURN_M_S2: f64 = 9.80665 * 0.466_307_658_154_998_6;
-/// Seconds between two decisions, for traffic with long horizons: a route that is given no later than this after the
-/// creation counts as known at once.
+/// Seconds between two decisions of methods that plan, for traffic with long horizons.
 const DT_S: f64 = 10.0;
+/// Seconds between two looks of methods that look anew each time, as in BlueSky (`asas_dt`).
+const LOOK_EVERY_S: f64 = 1.0;
+
 /// Returns the position of the plane's origin on earth, as a scenario writes it.
 fn origin(plane: &LocalPlane) -> String {
     let LatLon { lat_deg, lon_deg } = plane.center();
@@ -54,6 +57,7 @@ fn header_text(name: &str, zone: SeparationMinima, horizon_s: Option<f64>, more:
     format!(
         "format = 1\nworld = \"airspace\"\nname = {name}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
+         look_every_s = {LOOK_EVERY_S:?}\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {gap_m:?}\n"
     )
 }

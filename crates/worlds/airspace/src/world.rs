@@ -88,6 +88,10 @@ pub struct AirspaceWorld {
     pub(crate) first_fallbacks: Arc<Vec<OrbitSide>>,
     /// The airplanes that decide, by the orders that they may be given.
     pub(crate) teams: Arc<AgentTeams>,
+    /// The same world under the rules that hold from later cycles on, by rising cycle.
+    pub(crate) later_rules: Arc<Vec<(Cycle, AirspaceWorld)>>,
+    /// The cycle from which these rules hold.
+    pub(crate) rules_since: Cycle,
 }
 
 impl AirspaceWorld {
@@ -104,6 +108,25 @@ impl AirspaceWorld {
     /// Returns the name that people use for an airplane: its call sign, or else its id.
     pub(crate) fn display_name(&self, id: EntityId) -> String {
         self.callsign(id).unwrap_or_else(|| id.to_string())
+    }
+
+    /// Returns the world with the rules that hold in a cycle.
+    pub(crate) fn with_rules_of(&self, now: Cycle) -> &Self {
+        let begun = self.later_rules.partition_point(|(from, _)| *from <= now);
+        match begun.checked_sub(1) {
+            Some(last) => &self.later_rules[last].1,
+            None => self,
+        }
+    }
+
+    /// Returns whether other rules hold from this cycle on.
+    pub(crate) fn rules_begin_at(&self, now: Cycle) -> bool {
+        self.rules_since == now && now > 0
+    }
+
+    /// Returns the world and all that it becomes by changes of rules.
+    pub(crate) fn all_rules(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.later_rules.iter().map(|(_, world)| world))
     }
 
     /// Fills in the fields that follow from the others. Those that follow from models and orders alone, which
@@ -190,7 +213,7 @@ impl AirspaceWorld {
 
     /// Returns whether airplanes remember the conflicts that they resolve.
     pub(crate) fn has_resolution_memory(&self) -> bool {
-        matches!(self.method, MethodKind::Mvp)
+        self.all_rules().any(|world| matches!(world.method, MethodKind::Mvp))
     }
 
     /// Returns when a cycle starts, in seconds after the start of the run.
@@ -266,6 +289,7 @@ impl AirspaceWorld {
                 ReactiveSettings {
                     look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,
                     margin: self.objective.inflation,
+                    resolution_factor: 1.0,
                 }
             }
         }

@@ -44,8 +44,12 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
     if now == 0 {
         return;
     }
-    let is_entering: Vec<bool> =
-        flown.iter().map(|&slot| world.first_controlled_cycle(slot as usize) == now).collect();
+    // Under other rules each pair has to be apart anew.
+    let is_changing = world.rules_begin_at(now);
+    let is_entering: Vec<bool> = flown
+        .iter()
+        .map(|&slot| is_changing || world.first_controlled_cycle(slot as usize) == now)
+        .collect();
     if !is_entering.contains(&true) {
         return;
     }

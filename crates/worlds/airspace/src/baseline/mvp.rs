@@ -16,8 +16,6 @@ use sidestep_kernel::{EntitySlot, math};
 /// Closest approaches nearer than this have no direction of their own, so every airplane turns to the
 /// left of the line of sight.
 const MAX_HEAD_ON_M: f64 = 10.0;
-/// Factor on the zone out of which the closest point is moved (`RFACH`), BlueSky's default.
-const RESOLUTION_FACTOR: f64 = 1.05;
 /// Difference of headings in radians below which two airplanes near each other fly side by side: they
 /// would soon be in conflict again. BlueSky's value.
 const MAX_SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
@@ -157,7 +155,7 @@ fn resolution_velocity_change(
     closest: &ClosestApproach,
     settings: ReactiveSettings,
 ) -> Point {
-    let zone_m = own.zone_m(other, settings) * RESOLUTION_FACTOR;
+    let zone_m = own.zone_m(other, settings) * settings.resolution_factor;
     let apart = sub(other.at, own.at);
     // Two in one place have no line of sight, but its direction must be a number.
     let distance_m = vector_length(apart).max(1e-9);
@@ -191,7 +189,7 @@ fn is_conflict_active(
     let is_past = dot(apart, closing) > 0.0;
     let angle_rad = math::wrap_angle(own.heading_rad - other.heading_rad).abs();
     let is_side_by_side =
-        angle_rad < MAX_SIDE_BY_SIDE_RAD && distance_m < zone_m * RESOLUTION_FACTOR;
+        angle_rad < MAX_SIDE_BY_SIDE_RAD && distance_m < zone_m * settings.resolution_factor;
     !is_past || distance_m < zone_m || is_side_by_side
 }
 
@@ -200,7 +198,8 @@ mod tests {
     use super::super::test_aircraft;
     use super::*;
 
-    const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.0 };
+    const SETTINGS: ReactiveSettings =
+        ReactiveSettings { look_ahead_s: 90.0, margin: 1.0, resolution_factor: 1.05 };
 
     fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {
         resolution_headings(all, memory, SETTINGS, |_, _| true)

@@ -106,7 +106,8 @@ mod tests {
     use proptest::prelude::*;
     use std::borrow::Cow;
 
-    const SETTINGS: ReactiveSettings = ReactiveSettings { look_ahead_s: 60.0, margin: 1.05 };
+    const SETTINGS: ReactiveSettings =
+        ReactiveSettings { look_ahead_s: 60.0, margin: 1.05, resolution_factor: 1.0 };
 
     /// The velocity that another implementation chooses, without a limit of speed.
     fn by_library(own: &AircraftState, other: &AircraftState) -> Point {

@@ -35,9 +35,11 @@ const MAX_ACTIONS: usize = 1000;
 const MAX_PAIR_STEPS: usize = 100_000_000;
 /// Settings with which MVP loses no separation in super-conflicts of up to 20 airplanes, at the
 /// smallest delay; the margin is BlueSky's own.
-const MVP: ReactiveSettings = ReactiveSettings { look_ahead_s: 90.0, margin: 1.05 };
+const MVP: ReactiveSettings =
+    ReactiveSettings { look_ahead_s: 90.0, margin: 1.05, resolution_factor: 1.05 };
 /// Settings with which ORCA loses no separation there, at the smallest delay.
-const ORCA: ReactiveSettings = ReactiveSettings { look_ahead_s: 45.0, margin: 1.05 };
+const ORCA: ReactiveSettings =
+    ReactiveSettings { look_ahead_s: 45.0, margin: 1.05, resolution_factor: 1.0 };
 /// Standard deviations of errors for which the shield allows, unless the scenario gives a number: of normal errors one
 /// in 1.7 million is larger.
 const DEFAULT_SIGMAS: f64 = 5.0;
@@ -80,6 +82,7 @@ impl<'a> Compiler<'a> {
         };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
+        world.later_rules = Arc::new(self.later_rules(&world)?);
         let head = &self.recipe.head;
         let cycles = head.cycles.unwrap_or_else(|| cycle_limit(&world));
         let compiled = CompiledAirspace {
@@ -108,13 +111,11 @@ impl<'a> Compiler<'a> {
         if is_drawn {
             return SeedEffect::Decide;
         }
-        match world.method {
-            // A method of the program's own may draw: runs show it.
-            MethodKind::Pc | MethodKind::Own(_) => SeedEffect::Perhaps,
-            MethodKind::Mvp | MethodKind::Orca | MethodKind::None | MethodKind::External => {
-                SeedEffect::Nothing
-            }
-        }
+        // A method of the program's own may draw: runs show it.
+        let may_draw = world
+            .all_rules()
+            .any(|rules| matches!(rules.method, MethodKind::Pc | MethodKind::Own(_)));
+        if may_draw { SeedEffect::Perhaps } else { SeedEffect::Nothing }
     }
 
     fn world(&self) -> Result<AirspaceWorld, InputError> {
@@ -157,6 +158,8 @@ impl<'a> Compiler<'a> {
             alone_s: Arc::default(),
             first_fallbacks: Arc::default(),
             teams: Arc::default(),
+            later_rules: Arc::default(),
+            rules_since: 0,
         };
         let mut world = world.with_derived_fields(self.known);
         world.teams = match self.known {
@@ -234,15 +237,32 @@ impl<'a> Compiler<'a> {
     fn wind_m_s(&self, airplanes: &[AirplaneStart]) -> Result<[f64; 2], InputError> {
         let given = self.file.airspace.wind_m_s.as_ref();
         let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
+        self.check_wind(wind_m_s, given.map(Spanned::span), airplanes)?;
+        Ok(wind_m_s)
+    }
+
+    /// Refuses a wind against which an airplane cannot fly.
+    pub(super) fn check_wind(
+        &self,
+        wind_m_s: [f64; 2],
+        span: Option<std::ops::Range<usize>>,
+        airplanes: &[AirplaneStart],
+    ) -> Result<(), InputError> {
         let min_speed_m_s =
             airplanes.iter().flat_map(planned_speeds_m_s).fold(f64::INFINITY, f64::min);
         let wind_speed_m_s = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
         if wind_speed_m_s < min_speed_m_s {
-            return Ok(wind_m_s);
+            return Ok(());
         }
         let cause = format!("a wind of {wind_speed_m_s} m/s, and airplanes of {min_speed_m_s} m/s");
         let remedy = "give a wind that all airplanes can fly against";
-        Err(self.source.error(given.map(Spanned::span), cause, remedy))
+        Err(self.source.error(span, cause, remedy))
+    }
+
+    /// Sets the height that is enough between levels.
+    pub(super) fn set_vertical_m(&self, world: &mut AirspaceWorld, vertical_m: f64) {
+        world.vertical_m = vertical_m - ROUNDING_M;
+        world.objective.vertical_m = world.vertical_m;
     }
 
     /// Refuses settings that the deployment cannot compute.
@@ -301,6 +321,11 @@ impl<'a> Compiler<'a> {
 
     fn timing(&self) -> Result<TimeDiscretization, InputError> {
         let section = &self.file.airspace;
+        if let Some(look_every) = section.look_every_s.as_ref().filter(|_| self.looks_anew()) {
+            let every_s = look_every.get_ref().get();
+            let horizon = self.horizon(every_s, every_s)?;
+            return Ok(TimeDiscretization { dt_s: every_s, dtau_s: every_s, horizon });
+        }
         let dt_s = section.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let dtau_s = section.dtau_s.as_ref().map_or(1.0, |v| v.get_ref().get());
         let dtau_span = section.dtau_s.as_ref().map(Spanned::span);
@@ -318,6 +343,19 @@ impl<'a> Compiler<'a> {
             return Err(self.source.error(span, cause, remedy));
         }
         Ok(TimeDiscretization { dt_s, dtau_s, horizon: self.horizon(dt_s, dtau_s)? })
+    }
+
+    /// Returns whether all methods of the scenario look anew each time, and plan nothing.
+    fn looks_anew(&self) -> bool {
+        let is_reactive = |method: BuiltInMethod| {
+            matches!(method, BuiltInMethod::Mvp | BuiltInMethod::Orca | BuiltInMethod::None)
+        };
+        let section = &self.file.airspace;
+        let starts_so = match &section.method {
+            ByName::BuiltIn(method) => is_reactive(*method),
+            ByName::Own(_) => false,
+        };
+        starts_so && self.methods_of_changes().all(is_reactive)
     }
 
     /// Returns the number of points of a prediction, which reach as far as the scenario says.

@@ -59,6 +59,32 @@ pub(super) struct ReactiveSection {
     margin: Option<Number<SeparationFactor>>,
 }
 
+/// The settings of MVP.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct MvpSection {
+    /// Time within which conflicts are seen.
+    look_ahead_s: Option<Number<LookAhead>>,
+    /// Factor on the separation that is kept.
+    margin: Option<Number<SeparationFactor>>,
+    /// Further factor on the zone out of which a conflict is moved (RFACH of BlueSky).
+    resolution_factor: Option<Number<ResolutionFactor>>,
+}
+
+/// A factor on the zone out of which a conflict is moved.
+type ResolutionFactor = LeftOpen<0, 10>;
+
+impl MvpSection {
+    /// Returns the settings, with those of `default` where none are given.
+    pub(super) fn or_default(&self, default: ReactiveSettings) -> ReactiveSettings {
+        ReactiveSettings {
+            look_ahead_s: self.look_ahead_s.map_or(default.look_ahead_s, f64::from),
+            margin: self.margin.map_or(default.margin, f64::from),
+            resolution_factor: self.resolution_factor.map_or(default.resolution_factor, f64::from),
+        }
+    }
+}
+
 /// A time in which an airplane looks ahead.
 type LookAhead = LeftOpen<0, 100_000>;
 /// A factor on separations.
@@ -70,6 +96,7 @@ impl ReactiveSection {
         ReactiveSettings {
             look_ahead_s: self.look_ahead_s.map_or(default.look_ahead_s, f64::from),
             margin: self.margin.map_or(default.margin, f64::from),
+            ..default
         }
     }
 }

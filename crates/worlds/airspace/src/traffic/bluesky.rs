@@ -5,12 +5,14 @@
 //! airspeed stays as it is until the next `SPD`, also in climbs. Settings are rules of the scenario or refused by name
 //! (`import_settings.rs`); `not_flown` counts all other commands.
 
-use super::import_settings::{ImportedScenarioSettings, import_settings};
-use super::{DT_S, FOOT_M, NAUTICAL_MILE_M, banked_turn_deg_s, callsign, header_text, origin};
+use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
+use super::{
+    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, banked_turn_deg_s, callsign, header_text, origin,
+};
 use crate::flight::{Point, SeparationMinima};
 use crate::flight_plan::CLIMB_M_S;
-use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft, ScnFile};
-use sidestep_import::local_plane::LocalPlane;
+use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, Airspeed, ScnAircraft, ScnFile};
+use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_kernel::{InputError, math};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -22,36 +24,53 @@ const MIN_SPEED_M_S: f64 = 1.0;
 
 /// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
-    let traffic = &file.traffic;
-    let rules = &settings_from_bluesky(name, file);
+    let settings = &settings_from_bluesky(name, file);
     let aircraft: Vec<FlyableScnAircraft> =
-        traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
+        file.traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
     let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
-    let zone = SeparationMinima {
-        gap_m: traffic.zone_radius_nm * NAUTICAL_MILE_M,
-        vertical_m: traffic.zone_half_height_ft * FOOT_M,
-    };
-    let more = settings_text(rules) + &origin(&plane);
-    let mut text = header_text(name, zone, rules.look_ahead_s, &more);
+    let start = &settings.start;
+    let zone = SeparationMinima { gap_m: start.separation_m, vertical_m: start.vertical_m };
+    let more = settings_text(settings) + &origin(&plane);
+    // A prediction reaches as far as one decision at least.
+    let horizon_s = start.look_ahead_s.map(|s| s.max(DT_S));
+    let mut text = header_text(name, zone, horizon_s, &more);
     for one in &aircraft {
-        write_aircraft(&mut text, &one.0, &plane);
+        write_aircraft(
+            &mut text,
+            &one.0,
+            &Surroundings { plane: &plane, ends_s: file.traffic.ends_s },
+        );
     }
     Some(text)
+}
+
+/// What the flights of a file have in common.
+struct Surroundings<'a> {
+    plane: &'a LocalPlane,
+    /// Time at which all leave.
+    ends_s: Option<f64>,
+}
+
+impl Surroundings<'_> {
+    /// Returns a position as a scenario has it.
+    fn position_m(&self, position: LatLon) -> Point {
+        self.plane.to_plane_m(position)
+    }
 }
 
 /// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
 /// fly among them.
 pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScenarioSettings {
-    let mut rules = import_settings(place, file, DT_S);
+    let mut settings = import_settings(file);
     let never_moving =
         file.traffic.aircraft.iter().filter(|one| aircraft_at_flying_speed(one).is_none());
     for ScnAircraft { id, .. } in never_moving {
         let cause = format!("aircraft {id} is never given a speed, and is left out");
         let error =
             InputError::new(place, cause, "give it one with CRE or SPD before it is deleted");
-        rules.refused.push(error);
+        settings.refused.push(error);
     }
-    rules
+    settings
 }
 
 /// An aircraft from the time when it starts to move.
@@ -59,6 +78,11 @@ pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScen
 pub(super) struct FlyableScnAircraft(ScnAircraft);
 
 impl FlyableScnAircraft {
+    /// The aircraft.
+    pub(super) fn scn(&self) -> &ScnAircraft {
+        &self.0
+    }
+
     /// Returns the smallest speed that it has or is given.
     pub(super) fn min_speed_m_s(&self) -> f64 {
         let mut min_m_s = self.0.speed.true_airspeed_mps(self.0.altitude_ft);
@@ -101,22 +125,31 @@ fn is_flying_speed(speed: Airspeed, altitude_ft: f64) -> bool {
     speed.true_airspeed_mps(altitude_ft) >= MIN_SPEED_M_S
 }
 
-/// Returns the settings of a scenario that follow from rules.
-fn settings_text(rules: &ImportedScenarioSettings) -> String {
+/// Returns the settings of a scenario that follow from those of a file.
+fn settings_text(settings: &ImportedScenarioSettings) -> String {
+    let start = &settings.start;
     let mut text = String::new();
     // Writing to a string cannot fail.
-    if let Some(method) = rules.method {
+    if let Some(method) = start.method {
         let _ = writeln!(text, "method = {method:?}");
     }
-    if let Some(s) = rules.look_ahead_s {
-        // BlueSky's own method looks as far ahead as the predictions of others, wherever it is chosen.
-        let _ = writeln!(text, "mvp = {{ look_ahead_s = {s:?} }}");
+    // BlueSky's own method looks as far ahead as the predictions of others, wherever it is chosen.
+    let mvp = start.mvp_text();
+    if !mvp.is_empty() {
+        let _ = writeln!(text, "mvp = {{ {mvp} }}");
     }
-    if rules.is_bare {
+    if start.is_bare {
         text.push_str("shield = \"off\"\n");
     }
-    if let Some(wind_m_s) = rules.wind_m_s {
+    if let Some(wind_m_s) = start.wind_m_s {
         let _ = writeln!(text, "wind_m_s = {wind_m_s:?}");
+    }
+    if !settings.changes.is_empty() {
+        text.push_str("changes = [\n");
+        for ImportedChange { at_s, text: keys } in &settings.changes {
+            let _ = writeln!(text, "  {{ at_s = {at_s:?}{keys} }},");
+        }
+        text.push_str("]\n");
     }
     text
 }
@@ -172,13 +205,17 @@ impl FlightCommand {
     }
 }
 
-fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane) {
-    let at_m = plane.to_plane_m(aircraft.position());
+fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, around: &Surroundings<'_>) {
+    let at_m = around.position_m(aircraft.position());
     let heading_deg = 90.0 - aircraft.heading_deg;
     let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
     let mut way_points_m: Vec<Point> =
-        aircraft.known_goals().map(|at| plane.to_plane_m(at)).collect();
-    let orders = flight_commands(aircraft, !way_points_m.is_empty());
+        aircraft.known_goals().map(|at| around.position_m(at)).collect();
+    let mut orders = flight_commands(aircraft, !way_points_m.is_empty());
+    if let Some(ends_s) = around.ends_s {
+        orders.retain(|(at_s, _)| *at_s < ends_s);
+        orders.push((ends_s, FlightCommand::Leave));
+    }
     if way_points_m.is_empty() {
         let heading_rad = heading_deg.to_radians();
         let ahead_m = UNROUTED_FLIGHT_S * v_m_s;
@@ -203,6 +240,7 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
          appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
         callsign(&aircraft.id)
     );
+    write_own_settings(text, aircraft);
     if orders.is_empty() {
         return;
     }
@@ -213,11 +251,33 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, plane: &LocalPlane)
     text.push_str("]\n");
 }
 
+/// Writes the settings of its own that an aircraft has from the start.
+fn write_own_settings(text: &mut String, aircraft: &ScnAircraft) {
+    let mut radius_nm = None;
+    let mut avoids = true;
+    for &(at_s, setting) in &aircraft.settings {
+        match setting {
+            _ if at_s > aircraft.created_s => {}
+            AircraftSetting::ZoneRadiusNm(nm) => radius_nm = Some(nm),
+            AircraftSetting::Avoids(is_on) => avoids = is_on,
+        }
+    }
+    // Writing to a string cannot fail.
+    if let Some(nm) = radius_nm {
+        let _ = writeln!(text, "separation_m = {:?}", nm * NAUTICAL_MILE_M);
+    }
+    if !avoids {
+        text.push_str("non_cooperative = true\n");
+    }
+}
+
 /// Returns the commands to an aircraft in flight, by rising time.
 fn flight_commands(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
     let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
     let mut routed_s: Vec<f64> = route_command_times_s(aircraft);
-    if has_route && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + DT_S) {
+    if has_route
+        && routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + LOOK_EVERY_S)
+    {
         orders.push((aircraft.created_s, FlightCommand::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
@@ -337,13 +397,86 @@ mod tests {
             assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
             assert_eq!(compiled.world.mvp.margin, 1.05, "{settings}");
             let contents = crate::text::describe_scenario(&compiled).text;
-            assert!(
-                contents.contains(&format!("decides every 10 s, looks {s} s ahead")),
-                "{contents}"
-            );
+            let looks = match settings.contains("MVP") {
+                true => format!("decides every 1 s, looks {s} s ahead, anew every 1 s"),
+                false => format!("decides every 10 s, looks {s} s ahead\n"),
+            };
+            assert!(contents.contains(&looks), "{contents}");
         }
         // MVP that is chosen by `--set` instead of the file looks as far.
         assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
+    }
+
+    /// Losses of separation, and the nearest approach in meters, of two that meet head on after 7 minutes.
+    fn head_on(more: &str) -> (u64, f64) {
+        let text = "00:00:00>CRE AAA1,A320,52.0,4.0,090,FL300,270\n\
+                    00:00:00>CRE BBB2,A320,52.0,5.5,270,FL300,270\n";
+        let text = from_bluesky("ho", &parse(&"ho.scn", &format!("{text}{more}")));
+        let source = Source::new("ho", text.expect("it has aircraft"), "");
+        let mut run = airspace_run(&source, 1).expect("a scenario");
+        // A run may be split anywhere.
+        run.advance(30);
+        let mut resumed = airspace_run(&source, 1).expect("a scenario");
+        resumed.restore(&run.checkpoint()).expect("its own checkpoint");
+        resumed.advance(370);
+        let metrics = resumed.metrics();
+        (metrics.losses_of_separation, metrics.min_separation_m.expect("they meet"))
+    }
+
+    #[test]
+    fn imported_mvp_looks_every_second_and_comes_as_near_as_in_bluesky() {
+        // BlueSky 1.1.1: 9,612 m. The shield keeps a margin, and MVP one of 5 %.
+        let (losses, nearest_m) = head_on("00:00:00>ASAS ON\n00:00:00>RESO MVP\n");
+        assert!(losses == 0 && nearest_m < 12_000.0, "{losses} {nearest_m}");
+    }
+
+    #[test]
+    fn a_method_flies_from_its_time_until_another_one() {
+        for (more, loses) in [
+            ("00:00:00>RESO MVP\n02:00:00>ASAS OFF\n", false),
+            ("00:00:00>RESO MVP\n00:01:00>RESO OFF\n", true),
+            ("00:01:00>RESO MVP\n", false),
+            ("00:00:00>ASAS ON\n00:06:00>RESO MVP\n", true),
+            ("00:00:00>RESO OFF\n", true),
+            ("00:00:00>RESO MVP\n00:00:10>RESOOFF AAA1\n00:00:10>RESOOFF BBB2\n", true),
+            ("00:00:00>RESO MVP\n00:00:00>RESOOFF AAA1\n", false),
+        ] {
+            let (losses, nearest_m) = head_on(more);
+            assert_eq!(losses > 0, loses, "{more}: {nearest_m} m");
+        }
+    }
+
+    #[test]
+    fn a_zone_of_one_aircraft_is_its_own_and_one_for_all_holds_from_its_time_on() {
+        let flights =
+            "00:00:00>CRE A1,B744,0,-0.4,90,FL200,250\n00:00:00>CRE B2,B744,0,0.4,270,FL200,250\n";
+        let of = |settings: &str| {
+            let text = from_bluesky("z", &parse(&"z.scn", &format!("{flights}{settings}")));
+            let source = Source::new("z", text.expect("it has aircraft"), "");
+            CompiledAirspace::new(&source).expect("a scenario").world
+        };
+        let zones = |world: &crate::world::AirspaceWorld| {
+            [0, 1].map(|i: usize| world.airplanes[i].model.separation_m)
+        };
+        assert_eq!(zones(&of("00:00:00>ZONER 3 B2\n")), [9260.0, 5556.0]);
+        let world = of("00:00:00>ZONER 3 B2\n00:00:00>RESO MVP\n00:02:00>ZONER 2 A1\n");
+        assert_eq!(zones(world.with_rules_of(119)), [9260.0, 5556.0]);
+        assert_eq!(zones(world.with_rules_of(120)), [3704.0, 5556.0]);
+        let world =
+            of("00:00:00>RESO MVP\n00:02:00>ZONER 2;ZONEDH 500\n00:03:00>WIND 0,0,,270,36\n");
+        assert_eq!(zones(world.with_rules_of(119)), [9260.0, 9260.0]);
+        let later = world.with_rules_of(200);
+        assert_eq!((zones(later), later.vertical_m.round()), ([3704.0, 3704.0], 152.0));
+        assert_eq!((later.wind_m_s[0].round(), world.wind_m_s), (19.0, [0.0, 0.0]));
+    }
+
+    #[test]
+    fn all_leave_where_the_file_ends_the_simulation() {
+        let text = "00:00:00>CRE A1,A320,52,4,90,FL300,270\n00:01:00>QUIT NOW\n";
+        let text = from_bluesky("q", &parse(&"q.scn", text)).expect("it has aircraft");
+        let mut run = airspace_run(&Source::new("q", text, ""), 1).expect("a scenario");
+        run.advance(200);
+        assert_eq!((run.metrics().left, run.cycle()), (1, 7));
     }
 
     #[test]

@@ -1,68 +1,306 @@
-//! The settings of a BlueSky file that hold for all its aircraft: those that are flown, and those
-//! that cannot be.
+//! The settings of a BlueSky file, with their times: those that are flown, and those that cannot be.
 
-use super::KNOT_M_S;
 use super::bluesky::aircraft_at_flying_speed;
-use sidestep_import::bluesky::{ResolutionMethod, ScnAircraft, ScnFile, Traffic, Wind};
+use super::{FOOT_M, KNOT_M_S, NAUTICAL_MILE_M};
+use sidestep_import::bluesky::{
+    AircraftSetting, ResolutionMethod, ScnAircraft, ScnFile, Setting, TimedSetting, Wind,
+};
 use sidestep_kernel::{InputError, math};
+use std::fmt::Write;
 
-/// Settings of a scenario; `None` leaves the scenario's own.
-#[derive(Debug, Default, PartialEq)]
-pub(crate) struct ImportedScenarioSettings {
+/// The rules of a scenario; `None` leaves the scenario's own.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct ImportedRules {
     pub(super) method: Option<&'static str>,
     /// Whether conflicts are left as they are, by the shield too.
     pub(super) is_bare: bool,
     /// The look-ahead that the file asks for, or that its method has in BlueSky; `None` where it says
     /// nothing about either.
     pub(super) look_ahead_s: Option<f64>,
+    pub(super) resolution_factor: Option<f64>,
     pub(super) wind_m_s: Option<[f64; 2]>,
+    pub(super) separation_m: f64,
+    pub(super) vertical_m: f64,
+}
+
+/// A change of rules on the way, as a scenario writes it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ImportedChange {
+    pub(super) at_s: f64,
+    /// The keys that change, with their values.
+    pub(super) text: String,
+}
+
+/// The settings of a scenario.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct ImportedScenarioSettings {
+    /// The rules at the start.
+    pub(super) start: ImportedRules,
+    /// Changes on the way, by rising time.
+    pub(super) changes: Vec<ImportedChange>,
     /// Commands that cannot be flown.
     pub(crate) refused: Vec<InputError>,
+    /// Choices that are not in the file.
+    pub(crate) guesses: Vec<String>,
 }
 
-/// Returns the rules of a file, which is `place` in errors; a decision is made every `dt_s`.
-pub(super) fn import_settings(place: &str, file: &ScnFile, dt_s: f64) -> ImportedScenarioSettings {
-    let mut rules = ImportedScenarioSettings::default();
-    let mut refuse = |command: &str, cause: String, remedy: &str| {
-        let error = InputError::new(place, format!("{command}: {cause}"), remedy);
-        let line = file.last_lines.get(command).copied().unwrap_or(1);
-        rules.refused.push(error.with_position(line, 1));
-    };
-    let traffic = &file.traffic;
-    if let Some(ResolutionMethod::Ssd | ResolutionMethod::Eby) = traffic.resolution {
-        let cause = "this method is not known here; the scenario's own flies".to_string();
-        refuse("RESO", cause, "write RESO OFF or MVP, or choose with --set airspace.method=...");
-    }
-    if traffic.noise {
-        let cause = "its amounts are unknown; positions are exact".to_string();
-        refuse("NOISE", cause, "choose with --set airspace.position_noise_m=...");
-    }
-    let wind_m_s = wind_m_s(traffic).unwrap_or_else(|cause| {
-        refuse("WIND", cause, "give one wind below the speed of all aircraft");
-        None
-    });
-    let mut look_ahead_s = file.commands.contains_key("DTLOOK").then_some(traffic.lookahead_s);
-    if let Some(s) = look_ahead_s
-        && !(dt_s..=MAX_LOOK_AHEAD_S).contains(&s)
-    {
-        let cause = format!("a look-ahead of {s} s");
-        refuse("DTLOOK", cause, &format!("give {dt_s} to {MAX_LOOK_AHEAD_S} s"));
-        look_ahead_s = None;
-    }
-    let (method, is_bare) = resolution_method(traffic);
-    if look_ahead_s.is_none() && method == Some("mvp") {
-        look_ahead_s = Some(Traffic::default().lookahead_s);
-    }
-    ImportedScenarioSettings { method, is_bare, look_ahead_s, wind_m_s, ..rules }
-}
-
-/// Longest look-ahead of a scenario in seconds.
+/// Largest number of changes on the way: each is a world of its own.
+const MAX_CHANGES: usize = 1000;
+/// Shortest and longest look-ahead of a scenario in seconds.
+const MIN_LOOK_AHEAD_S: f64 = 1.0;
 const MAX_LOOK_AHEAD_S: f64 = 36_000.0;
+/// The look-ahead of BlueSky's methods, unless `DTLOOK` gives another one.
+const DEFAULT_LOOK_AHEAD_S: f64 = 300.0;
 
-/// Returns the method that the file asks for, and whether nothing is to keep aircraft apart.
+/// The settings that hold at one time, as BlueSky keeps them.
+#[derive(Debug, Clone)]
+struct SettingsInForce {
+    detection: Option<bool>,
+    resolution: Option<ResolutionMethod>,
+    look_ahead_s: Option<f64>,
+    resolution_factor: Option<f64>,
+    radius_nm: f64,
+    half_height_ft: f64,
+    winds: Vec<Wind>,
+}
+
+impl Default for SettingsInForce {
+    fn default() -> Self {
+        Self {
+            detection: None,
+            resolution: None,
+            look_ahead_s: None,
+            resolution_factor: None,
+            radius_nm: 5.0,
+            half_height_ft: 1000.0,
+            winds: Vec::new(),
+        }
+    }
+}
+
+/// Reads the settings of a file in the order of their times.
+struct SettingsReader<'a> {
+    file: &'a ScnFile,
+    now: SettingsInForce,
+    refused: Vec<InputError>,
+}
+
+/// Returns the settings of a file.
+pub(super) fn import_settings(file: &ScnFile) -> ImportedScenarioSettings {
+    let settings = &file.traffic.settings;
+    // What holds before anything flies holds from the start.
+    let created = file.traffic.aircraft.iter().map(|one| one.created_s);
+    let first_s = created.fold(f64::INFINITY, f64::min);
+    let first_s = if first_s.is_finite() { first_s } else { 0.0 };
+    let later = settings.partition_point(|timed| timed.at_s <= first_s);
+    let mut reader = SettingsReader { file, now: SettingsInForce::default(), refused: Vec::new() };
+    settings[..later].iter().for_each(|timed| reader.read(timed));
+    let mut states = vec![(0.0, reader.rules(None))];
+    for (k, timed) in settings.iter().enumerate().skip(later) {
+        reader.read(timed);
+        let is_last_of_its_time = settings.get(k + 1).is_none_or(|next| next.at_s > timed.at_s);
+        if is_last_of_its_time {
+            states.push((timed.at_s, reader.rules(Some(timed))));
+        }
+    }
+    let guesses = fill_silent_start(&mut states);
+    let mut imported = ImportedScenarioSettings {
+        start: states[0].1.clone(),
+        changes: changes_between(&states),
+        refused: reader.refused,
+        guesses,
+    };
+    imported.changes.extend(changes_of_aircraft(file));
+    imported.changes.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    if imported.changes.len() > MAX_CHANGES {
+        let left_out = imported.changes.split_off(MAX_CHANGES);
+        let cause = format!("{} changes of settings on the way", MAX_CHANGES + left_out.len());
+        let remedy = format!("write up to {MAX_CHANGES}; the first ones hold");
+        let place = settings.last().map_or("the file", |last| last.file.as_str());
+        imported.refused.push(InputError::new(place, cause, remedy));
+    }
+    imported
+}
+
+/// Decides what flies before a file first says something about conflicts, and whether the shield flies. Returns the
+/// choices.
+fn fill_silent_start(states: &mut [(f64, ImportedRules)]) -> Vec<String> {
+    let mut guesses = Vec::new();
+    let first_on = states.iter().position(|(_, rules)| rules.method == Some("mvp"));
+    if let Some(first_on) = first_on.filter(|k| *k > 0) {
+        // In BlueSky nothing is detected and resolved until it is switched on.
+        for (_, rules) in states[..first_on].iter_mut().filter(|(_, rules)| rules.method.is_none())
+        {
+            rules.method = Some("none");
+            rules.is_bare = true;
+        }
+    }
+    let is_switched_on = states.windows(2).any(|pair| pair[0].1.is_bare && !pair[1].1.is_bare);
+    if is_switched_on {
+        states.iter_mut().for_each(|(_, rules)| rules.is_bare = true);
+        guesses.push(
+            "conflicts are resolved from a time on: without the shield, which keeps separation from the start".into(),
+        );
+    }
+    let is_silent = states[0].1.method.is_none();
+    if is_silent && states.iter().any(|(_, rules)| rules.method.is_some()) {
+        guesses.push(
+            "until its first command about conflicts the scenario's own method flies; in BlueSky nobody resolves any".into(),
+        );
+    }
+    guesses
+}
+
+/// Returns the changes from each state to the next.
+fn changes_between(states: &[(f64, ImportedRules)]) -> Vec<ImportedChange> {
+    let mut changes = Vec::new();
+    for pair in states.windows(2) {
+        let [(_, before), (at_s, after)] = pair else { continue };
+        let text = change_text(before, after);
+        if !text.is_empty() {
+            changes.push(ImportedChange { at_s: *at_s, text });
+        }
+    }
+    changes
+}
+
+/// Returns the keys of a change; empty where nothing changes.
+fn change_text(before: &ImportedRules, after: &ImportedRules) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    if after.method != before.method
+        && let Some(method) = after.method
+    {
+        let _ = write!(text, ", method = {method:?}");
+    }
+    if after.is_bare && !before.is_bare {
+        text.push_str(", shield = \"off\"");
+    }
+    let (old_mvp, new_mvp) = (before.mvp_text(), after.mvp_text());
+    if new_mvp != old_mvp && !new_mvp.is_empty() {
+        let _ = write!(text, ", mvp = {{ {new_mvp} }}");
+    }
+    if after.separation_m != before.separation_m {
+        let _ = write!(text, ", separation_m = {:?}", after.separation_m);
+    }
+    if after.vertical_m != before.vertical_m {
+        let _ = write!(text, ", vertical_m = {:?}", after.vertical_m);
+    }
+    if after.wind_m_s != before.wind_m_s {
+        let _ = write!(text, ", wind_m_s = {:?}", after.wind_m_s.unwrap_or([0.0; 2]));
+    }
+    text
+}
+
+/// Returns the changes of single aircraft on their way; `aircraft` are those that fly, in the order of the scenario.
+fn changes_of_aircraft(file: &ScnFile) -> Vec<ImportedChange> {
+    let flying = file.traffic.aircraft.iter().filter_map(aircraft_at_flying_speed);
+    let mut changes = Vec::new();
+    for (id, one) in flying.enumerate() {
+        let aircraft = one.scn();
+        for &(at_s, setting) in &aircraft.settings {
+            if at_s <= aircraft.created_s {
+                continue;
+            }
+            let key = match setting {
+                AircraftSetting::ZoneRadiusNm(nm) => {
+                    format!("separation_m = {:?}", nm * NAUTICAL_MILE_M)
+                }
+                AircraftSetting::Avoids(avoids) => format!("non_cooperative = {}", !avoids),
+            };
+            changes.push(ImportedChange { at_s, text: format!(", airplanes = [{id}], {key}") });
+        }
+    }
+    changes
+}
+
+impl ImportedRules {
+    /// Returns the settings of MVP, as a scenario writes them; empty for its own ones.
+    pub(super) fn mvp_text(&self) -> String {
+        let look_ahead = self.look_ahead_s.map(|s| format!("look_ahead_s = {s:?}"));
+        let factor = self.resolution_factor.map(|factor| format!("resolution_factor = {factor:?}"));
+        let keys: Vec<String> = look_ahead.into_iter().chain(factor).collect();
+        keys.join(", ")
+    }
+}
+
+impl SettingsReader<'_> {
+    fn refuse(&mut self, timed: &TimedSetting, cause: String, remedy: &str) {
+        let error = InputError::new(&timed.file, format!("{}: {cause}", timed.command), remedy);
+        self.refused.push(error.with_position(timed.line, 1));
+    }
+
+    /// Takes a setting that holds from now on.
+    fn read(&mut self, timed: &TimedSetting) {
+        match timed.setting {
+            Setting::ZoneRadiusNm(nm) => self.now.radius_nm = nm,
+            Setting::ZoneHalfHeightFt(ft) => self.now.half_height_ft = ft,
+            Setting::Detection(is_on) => self.now.detection = Some(is_on),
+            Setting::Resolution(ResolutionMethod::Ssd | ResolutionMethod::Eby) => {
+                let cause = "this method is not known here; what flew before flies on";
+                let remedy = "write RESO OFF or MVP, or choose with --set airspace.method=...";
+                self.refuse(timed, cause.into(), remedy);
+            }
+            Setting::Resolution(method) => self.now.resolution = Some(method),
+            Setting::ResolutionFactor(factor) if (0.5..=10.0).contains(&factor) => {
+                self.now.resolution_factor = Some(factor);
+            }
+            Setting::ResolutionFactor(factor) => {
+                self.refuse(timed, format!("a factor of {factor}"), "give 0.5 to 10");
+            }
+            Setting::LookAheadS(s) if (MIN_LOOK_AHEAD_S..=MAX_LOOK_AHEAD_S).contains(&s) => {
+                self.now.look_ahead_s = Some(s);
+            }
+            Setting::LookAheadS(s) => {
+                let remedy = format!("give {MIN_LOOK_AHEAD_S} to {MAX_LOOK_AHEAD_S} s");
+                self.refuse(timed, format!("a look-ahead of {s} s"), &remedy);
+            }
+            Setting::AddedWind(wind) => self.now.winds.push(wind),
+            Setting::NoWind => self.now.winds.clear(),
+            Setting::Noise(true) => {
+                let cause = "its amounts are unknown; positions are exact".to_string();
+                self.refuse(timed, cause, "choose with --set airspace.position_noise_m=...");
+            }
+            Setting::Noise(false) => {}
+            Setting::Reset => self.now = SettingsInForce::default(),
+        }
+    }
+
+    /// Returns the rules that hold now; the last of the settings was read at `timed`.
+    fn rules(&mut self, timed: Option<&TimedSetting>) -> ImportedRules {
+        let (method, is_bare) = resolution_method(&self.now);
+        let mut look_ahead_s = self.now.look_ahead_s;
+        if look_ahead_s.is_none() && method == Some("mvp") {
+            look_ahead_s = Some(DEFAULT_LOOK_AHEAD_S);
+        }
+        let wind_m_s = wind_m_s(&self.now.winds, &self.file.traffic.aircraft);
+        let wind_m_s = wind_m_s.unwrap_or_else(|cause| {
+            let given = self.file.traffic.settings.iter();
+            let winds = given.filter(|one| matches!(one.setting, Setting::AddedWind(_)));
+            let last_s = timed.map_or(f64::INFINITY, |timed| timed.at_s);
+            if let Some(last) = winds.filter(|one| one.at_s <= last_s).last().cloned() {
+                self.refuse(&last, cause, "give one wind below the speed of all aircraft");
+            }
+            // It is told once.
+            self.now.winds.clear();
+            None
+        });
+        ImportedRules {
+            method,
+            is_bare,
+            look_ahead_s,
+            resolution_factor: self.now.resolution_factor,
+            wind_m_s,
+            separation_m: self.now.radius_nm * NAUTICAL_MILE_M,
+            vertical_m: self.now.half_height_ft * FOOT_M,
+        }
+    }
+}
+
+/// Returns the method that the settings ask for, and whether nothing is to keep aircraft apart.
 /// Without detection nothing is resolved.
-fn resolution_method(traffic: &Traffic) -> (Option<&'static str>, bool) {
-    match (traffic.detection, traffic.resolution) {
+fn resolution_method(now: &SettingsInForce) -> (Option<&'static str>, bool) {
+    match (now.detection, now.resolution) {
         (Some(false), _) | (_, Some(ResolutionMethod::Off)) => (Some("none"), true),
         (_, Some(ResolutionMethod::Mvp)) => (Some("mvp"), false),
         (_, Some(ResolutionMethod::Ssd | ResolutionMethod::Eby) | None) => (None, false),
@@ -73,18 +311,17 @@ fn resolution_method(traffic: &Traffic) -> (Option<&'static str>, bool) {
 ///
 /// # Errors
 /// The cause, when winds differ from place to place, or no aircraft could fly against it.
-fn wind_m_s(traffic: &Traffic) -> Result<Option<[f64; 2]>, String> {
-    let Some(first) = traffic.wind.first() else { return Ok(None) };
-    let is_uniform = traffic
-        .wind
+fn wind_m_s(winds: &[Wind], aircraft: &[ScnAircraft]) -> Result<Option<[f64; 2]>, String> {
+    let Some(first) = winds.first() else { return Ok(None) };
+    let is_uniform = winds
         .iter()
         .all(|other: &Wind| other.from_deg == first.from_deg && other.speed_kt == first.speed_kt);
     if !is_uniform {
-        return Err(format!("{} winds that differ; none blows", traffic.wind.len()));
+        return Err(format!("{} winds that differ; none blows", winds.len()));
     }
     let from_rad = first.from_deg.to_radians();
     let speed_m_s = first.speed_kt * KNOT_M_S;
-    if let Some(slow) = traffic.aircraft.iter().find(|one| min_speed_m_s(one) <= speed_m_s) {
+    if let Some(slow) = aircraft.iter().find(|one| min_speed_m_s(one) <= speed_m_s) {
         return Err(format!("{speed_m_s:.1} m/s, and {} is slower; it does not blow", slow.id));
     }
     // It blows from there, clockwise from north.
@@ -101,14 +338,16 @@ mod tests {
     use super::*;
     use sidestep_import::bluesky::parse;
 
+    fn found_at(timed: &str) -> (ImportedScenarioSettings, Vec<String>) {
+        let start = "00:00:00>CRE A1,B744,0,-0.4,90,FL200,250\n";
+        let settings = import_settings(&parse(&"a.scn", &format!("{start}{timed}")));
+        let refused = settings.refused.iter().map(ToString::to_string).collect();
+        (settings, refused)
+    }
+
     fn found(commands: &str) -> (ImportedScenarioSettings, Vec<String>) {
-        let text: String = std::iter::once("CRE A1,B744,0,-0.4,90,FL200,250")
-            .chain(commands.lines())
-            .map(|line| format!("00:00:00.00>{line}\n"))
-            .collect();
-        let rules = import_settings("a.scn", &parse(&"a.scn", &text), 10.0);
-        let refused = rules.refused.iter().map(ToString::to_string).collect();
-        (rules, refused)
+        let timed: String = commands.lines().map(|line| format!("00:00:00.00>{line}\n")).collect();
+        found_at(&timed)
     }
 
     #[test]
@@ -120,14 +359,61 @@ mod tests {
             ("ASAS ON\nRESO OFF", Some("none"), true),
             ("CDMETHOD STATEBASED\nRESO MVP", Some("mvp"), false),
         ] {
-            let (rules, refused) = found(commands);
-            assert_eq!((rules.method, rules.is_bare), (method, is_bare), "{commands}");
-            assert_eq!(refused, [""; 0], "{commands}");
+            let (settings, refused) = found(commands);
+            let start = &settings.start;
+            assert_eq!((start.method, start.is_bare), (method, is_bare), "{commands}");
+            assert_eq!((refused, settings.changes), (vec![], vec![]), "{commands}");
         }
-        let (rules, _) = found("DTLOOK 120\nWIND 0,1,,270,36");
-        assert_eq!(rules.look_ahead_s, Some(120.0));
-        let [east, north] = rules.wind_m_s.expect("a wind");
+        let (settings, _) = found("DTLOOK 120\nWIND 0,1,,270,36\nRFACH 1.2\nZONER 3\nZONEDH 500");
+        let start = settings.start;
+        assert_eq!(start.mvp_text(), "look_ahead_s = 120.0, resolution_factor = 1.2");
+        assert_eq!((start.separation_m, start.vertical_m), (5556.0, 152.4));
+        let [east, north] = start.wind_m_s.expect("a wind");
         assert!((east - 18.52).abs() < 1e-9 && north.abs() < 1e-9, "{east} {north}");
+    }
+
+    #[test]
+    fn a_setting_holds_from_its_time_on_and_not_before() {
+        for (timed, method, changes) in [
+            (
+                "00:00:00>RESO MVP\n00:20:00>RESO OFF\n",
+                Some("mvp"),
+                vec![(1200.0, ", method = \"none\", shield = \"off\"")],
+            ),
+            ("02:00:00>ASAS OFF\n", None, vec![(7200.0, ", method = \"none\", shield = \"off\"")]),
+            (
+                "00:10:00>RESO MVP\n",
+                Some("none"),
+                vec![(600.0, ", method = \"mvp\", mvp = { look_ahead_s = 300.0 }")],
+            ),
+            (
+                "00:00:00>RESO MVP\n00:01:00>ZONER 3;DTLOOK 60\n00:02:00>ZONEDH 500;ZONER 3\n",
+                Some("mvp"),
+                vec![
+                    (60.0, ", mvp = { look_ahead_s = 60.0 }, separation_m = 5556.0"),
+                    (120.0, ", vertical_m = 152.4"),
+                ],
+            ),
+            (
+                "00:00:00>WIND 0,1,,270,36\n00:01:00>DEL WIND\n",
+                None,
+                vec![(60.0, ", wind_m_s = [0.0, 0.0]")],
+            ),
+            (
+                "00:01:00>ZONER 3 A1\n00:02:00>RESOOFF A1\n",
+                None,
+                vec![
+                    (60.0, ", airplanes = [0], separation_m = 5556.0"),
+                    (120.0, ", airplanes = [0], non_cooperative = true"),
+                ],
+            ),
+        ] {
+            let (settings, refused) = found_at(timed);
+            assert_eq!((settings.start.method, refused), (method, vec![]), "{timed}");
+            let found: Vec<(f64, &str)> =
+                settings.changes.iter().map(|one| (one.at_s, one.text.as_str())).collect();
+            assert_eq!(found, changes, "{timed}");
+        }
     }
 
     #[test]
@@ -136,15 +422,17 @@ mod tests {
             ("RESO SSD", "RESO", 2),
             ("ZONER 3\nRESO EBY", "RESO", 3),
             ("NOISE ON", "NOISE", 2),
-            ("DTLOOK 1", "DTLOOK", 2),
+            ("DTLOOK 0.5", "DTLOOK", 2),
+            ("RFACH 20", "RFACH", 2),
             ("WIND 0,1,,270,36\nWIND 0,2,,90,36", "WIND", 3),
             ("WIND 0,1,,270,600", "WIND", 2),
         ] {
-            let (rules, refused) = found(commands);
+            let (settings, refused) = found(commands);
             let [one] = &refused[..] else { panic!("{commands}: {refused:?}") };
             assert!(one.contains(&format!("{name}: ")), "{one}");
-            assert_eq!(rules.refused[0].line_and_column(), Some((line, 1)), "{commands}");
-            assert_eq!((rules.look_ahead_s, rules.wind_m_s), (None, None), "{commands}");
+            assert_eq!(settings.refused[0].line_and_column(), Some((line, 1)), "{commands}");
+            let start = &settings.start;
+            assert_eq!((start.look_ahead_s, start.wind_m_s), (None, None), "{commands}");
         }
     }
 }

@@ -1,0 +1,209 @@
+//! Settings of all aircraft or of one, with the times from which they hold.
+
+use super::{
+    CommandError, CommandOutcome, CommandResult, Interpreter, canonical_name, refusal, upper,
+};
+use crate::bluesky::traffic::{AircraftSetting, ResolutionMethod, Setting, TimedSetting, Wind};
+use crate::bluesky::values::{
+    Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, duration_s, heading_deg, number,
+    on_off, positive, zone_size,
+};
+use crate::local_plane::LatLon;
+use crate::report::Treatment;
+use crate::table::Token;
+
+/// The zones of aircraft that are created from now on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SettingDefaults {
+    pub(super) zone_radius_nm: f64,
+    /// Whether an aircraft has a radius of its own: then all have, and `ZONER` is for new ones only.
+    has_own_radius: bool,
+    has_wind: bool,
+}
+
+impl Default for SettingDefaults {
+    fn default() -> Self {
+        Self { zone_radius_nm: 5.0, has_own_radius: false, has_wind: false }
+    }
+}
+
+impl SettingDefaults {
+    /// Returns the settings of its own that a new aircraft has.
+    pub(super) fn own_settings(&self) -> impl Iterator<Item = AircraftSetting> + use<> {
+        let radius = AircraftSetting::ZoneRadiusNm(self.zone_radius_nm);
+        self.has_own_radius.then_some(radius).into_iter()
+    }
+}
+
+impl Interpreter {
+    pub(super) fn has_wind(&self) -> bool {
+        self.defaults.has_wind
+    }
+
+    /// Adds a setting for all aircraft that holds from now on.
+    pub(super) fn add_setting(&mut self, command: &'static str, setting: Setting) {
+        match setting {
+            Setting::AddedWind(_) => self.defaults.has_wind = true,
+            Setting::NoWind | Setting::Reset => self.defaults.has_wind = false,
+            _ => {}
+        }
+        self.result.traffic.settings.push(TimedSetting {
+            at_s: self.now_s,
+            command,
+            file: self.source.name.clone(),
+            line: self.line,
+            setting,
+        });
+    }
+
+    /// `ZONER radius[,aircraft,...]` and `ZONEDH height[,aircraft,...]`. Without a value they are queries.
+    pub(super) fn set_zone(&mut self, arguments: &mut Arguments, name: &str) -> CommandResult {
+        let Some(word) = arguments.next() else { return Ok(CommandOutcome::Done) };
+        let is_radius = canonical_name(name) == "ZONER";
+        let (range, unit) =
+            if is_radius { (&ZONE_RADII_NM, "NM") } else { (&ZONE_HALF_HEIGHTS_FT, "ft") };
+        let size = zone_size(arguments.place, word, range, unit)?;
+        if !arguments.has_further() {
+            self.set_common_zone(is_radius, size);
+            return Ok(CommandOutcome::Done);
+        }
+        if !is_radius {
+            arguments.skip_all();
+            let reason = "heights of single zones are not known here; all have that of ZONEDH without aircraft";
+            return Ok(CommandOutcome::NotUnderstood(format!("{name} aircraft"), reason));
+        }
+        while arguments.has_further() {
+            let index = self.existing_aircraft(arguments)?;
+            let own = AircraftSetting::ZoneRadiusNm(size);
+            self.builders[index].aircraft.settings.push((self.now_s, own));
+        }
+        self.defaults.has_own_radius = true;
+        Ok(CommandOutcome::Done)
+    }
+
+    /// Sets the zone of all aircraft, or of new ones only where aircraft have zones of their own, as BlueSky does.
+    fn set_common_zone(&mut self, is_radius: bool, size: f64) {
+        if !is_radius {
+            self.add_setting("ZONEDH", Setting::ZoneHalfHeightFt(size));
+            return;
+        }
+        self.defaults.zone_radius_nm = size;
+        if self.defaults.has_own_radius {
+            let rule =
+                "ZONER for all after one for an aircraft: as in BlueSky, new aircraft have it";
+            self.note(Treatment::Guessed, rule, "name the aircraft");
+        } else {
+            self.add_setting("ZONER", Setting::ZoneRadiusNm(size));
+        }
+    }
+
+    /// A setting for all. Without a value it is a query and changes nothing.
+    pub(super) fn set(&mut self, arguments: &mut Arguments, name: &str) -> CommandResult {
+        if arguments.peek().is_none() {
+            return Ok(CommandOutcome::Done);
+        }
+        let value = arguments.required("a value")?;
+        let place = arguments.place;
+        match canonical_name(name) {
+            "RESO" => {
+                let method = resolution(arguments, value)?;
+                self.add_setting("RESO", Setting::Resolution(method));
+            }
+            "DTLOOK" => {
+                let look_ahead_s = duration_s(place, value)?;
+                if look_ahead_s <= 0.0 {
+                    let cause = "a look-ahead of no time".to_string();
+                    return Err(arguments.error(value, cause, "write seconds such as 300").into());
+                }
+                if arguments.has_further() {
+                    arguments.skip_all();
+                    let reason = "look-ahead times of single aircraft are not known here";
+                    return Ok(CommandOutcome::NotUnderstood("DTLOOK aircraft".into(), reason));
+                }
+                self.add_setting("DTLOOK", Setting::LookAheadS(look_ahead_s));
+            }
+            "RFACH" => {
+                let factor = positive(place, value)?;
+                self.add_setting("RFACH", Setting::ResolutionFactor(factor));
+            }
+            "RMETHH" | "RMETHV" => return Ok(self.limit_resolution(name, value)),
+            "PRIORULES" => return Ok(priority_rules(arguments, value)),
+            "NOISE" => {
+                let is_on = on_off(place, value)?;
+                self.add_setting("NOISE", Setting::Noise(is_on));
+            }
+            other => {
+                let is_method = ["STATEBASED", "CSTATEBASED"].contains(&&*upper(value));
+                let is_on = is_method || on_off(place, value)?;
+                let command = if other == "ASAS" { "ASAS" } else { "CDMETHOD" };
+                self.add_setting(command, Setting::Detection(is_on));
+            }
+        }
+        Ok(CommandOutcome::Done)
+    }
+
+    /// `RMETHH HDG` and `RMETHV OFF` are what MVP does here; all else is named.
+    fn limit_resolution(&mut self, name: &str, value: Token) -> CommandOutcome {
+        match (name, upper(value).as_str()) {
+            ("RMETHH", "HDG") | ("RMETHV", "OFF" | "OF" | "NONE") => CommandOutcome::Done,
+            (_, value) => {
+                let reason = "MVP here changes headings only, as with RMETHH HDG";
+                CommandOutcome::NotUnderstood(format!("{name} {value}"), reason)
+            }
+        }
+    }
+
+    /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for
+    /// each altitude, where the altitude may be left out.
+    pub(super) fn add_wind(&mut self, arguments: &mut Arguments) -> CommandResult {
+        let place = self.place(arguments)?;
+        let has_altitudes = arguments.remaining() != 2;
+        let mut winds = Vec::new();
+        let position = place.position().unwrap_or(LatLon { lat_deg: 0.0, lon_deg: 0.0 });
+        loop {
+            let altitude_ft = if has_altitudes { arguments.optional(altitude_ft)? } else { None };
+            let from = arguments.required("the direction the wind blows from")?;
+            let speed = arguments.required("the wind's speed in kt")?;
+            winds.push(Wind {
+                position,
+                altitude_ft,
+                from_deg: heading_deg(arguments.place, from)?,
+                speed_kt: number(arguments.place, speed)?,
+            });
+            if arguments.remaining() == 0 {
+                break;
+            }
+        }
+        self.add_unresolved(arguments.command, None, &place);
+        if place.position().is_some() {
+            for wind in winds {
+                self.add_setting("WIND", Setting::AddedWind(wind));
+            }
+        }
+        Ok(CommandOutcome::Done)
+    }
+}
+
+/// `PRIORULES OFF` and `ON FF1` are cooperative, as MVP is here; all else is named.
+fn priority_rules(arguments: &mut Arguments, value: Token) -> CommandOutcome {
+    let code = arguments.next().map(upper).unwrap_or_default();
+    let is_off = ["OFF", "FALSE", "NO", "0"].contains(&&*upper(value));
+    if is_off || code == "FF1" {
+        return CommandOutcome::Done;
+    }
+    let reason = "priorities are not known here: in each conflict both give way, as with FF1";
+    CommandOutcome::NotUnderstood(format!("PRIORULES {code}"), reason)
+}
+
+fn resolution(arguments: &Arguments, word: Token) -> Result<ResolutionMethod, CommandError> {
+    match upper(word).as_str() {
+        "OFF" => Ok(ResolutionMethod::Off),
+        "MVP" => Ok(ResolutionMethod::Mvp),
+        "SSD" => Ok(ResolutionMethod::Ssd),
+        "EBY" => Ok(ResolutionMethod::Eby),
+        other => {
+            let cause = format!("no resolution method `{other}` is known");
+            Err(refusal(arguments, word, cause, "take OFF, MVP, SSD or EBY"))
+        }
+    }
+}
