@@ -8,7 +8,7 @@ use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{BodyKind, Kinds};
 use sidestep_kernel::{InputError, RunConfig, Simulation};
 use std::any::Any;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Digits of the digest of added code in the name of a build: as many as a build's own digest has.

@@ -4,10 +4,10 @@ use super::traffic::{
     ImportedScenarioSettings, from_bluesky, from_tracks, omitted_commands, settings_from_bluesky,
 };
 use serde_json::{Value, json};
+use sidestep_import::Treatment;
 use sidestep_import::bluesky::{self, DISPLAY_RULE, ScnFile, ScnOptions, UnresolvedPosition};
 use sidestep_import::report::{Finding, ImportReport};
 use sidestep_import::traffic::{self, RecordedTraffic, TrafficOptions};
-use sidestep_import::Treatment;
 use sidestep_kernel::InputError;
 use sidestep_kernel::text::{KeyValues, group_thousands};
 use sidestep_scenario::{ImportOptions, ImportedScenario};

@@ -29,6 +29,11 @@ const DT_S: f64 = 10.0;
 /// Seconds between two looks of methods that look anew each time, as in BlueSky (`asas_dt`).
 const LOOK_EVERY_S: f64 = 1.0;
 
+/// Smallest speed in meters per second at which an aircraft counts as in the air.
+const MIN_SPEED_M_S: f64 = 1.0;
+/// Time in seconds for which an airplane without a destination flies ahead.
+const UNROUTED_FLIGHT_S: f64 = 1800.0;
+
 /// Returns the position of the plane's origin on earth, as a scenario writes it.
 fn origin(plane: &LocalPlane) -> String {
     let LatLon { lat_deg, lon_deg } = plane.center();

@@ -7,7 +7,8 @@
 
 use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
 use super::{
-    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, banked_turn_deg_s, callsign, header_text, origin,
+    DT_S, FOOT_M, LOOK_EVERY_S, MIN_SPEED_M_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
+    banked_turn_deg_s, callsign, header_text, origin,
 };
 use crate::flight::{Point, SeparationMinima};
 use crate::flight_plan::CLIMB_M_S;
@@ -16,11 +17,6 @@ use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_kernel::{InputError, math};
 use std::collections::BTreeMap;
 use std::fmt::Write;
-
-/// Time in seconds for which an airplane without a destination flies ahead.
-const UNROUTED_FLIGHT_S: f64 = 1800.0;
-/// Smallest speed in meters per second at which an aircraft counts as in the air.
-const MIN_SPEED_M_S: f64 = 1.0;
 
 /// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
