@@ -46,11 +46,22 @@ pub(crate) const TARGETS: &[Target] = &[
     ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data), &Default::default()))),
     ("bluesky_call", |data| drop(bluesky::read(&file("f.scn", data)))),
     ("navdata", |data| drop(bluesky::NavigationData::read(navdata_folder(data)))),
-    ("carmen", |data| text(data, |t| drop(carmen::parse("f", t)))),
-    ("learn_carmen", |data| drop(effector::from_carmen(&file("f.log", data), &Default::default()))),
+    ("carmen", |data| text(data, |t| drop(carmen::parse("f", t, None)))),
+    ("learn_carmen", |data| {
+        drop(effector::from_carmen(&file("f.log", data), None, &Default::default()));
+    }),
     ("bag", |data| drop(bag::read(&file("f.mcap", data), &all_of_a_bag()))),
+    ("bag_sqlite", |data| drop(bag::read(&file("f.db3", data), &all_of_a_bag()))),
+    ("bag_ros1", |data| drop(bag::read(&file("f.bag", data), &all_of_a_bag()))),
+    ("bag_metadata", |data| {
+        file("f.mcap", b"");
+        drop(bag::inspect(&file("metadata.yaml", data)));
+    }),
+    ("bag_clean", |data| {
+        drop(bag::write_clean(&file("f.mcap", data), &folder().join("clean.mcap")));
+    }),
     ("cdr", messages),
-    ("mrclam", |data| drop(mrclam::read(mrclam_folder(data)))),
+    ("mrclam", |data| drop(mrclam::read(mrclam_folder(data), None))),
     ("learn_csv", |data| text(data, learned)),
     ("checkpoint", |data| drop(checkpoint::decode_header(data))),
     ("journal", |data| {
@@ -121,6 +132,7 @@ fn all_of_a_bag() -> bag::TopicSelection {
         odometry: Some(source("/robot_0/odom")),
         truth: source("/robot_0/ground_truth"),
         scans: Some("/robot_0/sonar_ring".into()),
+        ..Default::default()
     }
 }
 
@@ -128,6 +140,8 @@ fn messages(data: &[u8]) {
     drop(bag::cdr::decode::<bag::messages::Odometry>(data));
     drop(bag::cdr::decode::<bag::messages::LaserScan>(data));
     drop(bag::cdr::decode::<bag::messages::TfMessage>(data));
+    drop(bag::cdr::decode_as::<bag::messages::Odometry>(bag::cdr::Encoding::Ros1, data));
+    drop(bag::cdr::decode_as::<bag::messages::LaserScan>(bag::cdr::Encoding::Ros1, data));
 }
 
 /// Reads a recording of any source; what is written of it is read again.

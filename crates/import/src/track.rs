@@ -63,8 +63,11 @@ impl Track {
 
 /// The usual speed times this is the limit: a robot that mostly drives at one speed can be faster at times.
 const SPEED_FACTOR: f64 = 3.0;
-/// The usual speed is this quantile of all.
-const SPEED_QUANTILE: f64 = 0.95;
+/// What is slower, in m/s or rad/s, is the noise of a robot that stands: the usual speed is the median of the others.
+const MIN_USUAL: f64 = 0.02;
+/// Where a greater share of steps, and more than a few, would be jumps, the limit is too low: it is doubled.
+const MAX_JUMP_FRACTION: f64 = 0.05;
+const MAX_FEW_JUMPS: usize = 4;
 /// No limit that is guessed is below this speed in m/s, nor below this rate in rad/s: slow robots are pushed and lifted.
 const MIN_SPEED_MPS: f64 = 1.0;
 const MIN_RATE_RADPS: f64 = 4.0;
@@ -91,23 +94,21 @@ pub struct SpeedRule {
 }
 
 impl SpeedRule {
-    /// Returns the rule for tracks of one robot: the given speed, or three times the speed that 95 % of its motion does
-    /// not exceed, at least 1 m/s. Of several tracks the slower counts, as jumps make a track faster.
+    /// Returns the rule for tracks of one robot: the given speed, or three times its usual speed, at least 1 m/s; twice that,
+    /// and so on, while more than 5 % of the steps would be jumps. Of several tracks the slower counts.
     pub fn for_tracks(max_speed_mps: Option<f64>, tracks: &[&[StampedPose2]]) -> Self {
-        let slowest = |of: fn(&[StampedPose2]) -> f64| {
-            tracks
-                .iter()
-                .map(|track| of(track))
-                .filter(|usual| *usual > 0.0)
-                .fold(f64::INFINITY, f64::min)
-        };
-        let limit = |usual: f64, least: f64| {
-            if usual.is_finite() { (SPEED_FACTOR * usual).max(least) } else { least }
-        };
-        let guessed_mps = limit(slowest(|track| usual_motion(track)[0]), MIN_SPEED_MPS);
+        let [mut speed_mps, mut rate_radps] = [f64::INFINITY; 2];
+        for track in tracks {
+            let [usual_mps, usual_radps] = usual_motion(track);
+            if usual_mps > 0.0 || usual_radps > 0.0 {
+                speed_mps = speed_mps.min(limit(track, usual_mps, MIN_SPEED_MPS, is_moved));
+                rate_radps = rate_radps.min(limit(track, usual_radps, MIN_RATE_RADPS, is_turned));
+            }
+        }
+        let guessed_mps = if speed_mps.is_finite() { speed_mps } else { MIN_SPEED_MPS };
         Self {
             max_speed_mps: max_speed_mps.unwrap_or(guessed_mps),
-            max_rate_radps: limit(slowest(|track| usual_motion(track)[1]), MIN_RATE_RADPS),
+            max_rate_radps: if rate_radps.is_finite() { rate_radps } else { MIN_RATE_RADPS },
             is_given: max_speed_mps.is_some(),
         }
     }
@@ -115,18 +116,47 @@ impl SpeedRule {
     /// Returns whether the robot can have moved from one pose to the other: over the time between their stamps and a
     /// tenth of a second, and 0.1 m and 0.3 rad more.
     pub fn is_possible(&self, from: &StampedPose2, to: &StampedPose2) -> bool {
-        let secs = (to.t_secs - from.t_secs).abs() + STAMP_TOLERANCE_SECS;
-        let turn_rad = wrap_angle(to.heading_rad - from.heading_rad).abs();
-        distance_m(from, to) <= self.max_speed_mps * secs + DISTANCE_TOLERANCE_M
-            && turn_rad <= self.max_rate_radps * secs + ANGLE_TOLERANCE_RAD
+        !is_moved(from, to, self.max_speed_mps) && !is_turned(from, to, self.max_rate_radps)
     }
+}
+
+/// Returns whether a step is longer than a speed in m/s allows.
+fn is_moved(from: &StampedPose2, to: &StampedPose2, max_mps: f64) -> bool {
+    distance_m(from, to) > max_mps * step_secs(from, to) + DISTANCE_TOLERANCE_M
+}
+
+/// Returns whether a turn is wider than a rate in rad/s allows.
+fn is_turned(from: &StampedPose2, to: &StampedPose2, max_radps: f64) -> bool {
+    let turn_rad = wrap_angle(to.heading_rad - from.heading_rad).abs();
+    turn_rad > max_radps * step_secs(from, to) + ANGLE_TOLERANCE_RAD
+}
+
+fn step_secs(from: &StampedPose2, to: &StampedPose2) -> f64 {
+    (to.t_secs - from.t_secs).abs() + STAMP_TOLERANCE_SECS
+}
+
+/// Returns the limit of a track by its usual speed or rate.
+fn limit(
+    track: &[StampedPose2],
+    usual: f64,
+    least: f64,
+    is_beyond: fn(&StampedPose2, &StampedPose2, f64) -> bool,
+) -> f64 {
+    let max_jumps = MAX_FEW_JUMPS.max((track.len() as f64 * MAX_JUMP_FRACTION) as usize);
+    let mut limit = (SPEED_FACTOR * usual).max(least);
+    let jumps =
+        |limit| track.windows(2).filter(|pair| is_beyond(&pair[0], &pair[1], limit)).count();
+    while limit.is_finite() && jumps(limit) > max_jumps {
+        limit *= 2.0;
+    }
+    limit
 }
 
 fn distance_m(from: &StampedPose2, to: &StampedPose2) -> f64 {
     hypot(to.position_m[0] - from.position_m[0], to.position_m[1] - from.position_m[1])
 }
 
-/// Returns the speed in m/s and the rate in rad/s that most motion does not exceed.
+/// Returns the usual speed in m/s and rate in rad/s of a robot while it moves; 0 where it never does.
 fn usual_motion(track: &[StampedPose2]) -> [f64; 2] {
     let mut speeds = Vec::new();
     let mut rates = Vec::new();
@@ -140,13 +170,13 @@ fn usual_motion(track: &[StampedPose2]) -> [f64; 2] {
         rates.push(wrap_angle(pose.heading_rad - last.heading_rad).abs() / secs);
         last = pose;
     }
-    [quantile(speeds), quantile(rates)]
+    [usual(speeds), usual(rates)]
 }
 
-fn quantile(mut values: Vec<f64>) -> f64 {
+fn usual(mut values: Vec<f64>) -> f64 {
+    values.retain(|value| *value >= MIN_USUAL);
     values.sort_by(f64::total_cmp);
-    let index = (values.len() as f64 * SPEED_QUANTILE) as usize;
-    values.get(index).or(values.last()).copied().unwrap_or(0.0)
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// A track after its jumps were cut.
@@ -276,6 +306,42 @@ pub fn cut_and_report(
     cut.track
 }
 
+/// Truth that stays equal to the last bit while odometry claims more than this way is hardly measured.
+const MAX_FROZEN_WAY_M: f64 = 3.0;
+
+/// Records where true poses stay as they are to the last bit while odometry drives on: the body was lost, or the robot
+/// stood against a wall.
+pub fn report_frozen(place: &str, truth: &Track, odometry: &Track, report: &mut ImportReport) {
+    let mut start = 0;
+    for end in 1..=truth.len() {
+        let is_same = end < truth.len()
+            && truth[end].position_m == truth[start].position_m
+            && truth[end].heading_rad == truth[start].heading_rad;
+        if is_same {
+            continue;
+        }
+        let [from_secs, to_secs] = [truth[start].t_secs, truth[end - 1].t_secs];
+        let way_m =
+            if end - start >= MIN_FROZEN { way_m(odometry, from_secs, to_secs) } else { 0.0 };
+        if way_m > MAX_FROZEN_WAY_M {
+            let rule =
+                format!("poses of {place} that stay equal to the last bit while odometry drives");
+            let place = format!("from {from_secs:.3} to {to_secs:.3} s: {way_m:.2} m");
+            let remedy = "cut that time out of the recording if the body was lost";
+            report.record(Treatment::Suspicious, rule, place, remedy);
+        }
+        start = end;
+    }
+}
+
+/// Returns the length of the way of a track between two times.
+fn way_m(track: &Track, from_secs: f64, to_secs: f64) -> f64 {
+    let first = track.partition_point(|pose| pose.t_secs < from_secs);
+    let last = track.partition_point(|pose| pose.t_secs <= to_secs);
+    let steps = (first + 1..last).filter(|k| !track.is_cut_before(*k));
+    steps.map(|k| distance_m(&track[k - 1], &track[k])).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -351,6 +417,39 @@ mod tests {
         let fast = SpeedRule::for_tracks(None, &[&poses]);
         assert!((fast.max_speed_mps - 1.2).abs() < 1e-9, "{fast:?}");
         assert_eq!(SpeedRule::for_tracks(None, &[]).max_speed_mps, MIN_SPEED_MPS);
+    }
+
+    #[test]
+    fn a_vehicle_that_is_much_faster_for_a_part_of_its_way_does_not_jump() {
+        let (mut x_m, mut poses) = (0.0, Vec::new());
+        for k in 0..400 {
+            x_m += if (100..180).contains(&k) { 3.0 } else { 0.05 };
+            poses.push(StampedPose2 {
+                t_secs: 0.1 * f64::from(k),
+                position_m: [x_m, 0.0],
+                heading_rad: 0.0,
+            });
+        }
+        let rule = SpeedRule::for_tracks(None, &[&poses]);
+        assert_eq!(cut_track(poses, &rule).jumps.len(), 0, "{rule:?}");
+    }
+
+    #[test]
+    fn a_body_that_is_lost_to_the_end_is_suspicious() {
+        let odometry = Track::from(drive(400));
+        let mut lost = drive(400);
+        for k in 201..400 {
+            lost[k].position_m = lost[200].position_m;
+        }
+        let mut report = ImportReport::default();
+        report_frozen("/truth", &odometry, &odometry, &mut report);
+        assert_eq!(report.findings, []);
+        report_frozen("/truth", &lost.into(), &odometry, &mut report);
+        assert!(
+            report.findings[0].to_string().contains("from 10.000 to 19.950 s: 3.98 m"),
+            "{report:?}"
+        );
+        report_frozen("/truth", &Track::default(), &odometry, &mut report);
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub use left_out::LeftOut;
 
 use serde::Serialize;
 
+use sidestep_import::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 
 /// Greatest number that is added to a count: beside a larger one no count counts, and sums of rows overflow.
@@ -74,6 +75,13 @@ impl EstimateOptions {
         }
         Ok(())
     }
+}
+
+/// Returns what was dropped, repaired, guessed or is suspicious in a log as warnings; what has another meaning and is not
+/// used changes nothing.
+pub(crate) fn import_warnings(name: &str, report: &ImportReport) -> Vec<String> {
+    let findings = report.findings.iter().filter(|found| found.treatment != Treatment::NotUsed);
+    findings.map(|finding| format!("{name}: {finding}")).collect()
 }
 
 #[cfg(test)]

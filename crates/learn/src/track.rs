@@ -1,6 +1,6 @@
 //! Poses over time and relative to each other (rule L1).
 
-use sidestep_import::mrclam::StampedPose2;
+use sidestep_import::track::{StampedPose2, Track};
 use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 
 /// Motion capture with a wider gap than this says nothing about the time between: a robot may turn and come back.
@@ -70,8 +70,8 @@ impl Pose2 {
 }
 
 /// Returns the pose at `t_secs`: linear between the two samples around it, the heading along the
-/// shorter arc. `None` outside the track and inside a gap wider than 0.5 s.
-pub(crate) fn pose_at(track: &[StampedPose2], t_secs: f64) -> Option<Pose2> {
+/// shorter arc. `None` outside the track, across a cut of it and inside a gap wider than 0.5 s.
+pub(crate) fn pose_at(track: &Track, t_secs: f64) -> Option<Pose2> {
     let after = track.partition_point(|sample| sample.t_secs < t_secs);
     let end = track.get(after)?;
     if after == 0 || end.t_secs == t_secs {
@@ -79,7 +79,7 @@ pub(crate) fn pose_at(track: &[StampedPose2], t_secs: f64) -> Option<Pose2> {
     }
     let start = &track[after - 1];
     let gap_secs = end.t_secs - start.t_secs;
-    (gap_secs <= MAX_INTERPOLATION_SECS)
+    (gap_secs <= MAX_INTERPOLATION_SECS && !track.is_cut_before(after))
         .then(|| interpolate(start, end, (t_secs - start.t_secs) / gap_secs))
 }
 
@@ -97,19 +97,27 @@ fn interpolate(start: &StampedPose2, end: &StampedPose2, fraction: f64) -> Pose2
 /// across.
 const GAP_FACTOR: f64 = 3.0;
 
-/// The gaps of a track: the times after which the next pose comes too late to interpolate between the two.
+/// The gaps of a track: the times after which the next pose comes too late to interpolate between the two, or lies
+/// behind a cut.
 pub(crate) struct Gaps(Vec<f64>);
 
 impl Gaps {
-    pub(crate) fn from_track(track: &[StampedPose2]) -> Self {
+    pub(crate) fn from_track(track: &Track) -> Self {
         let step_secs = |pair: &[StampedPose2]| pair[1].t_secs - pair[0].t_secs;
         let mut steps_secs: Vec<f64> = track.windows(2).map(step_secs).collect();
         steps_secs.sort_by(f64::total_cmp);
         // A simulation with a cycle a second has no gaps between its cycles.
         let usual_secs = steps_secs.get(steps_secs.len() / 2).copied().unwrap_or(0.0);
         let most_secs = MAX_INTERPOLATION_SECS.max(GAP_FACTOR * usual_secs);
-        let gaps = track.windows(2).filter(|pair| step_secs(pair) > most_secs);
-        Self(gaps.map(|pair| pair[0].t_secs).collect())
+        let is_gap = |k: &usize| step_secs(&track[k - 1..=*k]) > most_secs;
+        let gaps = (1..track.len()).filter(|k| is_gap(k) || track.is_cut_before(*k));
+        Self(gaps.map(|k| track[k - 1].t_secs).collect())
+    }
+
+    /// Returns the cuts of a track alone: poses that come late are no gap of what is known at single times.
+    pub(crate) fn cuts_of(track: &Track) -> Self {
+        let cuts = (1..track.len()).filter(|k| track.is_cut_before(*k));
+        Self(cuts.map(|k| track[k - 1].t_secs).collect())
     }
 
     /// Returns the number of gaps that begin before a time.
@@ -129,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_pose_is_linear_between_samples_and_turns_the_shorter_way() {
-        let track = [sample(0.0, 0.0, PI - 0.1), sample(0.4, 1.0, -PI + 0.1)];
+        let track = Track::from(vec![sample(0.0, 0.0, PI - 0.1), sample(0.4, 1.0, -PI + 0.1)]);
         let pose = pose_at(&track, 0.1).unwrap();
         assert!((pose.x_m - 0.25).abs() < 1e-12);
         assert!((wrap_angle(pose.heading_rad - (PI - 0.05))).abs() < 1e-12);
@@ -137,13 +145,14 @@ mod tests {
 
     #[test]
     fn there_is_no_pose_outside_the_track_or_in_a_gap() {
-        let track = [sample(0.0, 0.0, 0.0), sample(0.75, 1.0, 0.0), sample(1.25, 1.0, 0.0)];
+        let samples = [sample(0.0, 0.0, 0.0), sample(0.75, 1.0, 0.0), sample(1.25, 1.0, 0.0)];
+        let track = Track::from_iter(samples);
         assert_eq!(pose_at(&track, -0.1), None);
         assert_eq!(pose_at(&track, 1.3), None);
         assert_eq!(pose_at(&track, 0.3), None);
         assert!(pose_at(&track, 0.8).is_some(), "a gap of exactly 0.5 s is bridged");
         assert!(pose_at(&track, 0.0).is_some() && pose_at(&track, 1.25).is_some());
-        assert_eq!(pose_at(&[], 0.0), None);
+        assert_eq!(pose_at(&Track::default(), 0.0), None);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::console::{Console, LINE_COLS, wrap_text};
 use crate::exit::{ExitCode, Failure};
 use clap::{Args, Subcommand};
 use serde::Serialize;
-use sidestep::import::bag::{PoseTopic, TopicSelection};
+use sidestep::import::bag::{NoEcho, PoseTopic, TopicSelection};
 use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
 use sidestep::learn::effector::{self, EffectorOptions, EffectorProfile, LearnedEffector};
@@ -39,7 +39,7 @@ Examples:
   sidestep learn sensor --bag hall.mcap --truth /amcl_pose --odom /odom \\
       --scan /scan --map hall.yaml
 
-A bag is an MCAP file or a folder of `ros2 bag record`. Truth is an Odometry, PoseStamped, \
+A bag is a file (.mcap, .db3, or .bag of ROS 1) or a folder of `ros2 bag record`. Truth is an Odometry, PoseStamped, \
 PoseWithCovarianceStamped, TransformStamped or, with two frames, a TFMessage topic, in the frame of the \
 map: /tf:map:base_link. The scanner's place on the robot is read from /tf_static.
 
@@ -70,7 +70,7 @@ Examples:
 
 CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg; contact, robot, effector \
 and box_m where you have them. Moves that an obstacle cut short are left out: record logs in an open place. A run is recorded with \
---set record.calibration=true. A bag is an MCAP file or a folder of `ros2 bag record`; poses are of type \
+--set record.calibration=true. A bag is a file (.mcap, .db3, or .bag of ROS 1) or a folder of `ros2 bag record`; poses are of type \
 Odometry, PoseStamped, PoseWithCovarianceStamped, TransformStamped or TFMessage.";
 
 /// Learn the error models of a real robot's sensors and wheels from its logs.
@@ -127,6 +127,11 @@ struct SensorArgs {
     #[arg(long, value_name = "TOPIC", requires = "bag")]
     scan: Option<String>,
 
+    /// What the scanner writes where nothing answers [default: recognized by counts]
+    #[arg(long, value_name = "VALUE", requires = "bag")]
+    #[arg(value_parser = ["inf", "nan", "zero", "max"])]
+    no_echo: Option<String>,
+
     /// Map that the scans are compared with (with --bag)
     #[arg(long, value_name = "MAP.yaml", requires = "bag")]
     map: Option<PathBuf>,
@@ -145,7 +150,7 @@ struct SensorLog {
     #[arg(long, value_name = "DIR")]
     mrclam: Option<PathBuf>,
 
-    /// ROS 2 bag: an MCAP file, or a folder
+    /// Bag of ROS 2 or ROS 1: a file, or a folder
     #[arg(long, value_name = "PATH", requires_all = ["truth", "scan", "map"])]
     bag: Option<PathBuf>,
 
@@ -200,7 +205,7 @@ struct EffectorLog {
     #[arg(long, value_name = "FILE")]
     carmen: Option<PathBuf>,
 
-    /// ROS 2 bag: an MCAP file, or a folder
+    /// Bag of ROS 2 or ROS 1: a file, or a folder
     #[arg(long, value_name = "PATH", requires_all = ["odom", "truth"])]
     bag: Option<PathBuf>,
 
@@ -223,13 +228,35 @@ struct TopicArgs {
     /// Topic of true poses (with --bag), e.g. /amcl_pose; of transforms: /tf:map:base_link
     #[arg(long, value_name = "TOPIC", requires = "bag")]
     truth: Option<String>,
+
+    /// Greatest speed of the robot in m/s: what is faster is no motion of it [default: three times its usual speed, at
+    /// least 1]
+    #[arg(long, value_name = "M/S", conflicts_with_all = ["csv", "run"])]
+    max_speed: Option<f64>,
 }
 
 impl TopicArgs {
     fn topic_selection(&self, scans: Option<&String>) -> Result<TopicSelection, InputError> {
         let odometry = self.odom.as_deref().map(PoseTopic::parse).transpose()?;
         let truth = self.truth.as_deref().map(PoseTopic::parse).transpose()?;
-        Ok(TopicSelection { odometry, truth: truth.ok_or_else(no_log)?, scans: scans.cloned() })
+        Ok(TopicSelection {
+            odometry,
+            truth: truth.ok_or_else(no_log)?,
+            scans: scans.cloned(),
+            max_speed_mps: self.max_speed_mps()?,
+            no_echo: None,
+        })
+    }
+
+    /// Returns the greatest speed that was given.
+    fn max_speed_mps(&self) -> Result<Option<f64>, InputError> {
+        match self.max_speed {
+            Some(speed) if !(speed.is_finite() && speed > 0.0) => {
+                let cause = format!("no robot moves at {speed} m/s at most");
+                Err(InputError::new("--max-speed", cause, "give a positive speed, such as 1.5"))
+            }
+            speed => Ok(speed),
+        }
     }
 }
 
@@ -379,7 +406,7 @@ fn learn_sensor(args: &SensorArgs) -> Result<LearnedSensor, InputError> {
     };
     let log = &args.log;
     match (&log.mrclam, &log.bag, &log.csv, &log.run) {
-        (Some(folder), ..) => sensor::from_mrclam(folder, &options),
+        (Some(folder), ..) => sensor::from_mrclam(folder, args.topics.max_speed_mps()?, &options),
         (_, Some(bag), ..) => learn_scanner(args, bag, &options),
         (_, _, Some(file), _) => sensor::from_csv(file, &options),
         (.., Some(folder)) => learn_recorded_sensor(args, folder),
@@ -415,7 +442,9 @@ fn learn_scanner(
         range_m: args.range,
         bearings_deg: args.bearings.as_deref(),
     };
-    sensor::from_bag(bag, &args.topics.topic_selection(args.scan.as_ref())?, &scanner, options)
+    let mut selection = args.topics.topic_selection(args.scan.as_ref())?;
+    selection.no_echo = args.no_echo.as_deref().and_then(NoEcho::from_name);
+    sensor::from_bag(bag, &selection, &scanner, options)
 }
 
 /// Default side of a box for MRCLAM logs, in m.
@@ -436,10 +465,11 @@ fn learn_effector(args: &EffectorArgs) -> Result<LearnedEffector, InputError> {
     match (&log.mrclam, &log.carmen, &log.bag, &log.csv, &log.run) {
         (Some(folder), ..) => {
             let box_m = args.box_size_m.unwrap_or(MRCLAM_BOX_M);
-            effector::from_mrclam(folder, box_m, &estimate)
+            effector::from_mrclam(folder, box_m, args.topics.max_speed_mps()?, &estimate)
         }
         (_, Some(file), ..) => {
-            let learned = effector::from_carmen(file, &estimate)?;
+            let speed_mps = args.topics.max_speed_mps()?;
+            let learned = effector::from_carmen(file, speed_mps, &estimate)?;
             args.box_size_m.map_or(Ok(learned.clone()), |box_m| learned.with_box(box_m))
         }
         (_, _, Some(bag), ..) => {

@@ -172,7 +172,7 @@ fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
     let place = exported("60");
     let bytes = std::fs::read(place.path("bag/bag_0.mcap")).expect("read");
     place.write("cut.mcap", &bytes[..bytes.len() / 2]);
-    place.write("old.bag", "#ROSBAG V2.0\n");
+    place.write("old.bag", "#ROSBAG V1.2\n");
     let refused = |bag: &str, odom: &str, truth: &str, words: &[&str]| {
         let place_of = ["--odom", odom, "--truth", truth, "--profile", "p.toml"];
         let ended = place.run(&[&["learn", "effector", "--bag", bag][..], &place_of].concat());
@@ -190,8 +190,8 @@ fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
         &["error: bag:", "/odom is not there", "/robot_0/odom (nav_msgs"],
     );
     refused("bag", "/robot_0/eye", truth, &["bag: /robot_0/eye", "LaserScan", "Odometry"]);
-    refused("cut.mcap", odom, truth, &["cut.mcap", "cut off", "mcap recover"]);
-    refused("old.bag", odom, truth, &["old.bag", "ROS 1", "rosbags-convert"]);
+    refused("cut.mcap", odom, truth, &["cut.mcap", "nothing of the bag can be read", "cut off"]);
+    refused("old.bag", odom, truth, &["old.bag", "ROS 1", "version 2.0"]);
     refused(
         "bag",
         odom,
@@ -200,6 +200,8 @@ fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
     );
     refused("bag", odom, "/tf:map", &["/tf:map: this is not a topic", "/tf:map:base_link"]);
     refused("nowhere", odom, truth, &["nowhere", "cannot be read"]);
+    let ended = place.run(&["learn", "effector", "--carmen", "x.log", "--max-speed", "0"]);
+    assert!(ended.code() == 2 && ended.err().contains("--max-speed: no robot moves at 0 m/s"));
     // Options that belong together.
     for args in [&["--bag", "bag"][..], &["--csv", "x.csv", "--odom", "/odom"]] {
         let ended = place.run(&[&["learn", "effector"], args].concat());

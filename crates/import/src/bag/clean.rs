@@ -10,7 +10,7 @@ use sidestep_kernel::InputError;
 
 use super::inspect::{check, inspect};
 use super::messages::{LaserScan, Message, Odometry, PoseStamped, TfMessage};
-use super::storage::{self, RawMessage, Topic};
+use super::storage::{self, ROS1_TITLE, RawMessage, Topic};
 use crate::report::ImportReport;
 
 /// Writes the messages of a bag that can be read to an MCAP file, as they are: in CDR or in the encoding of ROS 1, with the
@@ -20,7 +20,14 @@ use crate::report::ImportReport;
 /// Those of [`inspect`]; when the file cannot be written.
 pub fn write_clean(path: &Path, out: &Path) -> Result<ImportReport, InputError> {
     let report = inspect(path)?;
-    let mut writer = CleanWriter::create(out)?;
+    if let (Ok(from), Ok(to)) = (path.canonicalize(), out.canonicalize())
+        && from == to
+    {
+        let remedy = "give another file for the clean bag";
+        return Err(InputError::new(out.display(), "is the bag itself", remedy));
+    }
+    let profile = if report.format == ROS1_TITLE { "ros1" } else { "ros2" };
+    let mut writer = CleanWriter::create(out, profile)?;
     storage::read(path, &|_| true, &mut |message| writer.add(&message))?;
     writer.finish()?;
     Ok(report)
@@ -33,9 +40,9 @@ struct CleanWriter<'o> {
 }
 
 impl<'o> CleanWriter<'o> {
-    fn create(out: &'o Path) -> Result<Self, InputError> {
+    fn create(out: &'o Path, profile: &str) -> Result<Self, InputError> {
         let file = std::fs::File::create(out).map_err(|e| unwritable(out, &McapError::Io(e)))?;
-        let options = WriteOptions::new().profile("").compression(Some(Compression::Zstd));
+        let options = WriteOptions::new().profile(profile).compression(Some(Compression::Zstd));
         let writer = options.create(BufWriter::new(file)).map_err(|e| unwritable(out, &e))?;
         Ok(Self { out, writer, channels: BTreeMap::new() })
     }

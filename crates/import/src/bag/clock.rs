@@ -10,7 +10,8 @@ use super::poses::StampedPose;
 use crate::report::{ImportReport, Treatment};
 use crate::track::StampedPose2;
 
-/// Messages on a network may overtake each other by up to this; a stamp further back is from a clock that was set back.
+/// Messages on a network may overtake each other by up to this; several stamps further back are from a clock that was set
+/// back.
 const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
 /// A stamp further ahead of the previous one, without as much time in between, is from a clock that was set forward,
 /// such as from 1970 to the present.
@@ -153,7 +154,10 @@ fn backward_jumps(stream: &Stream<'_>) -> Vec<Jump> {
     let mut latest = f64::NEG_INFINITY;
     for (item, stamped) in stream.items.iter().enumerate() {
         let step_secs = stamped.t_secs() - latest;
-        if step_secs < -MAX_BACKWARD_STEP_SECS {
+        // One message alone is late, and its stamp is right.
+        let next = stream.items.get(item + 1);
+        let is_next_back = next.is_some_and(|next| next.t_secs() < latest);
+        if step_secs < -MAX_BACKWARD_STEP_SECS && is_next_back {
             jumps.push(Jump { item, log_secs: stamped.log_secs(), step_secs });
             latest = stamped.t_secs();
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use sidestep_kernel::InputError;
 
 use super::content::{Tally, decode_scan, log_secs};
-use super::messages::{LaserScan, Message};
+use super::messages::{LaserScan, Message, TfMessage};
 use super::poses;
 use super::scans::RangeCounts;
 use super::storage::{self, RawMessage};
@@ -96,7 +96,7 @@ impl TopicFindings {
             Ok(Checked::Poses(t_secs)) => {
                 tally.good += 1;
                 // Transforms of several programs share a topic, and not their time.
-                if !raw.topic.contains("tf") {
+                if raw.info.schema != TfMessage::NAME {
                     self.add_stamp(raw, t_secs);
                 }
             }

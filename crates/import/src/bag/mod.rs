@@ -10,8 +10,8 @@
 //! four million ranges of scans are in memory, whatever its size.
 //!
 //! Times are the stamps of the headers, not those of the recording, which are late by the latency of the network.
-//! Messages that have overtaken each other by up to half a second are sorted. Where stamps go further back the clock was
-//! set: the time after is a part of its own. Tracks are cut where the robot cannot have moved from one pose to the next,
+//! Messages that have overtaken each other by up to half a second are sorted. Where several stamps go further back the
+//! clock was set: the time after is a part of its own. Tracks are cut where the robot cannot have moved from one pose to the next,
 //! see [`SpeedRule`]. Scans follow REP 117, whatever their driver writes, see [`NoEcho`].
 
 pub mod cdr;
@@ -42,7 +42,7 @@ use self::messages::LaserScan;
 pub use self::scans::NoEcho;
 pub use self::topics::{PoseTopic, TopicSelection};
 use crate::report::ImportReport;
-use crate::track::{SpeedRule, Track, cut_and_report};
+use crate::track::{SpeedRule, Track, cut_and_report, report_frozen};
 
 /// The content that was read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -98,6 +98,7 @@ pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputErro
     let truth = cut_and_report(&selection.truth.topic, truth.poses, &rule, &mut report);
     let odometry_topic = selection.odometry.as_ref().map_or("odometry", |source| &*source.topic);
     let odometry = cut_and_report(odometry_topic, odometry, &rule, &mut report);
+    report_frozen(&selection.truth.topic, &truth, &odometry, &mut report);
     report.add_kept("true poses", truth.len());
     report.add_kept("poses of odometry", odometry.len());
     report.add_kept("scans", scans.len());

@@ -11,6 +11,7 @@ const MAX_BEAMS: usize = 1 << 18;
 /// Ranges are equal to a limit within this fraction of it: they are numbers of 32 bits.
 const LIMIT_TOLERANCE: f32 = 1e-6;
 /// A driver that gives each scan the greatest of its own ranges as limit has one beam at that limit, rarely more.
+const MIN_AT_OWN_LIMIT: f64 = 0.5;
 const MAX_AT_OWN_LIMIT: f64 = 2.0;
 /// So many ranges at one limit, and this share of all, are no measurements: one of 32 bits hits a number by chance once
 /// in a million times.
@@ -94,7 +95,7 @@ fn kind_of(range_m: f32, scan: &LaserScan) -> RangeKind {
         RangeKind::TooNear
     } else if range_m <= 0.0 {
         RangeKind::Zero
-    } else if (range_m - max_m).abs() <= LIMIT_TOLERANCE * max_m {
+    } else if max_m.is_finite() && (range_m - max_m).abs() <= LIMIT_TOLERANCE * max_m {
         RangeKind::AtMaximum
     } else if range_m > max_m {
         RangeKind::BeyondMaximum
@@ -119,6 +120,8 @@ pub(super) struct RangeCounts {
     beyond_maximum: u64,
     /// The least and the greatest limit of the ranges of a scan.
     max_m: Option<[f32; 2]>,
+    /// The greatest range between the limits of its scan.
+    greatest_m: f32,
 }
 
 impl RangeCounts {
@@ -126,7 +129,11 @@ impl RangeCounts {
         self.scans += 1;
         self.beams += scan.ranges_m.len() as u64;
         for range_m in &scan.ranges_m {
-            *match kind_of(*range_m, scan) {
+            let kind = kind_of(*range_m, scan);
+            if kind == RangeKind::Measured {
+                self.greatest_m = self.greatest_m.max(*range_m);
+            }
+            *match kind {
                 RangeKind::Measured => &mut self.measured,
                 RangeKind::Infinite => &mut self.infinite,
                 RangeKind::NotANumber => &mut self.not_a_number,
@@ -145,7 +152,16 @@ impl RangeCounts {
     fn is_limit_measured(&self) -> bool {
         let is_varied = self.max_m.is_some_and(|[low, high]| low < high);
         let at_limit = self.at_maximum as f64 / (self.scans as f64).max(1.0);
-        is_varied && at_limit > 0.0 && at_limit <= MAX_AT_OWN_LIMIT
+        is_varied && (MIN_AT_OWN_LIMIT..=MAX_AT_OWN_LIMIT).contains(&at_limit)
+    }
+
+    /// Returns the limit for all scans where their own are none.
+    fn measured_limit_m(&self) -> Option<f32> {
+        let [_, high] = self.max_m?;
+        if !high.is_finite() && self.greatest_m > 0.0 {
+            return Some(self.greatest_m);
+        }
+        self.is_limit_measured().then_some(high)
     }
 
     /// Returns the most frequent value that may stand for "no echo"; `None` where none occurs.
@@ -173,11 +189,7 @@ impl RangeCounts {
         let no_echo = given.or_else(|| self.guess()).unwrap_or(NoEcho::Infinite);
         let convention = ScanConvention {
             no_echo,
-            measured_limit_m: if self.is_limit_measured() {
-                self.max_m.map(|[_, high]| high)
-            } else {
-                None
-            },
+            measured_limit_m: self.measured_limit_m(),
             is_maximum_no_echo: no_echo == NoEcho::Maximum
                 || given.is_none() && self.is_maximum_repeated(),
         };
@@ -227,9 +239,10 @@ impl RangeCounts {
             report.record(Treatment::Guessed, rule, "", remedy);
         }
         if let Some(limit_m) = convention.measured_limit_m {
+            let cause =
+                if self.is_limit_measured() { "its own greatest range" } else { "infinite" };
             let rule = format!(
-                "range_max of each scan on {topic} is its own greatest range: {limit_m} m, the greatest of all, is \
-                 taken for the limit"
+                "range_max of each scan on {topic} is {cause}: {limit_m} m, the greatest of all, is taken for the limit"
             );
             report.record(Treatment::Guessed, rule, "", "");
         }
@@ -398,6 +411,13 @@ mod tests {
             said[0].contains("range_max of each scan on /scan is its own greatest range: 6.25 m"),
             "{said:?}"
         );
+    }
+
+    #[test]
+    fn a_scanner_without_a_limit_reaches_as_far_as_it_has_measured() {
+        let (scans, said) = read(&[scan(INF, &[1.0, 7.5, INF]), scan(INF, &[2.0, 3.0, INF])], None);
+        assert_eq!((scans[1].range_max_m, &scans[0].ranges_m[..]), (7.5, &[1.0, 7.5, INF][..]));
+        assert!(said[0].contains("is infinite: 7.5 m"), "{said:?}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use sidestep_kernel::math::{hypot, wrap_angle};
 use super::messages::{ScanKind, ScanMessage, TimedPose};
 use super::{CarmenMotion, CorrectedLog, LogContent, LogEntry, PoseXyTheta, Scan};
 use crate::report::{ImportReport, Treatment};
-use crate::track::{SpeedRule, StampedPose2, cut_and_report};
+use crate::track::{SpeedRule, StampedPose2, cut_and_report, report_frozen};
 
 /// Poses in a log are rounded to this, in m and rad.
 const ROUNDING: f64 = 1e-3;
@@ -192,7 +192,8 @@ fn does_odometry_restart(log: &CorrectedLog) -> bool {
         repeated += u64::from(is_same(&scan.pose, first));
     }
     // Where nothing tells, a log is of the form that SLAM programs write.
-    2 * repeated > moved || moved == 0
+    let has_odometry = log.scans.iter().any(|scan| !scan.odometry.is_empty());
+    has_odometry && (2 * repeated > moved || moved == 0)
 }
 
 /// Checks that the scans are not where odometry has them.
@@ -251,10 +252,10 @@ fn tracks(
     }
     let [odometry, truth] = [&poses.odometry, &poses.truth].map(|poses| by_time(poses));
     let rule = SpeedRule::for_tracks(max_speed_mps, &[&odometry, &truth]);
-    CarmenMotion::Tracks {
-        odometry: cut_and_report("ODOM", odometry, &rule, report),
-        truth: cut_and_report("the true poses", truth, &rule, report),
-    }
+    let odometry = cut_and_report("ODOM", odometry, &rule, report);
+    let truth = cut_and_report("the true poses", truth, &rule, report);
+    report_frozen("the true poses", &truth, &odometry, report);
+    CarmenMotion::Tracks { odometry, truth }
 }
 
 fn by_time(poses: &[TimedPose]) -> Vec<StampedPose2> {

@@ -4,9 +4,10 @@ use super::carmen::{EventRule, learn_with_rule};
 use super::{LearnedEffector, check_box};
 use crate::EstimateOptions;
 use crate::track::{Gaps, Pose2, pose_at};
+use sidestep_import::ImportReport;
 use sidestep_import::bag::BagLog;
 use sidestep_import::carmen::{CorrectedLog, Scan};
-use sidestep_import::mrclam::StampedPose2;
+use sidestep_import::track::{StampedPose2, Track};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::hypot;
 
@@ -35,33 +36,82 @@ pub(super) fn learn(
         path_m: PATH_FRACTION * box_m,
         remedy: "choose a smaller box, or a bag in which the robot drives",
     };
-    let mut model = learn_with_rule(&rule, source, &windows(log, box_m), options)?;
+    let windows = Windows::cut(&log.odometry, &log.truth, box_m);
+    let mut model = learn_with_rule(&rule, source, &windows.log, options)?;
     model.report.box_m = Some(box_m);
     model.profile.box_m = Some(box_m);
+    windows.report(&mut model);
     Ok(model)
 }
 
-/// Returns the true pose at the end of each window, and the poses that odometry claims in between.
-fn windows(log: &BagLog, box_m: f64) -> CorrectedLog {
-    let gaps = Gaps::from_track(&log.odometry);
-    let mut scans: Vec<Scan> = Vec::new();
-    let mut open: Option<OdometryWindow> = None;
-    for truth in &log.truth {
-        let Some(believed) = pose_at(&log.odometry, truth.t_secs) else { continue };
-        let stretch = gaps.count_before(truth.t_secs);
-        let Some(window) = open.as_mut().filter(|window| window.stretch == stretch) else {
-            // Between stretches the claims of odometry are unknown.
-            scans.extend(open.take().map(OdometryWindow::into_unpaired_scan));
-            open = Some(OdometryWindow::new(truth, believed, stretch));
-            continue;
-        };
-        if window.extend(&believed, box_m) {
-            let done = open.replace(OdometryWindow::new(truth, believed, stretch));
-            scans.extend(done.map(|done| done.scan));
+/// The length of the windows of a CARMEN log with true poses: programs that correct such logs take a scan about every
+/// meter.
+const CARMEN_WINDOW_M: f64 = 1.0;
+/// The rule by which events of such a log become transitions.
+const CARMEN_RULE: &str = "odometry against true poses over windows of one meter or half a radian, displacement over \
+    claimed path, phase-averaged (L6), outcomes beyond the five spread in proportion; turns in place, true \
+    over claimed taken for the share of a quarter turn, phase-averaged; every count plus alpha";
+
+/// Learns from the tracks of a CARMEN log, in units of the claimed move.
+pub(super) fn learn_tracks(
+    source: &str,
+    odometry: &Track,
+    truth: &Track,
+    options: &EstimateOptions,
+) -> Result<LearnedEffector, InputError> {
+    let rule = EventRule {
+        words: CARMEN_RULE,
+        path_m: PATH_FRACTION * CARMEN_WINDOW_M,
+        remedy: "give a log in which the robot drives",
+    };
+    let windows = Windows::cut(odometry, truth, CARMEN_WINDOW_M);
+    let mut model = learn_with_rule(&rule, source, &windows.log, options)?;
+    windows.report(&mut model);
+    Ok(model)
+}
+
+/// Adds what was found in a log to the warnings of what was learned from it.
+pub(super) fn add_findings(model: &mut LearnedEffector, name: &str, report: &ImportReport) {
+    model.report.warnings.extend(crate::import_warnings(name, report));
+}
+
+/// The true pose at the end of each window, and the poses that odometry claims in between.
+struct Windows {
+    log: CorrectedLog,
+    /// Number of windows that a gap or a jump has cut short.
+    broken: u64,
+}
+
+impl Windows {
+    fn cut(odometry: &Track, truth: &Track, box_m: f64) -> Self {
+        let breaks = [Gaps::from_track(odometry), Gaps::cuts_of(truth)];
+        let mut scans: Vec<Scan> = Vec::new();
+        let mut open: Option<OdometryWindow> = None;
+        let mut broken = 0;
+        for truth in truth.iter() {
+            let Some(believed) = pose_at(odometry, truth.t_secs) else { continue };
+            let stretch = breaks.iter().map(|gaps| gaps.count_before(truth.t_secs)).sum();
+            let Some(window) = open.as_mut().filter(|window| window.stretch == stretch) else {
+                // Between stretches the claims of odometry, or the motion, are unknown.
+                broken += u64::from(open.is_some());
+                scans.extend(open.take().map(OdometryWindow::into_unpaired_scan));
+                open = Some(OdometryWindow::new(truth, believed, stretch));
+                continue;
+            };
+            if window.extend(&believed, box_m) {
+                let done = open.replace(OdometryWindow::new(truth, believed, stretch));
+                scans.extend(done.map(|done| done.scan));
+            }
+        }
+        scans.extend(open.map(|last| last.scan));
+        Self { log: CorrectedLog { odometry_before: Vec::new(), scans }, broken }
+    }
+
+    fn report(&self, model: &mut LearnedEffector) {
+        if self.broken > 0 {
+            model.report.rejected.insert("gap".into(), self.broken);
         }
     }
-    scans.extend(open.map(|last| last.scan));
-    CorrectedLog { odometry_before: Vec::new(), scans }
 }
 
 /// The time since a true pose, and the claims of odometry about it.
@@ -99,6 +149,7 @@ impl OdometryWindow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::track::{SpeedRule, cut_track};
 
     fn pose(t_secs: f64, x_m: f64, heading_rad: f64) -> StampedPose2 {
         StampedPose2 { t_secs, position_m: [x_m, 0.0], heading_rad }
@@ -111,7 +162,7 @@ mod tests {
     }
 
     fn log(odometry: Vec<StampedPose2>, truth: Vec<StampedPose2>) -> BagLog {
-        BagLog { odometry, truth, scans: Vec::new(), mount: None }
+        BagLog { odometry: odometry.into(), truth: truth.into(), ..BagLog::default() }
     }
 
     #[test]
@@ -133,6 +184,49 @@ mod tests {
         let report = model.unwrap().report;
         assert_eq!(report.events, 8, "0 to 4 s and 6 to 10 s");
         assert!(report.moments["ahead_boxes"].sd < 1e-9);
+    }
+
+    #[test]
+    fn nothing_is_learned_across_a_jump_of_the_truth_or_of_odometry() {
+        let cut = |poses: Vec<StampedPose2>| {
+            let rule = SpeedRule::for_tracks(None, &[&poses, &track(401, 1.0)]);
+            cut_track(poses, &rule).track
+        };
+        let mut lost = track(401, 1.0);
+        for pose in &mut lost[200..220] {
+            pose.position_m = [0.0; 2];
+        }
+        // The driver starts again at 0.
+        let mut restarted = track(401, 1.0);
+        for pose in &mut restarted[123..] {
+            pose.position_m[0] -= 12.3;
+        }
+        let logs = [
+            BagLog { odometry: track(401, 1.0).into(), truth: cut(lost), ..BagLog::default() },
+            BagLog { odometry: cut(restarted), truth: track(401, 1.0).into(), ..BagLog::default() },
+        ];
+        for log in logs {
+            let report = learn("f", &log, 0.5, &EstimateOptions::default()).unwrap().report;
+            let ahead = report.moments["ahead_boxes"];
+            assert!(
+                ahead.n >= 74 && (ahead.mean - 1.0).abs() < 1e-9 && ahead.sd < 1e-9,
+                "{ahead:?}"
+            );
+            assert_eq!(report.rejected, [("gap".to_string(), 1)].into());
+        }
+    }
+
+    #[test]
+    fn the_true_poses_of_a_carmen_log_are_compared_over_a_meter() {
+        let model = learn_tracks(
+            "f",
+            &track(101, 1.0).into(),
+            &track(101, 0.9).into(),
+            &EstimateOptions::default(),
+        );
+        let report = model.unwrap().report;
+        assert_eq!((report.events, report.box_m), (10, None));
+        assert!((report.moments["ahead_boxes"].mean - 0.9).abs() < 1e-9);
     }
 
     #[test]

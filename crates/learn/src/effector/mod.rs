@@ -1,7 +1,7 @@
 //! The real motion of a robot after a commanded move or turn.
 //!
 //! [`from_mrclam`] compares velocity commands with motion capture (L5, L7), [`from_carmen`]
-//! odometry with a corrected log (L6), [`from_bag`] odometry with the true poses of a ROS 2 bag by the same
+//! odometry with a corrected log (L6), [`from_bag`] odometry with the true poses of a bag of ROS by the same
 //! rule; [`from_csv`] takes displacements that were already measured.
 //! A displacement is given in the frame of the pose it starts from: ahead, left, and turn (+ =
 //! left).
@@ -35,6 +35,7 @@ use std::path::Path;
 
 use super::EstimateOptions;
 use sidestep_import::bag::TopicSelection;
+use sidestep_import::carmen::CarmenMotion;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
@@ -72,7 +73,8 @@ impl LearnedEffector {
     }
 }
 
-/// Learns moves of `box_m` meters and turns of 90 degrees from an MRCLAM folder.
+/// Learns moves of `box_m` meters and turns of 90 degrees from an MRCLAM folder; `max_speed_mps` is the greatest speed of
+/// the robots, see [`SpeedRule`](sidestep_import::track::SpeedRule).
 ///
 /// # Errors
 /// When a file is missing or damaged, `options` are not valid, `box_m` is not from 0.001 to 1000 m,
@@ -80,11 +82,14 @@ impl LearnedEffector {
 pub fn from_mrclam(
     folder: &Path,
     box_m: f64,
+    max_speed_mps: Option<f64>,
     options: &EstimateOptions,
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
-    let dataset = sidestep_import::mrclam::read(folder)?;
-    mrclam::learn(&folder.display().to_string(), &dataset, box_m, options).map(judged)
+    let dataset = sidestep_import::mrclam::read(folder, max_speed_mps)?;
+    let mut model = mrclam::learn(&folder.display().to_string(), &dataset, box_m, options)?;
+    bag::add_findings(&mut model, "the logs", &dataset.report);
+    Ok(judged(model))
 }
 
 /// Judges a model by the events and the windows of its log that were rejected.
@@ -94,23 +99,41 @@ fn judged(mut model: LearnedEffector) -> LearnedEffector {
     model
 }
 
-/// Learns moves and turns from a corrected CARMEN log, in units of the commanded move.
+/// Learns moves and turns from a CARMEN log, in units of the commanded move; `max_speed_mps` is the greatest speed of the
+/// robot, see [`SpeedRule`](sidestep_import::track::SpeedRule).
+///
+/// A log that a SLAM program has corrected is compared from scan to scan. Where it has true poses beside odometry
+/// ([`CarmenMotion::Tracks`](sidestep_import::carmen::CarmenMotion)), windows of a meter or half a radian are, as
+/// [`from_bag`] does.
 ///
 /// The report warns when the odometry in the log slips sideways by more than 2 % of its steps,
 /// because then the log holds the samples of a SLAM program instead of wheel measurements.
 ///
 /// # Errors
 /// When the file is missing or damaged, `options` are not valid, or no move is long enough.
-pub fn from_carmen(file: &Path, options: &EstimateOptions) -> Result<LearnedEffector, InputError> {
+pub fn from_carmen(
+    file: &Path,
+    max_speed_mps: Option<f64>,
+    options: &EstimateOptions,
+) -> Result<LearnedEffector, InputError> {
     options.check()?;
-    let log = sidestep_import::carmen::read(file)?;
-    carmen::learn(&file.display().to_string(), &log, options).map(judged)
+    let log = sidestep_import::carmen::read(file, max_speed_mps)?;
+    let source = file.display().to_string();
+    let mut model = match &log.motion {
+        CarmenMotion::Corrected(corrected) => carmen::learn(&source, corrected, options)?,
+        CarmenMotion::Tracks { odometry, truth } => {
+            bag::learn_tracks(&source, odometry, truth, options)?
+        }
+    };
+    bag::add_findings(&mut model, "the log", &log.report);
+    Ok(judged(model))
 }
 
-/// Learns moves and turns from odometry and true poses in a ROS 2 bag.
+/// Learns moves and turns from odometry and true poses in a bag of ROS.
 ///
 /// A window ends at the first true pose at which odometry claims a path of `box_m` meters since the window began, or
-/// a turn of half a radian, and the next begins there; across a gap of odometry of more than 0.5 s there is none.
+/// a turn of half a radian, and the next begins there; across a gap of odometry of more than 0.5 s, and across a
+/// jump of either, there is none.
 /// Windows are judged as those of a CARMEN log between two scans, with paths in proportion to `box_m` in place of
 /// 1 m, after which the mapping programs of such logs take a scan.
 ///
@@ -125,7 +148,9 @@ pub fn from_bag(
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let log = sidestep_import::bag::read(path, wanted)?;
-    bag::learn(&path.display().to_string(), &log, box_m, options).map(judged)
+    let mut model = bag::learn(&path.display().to_string(), &log, box_m, options)?;
+    bag::add_findings(&mut model, "the bag", &log.report);
+    Ok(judged(model))
 }
 
 /// Options of learning an effector from a table of displacements.

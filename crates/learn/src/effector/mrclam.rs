@@ -155,6 +155,7 @@ fn as_turn(window: &CommandWindow, robot: &RobotLog, end_secs: f64) -> Option<Tu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::ImportReport;
     use sidestep_import::mrclam::StampedPose2;
 
     /// Commands once a second from t = 0; the robot moves at 1.1 m/s along x and does not turn.
@@ -211,6 +212,7 @@ mod tests {
             subject_of_barcode: BTreeMap::new(),
             landmarks: BTreeMap::new(),
             robots: [(1, robot(&[(1.0, 0.0); 6]))].into(),
+            report: ImportReport::default(),
         };
         let learned = |box_m| learn("folder", &dataset, box_m, &EstimateOptions::default());
         assert!(learned(100.0).unwrap_err().remedy().contains("smaller"));

@@ -38,7 +38,7 @@ fn moves_of_every_box_size_are_those_of_the_oracle() {
     for (box_m, key) in
         [(0.1, "forward_0.1"), (0.25, "forward_0.25"), (0.5, "forward_0.5"), (1.0, "forward_1.0")]
     {
-        let model = from_mrclam(&folder, box_m, &EstimateOptions::default()).unwrap();
+        let model = from_mrclam(&folder, box_m, None, &EstimateOptions::default()).unwrap();
         let report = as_json(&model);
         assert_forward(&report, &expected[key], key);
         let rejected = &expected[key]["rejected"];
@@ -53,7 +53,7 @@ fn moves_of_every_box_size_are_those_of_the_oracle() {
 #[test]
 fn turns_are_those_of_the_oracle() {
     let Some(folder) = shared("logs/mrclam7") else { return };
-    let model = from_mrclam(&folder, 0.25, &EstimateOptions::default()).unwrap();
+    let model = from_mrclam(&folder, 0.25, None, &EstimateOptions::default()).unwrap();
     let (report, expected) = (as_json(&model), expected("mrclam7_dev_effector.json"));
     let (turns, expected) = (&report["turns"], &expected["turn_45deg"]);
     for key in ["n", "n_left", "n_right", "hist_15deg"] {
@@ -66,7 +66,7 @@ fn turns_are_those_of_the_oracle() {
 
 fn assert_carmen(log: &str, oracle: &str) {
     let Some(file) = shared(log) else { return };
-    let model = from_carmen(&file, &EstimateOptions::default()).unwrap();
+    let model = from_carmen(&file, None, &EstimateOptions::default()).unwrap();
     let (report, expected) = (as_json(&model), expected(oracle));
     assert_forward(&report, &expected["forward_one_box"], log);
     assert_moments(&report["lateral_slip"], &expected["lateral_slip_ratio"], 1.0, "slip");
@@ -97,7 +97,7 @@ fn the_fhw_log_gives_the_moves_of_the_oracle() {
 #[test]
 fn the_printed_report_names_the_figures_that_matter() {
     let Some(folder) = shared("logs/mrclam7") else { return };
-    let model = from_mrclam(&folder, 0.25, &EstimateOptions::default()).unwrap();
+    let model = from_mrclam(&folder, 0.25, None, &EstimateOptions::default()).unwrap();
     let printed = model.report.to_string();
     assert!(printed.contains("498 moves of one box (0.25 m) ahead"));
     let p: f64 =

@@ -6,7 +6,7 @@ use super::{assert_close, assert_moments, expected, shared};
 use crate::sensor::{LearnedSensor, SensorOptions, from_mrclam};
 
 fn learned() -> Option<(LearnedSensor, Value, Value)> {
-    let model = from_mrclam(&shared("logs/mrclam7")?, &SensorOptions::default()).unwrap();
+    let model = from_mrclam(&shared("logs/mrclam7")?, None, &SensorOptions::default()).unwrap();
     let report = serde_json::to_value(&model.report).unwrap();
     Some((model, report, expected("mrclam7_dev_sensor.json")))
 }

@@ -1,6 +1,6 @@
 //! A laser scanner learned from the scans of a bag: the ranges expected from a map against those measured.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::LearnedSensor;
 use super::camera::{NOTHING, SensorProfile};
@@ -59,7 +59,8 @@ pub(super) fn learn(
     report.skipped = n_skipped;
     report.skipped_by_cause = judged.skipped;
     report.warnings.extend(against.warning(MAX_IN_FRONT_FRACTION));
-    report.warnings.extend(mount_warning(log));
+    report.warnings.extend(crate::import_warnings("the bag", &log.report));
+    report.warnings.extend(mount_warnings(log));
     report.warnings.extend(map_warnings(map));
     report.against_map = Some(against);
     model.profile = with_walls_only(model.profile);
@@ -74,15 +75,16 @@ fn with_walls_only(profile: SensorProfile) -> SensorProfile {
     SensorProfile { designates: designates.collect(), ..profile }
 }
 
-fn mount_warning(log: &BagLog) -> Option<String> {
-    if log.mount.is_some() {
-        return None;
-    }
-    let frame = &log.scans.first()?.header.frame_id;
-    Some(format!(
-        "no static transform places the frame `{frame}` of the scans on the robot (/tf_static): the scanner \
-         is taken to sit in its middle and to look ahead"
-    ))
+fn mount_warnings(log: &BagLog) -> Vec<String> {
+    let frames: BTreeSet<&str> = log.scans.iter().map(|scan| &*scan.header.frame_id).collect();
+    let unplaced = frames.into_iter().filter(|frame| !log.mounts.contains_key(*frame));
+    let warning = |frame| {
+        format!(
+            "no static transform places the frame `{frame}` of the scans on the robot (/tf_static): the scanner \
+             is taken to sit in its middle and to look ahead"
+        )
+    };
+    unplaced.map(warning).collect()
 }
 
 /// Returns what may make the map another than the one that its author means.
@@ -99,13 +101,15 @@ fn map_warnings(map: &PixelMap) -> Vec<String> {
 /// Returns the options with the fan and the range of the scans, where no others are asked for.
 pub(super) fn scan_options(
     options: &SensorOptions,
-    scan: &LaserScan,
+    scans: &[LaserScan],
     range_m: Option<f64>,
     bearings_deg: Option<&[f64]>,
 ) -> SensorOptions {
+    let greatest_m = scans.iter().map(|scan| f64::from(scan.range_max_m)).fold(0.0, f64::max);
+    let fan = || scans.first().map_or_else(Vec::new, thinned_bearings_deg);
     SensorOptions {
-        range_m: range_m.unwrap_or(f64::from(scan.range_max_m)),
-        bearings_deg: bearings_deg.map_or_else(|| thinned_bearings_deg(scan), <[f64]>::to_vec),
+        range_m: range_m.unwrap_or(greatest_m),
+        bearings_deg: bearings_deg.map_or_else(fan, <[f64]>::to_vec),
         ..options.clone()
     }
 }
@@ -146,15 +150,20 @@ struct BeamEvaluator<'a> {
     range_m: f64,
     classes: &'a DistanceClasses,
     gaps: Gaps,
-    mount: ScannerMount,
+    /// The mounts of the frames of scans.
+    mounts: BTreeMap<&'a str, ScannerMount>,
+    /// The mount of a frame that nothing places.
+    middle: ScannerMount,
 }
 
 impl<'a> BeamEvaluator<'a> {
     fn new(log: &'a BagLog, map: &'a PixelMap, range_m: f64, classes: &'a DistanceClasses) -> Self {
         let gaps = Gaps::from_track(&log.odometry);
-        let mount =
-            ScannerMount::from_pose(log.mount.unwrap_or(view::Pose::from_position([0.0; 3])));
-        Self { log, map, range_m, classes, gaps, mount }
+        let mounts = log.mounts.iter();
+        let mounts =
+            mounts.map(|(frame, pose)| (&**frame, ScannerMount::from_pose(*pose))).collect();
+        let middle = ScannerMount::from_pose(view::Pose::from_position([0.0; 3]));
+        Self { log, map, range_m, classes, gaps, mounts, middle }
     }
 
     fn evaluate_all(&self) -> EvaluatedBeams {
@@ -207,7 +216,8 @@ impl<'a> BeamEvaluator<'a> {
         if measured_m < min_m {
             return Err("nearer_than_measured");
         }
-        let (from_m, direction_rad) = self.mount.beam(pose, bearing_rad(scan, beam));
+        let mount = self.mounts.get(&*scan.header.frame_id).unwrap_or(&self.middle);
+        let (from_m, direction_rad) = mount.beam(pose, bearing_rad(scan, beam));
         let limit_m = self.range_m.min(max_m);
         let expected_m = match self.map.cast_ray(from_m, direction_rad, limit_m) {
             RayHit::Unknown => return Err("unmapped"),
@@ -215,8 +225,8 @@ impl<'a> BeamEvaluator<'a> {
             RayHit::Wall(range_m) => Some(range_m),
             RayHit::Nothing => None,
         };
-        // Many drivers report the greatest range where nothing answers.
-        let reported_m = (measured_m < max_m && measured_m <= limit_m).then_some(measured_m);
+        // Ranges follow REP 117: where nothing answers they are infinite.
+        let reported_m = (measured_m <= limit_m).then_some(measured_m);
         Ok(self.reading(expected_m, reported_m))
     }
 
@@ -303,10 +313,10 @@ mod tests {
     fn log(scans: Vec<LaserScan>) -> BagLog {
         let truth = (0..5).map(|k| pose(f64::from(k), 1.0)).collect();
         BagLog {
-            odometry: Vec::new(),
             truth,
             scans,
-            mount: Some(view::Pose::from_position([0.0; 3])),
+            mounts: [("laser".to_owned(), view::Pose::from_position([0.0; 3]))].into(),
+            ..BagLog::default()
         }
     }
 
@@ -320,7 +330,7 @@ mod tests {
     }
 
     fn learned(log: &BagLog) -> Result<LearnedSensor, InputError> {
-        let own = scan_options(&SensorOptions::default(), &log.scans[0], None, None);
+        let own = scan_options(&SensorOptions::default(), &log.scans, None, None);
         let options = SensorOptions { distance_edges_m: vec![2.0], ..own };
         learn("f", log, &room(), &options, &options.check()?)
     }
@@ -332,7 +342,7 @@ mod tests {
         let scans = vec![
             scan(0, [1.0, nothing, 3.0]),
             scan(1, [nothing, 2.0, 1.0]),
-            scan(2, [1.1, 4.5, 4.4]),
+            scan(2, [1.1, nothing, 4.4]),
         ];
         let model = learned(&log(scans)).unwrap();
         let against =
@@ -358,7 +368,7 @@ mod tests {
         assert_eq!((report.measurements, report.sightings, report.skipped), (6, 1, 5));
         let error = learned(&log(vec![scan(9, [1.0; 3])])).unwrap_err();
         assert!(error.cause().contains("3 no true pose"), "{error}");
-        let far = BagLog { truth: vec![pose(0.0, 99.0)], ..log(vec![scan(0, [1.0; 3])]) };
+        let far = BagLog { truth: vec![pose(0.0, 99.0)].into(), ..log(vec![scan(0, [1.0; 3])]) };
         assert!(learned(&far).unwrap_err().cause().contains("3 unmapped"));
     }
 
@@ -366,7 +376,8 @@ mod tests {
     fn a_scanner_is_where_it_is_mounted_and_may_hang_upside_down() {
         // Ahead of the middle, turned by half a turn about x: left is right.
         let mount = view::Pose { at_m: [0.4, 0.0, 0.0], turn: [1.0, 0.0, 0.0, 0.0] };
-        let hanging = BagLog { mount: Some(mount), ..log(vec![scan(0, [3.0, 4.4, 1.0])]) };
+        let mounts = [("laser".to_owned(), mount)].into();
+        let hanging = BagLog { mounts, ..log(vec![scan(0, [3.0, 4.4, 1.0])]) };
         let report = learned(&hanging).unwrap().report;
         assert_eq!(report.against_map.map(|beams| (beams.agreeing, beams.not_there)), Some((2, 1)));
         assert!(report.errors.range_error_m.unwrap().sd < 1e-6);
@@ -376,8 +387,36 @@ mod tests {
     }
 
     #[test]
+    fn each_frame_of_scans_has_its_own_place_and_the_range_is_the_greatest_of_all() {
+        let mut behind = scan(1, [3.0, 2.0, 1.0]);
+        behind.header.frame_id = "rear".into();
+        behind.range_max_m = 7.0;
+        let mut both = log(vec![scan(0, [1.0, f32::INFINITY, 3.0]), behind]);
+        // It looks to the right from a meter behind the first: the wall behind is at 1 m.
+        both.truth = (0..5).map(|k| pose(f64::from(k), 2.0)).collect();
+        let facing = view::Pose::from_heading([-1.0, 0.0, 0.0], -FRAC_PI_2);
+        both.mounts.insert("rear".into(), facing);
+        let own = scan_options(&SensorOptions::default(), &both.scans, None, None);
+        assert_eq!(own.range_m, 7.0);
+        let report = learned(&both).unwrap().report;
+        assert_eq!(report.skipped, 0);
+        assert!(!report.warnings.iter().any(|warning| warning.contains("places the frame")));
+    }
+
+    #[test]
+    fn what_was_found_in_the_bag_is_a_warning() {
+        let mut found = log(vec![scan(0, [1.0, f32::INFINITY, 3.0])]);
+        found.report.record(Treatment::Guessed, "NaN on /scan is no echo", "", "");
+        found.report.record(Treatment::NotUsed, "ranges that are 0", "", "");
+        let warnings = learned(&found).unwrap().report.warnings;
+        assert_eq!(warnings[0], "the bag: guessed: NaN on /scan is no echo");
+        assert!(!warnings.iter().any(|warning| warning.contains("not used")));
+    }
+
+    #[test]
     fn a_scanner_that_nothing_places_is_warned_of() {
-        let unplaced = BagLog { mount: None, ..log(vec![scan(0, [1.0, 9.0, 3.0])]) };
+        let scans = vec![scan(0, [1.0, f32::INFINITY, 3.0])];
+        let unplaced = BagLog { mounts: BTreeMap::new(), ..log(scans) };
         assert!(learned(&unplaced).unwrap().report.warnings[0].contains("`laser`"));
     }
 
@@ -387,7 +426,7 @@ mod tests {
             let odometry =
                 (0..30).map(|k| pose(0.1 * f64::from(k), far_m * f64::from(k) / 20.0)).collect();
             // At 2 s the robot is `far_m` ahead of the last true pose, so that the wall is nearer.
-            let truth = vec![pose(0.0, 1.0), pose(9.0, 1.0)];
+            let truth = vec![pose(0.0, 1.0), pose(9.0, 1.0)].into();
             let scans = vec![scan(2, [1.0, (5.0 - far_m) as f32, 3.0])];
             learned(&BagLog { odometry, truth, ..log(scans) })
         };
@@ -401,7 +440,7 @@ mod tests {
         let mut wide = scan(0, [1.0; 3]);
         (wide.ranges_m, wide.angle_min_rad) = (vec![1.0; 360], -PI as f32);
         wide.angle_increment_rad = (PI / 180.0) as f32;
-        let fan = scan_options(&SensorOptions::default(), &wide, Some(3.0), None);
+        let fan = scan_options(&SensorOptions::default(), &[wide], Some(3.0), None);
         assert_eq!((fan.bearings_deg.len(), fan.range_m), (16, 3.0));
         assert!((fan.bearings_deg[8] - 15.0).abs() < 2.0, "{:?}", fan.bearings_deg);
         assert!(matches!(room().cast_ray([1.0, 1.0], 0.0, 9.0), RayHit::Wall(_)));

@@ -179,7 +179,9 @@ mod tests {
         let robot = dataset.robots.get_mut(&1).unwrap();
         let command = |t_secs| VelocityCommand { t_secs, forward_mps: 0.0, turn_radps: 0.0 };
         robot.commands = vec![command(0.0), command(1e12)];
-        robot.truth.last_mut().unwrap().t_secs = 1e12;
+        let mut truth = robot.truth.to_vec();
+        truth.last_mut().unwrap().t_secs = 1e12;
+        robot.truth = truth.into();
         assert_eq!(bins(robot), None);
     }
 }

@@ -63,14 +63,21 @@ impl LearnedSensor {
     }
 }
 
-/// Learns a camera from an MRCLAM folder.
+/// Learns a camera from an MRCLAM folder; `max_speed_mps` is the greatest speed of the robots, see
+/// [`SpeedRule`](sidestep_import::track::SpeedRule).
 ///
 /// # Errors
 /// When a file is missing or damaged, or `options` are not valid.
-pub fn from_mrclam(folder: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
+pub fn from_mrclam(
+    folder: &Path,
+    max_speed_mps: Option<f64>,
+    options: &SensorOptions,
+) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
-    let dataset = sidestep_import::mrclam::read(folder)?;
-    mrclam::learn(&folder.display().to_string(), &dataset, options, &classes).map(judged)
+    let dataset = sidestep_import::mrclam::read(folder, max_speed_mps)?;
+    let mut model = mrclam::learn(&folder.display().to_string(), &dataset, options, &classes)?;
+    model.report.warnings.extend(crate::import_warnings("the logs", &dataset.report));
+    Ok(judged(model))
 }
 
 /// Judges a model by the readings of its log that were skipped.
@@ -90,7 +97,7 @@ pub struct Scanner<'a> {
     pub bearings_deg: Option<&'a [f64]>,
 }
 
-/// Learns a scanner from the scans and true poses in a ROS 2 bag.
+/// Learns a scanner from the scans and true poses in a bag of ROS.
 ///
 /// A beam is expected to end at the first wall of the map, from the true pose at its time (L1; where true poses are
 /// farther apart, odometry gives the motion since the last one, up to a meter). Beams that run into unmapped places
@@ -111,10 +118,10 @@ pub fn from_bag(
     })?;
     let source = path.display().to_string();
     let log = sidestep_import::bag::read(path, wanted)?;
-    let Some(scan) = log.scans.first() else {
+    if log.scans.is_empty() {
         return Err(InputError::new(source, "no scans were read", "give the topic of the scans"));
-    };
-    let options = bag::scan_options(options, scan, scanner.range_m, scanner.bearings_deg);
+    }
+    let options = bag::scan_options(options, &log.scans, scanner.range_m, scanner.bearings_deg);
     let classes = options.check()?;
     bag::learn(&source, &log, &map, &options, &classes).map(judged)
 }

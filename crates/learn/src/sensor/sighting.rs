@@ -175,6 +175,7 @@ pub(super) fn position_of(dataset: &Dataset, subject: u32, t_secs: f64) -> Optio
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use sidestep_import::ImportReport;
     use sidestep_import::mrclam::{RobotLog, StampedPose2};
 
     /// Robot 1 stands at the origin and looks along x from t = 0 to 10 s; robot 2 stands at
@@ -195,6 +196,7 @@ pub(super) mod tests {
             subject_of_barcode: [1, 2, 6, 7].map(|s| (s * 10, s)).into(),
             landmarks: [(6, [2.0, 0.5]), (7, [2.0, -0.5])].into(),
             robots: [(1, first), (2, second)].into(),
+            report: ImportReport::default(),
         }
     }
 

@@ -80,9 +80,9 @@ fn the_models_of_what_was_learned_are_those_that_a_scenario_loads() {
 fn a_camera_from_mrclam_loads_with_its_wheels() {
     let Some(folder) = sidestep_testing::shared_data("logs/mrclam7") else { return };
     let folder = folder.as_path();
-    let camera = sensor::from_mrclam(folder, &SensorOptions::default()).unwrap();
+    let camera = sensor::from_mrclam(folder, None, &SensorOptions::default()).unwrap();
     let options = EstimateOptions::default();
-    let wheels = effector::from_mrclam(folder, 0.25, &options).unwrap();
+    let wheels = effector::from_mrclam(folder, 0.25, None, &options).unwrap();
     let text = with_sensor("p.toml", &empty("mrclam7"), "camera", &camera).unwrap();
     let text = with_effector("p.toml", &text, "create", &wheels).unwrap();
     loads(&text, "camera", "create").unwrap();

@@ -102,7 +102,7 @@ impl Metadata {
     }
 }
 
-const REMEDY: &str = "give the .mcap, .db3 or .bag file itself, or restore the folder with `ros2 bag reindex FOLDER`";
+const REMEDY: &str = "delete metadata.yaml: all files in the folder are read without it, in the order of their numbers";
 
 /// The keys that lead to the present value.
 #[derive(Debug, Default)]

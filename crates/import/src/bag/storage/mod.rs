@@ -92,6 +92,9 @@ fn unpack_to_disk(file: &mut Unpacked) -> io::Result<tempfile::NamedTempFile> {
     Ok(unpacked)
 }
 
+/// The format of a bag of ROS 1 in reports.
+pub(super) const ROS1_TITLE: &str = "bag of ROS 1";
+
 /// The formats of files that bags consist of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
@@ -127,7 +130,7 @@ impl Format {
         match self {
             Self::Mcap => "bag (MCAP)",
             Self::Sqlite => "bag of ROS 2 (SQLite)",
-            Self::Ros1 => "bag of ROS 1",
+            Self::Ros1 => ROS1_TITLE,
         }
     }
 }

@@ -12,6 +12,7 @@ use rusqlite::{Connection, OpenFlags};
 use sidestep_kernel::InputError;
 
 use super::sink::{MAX_RECORD_BYTES, Sink, Topic, ros2_name};
+use crate::report::Treatment;
 
 /// The first bytes of a file.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -26,11 +27,17 @@ const SETTINGS: &str =
 /// # Errors
 /// When it is no bag; those of the sink.
 pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), InputError> {
-    let opened = open(path).and_then(|database| Ok((read_topics(&database)?, database)));
-    let (topics, database) = opened.map_err(|error| {
+    let opened = open(path).and_then(|opened| Ok((read_topics(&opened.database)?, opened)));
+    let (topics, Opened { database, is_alone }) = opened.map_err(|error| {
         let cause = format!("is no readable bag in SQLite: {error}");
         InputError::new(file, cause, "give a bag of `ros2 bag record`, or copy it again")
     })?;
+    if is_alone && has_journal(path) {
+        let rule =
+            "a journal beside the file, which may hold its last messages and cannot be read here";
+        let remedy = "copy the file and its journal into a folder that may be written to";
+        sink.report.record(Treatment::Suspicious, rule, file, remedy);
+    }
     for (name, topic) in topics.values() {
         sink.declare(name, topic.clone());
     }
@@ -57,14 +64,28 @@ impl From<rusqlite::Error> for ReadError {
     }
 }
 
-fn open(path: &Path) -> rusqlite::Result<Connection> {
+/// A file that was opened, alone where its journal cannot be read.
+struct Opened {
+    database: Connection,
+    is_alone: bool,
+}
+
+fn has_journal(path: &Path) -> bool {
+    ["-wal", "-journal"]
+        .iter()
+        .any(|suffix| Path::new(&format!("{}{suffix}", path.display())).is_file())
+}
+
+fn open(path: &Path) -> rusqlite::Result<Opened> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let plain = Connection::open_with_flags(path, flags).and_then(prepared);
     // A bag whose recorder was killed has a journal; in a folder that cannot be written only the file itself is read.
-    plain.or_else(|_| {
-        let uri = format!("file:{}?immutable=1", uri_path(path));
-        Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI).and_then(prepared)
-    })
+    if let Ok(database) = plain {
+        return Ok(Opened { database, is_alone: false });
+    }
+    let uri = format!("file:{}?immutable=1", uri_path(path));
+    let alone = Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI);
+    Ok(Opened { database: alone.and_then(prepared)?, is_alone: true })
 }
 
 fn prepared(database: Connection) -> rusqlite::Result<Connection> {
