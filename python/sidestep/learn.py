@@ -127,11 +127,15 @@ def _options(
     """Returns a table, as CSV text or as the folder that contains it, and how to learn from it."""
     options: dict[str, Any] = {
         "text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out, "max_unexplained": max_unexplained,
+        "facts": [],
     }  # fmt: skip
     if isinstance(columns, str | os.PathLike):
         options["run"] = os.fspath(columns)
     else:
         options["text"] = _csv(columns, known)
+        if isinstance(columns, _native.Table):
+            # A recorded table says of all of its rows what a file would leave out, such as the side of a box.
+            options["facts"] = sorted(columns.about.items())
     return options
 
 

@@ -9,8 +9,8 @@ use sidestep::learn::EstimateOptions;
 use sidestep::learn::effector::{self, EffectorOptions, LearnedEffector};
 use sidestep::learn::profile;
 use sidestep::learn::sensor::{self, LearnedSensor, RunSensorOptions, SensorOptions};
-use sidestep_session::csv_table;
-use std::path::{Path, PathBuf};
+use sidestep_session::{RecordedCsv, csv_table};
+use std::path::PathBuf;
 
 /// A learned error model: its counts, probabilities with intervals, and its form in a profile.
 #[pyclass(module = "sidestep", frozen)]
@@ -80,6 +80,8 @@ pub(crate) struct LearnOptions {
     text: Option<String>,
     /// Or the folder of a run that recorded it.
     run: Option<PathBuf>,
+    /// What the recording says of all rows of the text, if they come from one.
+    facts: Vec<(String, String)>,
     alpha: f64,
     hold_out_every: usize,
     max_unexplained: f64,
@@ -120,7 +122,10 @@ pub(crate) fn learn_effector(
             let recorded = csv_table(run, "motions")?;
             effector::learn_run(&recorded.table, &recorded.facts, &chosen)
         }
-        None => effector::learn_csv(&options.parse_table("motions")?, &chosen),
+        None if options.facts.is_empty() => {
+            effector::learn_csv(&options.parse_table("motions")?, &chosen)
+        }
+        None => effector::learn_run(&options.parse_table("motions")?, &options.facts, &chosen),
     });
     let model = learned.map_err(|e| error::input_error(&e))?;
     Ok(Learned(Model::Effector(Box::new(model))))
@@ -146,7 +151,20 @@ pub(crate) fn learn_sensor(
     shape: SensorShape,
 ) -> PyResult<Learned> {
     let learned = py.detach(|| match &options.run {
-        Some(run) => learn_recorded_sensor(run, options.estimate(), shape),
+        Some(run) => {
+            let mut recorded = csv_table(run, "readings")?;
+            let RecordedCsv { table, facts } = &recorded;
+            let name = sensor::recorded_table(table, facts, shape.sensor.as_deref());
+            if name != "readings" {
+                recorded = csv_table(run, name)?;
+            }
+            let chosen = run_options(options.estimate(), shape);
+            sensor::learn_run(&recorded.table, &recorded.facts, &chosen)
+        }
+        None if !options.facts.is_empty() => {
+            let chosen = run_options(options.estimate(), shape);
+            sensor::learn_run(&options.parse_table("readings")?, &options.facts, &chosen)
+        }
         None => {
             let default = SensorOptions::default();
             let sensor_options = SensorOptions {
@@ -165,23 +183,14 @@ pub(crate) fn learn_sensor(
     Ok(Learned(Model::Sensor(Box::new(model))))
 }
 
-fn learn_recorded_sensor(
-    run: &Path,
-    estimate: EstimateOptions,
-    shape: SensorShape,
-) -> Result<LearnedSensor, InputError> {
-    let mut recorded = csv_table(run, "readings")?;
-    let table = sensor::recorded_table(&recorded.table, &recorded.facts, shape.sensor.as_deref());
-    if table != "readings" {
-        recorded = csv_table(run, table)?;
-    }
-    let run_options = RunSensorOptions {
+/// Returns the options for a recording, which knows what is left out of the shape.
+fn run_options(estimate: EstimateOptions, shape: SensorShape) -> RunSensorOptions {
+    RunSensorOptions {
         estimate,
         sensor: shape.sensor,
         distance_edges_m: shape.edges_m,
         distance_classes: shape.classes,
         bearings_deg: shape.bearings_deg,
         range_m: shape.range_m,
-    };
-    sensor::learn_run(&recorded.table, &recorded.facts, &run_options)
+    }
 }

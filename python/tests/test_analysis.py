@@ -119,6 +119,35 @@ def test_what_is_learned_from_arrays_is_what_the_command_learns_from_the_run(com
         assert of_run["probabilities"][0]["of"] > 0
 
 
+def test_a_table_of_moves_is_asked_for_its_box_and_damage_takes_the_intervals():
+    moves = {"action": ["forward"] * 100, "ahead_boxes": [1] * 100, "left_boxes": [0] * 100, "turn_deg": [0] * 100}
+    assert any("--box" in words for words in learn.effector(moves).report["warnings"])
+    known = learn.effector(moves, box_m=0.25)
+    assert known.report["warnings"] == [] and "box_m = 0.25" in known.profile("mine")
+    moves["ahead_boxes"] = [1] * 90 + [None] * 10
+    assert learn.effector(moves, box_m=0.25).report["probabilities"][0]["interval"] is None
+    accepted = learn.effector(moves, box_m=0.25, max_unexplained=0.2)
+    assert accepted.report["probabilities"][0]["interval"] is not None
+    assert accepted.report["left_out"] == {"samples": 100, "left_out": 10, "unexplained": 10}
+
+
+def test_the_beam_model_of_ranges_is_learned():
+    rng = np.random.default_rng(3)
+    true = rng.uniform(0.5, 5.0, 2000)
+    ranges = true + rng.normal(0.0, 0.05, 2000)
+    no_echo = rng.uniform(size=2000) < 0.1
+    readings = {
+        "true": ["wall"] * 2000,
+        "reported": ["nothing" if lost else "wall" for lost in no_echo],
+        "true_distance_m": true,
+        "reported_distance_m": [None if lost else m for lost, m in zip(no_echo, ranges, strict=True)],
+    }
+    learned = learn.sensor(readings, range_m=6.0, beam=True)
+    values = {one["name"]: one["value"] for one in learned.report["beam"]["parameters"]}
+    assert abs(values["max"] - 0.1) < 0.02 and abs(values["sigma_hit_m"] - 0.05) < 0.005
+    assert "[sensors.lidar-beam]" in learned.profile("lidar")
+
+
 def test_what_is_learned_becomes_part_of_a_scenario(tmp_path):
     polars = pytest.importorskip("polars")
     moves = polars.DataFrame(

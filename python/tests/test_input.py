@@ -48,6 +48,13 @@ def test_a_file_with_a_mistake_says_line_column_and_remedy(tmp_path):
         sidestep.Scenario(tmp_path / "no.toml")
 
 
+def test_a_text_in_place_of_a_path_is_not_repeated_and_told_where_it_belongs():
+    text = 'format = 1\nworld = "robots"\n' + "# a map\n" * 5000
+    with pytest.raises(sidestep.InputError, match="text=") as raised:
+        sidestep.Scenario(text)
+    assert len(str(raised.value)) < 300
+
+
 @pytest.mark.parametrize(
     ("order", "values", "extra", "words"),
     [

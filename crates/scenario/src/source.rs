@@ -171,6 +171,9 @@ impl Source {
         let table = self.text.parse::<toml::Table>();
         let world = table.as_ref().ok().and_then(|table| table.get("world")?.as_str());
         match (&table, world) {
+            (Err(error), _) if error.message().contains("overflow") => {
+                format!("give at most {}, the largest whole number of a file", i64::MAX)
+            }
             (Err(_), _) => "write valid TOML".into(),
             (_, Some(world)) => format!("see what `sidestep new {world}` writes"),
             (_, None) => "give a value of the right type".into(),
@@ -346,6 +349,7 @@ mod tests {
             ("n = -1", (3, 5), "see what `sidestep new w` writes"),
             ("seed = \"five\"", (3, 8), "see what `sidestep new w` writes"),
             ("n = = 3", (3, 5), "write valid TOML"),
+            ("n = 9223372036854775808", (3, 5), "give at most 9223372036854775807"),
         ] {
             let error = read(&format!("format = 1\nworld = \"w\"\n{line}\n")).expect_err(line);
             assert_eq!(error.line_and_column(), Some(at), "{error}");

@@ -176,3 +176,101 @@ fn a_run_without_calibration_says_how_to_record_it() {
     assert_eq!(refused.code(), 2);
     assert!(refused.err().contains("record.calibration=true"), "{}", refused.err());
 }
+
+/// Two sections of robots with different wheels, and a scanner, recorded to learn from.
+const MIXED: &str = "format = 1\nworld = \"robots\"\ncycles = 400\nseed = 5\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\nMAP\"\"\"\n\
+    [[robots]]\ncount = 4\neffector = \"slick\"\nsensors = [\"lidar\"]\n[[robots]]\ncount = 2\neffector = \"nomad\"\nsensors = [\"sonar-8\"]\n\
+    [record]\ncalibration = true\n\
+    [effectors.slick]\nforward = [{ p = 0.6, path = \"F\" }, { p = 0.4 }]\n\
+    left = [{ p = 1.0, turn = 90 }]\nright = [{ p = 1.0, turn = -90 }]\n\
+    [sensors.lidar]\nbearings_deg = [-45, 0, 45, 270]\nrange_m = 4.0\nobservations = [\"nothing\", \"wall\"]\n\
+    designates = { door = \"wall\", person = \"wall\", robot = \"wall\" }\ndistance_edges_m = [1.0]\n\
+    beam = { hit = 0.8, short = 0.06, max = 0.09, random = 0.05, sigma_hit_m = 0.1, lambda_short_per_m = 0.5 }\n";
+
+fn mixed_run() -> TestFolder {
+    let place = TestFolder::new();
+    let map = format!("{}\n", ".".repeat(40)).repeat(40);
+    place.write("mixed.toml", MIXED.replace("MAP", &map));
+    place.json(&["run", "mixed.toml", "--out", "r"]);
+    place
+}
+
+#[test]
+fn robots_of_different_effectors_are_not_one_table_and_a_run_knows_its_box() {
+    let place = mixed_run();
+    let refused = place.run(&["learn", "effector", "--run", "r"]);
+    assert_eq!(refused.code(), 2);
+    assert!(refused.err().contains("nomad, slick"), "{}", refused.err());
+    assert!(refused.err().contains("--effector nomad"), "{}", refused.err());
+    let to = ["--effector", "slick", "--profile", "p.toml", "--name", "w"];
+    let learned = place.json(&[&["learn", "effector", "--run", "r"], &to[..]].concat());
+    close(&learned["transitions"]["ahead"], &0.6.into(), 0.06);
+    assert_eq!((&learned["box_m"], &learned["effector"]), (&0.25.into(), &"slick".into()));
+    let scenario = "format = 1\nworld = \"robots\"\nprofiles = [\"p.toml\"]\nmap = { ascii = \".....\", box_size_m = 0.5 }\n\
+        robots = { count = 1, effector = \"w\" }\n";
+    place.write("other.toml", scenario);
+    let checked = place.run(&["check", "other.toml"]);
+    assert_eq!(checked.code(), 2);
+    assert!(checked.err().contains("was learned for boxes of 0.25 m"), "{}", checked.err());
+}
+
+#[test]
+fn a_profile_that_does_not_know_its_box_is_used_with_a_warning() {
+    let place = TestFolder::new();
+    place.write("motions.csv", MOTIONS);
+    let learn = |more: &[&str]| {
+        let to =
+            ["learn", "effector", "--csv", "motions.csv", "--profile", "p.toml", "--name", "w"];
+        place.run(&[&to[..], more].concat())
+    };
+    let asked = learn(&[]);
+    assert_eq!(asked.code(), 0, "{}", asked.err());
+    assert!(
+        asked.out().contains("give the side in") && asked.out().contains("--box"),
+        "{}",
+        asked.out()
+    );
+    let scenario = "format = 1\nworld = \"robots\"\nprofiles = [\"p.toml\"]\nmap.ascii = \".....\"\n\
+        robots = { count = 1, effector = \"w\" }\n";
+    place.write("l.toml", scenario);
+    let words = |place: &TestFolder| {
+        place.run(&["run", "l.toml", "--cycles", "2"]).err().replace('\n', " ")
+    };
+    assert!(words(&place).contains("does not say"), "{}", words(&place));
+    assert_eq!(learn(&["--box", "0.25"]).code(), 0);
+    assert_eq!(words(&place), "", "boxes of 0.25 m are the default");
+}
+
+#[test]
+fn too_many_damaged_rows_take_the_intervals_unless_they_are_accepted() {
+    let place = TestFolder::new();
+    let rows = "forward,1,0,0\n".repeat(90) + &"forward,?,0,0\n".repeat(10);
+    place.write("m.csv", format!("action,ahead_boxes,left_boxes,turn_deg\n{rows}"));
+    let learn = ["learn", "effector", "--csv", "m.csv", "--box", "0.25"];
+    assert_eq!(place.json(&learn)["probabilities"][0]["interval"], Value::Null);
+    let told = place.run(&learn).out().replace('\n', " ");
+    assert!(told.contains("--max-unexplained 0.11"), "{told}");
+    // The remedy works as it is given.
+    let accepted = place.json(&[&learn[..], &["--max-unexplained", "0.11"]].concat());
+    assert!(accepted["probabilities"][0]["interval"].is_object(), "{accepted}");
+}
+
+#[test]
+fn a_run_gives_its_scanner_back_and_knows_its_shape() {
+    let place = mixed_run();
+    let learn = ["learn", "sensor", "--run", "r", "--sensor", "lidar", "--profile", "p.toml"];
+    let learned = place.json(&[&learn[..], &["--name", "l"]].concat());
+    let parameters = learned["beam"]["parameters"].as_array().expect("a list");
+    for (parameter, known) in parameters.iter().zip([0.8, 0.06, 0.09, 0.05, 0.1, 0.5]) {
+        let ends =
+            ["low", "high"].map(|end| parameter["interval"][end].as_f64().expect("a number"));
+        let half = 0.5 * (ends[1] - ends[0]);
+        let value = parameter["value"].as_f64().expect("a number");
+        assert!((value - known).abs() < 1.68 * half, "{parameter} for {known}");
+    }
+    let profile = place.read("p.toml");
+    assert!(profile.contains("[sensors.l-beam]") && profile.contains("range_m = 4.0"), "{profile}");
+    assert!(profile.contains("bearings_deg = [-45.0, 0.0, 45.0, -90.0]"), "{profile}");
+    let other = place.run(&["learn", "sensor", "--run", "r", "--sensor", "lidar", "--edges", "2"]);
+    assert!(other.err().contains("leave out --edges"), "{}", other.err());
+}

@@ -17,6 +17,7 @@
 
 mod bag;
 mod beam_fit;
+mod beam_interval;
 mod camera;
 mod csv;
 mod detection;
@@ -153,6 +154,19 @@ pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, I
 /// # Errors
 /// When the table is damaged or `options` are not valid.
 pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
+    let mut model = learn_known_csv(table, options)?;
+    if table.find("true_class").is_some() {
+        let edges_m: Vec<String> = options.distance_edges_m.iter().map(f64::to_string).collect();
+        model.report.warnings.push(format!(
+            "the table gives distances by class and not where the classes end: {} m are taken (--edges)",
+            edges_m.join(", ")
+        ));
+    }
+    Ok(model)
+}
+
+/// Learns from a table with distance classes that are those of the options.
+fn learn_known_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
     csv::learn(table, options, &classes).map(judged)
 }

@@ -50,7 +50,7 @@ impl RecordedShape {
         let are_named = edges_m.as_ref().is_some_and(|edges| classes.len() == edges.len() + 1);
         Self {
             range_m: fact("range_m").and_then(|range| range.parse().ok()),
-            bearings_deg: fact("bearings_deg").and_then(numbers),
+            bearings_deg: fact("bearings_deg").and_then(numbers).map(wrapped_deg),
             distance_edges_m: edges_m,
             distance_classes: if are_named { classes } else { Vec::new() },
             designates: fact("designates").map(pairs).unwrap_or_default(),
@@ -66,6 +66,15 @@ fn words(list: &str) -> Vec<String> {
 fn numbers(list: &str) -> Option<Vec<f64>> {
     let items = list.split(',').filter(|item| !item.is_empty());
     items.map(|item| item.parse().ok()).collect()
+}
+
+/// Returns bearings from -180 to 180 degrees; scenarios may count on to 360.
+fn wrapped_deg(bearings_deg: Vec<f64>) -> Vec<f64> {
+    let wrapped = |deg: f64| {
+        let turned = deg.rem_euclid(360.0);
+        if turned > 180.0 { turned - 360.0 } else { turned }
+    };
+    bearings_deg.into_iter().map(wrapped).collect()
 }
 
 fn pairs(list: &str) -> Vec<(String, String)> {
@@ -98,7 +107,12 @@ pub fn learn_run(
 ) -> Result<LearnedSensor, InputError> {
     let name = options.sensor.clone().or_else(|| only_sensor(table));
     let shape = name.map(|name| RecordedShape::from_facts(&name, facts)).unwrap_or_default();
-    let mut model = super::learn_csv(table, &full_options(table.place(), options, &shape)?)?;
+    let full = full_options(table.place(), options, &shape)?;
+    let mut model = if shape.distance_edges_m.is_some() {
+        super::learn_known_csv(table, &full)?
+    } else {
+        super::learn_csv(table, &full)?
+    };
     if !shape.designates.is_empty() {
         model
             .profile
@@ -180,7 +194,7 @@ mod tests {
     fn facts() -> Vec<(String, String)> {
         let facts = [
             ("sensor.sonar.range_m", "3"),
-            ("sensor.sonar.bearings_deg", "0,90"),
+            ("sensor.sonar.bearings_deg", "0,90,315"),
             ("sensor.sonar.distance_edges_m", "1"),
             ("sensor.sonar.distance_classes", "near,far"),
             ("sensor.sonar.designates", "door=wall,person=nothing"),
@@ -204,7 +218,7 @@ mod tests {
         let model = learned(sonar()).unwrap();
         assert_eq!(model.report.sightings, 2, "the skin of robot 0 is another sensor 1");
         let profile = model.profile;
-        assert_eq!((profile.range_m, profile.bearings_deg), (3.0, vec![0.0, 90.0]));
+        assert_eq!((profile.range_m, profile.bearings_deg), (3.0, vec![0.0, 90.0, -45.0]));
         assert_eq!((profile.distance_edges_m, profile.distance_classes.len()), (vec![1.0], 2));
         assert!(profile.designates.contains(&("door".into(), "wall".into())));
         assert!(model.report.warnings.iter().any(|words| words.contains("never err")));

@@ -187,3 +187,75 @@ fn crowd() -> Source {
     );
     Source::new("crowd.toml", text, "")
 }
+
+const LIDAR: &str = r#"
+[sensors.lidar]
+bearings_deg = [-90, -45, 0, 45, 90, 135, 180, 225]
+range_m = 6.0
+observations = ["nothing", "wall"]
+designates = { door = "wall", person = "wall", robot = "wall" }
+distance_edges_m = [1.0, 3.0]
+beam = { hit = 0.80, short = 0.07, max = 0.08, random = 0.05, sigma_hit_m = 0.08, lambda_short_per_m = 0.6 }
+"#;
+
+/// Robots with a scanner that errs by the beam model, in a hall with pillars.
+fn scanners() -> Source {
+    let row = |pillar: bool| if pillar { ".........#" } else { ".........." }.repeat(5) + "\n";
+    let map: String = (0..50).map(|r| row(r % 10 == 5)).collect();
+    let text = format!(
+        "format = 1\nworld = \"robots\"\nseed = 8\n\
+         record = {{ trajectories = false, events = false, calibration = true }}\n\
+         [map]\nbox_size_m = 0.25\nascii = \"\"\"\n{map}\"\"\"\n\
+         [robots]\ncount = 20\nsensors = [\"lidar\"]\neffector = \"wheels\"\n{LIDAR}{EFFECTOR}"
+    );
+    Source::new("scanners.toml", text, "")
+}
+
+#[test]
+fn the_beam_model_of_a_scanner_comes_back_from_the_log_of_its_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let csv = record(&scanners(), 120, "ranges", folder.path());
+    let options = SensorOptions {
+        distance_edges_m: vec![1.0, 3.0],
+        range_m: 6.0,
+        bearings_deg: vec![-90.0, 0.0, 90.0],
+        beam: true,
+        ..SensorOptions::default()
+    };
+    let learned = sensor::from_csv(&csv, &options).unwrap();
+    let fit = learned.report.beam.as_ref().expect("asked for");
+    assert!(fit.has_converged && fit.scans == 20 * 120, "{fit}");
+    let known = [0.80, 0.07, 0.08, 0.05, 0.08, 0.6];
+    let mut outside = 0;
+    for (parameter, known) in fit.parameters.iter().zip(known) {
+        let interval = parameter.interval.expect("there are many ranges");
+        // 99.9 % intervals are 1.68 times as wide.
+        let off = (parameter.value - known).abs();
+        assert!(off < 1.68 * interval.half_width(), "{parameter:?} for {known}");
+        outside += u32::from(!interval.contains(known));
+    }
+    assert!(outside <= 1, "{fit}");
+
+    // The profile has both sensors, and a robot may have either.
+    let text = profile::with_sensor("p", &profile::empty("hall"), "lidar", &learned).unwrap();
+    std::fs::write(folder.path().join("learned.toml"), text).expect("a temporary file");
+    let scenario = "format = 1\nworld = \"robots\"\nprofiles = [\"learned.toml\"]\n[map]\n\
+                    ascii = \"\"\"\n.....\n\"\"\"\n[robots]\nat = [[1, 0, 0]]\n\
+                    sensors = [\"lidar\", \"lidar-beam\"]\n";
+    let loaded = Source::new("loaded.toml", scenario, folder.path());
+    let compiled = Compiled::new(&loaded, &Behaviours::new(), StorageOrder::ById);
+    let compiled = compiled.unwrap_or_else(|e| panic!("{e}"));
+    let beams: Vec<_> = compiled.world.sensors().map(|sensor| sensor.beam).collect();
+    let sigma_m = beams[1].expect("the beam model").sigma_hit_m;
+    assert!(beams[0].is_none() && (sigma_m - fit.model.sigma_hit_m).abs() < 1e-8);
+}
+
+#[test]
+fn a_scanner_reports_the_same_for_any_number_of_workers() {
+    let digest = |workers: usize| {
+        let mut run = robots_run(&scanners(), workers).unwrap_or_else(|e| panic!("{e}"));
+        run.advance(60);
+        run.digest()
+    };
+    assert_eq!(digest(1), digest(3));
+}
