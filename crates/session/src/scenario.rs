@@ -77,7 +77,7 @@ impl GivenScenario {
     }
 
     /// Returns the overrides without the options by which the file was read; others stay, and are unknown keys.
-    fn scenario_overrides(&self, overrides: &[String]) -> Vec<String> {
+    pub fn scenario_overrides(&self, overrides: &[String]) -> Vec<String> {
         let is_used =
             self.import.is_some() && ImportOptions::from_overrides(overrides) == self.options;
         let is_kept = |text: &&String| !(is_used && ImportOptions::is_option(text));

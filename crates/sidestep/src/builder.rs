@@ -2,7 +2,7 @@
 
 use crate::kernel::{InputError, workers::available_workers};
 use crate::run::Run;
-use crate::scenario::{Remark, Source, Worlds};
+use crate::scenario::{ImportOptions, Remark, Source, Worlds};
 use crate::session::{Error, GivenScenario, ManagedRun, OutputPaths, RowSelection};
 use crate::worlds::WORLDS;
 use serde::Serialize;
@@ -34,6 +34,8 @@ pub fn parse(text: impl Into<String>) -> Scenario {
 pub struct Scenario {
     worlds: Worlds,
     given: GivenScenario,
+    /// The file that it was read from.
+    file: Option<PathBuf>,
     /// Changes as `key=value`, each of which fits the text.
     overrides: Vec<String>,
     workers: Option<usize>,
@@ -65,7 +67,9 @@ impl Scenario {
     /// # Errors
     /// When the file cannot be read.
     pub fn load(worlds: &Worlds, file: impl AsRef<Path>) -> Result<Self, InputError> {
-        Ok(Self::new(worlds, GivenScenario::read(worlds, file.as_ref())?))
+        let file = file.as_ref();
+        let given = GivenScenario::read(worlds, file, &[])?;
+        Ok(Self { file: Some(file.to_path_buf()), ..Self::new(worlds, given) })
     }
 
     /// Takes the text of a scenario of one of `worlds`, see [`parse`].
@@ -78,6 +82,7 @@ impl Scenario {
         Self {
             worlds,
             given,
+            file: None,
             overrides: Vec::new(),
             workers: None,
             folder: None,
@@ -86,7 +91,8 @@ impl Scenario {
     }
 
     /// Changes a value, like `--set` of the command: a key goes by tables and by the numbers of arrays, as
-    /// `robots.0.count`; the value is anything that TOML has.
+    /// `robots.0.count`; the value is anything that TOML has. Keys `import.*` are choices for the reading of a file of
+    /// another program, as `import.max_gap_s`.
     ///
     /// # Errors
     /// When the text has no room for the key, or TOML for the value.
@@ -99,7 +105,11 @@ impl Scenario {
             )
         })?;
         self.overrides.push(format!("{key}={value}"));
-        self.given.source().clone().with_overrides(&self.overrides)?;
+        if let (true, Some(file)) = (ImportOptions::is_option(key), &self.file) {
+            self.given = GivenScenario::read(&self.worlds, file, &self.overrides)?;
+        }
+        let overrides = self.given.scenario_overrides(&self.overrides);
+        self.given.source().clone().with_overrides(&overrides)?;
         Ok(self)
     }
 
