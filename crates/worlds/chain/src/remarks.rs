@@ -182,7 +182,7 @@ mod tests {
         };
         let told = |ground: &str| {
             let text = format!(
-                "[[chains]]\nconnectors = 3\nrod_m = 0.1\nradius_m = 0.01\nat_m = [0.2, 0.5]\n\
+                "[[chains]]\nconnectors = 3\nrod_m = 0.1\nradius_m = 0.01\nat_m = [1.0, 0.5]\n\
                  tasks = [{{ kind = \"rest\" }}]\n[ground]\n{ground}\n"
             );
             remarks(&ChainScenario::<2>::new(&source(&text)).expect("valid"))
