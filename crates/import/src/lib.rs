@@ -3,8 +3,8 @@
 //!
 //! Every reader accepts its file plain or compressed with gzip, refuses absurd sizes before it
 //! allocates memory for them, and reports errors as an [`InputError`](sidestep_kernel::InputError)
-//! with file, line and column. Readers of maps, URDF files, bags and logs record what they dropped, repaired, guessed or did not
-//! use in an [`ImportReport`] beside their data.
+//! with file, line and column. Readers record what they dropped, repaired, guessed or did not use in an [`ImportReport`]
+//! beside their data.
 
 pub mod ascii;
 pub mod bag;

@@ -59,6 +59,8 @@ pub(super) enum Source {
     Segments,
     /// Encounters of DAIDALUS.
     Encounter,
+    /// Points of flights in EUROCONTROL's archive for research.
+    FlightPoints,
 }
 
 impl Source {
@@ -73,6 +75,9 @@ impl Source {
         if has("position") && has("direction") && has_any(&["timestamp", "utc"]) {
             return Self::Flightradar24;
         }
+        if has("ectrl_id") && has("time_over") {
+            return Self::FlightPoints;
+        }
         let is_library = ["timestamp", "latitude", "longitude", "altitude"].into_iter().all(has)
             && has_any(&["groundspeed", "flight_id"]);
         if is_library { Self::TrafficLibrary } else { Self::Own }
@@ -84,6 +89,7 @@ impl Source {
             Self::OpenSky => OPENSKY,
             Self::TrafficLibrary => TRAFFIC_LIBRARY,
             Self::Flightradar24 => FLIGHTRADAR24,
+            Self::FlightPoints => FLIGHT_POINTS,
             Self::Segments | Self::Encounter => &[],
         }
     }
@@ -98,6 +104,7 @@ impl Source {
             }
             Self::Flightradar24 => ("Flightradar24 track", "altitude ft, speed kt"),
             Self::Segments => ("flight segments", "flight levels, minutes of arc"),
+            Self::FlightPoints => ("flight points of EUROCONTROL", "flight levels"),
             Self::Encounter => ("encounter", "as its second line tells"),
         }
     }
@@ -144,6 +151,14 @@ const TRAFFIC_LIBRARY: &[NamedColumn] = &[
     ("vertical_rate", Field::VerticalSpeed, 1.0),
     ("onground", Field::OnGround, 1.0),
     ("last_position", Field::PositionTime, 1.0),
+];
+
+const FLIGHT_POINTS: &[NamedColumn] = &[
+    ("time_over", Field::Time, 1.0),
+    ("ectrl_id", Field::FlightId, 1.0),
+    ("latitude", Field::Latitude, 1.0),
+    ("longitude", Field::Longitude, 1.0),
+    ("flight_level", Field::Altitude, 100.0),
 ];
 
 const FLIGHTRADAR24: &[NamedColumn] = &[
@@ -365,6 +380,7 @@ mod tests {
             ("time,icao24,lat,lon,velocity,heading,baroaltitude", Source::OpenSky),
             ("timestamp,icao24,latitude,longitude,altitude,groundspeed", Source::TrafficLibrary),
             ("Timestamp,UTC,Callsign,Position,Altitude,Speed,Direction", Source::Flightradar24),
+            ("ECTRL ID,Time Over,Flight Level,Latitude,Longitude", Source::FlightPoints),
         ] {
             assert_eq!(layout(header).expect(header).source, source, "{header}");
         }

@@ -2,7 +2,7 @@
 
 use super::options::TrafficOptions;
 use super::plausibility::{self, Suspicion, distance_m, likely_unit, suspicions};
-use super::rows::{CheckedRows, Row, RowCollector};
+use super::rows::{CheckedRows, Row, RowCollector, UNUSED_COLUMNS_RULE};
 use super::summary::describe;
 use super::time::format_utc;
 use super::{MAX_SPEED_M_S, RecordedTraffic, Track};
@@ -165,11 +165,11 @@ impl FlightBuilder<'_> {
             match row.is_on_ground {
                 Some(true) => {
                     let rule = "rows of aircraft on the ground, which are no traffic";
-                    self.record(Treatment::Dropped, rule, &row, "");
+                    self.record(Treatment::NotUsed, rule, &row, "");
                 }
                 None if is_slow => {
                     let remedy = "add `--set import.ground_speed_kt=0` to keep them";
-                    self.record(Treatment::Dropped, &slow, &row, remedy);
+                    self.record(Treatment::Guessed, &slow, &row, remedy);
                 }
                 _ => {
                     let last_s = kept.last().map_or(f64::INFINITY, |last| last.sample.time_s);
@@ -348,9 +348,9 @@ impl FlightBuilder<'_> {
     }
 
     fn nothing_left(&self, place: &str, row_count: usize) -> InputError {
-        let dropped =
-            self.report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
-        let rules: Vec<String> = dropped.map(ToString::to_string).collect();
+        let findings =
+            self.report.findings.iter().filter(|found| found.rule != UNUSED_COLUMNS_RULE);
+        let rules: Vec<String> = findings.map(ToString::to_string).collect();
         let cause = format!("no flight remains of {row_count} rows: {}", rules.join("; "));
         let remedy = "give a recording of aircraft in the air, each in two rows at least";
         InputError::new(place, cause, remedy)

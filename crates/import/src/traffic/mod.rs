@@ -7,6 +7,7 @@
 //! | library `traffic` (CSV, Parquet) | `timestamp`, `latitude`, `longitude`, `altitude`, `groundspeed` or `flight_id` | kt, ft, ft/min |
 //! | Flightradar24 (CSV) | `Timestamp`, `Position`, `Direction` | kt, ft |
 //! | EUROCONTROL so6, m1 and m3 | 20 fields a line | flight levels, minutes of arc |
+//! | EUROCONTROL R&D data archive, flight points (CSV) | `ECTRL ID`, `Time Over` | flight levels, day before month |
 //! | DAIDALUS (.daa) | a line of names, a line of units | in the second line |
 //! | any other table | names with units: `alt_m`, `gs_m_s` | in the names |
 //!

@@ -35,7 +35,7 @@ pub(super) fn is_parquet(bytes: &[u8]) -> bool {
 pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<(), InputError> {
     let place = collector.place().to_string();
     let damaged = |cause: String| {
-        let remedy = "copy the file again from its source; it may be compressed with Snappy or Zstandard, or plain";
+        let remedy = "copy the file again from its source; it may be compressed with Snappy, Zstandard or gzip, or plain";
         InputError::new(&place, format!("cannot be read as Parquet: {cause}"), remedy)
     };
     // Its decoders may panic on damaged pages.

@@ -2,7 +2,7 @@
 
 use super::tests::finding;
 use super::{TrafficOptions, from_bytes};
-use parquet::basic::{Compression, ZstdLevel};
+use parquet::basic::{Compression, GzipLevel, ZstdLevel};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
@@ -54,9 +54,12 @@ fn file(compression: Compression) -> Vec<u8> {
 
 #[test]
 fn tables_of_the_library_traffic_are_read_plain_and_compressed() {
-    for compression in
-        [Compression::UNCOMPRESSED, Compression::SNAPPY, Compression::ZSTD(ZstdLevel::default())]
-    {
+    for compression in [
+        Compression::UNCOMPRESSED,
+        Compression::SNAPPY,
+        Compression::ZSTD(ZstdLevel::default()),
+        Compression::GZIP(GzipLevel::default()),
+    ] {
         let bytes = file(compression);
         let traffic = from_bytes(&"f.parquet", bytes, &TrafficOptions::default()).unwrap();
         assert_eq!(traffic.report.format, "tracks of the library traffic (Parquet)");

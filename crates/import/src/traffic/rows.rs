@@ -1,7 +1,7 @@
 //! The rows of a file, each checked: those with a position at a time are kept, all others counted.
 
 use super::columns::{Field, Layout, Source};
-use super::time::{UnixUnit, WrittenTime, parse_time};
+use super::time::{UnixUnit, WrittenTime, parse_day_first, parse_time};
 use super::value::{NotANumber, Value};
 use super::{LatLon, Sample};
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
@@ -17,6 +17,9 @@ const SPEEDS_KT: RangeInclusive<f64> = 0.0..=10_000.0;
 
 /// The longest time in s between the middle row and any other: no recording takes 30 years.
 const MAX_DURATION_S: f64 = 1e9;
+
+/// The rule by which columns are not used.
+pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
 /// A row of one aircraft.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,7 +98,12 @@ impl RowCollector {
             self.report.record(Treatment::Guessed, rule, "", "");
         }
         for name in &layout.unused {
-            self.report.record(Treatment::NotUsed, "columns", format!("`{name:.40}`"), "");
+            self.report.record(
+                Treatment::NotUsed,
+                UNUSED_COLUMNS_RULE,
+                format!("`{name:.40}`"),
+                "",
+            );
         }
     }
 
@@ -270,7 +278,13 @@ type Rule = &'static str;
 
 impl RowReader<'_> {
     fn row(&self, number: usize) -> Result<ReadRow, Rule> {
-        let time = self.time(Field::Time).ok_or("rows without a time")?;
+        let time = match self.time(Field::Time) {
+            Some(time) => time,
+            None if self.value(Field::Time) == Value::Missing => return Err("rows without a time"),
+            None => {
+                return Err("rows with a time that is neither ISO 8601 nor a number since 1970");
+            }
+        };
         let position = self.position()?;
         let altitude_ft = self.altitude_ft()?;
         let (ground_speed_kt, bad_speed) = self.optional(Field::GroundSpeed, SPEEDS_KT);
@@ -319,6 +333,9 @@ impl RowReader<'_> {
     fn time(&self, field: Field) -> Option<WrittenTime> {
         match self.value(field) {
             Value::Number(value) if value.is_finite() => Some(WrittenTime::Unix(value)),
+            Value::Text(text) if self.layout.source == Source::FlightPoints => {
+                parse_day_first(text)
+            }
             Value::Text(text) => parse_time(text),
             _ => None,
         }

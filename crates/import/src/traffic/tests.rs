@@ -77,7 +77,8 @@ fn a_second_row_for_one_instant_is_left_out_and_counted() {
 #[test]
 fn bad_rows_are_left_out_and_counted_with_their_lines() {
     for (row, rule) in [
-        ("x,a,,46,6,1,200,3,", "rows without a time"),
+        ("x,a,,46,6,1,200,3,", "rows with a time that is neither ISO 8601 nor a number"),
+        (",a,,46,6,1,200,3,", "rows without a time"),
         ("1533114905,,,46,6,1,200,3,", "rows without the name of an aircraft"),
         ("1533114905,a,,,6,1,200,3,", "rows without a position"),
         ("1533114905,a,,46,NaN,1,200,3,", "rows without a position"),
@@ -151,7 +152,8 @@ fn rows_on_the_ground_are_no_traffic() {
     let traffic = parsed(&(A1.rows(0..3) + taxi)).unwrap();
     assert_eq!(traffic.tracks.len(), 1);
     let slow = finding(&traffic, "slower than 30 kt").unwrap();
-    assert_eq!((slow.count, slow.treatment), (2, Treatment::Dropped));
+    assert_eq!((slow.count, slow.treatment), (2, Treatment::Guessed));
+    assert_eq!(traffic.report.dropped(), 0);
     assert!(slow.remedy.contains("import.ground_speed_kt=0"));
     let error = parsed(taxi).unwrap_err();
     assert!(error.cause().contains("no flight remains of 2 rows"), "{error}");
@@ -445,6 +447,19 @@ fn segments_of_eurocontrol_are_read_end_to_end() {
     assert_eq!(traffic.report.dropped(), 0);
     let torn = parse(&"a.so6", &format!("{text}CCC_DDD LFPG\n")).unwrap();
     assert_eq!(count(&torn, "lines that are no segment"), 1);
+}
+
+#[test]
+fn flight_points_of_eurocontrols_archive_have_the_day_first() {
+    let text = "\"ECTRL ID\",\"Sequence Number\",\"Time Over\",\"Flight Level\",\"Latitude\",\"Longitude\"\n\
+        \"186858226\",\"1\",\"01-03-2015 10:00:00\",\"350\",\"47.0\",\"7.0\"\n\
+        \"186858226\",\"2\",\"01-03-2015 10:01:00\",\"350\",\"47.0\",\"7.18\"\n";
+    let traffic = parse(&"points.csv", text).unwrap();
+    let first = traffic.tracks[0].samples[0];
+    assert_eq!(
+        (format_utc(first.time_s).as_str(), first.altitude_ft),
+        ("2015-03-01T10:00:00Z", 35_000.0)
+    );
 }
 
 #[test]

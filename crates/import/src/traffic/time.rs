@@ -78,6 +78,14 @@ pub(super) fn parse_time(text: &str) -> Option<WrittenTime> {
     })
 }
 
+/// Reads a date and a time of day with the day first, `DD-MM-YYYY HH:MM:SS`, of a source that is known to write so.
+pub(super) fn parse_day_first(text: &str) -> Option<WrittenTime> {
+    let (date, clock) = text.split_at_checked(10)?;
+    let (day, month_year) = date.split_once('-')?;
+    let (month, year) = month_year.split_once('-')?;
+    parse_time(&format!("{year}-{month}-{day}{clock}"))
+}
+
 /// Returns the days since 1970-01-01 of `YYYY-MM-DD`, with `-` or `/`.
 fn parse_date(text: &str) -> Option<i64> {
     let bytes = text.as_bytes();

@@ -223,13 +223,9 @@ fn report_lines(rows: usize, report: &ImportReport) -> KeyValues {
         let kept = report.kept.iter().find(|kept| kept.noun == noun);
         group_thousands(kept.map_or(0, |kept| kept.count))
     };
-    let kept = format!(
-        "{} of {} kept, in {} flights",
-        count("rows"),
-        group_thousands(rows as u64),
-        count("flights")
-    );
+    let kept = format!("{} of {} kept", count("rows"), group_thousands(rows as u64));
     lines.push(("rows".to_string(), kept));
+    lines.push(("flights".to_string(), count("flights")));
     lines.extend(report.findings.iter().map(finding_line));
     lines
 }
