@@ -6,7 +6,8 @@ use crate::exit::ExitCode;
 use crate::worlds;
 use clap::builder::Styles;
 use clap::{CommandFactory, FromArgMatches, Parser};
-use std::ffi::OsString;
+use sidestep::kernel::terminal::escape_controls;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::io::Write as _;
 
@@ -42,8 +43,9 @@ impl Cli {
     /// Returns the arguments of this process; ends it when they are wrong, or ask for help.
     pub(crate) fn parse_process_args() -> Self {
         let args = without_help_of_help(std::env::args_os());
-        let matches =
-            command().try_get_matches_from(args).unwrap_or_else(|error| exit_with(&error));
+        let matches = command()
+            .try_get_matches_from(&args)
+            .unwrap_or_else(|error| exit_with(&with_printable_args(error, &args)));
         Self::from_arg_matches(&matches).unwrap_or_else(|error| exit_with(&error))
     }
 }
@@ -58,6 +60,17 @@ fn exit_with(error: &clap::Error) -> ! {
         _ => error.exit_code(),
     };
     std::process::exit(code)
+}
+
+/// Returns an error in the arguments without what a terminal would execute: an argument may be the name of a file that
+/// `*` found. The error itself has colors, so the arguments are escaped before it is made.
+fn with_printable_args(error: clap::Error, args: &[OsString]) -> clap::Error {
+    let printable: Vec<String> =
+        args.iter().map(|arg| escape_controls(&arg.to_string_lossy()).into_owned()).collect();
+    if args.iter().map(OsString::as_os_str).eq(printable.iter().map(OsStr::new)) {
+        return error;
+    }
+    command().try_get_matches_from(printable).err().unwrap_or(error)
 }
 
 /// Returns the arguments with `help --help` as `help`: the command `help` has no options of its own.

@@ -2,7 +2,12 @@
 
 use crate::exit::Failure;
 use serde::Serialize;
+use sidestep::kernel::terminal::{
+    display_cols, escape_controls, escape_controls_in_json, escape_controls_in_lines, pad_end,
+    pad_start,
+};
 use sidestep_document::Table;
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
@@ -43,10 +48,10 @@ impl Console {
         text: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         if !self.json {
-            return write_out(&text());
+            return write_out(&escape_controls_in_lines(&text()));
         }
         let object = serde_json::to_string_pretty(json).expect("results are plain data");
-        write_out(&format!("{object}\n"))
+        write_out(&format!("{}\n", escape_controls_in_json(&object)))
     }
 
     /// Prints a result like [`Console::print_result`], with a shorter text if the console is quiet.
@@ -65,19 +70,20 @@ impl Console {
     /// Prints a remark for people to standard error.
     pub(crate) fn note(self, text: impl Display) {
         if !self.quiet && !self.json {
-            let _ = writeln!(std::io::stderr(), "{text}");
+            print_to_stderr(&text.to_string());
         }
     }
 
     /// Prints a warning: something is wrong, but the command continues.
     pub(crate) fn warn(self, text: impl Display) {
-        let lines = wrap_text(&format!("warning: {text}"), usize::from(prose_columns()));
-        let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
+        let warning = format!("warning: {text}");
+        let lines = wrap_text(&escape_controls_in_lines(&warning), usize::from(prose_columns()));
+        print_to_stderr(&lines.join("\n"));
     }
 
     /// Prints the reason why the command failed.
     pub(crate) fn error(self, text: impl Display) {
-        let _ = writeln!(std::io::stderr(), "error: {text}");
+        print_to_stderr(&format!("error: {text}"));
     }
 }
 
@@ -96,6 +102,11 @@ fn columns_variable() -> Option<u16> {
 /// Returns the number of columns that prose may take.
 pub(crate) fn prose_columns() -> u16 {
     terminal_columns().min(MAX_PROSE_COLS)
+}
+
+/// Prints lines to standard error, without what a terminal would execute: they may quote a file.
+fn print_to_stderr(lines: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", escape_controls_in_lines(lines));
 }
 
 /// Writes to standard output.
@@ -122,13 +133,16 @@ pub(crate) fn check_write(result: io::Result<()>) -> Result<(), Failure> {
 /// Returns a table as text in columns, numbers aligned to the right: in several blocks, each with the
 /// first column, where it is wider than a line.
 pub(crate) fn format_columns(table: &Table) -> String {
-    let rows: Vec<Vec<&str>> = table.rows.iter().map(|row| table.cells(row).collect()).collect();
-    let head: Vec<&str> = table.columns.iter().map(String::as_str).collect();
-    let lines: Vec<Vec<&str>> = std::iter::once(head).chain(rows).collect();
+    let head: Line<'_> = table.columns.iter().map(|column| escape_controls(column)).collect();
+    let rows = table.rows.iter().map(|row| table.cells(row).map(escape_controls).collect());
+    let lines: Vec<Line<'_>> = std::iter::once(head).chain(rows).collect();
     let blocks = blocks(&widths(&lines));
     let texts: Vec<String> = blocks.iter().map(|block| block_text(&lines, block)).collect();
     texts.join("\n")
 }
+
+/// The cells of a line of a table, as a terminal can show them.
+type Line<'a> = Vec<Cow<'a, str>>;
 
 /// Columns before each line of a table.
 const INDENT: usize = 2;
@@ -139,11 +153,11 @@ const COLUMN_GAP: usize = 3;
 /// Largest width of a first column that stands beside the others: half a line, so that each block holds some of them.
 const MAX_FIRST_COLUMN_COLS: usize = 40;
 
-fn widths(lines: &[Vec<&str>]) -> Vec<usize> {
+fn widths(lines: &[Line<'_>]) -> Vec<usize> {
     let mut widths = vec![0; lines.first().map_or(0, Vec::len)];
     for line in lines {
         for (width, cell) in widths.iter_mut().zip(line) {
-            *width = cell.chars().count().max(*width);
+            *width = display_cols(cell).max(*width);
         }
     }
     widths
@@ -176,17 +190,17 @@ fn blocks(widths: &[usize]) -> Vec<Range<usize>> {
 
 /// Returns the first column and those of a block; a first column that is too wide stands on lines of
 /// its own.
-fn block_text(lines: &[Vec<&str>], block: &Range<usize>) -> String {
+fn block_text(lines: &[Line<'_>], block: &Range<usize>) -> String {
     let widths = widths(lines);
     let first = widths.first().copied().unwrap_or(0);
     let mut text = String::new();
     for line in lines {
         let mut cells = String::new();
         for k in block.clone() {
-            cells.push_str(&format!("{:COLUMN_GAP$}{:>width$}", "", line[k], width = widths[k]));
+            cells.push_str(&format!("{:COLUMN_GAP$}{}", "", pad_start(&line[k], widths[k])));
         }
         if first <= MAX_FIRST_COLUMN_COLS {
-            let joined = format!("{:<first$}{cells}", line[0]);
+            let joined = pad_end(&line[0], first) + &cells;
             text.push_str(&format!("  {}\n", joined.trim_end()));
         } else {
             text.push_str(&format!("  {}\n  {}\n", line[0], cells.trim_end()));

@@ -2,6 +2,7 @@
 
 use crate::console::Console;
 use crate::progress::RunBar;
+use sidestep::kernel::terminal::escape_controls_in_lines;
 use sidestep_session::fleet::{FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::io::{IsTerminal, Write as _};
@@ -48,6 +49,7 @@ impl FleetTable {
         let height =
             terminal_size::terminal_size().map_or(usize::MAX, |(_, height)| height.0.into());
         let text = table(now, height.saturating_sub(FREE_LINES));
+        let text = escape_controls_in_lines(&text);
         let mut out = std::io::stderr().lock();
         let erase = match self.lines {
             // ANSI: to the start of the table's first line (CPL), then erase to the end of the screen (ED).

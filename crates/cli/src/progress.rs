@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use sidestep::kernel::Cycle;
+use sidestep::kernel::terminal::escape_controls;
 use std::fmt::Write;
 
 use crate::console::{Console, group_thousands};
@@ -73,7 +74,7 @@ impl StageBar {
     /// Shows the name of the stage, and the share of all work that is done (0 to 1).
     pub(crate) fn set(&self, what: &str, share: f64) {
         self.0.set_position((STEPS * share) as u64);
-        self.0.set_message(what.to_string());
+        self.0.set_message(escape_controls(what).into_owned());
     }
 
     /// Takes the bar away.

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use super::{ImportReport, Treatment};
 use roxmltree::{Attribute, Document, Node, ParsingOptions};
 use sidestep_kernel::InputError;
-use sidestep_scenario::file::read_bytes;
+use sidestep_scenario::file::{decode_text, read_bytes};
 
 /// The maximum number of elements, comments and pieces of text in one file.
 const MAX_NODES: u32 = 1 << 20;
@@ -21,21 +21,13 @@ pub(super) fn read_xml_text(path: &Path, max_bytes: u64) -> Result<String, Input
     let unit: fn([u8; 2]) -> u16 = match bytes.get(..2) {
         Some([0xff, 0xfe]) => u16::from_le_bytes,
         Some([0xfe, 0xff]) => u16::from_be_bytes,
-        _ => return utf8_text(path, bytes),
+        _ => return decode_text(path, bytes),
     };
     let units = bytes[2..].chunks(2).map(|pair| unit([pair[0], *pair.get(1).unwrap_or(&0)]));
     let text: Result<String, _> = char::decode_utf16(units).collect();
     text.map_err(|_| {
         let cause = "begins as a text in UTF-16, and is none";
         InputError::new(path.display(), cause, "save the file as UTF-8")
-    })
-}
-
-fn utf8_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
-    String::from_utf8(bytes).map_err(|error| {
-        let readable = String::from_utf8_lossy(error.as_bytes());
-        InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
-            .with_byte_offset(&readable, error.utf8_error().valid_up_to())
     })
 }
 

@@ -30,12 +30,57 @@ pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
 /// # Errors
 /// Those of [`read_bytes`], and bytes that are not UTF-8, with their line and column.
 pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
-    let text = String::from_utf8(read_bytes(path, max_bytes)?).map_err(|error| {
+    let text = decode_text(path, read_bytes(path, max_bytes)?)?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// Returns the bytes of a file as text.
+///
+/// # Errors
+/// When they are not UTF-8: a binary file is named for what it is, and in a text of another encoding the error points at
+/// the first byte that does not fit.
+pub fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    String::from_utf8(bytes).map_err(|error| {
+        if let Some(format) = binary_format(error.as_bytes()) {
+            let cause = format!("is {format}, and a text file is read here");
+            return InputError::new(path.display(), cause, "check that this is the right file");
+        }
         let readable = String::from_utf8_lossy(error.as_bytes());
         InputError::new(path.display(), "is not a text file (UTF-8)", "save the file as UTF-8")
             .with_byte_offset(&readable, error.utf8_error().valid_up_to())
-    })?;
-    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+    })
+}
+
+/// The first bytes of binary files that people have beside their scenarios, and what these are.
+const SIGNATURES: [(&[u8], &str); 18] = [
+    (b"PAR1", "a Parquet file"),
+    (b"\x89MCAP", "an MCAP file"),
+    (b"#ROSBAG V", "a bag of ROS 1"),
+    (b"SQLite format 3\0", "an SQLite database"),
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"GIF8", "a GIF image"),
+    (b"P4", "an image (PBM)"),
+    (b"P5", "an image (PGM)"),
+    (b"P6", "an image (PPM)"),
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
+    (b"\x04\x22\x4d\x18", "compressed with LZ4"),
+    (b"BZh", "compressed with bzip2"),
+    (b"\xfd7zXZ", "compressed with xz"),
+    (b"%PDF", "a PDF document"),
+    (b"\xff\xfe", "a text in UTF-16"),
+    (b"\xfe\xff", "a text in UTF-16"),
+];
+
+/// Number of bytes in which a zero tells that a file is no text.
+const SEARCHED_BYTES: usize = 8192;
+
+/// Returns what a file that is not UTF-8 is, as the predicate of a sentence; `None` for a text of another encoding.
+fn binary_format(bytes: &[u8]) -> Option<&'static str> {
+    let known = SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature));
+    let has_zero = bytes.iter().take(SEARCHED_BYTES).any(|byte| *byte == 0);
+    known.map(|(_, format)| *format).or(has_zero.then_some("a binary file"))
 }
 
 /// Returns the first bytes of the file at `path`, at most `max_bytes`, decompressed as by [`read_bytes`]: enough to tell
@@ -123,6 +168,25 @@ mod tests {
         let file = file_with(b"ok\nab\xff");
         let error = read_text(file.path(), 100).expect_err("not UTF-8");
         assert_eq!(error.line_and_column(), Some((2, 3)));
+    }
+
+    #[test]
+    fn a_binary_file_is_named_and_not_printed() {
+        for (bytes, format) in [
+            (b"PAR1\x15\x04\xff\x00".as_slice(), "a Parquet file"),
+            (b"\x89PNG\r\n\x1a\n\0", "a PNG image"),
+            (b"SQLite format 3\0\x10\0\xff", "an SQLite database"),
+            (b"\xff\xfea\0", "a text in UTF-16"),
+            (b"what\0\xff", "a binary file"),
+        ] {
+            let file = file_with(bytes);
+            let error = read_text(file.path(), 100).expect_err("no text");
+            assert!(error.cause().contains(format), "{error}");
+            assert_eq!(error.line_and_column(), None, "{error}");
+        }
+        let latin = file_with(b"name = \"Z\xfcrich\"");
+        let error = read_text(latin.path(), 100).expect_err("Latin-1");
+        assert_eq!(error.line_and_column(), Some((1, 10)));
     }
 
     #[test]

@@ -27,6 +27,7 @@ mod watch;
 
 use output::print_message;
 use parent_monitor::ParentMonitor;
+use sidestep::kernel::terminal::escape_controls;
 use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
 use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
@@ -53,6 +54,7 @@ pub fn main() -> ExitCode {
     match job {
         Ok(job) => report_result(run_job(job)),
         Err(reason) => {
+            let reason = escape_controls(&reason);
             eprintln!("error: standard input has no job: {reason}\n{USAGE}");
             ExitCode::from(2)
         }
