@@ -24,6 +24,8 @@ mod exit;
 mod fleet_table;
 mod fleet_watch;
 mod foxglove;
+#[cfg(test)]
+mod hints;
 mod interrupt;
 mod link;
 mod progress;

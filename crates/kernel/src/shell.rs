@@ -7,6 +7,14 @@ use std::path::Path;
 /// Characters beside letters and digits that no POSIX shell reads as anything but themselves.
 const PLAIN: &str = "/._-=:,+@%";
 
+/// Returns the command that applies a command of this program, `report`, to a path, ready to paste; further options may
+/// follow it.
+///
+/// Every hint that names a path is made by it, and a test reads all of them by the definition of the command line.
+pub fn sidestep_command(command: &str, path: impl AsRef<Path>) -> String {
+    format!("sidestep {command} {}", shell_path(path))
+}
+
 /// Returns a word as a POSIX shell must read it: as it is where that is safe, else in quotes.
 ///
 /// Controls are written as escapes of `printf`, because a terminal would not show them, and [`crate::InputError`] and

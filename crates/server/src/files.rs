@@ -165,7 +165,7 @@ fn folder_entry_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// Returns the problem of a path that may not be read.
 fn outside_roots(path: &str) -> Problem {
     let cause = "is not below the folders that were given at start";
-    Problem::new(path, cause, "start the studio with its folder: sidestep studio FOLDER")
+    Problem::new(path, cause, "start the studio with its folder: `sidestep studio FOLDER`")
 }
 
 /// Returns all strings in a text, any of which may be the path of a file.

@@ -12,6 +12,7 @@ use crate::run_recorder::{RunRecorder, restore_run};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_record::{IfExists, McapRecorder, RunFolder};
@@ -360,8 +361,11 @@ fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), Inpu
         return Ok(());
     }
     let cause = format!("its agents were controlled externally up to cycle {}", run.cycle());
-    let remedy = "continue it with the program that decided for them, or look at it with \
-                  `sidestep replay DIR --cycle N`";
+    let replay = sidestep_command("replay", folder);
+    let remedy = format!(
+        "continue it with the program that decided for them, or look at it with `{replay} --cycle {}`",
+        run.cycle()
+    );
     Err(InputError::new(folder.display(), cause, remedy))
 }
 
@@ -469,8 +473,10 @@ fn storage_error(
     recording: Option<&RunRecorder>,
     error: &RecordError,
 ) -> Error {
-    let remedy = match recording.map(|r| r.folder().path().display()) {
-        Some(folder) => format!("make room, then continue with: sidestep resume {folder}"),
+    let remedy = match recording.map(|r| r.folder().path()) {
+        Some(folder) => {
+            format!("make room, then continue with `{}`", sidestep_command("resume", folder))
+        }
         None => "make room, then run it again; without --out nothing can be continued".into(),
     };
     Error::other(format!("{error}\n  {}", replay_hint(run)), remedy)

@@ -4,6 +4,7 @@ use crate::compare::compare_poses;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::picture::{draw_svg, footnote, write_png};
 use crate::{Error, RecordedRun, Watcher};
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::path::Path;
 
@@ -28,7 +29,8 @@ pub fn replay_all(
     watcher: &dyn Watcher,
 ) -> Result<ReplayReport, Error> {
     if recorded.digest.is_none() {
-        let remedy = "end it with `sidestep resume DIR`, or give a --cycle";
+        let resume = sidestep_command("resume", &recorded.path);
+        let remedy = format!("end it with `{resume}`, or give a --cycle");
         let cause = "the run is not complete: no digest of it is recorded";
         return Err(InputError::new(recorded.path.display(), cause, remedy).into());
     }

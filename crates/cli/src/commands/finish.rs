@@ -5,8 +5,8 @@ use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::report::summary_text;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep_session::{ManagedRun, RunStatus, Summary};
-use std::path::Path;
 
 /// Advances the run to its end (or until Ctrl-C), and stores and prints the summary.
 ///
@@ -20,13 +20,15 @@ pub(super) fn run_to_end(run: ManagedRun, console: Console) -> Result<ExitCode, 
 }
 
 fn print_next_step(summary: &Summary, console: Console) -> ExitCode {
-    if let Some(folder) = summary.folder.as_deref().map(Path::display) {
+    if let Some(folder) = summary.folder.as_deref() {
         console.note(match summary.status {
             RunStatus::Complete => {
-                format!("Next: `sidestep report {folder}` writes a page with pictures and numbers.")
+                let report = sidestep_command("report", folder);
+                format!("Next: `{report}` writes a page with pictures and numbers.")
             }
             RunStatus::Incomplete => {
-                format!("The run is marked as incomplete; `sidestep resume {folder}` continues it.")
+                let resume = sidestep_command("resume", folder);
+                format!("The run is marked as incomplete; `{resume}` continues it.")
             }
         });
     }

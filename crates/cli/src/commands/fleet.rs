@@ -7,6 +7,7 @@ use crate::link::{LinkArgs, run_job};
 use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
 use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
 use std::path::PathBuf;
@@ -126,10 +127,9 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     match result {
         Ok(()) => Ok(ExitCode::Done),
         Err(Failure::Interrupted) => {
-            if let Some(folder) = args.out.as_ref().map(|folder| folder.display()) {
-                console.note(format!(
-                    "The run is incomplete; `sidestep resume {folder}` continues it."
-                ));
+            if let Some(folder) = &args.out {
+                let resume = sidestep_command("resume", folder);
+                console.note(format!("The run is incomplete; `{resume}` continues it."));
             }
             Ok(ExitCode::Interrupted)
         }

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::json;
 use sidestep::kernel::InputError;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep::scenario::WorldType;
 use sidestep_session::display_path;
 use std::io::Write;
@@ -47,7 +48,8 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
     let world = worlds().find(&args.world).expect("the parser takes these names alone");
     let path = args.file.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", world.name())));
     write_new(&path, world.default_scenario())?;
-    let next = format!("Try:\n  sidestep check {0}\n  sidestep run {0}\n", path.display());
+    let [check, run] = ["check", "run"].map(|command| sidestep_command(command, &path));
+    let next = format!("Try:\n  {check}\n  {run}\n");
     let json = json!({ "file": display_path(&path), "world": args.world });
     console.print_result(&json, || format!("Wrote {}\n{next}", path.display()))?;
     Ok(ExitCode::Done)

@@ -8,6 +8,7 @@ use crate::scenario_args::WorkersArg;
 use crate::sweep::run_remaining;
 use crate::worlds;
 use clap::Args;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::{RunReader, Status};
 use sidestep_session::sweep::Folder;
@@ -63,8 +64,8 @@ fn print_finished(reader: &RunReader, console: Console) -> Result<ExitCode, Fail
     let folder = reader.path.display();
     let cycles = group_thousands(reader.manifest.cycles_done);
     console.note(format!(
-        "{folder} is complete ({cycles} cycles): nothing is left to run. `sidestep report {folder}` writes \
-         its page."
+        "{folder} is complete ({cycles} cycles): nothing is left to run. `{}` writes its page.",
+        sidestep_command("report", &reader.path)
     ));
     let digest = reader.manifest.digest.as_deref().unwrap_or_default();
     console.print_result(&read_summary(&reader.path)?, || format!("{digest}\n"))?;

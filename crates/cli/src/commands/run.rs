@@ -76,7 +76,8 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
             return Err(InputError::new("--foxglove", "a sweep has no single view", remedy).into());
         }
         if args.mcap.is_some() || args.replace {
-            let remedy = "record the runs with --record-runs, then `sidestep export DIR/runs/N`";
+            let remedy =
+                "record the runs with --record-runs, then `sidestep export DIR/runs/N --to mcap`";
             let cause = "a sweep has no single recording, and its folder is never overwritten";
             return Err(InputError::new("--mcap or --replace", cause, remedy).into());
         }

@@ -13,6 +13,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use sidestep::experiment::sweep::{Plan, Shard};
 use sidestep::kernel::InputError;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
@@ -207,7 +208,6 @@ fn plan(args: &PlanArgs, console: Console) -> Result<ExitCode, Failure> {
 /// Returns the plan as text, and the commands that run it. A sweep that ends at a precision has no shares, because its
 /// stopping rule needs the results of all runs in one process.
 fn plan_lines(plan: &Plan, out: &Path) -> Vec<(String, String)> {
-    let dir = out.display();
     let all = group_thousands(plan.runs());
     let at_most = if plan.until.is_some() { "at most " } else { "" };
     let mut lines = vec![
@@ -215,10 +215,10 @@ fn plan_lines(plan: &Plan, out: &Path) -> Vec<(String, String)> {
         ("runs", format!("{at_most}{} of each, {at_most}{all} in all", plan.replicates)),
     ];
     if plan.until.is_some() {
-        lines.push(("run them", format!("sidestep resume {dir}")));
+        lines.push(("run them", sidestep_command("resume", out)));
     } else {
-        lines.push(("run them", format!("sidestep sweep run {dir} --shard 0/1")));
-        lines.push(("join them", format!("sidestep sweep collect {dir}")));
+        lines.push(("run them", sidestep_command("sweep run --shard 0/1", out)));
+        lines.push(("join them", sidestep_command("sweep collect", out)));
     }
     lines.into_iter().map(|(name, value)| (name.to_string(), value)).collect()
 }

@@ -9,6 +9,7 @@ use crate::worlds;
 use serde_json::json;
 use sidestep::experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep::experiment::sweep::{OmittedMetric, Plan, RunTable, Shard, Summary};
+use sidestep::kernel::shell::sidestep_command;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{self, Folder, SweepEnd, SweepResult, SweepTiming};
 
@@ -75,13 +76,14 @@ pub(crate) fn print_results(
 fn print_interrupted(output: SweepOutput<'_>, finished: usize) -> Result<ExitCode, Failure> {
     let SweepOutput { plan, folder, console } = output;
     let path = folder.map(Folder::path);
-    match path.map(display_path) {
+    match path {
         None => console.note("Interrupted; nothing is kept without --out DIR."),
         Some(path) => {
             let all = plan.runs();
             let of = if plan.until.is_some() { String::new() } else { format!(" of {all}") };
             console.note(format!(
-                "{finished}{of} runs are finished; `sidestep resume {path}` continues."
+                "{finished}{of} runs are finished; `{}` continues.",
+                sidestep_command("resume", path)
             ));
         }
     }
@@ -136,7 +138,7 @@ fn text(
     }
     if let Some(folder) = folder {
         lines.push(("results".to_string(), folder.results_file().display().to_string()));
-        let report = format!("sidestep report {}", folder.path().display());
+        let report = sidestep_command("report", folder.path());
         lines.push(("look at it".to_string(), report));
     }
     format!("{text}\n{}", align_pairs(&lines))
@@ -176,8 +178,8 @@ fn print_failures(output: SweepOutput<'_>, table: &RunTable) -> usize {
         let id = table.column("cell").and_then(|ids| ids.values.number(row));
         let Some(trial) = id.and_then(|id| plan.trial_of(id as u64)) else { continue };
         let again = folder.map_or_else(String::new, |folder| {
-            let scenario = folder.scenario(trial.variant);
-            format!("\n  again: sidestep run {} --seed {}", scenario.display(), trial.seed)
+            let run = sidestep_command("run", folder.scenario(trial.variant));
+            format!("\n  again: `{run} --seed {}`", trial.seed)
         });
         let variant = &plan.variants[trial.variant as usize];
         let cause = table.column("failure").map_or_else(String::new, |c| c.values.text(row));

@@ -4,6 +4,7 @@ use super::output::format_count;
 use crate::console::{Console, align_pairs, format_duration, group_thousands};
 use crate::exit::Failure;
 use serde_json::json;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep_session::display_path;
 use sidestep_session::sweep::{Folder, ShareStatus, SweepStatus};
 
@@ -37,7 +38,7 @@ pub(crate) fn print_status(
 }
 
 fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
-    let path = folder.path().display();
+    let command = |command| sidestep_command(command, folder.path());
     let mut lines: Vec<(String, String)> = Vec::new();
     for share in &status.shares {
         lines.push(line(&format!("share {}", share.share), share_text(share)));
@@ -54,13 +55,13 @@ fn lines(folder: &Folder, status: &SweepStatus) -> Vec<(String, String)> {
         lines.push(line("", text));
     }
     if status.is_complete {
-        lines.push(line("view it", format!("sidestep report {path}")));
+        lines.push(line("view it", command("report")));
     } else if status.is_active {
         // No advice: a second process would run the same trials again.
     } else if status.runs == status.total {
-        lines.push(line("join them", format!("sidestep sweep collect {path}")));
+        lines.push(line("join them", command("sweep collect")));
     } else {
-        lines.push(line("continue", format!("sidestep resume {path}")));
+        lines.push(line("continue", command("resume")));
     }
     lines
 }

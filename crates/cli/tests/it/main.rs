@@ -16,6 +16,7 @@ mod fk;
 mod fleet;
 mod foxglove;
 mod help;
+mod hints;
 mod ik;
 mod ik_poses;
 mod input;

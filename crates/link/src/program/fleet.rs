@@ -21,6 +21,7 @@ use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port, with_
 use crate::wire::view_server::ViewServer;
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::ports::RecordError;
+use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::WORLDS;
@@ -174,7 +175,7 @@ fn finish(
         Err(lost @ FleetError::NodeLost { .. }) => {
             let remedy = match folder {
                 Some(folder) => {
-                    format!("continue without nodes: sidestep resume {}", folder.display())
+                    format!("continue without nodes: `{}`", sidestep_command("resume", folder))
                 }
                 None => "start the fleet again; with --out DIR it could be resumed".into(),
             };

@@ -209,7 +209,8 @@ impl McapFile {
 }
 
 fn not_a_recording(path: &Path) -> InputError {
-    let remedy = "give a recording that `sidestep run --mcap` or `sidestep export --to mcap` made";
+    let remedy = "give a recording that `sidestep run SCENARIO --mcap FILE` or \
+                  `sidestep export DIR --to mcap` made";
     InputError::new(path.display(), "the file says nothing of a run of sidestep", remedy)
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::ports::{ColumnWithRole, RecordError};
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Digest, InputError};
 
 use crate::disk;
@@ -78,8 +79,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         fill: impl FnOnce(&Path) -> Result<(P, Vec<String>, Vec<ColumnWithRole<R>>), E>,
     ) -> Result<Self, E> {
         if Self::is_at(path) {
+            let resume = sidestep_command("resume", path);
             let remedy =
-                "give another folder, or continue the sweep in this one: sidestep resume DIR";
+                format!("give another folder, or continue the sweep in this one: `{resume}`");
             let cause = "the folder holds a sweep already";
             return Err(InputError::new(path.display(), cause, remedy).into());
         }

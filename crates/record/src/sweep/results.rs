@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnWithRole, RecordError};
+use sidestep_kernel::shell::sidestep_command;
 
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use crate::run_table::{self, LoadedTable, TableStream};
@@ -80,8 +81,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// A sweep that is not done; a table that is damaged, or of another sweep.
     pub fn results<R: DeserializeOwned + Clone>(&self) -> Result<LoadedTable<R>, InputError> {
         if !self.is_complete() {
-            let remedy = "go on with `sidestep resume DIR`, or run its shares and \
-                          `sidestep sweep collect DIR`";
+            let resume = sidestep_command("resume", self.path());
+            let collect = sidestep_command("sweep collect", self.path());
+            let remedy = format!("go on with `{resume}`, or run its shares and `{collect}`");
             return Err(InputError::new(
                 self.path().display(),
                 "the sweep is not done yet",
@@ -103,8 +105,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let path = self.path().join(name);
         self.check_own(&path).and_then(|()| run_table::read(&path)).map_err(|e| {
             // The results mark the sweep as done: without them everything is joined again.
+            let resume = sidestep_command("resume", self.path());
             let remedy = format!(
-                "delete `{RESULTS}`; `sidestep resume DIR` makes it again from the runs in `{SHARES}`"
+                "delete `{RESULTS}`; `{resume}` makes it again from the runs in `{SHARES}`"
             );
             InputError::new(e.place(), e.cause(), remedy)
         })

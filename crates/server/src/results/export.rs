@@ -148,7 +148,7 @@ fn write_export(
 
 fn too_large() -> HttpError {
     let cause = format!("it would have more than {} MiB", MAX_EXPORT_BYTES >> 20);
-    let remedy = "use the command, which has no such bound: sidestep export";
+    let remedy = "use the command, which has no such bound: `sidestep export DIR --to csv`";
     HttpError::new(StatusCode::PAYLOAD_TOO_LARGE, Problem::new("export", cause, remedy))
 }
 

@@ -9,6 +9,7 @@ use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
 use crate::protocol::{Problem, ReplyBody};
+use sidestep_kernel::shell::shell_quote;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::{MetricInfo, Source, Worlds};
@@ -42,7 +43,8 @@ impl SessionDeps {
     pub(super) fn fleet_feed(&self, endpoint: &str) -> Result<Arc<FleetFeed>, Problem> {
         let feed = self.fleets.iter().find(|feed| feed.endpoint == endpoint);
         let feed = feed.cloned().ok_or_else(|| {
-            let remedy = format!("start the studio with it: sidestep studio {endpoint}");
+            let remedy =
+                format!("start the studio with it: `sidestep studio {}`", shell_quote(endpoint));
             Problem::new(endpoint, "no fleet of this address is watched", remedy)
         })?;
         feed.snapshot().lost.map_or(Ok(feed), Err)

@@ -8,6 +8,7 @@ use serde_json::Value;
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Code, Picture, Text};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_record::{Manifest, RunReader, Status};
 use sidestep_scenario::{MetricInfo, Worlds};
 use std::path::Path;
@@ -84,8 +85,7 @@ fn unfinished(view: &RunReader) -> Option<Text> {
         "**This run is not complete.** {how}; what is below is of its first {} cycles at most. ",
         format_count(*cycles_done)
     );
-    let resume =
-        Text::code(format!("sidestep resume {}", shell_quote(&view.path.display().to_string())));
+    let resume = Text::code(sidestep_command("resume", &view.path));
     Some(Text::from_markup(&text).append(resume).append(" continues it."))
 }
 
@@ -127,24 +127,14 @@ fn summary_number(summary: Option<&Value>, key: &str) -> Option<f64> {
 
 /// Returns the commands that reproduce the run: an exact replay, and a new run of the recorded scenario.
 fn reproduction_commands(view: &RunReader) -> String {
-    let folder = shell_quote(&view.path.display().to_string());
-    let scenario = shell_quote(&view.path.join("scenario.toml").display().to_string());
+    let run = sidestep_command("run", view.path.join("scenario.toml"));
+    let replay = sidestep_command("replay", &view.path);
     format!(
         "# the same run, with the same rows and the same digest\n\
-         sidestep run {scenario} --out NEW_DIR\n\
+         {run} --out NEW_DIR\n\
          # its state at a cycle, computed anew and compared with what was recorded\n\
-         sidestep replay {folder}\n"
+         {replay}\n"
     )
-}
-
-/// Returns a path as one word of a POSIX shell.
-pub(super) fn shell_quote(path: &str) -> String {
-    let has_special =
-        path.contains(|c: char| !c.is_ascii_alphanumeric() && !"/._-+=:,@%".contains(c));
-    if !path.is_empty() && !has_special {
-        return path.into();
-    }
-    format!("'{}'", path.replace('\'', "'\\''"))
 }
 
 fn append_metrics(
@@ -175,17 +165,5 @@ fn picture(folder: &Path) -> Result<Option<Picture>, InputError> {
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(InputError::new(path.display(), e.to_string(), "make the file readable")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_reaches_the_shell_as_it_is() {
-        assert_eq!(shell_quote("runs/a-1"), "runs/a-1");
-        assert_eq!(shell_quote("my runs/it's"), "'my runs/it'\\''s'");
-        assert_eq!(shell_quote("$(rm)"), "'$(rm)'");
     }
 }

@@ -1,6 +1,5 @@
 //! The folder of a sweep as a document: its runs, their results, and the precision of these.
 
-use super::run::shell_quote;
 use super::text::{format_count, format_duration};
 use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
@@ -9,6 +8,7 @@ use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial, Variant};
 use sidestep_kernel::ports::ColumnValues;
+use sidestep_kernel::shell::{shell_path, sidestep_command};
 use sidestep_scenario::Worlds;
 
 /// Number of variants for which a run is drawn: some examples; the figures are about all variants.
@@ -73,7 +73,7 @@ fn unfinished(folder: &Folder, table: &RunTable) -> Text {
     let done = format_count(table.runs() as u64);
     let all = format_count(folder.plan().runs());
     let text = format!("**This sweep is not done.** {done} of at most {all} runs are finished. ");
-    let resume = format!("sidestep resume {}", shell_quote(&folder.path().display().to_string()));
+    let resume = sidestep_command("resume", folder.path());
     Text::from_markup(&text).append(Text::code(resume)).append(" continues it.")
 }
 
@@ -159,12 +159,12 @@ fn reproduction_commands(folder: &Folder) -> String {
     let scenario = folder.path().join("variants/0000/scenario.toml");
     format!(
         "# one run of the table: the scenario of its variant, and its seed\n\
-         sidestep run {} --seed {}\n\
+         {} --seed {}\n\
          # all runs as one table: a row a run, parameters and metrics in typed columns\n\
          python3 -c 'import polars, sys; print(polars.read_parquet(sys.argv[1]))' {}\n",
-        shell_quote(&scenario.display().to_string()),
+        sidestep_command("run", scenario),
         folder.plan().first_seed,
-        shell_quote(&folder.results_file().display().to_string()),
+        shell_path(folder.results_file()),
     )
 }
 

@@ -6,6 +6,7 @@ use crate::watcher::NestedWatcher;
 use crate::{Error, Watcher};
 use sidestep_experiment::sweep::{RunTable, RunTableBuilder, Trial};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_record::RunReader;
 use sidestep_scenario::{Source, Worlds};
 use std::path::Path;
@@ -37,7 +38,7 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
     let mut rows = RunTableBuilder::default();
     for_each_outcome(folder, None, |outcome| rows.push(&outcome))?;
     if rows.is_empty() {
-        let remedy = "run it first: sidestep resume DIR";
+        let remedy = format!("run it first: `{}`", sidestep_command("resume", folder.path()));
         return Err(InputError::new(folder.path().display(), "no run is finished yet", remedy));
     }
     Ok(FinishedRuns { table: rows.build(folder.plan())?, is_complete: false })

@@ -17,6 +17,7 @@ use sidestep_experiment::sweep::{
     Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, Trial, rows::trial_table,
 };
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_record::sweep::{ResultsWriter, fingerprint};
 use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 use std::collections::BTreeSet;
@@ -144,10 +145,9 @@ fn open_same(
         check_build(worlds, &folder)?;
         return Ok(folder);
     }
-    let there = out.display();
-    let remedy =
-        format!("give another folder, or continue the sweep in this one: sidestep resume {there}");
-    Err(InputError::new(there, "the folder holds another sweep", remedy).into())
+    let resume = sidestep_command("resume", out);
+    let remedy = format!("give another folder, or continue the sweep in this one: `{resume}`");
+    Err(InputError::new(out.display(), "the folder holds another sweep", remedy).into())
 }
 
 /// Runs all trials that are not finished, and joins all runs into one table.
@@ -290,7 +290,8 @@ fn refuse_precision(folder: &Folder) -> Result<(), InputError> {
     }
     let cause =
         "a sweep with a target precision cannot be sharded: its stopping rule needs all runs";
-    let remedy = "run it in one process with `sidestep resume DIR`, or plan it with --replicate";
+    let resume = sidestep_command("resume", folder.path());
+    let remedy = format!("run it in one process with `{resume}`, or plan it with --replicate");
     Err(InputError::new(folder.path().display(), cause, remedy))
 }
 
@@ -331,8 +332,11 @@ pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Resul
     };
     if missing > 0 {
         let cause = format!("{missing} of {} runs are missing", plan.runs());
-        let remedy = "run the shares that are not finished (finished ones are not run again), or \
-                      run the rest here: sidestep resume DIR";
+        let resume = sidestep_command("resume", folder.path());
+        let remedy = format!(
+            "run the shares that are not finished (finished ones are not run again), or run the rest here: \
+             `{resume}`"
+        );
         return Err(Error::other(cause, remedy));
     }
     join_runs(folder, BUCKET_TRIALS, SweepTiming::default(), watcher)
@@ -378,9 +382,10 @@ fn read_checked_variant(
 fn with_resume_hint(error: Error, folder: &Path) -> Error {
     match error {
         Error::Record(error) => {
+            let resume = sidestep_command("resume", folder);
             let remedy =
-                "free some space; the finished runs are saved, continue with: sidestep resume";
-            Error::other(error.to_string(), format!("{remedy} {}", folder.display()))
+                format!("free some space; the finished runs are saved, continue with `{resume}`");
+            Error::other(error.to_string(), remedy)
         }
         other => other,
     }
