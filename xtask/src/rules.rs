@@ -125,3 +125,56 @@ fn layers_have_all_modules_of_their_crates_and_no_others() {
         }
     }
 }
+
+/// Crates whose types are read from files of users.
+const READS_FILES: [&str; 8] = [
+    "crates/collectives",
+    "crates/error-models",
+    "crates/experiment",
+    "crates/import",
+    "crates/learn",
+    "crates/map",
+    "crates/scenario",
+    "crates/worlds",
+];
+
+/// Returns the attributes of an enum whose variants serde tells apart by a key, if it reads them from there.
+fn tagged_attributes(item: &syn::ItemEnum) -> Option<String> {
+    let lists = item.attrs.iter().filter_map(|attribute| attribute.meta.require_list().ok());
+    let text: String =
+        lists.map(|list| format!("{} {}\n", list.path.segments[0].ident, list.tokens)).collect();
+    let is_read =
+        text.contains("Deserialize") && text.contains("tag =") && !text.contains("from =");
+    is_read.then_some(text)
+}
+
+/// Serde reads such an enum by its key first, and accepts any other keys unless it is told not to; beside a variant without
+/// braces it accepts them in any case.
+#[test]
+fn tables_with_a_kind_refuse_keys_that_they_do_not_know() {
+    let mut tagged = 0;
+    for package in
+        packages().iter().filter(|package| READS_FILES.iter().any(|at| package.is_in(at)))
+    {
+        for source in package.sources().unwrap() {
+            let path = crate::root().join(&source.path);
+            let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
+            let enums = file.items.iter().filter_map(|item| match item {
+                syn::Item::Enum(item) => Some((item, tagged_attributes(item)?)),
+                _ => None,
+            });
+            for (item, attributes) in enums {
+                let name = format!("{}: {}", source.path.display(), item.ident);
+                assert!(attributes.contains("deny_unknown_fields"), "{name} accepts unknown keys");
+                let unit = item.variants.iter().find(|one| matches!(one.fields, syn::Fields::Unit));
+                let unit = unit.map(|variant| variant.ident.to_string());
+                assert_eq!(
+                    unit, None,
+                    "{name} accepts any keys beside it: read it as a variant {{}}"
+                );
+                tagged += 1;
+            }
+        }
+    }
+    assert!(tagged >= 2, "{tagged} tables with a kind are known");
+}

@@ -8,7 +8,8 @@ use sidestep_kernel::interrupt;
 
 /// The estimator of `E[G | x_i]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", tag = "kind")]
+#[serde(rename_all = "kebab-case", tag = "kind", from = "EstimatorTable")]
+#[schemars(with = "EstimatorTable")]
 pub enum Estimator {
     /// Estimates from blocks of joint samples, as in the paper.
     Sampled {
@@ -19,6 +20,31 @@ pub enum Estimator {
     },
     /// Closed form, for games that are sums over pairs.
     Exact,
+}
+
+/// An estimator as a table. Beside the name of a variant without braces serde accepts any keys.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+#[schemars(rename = "Estimator")]
+enum EstimatorTable {
+    /// Estimates from blocks of joint samples, as in the paper.
+    Sampled {
+        /// Samples per block, `N_SB`.
+        block: usize,
+        /// The factor on a block's weight after each further block, in [0, 1].
+        ageing: f64,
+    },
+    /// Closed form, for games that are sums over pairs.
+    Exact {},
+}
+
+impl From<EstimatorTable> for Estimator {
+    fn from(table: EstimatorTable) -> Self {
+        match table {
+            EstimatorTable::Sampled { block, ageing } => Self::Sampled { block, ageing },
+            EstimatorTable::Exact {} => Self::Exact,
+        }
+    }
 }
 
 /// The order in which the players update.

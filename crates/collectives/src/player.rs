@@ -12,7 +12,7 @@ const MIN_TEMPERATURE_FRACTION: f64 = 1e-12;
 
 /// The step of a distribution toward the minimum of eq. 7.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", tag = "kind")]
+#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
 pub enum Update {
     /// `q <- q - s q [ (E[G|x] - E_q G) / T + S(q) + ln q ]`, clipped and scaled to sum 1: a
     /// step `s` of Newton's method on the quadratic nearest to the Lagrangian.

@@ -32,7 +32,16 @@ pub(crate) fn explain(
     if let Some((missing, _)) = backticked_name(message, "missing field `") {
         return (format!("the key `{missing}` is missing"), format!("add `{missing} = ...`"));
     }
+    if message.contains("recursion") {
+        let cause = "tables and arrays within each other are too deep";
+        return (cause.into(), "write fewer than 80 of them within each other".into());
+    }
     (message.replace('\n', " "), default_remedy)
+}
+
+/// Returns the key that an error of the TOML reader calls unknown.
+pub(crate) fn unknown_key(error: &toml::de::Error) -> Option<&str> {
+    backticked_name(error.message().trim(), "unknown field `").map(|(found, _)| found)
 }
 
 fn top_level_remedy(key: &str) -> String {
@@ -74,11 +83,17 @@ pub(crate) fn quoted(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 
+/// Number of bytes above which a name is no misspelled one: the distance takes the time of their product.
+const MAX_MISSPELLED_BYTES: usize = 100;
+
 /// Returns "did you mean" with the nearest of `known`, or the whole list.
 pub fn suggestion(found: &str, known: &[&str]) -> String {
-    match known.iter().min_by_key(|name| strsim::osa_distance(found, name)) {
+    let is_name = found.len() <= MAX_MISSPELLED_BYTES;
+    let distance =
+        |name: &str| if is_name { strsim::osa_distance(found, name) } else { usize::MAX };
+    match known.iter().min_by_key(|name| distance(name)) {
         // The longer a name, the more typing errors it may have.
-        Some(best) if strsim::osa_distance(found, best) <= 1 + found.len() / 3 => {
+        Some(best) if distance(best) <= 1 + found.len() / 3 => {
             format!("did you mean `{best}`?")
         }
         // The keys of the top level are joined from several lists, which may share keys.
@@ -116,6 +131,23 @@ mod tests {
             (error.cause(), error.remedy()),
             ("unknown key `cylces`", "did you mean `cycles`?")
         );
+    }
+
+    #[test]
+    fn a_hostile_file_is_refused_at_its_limit_and_told_which() {
+        for nested in ["[".repeat(100_000), "{b = ".repeat(5000)] {
+            let error = Source::new("s.toml", format!("a = {nested}"), "").parse::<toml::Table>();
+            let error = error.expect_err("too deep");
+            assert!(error.cause().contains("too deep"), "{error}");
+        }
+        let error = Source::new("s.toml", format!("[{}]", ["a"; 50_000].join(".")), "");
+        let error = error.parse::<toml::Table>().expect_err("too deep");
+        assert!(error.cause().contains("too deep"), "{error}");
+        let name = "y".repeat(1 << 20);
+        let error = Source::new("s.toml", format!("{name} = 1"), "").parse::<Small>();
+        let error = error.expect_err("unknown");
+        assert_eq!(error.remedy(), "known are: cycles, seed");
+        assert!(error.to_string().len() < 10_000);
     }
 
     #[test]

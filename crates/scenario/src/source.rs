@@ -1,12 +1,13 @@
 //! The text of a scenario, and its parser.
 
-use super::explain::{explain, keys_of};
+use super::explain::{explain, keys_of, unknown_key};
 use super::locate::{dotted_path, locate};
 use crate::{Integer, Spanned};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_quote;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, Deserializer};
@@ -39,6 +40,9 @@ pub struct Preamble {
     /// Name of the world, which need not be a known one.
     pub world: Spanned<String>,
 }
+
+/// Remedy for a value of a wrong type, where there is no example.
+const TYPE_REMEDY: &str = "give a value of the right type";
 
 /// Words in errors about constructs that may span many lines: without its end, all errors after one follow from it.
 const MULTILINE_CONSTRUCTS: [&str; 4] = ["array", "inline table", "key-value pairs", "multi-line"];
@@ -152,11 +156,29 @@ impl Source {
     }
 
     fn toml_error(&self, error: &toml::de::Error, top: &[&str]) -> InputError {
-        let (cause, remedy) = explain(error, top, self.example_remedy());
+        self.toml_error_with_remedy(error, top, self.example_remedy())
+    }
+
+    fn toml_error_with_remedy(
+        &self,
+        error: &toml::de::Error,
+        top: &[&str],
+        default_remedy: String,
+    ) -> InputError {
+        let (cause, remedy) = explain(error, top, default_remedy);
         let input_error = InputError::new(&self.place, cause, remedy);
         match error.span() {
-            Some(span) => self.with_span(input_error, span),
+            Some(span) => self.with_span(input_error, self.unknown_key_span(error, span)),
             None => input_error,
+        }
+    }
+
+    /// Returns the position of the unknown key that an error is about. Of a table with a `kind` the reader knows only that
+    /// of the whole table, because it reads the kind first.
+    fn unknown_key_span(&self, error: &toml::de::Error, span: Range<usize>) -> Range<usize> {
+        match unknown_key(error) {
+            Some(key) if self.text.get(span.clone()) != Some(key) => self.key_span(span, &[key]),
+            _ => span,
         }
     }
 
@@ -175,8 +197,8 @@ impl Source {
                 format!("give at most {}, the largest whole number of a file", i64::MAX)
             }
             (Err(_), _) => "write valid TOML".into(),
-            (_, Some(world)) => format!("see what `sidestep new {world}` writes"),
-            (_, None) => "give a value of the right type".into(),
+            (_, Some(world)) => format!("see what `sidestep new {}` writes", shell_quote(world)),
+            (_, None) => TYPE_REMEDY.into(),
         }
     }
 
@@ -187,13 +209,22 @@ impl Source {
     pub fn preamble(&self) -> Result<Preamble, InputError> {
         let preamble = match toml::from_str::<Preamble>(self.top()) {
             Ok(preamble) => preamble,
-            Err(_) => self.parse().map_err(|e| self.sweep_error().unwrap_or(e))?,
+            Err(_) => self.parse_preamble().map_err(|e| self.sweep_error().unwrap_or(e))?,
         };
         if *preamble.format.get_ref() == FORMAT {
             return Ok(preamble);
         }
         let cause = format!("scenario format {} is not known", preamble.format.get_ref());
         Err(self.error(Some(preamble.format.span()), cause, format!("write `format = {FORMAT}`")))
+    }
+
+    /// Parses format and world of the whole text. Its errors give no example of the world, which may not exist.
+    fn parse_preamble(&self) -> Result<Preamble, InputError> {
+        toml::from_str(&self.text).map_err(|error| {
+            let is_valid = self.text.parse::<toml::Table>().is_ok();
+            let remedy = if is_valid { TYPE_REMEDY.into() } else { self.example_remedy() };
+            self.toml_error_with_remedy(&error, &[], remedy)
+        })
     }
 
     /// Returns the text above the first section, which has the keys of all worlds, so that the preamble of a large
@@ -328,6 +359,15 @@ mod tests {
         let (head, own) = read("format = 1\nn = 3\nworld = \"w\"\ncycles = 7\n").expect("right");
         assert_eq!((head.seed, head.cycles, head.name.as_str()), (1, Some(7), ""));
         assert_eq!((*own.n.get_ref(), own.n.span()), (3, 15..16));
+    }
+
+    #[test]
+    fn an_example_is_advised_only_of_a_world_that_may_exist() {
+        let preamble =
+            Source::new("s.toml", "format = \"x\"\nworld = \"no such\"\n", "").preamble();
+        assert_eq!(preamble.expect_err("a wrong type").remedy(), TYPE_REMEDY);
+        let read = read("format = 1\nworld = \"my w\"\nn = -1\n");
+        assert_eq!(read.expect_err("negative").remedy(), "see what `sidestep new 'my w'` writes");
     }
 
     #[test]

@@ -119,6 +119,30 @@ fn check_tells_all_errors_and_their_number() {
     assert_eq!(refused(&place, "s.toml", &[]).matches("error: ").count(), 1);
 }
 
+/// The sensor is there, so that nothing else is wrong with a robot that has it.
+#[test]
+fn a_mistake_in_a_sensor_is_one_error_and_the_sensor_stays_known() {
+    for (sensor, said) in [
+        ("[sensors]\n\"my eye\" = 3\n", "invalid type: integer `3`"),
+        ("[[sensors.\"my eye\"]]\nrange_m = 3\n", "invalid type: map"),
+        (
+            "[sensors.\"my eye\"]\nrange_m = 3\nbearings_deg = [0]\nobservations = []\nconfusion = 3\n",
+            "invalid type: integer `3`",
+        ),
+        (
+            "[sensors.\"my eye\"]\nrange_m = 3\nbearings_deg = [0]\nobservations = []\n",
+            "the key `confusion` is missing",
+        ),
+    ] {
+        let place = TestFolder::new();
+        place.write("s.toml", SCENARIO.replace("bumper-4", "my eye") + sensor);
+        let ended = place.run(&["check", "s.toml"]);
+        assert_eq!(ended.code(), 2);
+        assert!(ended.err().contains(said), "{sensor}: {}", ended.err());
+        assert!(!ended.err().contains("unknown sensor"), "{sensor}: {}", ended.err());
+    }
+}
+
 #[test]
 fn a_wrong_override_is_named() {
     let place = TestFolder::new();

@@ -17,6 +17,8 @@ pub(super) struct Repair {
     what: RepairKind,
     /// Whether its author is likely to have meant it.
     is_meant: bool,
+    /// Names of keys that are gone with it: what refers to them is wrong because of the repair.
+    removed_names: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +41,12 @@ pub(super) fn repairs(draft: &Draft, error: &InputError, schema: &Value) -> Vec<
     if !own.is_empty() {
         // A section with all its keys gives fewer errors that only follow.
         all.extend(other_value_repairs(draft, &own, schema));
-        all.push(Repair::from_guess(&own, RepairKind::Remove));
+        all.push(Repair::from_removal(draft, &own));
     }
     // At last the tables around the key, the innermost first: the less is removed, the more errors
     // of the rest are found.
     for count in (1..own.len()).rev() {
-        all.push(Repair::from_guess(&own[..count], RepairKind::Remove));
+        all.push(Repair::from_removal(draft, &own[..count]));
     }
     all
 }
@@ -64,7 +66,7 @@ fn suggested_repair(draft: &Draft, error: &InputError, own: &[String]) -> Vec<Re
     } else {
         RepairKind::Replace(toml::Value::from(meant).to_string())
     };
-    vec![Repair { target: own.to_vec(), what, is_meant: true }]
+    vec![Repair { target: own.to_vec(), what, is_meant: true, removed_names: Vec::new() }]
 }
 
 /// The error's text names the key; its values are examples of the schema, then the list beside it.
@@ -108,7 +110,13 @@ fn text_between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str>
 
 impl Repair {
     fn from_guess(target: &[String], what: RepairKind) -> Self {
-        Self { target: target.to_vec(), what, is_meant: false }
+        Self { target: target.to_vec(), what, is_meant: false, removed_names: Vec::new() }
+    }
+
+    fn from_removal(draft: &Draft, target: &[String]) -> Self {
+        let removed = find(draft.text(), target);
+        let removed_names = removed.map(|found| found.inner_names).unwrap_or_default();
+        Self { removed_names, ..Self::from_guess(target, RepairKind::Remove) }
     }
 
     /// Returns the guess that it makes, unless its author is likely to have meant it.
@@ -157,11 +165,13 @@ impl Repair {
 pub(super) struct Guess {
     key: Vec<String>,
     is_removed: bool,
+    removed_names: Vec<String>,
 }
 
 impl From<Repair> for Guess {
     fn from(repair: Repair) -> Self {
-        Self { key: repair.target, is_removed: repair.what == RepairKind::Remove }
+        let is_removed = repair.what == RepairKind::Remove;
+        Self { key: repair.target, is_removed, removed_names: repair.removed_names }
     }
 }
 
@@ -194,14 +204,24 @@ impl Guess {
         // Names of its own key are in the error anyway, and numbers of elements are no names.
         let mut names =
             self.key.iter().filter(|part| part.parse::<usize>().is_err() && !key.contains(part));
-        names.any(|name| mentions(error, name))
+        names.any(|name| mentions(error, name)) || self.is_unknown_by_removal(error)
+    }
+
+    /// Returns whether an error is about a name that nothing has because the table with it was removed.
+    fn is_unknown_by_removal(&self, error: &InputError) -> bool {
+        let is_unknown = error.cause().starts_with("unknown ");
+        let named = text_between(error.cause(), "`", "`");
+        is_unknown && named.is_some_and(|named| self.removed_names.iter().any(|name| name == named))
     }
 }
 
 fn mentions(error: &InputError, name: &str) -> bool {
     // A remedy of the reader's names the world, and sections may have its name.
     let is_of_the_reader = error.remedy().starts_with("see what");
-    has_word(error.cause(), name) || (!is_of_the_reader && has_word(error.remedy(), name))
+    // A name of several words stands in backticks.
+    error.cause().contains(&format!("`{name}`"))
+        || has_word(error.cause(), name)
+        || (!is_of_the_reader && has_word(error.remedy(), name))
 }
 
 fn has_word(text: &str, word: &str) -> bool {

@@ -17,6 +17,8 @@ pub(super) struct KeyNode {
     pub(super) parts: Vec<Range<usize>>,
     /// Texts of the lists beside it, or in it.
     pub(super) lists: Vec<String>,
+    /// Names of the keys in it, at any depth.
+    pub(super) inner_names: Vec<String>,
 }
 
 /// Returns the parts of a key as overrides name it.
@@ -137,6 +139,7 @@ impl Tree<'_> {
             inside,
             parts: merge_ranges(parts),
             lists: self.lists(value, parent),
+            inner_names: inner_names(value),
         }
     }
 
@@ -216,6 +219,25 @@ impl Tree<'_> {
     }
 }
 
+/// Returns the names of all keys in a value.
+fn inner_names(value: &Spanned<DeValue<'_>>) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut open = vec![value];
+    while let Some(value) = open.pop() {
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                for (name, value) in table.iter() {
+                    names.push(name.get_ref().to_string());
+                    open.push(value);
+                }
+            }
+            DeValue::Array(many) => open.extend(many.iter()),
+            _ => {}
+        }
+    }
+    names
+}
+
 /// Joins parts that overlap or touch.
 fn merge_ranges(mut parts: Vec<Range<usize>>) -> Vec<Range<usize>> {
     parts.sort_by_key(|part| part.start);
@@ -268,6 +290,7 @@ mod tests {
         let of = |key: &str| find(TEXT, &key_path(key)).expect(key);
         assert_eq!(of("s.one.rows.p").lists, ["[2]"]);
         assert_eq!(of("s.one.rows").lists, ["[1]", "[2]"]);
+        assert_eq!(of("m.0").inner_names, ["n", "t", "k"]);
         assert_eq!(of("").inside, Some(0..0));
         assert_eq!(of("other").inside.map(|at| &TEXT[at]), Some("[other]"));
         assert_eq!(of("s.one.b").inside.map(|at| &TEXT[at]), Some("{"));

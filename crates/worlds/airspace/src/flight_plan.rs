@@ -103,6 +103,16 @@ impl AirplaneSection {
         Err(source.error(given.span(), cause, remedy))
     }
 
+    /// Returns the error of a call sign that another airplane has at the same time.
+    pub(super) fn repeated_callsign_error(&self, source: &Source) -> Option<InputError> {
+        let given = self.callsign.as_ref()?;
+        let cause = format!(
+            "the call sign {:?} is that of another airplane at the same time",
+            given.get_ref()
+        );
+        Some(source.error(given.span(), cause, "give each airplane its own, or leave it out"))
+    }
+
     /// Returns the way-points in their order; none if none are given.
     pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
         points_m(self.way_points_m.as_ref())
@@ -149,9 +159,16 @@ impl AirplaneSection {
                 return Err(error(cause, "sort orders by at_s, from 0"));
             }
             last_s = at_s;
+            if leaves_s.is_finite() {
+                let cause = "an order after the airplane has left";
+                return Err(error(
+                    cause,
+                    "leave it out, or let the airplane leave as its last order",
+                ));
+            }
             match order.parse_task().map_err(|(cause, remedy)| error(cause, remedy))? {
                 Some(task) => orders.push(FlightOrder { at_s, task }),
-                None => leaves_s = at_s.min(leaves_s),
+                None => leaves_s = at_s,
             }
         }
         if orders.len() > MAX_ORDERS {

@@ -11,6 +11,7 @@ use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
 use sidestep_scenario::{Integer, Number, Open, RightOpen, Spanned};
+use std::collections::BTreeMap;
 
 /// The paper's airplane, for keys that a scenario leaves out.
 const PAPER_MODEL: AircraftModel = AircraftModel {
@@ -90,12 +91,22 @@ impl Compiler<'_> {
             Some(generator) => self.generate_airplanes(generator, &common.model(), streams)?,
             None => Vec::new(),
         };
+        let mut named: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for section in &self.file.airplanes.0 {
             let own = common.with_airplane_overrides(section.get_ref());
-            all.push(match section.get_ref().track(self.source)? {
+            let airplane = match section.get_ref().track(self.source)? {
                 Some(track) => self.recorded_airplane(section, own.model(), track, replay)?,
                 None => self.planned_airplane(section, own.model())?,
-            });
+            };
+            if let Some(callsign) = &airplane.callsign {
+                let namesakes = named.entry(callsign.clone()).or_default();
+                if namesakes.iter().any(|other| are_confusable(&all[*other], &airplane)) {
+                    let error = section.get_ref().repeated_callsign_error(self.source);
+                    return Err(error.expect("it has a call sign"));
+                }
+                namesakes.push(all.len());
+            }
+            all.push(airplane);
         }
         if self.file.airspace.replay_until_s.is_some() && all.iter().all(|a| a.track.is_none()) {
             return Err(self
@@ -215,6 +226,14 @@ impl Compiler<'_> {
         let cycles = (until_s / timing.dt_s).ceil() as u64;
         ReplayPeriod { cycles, until_s: cycles as f64 * timing.dt_s, dt_s: timing.dt_s }
     }
+}
+
+/// Returns whether two airplanes of one call sign are in the air at the same time. Recordings have such airplanes, and
+/// their aircraft are known by their addresses.
+fn are_confusable(one: &AirplaneStart, other: &AirplaneStart) -> bool {
+    let are_recorded = one.track.is_some() && other.track.is_some();
+    let overlap = one.appears_s < other.leaves_s && other.appears_s < one.leaves_s;
+    !are_recorded && overlap
 }
 
 fn replayed_airplane(
