@@ -55,7 +55,7 @@ class Mean(NamedTuple):
     mean: float | None
     #: Standard deviation (divisor n - 1); None below two values.
     sd: float | None
-    #: Student's interval of the mean.
+    #: Student's interval of the mean; None if all are equal but for rounding, which is no spread.
     interval: Interval | None
     #: Bootstrap (BCa) interval of the mean, for skewed values; None if all are equal.
     bootstrap: Interval | None
@@ -96,15 +96,16 @@ class Paired(NamedTuple):
     incomplete: int
     #: Mean of a - b.
     difference: float | None
-    #: Student's interval of it.
+    #: Student's interval of it; None if all pairs are the same one but for rounding.
     interval: Interval | None
-    #: Bootstrap interval of it.
+    #: Bootstrap interval of it; None where the other is.
     bootstrap: Interval | None
-    #: Two-sided p-value of Student's paired test of no difference.
+    #: Two-sided p-value of Student's paired test of no difference; None below 5 pairs, and if all differ by the same
+    #: but for rounding (a standard deviation of at most 1e-9 of the largest magnitude). 1 if none differs.
     p_value: float | None
-    #: Two-sided p-value of the sign test, which makes no assumption about the values.
+    #: Two-sided p-value of the sign test, which makes no assumption about the values; None below 5 pairs.
     sign_p_value: float | None
-    #: Numbers of pairs in which a is lower, equal, and higher.
+    #: Numbers of pairs in which a is lower, equal but for rounding, and higher.
     lower: int
     equal: int
     higher: int

@@ -25,10 +25,14 @@ pub(crate) fn stats_mean<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let sample = Sample::from_runs(to_options(&values));
     let bootstrap = py.detach(|| Bootstrap::default().mean(&sample.values));
+    // A spread that is rounding is none, and gives no interval.
+    let has_spread = !statistics::is_tied_measure(&sample.values);
+    let interval = statistics::mean_interval(&sample.values).filter(|_| has_spread);
+    let bootstrap = bootstrap.filter(|_| has_spread);
     Fields::new(py)
         .with("mean", statistics::mean(&sample.values))?
         .with("sd", statistics::sample_sd(&sample.values))?
-        .with_interval("interval", statistics::mean_interval(&sample.values))?
+        .with_interval("interval", interval)?
         .with_interval("bootstrap", bootstrap)?
         .with("n", sample.values.len())?
         .with("missing", sample.missing)?
@@ -93,6 +97,7 @@ pub(crate) fn stats_paired<'py>(
     let bootstrap = py.detach(|| pairs.difference_bootstrap(&Bootstrap::default()));
     let (lower, equal, higher) = pairs.sign_counts();
     let (ratio, ratio_interval) = pairs.ratio().unzip();
+    let ratio_interval = ratio_interval.flatten();
     Fields::new(py)
         .with("n", pairs.n())?
         .with("incomplete", pairs.incomplete())?

@@ -204,6 +204,15 @@ def test_missing_values_are_counted_and_not_averaged():
     assert stats.paired([-1.0, 2.0], [0.0, 1.0]).ratio is None
 
 
+def test_pairs_that_are_equal_but_for_rounding_prove_nothing():
+    turned = [14.285714348, 14.285714349, 14.285714348, 14.285714347, 14.285714348]
+    found = stats.paired(turned, [0.0] * 5)
+    assert (found.p_value, found.sign_p_value, found.interval, found.bootstrap) == (None,) * 4
+    assert stats.mean(turned)[2:4] == (None, None)
+    four = stats.paired([3.0, 4.5, 3.5, 4.0], [1.0, 1.2, 1.1, 1.3])
+    assert four.interval is not None and (four.p_value, four.sign_p_value) == (None, None)
+
+
 def test_the_stopping_rule_looks_at_rounds():
     rule = stats.StoppingRule(0.1, max_runs=40)
     values = np.tile([1.0, 2.0], 20)

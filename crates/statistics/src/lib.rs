@@ -15,8 +15,8 @@ pub use interval::{
     Interval, clopper_pearson, mean_interval, mean_p_value, paired_difference, proportion_p_value,
     runs_for_half_width, wilson,
 };
-pub use moments::{Moments, Sample, mean, percentile, sample_sd};
-pub use paired::{Pairs, holm};
+pub use moments::{Moments, Sample, is_tied, is_tied_measure, mean, percentile, sample_sd};
+pub use paired::{MIN_TEST_PAIRS, Pairs, holm};
 pub use quantile::{QuantileInterval, quantile_interval, runs_for_quantile};
 pub use rank::{Correlation, rank_correlation};
 pub use stopping::{StopDecision, StopReason, StoppingRule};

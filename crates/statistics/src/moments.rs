@@ -42,7 +42,7 @@ impl Sample {
 /// Returns a power of two near the largest magnitude: a value divided by it can be squared and
 /// summed without overflow, and loses no digit by the division.
 fn scale(values: &[f64]) -> f64 {
-    let largest = values.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    let largest = largest_magnitude(values);
     // Its exponent alone.
     let power = f64::from_bits(largest.to_bits() & 0x7ff0_0000_0000_0000);
     if power > 0.0 && power.is_finite() { power } else { 1.0 }
@@ -65,6 +65,28 @@ pub(super) fn sum(terms: impl IntoIterator<Item = f64>) -> f64 {
 /// Returns whether all values are equal; true without values.
 pub(super) fn is_constant(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] == pair[1])
+}
+
+/// The part of the largest magnitude up to which a spread is rounding: sums in another order, or of turned positions,
+/// differ by less, and no effect that runs can show is as small.
+pub(super) const TIE_FRACTION: f64 = 1e-9;
+
+/// Returns whether all values are equal but for rounding: their standard deviation is at most 1e-9 of the largest
+/// magnitude. True for fewer than two values.
+pub fn is_tied(values: &[f64]) -> bool {
+    let sd = sample_sd(values).unwrap_or(0.0);
+    sd <= TIE_FRACTION * largest_magnitude(values)
+}
+
+/// Returns whether all values of a measured quantity are equal but for rounding. Whole numbers are none: a count may be
+/// the same in a few runs by chance.
+pub fn is_tied_measure(values: &[f64]) -> bool {
+    is_tied(values) && values.iter().any(|value| value.fract() != 0.0)
+}
+
+/// Returns the largest magnitude of some values; 0 without any.
+pub(super) fn largest_magnitude(values: &[f64]) -> f64 {
+    values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()))
 }
 
 /// Returns the arithmetic mean; `None` without values. For equal values it is that value, to the

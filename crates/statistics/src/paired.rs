@@ -3,7 +3,10 @@
 use super::Bootstrap;
 use super::interval::binomial_cdf;
 use super::interval::{Interval, mean_interval, student_p_value, student_t};
-use super::moments::{mean, sample_sd, sum};
+use super::moments::{TIE_FRACTION, largest_magnitude, mean, sample_sd, sum};
+
+/// Number of pairs below which no test is made: two pairs that agree by chance would give any p-value.
+pub const MIN_TEST_PAIRS: usize = 5;
 
 /// Values of a treatment and of a baseline on the same cases (runs of the same seed), so that
 /// effects common to both cancel.
@@ -50,17 +53,39 @@ impl Pairs {
         mean(&self.differences())
     }
 
-    /// Returns Student's 95 % interval of the mean difference; `None` for fewer than two pairs.
+    /// Returns Student's 95 % interval of the mean difference; `None` for fewer than two pairs, and where
+    /// [they are one case](Self::is_one_case).
     pub fn difference_interval(&self) -> Option<Interval> {
+        if self.is_one_case() {
+            return None;
+        }
         mean_interval(&self.differences())
     }
 
-    /// Returns the mean of `a` over the mean of `b`, with its 95 % interval.
+    /// Returns the spread that rounding may give to a difference: 1e-9 of the largest magnitude of both.
+    fn rounding(&self) -> f64 {
+        let (a, b) = self.columns();
+        TIE_FRACTION * largest_magnitude(&a).max(largest_magnitude(&b))
+    }
+
+    /// Returns whether all differences are equal but for rounding.
+    fn is_tied(&self) -> bool {
+        sample_sd(&self.differences()).is_some_and(|sd| sd <= self.rounding())
+    }
+
+    /// Returns whether all pairs are the same one but for rounding: all differences are equal, and are measured, because
+    /// those of counts may be equal by chance. They tell nothing of other cases.
+    pub fn is_one_case(&self) -> bool {
+        self.is_tied() && self.pairs.iter().any(|(a, b)| a.fract() != 0.0 || b.fract() != 0.0)
+    }
+
+    /// Returns the mean of `a` over the mean of `b`, with its 95 % interval, which is absent where
+    /// [all pairs are one case](Self::is_one_case).
     ///
     /// The interval is Fieller's (1954) for pairs: exact where both are normal. `None` where a
     /// value is negative (a ratio of signed quantities means little), with fewer than two pairs,
     /// and where the interval of the baseline's mean contains 0, so that no factor is excluded.
-    pub fn ratio(&self) -> Option<(f64, Interval)> {
+    pub fn ratio(&self) -> Option<(f64, Option<Interval>)> {
         let (a, b) = self.columns();
         if self.n() < 2 || self.pairs.iter().any(|(a, b)| *a < 0.0 || *b < 0.0) {
             return None;
@@ -94,18 +119,22 @@ impl Pairs {
         let root = ((ratio - ab) * (ratio - ab) - leading * (ratio * ratio - aa)).max(0.0).sqrt();
         let interval =
             Interval { low: (ratio - ab - root) / leading, high: (ratio - ab + root) / leading };
-        Some((ratio, interval))
+        Some((ratio, (!self.is_one_case()).then_some(interval)))
     }
 
-    /// Returns the bootstrap's 95 % interval of the mean difference.
+    /// Returns the bootstrap's 95 % interval of the mean difference; `None` where
+    /// [all pairs are one case](Self::is_one_case).
     pub fn difference_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
+        if self.is_one_case() {
+            return None;
+        }
         bootstrap.mean(&self.differences())
     }
 
-    /// Returns the bootstrap's 95 % interval of the ratio of means; present where [`Self::ratio`]
-    /// is.
+    /// Returns the bootstrap's 95 % interval of the ratio of means; present where that of
+    /// [`Self::ratio`] is.
     pub fn ratio_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
-        self.ratio()?;
+        self.ratio()?.1?;
         bootstrap.interval(&self.pairs, |pairs| {
             let total_a: f64 = pairs.iter().map(|(a, _)| a).sum();
             let total_b: f64 = pairs.iter().map(|(_, b)| b).sum();
@@ -113,33 +142,40 @@ impl Pairs {
         })
     }
 
-    /// Returns the number of pairs in which `a` is lower than `b`, equal, and higher.
+    /// Returns the number of pairs in which `a` is lower than `b`, equal but for rounding, and higher.
     pub fn sign_counts(&self) -> (usize, usize, usize) {
-        let lower = self.pairs.iter().filter(|(a, b)| a < b).count();
-        let higher = self.pairs.iter().filter(|(a, b)| a > b).count();
+        let rounding = self.rounding();
+        let lower = self.pairs.iter().filter(|(a, b)| b - a > rounding).count();
+        let higher = self.pairs.iter().filter(|(a, b)| a - b > rounding).count();
         (lower, self.n() - lower - higher, higher)
     }
 
     /// Returns the two-sided p-value of Student's paired test of no difference.
     ///
-    /// 1 where no pair differs at all. `None` for fewer than two pairs, and where all differ by the
-    /// same amount, because the test needs a spread.
+    /// 1 where no pair differs but for rounding. `None` for fewer than [`MIN_TEST_PAIRS`], and where all
+    /// differ by the same amount but for rounding, because the test needs a spread: seeds that change nothing give any
+    /// number of equal pairs.
     pub fn p_value(&self) -> Option<f64> {
+        if self.n() < MIN_TEST_PAIRS {
+            return None;
+        }
         let differences = self.differences();
         let center = mean(&differences)?;
         let sd = sample_sd(&differences)?;
-        if sd == 0.0 {
-            return (center == 0.0).then_some(1.0);
+        let rounding = self.rounding();
+        if sd <= rounding {
+            return (center.abs() <= rounding).then_some(1.0);
         }
         student_p_value(center / sd * (self.n() as f64).sqrt(), self.n() - 1)
     }
 
     /// Returns the two-sided p-value of the exact sign test: among pairs that differ, `a` is as
-    /// often lower as higher. 1 where none differs; `None` without pairs.
+    /// often lower as higher. 1 where none differs; `None` for fewer than [`MIN_TEST_PAIRS`].
     pub fn sign_p_value(&self) -> Option<f64> {
         let (lower, _, higher) = self.sign_counts();
         let rarer = binomial_cdf(lower.min(higher), lower + higher, 0.5);
-        (self.n() > 0).then_some((2.0 * rarer).min(1.0))
+        let is_tested = self.n() >= MIN_TEST_PAIRS && !self.is_one_case();
+        is_tested.then_some((2.0 * rarer).min(1.0))
     }
 
     fn columns(&self) -> (Vec<f64>, Vec<f64>) {
@@ -224,7 +260,40 @@ mod tests {
         assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[1.0; 5])).p_value(), Some(1.0));
         assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).p_value(), None);
         let sure = Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).ratio().unwrap();
-        assert_eq!(sure, (0.5, Interval { low: 0.5, high: 0.5 }));
+        assert_eq!(sure, (0.5, Some(Interval { low: 0.5, high: 0.5 })));
+    }
+
+    #[test]
+    fn differences_that_are_equal_but_for_rounding_are_one_case() {
+        let zeros = some(&[0.0; 5]);
+        let turned = [14.285714348, 14.285714349, 14.285714348, 14.285714347, 14.285714348];
+        let pairs = Pairs::from_columns(&some(&turned), &zeros);
+        assert!(pairs.is_one_case());
+        assert_eq!(
+            (pairs.p_value(), pairs.sign_p_value(), pairs.difference_interval()),
+            (None, None, None)
+        );
+        assert_eq!(pairs.difference_bootstrap(&Bootstrap::default()), None);
+        // Both vary, and differ by rounding alone.
+        let cases = [1e6 + 0.1, 2e6 + 0.2, 3e6 + 0.3, 4e6 + 0.4, 5e6 + 0.5];
+        let rounded = cases.map(|case| case * (1.0 + 1e-14));
+        let pairs = Pairs::from_columns(&some(&rounded), &some(&cases));
+        assert_eq!((pairs.p_value(), pairs.sign_counts()), (Some(1.0), (0, 5, 0)));
+        // A small effect that is more than rounding is one.
+        let moved = [1e-3, 2e-3, 1.5e-3, 1e-3, 2e-3].map(|effect| 1e3 + effect);
+        let pairs = Pairs::from_columns(&some(&moved), &some(&[1e3; 5]));
+        assert!(pairs.p_value().is_some_and(|p| p < 0.01) && !pairs.is_one_case());
+    }
+
+    #[test]
+    fn fewer_than_five_pairs_have_an_interval_and_no_p_value() {
+        let a = some(&[3.0, 4.5, 3.5, 4.0, 3.2]);
+        let b = some(&[1.0, 1.2, 1.1, 1.3, 1.0]);
+        let four = Pairs::from_columns(&a[..4], &b[..4]);
+        assert!(four.difference_interval().is_some());
+        assert_eq!((four.p_value(), four.sign_p_value()), (None, None));
+        let five = Pairs::from_columns(&a, &b);
+        assert!(five.p_value().is_some() && five.sign_p_value().is_some());
     }
 
     #[test]
@@ -254,7 +323,7 @@ mod tests {
             let baseline = treated();
             let pairs: Vec<Pairs> =
                 (0..5).map(|_| Pairs::from_columns(&treated(), &baseline)).collect();
-            ratios += usize::from(pairs[0].ratio().unwrap().1.contains(1.0));
+            ratios += usize::from(pairs[0].ratio().unwrap().1.unwrap().contains(1.0));
             let p: Vec<_> = pairs.iter().map(Pairs::p_value).collect();
             wrong += usize::from(holm(&p).iter().any(|p| p.unwrap() < 0.05));
         }
@@ -272,6 +341,7 @@ mod tests {
             let (a, b): (Vec<_>, Vec<_>) = pairs.into_iter().map(|(a, b)| (Some(a), Some(b))).unzip();
             let (ratio, interval) = Pairs::from_columns(&a, &b).ratio().unwrap();
             let (other, inverse) = Pairs::from_columns(&b, &a).ratio().unwrap();
+            let (Some(interval), Some(inverse)) = (interval, inverse) else { return Ok(()) };
             prop_assert!((ratio * other - 1.0).abs() < 1e-12 && interval.contains(ratio));
             prop_assert!((interval.low * inverse.high - 1.0).abs() < 1e-9);
             prop_assert!((interval.high * inverse.low - 1.0).abs() < 1e-9);

@@ -29,7 +29,7 @@
 
 use super::interval::runs_for_half_width;
 use super::mean_interval;
-use super::moments::{Sample, is_constant, mean, sample_sd};
+use super::moments::{Sample, is_tied, mean, sample_sd};
 use serde::Serialize;
 
 /// The number of equal values from which on they are called constant: by the rule of three (`3 / n`) at
@@ -65,8 +65,11 @@ pub enum StopDecision {
 pub enum StopReason {
     /// The interval is as narrow as the target.
     Reached,
-    /// All values are equal, and there are enough of them (60) to call the metric constant.
+    /// All values are equal but for rounding, and there are enough of them (60) to call the metric constant.
     Constant,
+    /// All values of all metrics are equal but for rounding: seeds change nothing that a metric shows, so that no number
+    /// of runs gives an interval.
+    Unseen,
     /// The maximum number of runs is reached, and the interval is wider than the target.
     Maximum,
     /// The maximum number of runs is reached, and the interval contains 0: no fraction of a mean that
@@ -86,6 +89,10 @@ impl StopReason {
         match self {
             Self::Reached => "the interval is as narrow as wanted",
             Self::Constant => "all values are equal",
+            Self::Unseen => {
+                "seeds change nothing that a metric shows: all values are equal but for rounding, \
+                 so no number of runs gives an interval"
+            }
             Self::Maximum => "the maximum of runs is reached; the interval is wider than wanted",
             Self::MeanNearZero => {
                 "the maximum of runs is reached; the mean may be 0, of which no share is narrow \
@@ -148,7 +155,7 @@ impl StoppingRule {
 
     fn reason_before_max(&self, sample: &[f64]) -> Option<StopReason> {
         let interval = mean_interval(sample)?;
-        if is_constant(sample) {
+        if is_tied(sample) {
             return (sample.len() >= MIN_CONSTANT_RUNS).then_some(StopReason::Constant);
         }
         let reached = interval.half_width() <= self.target(sample);
@@ -174,7 +181,7 @@ impl StoppingRule {
     /// Returns the end of the next round: the number that the spread so far predicts, at least half
     /// as much again and at most twice the present number.
     fn next_round_end(&self, runs: usize, sample: &[f64]) -> usize {
-        let values = if is_constant(sample) {
+        let values = if is_tied(sample) {
             Some(MIN_CONSTANT_RUNS as u64)
         } else {
             sample_sd(sample).and_then(|sd| runs_for_half_width(sd, self.target(sample)))

@@ -36,6 +36,66 @@ fn a_run_ends_when_all_have_arrived_and_says_what_came_of_it() {
     assert_eq!(place.json(&["resume", "six"])["digest"], told["digest"], "told again");
 }
 
+/// Each key of a table that a `kind` selects, call signs and orders are checked like all others.
+#[test]
+fn keys_of_tables_with_a_kind_call_signs_and_orders_are_refused_where_they_are_wrong() {
+    let head = "format = 1\nworld = \"airspace\"\n";
+    let update = "[airspace]\nupdate = { kind = \"brouwer\", step = 0.5, foo = 3 }\n";
+    let exact = "[airspace]\nestimator = { kind = \"exact\", block = 3 }\n";
+    let sampled =
+        "[airspace]\nestimator = { kind = \"sampled\", block = 3, ageing = 0.5, bar = 1 }\n";
+    let table = "[airspace.update]\nkind = \"brouwer\"\nstep = 0.5\nfoo = 3\n";
+    let circle = "[airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
+    let airplane = |y: u32, more: &str| {
+        format!(
+            "[[airplanes]]\nat_m = [0, {y}]\nheading_deg = 0\nway_points_m = [[9000, {y}]]\n{more}\n"
+        )
+    };
+    let after =
+        airplane(0, "orders = [{ at_s = 5, leaves = true }, { at_s = 9, heading_deg = 3 }]");
+    let twins = airplane(0, "callsign = \"A\"") + &airplane(5000, "callsign = \"A\"");
+    for (text, place_of, said) in [
+        (format!("{head}{update}{circle}"), "s.toml:4:42: ", "unknown key `foo`"),
+        (format!("{head}{exact}{circle}"), "s.toml:4:31: ", "unknown key `block`"),
+        (format!("{head}{sampled}{circle}"), "s.toml:4:58: ", "unknown key `bar`"),
+        (format!("{head}{table}{circle}"), "s.toml:6:1: ", "unknown key `foo`"),
+        (format!("{head}{after}"), "s.toml:7:40: ", "an order after the airplane has left"),
+        (format!("{head}{twins}"), "s.toml:12:12: ", "that of another airplane at the same time"),
+    ] {
+        let place = TestFolder::new();
+        place.write("s.toml", &text);
+        let ended = place.run(&["check", "s.toml"]);
+        assert_eq!(ended.code(), 2, "{text}");
+        let err = ended.err();
+        assert!(err.contains(place_of) && err.contains(said), "{text}\n{err}");
+    }
+    // One that comes when its namesake has left is no twin.
+    let left = airplane(0, "callsign = \"A\"\norders = [{ at_s = 5, leaves = true }]");
+    let next = airplane(5000, "callsign = \"A\"\nappears_s = 6");
+    let place = TestFolder::new();
+    place.write("s.toml", format!("{head}{left}{next}"));
+    let ended = place.run(&["check", "s.toml"]);
+    assert_eq!(ended.code(), 0, "{}", ended.err());
+}
+
+/// In a circle without avoidance all pairs meet at the center, and the seed only turns the circle.
+#[test]
+fn seeds_that_only_turn_a_circle_give_no_interval_no_p_value_and_no_precision() {
+    let place = TestFolder::new();
+    place.write("six.toml", SIX);
+    let bare = ["--set", "airspace.shield=off", "--set", "airspace.method=none"];
+    let vary = ["--vary", "airspace.generator.n=1,8", "--replicate", "5"];
+    let swept = place.run(&[&["sweep", "six.toml"], &bare[..], &vary[..]].concat());
+    assert_eq!(swept.code(), 0, "{}", swept.err());
+    let shown = swept.out();
+    assert!(!shown.contains("28, 28") && !shown.contains("0.0001"), "{shown}");
+    assert!(shown.contains("Seeds change nothing that a metric shows"), "{shown}");
+    let until = ["--set", "airspace.generator.n=8", "--until", "ci=0.05"];
+    let stopped = place.json(&[&["sweep", "six.toml"], &bare[..], &until[..]].concat());
+    assert_eq!(stopped["stopped"][0]["reason"], "unseen", "{}", stopped["stopped"]);
+    assert_eq!(stopped["runs"], 10);
+}
+
 #[test]
 fn every_deployment_gives_the_digest_of_one_process() {
     let place = TestFolder::new();

@@ -4,7 +4,7 @@ use super::groups::RunGroups;
 use super::table::RunColumn;
 use serde::Serialize;
 use sidestep_kernel::ports::ColumnValues;
-use sidestep_statistics::{Bootstrap, Interval, Pairs, holm};
+use sidestep_statistics::{Bootstrap, Interval, Pairs};
 
 /// Difference between a variant and the baseline in one metric, over pairs of equal replicates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -13,7 +13,7 @@ pub struct Comparison {
     pub variant: String,
     /// The variant that it is compared with.
     pub baseline: String,
-    /// Whether seeds change neither: there is one pair, and no interval.
+    /// Whether seeds change nothing that metrics show in either: there is one pair, and no interval.
     pub seedless: bool,
     /// Number of pairs in which both have a value.
     pub pairs: usize,
@@ -21,7 +21,7 @@ pub struct Comparison {
     pub incomplete: usize,
     /// Mean of variant minus baseline.
     pub difference: Option<f64>,
-    /// Student's 95 % confidence interval of the difference.
+    /// Student's 95 % confidence interval of the difference; absent where all pairs are equal but for rounding.
     pub interval: Option<Interval>,
     /// The bootstrap's 95 % confidence interval of the difference.
     pub bootstrap: Option<Interval>,
@@ -39,9 +39,9 @@ pub struct Comparison {
     /// Number of pairs in which the variant is higher.
     pub higher: usize,
     /// P-value of no difference: Student's paired test; for a share the exact sign test, which is
-    /// McNemar's.
+    /// McNemar's. Absent for fewer than 5 pairs, and where all are equal but for rounding.
     pub p: Option<f64>,
-    /// The same p-value, adjusted by Holm over all variants compared in this metric.
+    /// The same p-value, adjusted by Holm over all comparisons of all metrics of the summary.
     pub p_holm: Option<f64>,
     /// P-value of the exact sign test, which makes no assumption about the distribution; not
     /// adjusted.
@@ -56,7 +56,7 @@ pub(super) struct BaselineIndex {
     pub(super) of: Vec<Option<usize>>,
 }
 
-/// Returns the comparison of every variant with that which corresponds to it, in one metric.
+/// Returns the comparison of every variant with that which corresponds to it, in one metric, without adjusted p-values.
 pub(super) fn comparisons(
     groups: &RunGroups<'_>,
     metric: &RunColumn,
@@ -72,12 +72,6 @@ pub(super) fn comparisons(
         let comparison = compare_pairs(names, &pairs, is_share, bootstrap);
         let seedless = groups.seedless[variant] && groups.seedless[baseline];
         all.push(Comparison { seedless, ..comparison });
-    }
-    // Of many variants without any effect, some differ by chance: Holm's method holds the chance of a single wrong
-    // finding among the comparisons of a metric.
-    let adjusted = holm(&all.iter().map(|c| c.p).collect::<Vec<_>>());
-    for (comparison, p) in all.iter_mut().zip(adjusted) {
-        comparison.p_holm = p;
     }
     all
 }
@@ -116,7 +110,7 @@ fn compare_pairs(
         interval: pairs.difference_interval(),
         bootstrap: bootstrap.and_then(|b| pairs.difference_bootstrap(b)),
         ratio: ratio.map(|(ratio, _)| ratio),
-        ratio_interval: ratio.map(|(_, interval)| interval),
+        ratio_interval: ratio.and_then(|(_, interval)| interval),
         ratio_bootstrap: bootstrap.and_then(|b| pairs.ratio_bootstrap(b)),
         lower,
         equal,

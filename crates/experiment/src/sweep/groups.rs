@@ -9,7 +9,7 @@ use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::{MetricInfo, metric_label};
-use sidestep_statistics::{Sample, wilson};
+use sidestep_statistics::{Sample, is_tied_measure, sample_sd, wilson};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of characters of a value in the name of a level that stands for several parameters: it is the name of
@@ -62,8 +62,10 @@ pub(super) struct RunGroups<'a> {
     pub(super) parameters: Vec<Parameter>,
     /// The metrics in words.
     meanings: &'static [MetricInfo],
-    /// Whether seeds change nothing, variant by variant.
+    /// Whether seeds change nothing that metrics show, variant by variant.
     pub(super) seedless: Vec<bool>,
+    /// Number of variants of which the metrics alone show that.
+    pub(super) unseen: usize,
     /// Row of the table, by variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
@@ -101,13 +103,18 @@ impl<'a> RunGroups<'a> {
             }
         }
         let replicates: BTreeSet<i64> = run_of.keys().map(|(_, replicate)| *replicate).collect();
+        let draws_nothing: Vec<bool> =
+            variants.iter().map(|name| options.seedless.contains(name)).collect();
+        let unseen = unseen_variants(table, &run_of, &draws_nothing);
+        let seedless = draws_nothing.iter().zip(&unseen).map(|(a, b)| *a || *b).collect();
         Ok(Self {
             table,
             replicates: replicates.into_iter().collect(),
             paired: replicate_column.is_some(),
             parameters: parameters(table, &run_of, variants.len()),
             meanings: options.meanings,
-            seedless: variants.iter().map(|name| options.seedless.contains(name)).collect(),
+            seedless,
+            unseen: unseen.iter().filter(|is_unseen| **is_unseen).count(),
             variants,
             run: run_of,
         })
@@ -130,7 +137,7 @@ impl<'a> RunGroups<'a> {
 
     /// In the order of replicates.
     pub(super) fn rows(&self, variant: usize) -> impl Iterator<Item = usize> {
-        self.run.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run)
+        rows_of(&self.run, variant).into_iter()
     }
 
     /// Returns the values of a variant, one for each of its runs; one where seeds change nothing.
@@ -164,7 +171,11 @@ impl<'a> RunGroups<'a> {
             if matches!(metric.values, ColumnValues::Bool(_)) {
                 return proportion(&values, self.seedless[*variant]);
             }
-            return Estimate::from_values(values);
+            let mut estimate = Estimate::from_values(values.iter().copied());
+            if is_tied_measure(&Sample::from_runs(values).values) {
+                estimate.interval = None;
+            }
+            return estimate;
         }
         let columns: Vec<_> = group.iter().map(|v| self.by_replicate(metric, *v)).collect();
         // Where all are seedless, every replicate gives the same number.
@@ -199,6 +210,80 @@ impl<'a> RunGroups<'a> {
         let of = &self.parameters[parameter].of_variant;
         (0..of.len()).filter(|v| of[*v] == level).collect()
     }
+}
+
+/// Returns the rows of a variant, in the order of replicates.
+fn rows_of(run_of: &BTreeMap<(usize, i64), usize>, variant: usize) -> Vec<usize> {
+    run_of.range((variant, i64::MIN)..=(variant, i64::MAX)).map(|(_, run)| *run).collect()
+}
+
+/// Returns for each variant whether its seeds change nothing that a metric shows. Counts alone do not tell, because those
+/// of a few runs may be equal by chance; beside a variant in which measures tell, they do.
+fn unseen_variants(
+    table: &RunTable,
+    run_of: &BTreeMap<(usize, i64), usize>,
+    draws_nothing: &[bool],
+) -> Vec<bool> {
+    let mut equal: Vec<Option<Equality>> = Vec::with_capacity(draws_nothing.len());
+    for (variant, draws_nothing) in draws_nothing.iter().enumerate() {
+        let rows = rows_of(run_of, variant);
+        let is_asked = !draws_nothing && rows.len() > 1;
+        equal.push(if is_asked { equality_of_metrics(table, &rows) } else { None });
+    }
+    let is_told = equal.contains(&Some(Equality::Measures));
+    equal.iter().map(|equality| is_told && equality.is_some()).collect()
+}
+
+/// Returns how all metrics are equal in some runs; `None` where one differs.
+fn equality_of_metrics(table: &RunTable, rows: &[usize]) -> Option<Equality> {
+    let mut whole = Equality::Counts;
+    for column in table.columns_with_role(Role::Metric) {
+        if matches!(column.values, ColumnValues::Text(_)) {
+            let texts: BTreeSet<String> = rows.iter().map(|row| column.values.text(*row)).collect();
+            if texts.len() > 1 {
+                return None;
+            }
+            continue;
+        }
+        let values: Vec<Option<f64>> = rows.iter().map(|row| column.values.number(*row)).collect();
+        whole = whole.max(equality(&values)?);
+    }
+    Some(whole)
+}
+
+/// How values of several runs are equal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Equality {
+    /// They are whole numbers, or none has a value.
+    Counts,
+    /// They are measured, and equal but for rounding.
+    Measures,
+}
+
+/// Part of the largest magnitude up to which the runs of a metric have no spread: a world finds some times and distances
+/// by bisection, to about six digits.
+const SPREAD_FRACTION: f64 = 1e-5;
+
+/// Magnitude below which a metric is 0: rounding of positions, in any unit of a metric.
+const ZERO_MAGNITUDE: f64 = 1e-9;
+
+/// Returns how values are equal but for rounding; `None` where they differ.
+pub(super) fn equality(values: &[Option<f64>]) -> Option<Equality> {
+    let finite = values.iter().map(|value| value.filter(|v| v.is_finite()));
+    let numbers: Vec<f64> = finite
+        .flatten()
+        .map(|value| if value.abs() < ZERO_MAGNITUDE { 0.0 } else { value })
+        .collect();
+    // A metric without a value in some runs tells them apart.
+    if !numbers.is_empty() && numbers.len() < values.len() {
+        return None;
+    }
+    let largest = numbers.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    if sample_sd(&numbers).unwrap_or(0.0) > SPREAD_FRACTION * largest {
+        return None;
+    }
+    let is_measure = numbers.iter().any(|value| value.fract() != 0.0);
+    Some(if is_measure { Equality::Measures } else { Equality::Counts })
 }
 
 fn proportion(values: &[Option<f64>], seedless: bool) -> Estimate {

@@ -1,6 +1,7 @@
 //! The next trials to run, if a requested precision decides when a variant has had enough runs.
 
 use super::file::Precision;
+use super::groups::{Equality, equality};
 use super::plan::{Plan, Trial};
 use super::table::RunTable;
 use super::trial::Outcome;
@@ -20,7 +21,8 @@ const MIN_RUNS: usize = 10;
 pub struct Rounds<'a> {
     plan: &'a Plan,
     until: &'a Precision,
-    /// Values by replicate of each variant, by metric.
+    /// Values by replicate of each variant, by metric: of all metrics, because those that decide may be equal where
+    /// others show that seeds change something.
     values: Vec<BTreeMap<String, Values>>,
     /// Replicates of each variant that have an outcome.
     done: Vec<BTreeSet<u32>>,
@@ -58,11 +60,9 @@ impl<'a> Rounds<'a> {
         let variant = trial.variant as usize;
         self.done[variant].insert(trial.replicate);
         for (name, value) in &outcome.metrics {
-            if self.until.metrics.is_empty() || self.until.metrics.contains(name) {
-                let number = value.as_f64().or_else(|| value.as_bool().map(f64::from));
-                let of_metric = self.values[variant].entry(name.clone()).or_default();
-                of_metric.insert(trial.replicate, number);
-            }
+            let number = value.as_f64().or_else(|| value.as_bool().map(f64::from));
+            let of_metric = self.values[variant].entry(name.clone()).or_default();
+            of_metric.insert(trial.replicate, number);
         }
     }
 
@@ -117,6 +117,10 @@ impl<'a> Rounds<'a> {
             }
             return StopDecision::Run(first);
         }
+        let first = MIN_RUNS.min(rule.max_runs);
+        if complete >= first && self.is_unseen(variant) {
+            return StopDecision::Enough(first, StopReason::Unseen);
+        }
         let columns: Vec<&[Option<f64>]> = columns.iter().map(Vec::as_slice).collect();
         rule.decide_columns(&columns)
     }
@@ -126,7 +130,8 @@ impl<'a> Rounds<'a> {
     fn deciding_metrics(&self, variant: u32) -> Vec<&Values> {
         let of_variant = &self.values[variant as usize];
         if !self.until.metrics.is_empty() {
-            return of_variant.values().collect();
+            let requested = of_variant.iter().filter(|(name, _)| self.until.metrics.contains(name));
+            return requested.map(|(_, values)| values).collect();
         }
         let mut present = Vec::new();
         let mut varying = Vec::new();
@@ -140,6 +145,20 @@ impl<'a> Rounds<'a> {
         }
         // If nothing varies, it takes as many runs to believe that as for a single metric.
         if varying.is_empty() { present } else { varying }
+    }
+
+    /// Returns whether all metrics of a variant's first round are equal but for rounding, one of them a measure: no
+    /// number of runs would give an interval. The first round decides, so that later runs do not change that.
+    fn is_unseen(&self, variant: u32) -> bool {
+        let mut whole = Equality::Counts;
+        for values in self.values[variant as usize].values() {
+            let round: Vec<Option<f64>> = first_round(values).copied().collect();
+            match equality(&round) {
+                Some(of_metric) => whole = whole.max(of_metric),
+                None => return false,
+            }
+        }
+        whole == Equality::Measures
     }
 
     /// Returns whether a metric differs between two runs of a variant's first round, for any variant: a
@@ -206,6 +225,30 @@ mod tests {
             }
             order(&mut trials);
             trials.iter().for_each(|trial| rounds.add(&outcome(*trial)));
+        }
+    }
+
+    #[test]
+    fn runs_whose_metrics_are_equal_but_for_rounding_stop_and_are_not_called_precise() {
+        for metrics in [vec![], vec!["losses".to_string()]] {
+            let mut plan = plan(100);
+            plan.until = Some(Precision { half_width: 0.05, is_relative: true, metrics });
+            let mut rounds = Rounds::new(&plan, plan.until.as_ref().expect("given"));
+            for trial in plan.shard_trials(crate::sweep::Shard::ALL) {
+                if trial.replicate < MIN_RUNS as u32 {
+                    let mut outcome = Outcome::from_failure(trial, "");
+                    let rounding = f64::from(trial.replicate) * 1e-9;
+                    outcome.metrics.insert("losses".into(), json!(28));
+                    outcome.metrics.insert("lost_s".into(), json!(14.285714 + rounding));
+                    rounds.add(&outcome);
+                }
+            }
+            let stops = rounds.variant_stops();
+            assert_eq!(stops.len(), 2);
+            assert!(
+                stops.iter().all(|stop| stop.reason == StopReason::Unseen && stop.runs == MIN_RUNS)
+            );
+            assert!(rounds.next_trials().is_empty());
         }
     }
 

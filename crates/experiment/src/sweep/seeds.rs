@@ -80,12 +80,16 @@ impl<'a> PilotRuns<'a> {
     }
 }
 
-/// Returns for each variant whether seeds change nothing in it.
+/// Returns for each variant whether seeds change nothing in it, or have changed nothing: its runs are one case.
 pub(super) fn seedless_variants(plan: &Plan, runs: &RunTable) -> Vec<bool> {
     let pilots = PilotRuns::from_table(plan, runs);
-    (0..plan.variants.len() as u32)
-        .map(|v| plan.seeds(v) == SeedEffect::Nothing || pilots.is_settled(v))
-        .collect()
+    let unchanged = unchanged_variants(plan, runs);
+    let is_seedless = |variant: u32| {
+        plan.seeds(variant) == SeedEffect::Nothing
+            || pilots.is_settled(variant)
+            || unchanged.contains(&variant)
+    };
+    (0..plan.variants.len() as u32).map(is_seedless).collect()
 }
 
 /// Returns the notes that a reader must know about the seeds of these runs.
@@ -115,11 +119,11 @@ pub(super) fn seed_notes(
             plan.first_seed + 1
         ));
     }
-    let unchanged = unchanged_variants(plan, runs);
+    let unchanged = unchanged_variants(plan, runs).len();
     if unchanged > 0 {
         notes.push(format!(
-            "All runs{} ended in the same state, to the bit: seeds changed nothing there, and \
-             intervals say nothing.",
+            "All runs{} ended in the same state, to the bit: seeds changed nothing there. So these runs \
+             count as one, without an interval.",
             in_variants(plan, unchanged)
         ));
     }
@@ -142,10 +146,12 @@ pub fn seed_remedy(world: &dyn WorldType) -> Option<String> {
     (!draws.is_empty()).then(|| format!("Seeds change what is drawn: {draws}."))
 }
 
-/// Returns the number of variants of which all runs ended alike, although seeds might decide.
-fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
-    let Some(trials) = runs.columns_with_role(Role::Trial).next() else { return 0 };
-    let Some(digests) = runs.columns_with_role(Role::Digest).next() else { return 0 };
+/// Returns the variants of which all runs ended alike, although seeds might decide.
+fn unchanged_variants(plan: &Plan, runs: &RunTable) -> BTreeSet<u32> {
+    let Some(trials) = runs.columns_with_role(Role::Trial).next() else { return BTreeSet::new() };
+    let Some(digests) = runs.columns_with_role(Role::Digest).next() else {
+        return BTreeSet::new();
+    };
     let mut ends: BTreeMap<u32, (BTreeSet<String>, usize)> = BTreeMap::new();
     for row in 0..runs.runs() {
         let trial = trials.values.number(row).and_then(|id| plan.trial_of(id as u64));
@@ -158,7 +164,9 @@ fn unchanged_variants(plan: &Plan, runs: &RunTable) -> usize {
             *count += 1;
         }
     }
-    ends.values().filter(|(different, count)| different.len() == 1 && *count > 1).count()
+    let are_alike =
+        |(different, count): &(BTreeSet<String>, usize)| different.len() == 1 && *count > 1;
+    ends.iter().filter(|(_, end)| are_alike(end)).map(|(variant, _)| *variant).collect()
 }
 
 #[cfg(test)]
@@ -220,7 +228,7 @@ mod tests {
         }
         let table = rows.build(&plan).expect("no twins");
         assert_eq!(table.runs(), 2 + 4);
-        assert_eq!(seedless_variants(&plan, &table), [true, false]);
+        assert_eq!(seedless_variants(&plan, &table), [true, true]);
         let told = seed_notes(&plan, &table, worlds().find("chain"));
         assert!(
             told[0].contains("in 1 of 2 variants: the runs with the seeds 7 and 8"),

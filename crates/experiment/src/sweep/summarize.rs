@@ -10,7 +10,7 @@
 //! each. Metrics beyond [`SummaryOptions::max_metrics`] are left out. [`Summary::left_out`] lists
 //! every metric that is not shown, and why.
 use super::charts;
-use super::compare::{BaselineIndex, comparisons};
+use super::compare::{BaselineIndex, Comparison, comparisons};
 use super::groups::{Level, RunGroups};
 use super::options::{BaselineChoice, SummaryOptions};
 use super::summary::{
@@ -23,8 +23,8 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::suggestion;
 use sidestep_statistics::{
-    Bootstrap, Sample, mean, mean_interval, percentile, quantile_interval, rank_correlation,
-    runs_for_half_width, sample_sd, wilson,
+    Bootstrap, MIN_TEST_PAIRS, Sample, holm, is_tied_measure, mean, mean_interval, percentile,
+    quantile_interval, rank_correlation, runs_for_half_width, sample_sd, wilson,
 };
 use std::collections::BTreeMap;
 
@@ -73,6 +73,7 @@ impl Summary {
         // In other designs a parameter has few levels, and figures and tables over them show more than a coefficient.
         let trends =
             if charts::is_sampled(&groups) { trends(&groups, &columns) } else { Vec::new() };
+        adjust_p_values(&mut metrics);
         let mut summary = Self {
             runs: table.runs(),
             variants: (0..groups.variants.len()).map(|v| variant_summary(&groups, v)).collect(),
@@ -86,6 +87,17 @@ impl Summary {
         };
         summary.notes = notes(&summary, &groups, options.against.as_ref());
         Ok(summary)
+    }
+}
+
+/// Adjusts the p-values of all comparisons of all metrics. Of many comparisons without any effect, some differ by chance:
+/// Holm's method holds the chance of a single wrong finding among all that a reader sees.
+fn adjust_p_values(metrics: &mut [MetricSummary]) {
+    let mut comparisons: Vec<&mut Comparison> =
+        metrics.iter_mut().flat_map(|metric| &mut metric.comparisons).collect();
+    let p_values: Vec<Option<f64>> = comparisons.iter().map(|c| c.p).collect();
+    for (comparison, adjusted) in comparisons.iter_mut().zip(holm(&p_values)) {
+        comparison.p_holm = adjusted;
     }
 }
 
@@ -350,16 +362,18 @@ fn numeric_summary(sample: &Sample, bootstrap: Option<&Bootstrap>) -> NumericSum
     }
     let mean = mean(values);
     let sd = sample_sd(values);
+    // The spread of rounding is none.
+    let is_tied = is_tied_measure(values);
     NumericSummary {
         mean,
         sd,
-        interval: mean_interval(values),
-        bootstrap: bootstrap.and_then(|b| b.mean(values)),
+        interval: mean_interval(values).filter(|_| !is_tied),
+        bootstrap: bootstrap.filter(|_| !is_tied).and_then(|b| b.mean(values)),
         quantiles,
         min: sorted.first().copied(),
         max: sorted.last().copied(),
         runs_for_5_percent: mean
-            .zip(sd.filter(|sd| *sd > 0.0))
+            .zip(sd.filter(|sd| *sd > 0.0 && !is_tied))
             .and_then(|(mean, sd)| runs_for_half_width(sd, 0.05 * mean.abs())),
     }
 }
@@ -408,13 +422,45 @@ fn baseline_note(groups: &RunGroups<'_>, against: Option<&BaselineChoice>) -> Op
     }
 }
 
+/// Returns the note that seeds change nothing that a metric shows, where that is so.
+fn unseen_note(groups: &RunGroups<'_>) -> Option<String> {
+    let all = groups.variants.len();
+    let in_variants = match groups.unseen {
+        0 => return None,
+        unseen if unseen == all => String::new(),
+        unseen => format!(" in {unseen} of {all} variants"),
+    };
+    Some(format!(
+        "Seeds change nothing that a metric shows{in_variants}: in all runs the \
+         metrics are equal but for rounding. So these runs count as one, without an interval."
+    ))
+}
+
+/// Returns the notes that a reader must know about p-values.
+fn test_notes(summary: &Summary) -> Vec<String> {
+    let compared: Vec<&Comparison> =
+        summary.metrics.iter().flat_map(|metric| &metric.comparisons).collect();
+    let mut notes = Vec::new();
+    let tested = compared.iter().filter(|comparison| comparison.p.is_some()).count();
+    if tested > 1 {
+        notes.push(format!("p is adjusted by Holm over the {tested} tests of all metrics shown."));
+    }
+    let is_small = |c: &Comparison| !c.seedless && (2..MIN_TEST_PAIRS).contains(&c.pairs);
+    if compared.iter().any(|comparison| is_small(comparison)) {
+        notes.push(format!("Fewer than {MIN_TEST_PAIRS} pairs have an interval, and no p."));
+    }
+    notes
+}
+
 fn notes(
     summary: &Summary,
     groups: &RunGroups<'_>,
     against: Option<&BaselineChoice>,
 ) -> Vec<String> {
     let mut notes = Vec::new();
+    notes.extend(unseen_note(groups));
     notes.extend(baseline_note(groups, against));
+    notes.extend(test_notes(summary));
     let hidden = summary.left_out.iter().filter(|l| l.reason.starts_with("beyond")).count();
     if hidden > 0 {
         notes.push(format!("{hidden} more metrics vary and are not shown."));

@@ -91,7 +91,7 @@ pub struct VariantMetric {
     pub missing: usize,
     /// Number of runs among these with a value that is infinite or not a number.
     pub not_finite: usize,
-    /// Whether seeds change nothing in the variant.
+    /// Whether seeds change nothing that a metric shows in the variant: it counts as one run.
     pub seedless: bool,
     /// Mean, spread and quantiles of numbers, or a share.
     pub values: MetricValues,

@@ -199,7 +199,8 @@ fn footnotes(summary: &Summary) -> Vec<&'static str> {
 }
 
 const INTERVALS_NOTE: &str = "95 % intervals stand in brackets: of a mean by Student's t and by the bootstrap \
-                       (BCa), of quantiles by order statistics; `-` where n is too small for one. n: runs \
+                       (BCa), of quantiles by order statistics; `-` where n is too small for one, or all values are \
+                       equal but for rounding. n: runs \
                        with a value. sd, min and max describe these very runs. `for ±5 %`: runs that would \
                        narrow Student's interval to 5 % of the mean to either side, if runs go on to vary by \
                        this sd.";
@@ -212,8 +213,8 @@ const DIFFERENCES_NOTE: &str = "Differences are variant minus baseline, replicat
                            by Fieller's method, where no value is negative and the baseline's mean is well \
                            away from 0. `lower`, `higher`: pairs in which the variant is. p: of no difference \
                            by Student's paired test (of shares the exact sign test, McNemar's), adjusted by \
-                           Holm over the comparisons of one metric; over several metrics chances add up. `-`: \
-                           the pairs do not give it.";
+                           Holm over the comparisons of all metrics shown. `-`: the pairs do not give it, \
+                           because they are fewer than 5 or equal but for rounding.";
 
 const EFFECTS_NOTE: &str = "Main effects are means over all variants that have the level; n: replicates of which all \
                        these variants have a value. Each replicate counts as one, since its variants share \
