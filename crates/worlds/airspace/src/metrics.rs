@@ -57,6 +57,11 @@ metrics! {
         pub min_separation_m: Option<f64> => "closest approach",
         /// Times that two came nearer than their separation.
         pub losses_of_separation: u64 => "losses of separation",
+        /// Losses of pairs that the shield had reported, because it promises nothing for them. These are the pairs in
+        /// `too_close`, and those of the airplanes in `beyond_bound`.
+        pub losses_of_reported_pairs: u64 => "losses of reported pairs",
+        /// Losses of all other pairs, for which the shield promises that there are none. Without a shield these are all.
+        pub losses_of_unreported_pairs: u64 => "losses of unreported pairs",
         /// Time that pairs spent nearer than their separation. In seconds.
         pub lost_s: f64 => "time with separation lost",
         /// Airplanes that have reached their last way-point.
@@ -66,6 +71,9 @@ metrics! {
         /// Mean, over those that have arrived, of the time beyond that of the flight alone, in percent of it. Airplanes
         /// that would never arrive alone are left out.
         pub mean_delay_percent: Option<f64> => "mean delay",
+        /// Airplanes still in the air when the run ended, without a delay. The mean delay is too low where late ones are among
+        /// them.
+        pub in_flight: u64 => "airplanes still in the air",
         /// Messages between agents (one per receiver), or migrations of a coordinator; 0 where one process decides.
         pub messages: u64 => "messages",
         /// Bytes of these messages.
@@ -270,6 +278,18 @@ fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
     ended.filter(|(id, _)| is_fully_replayed(world, *id)).count() as u64
 }
 
+/// Returns the number of losses of pairs that the shield reported, and of those of all others.
+fn losses_by_report(counters: &Counters) -> [u64; 2] {
+    let mut losses = [0, 0];
+    for ((a, b), record) in &counters.pairs {
+        let is_beyond_bound = [a, b].iter().any(|id| counters.beyond_bound.contains_key(id));
+        let pair = (*a.min(b), *a.max(b));
+        let is_reported = is_beyond_bound || counters.too_close.contains_key(&pair);
+        losses[usize::from(!is_reported)] += u64::from(record.losses);
+    }
+    losses
+}
+
 fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
@@ -294,13 +314,19 @@ pub(crate) fn metrics(
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
     let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } =
         counters.effort;
+    let [losses_of_reported_pairs, losses_of_unreported_pairs] = losses_by_report(counters);
+    let not_appeared = not_appeared_count(world, now);
+    let unfinished = count_airplanes_where(state, AirplaneState::is_unfinished);
     Metrics {
         min_separation_m: counters.pairs.values().map(|r| r.nearest_m).min_by(f64::total_cmp),
         losses_of_separation: counters.pairs.values().map(|r| u64::from(r.losses)).sum(),
+        losses_of_reported_pairs,
+        losses_of_unreported_pairs,
         lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
         arrived: count_airplanes_where(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
+        in_flight: unfinished.saturating_sub(not_appeared),
         messages: traffic.messages,
         bytes: traffic.bytes,
         multicasts: traffic.multicasts,
@@ -320,7 +346,7 @@ pub(crate) fn metrics(
         contacts_lost: counters.event_count(EventKind::Unheard),
         deadlines_missed: counters.event_count(EventKind::Deadline),
         groups_too_large: counters.event_count(EventKind::GroupTooLarge),
-        not_appeared: not_appeared_count(world, now),
+        not_appeared,
         left: count_airplanes_where(state, AirplaneState::has_left),
         replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
@@ -393,6 +419,40 @@ mod tests {
         assert_eq!((first.flown_s, first.delay_s(), first.delay_percent), (Some(20.0), None, None));
         let metrics = run.metrics();
         assert!(metrics.mean_delay_percent.is_some_and(f64::is_finite), "{metrics:?}");
+    }
+
+    /// The first arrives, the second is on its way, the third has not appeared.
+    #[test]
+    fn the_mean_delay_says_how_many_flights_it_leaves_out_because_they_have_not_ended() {
+        let text = "format = 1\nworld = \"airspace\"\n\
+                    [[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[700, 0]]\n\
+                    [[airplanes]]\nat_m = [0, 9000]\nheading_deg = 0\nway_points_m = [[90000, 9000]]\n\
+                    [[airplanes]]\nat_m = [0, 19000]\nheading_deg = 0\nappears_s = 3000\n\
+                    way_points_m = [[700, 19000]]\n";
+        let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+        run.advance(30);
+        let metrics = run.metrics();
+        assert_eq!((metrics.arrived, metrics.in_flight, metrics.not_appeared), (1, 1, 1));
+        assert!(metrics.mean_delay_percent.is_some());
+    }
+
+    #[test]
+    fn losses_of_pairs_that_the_shield_reported_are_apart_from_all_others() {
+        let losses = |shield: &str| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"none\"\nshield = {shield:?}\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 6\nradius_m = 600\n"
+            );
+            let mut run = airspace_run(&Source::new("n", text, ""), 1).expect("a scenario");
+            run.advance(40);
+            let metrics = run.metrics();
+            let parts = [metrics.losses_of_reported_pairs, metrics.losses_of_unreported_pairs];
+            assert_eq!(parts[0] + parts[1], metrics.losses_of_separation);
+            assert!(metrics.losses_of_separation > 0);
+            parts
+        };
+        assert_eq!(losses("on")[1], 0);
+        assert_eq!(losses("off")[0], 0);
     }
 
     #[test]

@@ -292,9 +292,11 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
     let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),
-        n => format!("{}, {:.1} s in all", group_thousands(n), m.lost_s),
+        n => format!("{}, {:.1} s in all{}", group_thousands(n), m.lost_s, reported_text(m)),
     };
-    let delay = m.mean_delay_percent.map_or("-".into(), |d| format!("{d:.1} % on average"));
+    let delay = m
+        .mean_delay_percent
+        .map_or("-".into(), |d| format!("{d:.1} % on average{}", in_flight_text(m.in_flight)));
     let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
     vec![
         key_value_pair(
@@ -314,6 +316,22 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
             ),
         ),
     ]
+}
+
+/// Returns how many losses are of pairs that the shield reported, if there are any.
+fn reported_text(m: &Metrics) -> String {
+    match m.losses_of_reported_pairs {
+        0 => String::new(),
+        n => format!(", {} of pairs that the shield reported", group_thousands(n)),
+    }
+}
+
+/// Returns how many flights a mean leaves out because they have not ended, if there are any.
+fn in_flight_text(in_flight: u64) -> String {
+    match in_flight {
+        0 => String::new(),
+        n => format!(", without {} still in the air", group_thousands(n)),
+    }
 }
 
 #[cfg(test)]

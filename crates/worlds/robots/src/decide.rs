@@ -189,6 +189,12 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Returns whether a robot with this memory is on a trip that it will complete: how long that takes is not known
+    /// yet, and statistics of trips count it.
+    fn is_on_trip(&self, _memory: &Memory) -> bool {
+        false
+    }
+
     /// Returns whether it follows the orders of a caller ([`External`]) and looks at nothing, so that its
     /// robots need not perceive twice.
     fn is_external(&self) -> bool {

@@ -1,7 +1,7 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the place of every body.
 
 use super::effector::{EffectorModel, HEADING_NAMES};
-use super::metrics::Metrics;
+use super::metrics::{Counters, Metrics};
 use super::scenario::Compiled;
 use super::sensor::SensorModel;
 use super::state::{BodyRecord, Snapshot};
@@ -17,7 +17,7 @@ pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     let total = &metrics.total;
     let mut lines = vec![
         key_value_pair("contacts", contacts(metrics)),
-        key_value_pair("trips", trips(total.trips, total.trip_cycles_mean)),
+        key_value_pair("trips", trips(total)),
         key_value_pair("distance", distance(total.distance_m)),
         key_value_pair("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
@@ -45,9 +45,15 @@ fn contacts(metrics: &Metrics) -> String {
     format!("{count} ({in_1000:.1} in 1000 actions): {}", by_kind.join(", "))
 }
 
-fn trips(trips: u64, mean_cycles: Option<f64>) -> String {
-    match mean_cycles {
-        Some(mean) => format!("{}, {mean:.1} cycles on average", group_thousands(trips)),
+fn trips(total: &Counters) -> String {
+    let under_way = match total.trips_under_way {
+        0 => String::new(),
+        n => format!(", without {} under way", group_thousands(n)),
+    };
+    match total.trip_cycles_mean {
+        Some(mean) => {
+            format!("{}, {mean:.1} cycles on average{under_way}", group_thousands(total.trips))
+        }
         None => "none".into(),
     }
 }

@@ -96,6 +96,10 @@ impl Goto {
 }
 
 impl Behaviour for Goto {
+    fn is_on_trip(&self, memory: &Memory) -> bool {
+        (memory.words[GOALS_REACHED_WORD] as usize) < self.goals.len()
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
         let (goal, trip) = self.next_goal(percept, memory);
         let action = goal.map_or(STAY, |goal| self.avoidance.step(goal, percept, memory, draws));
@@ -112,6 +116,11 @@ impl Behaviour for Goto {
 }
 
 impl Behaviour for Shuttle {
+    fn is_on_trip(&self, memory: &Memory) -> bool {
+        // The first trip starts at end 0.
+        memory.words[GOALS_REACHED_WORD] > 0
+    }
+
     fn flow_fields(&self) -> &[Arc<FlowField>] {
         &self.ends
     }
