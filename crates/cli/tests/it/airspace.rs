@@ -172,7 +172,7 @@ fn seeds_that_run_over_are_told_as_such() {
     let place = TestFolder::new();
     place.write("six.toml", SIX);
     let last = ["compare", "six.toml", "--methods", "none", "--seed", "9223372036854775807"];
-    let told = place.run(&[&last[..], &["--runs", "2"]].concat());
+    let told = place.run(&[&last[..], &["--replicate", "2"]].concat());
     assert_eq!((told.code(), told.out().as_str()), (2, ""));
     let cause = "2 seeds from 9223372036854775807 on exceed 2^63 - 1";
     assert!(told.err().contains(cause) && !told.err().contains("line"), "{}", told.err());
@@ -253,6 +253,40 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     for expected in ["not used: MCRE: aircraft that", "line 4", "PAN 1", "two.scn:5:13"] {
         assert!(report.contains(expected), "{expected} is missing in\n{report}");
     }
+}
+
+#[test]
+fn a_bluesky_file_calls_files_beside_it_and_finds_places_in_the_users_tables() {
+    let place = TestFolder::new();
+    place.write(
+        "a.scn",
+        "00:00:00.00>PCALL sub.scn KL001 4.0\n00:01:00.00>PCALL sub.scn KL002 5.0\n",
+    );
+    place.write(
+        "sub.scn",
+        "00:00:00.00>CRE %0,A320,52.0,%1,090,FL300,270\n00:00:00.00>ADDWPT %0 SPY\n",
+    );
+    std::fs::create_dir(place.path("nav")).expect("made");
+    place.write("nav/fix.dat", " 52.5 8.0 SPY\n");
+    let unknown = place.run(&["check", "a.scn"]);
+    assert_eq!(unknown.code(), 0, "{}", unknown.err());
+    assert!(unknown.out().contains("give --navdata"), "{}", unknown.out());
+    assert!(unknown.out().contains("sub.scn line 2"), "{}", unknown.out());
+    let told = place.json(&["check", "a.scn", "--navdata", "nav"]);
+    assert_eq!((&told["airplanes"], &told["unresolved_places"]), (&2.into(), &0.into()), "{told}");
+    let ran = place.json(&["run", "a.scn", "--navdata", "nav", "--cycles", "3", "--out", "a"]);
+    assert_eq!(ran["metrics"]["airplanes"], 2, "{ran}");
+    let wrong = place.run(&["run", "a.scn", "--navdata", "nowhere"]);
+    assert_eq!(wrong.code(), 2);
+    assert!(wrong.err().contains("fix.dat"), "{}", wrong.err());
+    let sweep = place.run(&["run", "a.scn", "--navdata", "nav", "--replicate", "2"]);
+    assert_eq!(sweep.code(), 2);
+    // The advice that it gives.
+    assert!(sweep.err().contains("then give DIR/scenario.toml"), "{}", sweep.err());
+    assert_eq!(
+        place.run(&["run", "a/scenario.toml", "--replicate", "2", "--cycles", "2"]).code(),
+        0
+    );
 }
 
 /// Rows of two airplanes on one level over the equator that meet head on after 400 s.

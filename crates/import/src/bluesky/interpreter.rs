@@ -23,6 +23,13 @@ use setting::SettingDefaults;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 use std::rc::Rc;
+use std::sync::Arc;
+
+/// The maximum number of rules in a report.
+const MAX_RULES: usize = 500;
+
+/// The maximum number of commands without effect that are listed one by one.
+const MAX_UNUSED: usize = 100_000;
 
 /// The result of a command.
 enum CommandOutcome {
@@ -50,6 +57,10 @@ struct AircraftBuilder {
     aircraft: ScnAircraft,
     /// The name of its start, where the position of that is not known.
     unresolved_start: Option<String>,
+    /// The altitude that it was given last, in ft.
+    last_altitude_ft: f64,
+    /// Number of its way-points without a name of their own.
+    unnamed_way_points: usize,
     /// Vertical speed at its creation in ft/min.
     vertical_speed_fpm: f64,
     /// Whether it is gone before any time has passed.
@@ -59,7 +70,7 @@ struct AircraftBuilder {
 /// Carries out commands in their order.
 pub(super) struct Interpreter {
     folder: CallFolder,
-    navdata: NavigationData,
+    navdata: Arc<NavigationData>,
     schedule: Schedule,
     result: ScnFile,
     builders: Vec<AircraftBuilder>,
@@ -83,7 +94,7 @@ pub(super) struct Interpreter {
 }
 
 impl Interpreter {
-    pub(super) fn new(folder: CallFolder, navdata: NavigationData) -> Self {
+    pub(super) fn new(folder: CallFolder, navdata: Arc<NavigationData>) -> Self {
         let source = CommandFile { name: String::new(), prefix: String::new(), depth: 0 };
         Self {
             folder,
@@ -234,11 +245,20 @@ impl Interpreter {
     /// Adds a finding at the present command.
     fn note(&mut self, treatment: Treatment, rule: &str, remedy: &str) {
         let place = self.place.clone();
-        self.result.report.record(treatment, rule, place, remedy);
+        let report = &mut self.result.report;
+        // Each rule is looked for among all, and names in a file are of any number.
+        let is_full = report.findings.len() >= MAX_RULES;
+        if is_full && !report.findings.iter().any(|found| found.rule == rule) {
+            return report.record(treatment, "further commands without effect", place, "");
+        }
+        report.record(treatment, rule, place, remedy);
     }
 
     /// Lists the present command as one without effect.
     fn note_unused(&mut self, name: &str, reason: &str) {
+        if self.result.unused.len() >= MAX_UNUSED {
+            return;
+        }
         let one = UnusedCommand {
             place: self.place.clone(),
             command: name.to_string(),

@@ -32,6 +32,7 @@ mod values;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 pub use navdata::NavigationData;
 pub use options::{ScnOptions, UnusedCommand};
@@ -81,7 +82,7 @@ pub struct ScnFile {
     pub refused: Vec<InputError>,
     /// Names of places that the file does not define, one entry for each use.
     pub unresolved_places: Vec<UnresolvedPosition>,
-    /// All commands without effect, in the order in which they were due.
+    /// The commands without effect, in the order in which they were due, at most 100,000.
     pub unused: Vec<UnusedCommand>,
     /// What was read, and what is not acted on, by rule.
     pub report: ImportReport,
@@ -119,12 +120,20 @@ pub fn read_with(path: &Path, options: &ScnOptions) -> Result<ScnFile, InputErro
         Some(folder) => NavigationData::read(folder)?,
         None => NavigationData::default(),
     };
+    read_with_places(path, &Arc::new(navdata))
+}
+
+/// Reads a scenario file, plain or compressed with gzip, with places that were read before.
+///
+/// # Errors
+/// When it cannot be read; errors in its text are listed in the result.
+pub fn read_with_places(path: &Path, places: &Arc<NavigationData>) -> Result<ScnFile, InputError> {
     let text = read_text(path, MAX_SCN_BYTES)?;
     let folder = CallFolder::of_file(path);
-    Ok(Interpreter::new(folder, navdata).run(&path.display().to_string(), &text))
+    Ok(Interpreter::new(folder, Arc::clone(places)).run(&path.display().to_string(), &text))
 }
 
 /// Parses the text of a scenario; `place` is its name in errors. Files that it calls are not read.
 pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
-    Interpreter::new(CallFolder::nowhere(), NavigationData::default()).run(&place.to_string(), text)
+    Interpreter::new(CallFolder::nowhere(), Arc::default()).run(&place.to_string(), text)
 }

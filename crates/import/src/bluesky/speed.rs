@@ -54,6 +54,12 @@ impl Airspeed {
     }
 }
 
+/// Returns the speed of sound at a pressure altitude in ft, in m/s.
+pub(super) fn sound_mps(altitude_ft: f64) -> f64 {
+    let (temperature_k, _) = standard_air(altitude_ft * FOOT_M);
+    (HEAT_CAPACITY_RATIO * AIR_GAS_CONSTANT * temperature_k).sqrt()
+}
+
 /// Returns impact pressure over static pressure at a Mach number.
 fn impact_ratio(mach: f64) -> f64 {
     math::powf(

@@ -4,6 +4,7 @@ use super::{
     AircraftBuilder, CommandError, CommandOutcome, CommandResult, Interpreter, refusal, upper,
 };
 use crate::bluesky::lines::CommandText;
+use crate::bluesky::speed::sound_mps;
 use crate::bluesky::traffic::{
     AircraftCommand, AircraftSetting, PositionRef, ScnAircraft, Setting,
 };
@@ -53,10 +54,26 @@ impl Interpreter {
             PositionRef::Unresolved(name) => Some(name.clone()),
             _ => None,
         };
+        let (speed, altitude_ft) = (aircraft.speed, aircraft.altitude_ft);
+        let has_type = !aircraft.kind.is_empty();
         self.add_aircraft(arguments, id, aircraft)?;
+        self.note_supersonic(speed, altitude_ft);
+        if has_type {
+            let rule = "types of aircraft: each flies with the speeds and climbs of its commands";
+            self.note(Treatment::NotUsed, rule, "");
+        }
         self.set_unresolved_start(unresolved_start);
         self.add_unresolved(arguments.command, Some(id.text), &place);
         Ok(CommandOutcome::Done)
+    }
+
+    /// Names a speed at which no airliner flies: a calibrated airspeed means more and more on higher levels.
+    fn note_supersonic(&mut self, speed: Airspeed, altitude_ft: f64) {
+        let mach = speed.true_airspeed_mps(altitude_ft) / sound_mps(altitude_ft);
+        if mach > 1.0 {
+            let rule = "speeds above that of sound, which no limit of a type reduces here";
+            self.note(Treatment::Suspicious, rule, "give a Mach number such as M0.8");
+        }
     }
 
     fn set_unresolved_start(&mut self, name: Option<String>) {
@@ -87,6 +104,8 @@ impl Interpreter {
         aircraft.settings.extend(self.defaults.own_settings().map(|own| (self.now_s, own)));
         self.by_id.insert(id.clone(), self.builders.len());
         self.builders.push(AircraftBuilder {
+            last_altitude_ft: aircraft.altitude_ft,
+            unnamed_way_points: 0,
             aircraft,
             unresolved_start: None,
             vertical_speed_fpm: 0.0,
@@ -181,6 +200,12 @@ impl Interpreter {
             }
             _ => {}
         }
+        if let Some(AircraftCommand::Speed(speed)) = change {
+            self.note_supersonic(speed, self.builders[index].last_altitude_ft);
+        }
+        if let Some(AircraftCommand::AltitudeFt(altitude_ft)) = change {
+            self.builders[index].last_altitude_ft = altitude_ft;
+        }
         let changes = change.into_iter().chain(climb.map(AircraftCommand::VerticalSpeedFpm));
         let changes = changes.map(|change| (self.now_s, change));
         self.builders[index].aircraft.changes.extend(changes);
@@ -247,7 +272,7 @@ impl Interpreter {
         let flown_s = self.now_s - aircraft.created_s;
         let is_straight = aircraft.way_points.is_empty()
             && aircraft.destination.is_none()
-            && aircraft.changes.iter().all(|(at_s, _)| *at_s >= self.now_s)
+            && aircraft.changes.first().is_none_or(|(at_s, _)| *at_s >= self.now_s)
             && builder.vertical_speed_fpm == 0.0
             && !self.has_wind();
         if flown_s > 0.0 && !is_straight {

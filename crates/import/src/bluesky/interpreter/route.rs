@@ -92,8 +92,9 @@ impl Interpreter {
         self.reference = last.unwrap_or_else(|| aircraft.position());
         let place = self.place(arguments)?;
         let name = place.name().unwrap_or(&self.builders[index].aircraft.id).to_string();
+        let name = self.free_name(index, &name, place.name().is_none());
         Ok(WayPoint {
-            name: self.free_name(index, &name, place.name().is_none()),
+            name,
             place,
             altitude_ft: arguments.optional(altitude_ft)?,
             speed: arguments.optional(speed)?,
@@ -102,19 +103,14 @@ impl Interpreter {
         })
     }
 
-    /// Returns a name that no way-point of an aircraft has: that of its place, or the aircraft's with a number.
-    fn free_name(&self, index: usize, name: &str, is_position: bool) -> String {
-        let route = &self.builders[index].aircraft.way_points;
-        let is_taken = |name: &str| route.iter().any(|point| point.name == name);
+    /// Returns the name of a new way-point: that of its place, or the aircraft's with a number.
+    fn free_name(&mut self, index: usize, name: &str, is_position: bool) -> String {
         if !is_position {
             return name.to_string();
         }
-        // As many way-points have no name, the search begins at their number.
-        let mut number = route.iter().filter(|point| point.place.name().is_none()).count() + 1;
-        while is_taken(&format!("{name}{number:03}")) {
-            number += 1;
-        }
-        format!("{name}{number:03}")
+        let builder = &mut self.builders[index];
+        builder.unnamed_way_points += 1;
+        format!("{name}{:03}", builder.unnamed_way_points)
     }
 
     fn insert_way_point(
