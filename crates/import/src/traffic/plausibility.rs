@@ -139,7 +139,7 @@ impl Flight<'_> {
 
     fn mark_frozen(&self, found: &mut [Option<Suspicion>]) {
         let mut first = 0;
-        for k in 1..self.rows.len() {
+        for (k, suspicion) in found.iter_mut().enumerate() {
             let (here, there) = (&self.rows[k].sample, &self.rows[first].sample);
             if here.position != there.position {
                 first = k;
@@ -147,7 +147,7 @@ impl Flight<'_> {
             let still_m = (here.time_s - self.rows[first].sample.time_s) * self.speed_m_s(k);
             let is_old = self.rows[k].position_age_s > MAX_POSITION_AGE_S;
             if still_m > TOLERANCE_M || is_old {
-                found[k] = Some(Suspicion::Frozen);
+                *suspicion = Some(Suspicion::Frozen);
             }
         }
     }
@@ -192,8 +192,8 @@ impl Flight<'_> {
         let mut chains: Vec<Vec<usize>> = Vec::new();
         // Those that may go on, the latest last.
         let mut open: Vec<usize> = Vec::new();
-        for row in 0..self.rows.len() {
-            if found[row].is_some() {
+        for (row, suspicion) in found.iter().enumerate() {
+            if suspicion.is_some() {
                 continue;
             }
             let fits = |chain: &usize| self.follows(ends(&chains[*chain])[1], row);

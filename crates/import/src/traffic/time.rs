@@ -166,7 +166,7 @@ fn digits(text: &str) -> Option<u32> {
 /// Returns a time in s since 1970 as ISO 8601 in UTC: `2018-08-01T09:00:00Z`, with tenths of a second where it has any.
 pub fn format_utc(time_s: f64) -> String {
     let tenths = (time_s * 10.0).round();
-    if !(tenths.abs() < 1e14) {
+    if !(-1e14..1e14).contains(&tenths) {
         return format!("{time_s:e} s since 1970");
     }
     let tenths = tenths as i64;

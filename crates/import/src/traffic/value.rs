@@ -43,8 +43,8 @@ impl<'a> Value<'a> {
     pub(super) fn flag(self) -> Option<bool> {
         match self {
             Self::Flag(flag) => Some(flag),
-            Self::Number(value) if value == 0.0 => Some(false),
-            Self::Number(value) if value == 1.0 => Some(true),
+            Self::Number(0.0) => Some(false),
+            Self::Number(1.0) => Some(true),
             Self::Text(text) => match text.to_ascii_lowercase().as_str() {
                 "true" | "t" | "yes" | "y" | "1" | "1.0" => Some(true),
                 "false" | "f" | "no" | "n" | "0" | "0.0" => Some(false),
