@@ -230,6 +230,25 @@ fn a_bag_of_another_program_gives_its_robots_wheels_back() {
 }
 
 #[test]
+fn bags_of_another_program_teach_the_same_in_sqlite_packed_by_message_or_as_a_whole() {
+    if !has("numpy, rosbags") {
+        return;
+    }
+    let place = TestFolder::new();
+    let mut learned = Vec::new();
+    for form in ["mcap", "sqlite", "file"] {
+        script("write_bag.py", &[Path::new("wheels"), &place.path(form), Path::new(form)]);
+        let learn = ["learn", "effector", "--bag", form, "--box", "0.5"];
+        let topics = ["--odom", "/odom", "--truth", "/vicon/pose"];
+        let mut report = place.json(&[&learn[..], &topics].concat());
+        report["source"] = Value::Null;
+        learned.push(report);
+    }
+    assert_eq!(learned[0]["warnings"], json!([]));
+    assert!(learned.iter().all(|report| *report == learned[0]));
+}
+
+#[test]
 fn a_bag_of_another_program_gives_its_scanner_back() {
     if !has("numpy, rosbags") {
         return;

@@ -1,7 +1,9 @@
 """Writes a bag with the package rosbags, of a robot that is simulated here with known errors.
 
-usage: write_bag.py wheels BAG    legs of half a meter and quarter turns: odometry and motion capture
-       write_bag.py scanner BAG   rounds in a room of 8 x 6 m: transforms and scans, and the map beside it
+usage: write_bag.py wheels BAG [FORM]   legs of half a meter and quarter turns: odometry and motion capture
+       write_bag.py scanner BAG [FORM]  rounds in a room of 8 x 6 m: transforms and scans, and the map beside it
+
+FORM is mcap with packed chunks, sqlite with packed messages, or file: SQLite, packed as a whole.
 
 Says what was put in, as JSON.
 """
@@ -49,9 +51,15 @@ def transform(t, parent, child, x, y, rotation):
 
 
 class Bag:
-    def __init__(self, path):
-        self.writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-        self.writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    def __init__(self, path, form):
+        plugin = StoragePlugin.MCAP if form == "mcap" else StoragePlugin.SQLITE3
+        mode = {
+            "mcap": CompressionMode.STORAGE,
+            "sqlite": CompressionMode.MESSAGE,
+            "file": CompressionMode.FILE,
+        }[form]
+        self.writer = Writer(path, version=9, storage_plugin=plugin)
+        self.writer.set_compression(mode, CompressionFormat.ZSTD)
         self.writer.open()
         self.connections = {}
 
@@ -177,7 +185,7 @@ def write_map(folder):
 
 
 what, path = sys.argv[1], Path(sys.argv[2])
-bag = Bag(path)
+bag = Bag(path, sys.argv[3] if len(sys.argv) > 3 else "mcap")
 said = wheels(bag) if what == "wheels" else scanner(bag, path.parent)
 bag.writer.close()
 print(json.dumps(said))

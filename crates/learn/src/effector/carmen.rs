@@ -8,6 +8,7 @@ use super::report::EffectorReport;
 use crate::EstimateOptions;
 use crate::track::{Displacement2, Pose2};
 use sidestep_import::carmen::{CorrectedLog, Scan};
+use sidestep_import::track::{SpeedRule, StampedPose2};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::{hypot, tan, wrap_angle};
 use sidestep_statistics::{Moments, percentile};
@@ -48,9 +49,40 @@ const CARMEN_RULE: EventRule =
 pub(super) fn learn(
     source: &str,
     log: &CorrectedLog,
+    max_speed_mps: Option<f64>,
     options: &EstimateOptions,
 ) -> Result<LearnedEffector, InputError> {
-    learn_with_rule(&CARMEN_RULE, source, log, options)
+    let (possible, jumps) = without_jumps(log, max_speed_mps);
+    let mut model = learn_with_rule(&CARMEN_RULE, source, &possible, options)?;
+    if jumps > 0 {
+        model.report.rejected.insert("gap".into(), jumps);
+    }
+    Ok(model)
+}
+
+/// Returns a log without the odometry between scans over which it, or the corrected pose, moves faster than the robot can,
+/// and the number of such pairs of scans. Stamps that go back tell no speed.
+fn without_jumps(log: &CorrectedLog, max_speed_mps: Option<f64>) -> (CorrectedLog, u64) {
+    let stamped = |t_secs: f64, [x_m, y_m, heading_rad]: [f64; 3]| StampedPose2 {
+        t_secs,
+        position_m: [x_m, y_m],
+        heading_rad,
+    };
+    let corrected: Vec<StampedPose2> =
+        log.scans.iter().map(|scan| stamped(scan.t_secs, scan.pose)).collect();
+    let rule = SpeedRule::for_tracks(max_speed_mps, &[&corrected]);
+    let mut possible = log.clone();
+    let mut jumps = 0;
+    for (k, pair) in corrected.windows(2).enumerate() {
+        let Some(claimed) = log.scans[k].odometry.last() else { continue };
+        let claimed = stamped(pair[1].t_secs, *claimed);
+        let is_possible = [&pair[1], &claimed].iter().all(|end| rule.is_possible(&pair[0], end));
+        if pair[1].t_secs > pair[0].t_secs && !is_possible {
+            possible.scans[k].odometry.clear();
+            jumps += 1;
+        }
+    }
+    (possible, jumps)
 }
 
 /// Learns from a log by a rule that may differ from that for CARMEN logs.
@@ -209,7 +241,7 @@ mod tests {
             scan(1.5, [1.5, 0.5, 0.2], &[]),
             scan(2.0, [9.0, 0.0, 0.0], &[]),
         ]);
-        let model = learn("f", &log, &EstimateOptions::default()).unwrap();
+        let model = learn("f", &log, None, &EstimateOptions::default()).unwrap();
         assert_eq!(model.report.events, 1, "no odometry, no pair");
         let moments = &model.report.moments;
         assert_eq!((moments["ahead_boxes"].mean, moments["left_boxes"].mean), (0.75, 0.25));
@@ -245,7 +277,7 @@ mod tests {
 
     fn learned(odometry: &[[f64; 3]]) -> LearnedEffector {
         let scans = vec![scan(0.0, [0.0; 3], odometry), scan(1.0, [19.0, 0.0, 0.0], &[])];
-        learn("f", &log(scans), &EstimateOptions::default()).unwrap()
+        learn("f", &log(scans), None, &EstimateOptions::default()).unwrap()
     }
 
     #[test]
@@ -271,8 +303,21 @@ mod tests {
     }
 
     #[test]
+    fn odometry_that_jumps_between_two_scans_is_no_slip() {
+        let drive = |k: u32| {
+            let x_m = f64::from(k);
+            let claimed_m = if k == 7 { 60.0 } else { x_m + 1.1 };
+            scan(2.0 * x_m, [x_m, 0.0, 0.0], &[[x_m, 0.0, 0.0], [claimed_m, 0.0, 0.0]])
+        };
+        let log = log((0..20).map(drive).collect());
+        let report = learn("f", &log, None, &EstimateOptions::default()).unwrap().report;
+        assert_eq!((report.events, report.rejected["gap"]), (18, 1));
+        assert!(report.moments["ahead_boxes"].sd < 1e-9);
+    }
+
+    #[test]
     fn a_log_without_moves_is_an_error() {
         let log = log(vec![scan(0.0, [0.0; 3], &[]), scan(1.0, [0.0; 3], &[])]);
-        assert!(learn("f", &log, &EstimateOptions::default()).is_err());
+        assert!(learn("f", &log, None, &EstimateOptions::default()).is_err());
     }
 }

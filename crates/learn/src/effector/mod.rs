@@ -120,7 +120,9 @@ pub fn from_carmen(
     let log = sidestep_import::carmen::read(file, max_speed_mps)?;
     let source = file.display().to_string();
     let mut model = match &log.motion {
-        CarmenMotion::Corrected(corrected) => carmen::learn(&source, corrected, options)?,
+        CarmenMotion::Corrected(corrected) => {
+            carmen::learn(&source, corrected, max_speed_mps, options)?
+        }
         CarmenMotion::Tracks { odometry, truth } => {
             bag::learn_tracks(&source, odometry, truth, options)?
         }
