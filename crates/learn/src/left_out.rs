@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::EstimateOptions;
+use sidestep_kernel::InputError;
 
 /// Causes that have nothing to do with the result of a sample, so that the others are still a fair draw. Any other
 /// cause is unexplained: a reading that is no number may be just the one that missed.
@@ -70,6 +71,14 @@ impl LeftOut {
             )
         })
     }
+}
+
+/// Returns the warning on damaged rows of a table, with the error of the first of them.
+pub(crate) fn damage_warning(count: u64, first: &InputError) -> String {
+    // Its remedy is for a file of one's own, and the rest of its text for a terminal.
+    let text = first.to_string();
+    let cause = text.lines().next().unwrap_or_default();
+    format!("{count} damaged rows were left out, the first: {cause}")
 }
 
 fn is_explained(cause: &str) -> bool {

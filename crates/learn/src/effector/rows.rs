@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::EffectorOptions;
+use crate::left_out;
 use sidestep_error_models::effector::STANDARD_ACTIONS;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
@@ -72,7 +73,7 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
         if 2 * damaged > chosen.rows.len() as u64 {
             return Err(error);
         }
-        parsed.damage = Some(format!("{damaged} damaged rows were left out, the first: {error}"));
+        parsed.damage = Some(left_out::damage_warning(damaged, &error));
     }
     if parsed.free.is_empty() {
         let cause = "the file has no displacements without contact";

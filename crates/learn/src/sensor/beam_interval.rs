@@ -23,7 +23,11 @@ pub(super) fn log_interval(value: f64, sd: f64) -> Interval {
 
 /// Returns the weights of a part, the others in proportion, at which the likelihood is as low as chance brings the
 /// true weight in one of twenty logs.
-pub(super) fn likelihood_interval(weights: [f64; 4], part: usize, chances: &[PartChances]) -> Interval {
+pub(super) fn likelihood_interval(
+    weights: [f64; 4],
+    part: usize,
+    chances: &[PartChances],
+) -> Interval {
     let at = weights[part];
     let others = (1.0 - at).max(f64::MIN_POSITIVE);
     let log_likelihood = |weight: f64| {
@@ -49,4 +53,3 @@ pub(super) fn likelihood_interval(weights: [f64; 4], part: usize, chances: &[Par
     let high = if log_likelihood(1.0) >= least { 1.0 } else { root(at, 1.0) };
     Interval { low, high }
 }
-

@@ -8,6 +8,7 @@ use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
 use super::readings::{LabeledReading, ParsedReadings, read};
 use super::report::{ErrorMoments, SensorReport};
 use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
+use crate::left_out::damage_warning;
 use crate::{CountMatrix, CountTable, LeftOut};
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
@@ -28,7 +29,7 @@ pub(super) fn learn(
         report.measurements += damaged;
         report.skipped = damaged;
         report.skipped_by_cause.insert("damaged_row".to_string(), damaged);
-        report.warnings.push(format!("{damaged} damaged rows were left out, the first: {error}"));
+        report.warnings.push(damage_warning(damaged, &error));
     }
     if options.beam {
         refuse_kinds_of_things(table, &log)?;

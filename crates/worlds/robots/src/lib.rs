@@ -19,6 +19,7 @@ mod audit;
 pub mod baseline;
 mod broadcast;
 mod bundle;
+mod calibration_rows;
 mod contact_remarks;
 mod cycle_context;
 pub mod decide;

@@ -26,7 +26,7 @@ fn drawn(beam: &BeamModel, seed: u64, n: u32) -> Vec<LabeledReading> {
     let reading = |k: u32| {
         let place = streams.block(k, 1, Purpose(1), 0)[0];
         let somewhere_m = 0.05 + 5.9 * f64::from(place) / f64::from(u32::MAX);
-        let true_m = (k % 7 != 0).then_some(somewhere_m);
+        let true_m = (!k.is_multiple_of(7)).then_some(somewhere_m);
         let words = |draw: u16| streams.block(k, 2, Purpose(16), draw * BEAMS_PER_DRAW);
         let reported_m = beam.sample(true_m, RANGE_M, words);
         LabeledReading {

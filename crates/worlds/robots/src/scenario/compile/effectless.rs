@@ -4,6 +4,7 @@
 use super::super::{
     AvoidanceSection, EffectorSection, RobotSection, RobotsFile, TransitionSection,
 };
+use super::known_tables::PRESETS;
 use super::*;
 use crate::effector::STANDARD_ACTIONS;
 use std::collections::BTreeSet;
