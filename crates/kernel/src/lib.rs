@@ -18,7 +18,7 @@
 //! - [`batch`]: many simulations of one scenario at once, the same bits for every number of workers.
 //! - [`interrupt`]: a cycle that takes long can be abandoned.
 //! - [`view`]: the scenery and the frames of any world; reading them changes no run.
-//! - [`math`], [`distr`], [`geometry`]: numbers that are the same on every platform.
+//! - [`math`], [`distr`], [`geometry`], [`geodesy`]: numbers that are the same on every platform.
 //! - [`network`]: the messages between agents, and their faults.
 //! - [`terminal`], [`shell`]: text of unknown origin on a terminal, and commands to paste.
 //! - [`ports`]: recorder, transport and clock, each with an in-memory version.
@@ -33,6 +33,7 @@ pub mod digest;
 pub mod distr;
 pub mod engine;
 pub mod error;
+pub mod geodesy;
 pub mod geometry;
 pub mod interrupt;
 pub mod math;
