@@ -97,6 +97,7 @@ fn corridor() -> Result<String, DrawError> {
         floor: Some(floor),
         bodies: Vec::new(),
         names: Vec::new(),
+        earth: Default::default(),
     };
     let frame = Frame { bodies, ..Frame::default() };
     let trails: Vec<Trail> = (0..).zip(&paths).map(trail).collect();

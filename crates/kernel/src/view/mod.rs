@@ -7,6 +7,7 @@
 mod appearance;
 mod body;
 mod color;
+mod earth;
 mod inspect;
 mod kind;
 mod log;
@@ -19,6 +20,7 @@ pub use color::{
     ALERT_COLOR, BODY_COLORS, Color, DOOR_COLOR, MOBILE_COLOR, UNKNOWN_COLOR, WALL_COLOR,
     body_color,
 };
+pub use earth::{EarthChart, EarthProjection, EarthReference};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
 pub use kind::{BodyKind, BodyRole, KindSpec, Kinds, LegendTexts, Outline, Paint, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
@@ -43,6 +45,8 @@ pub struct Scenery {
     pub bodies: Vec<Body>,
     /// Names of bodies that have their own, by kind and number.
     pub names: Vec<(BodyKind, u32, String)>,
+    /// Where on earth, and when, all this is.
+    pub earth: EarthReference,
 }
 
 /// A floor of square boxes, along the axes of its own plane.

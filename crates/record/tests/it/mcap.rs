@@ -5,12 +5,15 @@ use sidestep_chain::kinds::CONNECTOR;
 use sidestep_robots::kinds::ROBOT;
 use std::path::Path;
 
+use foxglove::messages::LocationFix;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyId, BodyKind, Frame, Isometry2, LogEvent, LogEventKind, Occupancy,
-    OccupancyGrid, Pose, Scan, Scenery, Severity, Shape,
+    Body, BodyCondition, BodyId, BodyKind, EarthChart, EarthProjection, EarthReference, Frame,
+    Isometry2, Kinds, LogEvent, LogEventKind, Occupancy, OccupancyGrid, Pose, Scan, Scenery,
+    Severity, Shape,
 };
 use sidestep_record::{
-    IfExists, McapFooter, McapProvenance, McapRecorder, McapRunInfo, Status, is_mcap,
+    IfExists, McapFooter, McapProvenance, McapRecorder, McapRunInfo, McapSceneReader, Status,
+    is_mcap,
 };
 
 use crate::support::{names, origin};
@@ -43,6 +46,7 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         names: Vec::new(),
+        earth: Default::default(),
         bodies: vec![Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), wall)],
     }
 }
@@ -205,4 +209,42 @@ fn damage_is_an_error_and_never_a_panic() {
             assert_eq!((run.scenario, run.files), (sound.scenario.clone(), sound.files.clone()));
         }
     }
+}
+
+#[test]
+fn a_run_with_a_date_is_recorded_in_utc_with_the_places_of_its_airplanes_on_earth() {
+    const START_NS: u64 = 1_533_114_900_000_000_000;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flight.mcap");
+    let projection = EarthProjection::AzimuthalEquidistant;
+    let earth = EarthReference {
+        chart: Some(EarthChart { origin_deg: [10.0, 179.99], projection }),
+        start_utc_s: Some(1_533_114_900.0),
+    };
+    let names = vec![(AIRPLANE, 0, "DAT1".to_string())];
+    let scenery = Scenery { earth, names, ..scenery() };
+    let mut recorder = McapRecorder::create(&path, about(), &scenery).unwrap();
+    (0..=10).step_by(2).for_each(|cycle| recorder.write_frame(&frame(cycle)).unwrap());
+    recorder.finish(&end(Status::Complete)).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let mut fixes = Vec::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!((START_NS..=START_NS + 1_000_000_000).contains(&message.log_time));
+        if message.channel.topic == "/fix/DAT1" {
+            assert_eq!(message.channel.schema.as_ref().unwrap().name, "foxglove.LocationFix");
+            let fix = <LocationFix as foxglove::Decode>::decode(&*message.data).unwrap();
+            fixes.push((message.log_time - START_NS, fix));
+        }
+    }
+    assert_eq!(fixes.len(), 3, "it is there in cycles 0, 2 and 4");
+    let (after_ns, fix) = &fixes[2];
+    assert_eq!(*after_ns, 400_000_000);
+    // 0.4 m east and 1 m north of the origin.
+    assert!((fix.latitude - 10.0 - 1.0 / 110_600.0).abs() < 1e-7, "{}", fix.latitude);
+    assert!((fix.longitude - 179.99 - 0.4 / 109_640.0).abs() < 1e-7, "{}", fix.longitude);
+    let mut reader = McapSceneReader::open(&path, Kinds::new([AIRPLANE, ROBOT])).unwrap();
+    assert!(reader.bodies(4).unwrap().iter().any(|body| body.kind == AIRPLANE));
+    assert!(reader.bodies(6).unwrap().iter().all(|body| body.kind != AIRPLANE));
+    assert_eq!(reader.events().unwrap()[0].cycle, 1);
 }

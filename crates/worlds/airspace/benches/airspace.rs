@@ -7,7 +7,7 @@ use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
     Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourAlternatives, FlightLevelRange,
-    Point, Pose2, TimeDiscretization, WaypointRule, actions,
+    Frame, PairPlane, Point, Pose2, TimeDiscretization, WaypointRule, actions,
 };
 use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
@@ -71,6 +71,7 @@ impl Conflict {
             let predictions = self.actions.iter().map(predict).collect();
             ActionPredictions::new(
                 predictions,
+                Frame::PLANE,
                 self.model.separation_m,
                 FlightLevelRange::from_level(0.0),
             )
@@ -103,7 +104,8 @@ impl Game for UncachedGame<'_> {
             let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, timing);
             sum += objective.alpha * objective.deviation_cost(a, &best);
             for b in &predictions[i + 1..] {
-                sum += objective.collision_costs(a, b, r).iter().sum::<f64>();
+                sum +=
+                    objective.collision_costs(&PairPlane::ONE_FRAME, a, b, r).iter().sum::<f64>();
             }
         }
         sum

@@ -46,7 +46,7 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
         // An event tells where its airplane is at the end of the cycle, which is known only now.
         for event in &mut context.scratch.events[before..] {
             let current = &state.airplanes[event.airplane as usize];
-            let [x_m, y_m] = current.pose().at;
+            let [x_m, y_m] = world.display_m(current.pose().at);
             event.at_m = Some([x_m, y_m, current.altitude_m.get()]);
         }
     }

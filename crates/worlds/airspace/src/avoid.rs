@@ -28,8 +28,8 @@ struct PathClearance {
 /// An airplane among non-cooperative ones.
 pub(crate) struct NonCooperativeAvoidance<'a> {
     aircraft: &'a ShieldedAircraft,
-    /// Those on its levels.
-    others: Vec<&'a NonCooperativeAircraft>,
+    /// Those on its levels, each with what it is in the frame of the airplane.
+    others: Vec<(&'a NonCooperativeAircraft, NonCooperativeAircraft)>,
     dtau_s: f64,
 }
 
@@ -42,6 +42,7 @@ impl<'a> NonCooperativeAvoidance<'a> {
         let others = non_cooperative
             .iter()
             .filter(|one| one.levels.overlaps(&aircraft.levels, aircraft.vertical_m))
+            .map(|one| (one, one.in_frame(aircraft.frame)))
             .collect();
         Self { aircraft, others, dtau_s }
     }
@@ -73,21 +74,23 @@ impl<'a> NonCooperativeAvoidance<'a> {
         profile: &'b TurnProfile,
     ) -> impl Iterator<Item = &'a NonCooperativeAircraft> + 'b {
         let poses = self.poses_along(profile);
-        self.others.iter().copied().filter(move |one| !self.is_clear(&poses, profile, one))
+        let threats =
+            self.others.iter().filter(move |(_, one)| !self.is_clear(&poses, profile, one));
+        threats.map(|(one, _)| *one)
     }
 
     fn clearance(&self, profile: &TurnProfile) -> PathClearance {
         let poses = self.poses_along(profile);
-        let margins_m = self.others.iter().map(|one| self.clearance_margin_m(&poses, one));
+        let margins_m = self.others.iter().map(|(_, one)| self.clearance_margin_m(&poses, one));
         PathClearance {
-            is_clear: self.others.iter().all(|one| self.is_clear(&poses, profile, one)),
+            is_clear: self.others.iter().all(|(_, one)| self.is_clear(&poses, profile, one)),
             margin_m: margins_m.fold(0.0, f64::min),
         }
     }
 
     /// Returns its poses at the start of each step of a profile, and at the end.
     fn poses_along(&self, profile: &TurnProfile) -> Vec<Pose2> {
-        let mut poses = vec![self.aircraft.pose];
+        let mut poses = vec![self.aircraft.local_pose()];
         for &omega in &profile.omegas_rad_s {
             poses.push(poses[poses.len() - 1].step(self.aircraft.v_m_s, omega, self.dtau_s));
         }

@@ -2,6 +2,7 @@
 
 mod external;
 mod group_memory;
+mod local_flight;
 mod preferences;
 mod velocity;
 

@@ -1,11 +1,17 @@
 //! The text of one airplane of a scenario: its start, its way-points, its recorded track, and its orders.
+//!
+//! Positions are in meters on a plane, or latitudes and longitudes in degrees on the earth. All airplanes of a scenario
+//! have them in the same form, which makes it planar or geographic.
 
-use super::flight::{FlightOrder, FlightTask, MAX_ORDERS, Track, TrackPoint};
+use super::flight::{
+    FlightOrder, FlightTask, MAX_ORDERS, Surface, Track, TrackPoint, coordinates_from_degrees,
+};
 use super::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{Closed, LeftOpen, Number, Point, Source, Spanned};
+use std::ops::Range;
 
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
@@ -14,6 +20,8 @@ type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.
 type BoundedTime = Number<Closed<0, 1_000_000_000>>;
 type BoundedPoint = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
+/// Latitude and longitude in degrees; the latitude is checked beside that.
+pub(super) type LatLonDeg = Point<2, Closed<-360, 360>>;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -21,14 +29,20 @@ pub(super) struct AirplaneSection {
     callsign: Option<Spanned<String>>,
     /// Place at the start.
     pub(super) at_m: Option<BoundedPoint>,
+    /// Latitude and longitude at the start, on the earth.
+    at_deg: Option<Spanned<LatLonDeg>>,
     /// Heading at the start, counterclockwise from east.
     pub(super) heading_deg: Option<BoundedNumber>,
     /// Places to fly to, one after the other.
     way_points_m: Option<Vec<BoundedPoint>>,
+    /// Latitudes and longitudes to fly to, one after the other, each on the shortest path.
+    way_points_deg: Option<Vec<Spanned<LatLonDeg>>>,
     pub(super) altitude_m: Option<BoundedNumber>,
     pub(super) appears_s: Option<BoundedTime>,
     /// Recorded track: [t_s, x_m, y_m, altitude_m], ...
     track: Option<Spanned<Vec<[f64; 4]>>>,
+    /// Recorded track on the earth: [t_s, latitude_deg, longitude_deg, altitude_m], ...
+    track_deg: Option<Spanned<Vec<[f64; 4]>>>,
     /// Orders on its way, one thing each.
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
@@ -60,6 +74,8 @@ struct OrderSection {
     climb_m_s: Option<Number<LeftOpen<0, 1_000_000_000>>>,
     /// Way-points instead of those it has.
     way_points_m: Option<Vec<BoundedPoint>>,
+    /// Latitudes and longitudes instead of the way-points it has.
+    way_points_deg: Option<Vec<Spanned<LatLonDeg>>>,
     /// Whether it goes on to its next way-point.
     proceeds: Option<bool>,
     /// Whether it leaves the airspace.
@@ -71,6 +87,26 @@ type OrdersAndRemovalTime = (Vec<FlightOrder>, f64);
 
 fn points_m(given: Option<&Vec<BoundedPoint>>) -> Vec<[f64; 2]> {
     given.into_iter().flatten().map(|place| place.get()).collect()
+}
+
+/// Returns coordinates of positions on the earth.
+///
+/// # Errors
+/// When a latitude is beyond a pole.
+fn coordinates(
+    source: &Source,
+    given: Option<&Vec<Spanned<LatLonDeg>>>,
+) -> Result<Vec<[f64; 2]>, InputError> {
+    given.into_iter().flatten().map(|at| coordinates_of(source, at)).collect()
+}
+
+fn coordinates_of(source: &Source, at: &Spanned<LatLonDeg>) -> Result<[f64; 2], InputError> {
+    let lat_lon_deg = at.get_ref().get();
+    if lat_lon_deg[0].abs() <= 90.0 {
+        return Ok(coordinates_from_degrees(lat_lon_deg));
+    }
+    let cause = format!("a latitude of {} degrees", lat_lon_deg[0]);
+    Err(source.error(at.span(), cause, "give [latitude, longitude], the latitude from -90 to 90"))
 }
 
 /// Largest number of characters of a call sign.
@@ -113,33 +149,107 @@ impl AirplaneSection {
         Some(source.error(given.span(), cause, "give each airplane its own, or leave it out"))
     }
 
-    /// Returns the way-points in their order; none if none are given.
-    pub(super) fn way_points_m(&self) -> Vec<[f64; 2]> {
-        points_m(self.way_points_m.as_ref())
+    /// Returns the surface on which it has its positions: the earth if any of them are in degrees, the plane if any are
+    /// in meters.
+    ///
+    /// # Errors
+    /// When it has both.
+    pub(super) fn surface(
+        &self,
+        source: &Source,
+        span: Range<usize>,
+    ) -> Result<Option<Surface>, InputError> {
+        let orders = || self.orders.iter().map(Spanned::get_ref);
+        let is_on_earth = self.at_deg.is_some()
+            || self.way_points_deg.is_some()
+            || self.track_deg.is_some()
+            || orders().any(|order| order.way_points_deg.is_some());
+        let is_in_plane = self.at_m.is_some()
+            || self.way_points_m.is_some()
+            || self.track.is_some()
+            || orders().any(|order| order.way_points_m.is_some());
+        match (is_in_plane, is_on_earth) {
+            (true, true) => Err(mixed_positions(source, span)),
+            (false, true) => Ok(Some(Surface::Earth)),
+            (true, false) => Ok(Some(Surface::Plane)),
+            (false, false) => Ok(None),
+        }
+    }
+
+    /// Returns the position at the start in coordinates, if it has one.
+    ///
+    /// # Errors
+    /// When it is not on the earth.
+    pub(super) fn start_at(&self, source: &Source) -> Result<Option<[f64; 2]>, InputError> {
+        match &self.at_deg {
+            Some(at) => coordinates_of(source, at).map(Some),
+            None => Ok(self.at_m.map(|at| at.get())),
+        }
+    }
+
+    /// Returns the way-points in their order, in coordinates; none if none are given.
+    ///
+    /// # Errors
+    /// When one is not on the earth.
+    pub(super) fn way_points(&self, source: &Source) -> Result<Vec<[f64; 2]>, InputError> {
+        let on_earth = coordinates(source, self.way_points_deg.as_ref())?;
+        Ok([points_m(self.way_points_m.as_ref()), on_earth].concat())
     }
 
     /// Returns the recorded track, if there is one.
     pub(super) fn track(&self, source: &Source) -> Result<Option<Track>, InputError> {
-        let Some(rows) = &self.track else { return Ok(None) };
-        let has_own_start =
-            self.at_m.is_some() || self.altitude_m.is_some() || self.heading_deg.is_some();
-        let has_own_flight =
-            self.way_points_m.is_some() || self.appears_s.is_some() || !self.orders.is_empty();
+        let (rows, surface) = match (&self.track, &self.track_deg) {
+            (Some(rows), _) => (rows, Surface::Plane),
+            (None, Some(rows)) => (rows, Surface::Earth),
+            (None, None) => return Ok(None),
+        };
+        let has_own_start = self.at_m.is_some()
+            || self.at_deg.is_some()
+            || self.altitude_m.is_some()
+            || self.heading_deg.is_some();
+        let has_own_flight = self.way_points_m.is_some()
+            || self.way_points_deg.is_some()
+            || self.appears_s.is_some()
+            || !self.orders.is_empty();
         if has_own_start || has_own_flight {
-            let remedy =
-                "leave out at_m, heading_deg, way_points_m, altitude_m, appears_s and orders";
+            let remedy = match surface {
+                Surface::Plane => {
+                    "leave out at_m, heading_deg, way_points_m, altitude_m, appears_s and orders"
+                }
+                Surface::Earth => {
+                    "leave out at_deg, heading_deg, way_points_deg, altitude_m, appears_s and orders"
+                }
+            };
             return Err(source.error(rows.span(), "a track beside keys that it replaces", remedy));
         }
+        let mut is_on_earth = true;
         let points: Vec<TrackPoint> = rows
             .get_ref()
             .iter()
-            .map(|&[t_s, x, y, altitude_m]| TrackPoint { t_s, at: [x, y], altitude_m })
+            .map(|&[t_s, x, y, altitude_m]| {
+                let at = match surface {
+                    Surface::Plane => [x, y],
+                    Surface::Earth => {
+                        is_on_earth &= x.abs() <= 90.0 && y.abs() <= 360.0;
+                        coordinates_from_degrees([x, y])
+                    }
+                };
+                TrackPoint { t_s, at, altitude_m }
+            })
             .collect();
         let begins_before_run = points.first().is_some_and(|p| p.t_s < 0.0);
-        match Track::new(points).filter(|_| !begins_before_run) {
+        match Track::new(surface, points).filter(|_| is_on_earth && !begins_before_run) {
             Some(track) => Ok(Some(track)),
             None => {
-                let remedy = "give two or more [t_s, x_m, y_m, altitude_m], times rising from 0";
+                let remedy = match surface {
+                    Surface::Plane => {
+                        "give two or more [t_s, x_m, y_m, altitude_m], times rising from 0"
+                    }
+                    Surface::Earth => {
+                        "give two or more [t_s, latitude_deg, longitude_deg, altitude_m], times rising \
+                         from 0, latitudes from -90 to 90"
+                    }
+                };
                 Err(source.error(rows.span(), "this is no track", remedy))
             }
         }
@@ -166,7 +276,9 @@ impl AirplaneSection {
                     "leave it out, or let the airplane leave as its last order",
                 ));
             }
-            match order.parse_task().map_err(|(cause, remedy)| error(cause, remedy))? {
+            let way_points_deg = coordinates(source, order.way_points_deg.as_ref())?;
+            let task = order.parse_task(way_points_deg);
+            match task.map_err(|(cause, remedy)| error(cause, remedy))? {
                 Some(task) => orders.push(FlightOrder { at_s, task }),
                 None => leaves_s = at_s,
             }
@@ -179,19 +291,31 @@ impl AirplaneSection {
     }
 }
 
+/// Returns the error of a scenario with positions in a plane and on the earth.
+pub(super) fn mixed_positions(source: &Source, span: Range<usize>) -> InputError {
+    let cause = "positions in meters beside positions in degrees";
+    let remedy = "give all airplanes of a scenario at_m, way_points_m and track, or all of them at_deg, \
+                  way_points_deg and track_deg";
+    source.error(span, cause, remedy)
+}
+
 impl OrderSection {
-    /// Returns the one task of the order; `None` for leaving.
-    fn parse_task(&self) -> Result<Option<FlightTask>, (&'static str, &'static str)> {
+    /// Returns the one task of the order; `None` for leaving. `on_earth` are the coordinates of its way-points in
+    /// degrees.
+    fn parse_task(
+        &self,
+        on_earth: Vec<[f64; 2]>,
+    ) -> Result<Option<FlightTask>, (&'static str, &'static str)> {
         if self.climb_m_s.is_some() && self.altitude_m.is_none() {
             return Err(("climb_m_s without altitude_m", "say to which altitude_m"));
         }
         let climb_m_s = self.climb_m_s.map_or(CLIMB_M_S, f64::from);
-        let way_points_m = points_m(self.way_points_m.as_ref());
+        let way_points = [points_m(self.way_points_m.as_ref()), on_earth].concat();
         let tasks = [
             self.heading_deg.map(|to| FlightTask::Heading(math::wrap_angle(to.get().to_radians()))),
             self.speed_m_s.map(|speed| FlightTask::Speed(speed.get())),
             self.altitude_m.map(|to| FlightTask::Altitude { altitude_m: to.get(), climb_m_s }),
-            (!way_points_m.is_empty()).then_some(FlightTask::WayPoints(way_points_m)),
+            (!way_points.is_empty()).then_some(FlightTask::WayPoints(way_points)),
             (self.proceeds == Some(true)).then_some(FlightTask::Proceed),
         ];
         let mut tasks: Vec<FlightTask> = tasks.into_iter().flatten().collect();
@@ -200,7 +324,8 @@ impl OrderSection {
             (0, true) => Ok(None),
             _ => Err((
                 "an order that is not one thing",
-                "give one of heading_deg, speed_m_s, altitude_m, way_points_m, proceeds = true and leaves = true",
+                "give one of heading_deg, speed_m_s, altitude_m, way_points_m, way_points_deg, proceeds = true and \
+                 leaves = true",
             )),
         }
     }

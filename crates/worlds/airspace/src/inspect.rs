@@ -6,7 +6,7 @@ mod sections;
 mod tests;
 
 use super::act;
-use super::flight::{KnownAircraft, Point, distance_m};
+use super::flight::{KnownAircraft, Point};
 use super::join;
 use super::perceive::{self, observed_pose};
 use super::scratch::{PhaseContext, Scratch};
@@ -95,8 +95,9 @@ impl Inspector<'_> {
         own.unwrap_or_else(|| perceive::known_aircraft(self.world, self.before, self.now, self.id))
     }
 
-    /// Returns a point on the level of the airplane.
-    fn point_on_level(&self, [x_m, y_m]: Point) -> view::Vec3 {
+    /// Returns a position, as it is drawn, on the level of the airplane.
+    fn point_on_level(&self, at: Point) -> view::Vec3 {
+        let [x_m, y_m] = self.world.display_m(at);
         [x_m, y_m, self.before.airplanes[self.id as usize].altitude_m.get()]
     }
 
@@ -139,9 +140,10 @@ impl Inspector<'_> {
         let own = self.known_airplane().pose.at;
         for &other in self.group.iter().filter(|&&other| other != self.id) {
             let current = &self.before.airplanes[other as usize];
-            let [x_m, y_m] = observed_pose(self.world, other, self.now, current.pose()).at;
+            let at = observed_pose(self.world, other, self.now, current.pose()).at;
+            let [x_m, y_m] = self.world.display_m(at);
             let at_m = [x_m, y_m, current.altitude_m.get()];
-            let apart_m = distance_m(own, [x_m, y_m]);
+            let apart_m = self.world.surface.distance_m(own, at);
             let avoids = !self.world.is_non_cooperative(other, self.now);
             table.push_row([airplane(other).into(), FactValue::meters(apart_m), avoids.into()]);
             inspection.add_mark(

@@ -1,6 +1,6 @@
 //! Groups: airplanes that have to avoid each other decide together.
 
-use super::flight::{FlightLevelRange, FlightTask, distance_m};
+use super::flight::{FlightLevelRange, FlightTask};
 use super::non_cooperative::NonCooperativeAircraft;
 use super::perceive::{claim, ownship_state, surveillance_report};
 use super::pilot::{Percept, SurveillanceReport};
@@ -114,7 +114,7 @@ fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: EntitySlot, b: Entity
     let PhaseContext { world, state, .. } = context;
     let at_a = state.airplanes[a as usize].pose().at;
     let at_b = state.airplanes[b as usize].pose().at;
-    distance_m(at_a, at_b) <= world.interaction_range_m(a as usize, b as usize)
+    world.surface.is_within(at_a, at_b, world.interaction_range_m(a as usize, b as usize))
         && levels(context, a).overlaps(&levels(context, b), world.vertical_m)
 }
 

@@ -4,7 +4,7 @@
 //! is bound for. Methods assume that it flies straight on. The shield knows where it can be within `dt`:
 //! anywhere in a circle that grows at its greatest speed.
 
-use crate::flight::{FlightLevelRange, Point};
+use crate::flight::{FlightLevelRange, Frame, Point};
 use serde::{Deserialize, Serialize};
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::EntitySlot;
@@ -20,9 +20,10 @@ const MAX_DT_S: f64 = 1e4;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NonCooperativeAircraft {
     pub(crate) slot: EntitySlot,
-    /// Its position as all see it, with the error of the cycle.
+    /// Its position as all see it, with the error of the cycle: coordinates of the scenario, or a place in a frame, see
+    /// [`Self::in_frame`].
     pub(crate) at: Point,
-    /// Its velocity through the air, in meters per second.
+    /// Its velocity through the air, in meters per second east and north.
     pub(crate) velocity_m_s: Point,
     /// Its greatest speed through the air, in meters per second.
     pub(crate) top_m_s: f64,
@@ -42,6 +43,15 @@ impl NonCooperativeAircraft {
         self.separation_m.max(separation_m) + self.top_m_s * self.dt_s
     }
 
+    /// Returns it with its position and its velocity in a frame.
+    pub(crate) fn in_frame(&self, frame: Frame) -> Self {
+        Self {
+            at: frame.to_local(self.at),
+            velocity_m_s: frame.velocity_to_local(self.at, self.velocity_m_s),
+            ..self.clone()
+        }
+    }
+
     /// Returns whether its numbers can be computed with.
     pub(crate) fn is_valid(&self) -> bool {
         let Self { velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = *self;
@@ -55,7 +65,7 @@ impl NonCooperativeAircraft {
             && levels.low_m <= levels.high_m
     }
 
-    /// Returns its position in the moving air after some seconds, if it flies straight on.
+    /// Returns its position in the moving air of a frame after some seconds, if it flies straight on.
     pub(crate) fn position_after(&self, seconds: f64) -> Point {
         let [x, y] = self.at;
         let [vx, vy] = self.velocity_m_s;

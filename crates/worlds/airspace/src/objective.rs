@@ -6,11 +6,11 @@
 //! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
 //! ```
 
-use super::flight::{FlightLevelRange, Point, Prediction};
+use super::flight::{FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion};
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
-use sidestep_kernel::interrupt;
+use sidestep_kernel::{interrupt, math};
 
 /// The weights of separation and deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,8 +28,8 @@ pub struct Objective {
 }
 
 impl Objective {
-    /// Returns the cost of a prediction of an airplane with this separation beside a non-cooperative one, which is
-    /// assumed to fly straight on.
+    /// Returns the cost of a prediction of an airplane with this separation beside a non-cooperative one in its frame,
+    /// which is assumed to fly straight on.
     fn non_cooperative_cost(
         &self,
         one: &NonCooperativeAircraft,
@@ -40,20 +40,26 @@ impl Objective {
         let points: Vec<Point> =
             (1..=prediction.points.len()).map(|k| one.position_after(k as f64 * dtau_s)).collect();
         let straight = Prediction { counted: points.len(), points };
-        self.collision_costs(prediction, &straight, [one.required_clearance_m(separation_m), 0.0])
-            [0]
+        let r = [one.required_clearance_m(separation_m), 0.0];
+        self.collision_costs(&PairPlane::ONE_FRAME, prediction, &straight, r)[0]
     }
 
-    /// Returns `Gcol_i` and `Gcol_j` of two predictions, for separations `r` of `i` and `j` in
+    /// Returns `Gcol_i` and `Gcol_j` of two predictions in the frames of a pair, for separations `r` of `i` and `j` in
     /// meters (eq. 9). Sums slice by slice of time, so that a caller that skips slices which are
     /// apart gets the same bits.
-    pub fn collision_costs(&self, a: &Prediction, b: &Prediction, r: [f64; 2]) -> [f64; 2] {
+    pub fn collision_costs(
+        &self,
+        plane: &PairPlane,
+        a: &Prediction,
+        b: &Prediction,
+        r: [f64; 2],
+    ) -> [f64; 2] {
         let end = self.counted_points(a).min(self.counted_points(b));
         let mut sums = [0.0; 2];
         let mut weight = 1.0;
         let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
         for (of_a, of_b) in slices {
-            let parts = self.slice_collision_costs(of_a, of_b, weight, r);
+            let parts = self.slice_collision_costs(plane, [of_a, of_b], weight, r);
             sums[0] += parts[0];
             sums[1] += parts[1];
             weight = self.next_slice_weight(weight);
@@ -68,8 +74,8 @@ impl Objective {
     /// Returns the same over the points of one slice, of which the first has the weight `weight`.
     fn slice_collision_costs(
         &self,
-        a: &[Point],
-        b: &[Point],
+        plane: &PairPlane,
+        [a, b]: [&[Point]; 2],
         mut weight: f64,
         r: [f64; 2],
     ) -> [f64; 2] {
@@ -77,6 +83,7 @@ impl Objective {
         let max_square_m2 = ra.max(rb) * ra.max(rb);
         let mut sums = [0.0; 2];
         for (p, q) in a.iter().zip(b) {
+            let [p, q] = plane.points(*p, *q);
             let dx = p[0] - q[0];
             let dy = p[1] - q[1];
             let square_m2 = dx * dx + dy * dy;
@@ -121,6 +128,8 @@ const SLICE: usize = 16;
 pub struct ActionPredictions {
     /// One prediction per action.
     pub predictions: Vec<Prediction>,
+    /// The frame in which they lie.
+    pub frame: Frame,
     /// Separation asked for, in meters.
     pub separation_m: f64,
     /// The levels that the airplane occupies.
@@ -128,15 +137,24 @@ pub struct ActionPredictions {
     /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
     non_cooperative_costs: Vec<f64>,
     slices: Vec<TimeSlice>,
+    /// Largest distance of a point from the origin of the frame, in meters.
+    reach_m: f64,
 }
 
 impl ActionPredictions {
-    /// Returns options with their slices.
-    pub fn new(predictions: Vec<Prediction>, separation_m: f64, levels: FlightLevelRange) -> Self {
+    /// Returns options in a frame, with their slices.
+    pub fn new(
+        predictions: Vec<Prediction>,
+        frame: Frame,
+        separation_m: f64,
+        levels: FlightLevelRange,
+    ) -> Self {
         let max_points = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
-        let slices =
+        let slices: Vec<TimeSlice> =
             (0..max_points).step_by(SLICE).map(|from| TimeSlice::new(&predictions, from)).collect();
-        Self { predictions, separation_m, levels, non_cooperative_costs: Vec::new(), slices }
+        let reach_m = slices.iter().map(|slice| slice.all.reach_m()).fold(0.0, f64::max);
+        let non_cooperative_costs = Vec::new();
+        Self { predictions, frame, separation_m, levels, non_cooperative_costs, slices, reach_m }
     }
 
     /// Returns the same options beside non-cooperative aircraft, seen at each point of the predictions.
@@ -150,9 +168,10 @@ impl ActionPredictions {
         if non_cooperative.is_empty() {
             return self;
         }
-        let on_level: Vec<&NonCooperativeAircraft> = non_cooperative
+        let on_level: Vec<NonCooperativeAircraft> = non_cooperative
             .iter()
             .filter(|one| one.levels.overlaps(&self.levels, objective.vertical_m))
+            .map(|one| one.in_frame(self.frame))
             .collect();
         self.non_cooperative_costs = self
             .predictions
@@ -242,6 +261,23 @@ impl BoundingBox {
         })
     }
 
+    /// Returns the largest distance of a point in it from the origin.
+    fn reach_m(&self) -> f64 {
+        let [x, y] = [0, 1].map(|k: usize| self.low[k].abs().max(self.high[k].abs()));
+        math::hypot(x, y)
+    }
+
+    /// Returns the smallest upright rectangle around this one in another plane.
+    fn moved(&self, motion: &RigidMotion) -> Self {
+        let [low, high] = [self.low, self.high];
+        let corners = [low, [low[0], high[1]], [high[0], low[1]], high];
+        // Corners of no points are infinite, and would become no numbers.
+        if low[0] > high[0] {
+            return *self;
+        }
+        Self::from_points(&corners.map(|corner| motion.point(corner)))
+    }
+
     fn is_within_gap(&self, other: &Self, gap_m: f64) -> bool {
         (0..2).all(|k| self.low[k] - gap_m <= other.high[k] && other.low[k] - gap_m <= self.high[k])
     }
@@ -301,17 +337,25 @@ fn pair_costs(
     let r = [a.separation_m, b.separation_m];
     // Slightly more, so that no rounding of bounds leaves out points that add a cost.
     let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
+    if a.frame.is_surely_beyond(&b.frame, gap_m + a.reach_m + b.reach_m) {
+        return None;
+    }
+    let plane = PairPlane::between(a.frame, b.frame);
+    let is_near = |p: &BoundingBox, q: &BoundingBox| match plane.motions() {
+        None => p.is_within_gap(q, gap_m),
+        Some([first, second]) => p.moved(first).is_within_gap(&q.moved(second), gap_m),
+    };
     let columns = b.predictions.len();
     let mut costs = None;
     let mut weight = 1.0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
-        let is_near = of_a.all.is_within_gap(&of_b.all, gap_m);
-        let rows = of_a.pieces.iter().filter(|_| is_near);
-        for p in rows.filter(|p| p.bounds.is_within_gap(&of_b.all, gap_m)) {
+        let are_all_far = !is_near(&of_a.all, &of_b.all);
+        let rows = of_a.pieces.iter().filter(|_| !are_all_far);
+        for p in rows.filter(|p| is_near(&p.bounds, &of_b.all)) {
             let of_p = a.piece_points(p, k * SLICE, objective.mask);
-            for q in of_b.pieces.iter().filter(|q| p.bounds.is_within_gap(&q.bounds, gap_m)) {
+            for q in of_b.pieces.iter().filter(|q| is_near(&p.bounds, &q.bounds)) {
                 let of_q = b.piece_points(q, k * SLICE, objective.mask);
-                let parts = objective.slice_collision_costs(of_p, of_q, weight, r);
+                let parts = objective.slice_collision_costs(&plane, [of_p, of_q], weight, r);
                 if parts != [0.0; 2] {
                     // Most pairs never need the table, which is large.
                     let costs =
@@ -438,7 +482,7 @@ mod tests {
             let mut own = objective.alpha * objective.deviation_cost(a, optimal);
             total[1] += objective.deviation_cost(a, optimal);
             for (j, (b, _, rb)) in predictions.iter().enumerate().filter(|(j, _)| *j != i) {
-                let [of_a, _] = objective.collision_costs(a, b, [*ra, *rb]);
+                let [of_a, _] = objective.collision_costs(&PairPlane::ONE_FRAME, a, b, [*ra, *rb]);
                 near(of_a, &expected["G_col_ij"][i][j], name);
                 own += of_a;
                 total[0] += of_a;
@@ -453,6 +497,7 @@ mod tests {
             .map(|(p, optimal, r)| {
                 ActionPredictions::new(
                     vec![p.clone(), optimal.clone()],
+                    Frame::PLANE,
                     *r,
                     FlightLevelRange::from_level(0.0),
                 )
@@ -486,6 +531,7 @@ mod tests {
                 let predictions = all[k as usize % 2].iter().map(predict).collect();
                 ActionPredictions::new(
                     predictions,
+                    Frame::PLANE,
                     model.separation_m * (1.0 - 0.1 * side),
                     FlightLevelRange::from_level(0.0),
                 )
@@ -499,7 +545,7 @@ mod tests {
                 a.predictions.iter().flat_map(|p| b.predictions.iter().map(move |q| (p, q)));
             let r = [a.separation_m, b.separation_m];
             for ((p, q), found) in pairs.zip(&table) {
-                assert_eq!(*found, objective.collision_costs(p, q, r));
+                assert_eq!(*found, objective.collision_costs(&PairPlane::ONE_FRAME, p, q, r));
                 meetings += usize::from(*found != [0.0; 2]);
             }
         }

@@ -31,9 +31,12 @@ pub(super) fn observed_pose(
 ) -> Pose2 {
     if world.disturbance.position_m > 0.0 {
         let mut draws = world.streams.draws(slot, now, purpose::POSITION);
+        let frame = world.surface.frame_at(pose.at);
+        pose = frame.pose_to_local(pose);
         for coordinate in &mut pose.at {
             *coordinate += world.disturbance.position_m * normal(&mut draws);
         }
+        pose = frame.pose_to_world(pose);
     }
     pose
 }

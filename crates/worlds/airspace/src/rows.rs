@@ -2,7 +2,7 @@
 
 use super::decide::OptimizationRecord;
 use super::events::{Event, EventKind, EventQuantity};
-use super::flight::ConstantRateLeg;
+use super::flight::{ConstantRateLeg, Pose2};
 use super::settings::RecordSection;
 use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_index;
@@ -14,7 +14,10 @@ use sidestep_kernel::{Cycle, EntityId};
 pub(super) struct FlownLeg {
     pub(super) cycle: Cycle,
     pub(super) airplane: EntityId,
+    /// The leg, in the frame in which it was flown.
     pub(super) leg: ConstantRateLeg,
+    /// The pose at its start, in coordinates of the scenario.
+    pub(super) start: Pose2,
 }
 
 impl FlownLeg {
@@ -25,7 +28,8 @@ impl FlownLeg {
     }
 }
 
-fn trajectories_table(callsigns: &[Option<String>]) -> Table<FlownLeg> {
+fn trajectories_table(world: &AirspaceWorld) -> Table<FlownLeg> {
+    let callsigns = callsigns(world);
     let mut names: Vec<String> = callsigns.iter().flatten().cloned().collect();
     names.sort_unstable();
     names.dedup();
@@ -36,12 +40,13 @@ fn trajectories_table(callsigns: &[Option<String>]) -> Table<FlownLeg> {
             Some(label as u32)
         })
         .collect();
-    Table::new("trajectories")
+    let chart = world.chart();
+    let table = Table::new("trajectories")
         .u64("cycle", "cycle of dt in which this leg is flown", |f: &FlownLeg| f.cycle)
         .u32("airplane", "entity id", |f| f.airplane)
-        .f64("x_m", "position east at the start of the leg", |f| f.leg.pose.at[0])
-        .f64("y_m", "position north", |f| f.leg.pose.at[1])
-        .f64("heading_rad", "heading, counterclockwise from east", |f| f.leg.pose.heading_rad)
+        .f64("x_m", "position east at the start of the leg", move |f| chart.point(f.start.at)[0])
+        .f64("y_m", "position north", move |f| chart.point(f.start.at)[1])
+        .f64("heading_rad", "heading, counterclockwise from east", |f| f.start.heading_rad)
         .f64("altitude_m", "altitude", |f| f.leg.altitude_m)
         .f64("from_s", "start of the leg, after the start of the run", |f| f.leg.from_s)
         .f64("until_s", "its end; the same as its start where the flight ends", |f| f.leg.until_s)
@@ -52,12 +57,33 @@ fn trajectories_table(callsigns: &[Option<String>]) -> Table<FlownLeg> {
         .f64("drift_y_m_s", "velocity of the air north", |f| f.leg.drift_m_s[1])
         .label("callsign", "call sign of the airplane", names, move |f| {
             labels.get(f.airplane as usize).copied().flatten()
-        })
+        });
+    with_earth_columns(table, world)
 }
 
-fn events_table(callsigns: Vec<Option<String>>) -> Table<Event> {
+/// Adds where on earth and when a leg starts, as far as the scenario says so.
+fn with_earth_columns(mut table: Table<FlownLeg>, world: &AirspaceWorld) -> Table<FlownLeg> {
+    let chart = world.chart();
+    if chart.is_on_earth() {
+        let [latitude, longitude] =
+            [0, 1].map(|axis| move |f: &FlownLeg| Some(chart.lat_lon_deg(f.start.at)?[axis]));
+        table = table.f64("latitude_deg", "latitude at the start of the leg", latitude).f64(
+            "longitude_deg",
+            "longitude",
+            longitude,
+        );
+    }
+    if let Some(start_utc_s) = world.start_utc_s {
+        let utc_s = move |f: &FlownLeg| start_utc_s + f.leg.from_s;
+        table = table.f64("utc_s", "start of the leg, seconds since 1970, UTC", utc_s);
+    }
+    table
+}
+
+fn events_table(world: &AirspaceWorld) -> Table<Event> {
+    let callsigns = callsigns(world);
     let kinds = EventKind::ALL.map(EventKind::name);
-    Table::new("events")
+    let table = Table::new("events")
         .u64("cycle", "cycle of dt in which it happened", |e: &Event| e.cycle)
         .label("event", "what happened", kinds, |e| label_index(&EventKind::ALL, &e.kind))
         .u32("airplane", "entity id", |e| e.airplane)
@@ -69,7 +95,32 @@ fn events_table(callsigns: Vec<Option<String>>) -> Table<Event> {
         .f64("delay_s", "time beyond that of the flight alone", |e| {
             e.value_of_quantity(EventQuantity::Delay)
         })
-        .f64("number", "a number, by event", |e| e.value_of_quantity(EventQuantity::Number))
+        .f64("number", "a number, by event", |e| e.value_of_quantity(EventQuantity::Number));
+    with_event_place(table, world)
+}
+
+/// Adds where on earth the airplane is and when, at the end of the cycle of an event.
+fn with_event_place(mut table: Table<Event>, world: &AirspaceWorld) -> Table<Event> {
+    let chart = world.chart();
+    if chart.is_on_earth() {
+        let [latitude, longitude] = [0, 1].map(|axis| {
+            move |e: &Event| {
+                let [x_m, y_m, _] = e.at_m?;
+                Some(chart.lat_lon_of_drawn_deg([x_m, y_m])?[axis])
+            }
+        });
+        table = table.f64("latitude_deg", "latitude at the end of the cycle", latitude).f64(
+            "longitude_deg",
+            "longitude",
+            longitude,
+        );
+    }
+    if let Some(start_utc_s) = world.start_utc_s {
+        let dt_s = world.timing.dt_s;
+        let utc_s = move |e: &Event| start_utc_s + (e.cycle + 1) as f64 * dt_s;
+        table = table.f64("utc_s", "end of the cycle, seconds since 1970, UTC", utc_s);
+    }
+    table
 }
 
 fn optimizations_table() -> Table<OptimizationRecord> {
@@ -111,9 +162,8 @@ impl RecordBuffers {
 
     /// Starts to keep rows of the tables that the scenario asks for; before this call none are kept.
     pub(super) fn start(&mut self, world: &AirspaceWorld) {
-        self.flown
-            .set_table(self.record.trajectories.then(|| trajectories_table(&callsigns(world))));
-        self.events.set_table(self.record.events.then(|| events_table(callsigns(world))));
+        self.flown.set_table(self.record.trajectories.then(|| trajectories_table(world)));
+        self.events.set_table(self.record.events.then(|| events_table(world)));
         self.optimizations.set_table(self.record.optimizations.then(optimizations_table));
     }
 

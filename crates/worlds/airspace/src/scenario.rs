@@ -2,6 +2,7 @@
 
 mod airplanes;
 mod compile;
+mod earth;
 mod network;
 mod optimizer;
 mod rule_changes;
@@ -100,7 +101,7 @@ struct AirspaceSection {
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
     /// Latitude and longitude of the origin.
-    origin_deg: Option<Point<2, Closed<-360, 360>>>,
+    origin_deg: Option<Spanned<Point<2, Closed<-360, 360>>>>,
     /// Time of the start, in seconds since 1970, UTC.
     start_utc_s: Option<Number<Closed<-1_000_000_000_000, 1_000_000_000_000>>>,
     /// Standard deviation in meters; larger errors of known positions make no sense.
@@ -306,7 +307,12 @@ mod tests {
                 };
                 let a = straight(-2000.0, 35.0);
                 let b = straight(2000.0, -35.0);
-                let [cost, _] = world.objective.collision_costs(&a, &b, [500.0; 2]);
+                let [cost, _] = world.objective.collision_costs(
+                    &crate::flight::PairPlane::ONE_FRAME,
+                    &a,
+                    &b,
+                    [500.0; 2],
+                );
                 cost / world.objective.deviation_cost(&a, &straight(-1300.0, 35.0))
                     / world.objective.alpha
             };

@@ -7,7 +7,7 @@ mod snapshot;
 use super::agents::traffic_state::TrafficPicture;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
-use super::flight::{InterOrderSegment, Pose2};
+use super::flight::{InterOrderSegment, Pose2, Surface};
 use super::method::MethodKind;
 use super::pilot::{AirplaneControl, PilotMemory};
 use super::shield::{ExemptIds, OrbitSide};
@@ -23,6 +23,7 @@ use std::sync::{Mutex, PoisonError};
 /// The state of an airspace; slots are ids.
 #[derive(Debug)]
 pub struct AirspaceState {
+    surface: Surface,
     /// The changing part of each airplane.
     pub airplanes: Box<[AirplaneState]>,
     pub(super) neighborhood: SpatialIndex,
@@ -52,10 +53,10 @@ const NEVER: Cycle = Cycle::MAX;
 // A cache line each, so that workers of different airplanes do not wait for each other.
 #[repr(align(64))]
 pub struct AirplaneState {
-    /// Position east, in meters.
-    pub x_m: AtomicCell<f64>,
-    /// Position north, in meters.
-    pub y_m: AtomicCell<f64>,
+    /// Position east in meters, or longitude in radians.
+    pub x: AtomicCell<f64>,
+    /// Position north in meters, or latitude in radians.
+    pub y: AtomicCell<f64>,
     /// Heading in radians, counterclockwise from east.
     pub heading_rad: AtomicCell<f64>,
     /// Altitude in meters.
@@ -81,21 +82,21 @@ pub struct AirplaneState {
 /// A pose on an orbit, in cells, so that workers can store those of their groups at the same time.
 #[derive(Debug, Default)]
 struct OrbitPose {
-    x_m: AtomicCell<f64>,
-    y_m: AtomicCell<f64>,
+    x: AtomicCell<f64>,
+    y: AtomicCell<f64>,
     heading_rad: AtomicCell<f64>,
 }
 
 impl AirplaneState {
     /// Returns its pose; in a cycle only the worker of its group changes it.
     pub fn pose(&self) -> Pose2 {
-        Pose2 { at: [self.x_m.get(), self.y_m.get()], heading_rad: self.heading_rad.get() }
+        Pose2 { at: [self.x.get(), self.y.get()], heading_rad: self.heading_rad.get() }
     }
 
     /// Stores its pose, whose heading the caller has wrapped.
     pub fn set_pose(&self, pose: Pose2) {
-        self.x_m.set(pose.at[0]);
-        self.y_m.set(pose.at[1]);
+        self.x.set(pose.at[0]);
+        self.y.set(pose.at[1]);
         self.heading_rad.set(pose.heading_rad);
     }
 
@@ -189,8 +190,7 @@ impl AirspaceState {
     /// Returns the distance between two airplanes in meters, heights included.
     pub(crate) fn distance_m(&self, [a, b]: [EntityId; 2]) -> f64 {
         let [a, b] = [a, b].map(|id| &self.airplanes[id as usize]);
-        let ([ax, ay], [bx, by]) = (a.pose().at, b.pose().at);
-        let level_m = math::hypot(ax - bx, ay - by);
+        let level_m = self.surface.distance_m(a.pose().at, b.pose().at);
         math::hypot(level_m, a.altitude_m.get() - b.altitude_m.get())
     }
 
@@ -214,8 +214,9 @@ impl AirspaceState {
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {
+            surface: world.surface,
             airplanes,
-            neighborhood: SpatialIndex::new(n, max_range_m),
+            neighborhood: SpatialIndex::new(world.surface, n, max_range_m),
             contacts: restore_memories(with_contacts, &snapshot.contacts),
             resolving: restore_memories(with_resolutions, &snapshot.resolving),
             exempt: (0..n).map(|_| Mutex::default()).collect(),
@@ -247,7 +248,7 @@ impl AirspaceState {
     pub(super) fn orbit_pose(&self, slot: EntitySlot) -> Pose2 {
         match self.orbit_poses.get(slot as usize) {
             Some(orbit_pose) => Pose2 {
-                at: [orbit_pose.x_m.get(), orbit_pose.y_m.get()],
+                at: [orbit_pose.x.get(), orbit_pose.y.get()],
                 heading_rad: orbit_pose.heading_rad.get(),
             },
             None => self.airplanes[slot as usize].pose(),
@@ -257,8 +258,8 @@ impl AirspaceState {
     /// Stores the pose that an airplane has on its orbit.
     pub(super) fn set_orbit_pose(&self, slot: EntitySlot, pose: Pose2) {
         if let Some(orbit_pose) = self.orbit_poses.get(slot as usize) {
-            orbit_pose.x_m.set(pose.at[0]);
-            orbit_pose.y_m.set(pose.at[1]);
+            orbit_pose.x.set(pose.at[0]);
+            orbit_pose.y.set(pose.at[1]);
             orbit_pose.heading_rad.set(pose.heading_rad);
         }
     }

@@ -1,11 +1,12 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the pose of every airplane.
 
 use super::decide::DecisionStrategy;
+use super::flight::Surface;
 use super::metrics::{ErrorBoundViolation, Metrics, UnprotectedPair};
 use super::scenario::CompiledAirspace;
 use super::state::Snapshot;
 use super::world::AirspaceWorld;
-use serde_json::json;
+use serde_json::{Value, json};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::text::{
     JsonTextReport, KeyValues, align_pairs, group_thousands, key_value_pair,
@@ -37,6 +38,12 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
         "seed": compiled.seed,
         "too_close": compiled.too_close,
         "origin_deg": world.origin_deg,
+        "surface": match world.surface {
+            Surface::Plane => "plane",
+            Surface::Earth => "earth",
+        },
+        "curvature_margin_m": (world.surface == Surface::Earth && world.shield)
+            .then_some(2.0 * world.curvature_m),
         "start_utc_s": world.start_utc_s,
         "recorded": recorded,
         "replay_until_s": (recorded > 0).then_some(until_s),
@@ -56,6 +63,7 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
     }
     lines.extend(scenario_timing_text(compiled));
     lines.extend(geographic_origin_text(world));
+    lines.extend(surface_text(world));
     lines.extend(too_close_warning(world, &compiled.too_close));
     JsonTextReport { json, text: align_pairs(&lines) }
 }
@@ -100,6 +108,23 @@ fn look_interval(compiled: &CompiledAirspace) -> String {
 fn geographic_origin_text(world: &AirspaceWorld) -> Option<(String, String)> {
     let [lat, lon] = world.origin_deg?;
     Some(key_value_pair("origin", format!("latitude {lat:.5}, longitude {lon:.5}")))
+}
+
+/// Returns that a scenario is geographic, and how much the shield keeps for the roundness of the earth.
+fn surface_text(world: &AirspaceWorld) -> Option<(String, String)> {
+    if world.surface == Surface::Plane {
+        return None;
+    }
+    let margin = match world.shield {
+        true => {
+            format!("; the shield keeps {:.1} m more for its roundness", 2.0 * world.curvature_m)
+        }
+        false => String::new(),
+    };
+    Some(key_value_pair(
+        "earth",
+        format!("WGS84 ellipsoid, each pair in a plane of its own{margin}"),
+    ))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
@@ -168,14 +193,34 @@ pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
 }
 
 /// Returns the pose of every airplane, by entity id.
-pub(super) fn poses(snapshot: &Snapshot) -> JsonTextReport {
+pub(super) fn poses(surface: Surface, snapshot: &Snapshot) -> JsonTextReport {
     let json = serde_json::to_value(&snapshot.airplanes).unwrap_or_default();
+    if surface == Surface::Earth {
+        return poses_on_earth(json, snapshot);
+    }
     let mut text = "  airplane       x_m         y_m    heading_deg\n".to_string();
     for (id, airplane) in snapshot.airplanes.iter().enumerate() {
         let [x, y] = airplane.pose.at;
         let heading_deg = airplane.pose.heading_rad.to_degrees();
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {id:<8} {x:>10.1}  {y:>10.1}  {heading_deg:>13.1}");
+    }
+    JsonTextReport { json, text }
+}
+
+/// Returns the same with latitudes and longitudes.
+fn poses_on_earth(mut json: Value, snapshot: &Snapshot) -> JsonTextReport {
+    let mut text = "  airplane     latitude     longitude    heading_deg\n".to_string();
+    for (id, airplane) in snapshot.airplanes.iter().enumerate() {
+        let [longitude_deg, latitude_deg] = airplane.pose.at.map(f64::to_degrees);
+        let heading_deg = airplane.pose.heading_rad.to_degrees();
+        json[id]["latitude_deg"] = latitude_deg.into();
+        json[id]["longitude_deg"] = longitude_deg.into();
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "  {id:<8} {latitude_deg:>12.6}  {longitude_deg:>12.6}  {heading_deg:>13.1}"
+        );
     }
     JsonTextReport { json, text }
 }

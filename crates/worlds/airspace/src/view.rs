@@ -1,13 +1,13 @@
 //! The visible part of an airspace: airplanes, the zones around them, their starts and goals.
 
 use super::events::{Event, EventKind};
-use super::flight::{Point, distance_m};
+use super::flight::{Point, Pose2};
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use crate::kinds;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
-    Quantity, Scenery, Severity, Shape,
+    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, EarthReference, LogEvent, Pose,
+    PositionTableColumns, Quantity, Scenery, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, EntitySlot};
 
@@ -25,13 +25,14 @@ const GOAL_FRACTION: f64 = 0.15;
 pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     let mut bodies = Vec::new();
     for (id, airplane) in (0..).zip(world.airplanes.iter()) {
-        let [x_m, y_m] = airplane.start.at;
+        let [x_m, y_m] = world.display_m(airplane.start.at);
         let pose = Pose::from_position([x_m, y_m, airplane.altitude_m]);
         bodies.push(Body::new(kinds::START, id, pose, zone_shape(world, id)));
     }
     for (id, airplane) in (0..).zip(world.airplanes.iter()) {
-        if let Some([x_m, y_m]) = airplane.mission.last() {
-            let pose = Pose::from_position([*x_m, *y_m, airplane.altitude_m]);
+        if let Some(&goal) = airplane.mission.last() {
+            let [x_m, y_m] = world.display_m(goal);
+            let pose = Pose::from_position([x_m, y_m, airplane.altitude_m]);
             let radius_m = GOAL_FRACTION * zone_radius_m(world, id);
             bodies.push(Body::new(BodyKind::GOAL, id, pose, Shape::Sphere { radius_m }));
         }
@@ -43,6 +44,10 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         floor: None,
         bodies,
         names: body_names(world),
+        earth: EarthReference {
+            chart: world.chart().earth_chart(),
+            start_utc_s: world.start_utc_s,
+        },
     }
 }
 
@@ -109,8 +114,8 @@ fn airplane_and_zone(
     too_near: &[EntitySlot],
 ) -> [Body; 2] {
     let current = &state.airplanes[id as usize];
-    let [x_m, y_m] = current.pose().at;
-    let pose = Pose::from_heading([x_m, y_m, current.altitude_m.get()], current.pose().heading_rad);
+    let Pose2 { at: [x_m, y_m], heading_rad } = world.display_pose(current.pose());
+    let pose = Pose::from_heading([x_m, y_m, current.altitude_m.get()], heading_rad);
     let length_m = LENGTH_FRACTION * zone_radius_m(world, id);
     let dart = Shape::Dart { length_m, width_m: WIDTH_FRACTION * length_m };
     let bodies = [
@@ -130,15 +135,19 @@ fn too_close_aircraft(
 ) -> Vec<EntitySlot> {
     let at = |slot: EntitySlot| state.airplanes[slot as usize].pose().at;
     let max_gap_m = world.airplanes.iter().map(|a| a.model.separation_m).fold(0.0, f64::max);
-    // Sorted from west to east, so that only neighbors have to be compared.
-    let mut by_x: Vec<(Point, EntitySlot)> = active.iter().map(|&slot| (at(slot), slot)).collect();
-    by_x.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
+    // Sorted along one direction, so that only neighbors have to be compared.
+    let sweep = |slot: EntitySlot| (world.surface.sweep_m(at(slot)), at(slot), slot);
+    let mut by_x: Vec<(f64, Point, EntitySlot)> = active.iter().map(|&slot| sweep(slot)).collect();
+    by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
     let mut near = Vec::new();
-    for (k, &(p, a)) in by_x.iter().enumerate() {
-        let candidates = by_x[k + 1..].iter().take_while(|(q, _)| q[0] - p[0] < max_gap_m);
-        for &(q, b) in candidates {
+    for (k, &(p_m, p, a)) in by_x.iter().enumerate() {
+        let candidates = by_x[k + 1..].iter().take_while(|(q_m, ..)| q_m - p_m < max_gap_m);
+        for &(_, q, b) in candidates {
             let gap_m = 2.0 * zone_radius_m(world, a).max(zone_radius_m(world, b));
-            if distance_m(p, q) < gap_m && are_on_one_level(world, state, a, b) {
+            if world.surface.is_within(p, q, gap_m)
+                && world.surface.distance_m(p, q) < gap_m
+                && are_on_one_level(world, state, a, b)
+            {
                 near.extend([a, b]);
             }
         }

@@ -5,15 +5,15 @@ mod solo_flight;
 mod tests;
 
 use super::flight::{
-    Action, AirplaneStart, DetourAlternatives, FlightConditions, FlightLevelRange, FlightTask,
-    InterOrderSegment, KnownAircraft, Point, RoutePosition, SegmentAfterOrder, TimeDiscretization,
-    Track, WaypointRule, actions, segments_after_orders,
+    Action, AirplaneStart, Chart, DetourAlternatives, FlightConditions, FlightLevelRange,
+    FlightTask, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition, SegmentAfterOrder,
+    Surface, TimeDiscretization, Track, WaypointRule, actions, segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
-use super::shield::{ErrorBounds, OrbitSide, common_orbit_rates};
+use super::shield::{ErrorBounds, OrbitSide, common_orbit_rates, curvature_error_m};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::network::Network;
@@ -61,7 +61,13 @@ pub struct AirspaceWorld {
     /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
     /// them.
     pub replay_cycles: Cycle,
-    /// Latitude and longitude of the origin, in degrees, where traffic has a position on earth.
+    /// The surface that all fly over.
+    pub surface: Surface,
+    /// Bound in meters on how far an airplane may be from where it is in the plane of a pair, because the earth is
+    /// round, see `shield/curvature.rs`; 0 in a plane.
+    pub(crate) curvature_m: f64,
+    /// Latitude and longitude of the origin, in degrees, where traffic has a position on earth: in a geographic scenario
+    /// only where drawings have their origin.
     pub origin_deg: Option<Point>,
     /// Time of the start, in seconds since 1970, UTC, where traffic has a date.
     pub start_utc_s: Option<f64>,
@@ -148,6 +154,7 @@ impl AirspaceWorld {
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.map_airplanes(Self::max_speed_m_s));
         }
+        self.curvature_m = self.curvature_error_m();
         self.alone_s = Arc::new(self.map_airplanes(Self::solo_s));
         self
     }
@@ -174,9 +181,24 @@ impl AirspaceWorld {
         rates
     }
 
+    /// Returns how far an airplane may be from where it is in the plane of a pair that has to be kept apart.
+    pub(crate) fn curvature_error_m(&self) -> f64 {
+        let is_orbiting = |i: &usize| self.shield && self.is_controlled(*i);
+        let reach_m = (0..self.airplanes.len()).filter(is_orbiting).map(|i| {
+            let v_m_s = self.top_m_s[i];
+            v_m_s * self.timing.dt_s + 2.0 * v_m_s / self.orbit_rad_s[i]
+        });
+        let max_reach_m = reach_m.fold(0.0, f64::max);
+        let gaps_m = self.airplanes.iter().map(|airplane| airplane.model.separation_m);
+        match self.surface {
+            Surface::Plane => 0.0,
+            Surface::Earth => curvature_error_m(gaps_m.fold(0.0, f64::max), max_reach_m),
+        }
+    }
+
     /// Returns how far an airplane may be from its plans as they are seen, in meters.
     pub(crate) fn error_m(&self, i: usize) -> f64 {
-        self.bounds.error_m(self.top_m_s[i], self.timing.dt_s)
+        self.bounds.error_m(self.top_m_s[i], self.timing.dt_s) + self.curvature_m
     }
 
     fn max_speed_m_s(&self, i: usize) -> f64 {
@@ -189,9 +211,29 @@ impl AirspaceWorld {
         ordered.fold(airplane.model.v_m_s.max(recorded), f64::max)
     }
 
+    /// Returns how positions are drawn.
+    pub(crate) fn chart(&self) -> Chart {
+        Chart::new(self.surface, self.origin_deg)
+    }
+
+    /// Returns where a position is drawn, in meters.
+    pub(crate) fn display_m(&self, at: Point) -> Point {
+        self.chart().point(at)
+    }
+
+    /// Returns how a pose is drawn.
+    pub(crate) fn display_pose(&self, pose: Pose2) -> Pose2 {
+        self.chart().pose(pose)
+    }
+
     /// Returns the properties of the air, which are the same for all airplanes.
     pub fn flight_environment(&self) -> FlightConditions {
-        FlightConditions { timing: self.timing, passing: self.passing, wind_m_s: self.wind_m_s }
+        FlightConditions {
+            timing: self.timing,
+            passing: self.passing,
+            wind_m_s: self.wind_m_s,
+            surface: self.surface,
+        }
     }
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of
@@ -348,7 +390,8 @@ impl AirspaceWorld {
         let actions = self.actions(known.slot);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
         let predictions = self.flight_environment().predictions(model, actions, route);
-        ActionPredictions::new(predictions, model.separation_m, self.levels(known))
+        let frame = self.surface.frame_at(known.pose.at);
+        ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
     }
 

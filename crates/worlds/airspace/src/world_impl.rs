@@ -298,6 +298,6 @@ impl WorldMetrics for AirspaceWorld {
     }
 
     fn poses(&self, state: &AirspaceState, now: Cycle) -> JsonTextReport {
-        text::poses(&state.snapshot(now))
+        text::poses(self.surface, &state.snapshot(now))
     }
 }

@@ -33,6 +33,7 @@ impl RobotsWorld {
             floor: Some(self.map.occupancy_grid()),
             bodies: Vec::new(),
             names: Vec::new(),
+            earth: Default::default(),
         }
     }
 

@@ -2,10 +2,14 @@
 
 use super::flight::{AircraftCycleMotion, SubStep};
 use crate::events::{Event, EventKind};
-use crate::flight::{PairApproach, SeparationMinima, distance_m, is_separation_lost};
+use crate::flight::{
+    ConstantRateLeg, PairApproach, PairPlane, RigidMotion, SeparationMinima, Surface,
+    is_separation_lost,
+};
 use crate::scratch::Scratch;
 use crate::state::PairRecord;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::math;
 
 /// Pairs farther apart than this many separations are not recorded: most pairs of a large scenario never come near.
 const MAX_RECORDED_SEPARATIONS: f64 = 4.0;
@@ -20,8 +24,9 @@ pub(super) fn record_distances(
     scratch: &mut Scratch,
 ) {
     let flying = flights.iter().enumerate().filter(|(_, flight)| flight.end.is_none());
-    // Sorted from west to east, so that only neighbors have to be compared.
-    let mut by_x: Vec<(f64, usize)> = flying.map(|(k, flight)| (flight.pose.at[0], k)).collect();
+    // Sorted along one direction, so that only neighbors have to be compared.
+    let mut by_x: Vec<(f64, usize)> =
+        flying.map(|(k, flight)| (sweep_m(world, flight), k)).collect();
     by_x.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let max_m = max_recorded_m(world, flights);
     for (k, &(x_m, i)) in by_x.iter().enumerate() {
@@ -29,8 +34,9 @@ pub(super) fn record_distances(
             // Flights are sorted by id, and so are the two of a pair.
             let a = &flights[i.min(j)];
             let b = &flights[i.max(j)];
-            if can_come_near(world, a, b) {
-                record_pair(a, b, closest_approach(world, a, b, moment), moment, scratch);
+            if let Some(plane) = plane_of_near_pair(world, a, b) {
+                let approach = closest_approach(world, &plane, [a, b], moment);
+                record_pair(a, b, approach, moment, scratch);
             }
         }
     }
@@ -64,21 +70,44 @@ fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftCycleMotion<'_>]) ->
         max_gap_m = max_gap_m.max(world.airplanes[slot].model.separation_m);
         max_speed_m_s = max_speed_m_s.max(world.top_m_s[slot]);
     }
-    let step_m = 2.0 * max_speed_m_s * world.timing.dtau_s;
-    MAX_RECORDED_SEPARATIONS * max_gap_m + step_m
+    let seconds = world.timing.dtau_s + seconds_since_sweep(world);
+    MAX_RECORDED_SEPARATIONS * max_gap_m + 2.0 * max_speed_m_s * seconds
 }
 
-/// Returns whether two airplanes may come so near within a step that it is to be recorded.
-fn can_come_near(
+/// Returns the number by which airplanes are sorted: of where one is, or on the earth of where it was at the start of
+/// this `dt`.
+fn sweep_m(world: &AirspaceWorld, flight: &AircraftCycleMotion<'_>) -> f64 {
+    match world.surface {
+        Surface::Plane => world.surface.sweep_m(flight.pose.at),
+        Surface::Earth => world.surface.sweep_m(flight.from),
+    }
+}
+
+/// Returns for how long airplanes may have flown since they were where they are sorted.
+fn seconds_since_sweep(world: &AirspaceWorld) -> f64 {
+    match world.surface {
+        Surface::Plane => 0.0,
+        Surface::Earth => world.timing.dt_s,
+    }
+}
+
+/// Returns the plane of two airplanes, if they may come so near within a step that it is to be recorded.
+fn plane_of_near_pair(
     world: &AirspaceWorld,
     a: &AircraftCycleMotion<'_>,
     b: &AircraftCycleMotion<'_>,
-) -> bool {
+) -> Option<PairPlane> {
     let dtau_s = world.timing.dtau_s;
-    let step_m = (world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize]) * dtau_s;
-    distance_m(a.pose.at, b.pose.at)
-        <= MAX_RECORDED_SEPARATIONS * pair_separation_m(world, a, b) + step_m
-        && a.levels(dtau_s).overlaps(&b.levels(dtau_s), world.vertical_m)
+    let speeds_m_s = world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize];
+    let limit_m = MAX_RECORDED_SEPARATIONS * pair_separation_m(world, a, b) + speeds_m_s * dtau_s;
+    let from_origins_m = [a, b].map(|one| math::hypot(one.pose.at[0], one.pose.at[1]));
+    if a.frame.is_surely_beyond(&b.frame, limit_m + from_origins_m[0] + from_origins_m[1]) {
+        return None;
+    }
+    let plane = PairPlane::between(a.frame, b.frame);
+    let is_near = plane.distance_m(a.pose.at, b.pose.at) <= limit_m
+        && a.levels(dtau_s).overlaps(&b.levels(dtau_s), world.vertical_m);
+    is_near.then_some(plane)
 }
 
 /// Returns the separation of a pair in meters.
@@ -92,11 +121,31 @@ fn pair_separation_m(
     separation_a_m.max(separation_b_m)
 }
 
+/// Returns by how many meters a distance may seem to change from one step to the next: on the earth the plane of a pair
+/// is another one in each `dt`. A loss that began so near the separation counts once more rather than never.
+fn plane_change_m(world: &AirspaceWorld) -> f64 {
+    match world.surface {
+        Surface::Plane => 0.0,
+        Surface::Earth => 0.01,
+    }
+}
+
+/// Returns legs in the plane of a pair.
+fn legs_in_plane(
+    flight: &AircraftCycleMotion<'_>,
+    motion: Option<&RigidMotion>,
+) -> Vec<ConstantRateLeg> {
+    match motion {
+        None => flight.legs.clone(),
+        Some(motion) => flight.legs.iter().map(|leg| leg.moved(motion)).collect(),
+    }
+}
+
 /// Returns the record of a pair in one step.
 fn closest_approach(
     world: &AirspaceWorld,
-    a: &AircraftCycleMotion<'_>,
-    b: &AircraftCycleMotion<'_>,
+    plane: &PairPlane,
+    [a, b]: [&AircraftCycleMotion<'_>; 2],
     moment: SubStep,
 ) -> PairRecord {
     let zone =
@@ -104,12 +153,16 @@ fn closest_approach(
     // A loss continues from the end of the step before; there is no step before when one of the two
     // has just come into the air.
     let is_first_step = moment.step_s <= a.since_s.max(b.since_s) + ROUNDING * world.timing.dtau_s;
-    let first_legs = a.legs.first().zip(b.legs.first());
+    let motions = plane.motions();
+    let legs_a = legs_in_plane(a, motions.map(|motions| &motions[0]));
+    let legs_b = legs_in_plane(b, motions.map(|motions| &motions[1]));
+    let first_legs = legs_a.first().zip(legs_b.first());
+    let before = SeparationMinima { gap_m: zone.gap_m - plane_change_m(world), ..zone };
     let continues_loss =
-        !is_first_step && first_legs.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, zone));
+        !is_first_step && first_legs.is_some_and(|(a, b)| is_separation_lost(a, b, 0.0, before));
     let mut approach = PairApproach::new(continues_loss.then_some(0.0));
-    for leg_a in &a.legs {
-        for leg_b in &b.legs {
+    for leg_a in &legs_a {
+        for leg_b in &legs_b {
             if leg_a.from_s < leg_b.until_s && leg_b.from_s < leg_a.until_s {
                 approach.add(leg_a, leg_b, zone);
             }

@@ -4,7 +4,7 @@
 //! only once their plans have been made within the bounds.
 
 use crate::events::{Event, EventKind};
-use crate::flight::{Pose2, distance_m};
+use crate::flight::Pose2;
 use crate::perceive::observed_pose;
 use crate::scratch::PhaseContext;
 use sidestep_kernel::EntitySlot;
@@ -36,8 +36,11 @@ fn error_ratio(context: &PhaseContext<'_>, slot: EntitySlot) -> f64 {
     let max_deviation_m = world.bounds.max_deviation_m(v_m_s, world.timing.dt_s);
     // The bounds on which the argument in `shield/errors.rs` rests.
     let errors_and_bounds = [
-        (distance_m(observed_pose(world, slot, now, pose).at, pose.at), world.bounds.position_m),
-        (distance_m(pose.at, at), max_deviation_m),
+        (
+            world.surface.distance_m(observed_pose(world, slot, now, pose).at, pose.at),
+            world.bounds.position_m,
+        ),
+        (world.surface.distance_m(pose.at, at), max_deviation_m),
         (heading_error_rad, 2.0 * world.bounds.heading_rad),
     ];
     // A bound may be 0 where there is no error, either.

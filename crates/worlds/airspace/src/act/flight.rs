@@ -1,10 +1,13 @@
 //! Airplanes in the air during one `dt`.
 
-use crate::flight::{ConstantRateLeg, FlightLevelRange, InterOrderSegment, Point, Pose2, Track};
+use crate::flight::{
+    ConstantRateLeg, FlightLevelRange, Frame, InterOrderSegment, Point, Pose2, RoutePosition, Track,
+};
 use crate::scratch::PhaseContext;
 use crate::shield::TurnProfile;
 use crate::state::FlightEnd;
 use sidestep_kernel::{Cycle, EntitySlot};
+use std::borrow::Cow;
 
 /// One step of `dtau`.
 #[derive(Debug, Clone, Copy)]
@@ -22,14 +25,21 @@ pub(super) struct SubStep {
 pub(super) struct AircraftCycleMotion<'a> {
     pub(super) slot: EntitySlot,
     pub(super) path: FlightPathSource<'a>,
+    /// Its position at the start of this `dt`, in coordinates of the scenario.
+    pub(super) from: Point,
+    /// The frame in which it flies: on the earth that which touches where it starts, or at the center of its orbit.
+    pub(super) frame: Frame,
+    /// The way-points of its route in the frame, as far as it can get in this `dt`.
+    pub(super) mission: Cow<'a, [Point]>,
+    /// Its pose in the frame.
     pub(super) pose: Pose2,
     pub(super) altitude_m: f64,
     /// Time at which it came into the air, in seconds after the start of the run.
     pub(super) since_s: f64,
     pub(super) next: usize,
-    /// Legs of the present step, with times after its start.
+    /// Legs of the present step in the frame, with times after its start.
     pub(super) legs: Vec<ConstantRateLeg>,
-    /// Legs flown in this `dt`, with times after the start of the run.
+    /// Legs flown in this `dt` in the frame, with times after the start of the run.
     pub(super) flown: Vec<ConstantRateLeg>,
     /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
     pub(super) end: Option<FlightEnd>,
@@ -55,13 +65,33 @@ impl<'a> AircraftCycleMotion<'a> {
         let track = &world.airplanes[slot as usize].track;
         let recorded_s = track.as_ref().map_or(0.0, Track::start_s);
         let since_s = world.cycle_start_s(world.appearance_cycle(slot as usize)).max(recorded_s);
+        let from = current.pose();
+        let frame = match &path {
+            FlightPathSource::Profile(_, segment) if current.orbiting.get() > 0 => {
+                let omega = current.fallback.get().sign() * world.orbit_rad_s[slot as usize];
+                world.surface.orbit_frame(state.orbit_pose(slot), segment.model.v_m_s, omega)
+            }
+            _ => world.surface.frame_at(from.at),
+        };
+        let pose = frame.pose_to_local(from);
+        let next = current.next.get() as usize;
+        let mission = match &path {
+            FlightPathSource::Profile(_, InterOrderSegment { model, mission, .. }) => {
+                let route = RoutePosition { mission, next, pose };
+                world.flight_environment().local_mission(frame, model, route, world.timing.dt_s)
+            }
+            FlightPathSource::Track(_) => Cow::default(),
+        };
         Self {
             slot,
             path,
-            pose: current.pose(),
+            from: from.at,
+            frame,
+            mission,
+            pose,
             altitude_m: current.altitude_m.get(),
             since_s,
-            next: current.next.get() as usize,
+            next,
             legs: Vec::new(),
             flown: Vec::new(),
             end: None,
@@ -98,7 +128,8 @@ impl<'a> AircraftCycleMotion<'a> {
                 self.legs.retain(|leg| leg.from_s < leg.until_s);
             }
             FlightPathSource::Track(track) => {
-                track.add_legs_in_interval(moment.step_s, moment.step_s + dtau_s, &mut self.legs);
+                let times_s = [moment.step_s, moment.step_s + dtau_s];
+                track.add_legs_in_interval(self.frame, times_s, &mut self.legs);
             }
         }
         self.record_legs(moment.step_s);

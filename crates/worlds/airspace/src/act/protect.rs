@@ -2,7 +2,7 @@
 
 use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
-use crate::flight::{Pose2, distance_m};
+use crate::flight::Pose2;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::perceive::ownship_state;
 use crate::pilot::{Maneuver, OwnshipState};
@@ -41,7 +41,7 @@ pub(super) fn exempt_non_cooperative(
     for one in threats.iter().filter(|one| !exempt.contains(&one.slot)) {
         state.exempt_pair(slot, one.slot);
         scratch.too_close.push((now, slot, one.slot));
-        let apart_m = distance_m(state.airplanes[slot as usize].pose().at, one.at);
+        let apart_m = world.surface.distance_m(state.airplanes[slot as usize].pose().at, one.at);
         let event = Event::new_for_pair(now, EventKind::Intruder, slot, one.slot);
         scratch.events.push(event.with_value(apart_m));
     }
@@ -83,7 +83,9 @@ fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
     let side = state.airplanes[slot as usize].fallback.get();
     let v_m_s = state.segment(world, slot).model.v_m_s;
     let omega = side.sign() * world.orbit_rad_s[slot as usize];
-    let mut orbit_pose = state.orbit_pose(slot);
+    let stored = state.orbit_pose(slot);
+    let frame = world.surface.orbit_frame(stored, v_m_s, omega);
+    let mut orbit_pose = frame.pose_to_local(stored);
     for _ in 0..world.timing.points_per_dt() {
         orbit_pose = world.flight_environment().after_wind_step(orbit_pose.step(
             v_m_s,
@@ -91,6 +93,7 @@ fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
             world.timing.dtau_s,
         ));
     }
+    let orbit_pose = frame.pose_to_world(orbit_pose);
     state.set_orbit_pose(
         slot,
         Pose2 { heading_rad: wrap_angle(orbit_pose.heading_rad), ..orbit_pose },

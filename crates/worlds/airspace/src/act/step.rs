@@ -56,13 +56,13 @@ fn fly(
             flight.altitude_m = altitude_m;
             let before = flight.pose;
             flight.pose = air.after_wind_step(before.step(segment.model.v_m_s, omega, dtau_s));
-            let autopilot = air.autopilot(segment.model, segment.mission);
+            let autopilot = air.autopilot(segment.model, &flight.mission);
             flight.next = autopilot.next_way_point((before, flight.pose), flight.next);
             flight.next == segment.mission.len()
         }
         FlightPathSource::Track(track) => {
             let after_s = (step + 1) as f64 * dtau_s;
-            flight.pose = track.pose_at(after_s);
+            flight.pose = flight.frame.pose_to_local(track.pose_at(after_s));
             flight.altitude_m = track.altitude_at_m(after_s);
             track.end_s() <= after_s
         }
@@ -77,13 +77,16 @@ fn leg_rows(
     flight: &AircraftCycleMotion<'_>,
 ) -> Vec<FlownLeg> {
     let airplane = flight.slot;
-    let mut rows: Vec<FlownLeg> =
-        flight.flown.iter().map(|&leg| FlownLeg { cycle, airplane, leg }).collect();
+    let row = |leg: ConstantRateLeg| {
+        let start = flight.frame.pose_to_world(leg.pose);
+        FlownLeg { cycle, airplane, leg, start }
+    };
+    let mut rows: Vec<FlownLeg> = flight.flown.iter().map(|&leg| row(leg)).collect();
     if let Some(FlightEnd::Arrived(step) | FlightEnd::Left(step)) = flight.end {
         let at_s = step as f64 * world.timing.dtau_s;
         let end = ConstantRateLeg::new(at_s, at_s, flight.pose, 0.0, 0.0)
             .with_climb(flight.altitude_m, 0.0);
-        rows.push(FlownLeg { cycle, airplane, leg: end });
+        rows.push(row(end));
     }
     rows
 }
@@ -91,7 +94,7 @@ fn leg_rows(
 fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftCycleMotion<'_>) {
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[flight.slot as usize];
-    let mut pose = flight.pose;
+    let mut pose = flight.frame.pose_to_world(flight.pose);
     scratch.flown.extend(leg_rows(world, now, &flight));
     let is_disturbed = matches!(flight.path, FlightPathSource::Profile(..));
     let turn_rate_rad_s = match &flight.path {

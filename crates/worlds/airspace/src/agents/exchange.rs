@@ -197,6 +197,7 @@ impl ShieldExchangeAgent {
         let Proposal { beacon, orbit_pose, fallback, exempt, rank, .. } = proposal;
         ShieldedAircraft {
             id: self.id(place),
+            frame: self.setup.air.surface.frame_at(beacon.pose.at),
             pose: beacon.pose,
             orbit_pose: *orbit_pose,
             v_m_s: beacon.v_m_s,
@@ -433,6 +434,7 @@ impl ShieldExchangeAgent {
         let [wx, wy] = self.setup.air.wind_m_s.map(|w| w * self.setup.air.timing.dt_s);
         let mut pose = plan.end_pose();
         pose.at = [pose.at[0] + wx, pose.at[1] + wy];
+        let pose = plan.frame().pose_to_world(pose);
         OrbitState { pose, as_of: self.setup.now + 1, side: plan.side() }
     }
 }

@@ -47,7 +47,7 @@ mod tests;
 
 use super::link::{self, MessageLimits};
 use super::participant::InvalidMessage;
-use crate::flight::distance_m;
+use crate::flight::Surface;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::PlanCertainty;
 pub use beacon::{Beacon, GroupingMessageItem, SurveillanceReport};
@@ -72,6 +72,8 @@ pub struct GroupingInput {
     pub expected: Vec<bool>,
     /// Number of all airplanes.
     pub airplanes: usize,
+    /// The surface that all fly over.
+    pub surface: Surface,
     /// Distance in meters that messages reach.
     pub range_m: f64,
     /// Whether the network loses nothing.
@@ -117,7 +119,7 @@ impl GroupingAgent {
         let is_gone = input
             .near
             .iter()
-            .map(|other| distance_m(own.pose.at, other.pose.at) > input.range_m)
+            .map(|other| input.surface.distance_m(own.pose.at, other.pose.at) > input.range_m)
             .collect();
         Self {
             is_gone,

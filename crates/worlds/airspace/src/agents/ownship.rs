@@ -4,7 +4,8 @@ use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
 use crate::flight::{
-    Action, AircraftModel, FlightConditions, KnownAircraft, Point, Pose2, Prediction, RoutePosition,
+    Action, AircraftModel, FlightConditions, Frame, KnownAircraft, Point, Pose2, Prediction,
+    RoutePosition,
 };
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::objective::{ActionPredictions, Objective};
@@ -74,8 +75,14 @@ impl CommonKnowledge {
         };
         let route = RoutePosition { mission, next, pose: beacon.pose };
         let predictions = self.air.predictions(&model, actions, route);
-        ActionPredictions::new(predictions, beacon.separation_m, beacon.levels)
+        let frame = self.air.surface.frame_at(beacon.pose.at);
+        ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
+    }
+
+    /// Returns the frame in which the predictions of the airplane at a place lie: where all see it.
+    pub(super) fn frame(&self, place: usize) -> Frame {
+        self.air.surface.frame_at(self.poses[place].at)
     }
 
     /// Returns the `k`-th uniform number in [0, 1) of an airplane's stream, which all can draw.
@@ -219,16 +226,22 @@ impl Ownship {
     pub(super) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
         let id = self.common.ids[other];
         let filed = &self.common.filed[other].contact;
-        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed))
+        let frame = self.common.frame(other);
+        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed), frame)
     }
 
     /// Returns the same for one that was heard a moment ago.
-    pub(super) fn predictions_from_beacon(&self, beacon: &StateBeacon) -> ActionPredictions {
-        self.predictions_from_state(&LastKnownState::from_beacon(beacon.clone(), self.common.now))
+    pub(super) fn predictions_from_beacon(
+        &self,
+        other: usize,
+        beacon: &StateBeacon,
+    ) -> ActionPredictions {
+        let contact = LastKnownState::from_beacon(beacon.clone(), self.common.now);
+        self.predictions_from_state(&contact, self.common.frame(other))
     }
 
-    fn predictions_from_state(&self, contact: &LastKnownState) -> ActionPredictions {
+    fn predictions_from_state(&self, contact: &LastKnownState, frame: Frame) -> ActionPredictions {
         let CommonKnowledge { air, is_shielded, now, .. } = &*self.common;
-        contact.presumed_predictions(air, *is_shielded, *now)
+        contact.presumed_predictions(air, *is_shielded, *now, frame)
     }
 }

@@ -354,8 +354,9 @@ impl Optimizer for PredictionSharingAgent {
         let member = &mut self.members[from];
         match message {
             PredictionSharingMessage::Predictions { beacon, predictions } => {
-                let options =
-                    ActionPredictions::new(predictions, beacon.separation_m, beacon.levels);
+                let StateBeacon { separation_m, levels, .. } = beacon;
+                let frame = self.own.common.frame(from);
+                let options = ActionPredictions::new(predictions, frame, separation_m, levels);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }

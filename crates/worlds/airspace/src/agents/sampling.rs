@@ -5,7 +5,7 @@ use super::ownship::Ownship;
 use super::participant::InvalidMessage;
 use super::traffic_state::StateBeacon;
 use super::{ActionChoice, MessageLimits};
-use crate::flight::{FlightLevelRange, Prediction};
+use crate::flight::{FlightLevelRange, PairPlane, Prediction};
 use crate::objective::{ActionPredictions, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
@@ -155,7 +155,7 @@ impl SamplingAgent {
         let x = self.samples[k];
         let prediction = &options.predictions[x];
         let mut cost = self.own_costs[x];
-        for (_, member) in self.others() {
+        for (place, member) in self.others() {
             let is_on_level = member
                 .levels()
                 .is_none_or(|levels| levels.overlaps(&options.levels, objective.vertical_m));
@@ -163,7 +163,8 @@ impl SamplingAgent {
                 let presumed = member.presumed.as_ref();
                 let other_separation_m = presumed.map_or(0.0, |options| options.separation_m);
                 let r = options.separation_m.max(other_separation_m);
-                cost += objective.collision_costs(prediction, other, [r, r])[0];
+                let plane = PairPlane::between(options.frame, self.own.common.frame(place));
+                cost += objective.collision_costs(&plane, prediction, other, [r, r])[0];
             }
         }
         cost
@@ -271,9 +272,11 @@ impl Optimizer for SamplingAgent {
             member.predictions.values().next_back().and_then(|predictions| predictions.first());
         member.presumed = Some(match (&member.beacon, last) {
             (Some(beacon), Some(prediction)) if is_settled => {
-                ActionPredictions::new(vec![prediction.clone()], beacon.separation_m, beacon.levels)
+                let StateBeacon { separation_m, levels, .. } = *beacon;
+                let frame = self.own.common.frame(other);
+                ActionPredictions::new(vec![prediction.clone()], frame, separation_m, levels)
             }
-            (Some(beacon), _) => self.own.predictions_from_beacon(beacon),
+            (Some(beacon), _) => self.own.predictions_from_beacon(other, beacon),
             _ => self.own.presumed_predictions(other),
         });
     }

@@ -1,7 +1,9 @@
 //! Knowledge of airplanes about each other when messages get lost.
 
 use super::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{FlightConditions, FlightLevelRange, Point, Pose2, Prediction, distance_m};
+use crate::flight::{
+    FlightConditions, FlightLevelRange, Frame, Point, Pose2, Prediction, distance_m,
+};
 use crate::objective::ActionPredictions;
 use crate::shield::{OrbitSide, ShieldedAircraft};
 use serde::{Deserialize, Serialize};
@@ -69,12 +71,18 @@ pub struct PlanEnd {
 pub type TrafficPicture = BTreeMap<EntityId, LastKnownState>;
 
 impl OrbitState {
-    /// Returns its pose at the start of cycle `now`, carried by the wind since `as_of`.
-    fn pose(&self, air: &FlightConditions, beacon: &StateBeacon, now: Cycle) -> Pose2 {
+    /// Returns its pose in a frame at the start of cycle `now`, carried by the wind since `as_of`.
+    fn pose_in(
+        &self,
+        frame: Frame,
+        air: &FlightConditions,
+        beacon: &StateBeacon,
+        now: Cycle,
+    ) -> Pose2 {
         let elapsed_s = now.saturating_sub(self.as_of) as f64 * air.timing.dt_s;
         let omega_rad_s = self.side.sign() * beacon.orbit_rad_s;
         let Pose2 { at: [x, y], heading_rad } =
-            self.pose.step(beacon.v_m_s, omega_rad_s, elapsed_s);
+            frame.pose_to_local(self.pose).step(beacon.v_m_s, omega_rad_s, elapsed_s);
         let [wx, wy] = air.wind_m_s;
         Pose2 {
             at: [x + wx * elapsed_s, y + wy * elapsed_s],
@@ -120,38 +128,42 @@ impl LastKnownState {
 
     /// Returns the presumed flight of an airplane that is not heard: on the orbit on which the
     /// shield keeps it, or else straight to its last known way-point. Others keep farther away from
-    /// it.
+    /// it. `frame` is that in which the predictions lie: where the airplane is seen.
     pub(crate) fn presumed_predictions(
         &self,
         air: &FlightConditions,
         is_shielded: bool,
         now: Cycle,
+        frame: Frame,
     ) -> ActionPredictions {
         let points = match &self.presumed {
-            Some(orbiting) if is_shielded => self.orbit_points(air, orbiting, now),
-            _ => self.straight_points(air, now),
+            Some(orbiting) if is_shielded => self.orbit_points(frame, air, orbiting, now),
+            _ => self.straight_points(frame, air, now),
         };
         let prediction = Prediction { counted: points.len(), points };
         let separation_m = UNHEARD_SEPARATION_FACTOR * self.beacon.separation_m;
-        ActionPredictions::new(vec![prediction], separation_m, self.beacon.levels)
+        ActionPredictions::new(vec![prediction], frame, separation_m, self.beacon.levels)
     }
 
     fn orbit_points(
         &self,
+        frame: Frame,
         air: &FlightConditions,
         orbiting: &OrbitState,
         now: Cycle,
     ) -> Vec<Point> {
         let StateBeacon { v_m_s, orbit_rad_s, .. } = self.beacon;
-        let pose = orbiting.pose(air, &self.beacon, now);
+        let pose = orbiting.pose_in(frame, air, &self.beacon, now);
         let omega_rad_s = orbiting.side.sign() * orbit_rad_s;
         (1..=air.timing.horizon)
             .map(|k| pose.step(v_m_s, omega_rad_s, k as f64 * air.timing.dtau_s).at)
             .collect()
     }
 
-    fn straight_points(&self, air: &FlightConditions, now: Cycle) -> Vec<Point> {
-        let StateBeacon { pose: Pose2 { at, heading_rad }, goal, v_m_s, .. } = self.beacon;
+    fn straight_points(&self, frame: Frame, air: &FlightConditions, now: Cycle) -> Vec<Point> {
+        let StateBeacon { pose, goal, v_m_s, .. } = self.beacon;
+        let Pose2 { at, heading_rad } = frame.pose_to_local(pose);
+        let goal = goal.map(|goal| frame.to_local(goal));
         let bearing_rad = match goal.map(|goal| air.aim_point(at, goal, v_m_s)) {
             Some(aim) if distance_m(at, aim) > 0.0 => math::atan2(aim[1] - at[1], aim[0] - at[0]),
             _ => heading_rad,

@@ -52,22 +52,22 @@ struct ClosestApproach {
 }
 
 /// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
-/// `meets` says whether two are on one level.
+/// `meets` returns the second of two, by their places, as the first sees it, if they are on one level and near enough to
+/// be in conflict.
 pub(crate) fn resolution_headings(
     all: &[AircraftState],
     resolving: &mut [ActiveResolutions],
     settings: ReactiveSettings,
-    meets: impl Fn(&AircraftState, &AircraftState) -> bool,
+    meets: impl Fn(usize, usize) -> Option<AircraftState>,
 ) -> Vec<Option<f64>> {
     let mut conflicts = Vec::with_capacity(all.len());
-    for own in all {
+    for (i, own) in all.iter().enumerate() {
         let mut own_conflicts = Vec::new();
-        for (j, other) in all.iter().enumerate() {
-            if other.slot != own.slot
-                && meets(own, other)
-                && let Some(closest) = find_conflict(own, other, settings)
+        for j in (0..all.len()).filter(|&j| all[j].slot != own.slot) {
+            if let Some(other) = meets(i, j)
+                && let Some(closest) = find_conflict(own, &other, settings)
             {
-                own_conflicts.push((j, closest));
+                own_conflicts.push((other, closest));
             }
         }
         conflicts.push(own_conflicts);
@@ -75,36 +75,39 @@ pub(crate) fn resolution_headings(
     let by_slot = sorted_by_slot(all);
     // As in BlueSky, the headings are kept only while no airplane is in conflict.
     let has_conflict = conflicts.iter().any(|own_conflicts| !own_conflicts.is_empty());
-    for ((own, own_conflicts), memory) in all.iter().zip(&conflicts).zip(&mut *resolving) {
+    let each = all.iter().zip(&conflicts).enumerate();
+    for ((i, (own, own_conflicts)), memory) in each.zip(&mut *resolving) {
         if has_conflict {
-            memory.heading_rad = resolution_heading_rad(all, own, own_conflicts, settings);
+            memory.heading_rad = resolution_heading_rad(own, own_conflicts, settings);
         }
-        memory.with.extend(own_conflicts.iter().map(|(j, _)| all[*j].slot));
+        memory.with.extend(own_conflicts.iter().map(|(other, _)| other.slot));
         memory.with.sort_unstable();
         memory.with.dedup();
         memory.with.retain(|&slot| {
-            find_aircraft_by_slot(&by_slot, slot)
-                .is_some_and(|other| meets(own, other) && is_conflict_active(own, other, settings))
+            find_aircraft_by_slot(all, &by_slot, slot)
+                .and_then(|j| meets(i, j))
+                .is_some_and(|other| is_conflict_active(own, &other, settings))
         });
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
 }
 
-/// Returns all airplanes by rising slot, because each looks for many of the others among them.
-fn sorted_by_slot(all: &[AircraftState]) -> Vec<&AircraftState> {
-    let mut by_slot: Vec<&AircraftState> = all.iter().collect();
+/// Returns the places of all airplanes by rising slot, because each looks for many of the others among them.
+fn sorted_by_slot(all: &[AircraftState]) -> Vec<usize> {
+    let mut by_slot: Vec<usize> = (0..all.len()).collect();
     // A stable sort: of those with one slot the first one counts.
-    by_slot.sort_by_key(|one| one.slot);
+    by_slot.sort_by_key(|&k| all[k].slot);
     by_slot
 }
 
-/// Returns the first airplane with a slot, if there is one.
-fn find_aircraft_by_slot<'a>(
-    by_slot: &[&'a AircraftState],
+/// Returns the place of the first airplane with a slot, if there is one.
+fn find_aircraft_by_slot(
+    all: &[AircraftState],
+    by_slot: &[usize],
     slot: EntitySlot,
-) -> Option<&'a AircraftState> {
-    let first = by_slot.partition_point(|one| one.slot < slot);
-    by_slot.get(first).copied().filter(|one| one.slot == slot)
+) -> Option<usize> {
+    let first = by_slot.partition_point(|&k| all[k].slot < slot);
+    by_slot.get(first).copied().filter(|&k| all[k].slot == slot)
 }
 
 /// Returns the closest approach of two airplanes if one enters the other's zone within the look-ahead time, or has
@@ -131,17 +134,16 @@ fn find_conflict(
 
 /// Returns the heading that resolves an airplane's conflicts; its present one without any.
 fn resolution_heading_rad(
-    all: &[AircraftState],
     own: &AircraftState,
-    conflicts: &[(usize, ClosestApproach)],
+    conflicts: &[(AircraftState, ClosestApproach)],
     settings: ReactiveSettings,
 ) -> f64 {
     if conflicts.is_empty() {
         return own.heading_rad;
     }
     let [mut vx, mut vy] = own.velocity;
-    for (j, closest) in conflicts {
-        let [change_x, change_y] = resolution_velocity_change(own, &all[*j], closest, settings);
+    for (other, closest) in conflicts {
+        let [change_x, change_y] = resolution_velocity_change(own, other, closest, settings);
         vx -= change_x;
         vy -= change_y;
     }
@@ -202,7 +204,7 @@ mod tests {
         ReactiveSettings { look_ahead_s: 90.0, margin: 1.0, resolution_factor: 1.05 };
 
     fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {
-        resolution_headings(all, memory, SETTINGS, |_, _| true)
+        resolution_headings(all, memory, SETTINGS, |_, j| Some(all[j]))
     }
 
     /// The headings that BlueSky 1.1.1 commands for the same poses after one look (`traf.cr.trk`, as
@@ -240,14 +242,12 @@ mod tests {
         let by_slot = sorted_by_slot(&all);
         for slot in 0..12 {
             assert_eq!(
-                find_aircraft_by_slot(&by_slot, slot),
-                all.iter().find(|one| one.slot == slot),
+                find_aircraft_by_slot(&all, &by_slot, slot),
+                all.iter().position(|one| one.slot == slot),
                 "{slot}"
             );
         }
-        let first: *const AircraftState =
-            find_aircraft_by_slot(&by_slot, 2).expect("there are two");
-        assert!(std::ptr::eq(first, &all[1]));
+        assert_eq!(find_aircraft_by_slot(&all, &by_slot, 2), Some(1), "the first of two");
     }
 
     #[test]

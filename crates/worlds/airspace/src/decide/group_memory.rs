@@ -1,6 +1,6 @@
 //! The memory that optimizing a group takes, computed in advance.
 
-use crate::flight::{KnownAircraft, Point, distance_m};
+use crate::flight::{KnownAircraft, Point};
 use crate::settings::Deployment;
 use crate::world::AirspaceWorld;
 use sidestep_collectives::{Estimator, PairwiseGame};
@@ -43,16 +43,18 @@ fn table_bytes(world: &AirspaceWorld, group: &[KnownAircraft]) -> u64 {
         world.interaction_range_m(a.slot as usize, b.slot as usize)
     };
     let max_range_m = group.iter().map(|known| range_m(known, known)).fold(0.0, f64::max);
-    // Sorted by x, so that only neighbors in that order have to be compared.
-    let mut by_x: Vec<&KnownAircraft> = group.iter().collect();
-    by_x.sort_unstable_by(|a, b| a.pose.at[0].total_cmp(&b.pose.at[0]));
+    // Sorted along one direction, so that only neighbors in that order have to be compared.
+    let sweep_m = |known: &KnownAircraft| world.surface.sweep_m(known.pose.at);
+    let mut by_x: Vec<(f64, &KnownAircraft)> =
+        group.iter().map(|known| (sweep_m(known), known)).collect();
+    by_x.sort_unstable_by(|(a_m, _), (b_m, _)| a_m.total_cmp(b_m));
     let mut entries = 0;
-    for (k, a) in by_x.iter().enumerate() {
-        let next = by_x[k + 1..].iter().take_while(|b| b.pose.at[0] - a.pose.at[0] <= max_range_m);
-        for b in next {
+    for (k, (a_m, a)) in by_x.iter().enumerate() {
+        let next = by_x[k + 1..].iter().take_while(|(b_m, _)| b_m - a_m <= max_range_m);
+        for (_, b) in next {
             interrupt::check();
             if (a.altitude_m - b.altitude_m).abs() < world.vertical_m
-                && distance_m(a.pose.at, b.pose.at) <= range_m(a, b)
+                && world.surface.is_within(a.pose.at, b.pose.at, range_m(a, b))
             {
                 entries += actions(a) * actions(b);
             }

@@ -1,20 +1,18 @@
 //! The actions of an airplane by preference, and their turn profiles.
 
+use super::local_flight::LocalFlight;
 use crate::agents::ActionChoice;
-use crate::flight::{Action, InterOrderSegment, KnownAircraft};
+use crate::flight::{Action, KnownAircraft};
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 
 /// Returns the action straight to the way-point, and then the others by how little they differ from
 /// it.
 pub(super) fn rank_straight_first(world: &AirspaceWorld, known: KnownAircraft) -> Vec<Action> {
-    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let flight = LocalFlight::new(world, known, world.timing.dtau_s);
     let air = world.flight_environment();
-    rank_by_turn_difference(
-        world,
-        known,
-        air.steer(&air.autopilot(model, mission), known.pose, known.next),
-    )
+    let straight_rad_s = air.steer(&flight.autopilot(world), flight.pose, known.next);
+    rank_by_turn_difference(world, known, straight_rad_s)
 }
 
 /// Returns proceeding, and then the other actions by how little they differ from a turn rate.
@@ -62,9 +60,10 @@ pub(super) fn turn_profiles_from_actions(
     known: KnownAircraft,
     actions: &[Action],
 ) -> Vec<TurnProfile> {
+    let flight = LocalFlight::new(world, known, world.timing.dt_s);
     let mut profiles: Vec<TurnProfile> = Vec::new();
     for &action in actions {
-        let profile = turn_profile(world, known, action);
+        let profile = turn_profile(world, &flight, action);
         if !profiles.contains(&profile) {
             profiles.push(profile);
         }
@@ -72,20 +71,19 @@ pub(super) fn turn_profiles_from_actions(
     profiles
 }
 
-fn turn_profile(world: &AirspaceWorld, known: KnownAircraft, action: Action) -> TurnProfile {
-    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+fn turn_profile(world: &AirspaceWorld, flight: &LocalFlight<'_>, action: Action) -> TurnProfile {
     let air = world.flight_environment();
     let dtau_s = world.timing.dtau_s;
-    let autopilot = air.autopilot(model, mission);
-    let mut pose = known.pose;
-    let mut next = known.next;
+    let autopilot = flight.autopilot(world);
+    let mut pose = flight.pose;
+    let mut next = flight.next;
     let mut omegas_rad_s = Vec::new();
     for k in 0..world.timing.points_per_dt() {
         let fixed_rad_s = action.turn_rate_rad_s(k as f64 * dtau_s);
         let omega = fixed_rad_s.unwrap_or_else(|| air.steer(&autopilot, pose, next));
         omegas_rad_s.push(omega);
         let before = pose;
-        pose = air.after_wind_step(before.step(model.v_m_s, omega, dtau_s));
+        pose = air.after_wind_step(before.step(flight.model.v_m_s, omega, dtau_s));
         next = autopilot.next_way_point((before, pose), next);
     }
     TurnProfile { omegas_rad_s }

@@ -4,9 +4,10 @@
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
 //! step by step, each airplane as the method says.
 
+use super::local_flight::LocalFlight;
 use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
 use crate::baseline::{AircraftState, mvp, orca};
-use crate::flight::{InterOrderSegment, KnownAircraft, Point, Pose2};
+use crate::flight::{Frame, InterOrderSegment, KnownAircraft, Point, Pose2, Surface};
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;
@@ -106,26 +107,22 @@ fn decide_steering(
         }
     }
     let own = flying.iter().map(|&k| aircraft_state(world, group[k]));
-    let all: Vec<AircraftState> = own.chain(others.iter().copied()).collect();
-    let is_on_level =
-        |a: &AircraftState, b: &AircraftState| a.levels.overlaps(&b.levels, world.vertical_m);
+    let considered = ConsideredTraffic::new(world, own.chain(others.iter().copied()).collect());
     let mut steering = vec![Steering::Proceed; group.len()];
     match &world.method {
         MethodKind::Orca => {
-            for (&k, own) in flying.iter().zip(&all) {
-                let others =
-                    all.iter().filter(|other| other.slot != own.slot && is_on_level(own, other));
-                let heading_rad = orca::heading_rad(own, others, world.orca, world.timing.dtau_s);
+            for (place, &k) in flying.iter().enumerate() {
+                let own = &considered.all[place];
+                let others = considered.others_seen_from(place);
+                let heading_rad =
+                    orca::heading_rad(own, others.iter(), world.orca, world.timing.dtau_s);
                 steering[k] = heading_rad.into();
             }
         }
         MethodKind::Own(method) => {
-            for (&k, own) in flying.iter().zip(&all) {
-                let others: Vec<AircraftState> = all
-                    .iter()
-                    .filter(|other| other.slot != own.slot && is_on_level(own, other))
-                    .copied()
-                    .collect();
+            for (place, &k) in flying.iter().enumerate() {
+                let others = considered.others_seen_from(place);
+                let own = &considered.all[place];
                 let one = CustomMethodContext { traffic, k, own, others: &others };
                 steering[k] = one.decide(world, method, &mut memory.draws[k]);
             }
@@ -133,7 +130,9 @@ fn decide_steering(
         MethodKind::Mvp => {
             let mut resolutions: Vec<mvp::ActiveResolutions> =
                 flying.iter().map(|&k| std::mem::take(&mut memory.resolving[k])).collect();
-            let found = mvp::resolution_headings(&all, &mut resolutions, world.mvp, is_on_level);
+            let meets = |own: usize, other: usize| considered.seen_from(own, other);
+            let found =
+                mvp::resolution_headings(&considered.all, &mut resolutions, world.mvp, meets);
             for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
                 steering[k] = heading_rad.into();
                 memory.resolving[k] = resolution;
@@ -143,6 +142,62 @@ fn decide_steering(
         MethodKind::Pc | MethodKind::None | MethodKind::External => {}
     }
     steering
+}
+
+/// The airplanes of a step that a method considers, and the frame of each.
+struct ConsideredTraffic<'a> {
+    world: &'a AirspaceWorld,
+    all: Vec<AircraftState>,
+    frames: Vec<Frame>,
+}
+
+impl<'a> ConsideredTraffic<'a> {
+    fn new(world: &'a AirspaceWorld, all: Vec<AircraftState>) -> Self {
+        let frames = all.iter().map(|one| world.surface.frame_at(one.at)).collect();
+        Self { world, all, frames }
+    }
+
+    fn is_on_level(&self, a: usize, b: usize) -> bool {
+        self.all[a].levels.overlaps(&self.all[b].levels, self.world.vertical_m)
+    }
+
+    /// Returns another airplane as one sees it: in the plane of the scenario as it is, on the earth in the frame where the
+    /// one is, so that positions and velocities of the two can be subtracted. `None` for one on another level, or on
+    /// the earth so far away that the two cannot come too near within the look-ahead time.
+    fn seen_from(&self, own: usize, other: usize) -> Option<AircraftState> {
+        let Self { world, all, frames } = self;
+        if !self.is_on_level(own, other) {
+            return None;
+        }
+        let (own_frame, other_frame) = (&frames[own], &frames[other]);
+        let (own, other) = (&all[own], &all[other]);
+        if world.surface == Surface::Plane {
+            return Some(*other);
+        }
+        let settings = world.reactive_settings();
+        let speeds_m_s = [own, other].map(|one| math::hypot(one.velocity[0], one.velocity[1]));
+        let gap_m = own.separation_m.max(other.separation_m) * settings.margin.max(1.0);
+        let range_m = (speeds_m_s[0] + speeds_m_s[1]) * settings.look_ahead_s + 2.0 * gap_m;
+        if own_frame.is_surely_beyond(other_frame, range_m) {
+            return None;
+        }
+        let Pose2 { at: [x_m, y_m], heading_rad: turn_rad } = own_frame.origin_of(other_frame);
+        Some(AircraftState {
+            // Of the one as it is, whose own position remains in coordinates.
+            at: [own.at[0] + x_m, own.at[1] + y_m],
+            heading_rad: other.heading_rad + turn_rad,
+            velocity: rotated(other.velocity, turn_rad),
+            preferred_rad: other.preferred_rad + turn_rad,
+            ..*other
+        })
+    }
+
+    /// Returns all other airplanes as one sees them.
+    fn others_seen_from(&self, own: usize) -> Vec<AircraftState> {
+        let slot = self.all[own].slot;
+        let others = (0..self.all.len()).filter(|&k| self.all[k].slot != slot);
+        others.filter_map(|other| self.seen_from(own, other)).collect()
+    }
 }
 
 /// One airplane for which a method of the program's own decides.
@@ -159,26 +214,39 @@ impl CustomMethodContext<'_> {
         let StepTraffic { now, elapsed_s, group, .. } = self.traffic;
         let known = group[self.k];
         let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+        // On the earth all positions are those in the frame where the airplane is.
+        let origin = match world.surface {
+            Surface::Plane => [0.0; 2],
+            Surface::Earth => self.own.at,
+        };
+        let own = &relative_to(origin, self.own);
+        let others: Vec<AircraftState> =
+            self.others.iter().map(|other| relative_to(origin, other)).collect();
         let percept = MethodPercept {
             now,
             elapsed_s,
             step_s: world.timing.dtau_s,
-            own: self.own,
-            way_point_m: mission[known.next],
+            own,
+            way_point_m: world.surface.frame_at(known.pose.at).to_local(mission[known.next]),
             omega_max_rad_s: model.omega_max_rad_s,
             wind_m_s: world.wind_m_s,
-            others: self.others,
+            others: &others,
         };
         method.decide(&percept, draws)
     }
 }
 
+/// Returns an airplane with its position relative to an origin.
+fn relative_to(origin: Point, one: &AircraftState) -> AircraftState {
+    AircraftState { at: [one.at[0] - origin[0], one.at[1] - origin[1]], ..*one }
+}
+
 /// Flies one step as steered, and returns its turn rate.
 pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: Steering) -> f64 {
-    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let flight = LocalFlight::new(world, *known, world.timing.dtau_s);
     let air = world.flight_environment();
-    let pose = known.pose;
-    let autopilot = air.autopilot(model, mission);
+    let LocalFlight { model, pose, frame, .. } = flight;
+    let autopilot = flight.autopilot(world);
     let omega_max_rad_s = model.omega_max_rad_s;
     let omega_rad_s = match steering {
         Steering::Proceed | Steering::Velocity([0.0, 0.0]) => {
@@ -194,8 +262,9 @@ pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: S
         }
         Steering::TurnRate(omega_rad_s) => omega_rad_s.clamp(-omega_max_rad_s, omega_max_rad_s),
     };
-    known.pose = air.after_wind_step(pose.step(model.v_m_s, omega_rad_s, autopilot.dtau_s));
-    known.next = autopilot.next_way_point((pose, known.pose), known.next);
+    let after = air.after_wind_step(pose.step(model.v_m_s, omega_rad_s, autopilot.dtau_s));
+    known.next = autopilot.next_way_point((pose, after), known.next);
+    known.pose = frame.pose_to_world(after);
     omega_rad_s
 }
 
@@ -211,29 +280,44 @@ fn non_cooperative_state(
     one: &NonCooperativeAircraft,
     seconds: f64,
 ) -> AircraftState {
-    let [x, y] = one.position_after(seconds);
+    // In its own frame on the earth, because it may be far from all that see it.
+    let frame = world.surface.frame_at(one.at);
+    let [x, y] = one.in_frame(frame).position_after(seconds);
     let [vx, vy] = one.velocity_m_s;
     let [wx, wy] = world.wind_m_s;
     let heading_rad = math::atan2(vy, vx);
+    let there = Pose2 { at: [x + wx * seconds, y + wy * seconds], heading_rad };
+    let Pose2 { at, heading_rad: turned_rad } = frame.pose_to_world(there);
     AircraftState {
         slot: one.slot,
-        at: [x + wx * seconds, y + wy * seconds],
-        heading_rad,
-        velocity: one.velocity_m_s,
-        preferred_rad: heading_rad,
+        at,
+        heading_rad: turned_rad,
+        velocity: rotated(one.velocity_m_s, turned_rad - heading_rad),
+        preferred_rad: turned_rad,
         separation_m: one.required_clearance_m(0.0),
         levels: one.levels,
         yields: false,
     }
 }
 
+/// Returns a vector turned by an angle; the same bits for none.
+fn rotated([x, y]: Point, rad: f64) -> Point {
+    if rad == 0.0 {
+        return [x, y];
+    }
+    let (sin, cos) = math::sin_cos(rad);
+    [cos * x - sin * y, sin * x + cos * y]
+}
+
 fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState {
-    let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+    let flight = LocalFlight::new(world, known, world.timing.dtau_s);
+    let model = flight.model;
     let Pose2 { at, heading_rad } = known.pose;
     let v = model.v_m_s;
-    let preferred_rad = mission.get(known.next).map_or(heading_rad, |&goal| {
-        let aim = world.flight_environment().aim_point(at, goal, v);
-        math::atan2(aim[1] - at[1], aim[0] - at[0])
+    let preferred_rad = flight.goal().map_or(heading_rad, |goal| {
+        let from = flight.pose.at;
+        let aim = world.flight_environment().aim_point(from, goal, v);
+        math::atan2(aim[1] - from[1], aim[0] - from[0])
     });
     AircraftState {
         slot: known.slot,

@@ -1,11 +1,10 @@
 //! Observations: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
-use crate::flight::{InterOrderSegment, KnownAircraft, Point, distance_m};
+use crate::flight::{InterOrderSegment, KnownAircraft, Point, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{BufferMut, ValueDomain, ValueSpace};
-use sidestep_kernel::geometry::sub;
 use sidestep_kernel::math::{atan2, hypot, wrap_angle};
 use sidestep_kernel::{EntityId, EntitySlot};
 use std::array::from_fn;
@@ -104,12 +103,14 @@ impl AgentKnowledge {
         let ahead = mission.get(own.next..).unwrap_or_default();
         Self {
             is_due: true,
-            at: own.pose.at,
+            at: world.display_m(own.pose.at),
             altitude_m: own.altitude_m,
             heading_rad: wrap_heading(own.pose.heading_rad),
             speed_m_s: model.v_m_s,
             turn_rate_rad_s: state.turn_rate_rad_s(own.slot),
-            way_point: ahead.first().map_or([0.0; 2], |&goal| sub(goal, own.pose.at)),
+            way_point: ahead
+                .first()
+                .map_or([0.0; 2], |&goal| world.surface.offset_m(own.pose.at, goal)),
             way_points_left: ahead.len(),
             delay_s: delay_s(context, own, ahead),
             neighbors: neighbors(context, own, all),
@@ -176,8 +177,9 @@ fn neighbors(
 ) -> Vec<Neighbor> {
     let PhaseContext { world, state, now, .. } = context;
     let others = all.iter().filter(|other| other.slot != own.slot);
+    let distance_m = |other: &VisibleAircraft| world.surface.distance_m(own.pose.at, other.at);
     let mut nearest: Vec<(f64, &VisibleAircraft)> =
-        others.map(|other| (distance_m(own.pose.at, other.at), other)).collect();
+        others.map(|other| (distance_m(other), other)).collect();
     nearest.sort_unstable_by(|(a_m, a), (b_m, b)| a_m.total_cmp(b_m).then(a.slot.cmp(&b.slot)));
     nearest.truncate(MAX_NEIGHBORS);
     let exempt = state.exempt_ids(own.slot);
@@ -186,8 +188,8 @@ fn neighbors(
     nearest
         .into_iter()
         .map(|(_, other)| Neighbor {
-            aircraft: *other,
-            relative_m: sub(other.at, own.pose.at),
+            aircraft: seen_from(world, own, other),
+            relative_m: world.surface.offset_m(own.pose.at, other.at),
             above_m: other.altitude_m - own.altitude_m,
             separation_m: separation_m.max(other.separation_m),
             is_exempt: exempt.binary_search(&other.slot).is_ok(),
@@ -196,6 +198,17 @@ fn neighbors(
                 .map(|contact| world.cycle_start_s(now.saturating_sub(contact.heard_in))),
         })
         .collect()
+}
+
+/// Returns another airplane with the heading that it has in the frame of the one that observes.
+fn seen_from(
+    world: &AirspaceWorld,
+    own: &KnownAircraft,
+    other: &VisibleAircraft,
+) -> VisibleAircraft {
+    let pose = Pose2 { at: other.at, heading_rad: other.heading_rad };
+    let heading_rad = world.surface.frame_at(own.pose.at).pose_to_local(pose).heading_rad;
+    VisibleAircraft { heading_rad: wrap_heading(heading_rad), ..*other }
 }
 
 /// Returns how much later an airplane will arrive than it would alone, if it now flies straight from
@@ -215,7 +228,8 @@ fn delay_s(context: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> 
     let mut from = own.pose.at;
     let mut left_s = 0.0;
     for &to in ahead {
-        left_s += air.straight_flight_time_s(from, to, v_m_s);
+        let frame = world.surface.frame_at(from);
+        left_s += air.straight_flight_time_s(frame.to_local(from), frame.to_local(to), v_m_s);
         from = to;
     }
     flown_s + left_s - alone_s

@@ -6,7 +6,9 @@
 use super::action::Action;
 use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
+use super::surface::{Frame, Surface, way_point_reach_m};
 use sidestep_kernel::{interrupt, math};
+use std::borrow::Cow;
 
 /// Difference of heading and bearing in radians below which an airplane no longer turns: in an hour at 250 m/s it
 /// leads 0.1 mm astray.
@@ -21,6 +23,8 @@ pub struct FlightConditions {
     pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
+    /// The surface that all fly over.
+    pub surface: Surface,
 }
 
 /// An airplane's position on its route.
@@ -30,7 +34,7 @@ pub struct RoutePosition<'a> {
     pub mission: &'a [Point],
     /// Number of way-points done with, which is the index of the one that it flies to.
     pub next: usize,
-    /// The pose from which it flies there.
+    /// The pose from which it flies there, in the coordinates of the way-points unless a method says otherwise.
     pub pose: Pose2,
 }
 
@@ -44,6 +48,27 @@ impl FlightConditions {
             after: AfterLastWaypoint::Straight,
             dtau_s: self.timing.dtau_s,
         }
+    }
+
+    /// Returns the way-points of a route in a frame, as far as an airplane gets in some seconds from a pose in that
+    /// frame; see [`Frame::local_mission`].
+    pub(crate) fn local_mission<'a>(
+        &self,
+        frame: Frame,
+        model: &AircraftModel,
+        route: RoutePosition<'a>,
+        seconds: f64,
+    ) -> Cow<'a, [Point]> {
+        let RoutePosition { mission, next, pose } = route;
+        let drift_m = math::hypot(self.wind_m_s[0], self.wind_m_s[1]) * seconds;
+        let from_m = math::hypot(pose.at[0], pose.at[1]);
+        let reach_m = way_point_reach_m(model, seconds, self.passing.tolerance_m);
+        frame.local_mission(mission, next, from_m + drift_m + reach_m)
+    }
+
+    /// Returns whether the air moves.
+    pub(crate) fn has_wind(&self) -> bool {
+        !self.is_windless()
     }
 
     fn is_windless(&self) -> bool {
@@ -120,7 +145,7 @@ impl FlightConditions {
         Pose2 { at, ..pose }
     }
 
-    /// Returns where each action leads an airplane that is at a point of its route.
+    /// Returns where each action leads an airplane that is at a point of its route, in the frame of that point.
     ///
     /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
     /// be when the airplane, flying straight, reaches it.
@@ -132,7 +157,13 @@ impl FlightConditions {
     ) -> Vec<Prediction> {
         let RoutePosition { mission, next, pose } = route;
         interrupt::check();
-        let mission = self.wind_corrected_mission(mission, pose.at, next, model.v_m_s);
+        let frame = self.surface.frame_at(pose.at);
+        let pose = frame.pose_to_local(pose);
+        // A step more, within which the last point may still change the way-point.
+        let seconds = self.timing.horizon_s() + self.timing.dtau_s;
+        let local = RoutePosition { mission, next, pose };
+        let mission = self.local_mission(frame, model, local, seconds);
+        let mission = self.wind_corrected_mission(&mission, pose.at, next, model.v_m_s);
         let autopilot = self.autopilot(model, &mission);
         actions.iter().map(|action| autopilot.predict(*action, pose, next, &self.timing)).collect()
     }

@@ -9,6 +9,7 @@
 //! changes, so that halving would not end.
 
 use super::motion::{Point, Pose2, sinc};
+use super::pair_plane::RigidMotion;
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::math;
 
@@ -109,6 +110,17 @@ impl ConstantRateLeg {
     #[must_use]
     pub fn with_times(self, from_s: f64, until_s: f64) -> Self {
         Self { from_s, until_s, ..self }
+    }
+
+    /// Returns the leg in another plane.
+    #[must_use]
+    pub(crate) fn moved(&self, motion: &RigidMotion) -> Self {
+        Self {
+            pose: motion.pose(self.pose),
+            along: motion.direction(self.along),
+            drift_m_s: motion.direction(self.drift_m_s),
+            ..*self
+        }
     }
 
     /// Returns whether a leg that starts at the end of this one continues it without any change.

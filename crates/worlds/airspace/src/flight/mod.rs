@@ -6,26 +6,35 @@
 //! airplane.rs  order.rs  segment.rs  one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
 //! leg.rs                             stretches of flight, and how near two of them come
+//! surface.rs  pair_plane.rs          a plane or the earth, and the planes in which motions are computed and compared
+//! chart.rs                           how positions are drawn
 //! ```
 
 mod action;
 mod air;
 mod airplane;
 mod autopilot;
+mod chart;
 mod leg;
 mod levels;
 mod motion;
 mod order;
+mod pair_plane;
 mod segment;
+mod surface;
 mod track;
 
 pub use action::{Action, DetourAlternatives, actions};
 pub use air::{FlightConditions, RoutePosition};
 pub use airplane::{AirplaneStart, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
+pub use chart::Chart;
 pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
 pub use levels::FlightLevelRange;
 pub use motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
+pub use pair_plane::PairPlane;
+pub(crate) use pair_plane::RigidMotion;
 pub(crate) use segment::{InterOrderSegment, SegmentAfterOrder, segments_after_orders};
+pub use surface::{Frame, Surface, coordinates_from_degrees};
 pub use track::{Track, TrackPoint};

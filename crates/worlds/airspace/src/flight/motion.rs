@@ -1,6 +1,7 @@
 //! Motion: place, heading and speed of an airplane.
 //!
-//! Plane meters, x east and y north; headings in radians, counterclockwise from east; a
+//! Plane meters, x east and y north (a scenario on the earth keeps poses in other coordinates, see `surface.rs`, and
+//! computes motion in planes); headings in radians, counterclockwise from east; a
 //! positive turn rate turns left. Source: section 3 of the paper; the step is exact.
 
 use serde::{Deserialize, Serialize};

@@ -3,13 +3,10 @@
 use super::airplane::AirplaneStart;
 use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
+use super::surface::FAR_AHEAD_M;
 use sidestep_kernel::math;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Distance of the point for which an airplane that keeps a heading steers: so far ahead that the
-/// bearing equals the heading wherever the airplane is.
-const FAR_AHEAD_M: f64 = 1e12;
 
 /// The part of a flight between two orders.
 #[derive(Debug, Clone, Copy)]

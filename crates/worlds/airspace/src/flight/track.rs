@@ -1,7 +1,9 @@
-//! Recorded tracks: the position of an airplane at any time, and the rest of its route.
+//! Recorded tracks: the position of an airplane at any time, and the rest of its route. On the earth it flies on the
+//! shortest path from each point to the next.
 
 use super::leg::ConstantRateLeg;
 use super::motion::{Point, Pose2, distance_m};
+use super::surface::{Frame, Surface};
 use sidestep_kernel::math;
 
 /// Seconds between two way-points along the rest of a track: far enough apart to leave room for avoiding others.
@@ -12,7 +14,7 @@ const WAY_POINT_INTERVAL_S: f64 = 120.0;
 pub struct TrackPoint {
     /// Time in seconds after the start of the scenario.
     pub t_s: f64,
-    /// Position in meters, x east and y north.
+    /// Position: meters east and north, or longitude and latitude in radians.
     pub at: Point,
     /// Altitude in meters.
     pub altitude_m: f64,
@@ -21,7 +23,10 @@ pub struct TrackPoint {
 /// A recorded track: straight and at constant speed between its points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
+    surface: Surface,
     points: Vec<TrackPoint>,
+    /// Meters east and north from each point to the next one, as seen from there.
+    offsets_m: Vec<Point>,
     /// Heading from each point to the next one elsewhere.
     headings_rad: Vec<f64>,
 }
@@ -29,12 +34,14 @@ pub struct Track {
 impl Track {
     /// Returns a track of at least two points with finite numbers and rising times; `None`
     /// otherwise.
-    pub fn new(points: Vec<TrackPoint>) -> Option<Self> {
+    pub fn new(surface: Surface, points: Vec<TrackPoint>) -> Option<Self> {
         let is_rising = points.windows(2).all(|pair| pair[0].t_s < pair[1].t_s);
         if points.len() < 2 || !is_rising || !points.iter().all(TrackPoint::is_valid) {
             return None;
         }
-        Some(Self { headings_rad: headings_rad(&points), points })
+        let offset_m = |pair: &[TrackPoint]| surface.offset_m(pair[0].at, pair[1].at);
+        let offsets_m: Vec<Point> = points.windows(2).map(offset_m).collect();
+        Some(Self { surface, headings_rad: headings_rad(&offsets_m), offsets_m, points })
     }
 
     /// Returns the time of its first point, in seconds after the start.
@@ -55,10 +62,15 @@ impl Track {
     /// Returns its pose at a time; before the first point and after the last one, the pose there.
     pub fn pose_at(&self, t_s: f64) -> Pose2 {
         let (k, fraction) = self.locate(t_s);
-        let [x0, y0] = self.points[k].at;
-        let [x1, y1] = self.points[k + 1].at;
-        let at = [x0 + fraction * (x1 - x0), y0 + fraction * (y1 - y0)];
-        Pose2 { at, heading_rad: self.headings_rad[k] }
+        let [x, y] = self.points[k].at;
+        let [dx, dy] = self.offsets_m[k].map(|part| fraction * part);
+        let heading_rad = self.headings_rad[k];
+        match self.surface {
+            Surface::Plane => Pose2 { at: [x + dx, y + dy], heading_rad },
+            Surface::Earth => {
+                self.surface.frame_at([x, y]).pose_to_world(Pose2 { at: [dx, dy], heading_rad })
+            }
+        }
     }
 
     /// Returns its altitude in meters.
@@ -69,11 +81,11 @@ impl Track {
         from_m + fraction * (to_m - from_m)
     }
 
-    /// Adds the legs flown in an interval, with times after its start.
+    /// Adds the legs flown in an interval in a frame, with times after the interval's start.
     pub(crate) fn add_legs_in_interval(
         &self,
-        from_s: f64,
-        until_s: f64,
+        frame: Frame,
+        [from_s, until_s]: [f64; 2],
         legs: &mut Vec<ConstantRateLeg>,
     ) {
         let first = self.points.partition_point(|p| p.t_s <= from_s).max(1) - 1;
@@ -88,11 +100,40 @@ impl Track {
             }
             let duration_s = pair[1].t_s - pair[0].t_s;
             let climb_m_s = (pair[1].altitude_m - pair[0].altitude_m) / duration_s;
-            let v_m_s = distance_m(pair[0].at, pair[1].at) / duration_s;
-            let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(start_s) };
+            let (pose, v_m_s) = self.leg_start(frame, k, [start_s, end_s]);
             let leg = ConstantRateLeg::new(start_s - from_s, end_s - from_s, pose, v_m_s, 0.0);
             legs.push(leg.with_climb(self.altitude_at_m(start_s), climb_m_s));
         }
+    }
+
+    /// Returns the pose in a frame with which an airplane starts a leg between point `k` and the next one, and its speed
+    /// on that leg.
+    fn leg_start(&self, frame: Frame, k: usize, [start_s, end_s]: [f64; 2]) -> (Pose2, f64) {
+        if self.surface == Surface::Plane {
+            let pose = Pose2 { heading_rad: self.headings_rad[k], ..self.pose_at(start_s) };
+            return (pose, self.leg_speed_m_s(k));
+        }
+        // In a frame that touches the earth elsewhere, a leg is straight only so nearly that it has to be drawn between
+        // its ends for the next one to start where it ends.
+        let pose = frame.pose_to_local(self.pose_at(start_s));
+        let next = if end_s < self.points[k + 1].t_s {
+            self.pose_at(end_s).at
+        } else {
+            self.points[k + 1].at
+        };
+        let next = frame.to_local(next);
+        let length_m = distance_m(pose.at, next);
+        if length_m == 0.0 {
+            return (pose, 0.0);
+        }
+        let heading_rad = math::atan2(next[1] - pose.at[1], next[0] - pose.at[0]);
+        (Pose2 { heading_rad, ..pose }, length_m / (end_s - start_s))
+    }
+
+    /// Returns the speed between point `k` and the next one.
+    fn leg_speed_m_s(&self, k: usize) -> f64 {
+        let [dx, dy] = self.offsets_m[k];
+        math::hypot(dx, dy) / (self.points[k + 1].t_s - self.points[k].t_s)
     }
 
     /// Returns the last point before a time that has a next one, and the fraction of the time to that.
@@ -126,7 +167,7 @@ impl Track {
         let mut at = self.pose_at(from_s).at;
         let mut length_m = 0.0;
         for point in self.points.iter().filter(|p| p.t_s > from_s) {
-            length_m += distance_m(at, point.at);
+            length_m += self.surface.distance_m(at, point.at);
             at = point.at;
         }
         length_m / (self.end_s() - from_s)
@@ -135,7 +176,7 @@ impl Track {
     /// Returns its speed over the ground at a time, in meters per second.
     pub fn speed_m_s(&self, t_s: f64) -> f64 {
         let (k, _) = self.locate(t_s);
-        speed_m_s(&self.points[k..k + 2])
+        self.leg_speed_m_s(k)
     }
 
     /// Returns its greatest rate of climb or descent, in meters per second.
@@ -148,7 +189,7 @@ impl Track {
 
     /// Returns the greatest speed over the ground, in meters per second.
     pub fn max_speed_m_s(&self) -> f64 {
-        self.points.windows(2).map(speed_m_s).fold(0.0, f64::max)
+        (0..self.offsets_m.len()).map(|k| self.leg_speed_m_s(k)).fold(0.0, f64::max)
     }
 }
 
@@ -161,15 +202,10 @@ impl TrackPoint {
     }
 }
 
-/// Returns the speed over the ground between two points.
-fn speed_m_s(pair: &[TrackPoint]) -> f64 {
-    distance_m(pair[0].at, pair[1].at) / (pair[1].t_s - pair[0].t_s)
-}
-
 /// Returns the headings. An airplane that is recorded at one place twice keeps the heading in which
 /// it flies on, and one that ends at rest the last heading.
-fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
-    let mut known: Vec<Option<f64>> = points.windows(2).map(bearing_rad).collect();
+fn headings_rad(offsets_m: &[Point]) -> Vec<f64> {
+    let mut known: Vec<Option<f64>> = offsets_m.iter().map(bearing_rad).collect();
     for k in (1..known.len()).rev() {
         known[k - 1] = known[k - 1].or(known[k]);
     }
@@ -183,9 +219,7 @@ fn headings_rad(points: &[TrackPoint]) -> Vec<f64> {
 }
 
 /// Returns the direction from one point to another; none if they are at one place.
-fn bearing_rad(pair: &[TrackPoint]) -> Option<f64> {
-    let dx = pair[1].at[0] - pair[0].at[0];
-    let dy = pair[1].at[1] - pair[0].at[1];
+fn bearing_rad(&[dx, dy]: &Point) -> Option<f64> {
     (dx != 0.0 || dy != 0.0).then(|| math::atan2(dy, dx))
 }
 
@@ -196,7 +230,7 @@ mod tests {
     fn track(points: &[[f64; 4]]) -> Option<Track> {
         let point =
             |&[t_s, x, y, altitude_m]: &[f64; 4]| TrackPoint { t_s, at: [x, y], altitude_m };
-        Track::new(points.iter().map(point).collect())
+        Track::new(Surface::Plane, points.iter().map(point).collect())
     }
 
     #[test]

@@ -44,7 +44,8 @@ impl Inspector<'_> {
                 expected,
                 is_chosen.into(),
             ]);
-            let ahead = options.predictions[k].points.iter().copied();
+            let frame = options.frame;
+            let ahead = options.predictions[k].points.iter().map(|at| frame.to_world(*at));
             let shape = self.path_mark(&[own.pose.at].into_iter().chain(ahead).collect::<Vec<_>>());
             let role = if is_chosen { MarkRole::Chosen } else { MarkRole::Predicted };
             inspection.add_weighted_mark(
@@ -123,7 +124,7 @@ impl Inspector<'_> {
                 .fact_if("can be reached by", threat.map(|event| airplane(event.other)))
                 .table(table),
         );
-        let at_m = self.point_on_level(orbit.center());
+        let at_m = self.point_on_level(aircraft.frame.to_world(orbit.center()));
         let radius_m = orbit.radius_m;
         inspection.add_mark(
             MarkRole::Orbit,
@@ -145,15 +146,17 @@ impl Inspector<'_> {
     fn turn_profile_line(&self, profile: &TurnProfile) -> MarkShape {
         // Orders are carried out before anything is flown.
         let v_m_s = self.after.segment(self.world, self.id).model.v_m_s;
-        let mut pose: Pose2 = self.before.airplanes[self.id as usize].pose();
-        let mut points = vec![pose.at];
+        let start: Pose2 = self.before.airplanes[self.id as usize].pose();
+        let frame = self.world.surface.frame_at(start.at);
+        let mut pose = frame.pose_to_local(start);
+        let mut points = vec![start.at];
         for &omega in &profile.omegas_rad_s {
             pose = self.world.flight_environment().after_wind_step(pose.step(
                 v_m_s,
                 omega,
                 self.world.timing.dtau_s,
             ));
-            points.push(pose.at);
+            points.push(frame.to_world(pose.at));
         }
         self.path_mark(&points)
     }
@@ -181,7 +184,7 @@ impl Inspector<'_> {
         let current = &self.after.airplanes[self.id as usize];
         let profile = &self.trace.flown;
         let turn = profile.as_ref().and_then(|profile| profile.omegas_rad_s.first().copied());
-        let [x_m, y_m] = current.pose().at;
+        let [x_m, y_m] = self.world.display_m(current.pose().at);
         let next: Option<Vec3> =
             current.is_unfinished().then_some([x_m, y_m, current.altitude_m.get()]);
         let heading =

@@ -154,6 +154,7 @@ fn shielded_aircraft_from_report(
         own.exempt.binary_search(&one.id).map_or(&[][..], |_| std::slice::from_ref(&own.id));
     ShieldedAircraft {
         id: one.id,
+        frame: world.surface.frame_at(one.pose.at),
         pose: one.pose,
         orbit_pose: one.pose,
         v_m_s: segment.model.v_m_s,

@@ -144,6 +144,7 @@ pub(super) fn grouping_participant(
         non_cooperative: percept.non_cooperative.clone(),
         expected: expected_members(percept, contacts),
         airplanes: world.airplanes.len(),
+        surface: world.surface,
         range_m: network.map_or(f64::INFINITY, |network| network.range_m),
         certainty: plan_certainty(world),
     };

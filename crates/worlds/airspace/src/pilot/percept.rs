@@ -3,7 +3,7 @@
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
-use crate::flight::{FlightLevelRange, InterOrderSegment, KnownAircraft, Pose2, distance_m};
+use crate::flight::{FlightLevelRange, InterOrderSegment, KnownAircraft, Pose2, Surface};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{OrbitSide, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
@@ -74,6 +74,7 @@ impl OwnshipState {
         let segment = world.segment(self.id, self.orders);
         ShieldedAircraft {
             id: self.id,
+            frame: world.surface.frame_at(self.seen.at),
             pose: self.seen,
             orbit_pose: self.seen_orbit_pose,
             v_m_s: segment.model.v_m_s,
@@ -85,21 +86,21 @@ impl OwnshipState {
             vertical_m: world.vertical_m,
             fallback: self.fallback,
             exempt: self.exempt.as_slice().into(),
-            rank: self.priority_rank(world.timing.dt_s, &segment),
+            rank: self.priority_rank(world.surface, world.timing.dt_s, &segment),
         }
     }
 
     /// Returns its rank. It is higher the nearer its goal is, so that it is soon gone, and the more
     /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
     /// lower half makes it unique.
-    fn priority_rank(&self, dt_s: f64, segment: &InterOrderSegment<'_>) -> u64 {
+    fn priority_rank(&self, surface: Surface, dt_s: f64, segment: &InterOrderSegment<'_>) -> u64 {
         // A percept that came off a network may count more way-points than there are.
         let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
         // Along the whole route, from where its own instruments see it: others are sent its rank, and do not compute
         // it.
-        let legs = ahead
-            .iter()
-            .scan(self.pose.at, |from, &to| Some(distance_m(std::mem::replace(from, to), to)));
+        let legs = ahead.iter().scan(self.pose.at, |from, &to| {
+            Some(surface.distance_m(std::mem::replace(from, to), to))
+        });
         let refused_m = f64::from(self.refusals) * segment.model.v_m_s * dt_s;
         // The conversion saturates at the ends of the range.
         let first =
@@ -116,8 +117,10 @@ impl OwnshipState {
             return TurnProfile { omegas_rad_s: vec![self.fallback.sign() * rate_rad_s; steps] };
         }
         let model = world.segment(self.id, self.orders).model;
-        let tracker =
-            OrbitTracker::new(self.pose, self.orbit_pose, model, rate_rad_s, self.fallback);
+        let omega_rad_s = self.fallback.sign() * rate_rad_s;
+        let frame = world.surface.orbit_frame(self.orbit_pose, model.v_m_s, omega_rad_s);
+        let [pose, orbit_pose] = [self.pose, self.orbit_pose].map(|pose| frame.pose_to_local(pose));
+        let tracker = OrbitTracker::new(pose, orbit_pose, model, rate_rad_s, self.fallback);
         TurnProfile { omegas_rad_s: tracker.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
     }
 }

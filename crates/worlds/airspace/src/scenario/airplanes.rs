@@ -1,8 +1,8 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use crate::flight::{AircraftModel, AirplaneStart, Pose2, TimeDiscretization, Track};
-use crate::flight_plan::AirplaneSection;
+use crate::flight::{AircraftModel, AirplaneStart, Pose2, Surface, TimeDiscretization, Track};
+use crate::flight_plan::{AirplaneSection, mixed_positions};
 use crate::generate::{GeneratorKind, GeneratorParams, generate};
 use crate::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
@@ -87,6 +87,7 @@ impl Compiler<'_> {
         replay: ReplayPeriod,
     ) -> Result<Vec<AirplaneStart>, InputError> {
         let common = self.file.airplane.clone().unwrap_or_default();
+        self.check_generator_surface()?;
         let mut all = match &self.file.airspace.generator {
             Some(generator) => self.generate_airplanes(generator, &common.model(), streams)?,
             None => Vec::new(),
@@ -118,6 +119,35 @@ impl Compiler<'_> {
             return Err(self.source.error(None, "the scenario has no airplanes", remedy));
         }
         Ok(all)
+    }
+
+    /// Returns the surface on which the airplanes have their positions.
+    pub(super) fn surface(&self) -> Result<Surface, InputError> {
+        let mut surface = None;
+        for section in &self.file.airplanes.0 {
+            let own = section.get_ref().surface(self.source, section.span())?;
+            match (surface, own) {
+                (Some(before), Some(own)) if before != own => {
+                    return Err(mixed_positions(self.source, section.span()));
+                }
+                _ => surface = surface.or(own),
+            }
+        }
+        Ok(surface.unwrap_or_default())
+    }
+
+    /// Refuses generated traffic, which is in a plane, beside positions on the earth.
+    fn check_generator_surface(&self) -> Result<(), InputError> {
+        match &self.file.airspace.generator {
+            Some(generator) if self.surface()? == Surface::Earth => {
+                let cause =
+                    "generated airplanes, which fly over a plane, beside positions in degrees";
+                let remedy =
+                    "leave out [airspace.generator], or give all airplanes at_m and way_points_m";
+                Err(self.source.error(generator.span(), cause, remedy))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn generate_airplanes(
@@ -167,13 +197,16 @@ impl Compiler<'_> {
         let s = section.get_ref();
         let error =
             |cause: &str, remedy: &str| Err(self.source.error(section.span(), cause, remedy));
-        let (Some(at_m), Some(heading_deg)) = (s.at_m, s.heading_deg) else {
+        let (Some(at), Some(heading_deg)) = (s.start_at(self.source)?, s.heading_deg) else {
             let remedy = "add at_m = [x, y] and heading_deg, or a track";
             return error("an airplane that begins nowhere", remedy);
         };
-        let mission = s.way_points_m();
+        let mission = s.way_points(self.source)?;
         if mission.is_empty() {
-            let remedy = "add way_points_m = [[x, y], ...]";
+            let remedy = match self.surface()? {
+                Surface::Plane => "add way_points_m = [[x, y], ...]",
+                Surface::Earth => "add way_points_deg = [[latitude, longitude], ...]",
+            };
             return error("an airplane without way-points", remedy);
         }
         let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
@@ -181,7 +214,7 @@ impl Compiler<'_> {
         Ok(AirplaneStart {
             callsign: s.callsign(self.source)?,
             model,
-            start: Pose2 { at: at_m.get(), heading_rad },
+            start: Pose2 { at, heading_rad },
             mission,
             altitude_m: s.altitude_m.map_or(0.0, f64::from),
             appears_s: s.appears_s.map_or(0.0, f64::from),

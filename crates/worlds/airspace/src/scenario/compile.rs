@@ -83,6 +83,7 @@ impl<'a> Compiler<'a> {
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         world.later_rules = Arc::new(self.later_rules(&world)?);
+        self.check_earth(&world)?;
         let head = &self.recipe.head;
         let cycles = head.cycles.unwrap_or_else(|| cycle_limit(&world));
         let compiled = CompiledAirspace {
@@ -126,6 +127,8 @@ impl<'a> Compiler<'a> {
         let replay = self.replay_period(&timing);
         let airplanes = self.airplanes(&streams, replay)?;
         let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDING_M;
+        let surface = self.surface()?;
+        let origin_deg = self.origin_deg(surface, &airplanes)?;
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
@@ -144,7 +147,9 @@ impl<'a> Compiler<'a> {
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,
-            origin_deg: section.origin_deg.map(|at| at.get()),
+            origin_deg,
+            surface,
+            curvature_m: 0.0,
             start_utc_s: section.start_utc_s.map(f64::from),
             replay_cycles: replay.cycles,
             disturbance: self.disturbance(),
@@ -433,6 +438,7 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>
     for (rank, &i) in starts.iter().enumerate() {
         let airplane = &world.airplanes[i];
         group.push(ShieldedAircraft {
+            frame: world.surface.frame_at(observed_pose(world, i as u32, 0, airplane.start).at),
             pose: observed_pose(world, i as u32, 0, airplane.start),
             orbit_pose: observed_pose(world, i as u32, 0, airplane.start),
             v_m_s: airplane.model.v_m_s,

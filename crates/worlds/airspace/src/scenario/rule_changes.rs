@@ -93,6 +93,7 @@ impl Compiler<'_> {
             last_s = at_s;
             let mut world = later.last().map_or(start, |(_, world)| world).clone();
             self.change_rules(&mut world, change, &mut has_own)?;
+            world.curvature_m = world.curvature_error_m();
             let from = (at_s / start.timing.dt_s).ceil() as Cycle;
             world.rules_since = from;
             // Of changes in one cycle, the last world has all.

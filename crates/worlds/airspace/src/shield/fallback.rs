@@ -2,7 +2,6 @@
 
 use super::orbit::OrbitSide;
 use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
-use crate::flight::distance_m;
 use sidestep_kernel::interrupt;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
@@ -55,7 +54,7 @@ fn orbits_stay_apart(
     (i, side_i): (usize, OrbitSide),
     (j, side_j): (usize, OrbitSide),
 ) -> bool {
-    group[i].orbit(side_i).stays_apart(&group[j].orbit(side_j), group[i].required_gap_m(&group[j]))
+    group[i].do_orbits_stay_apart(side_i, &group[j], side_j)
 }
 
 /// Returns the side on which an airplane that is about to fly as `changed` has an orbit apart from
@@ -68,18 +67,15 @@ pub(crate) fn safe_orbit_side(
         others.filter(|other| changed.is_protected_from(other)).collect();
     let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changed.fallback);
     [changed.fallback].into_iter().chain(other_sides).find(|&side| {
-        let orbit = changed.orbit(side);
-        others
-            .iter()
-            .all(|other| orbit.stays_apart(&other.fallback_orbit(), changed.required_gap_m(other)))
+        others.iter().all(|other| changed.do_orbits_stay_apart(side, other, other.fallback))
     })
 }
 
 /// Returns for each airplane all others whose orbits might come too near its own, by rising number.
-/// They are sorted by x, so that only neighbors in that order have to be compared.
+/// They are sorted along one direction, so that only neighbors in that order have to be compared.
 fn neighbors(group: &[ShieldedAircraft]) -> Vec<Vec<usize>> {
     let max_reach_m = group.iter().map(orbit_reach_m).fold(0.0, f64::max);
-    let x = |i: usize| group[i].orbit_pose.at[0];
+    let x = |i: usize| group[i].frame.surface().sweep_m(group[i].orbit_pose.at);
     let mut by_x: Vec<usize> = (0..group.len()).collect();
     by_x.sort_unstable_by(|&a, &b| x(a).total_cmp(&x(b)));
     let mut near = vec![Vec::new(); group.len()];
@@ -87,9 +83,12 @@ fn neighbors(group: &[ShieldedAircraft]) -> Vec<Vec<usize>> {
         let next = by_x[k + 1..].iter().take_while(|&&j| x(j) - x(i) < 2.0 * max_reach_m);
         for &j in next {
             interrupt::check();
-            let apart_m = distance_m(group[i].orbit_pose.at, group[j].orbit_pose.at);
+            let reach_m = orbit_reach_m(&group[i]) + orbit_reach_m(&group[j]);
+            let (surface, at, other_at) =
+                (group[i].frame.surface(), group[i].orbit_pose.at, group[j].orbit_pose.at);
             if group[i].is_protected_from(&group[j])
-                && apart_m < orbit_reach_m(&group[i]) + orbit_reach_m(&group[j])
+                && !surface.is_surely_beyond(at, other_at, reach_m)
+                && surface.distance_m(at, other_at) < reach_m
             {
                 near[i].push(j);
                 near[j].push(i);

@@ -33,8 +33,9 @@
 //!    (`safe_side`); or the exemption of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
 //!    airplane that leaves the world keeps every other pair as it was.
 //!
-//! By induction over `dt` no pair that is not exempt ever loses separation. A wind that all know
-//! moves all alike and changes no distance. `errors.rs` has the margin that errors of position and
+//! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
+//! moves all alike and changes no distance. On the earth each pair is compared in a plane of its own, and
+//! `curvature.rs` has the margin for what that leaves. `errors.rs` has the margin that errors of position and
 //! heading add to `R`, and `avoid.rs` the guarantee beside non-cooperative aircraft. Each step is
 //! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`.
 //!
@@ -45,6 +46,7 @@
 //! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
 //! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
 
+mod curvature;
 #[cfg(test)]
 mod delay_tests;
 mod errors;
@@ -58,6 +60,7 @@ mod shielded_aircraft;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use curvature::curvature_error_m;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
 pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_orbit_side};

@@ -5,7 +5,7 @@
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
 
-use crate::flight::{Point, Pose2, distance_m};
+use crate::flight::{PairPlane, Point, Pose2, RigidMotion, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::math;
@@ -79,6 +79,19 @@ impl Orbit {
         Self { center, radius_m, omega_rad_s, phase_rad: to_center_rad + std::f64::consts::PI }
     }
 
+    /// Returns two orbits, each in a frame of its own, in the plane of the pair.
+    pub(crate) fn both_in_plane(plane: &PairPlane, [a, b]: [Self; 2]) -> [Self; 2] {
+        match plane.motions() {
+            None => [a, b],
+            Some([first, second]) => [a.moved(first), b.moved(second)],
+        }
+    }
+
+    fn moved(&self, motion: &RigidMotion) -> Self {
+        let center = motion.point(self.center);
+        Self { center, phase_rad: motion.angle_rad(self.phase_rad), ..*self }
+    }
+
     /// Returns the airplane's position on it.
     pub(crate) fn at(&self, t_s: f64) -> Point {
         let angle_rad = self.phase_rad + self.omega_rad_s * t_s;
@@ -91,11 +104,6 @@ impl Orbit {
     /// Returns the center of the circle.
     pub(crate) fn center(&self) -> Point {
         self.center
-    }
-
-    /// Returns whether all of it is at least `gap_m` from a point, which is not inside of it.
-    pub(crate) fn is_clear_of_point(&self, point: Point, gap_m: f64) -> bool {
-        distance_m(self.center, point) >= self.radius_m + gap_m
     }
 
     fn speed_m_s(&self) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::orbit::{Orbit, OrbitSide, stays_apart_for};
 use super::shielded_aircraft::ShieldedAircraft;
-use crate::flight::{Point, Pose2, distance_m};
+use crate::flight::{Frame, PairPlane, Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
 
@@ -17,7 +17,7 @@ pub struct TurnProfile {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SafeManeuver {
     aircraft: ShieldedAircraft,
-    /// Poses at the start of each step, and at the end.
+    /// Poses at the start of each step, and at the end, in the frame of the airplane.
     poses: Vec<Pose2>,
     omegas_rad_s: Vec<f64>,
     dtau_s: f64,
@@ -47,7 +47,7 @@ impl SafeManeuver {
         side: OrbitSide,
     ) -> Self {
         let flown = Self::from_turn_rates(
-            aircraft.pose,
+            aircraft.local_pose(),
             aircraft,
             profile.omegas_rad_s.clone(),
             dtau_s,
@@ -84,10 +84,16 @@ impl SafeManeuver {
     pub(crate) fn fallback(aircraft: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
         let omega = aircraft.fallback.sign() * aircraft.orbit_rad_s;
         let side = aircraft.fallback;
-        Self::from_turn_rates(aircraft.orbit_pose, aircraft, vec![omega; steps], dtau_s, side)
+        let start = aircraft.frame.pose_to_local(aircraft.orbit_pose);
+        Self::from_turn_rates(start, aircraft, vec![omega; steps], dtau_s, side)
     }
 
-    /// Returns the pose at the end of `dt`, where the orbit begins.
+    /// Returns the frame in which it is flown.
+    pub(crate) fn frame(&self) -> Frame {
+        self.aircraft.frame
+    }
+
+    /// Returns the pose at the end of `dt`, where the orbit begins, in the frame of the airplane.
     pub(crate) fn end_pose(&self) -> Pose2 {
         self.poses[self.poses.len() - 1]
     }
@@ -106,14 +112,16 @@ impl SafeManeuver {
         }
         let gap_m = self.aircraft.required_gap_m(&other.aircraft);
         interrupt::check();
-        self.orbit.stays_apart(&other.orbit, gap_m) && self.profiles_stay_apart(other, gap_m)
+        let plane = self.aircraft.pair_plane(&other.aircraft);
+        let [own, others] = Orbit::both_in_plane(&plane, [self.orbit, other.orbit]);
+        own.stays_apart(&others, gap_m) && self.profiles_stay_apart(other, &plane, gap_m)
     }
 
-    fn profiles_stay_apart(&self, other: &Self, gap_m: f64) -> bool {
+    fn profiles_stay_apart(&self, other: &Self, plane: &PairPlane, gap_m: f64) -> bool {
         let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s;
         (0..self.omegas_rad_s.len()).all(|k| {
             let apart_m = |t_s: f64| {
-                distance_m(self.position_in_step(k, t_s), other.position_in_step(k, t_s))
+                plane.distance_m(self.position_in_step(k, t_s), other.position_in_step(k, t_s))
             };
             stays_apart_for(&apart_m, self.dtau_s, closing_m_s, gap_m)
         })
@@ -131,12 +139,17 @@ impl SafeManeuver {
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
         let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
         let (centers, radius_m) = other.reach_discs(dt_s);
+        let plane = self.aircraft.pair_plane(other);
         let gap_m = radius_m + self.aircraft.required_gap_m(other);
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
         centers.iter().all(|&center| {
-            self.poses.iter().all(|pose| distance_m(pose.at, center) >= gap_m + half_step_m)
-                && self.orbit.is_clear_of_point(center, gap_m)
+            let are_poses_clear = self
+                .poses
+                .iter()
+                .all(|pose| plane.distance_m(pose.at, center) >= gap_m + half_step_m);
+            let [orbit_center, center] = plane.points(self.orbit.center(), center);
+            are_poses_clear && distance_m(orbit_center, center) >= self.orbit.radius_m + gap_m
         })
     }
 

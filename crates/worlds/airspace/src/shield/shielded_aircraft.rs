@@ -1,7 +1,7 @@
 //! An airplane as the shield knows it.
 
 use super::orbit::{Orbit, OrbitSide};
-use crate::flight::{FlightLevelRange, Point, Pose2, distance_m};
+use crate::flight::{FlightLevelRange, Frame, PairPlane, Point, Pose2, Surface, distance_m};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
 
@@ -17,7 +17,9 @@ pub struct ShieldedAircraft {
     /// The airplane whose orbit this is. One that may be on several orbits takes part once with
     /// each.
     pub id: EntityId,
-    /// Its pose, as all see it.
+    /// The frame in which its motion is computed: that where all see it.
+    pub frame: Frame,
+    /// Its pose, as all see it, in coordinates of the scenario.
     pub pose: Pose2,
     /// The pose that it would have on its stored orbit without errors of heading, as all see it.
     pub orbit_pose: Pose2,
@@ -56,18 +58,36 @@ impl ShieldedAircraft {
     /// apart: the pair need no longer be exempt.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
         !self.is_on_same_level(other)
-            || self
-                .fallback_orbit()
-                .stays_apart(&other.fallback_orbit(), self.required_gap_m(other))
+            || self.do_orbits_stay_apart(self.fallback, other, other.fallback)
     }
 
-    pub(super) fn fallback_orbit(&self) -> Orbit {
-        self.orbit(self.fallback)
+    /// Returns its pose in its frame.
+    pub(crate) fn local_pose(&self) -> Pose2 {
+        self.frame.pose_to_local(self.pose)
     }
 
-    /// Returns the orbit to a side that it holds, or that it enters where it is.
+    /// Returns the plane in which it is compared with another airplane.
+    pub(super) fn pair_plane(&self, other: &Self) -> PairPlane {
+        PairPlane::between(self.frame, other.frame)
+    }
+
+    /// Returns the orbit to a side that it holds, or that it enters where it is, in its frame.
     pub(crate) fn orbit(&self, side: OrbitSide) -> Orbit {
-        Orbit::from_pose(self.orbit_pose, self.v_m_s, side.sign() * self.orbit_rad_s)
+        let pose = self.frame.pose_to_local(self.orbit_pose);
+        Orbit::from_pose(pose, self.v_m_s, side.sign() * self.orbit_rad_s)
+    }
+
+    /// Returns whether its orbit to a side and that of another airplane stay apart forever.
+    pub(super) fn do_orbits_stay_apart(
+        &self,
+        side: OrbitSide,
+        other: &Self,
+        other_side: OrbitSide,
+    ) -> bool {
+        let plane = self.pair_plane(other);
+        let [own, others] =
+            Orbit::both_in_plane(&plane, [self.orbit(side), other.orbit(other_side)]);
+        own.stays_apart(&others, self.required_gap_m(other))
     }
 
     /// Returns the distance in meters that two airplanes have to keep on new plans, as they are
@@ -79,8 +99,16 @@ impl ShieldedAircraft {
     /// Returns whether some plans of `dt_s` seconds, and orbits after them, could bring two airplanes
     /// too near each other.
     pub(super) fn can_come_too_near(&self, other: &Self, dt_s: f64) -> bool {
-        let apart_m = distance_m(self.pose.at, other.pose.at);
-        apart_m < self.required_gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s)
+        let limit_m = self.required_gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s);
+        !self.frame.is_surely_beyond(&other.frame, limit_m) && self.apart_m(other) < limit_m
+    }
+
+    /// Returns how far from each other all see the two, in meters.
+    fn apart_m(&self, other: &Self) -> f64 {
+        match self.frame.surface() {
+            Surface::Plane => distance_m(self.pose.at, other.pose.at),
+            Surface::Earth => distance_m([0.0; 2], self.frame.origin_of(&other.frame).at),
+        }
     }
 
     /// Returns how far it can get from where it is in `dt_s` seconds and on an orbit after them, in meters.
@@ -89,7 +117,7 @@ impl ShieldedAircraft {
     }
 
     /// Returns two discs that it cannot leave, however it flies for `dt_s` seconds and to
-    /// whichever side it turns forever after that: their centers, and their radius in meters.
+    /// whichever side it turns forever after that: their centers in its frame, and their radius in meters.
     ///
     /// At any time it is on the circle to its left that it would fly from there, whose center is at
     /// right angles to its heading. Flown straight on, that center ends `v dt` ahead, which is the
@@ -97,7 +125,7 @@ impl ShieldedAircraft {
     /// about it by at most `r omega dt`. Earlier it is nearer, because `r omega` is not less than
     /// `v`. The same holds to the right.
     pub(super) fn reach_discs(&self, dt_s: f64) -> ([Point; 2], f64) {
-        let ahead = self.pose.step(self.v_m_s, 0.0, dt_s);
+        let ahead = self.local_pose().step(self.v_m_s, 0.0, dt_s);
         let orbit =
             |side: OrbitSide| Orbit::from_pose(ahead, self.v_m_s, side.sign() * self.orbit_rad_s);
         let centers = OrbitSide::BOTH.map(|side| orbit(side).center());

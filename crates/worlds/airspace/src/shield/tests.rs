@@ -2,7 +2,7 @@
 
 use super::orbit::Orbit;
 use super::*;
-use crate::flight::{FlightLevelRange, Point, Pose2, distance_m};
+use crate::flight::{FlightLevelRange, Frame, Point, Pose2, distance_m};
 use proptest::prelude::*;
 
 const DTAU_S: f64 = 1.0;
@@ -12,6 +12,7 @@ fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
     let pose = Pose2 { at: [x, y], heading_rad };
     ShieldedAircraft {
         id: rank as u32,
+        frame: Frame::PLANE,
         pose,
         orbit_pose: pose,
         v_m_s: 35.0,

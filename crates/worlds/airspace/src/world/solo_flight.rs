@@ -1,7 +1,7 @@
 //! Solo flights: how long each airplane would fly if there were no other.
 
 use super::AirspaceWorld;
-use crate::flight::{AirplaneStart, InterOrderSegment, Pose2};
+use crate::flight::{AirplaneStart, InterOrderSegment, Pose2, RoutePosition, Surface};
 use sidestep_kernel::{EntitySlot, interrupt};
 
 /// Seconds, or steps where these are longer, after which a flight counts as endless: no flight of a scenario is as
@@ -56,25 +56,43 @@ impl SoloFlight<'_> {
         (is_endless || flown_s >= most_s).then_some(f64::INFINITY)
     }
 
+    /// Flies all steps at once in which it certainly flies straight on to its way-point. On the earth that is along the
+    /// shortest path, on which a wind would blow from ever other sides.
+    fn fly_straight(&mut self) {
+        let world = self.world;
+        let air = world.flight_environment();
+        let InterOrderSegment { model, mission, .. } = world.segment(self.slot, self.orders);
+        let frame = world.surface.frame_at(self.pose.at);
+        let pose = frame.pose_to_local(self.pose);
+        let route = RoutePosition { mission, next: self.next, pose };
+        let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
+        let straight = air.straight_step_count(&air.autopilot(model, &mission), pose, self.next);
+        self.pose = frame.pose_to_world(air.after_straight_steps(pose, model.v_m_s, straight));
+        self.steps = self.steps.saturating_add(straight);
+    }
+
     /// Flies a step, and all those before it in which it certainly flies straight on, at once.
     fn step(&mut self) {
         let world = self.world;
         let air = world.flight_environment();
         let InterOrderSegment { model, mission, .. } = world.segment(self.slot, self.orders);
-        let pilot = air.autopilot(model, mission);
         let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
-        if has_no_orders {
-            let straight = air.straight_step_count(&pilot, self.pose, self.next);
-            self.pose = air.after_straight_steps(self.pose, model.v_m_s, straight);
-            self.steps = self.steps.saturating_add(straight);
+        let can_skip = has_no_orders && !(world.surface == Surface::Earth && air.has_wind());
+        if can_skip {
+            self.fly_straight();
         }
-        let omega = air.steer(&pilot, self.pose, self.next);
-        let before = self.pose;
-        self.pose = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
-        let next = pilot.next_way_point((before, self.pose), self.next);
+        let frame = world.surface.frame_at(self.pose.at);
+        let before = frame.pose_to_local(self.pose);
+        let route = RoutePosition { mission, next: self.next, pose: before };
+        let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
+        let pilot = air.autopilot(model, &mission);
+        let omega = air.steer(&pilot, before, self.next);
+        let after = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
+        let next = pilot.next_way_point((before, after), self.next);
+        self.pose = frame.pose_to_world(after);
         // Far from the origin a step may be lost to rounding, and then all later ones are too: the flight is endless.
-        let is_stuck = has_no_orders && self.pose == before && self.next == next;
+        let is_stuck = has_no_orders && after == before && self.next == next;
         self.next = next;
         self.steps = if is_stuck { usize::MAX } else { self.steps.saturating_add(1) };
     }

@@ -4,7 +4,7 @@ use super::CoordinatorHostServices;
 use super::state::OptimizationProgress;
 use crate::agents::link::ConversationEnd;
 use crate::agents::{OptimizationResult, Ownship};
-use crate::flight::{Point, distance_m};
+use crate::flight::{Point, Surface};
 
 /// An airplane as the coordinators on it see it.
 #[derive(Debug, Clone)]
@@ -105,12 +105,12 @@ impl CoordinatorHostServices for HostAircraft {
 
 /// Splits a group at some places by proximity into parts of about as many members as there are
 /// parts: each time the first that is left and those nearest to it.
-pub(super) fn partition_group(at: &[Point]) -> Vec<Vec<usize>> {
+pub(super) fn partition_group(surface: Surface, at: &[Point]) -> Vec<Vec<usize>> {
     let size = (at.len() as f64).sqrt().ceil() as usize;
     let mut rest: Vec<usize> = (0..at.len()).collect();
     let mut parts = Vec::new();
     while let Some(&first) = rest.first() {
-        let from_first_m = |place: usize| distance_m(at[first], at[place]);
+        let from_first_m = |place: usize| surface.distance_m(at[first], at[place]);
         rest.sort_by(|&a, &b| from_first_m(a).total_cmp(&from_first_m(b)).then(a.cmp(&b)));
         let mut part: Vec<usize> = rest.drain(..size.min(rest.len())).collect();
         part.sort_unstable();

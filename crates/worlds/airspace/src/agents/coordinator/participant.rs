@@ -32,8 +32,11 @@ impl CoordinatorHostParticipant {
         // No host waits forever, except where no message is lost.
         let patience = (patience.ticks < u64::MAX).then_some(patience);
         let at: Vec<_> = own.common.poses.iter().map(|pose| pose.at).collect();
-        let parts =
-            if is_hierarchy { partition_group(&at) } else { vec![(0..group.len()).collect()] };
+        let parts = if is_hierarchy {
+            partition_group(own.common.air.surface, &at)
+        } else {
+            vec![(0..group.len()).collect()]
+        };
         let bytes = max_state_bytes(&own.common);
         let miss_ticks = patience.map_or(u64::MAX, |patience| {
             // The ticks of a tour, and those within which every host in touch answers; at most a quarter of the conversation,

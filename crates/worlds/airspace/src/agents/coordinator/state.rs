@@ -4,7 +4,7 @@
 use super::epoch::CoordinatorEpoch;
 use crate::agents::traffic_state::StateBeacon;
 use crate::agents::{ActionChoice, CommonKnowledge, Ownship};
-use crate::flight::{FlightLevelRange, Prediction};
+use crate::flight::{FlightLevelRange, PairPlane, Prediction};
 use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
@@ -154,7 +154,10 @@ impl OptimizationProgress {
         let all: Vec<ActionPredictions> = self
             .airplanes
             .iter()
-            .map(|a| ActionPredictions::new(a.predictions.clone(), a.separation_m, a.levels))
+            .map(|a| {
+                let frame = common.frame(a.place);
+                ActionPredictions::new(a.predictions.clone(), frame, a.separation_m, a.levels)
+            })
             .collect();
         let own = self.airplanes.iter().map(|airplane| airplane.own_costs.clone()).collect();
         let mut game = PairwiseGame::new(own);
@@ -242,8 +245,9 @@ impl OptimizationProgress {
             // Others are to keep farther away from one that is presumed.
             let other_separation_m = if other.is_presumed { other.separation_m } else { 0.0 };
             let r = own.separation_m.max(other_separation_m);
-            cost +=
-                objective.collision_costs(&own.predictions[k], &other.predictions[k], [r, r])[0];
+            let plane = PairPlane::between(common.frame(own.place), common.frame(other.place));
+            let [p, q] = [own, other].map(|one| &one.predictions[k]);
+            cost += objective.collision_costs(&plane, p, q, [r, r])[0];
         }
         cost
     }

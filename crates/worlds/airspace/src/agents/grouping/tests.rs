@@ -1,7 +1,7 @@
 //! Agents that look for their groups, over links of which some never carry anything.
 
 use super::*;
-use crate::flight::Pose2;
+use crate::flight::{Pose2, Surface};
 use crate::shield::OrbitSide;
 use link::ProtocolAgent as _;
 use proptest::prelude::*;
@@ -50,6 +50,7 @@ impl Links {
             near: near.into_iter().map(sighted).collect(),
             non_cooperative: Vec::new(),
             airplanes: 100,
+            surface: Surface::Plane,
             range_m: f64::INFINITY,
             certainty,
         })
