@@ -1,7 +1,7 @@
 //! Conversion of other programs' traffic to a scenario: BlueSky `.scn` files and recorded tracks.
 //!
 //! The resulting text is a scenario like any other, complete in itself: it goes into the run folder
-//! and can be edited. Latitude and longitude become a plane about the traffic's center. Turn rates
+//! and can be edited. Positions stay latitudes and longitudes: the scenario is geographic. Turn rates
 //! are those of a turn at 25 degrees of bank at the airplane's greatest speed.
 //!
 //! Recorded tracks are replayed as they are; from `airspace.replay_until_s` on, which is infinity
@@ -9,6 +9,7 @@
 
 mod bluesky;
 mod import_settings;
+mod position;
 mod recorded;
 
 pub use bluesky::from_bluesky;
@@ -17,7 +18,6 @@ pub(crate) use import_settings::ImportedScenarioSettings;
 pub use recorded::from_tracks;
 
 use super::flight::SeparationMinima;
-use sidestep_import::local_plane::{LatLon, LocalPlane};
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
 const FOOT_M: f64 = 0.3048;
@@ -33,12 +33,6 @@ const LOOK_EVERY_S: f64 = 1.0;
 const MIN_SPEED_M_S: f64 = 1.0;
 /// Time in seconds for which an airplane without a destination flies ahead.
 const UNROUTED_FLIGHT_S: f64 = 1800.0;
-
-/// Returns the position of the plane's origin on earth, as a scenario writes it.
-fn origin(plane: &LocalPlane) -> String {
-    let LatLon { lat_deg, lon_deg } = plane.center();
-    format!("origin_deg = {:?}\n", [lat_deg, lon_deg])
-}
 
 /// Returns a call sign as a line of the scenario; none where it would not be one.
 fn callsign(name: &str) -> String {

@@ -6,15 +6,16 @@
 //! (`import_settings.rs`); `not_flown` counts all other commands.
 
 use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
+use super::position::{origin_text, path_of_heading, position_text, positions_text};
 use super::{
     DT_S, FOOT_M, LOOK_EVERY_S, MIN_SPEED_M_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
-    banked_turn_deg_s, callsign, header_text, origin,
+    banked_turn_deg_s, callsign, header_text,
 };
-use crate::flight::{Point, SeparationMinima};
+use crate::flight::SeparationMinima;
 use crate::flight_plan::CLIMB_M_S;
 use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, Airspeed, ScnAircraft, ScnFile};
-use sidestep_import::local_plane::{LatLon, LocalPlane};
-use sidestep_kernel::{InputError, math};
+use sidestep_import::local_plane::LatLon;
+use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -23,35 +24,17 @@ pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
     let settings = &settings_from_bluesky(name, file);
     let aircraft: Vec<FlyableScnAircraft> =
         file.traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
-    let plane = LocalPlane::from_positions(aircraft.iter().map(|one| one.0.position()))?;
+    let origin = origin_text(aircraft.iter().map(|one| one.0.position()))?;
     let start = &settings.start;
     let zone = SeparationMinima { gap_m: start.separation_m, vertical_m: start.vertical_m };
-    let more = settings_text(settings) + &origin(&plane);
+    let more = settings_text(settings) + &origin;
     // A prediction reaches as far as one decision at least.
     let horizon_s = start.look_ahead_s.map(|s| s.max(DT_S));
     let mut text = header_text(name, zone, horizon_s, &more);
     for one in &aircraft {
-        write_aircraft(
-            &mut text,
-            &one.0,
-            &Surroundings { plane: &plane, ends_s: file.traffic.ends_s },
-        );
+        write_aircraft(&mut text, &one.0, file.traffic.ends_s);
     }
     Some(text)
-}
-
-/// What the flights of a file have in common.
-struct Surroundings<'a> {
-    plane: &'a LocalPlane,
-    /// Time at which all leave.
-    ends_s: Option<f64>,
-}
-
-impl Surroundings<'_> {
-    /// Returns a position as a scenario has it.
-    fn position_m(&self, position: LatLon) -> Point {
-        self.plane.to_plane_m(position)
-    }
 }
 
 /// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
@@ -201,26 +184,22 @@ impl FlightCommand {
     }
 }
 
-fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, around: &Surroundings<'_>) {
-    let at_m = around.position_m(aircraft.position());
+/// Writes an aircraft; all leave when the file ends the simulation, at `ends_s`.
+fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, ends_s: Option<f64>) {
+    let at_deg = position_text(aircraft.position());
     let heading_deg = 90.0 - aircraft.heading_deg;
     let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
-    let mut way_points_m: Vec<Point> =
-        aircraft.known_goals().map(|at| around.position_m(at)).collect();
-    let mut orders = flight_commands(aircraft, !way_points_m.is_empty());
-    if let Some(ends_s) = around.ends_s {
+    let mut way_points: Vec<LatLon> = aircraft.known_goals().collect();
+    let mut orders = flight_commands(aircraft, !way_points.is_empty());
+    if let Some(ends_s) = ends_s {
         orders.retain(|(at_s, _)| *at_s < ends_s);
         orders.push((ends_s, FlightCommand::Leave));
     }
-    if way_points_m.is_empty() {
-        let heading_rad = heading_deg.to_radians();
-        let ahead_m = UNROUTED_FLIGHT_S * v_m_s;
-        let goal = [
-            at_m[0] + ahead_m * math::cos(heading_rad),
-            at_m[1] + ahead_m * math::sin(heading_rad),
-        ];
-        way_points_m.push(goal);
+    if way_points.is_empty() {
+        let (at, seconds) = (aircraft.position(), UNROUTED_FLIGHT_S);
+        way_points = path_of_heading(at, aircraft.heading_deg, v_m_s, seconds);
     }
+    let way_points_deg = positions_text(&way_points);
     let ordered_m_s = orders.iter().filter_map(|(_, command)| match command {
         FlightCommand::Speed(v_m_s) => Some(*v_m_s),
         _ => None,
@@ -231,8 +210,8 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, around: &Surroundin
     // Writing to a string cannot fail.
     let _ = write!(
         text,
-        "\n[[airplanes]]\n{}at_m = {at_m:?}\nheading_deg = {heading_deg:?}\n\
-         way_points_m = {way_points_m:?}\naltitude_m = {altitude_m:?}\n\
+        "\n[[airplanes]]\n{}at_deg = [{at_deg}]\nheading_deg = {heading_deg:?}\n\
+         way_points_deg = {way_points_deg}\naltitude_m = {altitude_m:?}\n\
          appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
         callsign(&aircraft.id)
     );

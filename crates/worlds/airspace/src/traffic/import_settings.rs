@@ -142,6 +142,13 @@ fn fill_silent_start(states: &mut [(f64, ImportedRules)]) -> Vec<String> {
             "conflicts are resolved from a time on: without the shield, which keeps separation from the start".into(),
         );
     }
+    if states.iter().any(|(_, rules)| rules.wind_m_s.is_some() && !rules.is_bare) {
+        states.iter_mut().for_each(|(_, rules)| rules.is_bare = true);
+        guesses.push(
+            "a wind blows: without the shield, whose stored orbits a wind would drive apart or together on the earth"
+                .into(),
+        );
+    }
     let is_silent = states[0].1.method.is_none();
     if is_silent && states.iter().any(|(_, rules)| rules.method.is_some()) {
         guesses.push(

@@ -1,11 +1,12 @@
 //! Conversion of recorded tracks to a scenario, which replays them.
 
+use super::position::{origin_text, position_text, straight_ahead};
 use super::{
     FOOT_M, KNOT_M_S, MIN_SPEED_M_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S, banked_turn_deg_s,
-    callsign, header_text, origin,
+    callsign, header_text,
 };
 use crate::flight::SeparationMinima;
-use sidestep_import::local_plane::{LatLon, LocalPlane};
+use sidestep_import::local_plane::LocalPlane;
 use sidestep_import::traffic::{RecordedTraffic, Track};
 use sidestep_kernel::math;
 use std::fmt::Write;
@@ -18,27 +19,21 @@ const ZONE: SeparationMinima =
 /// any flight.
 pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let samples = || traffic.tracks.iter().flat_map(|track| &track.samples);
-    let plane = LocalPlane::from_positions(samples().map(|s| s.position))?;
+    let origin = origin_text(samples().map(|s| s.position))?;
     let start_s = samples().map(|s| s.time_s).fold(f64::INFINITY, f64::min);
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
     let replay = if traffic.is_snapshot { "" } else { replay };
-    let more = format!("{replay}start_utc_s = {start_s:?}\n{}", origin(&plane));
+    let more = format!("{replay}start_utc_s = {start_s:?}\n{origin}");
     let mut text = header_text(name, ZONE, None, &more);
     for track in &traffic.tracks {
         if traffic.is_snapshot {
-            write_straight_flight(&mut text, track, &plane, start_s);
+            write_straight_flight(&mut text, track, start_s);
         } else {
-            write_track(&mut text, track, &plane, start_s);
+            write_track(&mut text, track, start_s);
         }
     }
     (!traffic.tracks.is_empty()).then_some(text)
-}
-
-/// Returns a position as the scenario writes it.
-fn position_text(position: LatLon, plane: &LocalPlane) -> String {
-    let [x, y] = plane.to_plane_m(position);
-    format!("{x:?}, {y:?}")
 }
 
 /// Returns the first lines of an airplane's section: its address as a comment, and its name.
@@ -48,13 +43,13 @@ fn section_head(track: &Track) -> String {
     format!("\n[[airplanes]] # {}\n{}", track.icao24.escape_debug(), callsign(name))
 }
 
-fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, start_s: f64) {
+fn write_track(text: &mut String, track: &Track, start_s: f64) {
     let omega_deg_s = banked_turn_deg_s(mean_speed_m_s(track).max(1.0));
     text.push_str(&section_head(track));
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "omega_max_deg_s = {omega_deg_s:?}\ntrack = [");
+    let _ = writeln!(text, "omega_max_deg_s = {omega_deg_s:?}\ntrack_deg = [");
     for sample in &track.samples {
-        let at = position_text(sample.position, plane);
+        let at = position_text(sample.position);
         let t_s = sample.time_s - start_s;
         let altitude_m = sample.altitude_ft * FOOT_M;
         let _ = writeln!(text, "  [{t_s:?}, {at}, {altitude_m:?}],");
@@ -63,31 +58,24 @@ fn write_track(text: &mut String, track: &Track, plane: &LocalPlane, start_s: f6
 }
 
 /// Writes an aircraft of one instant, which flies straight on at its speed and level.
-fn write_straight_flight(text: &mut String, track: &Track, plane: &LocalPlane, start_s: f64) {
+fn write_straight_flight(text: &mut String, track: &Track, start_s: f64) {
     let Some(sample) = track.samples.first() else { return };
     let v_m_s = sample.ground_speed_kt.map_or(0.0, |kt| kt * KNOT_M_S).max(MIN_SPEED_M_S);
     let track_deg = sample.track_deg.unwrap_or(0.0);
-    let goal = ahead(sample.position, track_deg, UNROUTED_FLIGHT_S * v_m_s);
+    let goal = straight_ahead(sample.position, track_deg, UNROUTED_FLIGHT_S * v_m_s);
     text.push_str(&section_head(track));
     // Writing to a string cannot fail.
     let _ = write!(
         text,
-        "at_m = [{}]\nheading_deg = {:?}\nway_points_m = [[{}]]\naltitude_m = {:?}\n\
+        "at_deg = [{}]\nheading_deg = {:?}\nway_points_deg = [[{}]]\naltitude_m = {:?}\n\
          appears_s = {:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {:?}\n",
-        position_text(sample.position, plane),
+        position_text(sample.position),
         90.0 - track_deg,
-        position_text(goal, plane),
+        position_text(goal),
         sample.altitude_ft * FOOT_M,
         sample.time_s - start_s,
         banked_turn_deg_s(v_m_s)
     );
-}
-
-/// Returns the position at a distance ahead of another one, in a direction clockwise from north.
-fn ahead(from: LatLon, track_deg: f64, distance_m: f64) -> LatLon {
-    let direction_rad = track_deg.to_radians();
-    let plane = LocalPlane::centered_at(from);
-    plane.to_lat_lon([distance_m * math::sin(direction_rad), distance_m * math::cos(direction_rad)])
 }
 
 /// Returns the mean of the speeds that a flight reports, or else that of its rows.
@@ -148,10 +136,11 @@ mod tests {
         let text = "time_s,icao24,lat_deg,lon_deg,alt_ft,gs_kt,track_deg\n\
                     100,aaaaa1,47.0,7.0,35000,440,90\n100,bbbbb2,48.0,7.0,35000,440,0\n";
         let compiled = CompiledAirspace::new(&Source::new("t", scenario(text), "")).expect("valid");
-        let first = &compiled.world.airplanes[0];
-        let goal = first.mission[0];
-        assert!((first.start.heading_rad).abs() < 1e-9 && goal[0] > first.start.at[0] + 400_000.0);
-        assert!((goal[1] - first.start.at[1]).abs() < 1.0);
+        let world = &compiled.world;
+        let first = &world.airplanes[0];
+        let [east_m, north_m] = world.surface.offset_m(first.start.at, first.mission[0]);
+        assert!(first.start.heading_rad.abs() < 1e-9 && east_m > 400_000.0);
+        assert!(north_m.abs() < 1.0);
     }
 
     #[test]

@@ -1,0 +1,90 @@
+//! Positions of other programs' traffic, as a geographic scenario writes them.
+
+use sidestep_import::local_plane::{LatLon, center};
+use sidestep_kernel::geodesy::GeoPosition;
+use sidestep_kernel::math;
+
+/// Seconds between two way-points on the path of an aircraft that keeps its heading.
+const WAY_POINT_INTERVAL_S: f64 = 120.0;
+/// Steps between two of them, in which a path of one heading is followed.
+const STEPS: u32 = 60;
+/// Latitude in radians beyond which a heading is not kept: at a pole it has no meaning.
+const MAX_LATITUDE_RAD: f64 = 1.5;
+
+fn geo_position(at: LatLon) -> GeoPosition {
+    GeoPosition::from_degrees(at.lat_deg, at.lon_deg)
+}
+
+fn lat_lon(at: GeoPosition) -> LatLon {
+    let [lat_deg, lon_deg] = at.to_degrees();
+    LatLon { lat_deg, lon_deg }
+}
+
+/// Returns a position as it stands in a list of coordinates: latitude and longitude in degrees.
+pub(super) fn position_text(at: LatLon) -> String {
+    let LatLon { lat_deg, lon_deg } = at;
+    format!("{lat_deg:?}, {lon_deg:?}")
+}
+
+/// Returns positions as the value of a key.
+pub(super) fn positions_text(all: &[LatLon]) -> String {
+    let all: Vec<String> = all.iter().map(|at| format!("[{}]", position_text(*at))).collect();
+    format!("[{}]", all.join(", "))
+}
+
+/// Returns the line that says where drawings of a scenario have their origin: the center of its traffic. `None` without
+/// any.
+pub(super) fn origin_text(positions: impl IntoIterator<Item = LatLon>) -> Option<String> {
+    let LatLon { lat_deg, lon_deg } = center(positions)?;
+    Some(format!("origin_deg = {:?}\n", [lat_deg, lon_deg]))
+}
+
+/// Returns the position that is reached on the shortest path in a direction clockwise from north.
+pub(super) fn straight_ahead(from: LatLon, track_deg: f64, distance_m: f64) -> LatLon {
+    let (sin, cos) = math::sin_cos(track_deg.to_radians());
+    lat_lon(geo_position(from).destination([sin, cos], distance_m).0)
+}
+
+/// Returns way-points of an aircraft that keeps its heading, clockwise from north, for some seconds. Near a pole, where
+/// a heading means nothing, it flies straight on.
+pub(super) fn path_of_heading(
+    from: LatLon,
+    heading_deg: f64,
+    v_m_s: f64,
+    seconds: f64,
+) -> Vec<LatLon> {
+    let (sin, cos) = math::sin_cos(heading_deg.to_radians());
+    let legs = (seconds / WAY_POINT_INTERVAL_S).ceil().max(1.0);
+    let step_m = v_m_s * seconds / legs / f64::from(STEPS);
+    let mut at = geo_position(from);
+    let mut path = Vec::new();
+    for _ in 0..legs as u32 {
+        for _ in 0..STEPS {
+            at = at.destination([sin, cos], step_m).0;
+        }
+        if at.latitude_rad.abs() > MAX_LATITUDE_RAD {
+            return vec![straight_ahead(from, heading_deg, v_m_s * seconds)];
+        }
+        path.push(lat_lon(at));
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heading_that_is_kept_to_the_east_stays_on_its_parallel() {
+        let from = LatLon { lat_deg: 60.0, lon_deg: 179.0 };
+        let path = path_of_heading(from, 90.0, 250.0, 1800.0);
+        assert_eq!(path.len(), 15);
+        let last = path[14];
+        assert!((last.lat_deg - 60.0).abs() < 1e-3, "{last:?}");
+        assert!(last.lon_deg < -172.0, "{last:?}");
+        let straight = straight_ahead(from, 90.0, 450_000.0);
+        assert!(straight.lat_deg < 59.8, "the shortest path leads to the south: {straight:?}");
+        let over_the_pole = LatLon { lat_deg: 89.5, lon_deg: 0.0 };
+        assert_eq!(path_of_heading(over_the_pole, 0.0, 250.0, 1800.0).len(), 1);
+    }
+}
