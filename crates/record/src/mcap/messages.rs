@@ -1,16 +1,18 @@
 //! Frames as messages of Foxglove's schemas.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::FRAC_PI_2;
 
 use foxglove::messages::{
     ArrowPrimitive, Color, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Grid,
-    LaserScan, LinePrimitive, Log, PackedElementField, Point3, Pose, PosesInFrame, Quaternion,
-    SceneEntity, SceneEntityDeletion, SceneUpdate, SpherePrimitive, Timestamp, Vector2, Vector3,
-    line_primitive, log, packed_element_field, scene_entity_deletion,
+    LaserScan, LinePrimitive, LocationFix, Log, PackedElementField, Point3, Pose, PosesInFrame,
+    Quaternion, SceneEntity, SceneEntityDeletion, SceneUpdate, SpherePrimitive, Timestamp, Vector2,
+    Vector3, line_primitive, log, packed_element_field, scene_entity_deletion,
 };
+use sidestep_kernel::math;
 use sidestep_kernel::view::{
-    Body, BodyKind, Frame, Isometry2, LogEvent, Occupancy, OccupancyGrid, Pose as ViewPose, Scan,
-    Scenery, Severity, Shape, Vec3,
+    Body, BodyKind, EarthChart, Frame, Isometry2, LogEvent, Occupancy, OccupancyGrid,
+    Pose as ViewPose, Scan, Scenery, Severity, Shape, Vec3,
 };
 
 use super::WORLD;
@@ -79,11 +81,11 @@ fn occupancy_byte(occupancy: &Occupancy) -> u8 {
 }
 
 /// Returns the floor as bytes: 0 free, 100 wall, 255 unknown.
-pub(super) fn grid(floor: &OccupancyGrid) -> Grid {
+pub(super) fn grid(floor: &OccupancyGrid, now_ns: u64) -> Grid {
     let data: Vec<u8> = floor.boxes.iter().map(occupancy_byte).collect();
     let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = floor.plane;
     Grid {
-        timestamp: timestamp(0),
+        timestamp: timestamp(now_ns),
         frame_id: WORLD.into(),
         pose: pose(&ViewPose::from_heading([x_m, y_m, 0.0], yaw_rad)),
         column_count: floor.width,
@@ -100,15 +102,19 @@ pub(super) fn grid(floor: &OccupancyGrid) -> Grid {
 }
 
 /// Returns everything that never moves, as one entity to show or hide.
-pub(super) fn scenery(scenery: &Scenery) -> SceneUpdate {
-    let mut whole = entity("scenery", 0);
+pub(super) fn scenery(scenery: &Scenery, now_ns: u64) -> SceneUpdate {
+    let mut whole = entity("scenery", now_ns);
     scenery.bodies.iter().for_each(|body| add(&mut whole, body, scenery.dimensions));
     SceneUpdate { deletions: Vec::new(), entities: vec![whole] }
 }
 
 /// Returns the bodies of a frame; those of the frame before that are gone are deleted.
-pub(super) fn scene(frame: &Frame, dimensions: u8, shown: &mut BTreeSet<String>) -> SceneUpdate {
-    let now_ns = to_ns(frame.time_s);
+pub(super) fn scene(
+    frame: &Frame,
+    now_ns: u64,
+    dimensions: u8,
+    shown: &mut BTreeSet<String>,
+) -> SceneUpdate {
     let mut entities: Vec<SceneEntity> = Vec::new();
     for body in &frame.bodies {
         let name = entity_name(body);
@@ -234,8 +240,8 @@ fn agents(frame: &Frame) -> impl Iterator<Item = &Body> {
 }
 
 /// Returns the pose of each agent, as the frame of reference of its name.
-pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
-    let now = timestamp(to_ns(frame.time_s));
+pub(super) fn transforms(frame: &Frame, now_ns: u64) -> FrameTransforms {
+    let now = timestamp(now_ns);
     let transforms = agents(frame).map(|body| FrameTransform {
         timestamp: now,
         parent_frame_id: WORLD.into(),
@@ -247,8 +253,8 @@ pub(super) fn transforms(frame: &Frame) -> FrameTransforms {
 }
 
 /// Returns the poses of the agents, by kind.
-pub(super) fn poses_by_kind(frame: &Frame) -> BTreeMap<BodyKind, PosesInFrame> {
-    let timestamp = timestamp(to_ns(frame.time_s));
+pub(super) fn poses_by_kind(frame: &Frame, now_ns: u64) -> BTreeMap<BodyKind, PosesInFrame> {
+    let timestamp = timestamp(now_ns);
     let mut by_kind = BTreeMap::new();
     for body in agents(frame) {
         let of_kind = by_kind.entry(body.kind).or_insert_with(|| PosesInFrame {
@@ -259,6 +265,31 @@ pub(super) fn poses_by_kind(frame: &Frame) -> BTreeMap<BodyKind, PosesInFrame> {
         of_kind.poses.extend(pose(&body.pose));
     }
     by_kind
+}
+
+/// Returns where on earth each agent is.
+pub(super) fn location_fixes<'a>(
+    frame: &'a Frame,
+    chart: &'a EarthChart,
+    now_ns: u64,
+) -> impl Iterator<Item = (&'a Body, LocationFix)> {
+    agents(frame).map(move |body| {
+        let [x_m, y_m, altitude_m] = body.pose.at_m;
+        let [latitude, longitude] = chart.lat_lon_deg([x_m, y_m]);
+        let [ahead_x, ahead_y, _] = body.pose.rotate([1.0, 0.0, 0.0]);
+        let heading_rad = chart.true_heading_rad([x_m, y_m], math::atan2(ahead_y, ahead_x));
+        let fix = LocationFix {
+            timestamp: timestamp(now_ns),
+            frame_id: body.name(),
+            latitude,
+            longitude,
+            altitude: altitude_m,
+            // The schema's headings are clockwise from north.
+            heading: Some(FRAC_PI_2 - heading_rad),
+            ..LocationFix::default()
+        };
+        (body, fix)
+    })
 }
 
 /// Returns a scan with evenly spaced beams, as the schema requires.
@@ -275,12 +306,14 @@ pub(super) fn laser_scan(scan: &Scan, now_ns: u64) -> LaserScan {
     }
 }
 
-/// Returns the events of a frame, and how many are left out.
-pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
-    let mut logs: Vec<Log> = frame.log.iter().map(|event| event_log(event, cycle_s)).collect();
+/// Returns the events of a frame of a run that started at `start_ns`, and how many are left out.
+pub(super) fn log(frame: &Frame, cycle_s: f64, start_ns: u64) -> Vec<Log> {
+    let event_ns = |event: &LogEvent| start_ns + to_ns(event.cycle as f64 * cycle_s);
+    let mut logs: Vec<Log> =
+        frame.log.iter().map(|event| event_log(event, event_ns(event))).collect();
     if frame.log_left_out > 0 {
         logs.push(Log {
-            timestamp: timestamp(to_ns(frame.time_s)),
+            timestamp: timestamp(start_ns + to_ns(frame.time_s)),
             level: log_level(Severity::Warning),
             message: format!("{} more events are not told", frame.log_left_out),
             name: "log".into(),
@@ -290,9 +323,9 @@ pub(super) fn log(frame: &Frame, cycle_s: f64) -> Vec<Log> {
     logs
 }
 
-fn event_log(event: &LogEvent, cycle_s: f64) -> Log {
+fn event_log(event: &LogEvent, event_ns: u64) -> Log {
     Log {
-        timestamp: timestamp(to_ns(event.cycle as f64 * cycle_s)),
+        timestamp: timestamp(event_ns),
         level: log_level(event.level),
         message: format!("{} {}", event.name(), event.words),
         name: event.name(),

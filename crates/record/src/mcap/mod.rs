@@ -8,13 +8,15 @@
 //! | `/scene` | `foxglove.SceneUpdate` | each frame: one entity per body; those that left are deleted |
 //! | `/tf` | `foxglove.FrameTransforms` | each frame: from `world` to each agent, by its name |
 //! | `/poses/KIND` | `foxglove.PosesInFrame` | each frame: agents of a kind, in the order of `/tf` |
+//! | `/fix/NAME` | `foxglove.LocationFix` | each frame: where on earth an agent is, by its call sign or name |
 //! | `/scan/BODY/SENSOR` | `foxglove.LaserScan` | each frame: ranges in the frame `world` |
 //! | `/log` | `foxglove.Log` | each event, at its own time |
 //!
 //! Things that never move have a topic of their own, because a viewer that jumps to a moment shows the last
 //! message of each topic before it.
 //!
-//! `log_time` is simulated time in nanoseconds. The scenario and its files are attachments; the
+//! `log_time` is simulated time in nanoseconds; where the run has a date, nanoseconds since 1970, UTC, in a file, and since
+//! the start of the run for live viewers. The scenario and its files are attachments; the
 //! metadata record `sidestep` describes the run and how it ended. While it is incomplete, the file
 //! is called `NAME.partial`. Equal runs give equal bytes.
 //!

@@ -28,6 +28,8 @@ pub struct McapSceneReader {
     source: McapFile,
     summary: Summary,
     cycle_s: f64,
+    /// Time of the run's start in nanoseconds, 0 where times are those since then.
+    start_ns: u64,
     kinds: Kinds,
 }
 
@@ -44,7 +46,8 @@ impl McapSceneReader {
         let cycle_s = cycle_s.filter(|s: &f64| s.is_finite() && *s > 0.0);
         let cycle_s =
             cycle_s.ok_or_else(|| damaged(path, "it does not say how long a cycle takes"))?;
-        Ok(Self { source, summary, cycle_s, kinds })
+        let start_ns = description.get("start_utc_ns").and_then(|text| text.parse().ok());
+        Ok(Self { source, summary, cycle_s, start_ns: start_ns.unwrap_or(0), kinds })
     }
 
     /// Returns the bodies of the last recorded frame up to a cycle; none before the first.
@@ -52,7 +55,8 @@ impl McapSceneReader {
     /// # Errors
     /// When the file is damaged.
     pub fn bodies(&mut self, cycle: Cycle) -> Result<Vec<Body>, InputError> {
-        let until_ns = messages::to_ns(cycle as f64 * self.cycle_s);
+        let flown_ns = messages::to_ns(cycle as f64 * self.cycle_s);
+        let until_ns = self.start_ns.saturating_add(flown_ns);
         let last = IndexedReaderOptions::new().with_order(ReadOrder::ReverseLogTime);
         let mut update = None;
         self.for_each::<SceneUpdate>("/scene", last.ending_at(until_ns), |scene| {
@@ -69,10 +73,10 @@ impl McapSceneReader {
     /// When the file is damaged.
     pub fn events(&mut self) -> Result<Vec<LogEvent>, InputError> {
         let mut events = Vec::new();
-        let cycle_s = self.cycle_s;
+        let Self { cycle_s, start_ns, .. } = *self;
         let kinds = self.kinds.clone();
         self.for_each::<Log>("/log", IndexedReaderOptions::new(), |entry| {
-            events.extend(parse_event(&entry, cycle_s, &kinds));
+            events.extend(parse_event(&entry, (cycle_s, start_ns), &kinds));
             if events.len() < MAX_EVENTS {
                 ControlFlow::Continue(())
             } else {
@@ -171,14 +175,14 @@ fn shapes(entity: &SceneEntity) -> Vec<(Pose, Shape)> {
 }
 
 /// Returns the event of a body that a message reports. Its words are all that is known of it.
-fn parse_event(entry: &Log, cycle_s: f64, kinds: &Kinds) -> Option<LogEvent> {
+fn parse_event(entry: &Log, (cycle_s, start_ns): (f64, u64), kinds: &Kinds) -> Option<LogEvent> {
     let words = entry.message.strip_prefix(&entry.name).unwrap_or(&entry.message).trim();
     let level = match log::Level::try_from(entry.level) {
         Ok(log::Level::Warning) => Severity::Warning,
         Ok(log::Level::Error | log::Level::Fatal) => Severity::Error,
         _ => Severity::Info,
     };
-    let time_s = messages::log_time_ns(entry) as f64 / 1e9;
+    let time_s = messages::log_time_ns(entry).saturating_sub(start_ns) as f64 / 1e9;
     Some(LogEvent {
         cycle: (time_s / cycle_s).round() as Cycle,
         level,
@@ -231,7 +235,7 @@ mod tests {
                 .with_part(k)
         }));
         let frame = Frame { bodies: written.clone(), ..Frame::default() };
-        let update = messages::scene(&frame, 3, &mut BTreeSet::new());
+        let update = messages::scene(&frame, 0, 3, &mut BTreeSet::new());
         let read: Vec<Body> =
             update.entities.iter().flat_map(|entity| bodies(entity, &all)).collect();
         assert_eq!(read, written);
@@ -239,7 +243,7 @@ mod tests {
         let dart = Shape::Dart { length_m: 2.0, width_m: 1.0 };
         let frame =
             Frame { bodies: vec![Body::new(AIRPLANE, 7, turned, dart)], ..Frame::default() };
-        let update = messages::scene(&frame, 2, &mut BTreeSet::new());
+        let update = messages::scene(&frame, 0, 2, &mut BTreeSet::new());
         let [read] = &bodies(&update.entities[0], &all)[..] else { panic!("one airplane") };
         let Shape::Dart { length_m, width_m } = read.shape else { panic!("{read:?}") };
         assert!((length_m - 2.0).abs() < 1e-12 && width_m == 1.0);

@@ -110,7 +110,7 @@ impl McapRecorder {
             frames: 0,
             buffer: Vec::new(),
         };
-        let mut recorder = Self { origin, topics: FrameEncoder::new(scenery), output };
+        let mut recorder = Self { origin, topics: FrameEncoder::with_utc(scenery), output };
         recorder.start(scenery)?;
         Ok(recorder)
     }
@@ -132,7 +132,7 @@ impl McapRecorder {
 
     fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), RecordError> {
         let attachment = Attachment {
-            log_time: 0,
+            log_time: self.topics.start_ns,
             create_time: 0,
             name: name.into(),
             media_type: media_type.into(),
@@ -200,7 +200,11 @@ impl McapRecorder {
             ("status", status.into()),
             ("digest", end.digest.clone()),
         ];
-        pairs.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
+        // Only where times are not those since the start of the run.
+        let start_ns = self.topics.start_ns;
+        let start = (start_ns > 0).then(|| ("start_utc_ns", start_ns.to_string()));
+        let pairs = pairs.into_iter().chain(start);
+        pairs.map(|(key, value)| (key.to_string(), value)).collect()
     }
 }
 
