@@ -33,7 +33,10 @@ enum ExportFormat {
     Csv,
     /// Tables as Parquet, one file each
     Parquet,
-    /// Recording for Foxglove and other viewers: bodies, scans, events
+    /// Paths of airplanes on earth, for maps (GeoJSON)
+    #[value(name = "geojson")]
+    GeoJson,
+    /// Recording for Foxglove and other viewers: bodies, scans, events, places on earth
     Mcap,
     /// ROS 2 bag: odometry, true poses and scans of robots, and the map
     #[value(name = "rosbag")]
@@ -54,6 +57,7 @@ impl ExportFormat {
         match self {
             Self::Csv => "csv",
             Self::Parquet => "parquet",
+            Self::GeoJson => "geojson",
             Self::Mcap => "mcap",
             Self::RosBag => "rosbag",
             Self::Svg => "svg",
@@ -149,6 +153,7 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
     let format = match args.to {
         ExportFormat::Csv => export::Format::Csv(args.table.clone()),
         ExportFormat::Parquet => export::Format::Parquet(args.table.clone()),
+        ExportFormat::GeoJson => export::Format::GeoJson,
         ExportFormat::Mcap => export::Format::Mcap,
         ExportFormat::RosBag => export::Format::RosBag,
         ExportFormat::Svg => export::Format::Svg,

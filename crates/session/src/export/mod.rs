@@ -1,6 +1,7 @@
 //! Exports of recorded runs to other formats. Tables are copied from the run folder; everything
 //! else is computed again from the recorded scenario.
 
+mod geojson;
 mod pictures;
 mod tables;
 mod target;
@@ -19,6 +20,8 @@ pub enum Format {
     Csv(Option<String>),
     /// Tables as Parquet, one file each: one of this name, or all.
     Parquet(Option<String>),
+    /// Paths of airplanes on earth, for maps.
+    GeoJson,
     /// Bodies, scans and events, for Foxglove and other viewers.
     Mcap,
     /// ROS 2 bag: odometry, true poses and scans of robots, with the map.
@@ -104,6 +107,7 @@ pub fn export(
         Format::Parquet(table) => {
             tables::export(&job, tables::TableFormat::Parquet, table.as_deref())
         }
+        Format::GeoJson => geojson::export(&job),
         Format::Mcap => export_mcap(&job),
         Format::RosBag => export_bag(&job),
         Format::Svg => pictures::export_svg(&job),

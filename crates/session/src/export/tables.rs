@@ -26,12 +26,7 @@ pub(super) fn export(
     form: TableFormat,
     only: Option<&str>,
 ) -> Result<ExportResult, Error> {
-    let Some(folder) = &job.recorded.folder else {
-        let remedy = "give the run folder; one is made by `sidestep run SCENARIO --out DIR`";
-        let cause = "a recording for viewers has no tables";
-        return Err(InputError::new(job.recorded.path.display(), cause, remedy).into());
-    };
-    let source = TableExport { folder, job, form };
+    let source = TableExport::new(job, form)?;
     let ending = match form {
         TableFormat::Csv => "csv",
         TableFormat::Parquet => "parquet",
@@ -44,7 +39,7 @@ pub(super) fn export(
             vec![target.path().to_path_buf()]
         }
         None => {
-            let names = tables(folder)?;
+            let names = tables(source.folder)?;
             let target = Target::for_folder(job, &format!("-{ending}"), &[ending])?;
             target.write_folder(|partial| {
                 for name in &names {
@@ -59,14 +54,27 @@ pub(super) fn export(
 }
 
 /// An export of tables, with the cycles of their rows.
-struct TableExport<'a> {
+pub(super) struct TableExport<'a> {
     folder: &'a Path,
     job: &'a ExportContext<'a>,
     form: TableFormat,
 }
 
-impl TableExport<'_> {
-    fn check_table(&self, name: &str) -> Result<(), InputError> {
+impl<'a> TableExport<'a> {
+    /// Returns an export of the tables of a run folder.
+    ///
+    /// # Errors
+    /// When the run was recorded in a form without tables.
+    pub(super) fn new(job: &'a ExportContext<'a>, form: TableFormat) -> Result<Self, InputError> {
+        let Some(folder) = &job.recorded.folder else {
+            let remedy = "give the run folder; one is made by `sidestep run SCENARIO --out DIR`";
+            let cause = "a recording for viewers has no tables";
+            return Err(InputError::new(job.recorded.path.display(), cause, remedy));
+        };
+        Ok(Self { folder, job, form })
+    }
+
+    pub(super) fn check_table(&self, name: &str) -> Result<(), InputError> {
         let names = tables(self.folder)?;
         if names.iter().any(|known| known == name) {
             return Ok(());
@@ -84,7 +92,7 @@ impl TableExport<'_> {
     }
 
     /// Passes on the requested rows, block by block.
-    fn for_each_block_of(
+    pub(super) fn for_each_block_of(
         &self,
         name: &str,
         mut each: impl FnMut(Table) -> Result<(), Error>,
