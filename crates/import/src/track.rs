@@ -269,7 +269,7 @@ fn drop_excursions(
             poses[*end].t_secs - last.t_secs <= MAX_EXCURSION_SECS
                 && rule.is_possible(last, &poses[*end])
         };
-        let back = jumps[next + 1..].iter().position(|end| is_back(end));
+        let back = jumps[next + 1..].iter().position(is_back);
         let Some(back) = back else {
             next += 1;
             continue;

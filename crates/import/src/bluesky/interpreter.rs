@@ -188,7 +188,7 @@ impl Interpreter {
     /// Splits a command into its name and its arguments; an aircraft before the name becomes the first argument.
     fn name_and_arguments<'a>(
         &self,
-        file_name: &'a String,
+        place: &'a dyn std::fmt::Display,
         mut words: Vec<Token<'a>>,
     ) -> (String, Arguments<'a>) {
         let first = upper(words[0]);
@@ -202,7 +202,7 @@ impl Interpreter {
             (true, Some(name)) => (name, words.remove(1)),
             (true, None) => ("POS".to_string(), words[0]),
         };
-        (name, Arguments::new(file_name, command, words))
+        (name, Arguments::new(place, command, words))
     }
 
     fn dispatch(

@@ -83,7 +83,7 @@ impl Placement {
     /// Returns a turn about an axis, which needs a direction.
     fn rotation(axis: [f64; 3], angle_deg: f64) -> Option<Self> {
         let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if !(length > 0.0) {
+        if length.is_nan() || length <= 0.0 {
             return None;
         }
         let [x, y, z] = axis.map(|x| x / length);

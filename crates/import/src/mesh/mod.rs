@@ -37,7 +37,7 @@ impl Mesh {
         if points_m.is_empty() {
             return Err(InputError::new(place, "has no triangles", remedy));
         }
-        if points_m.iter().flatten().any(|x| !(x.abs() <= MAX_COORDINATE)) {
+        if points_m.iter().flatten().any(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
             let cause = "has a vertex with an impossible coordinate";
             return Err(InputError::new(place, cause, remedy));
         }

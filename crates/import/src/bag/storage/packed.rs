@@ -42,11 +42,14 @@ pub(super) fn open(path: &Path) -> io::Result<Unpacked> {
     Ok(Unpacked { head, stream, packing })
 }
 
+/// A stream whose first bytes were read, from its start.
+type Rewound<R> = io::Chain<Cursor<Vec<u8>>, R>;
+
 /// Returns the first bytes of a stream, and the stream from its start.
 fn with_head<R: Read>(
     mut stream: R,
     n: usize,
-) -> io::Result<(Vec<u8>, io::Chain<Cursor<Vec<u8>>, R>)> {
+) -> io::Result<(Vec<u8>, Rewound<R>)> {
     let mut head = Vec::with_capacity(n);
     stream.by_ref().take(n as u64).read_to_end(&mut head)?;
     Ok((head.clone(), Cursor::new(head).chain(stream)))
@@ -109,7 +112,8 @@ mod tests {
         let mut bz2 = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::fast());
         bz2.write_all(&zeros).unwrap();
         let bz2 = bz2.finish().unwrap();
-        let unpackers: [(fn(&[u8], usize) -> Result<Vec<u8>, String>, &[u8]); 3] =
+        type Unpack = fn(&[u8], usize) -> Result<Vec<u8>, String>;
+        let unpackers: [(Unpack, &[u8]); 3] =
             [(unzstd, &zstd), (unlz4, &lz4), (unbzip2, &bz2)];
         for (unpack, packed) in unpackers {
             assert_eq!(unpack(packed, 1 << 20).unwrap(), zeros);

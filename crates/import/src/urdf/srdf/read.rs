@@ -75,6 +75,9 @@ fn check_robot_name(robot: Element, model: &Model, report: &mut ImportReport) {
     report.record(Treatment::Suspicious, rule, robot.line(), remedy);
 }
 
+/// Two links, as indices of the model's links, and the reason that is given for them.
+type LinkPair = ((usize, usize), String);
+
 struct SrdfReader<'a> {
     robot: Element<'a>,
     model: &'a Model,
@@ -231,7 +234,7 @@ impl<'a> SrdfReader<'a> {
 
     /// Reads all elements that name a pair of links, each with its reason. Those with a link that the model does not
     /// have are left out, as by `MoveIt`: they are remains of tools that were taken off.
-    fn pairs(&mut self, name: &'static str) -> Result<Vec<((usize, usize), String)>, InputError> {
+    fn pairs(&mut self, name: &'static str) -> Result<Vec<LinkPair>, InputError> {
         let mut pairs = Vec::new();
         for element in self.robot.children(name).collect::<Vec<_>>() {
             let names = [element.required("link1")?, element.required("link2")?];
