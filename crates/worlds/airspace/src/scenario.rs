@@ -200,7 +200,7 @@ impl CompiledAirspace {
         }
         let fingerprint = fingerprint(&self.recipe.source.text, seed);
         let reseeded = |world: &AirspaceWorld| AirspaceWorld {
-            streams: streams.clone(),
+            streams,
             fingerprint,
             ..world.clone()
         };

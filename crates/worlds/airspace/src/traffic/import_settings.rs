@@ -285,7 +285,7 @@ impl SettingsReader<'_> {
             let given = self.file.traffic.settings.iter();
             let winds = given.filter(|one| matches!(one.setting, Setting::AddedWind(_)));
             let last_s = timed.map_or(f64::INFINITY, |timed| timed.at_s);
-            if let Some(last) = winds.filter(|one| one.at_s <= last_s).last().cloned() {
+            if let Some(last) = winds.rfind(|one| one.at_s <= last_s).cloned() {
                 self.refuse(&last, cause, "give one wind below the speed of all aircraft");
             }
             // It is told once.
