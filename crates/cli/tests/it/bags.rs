@@ -171,7 +171,7 @@ fn the_bag_of_the_examples_is_what_its_commands_make() {
 fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
     let place = exported("60");
     let bytes = std::fs::read(place.path("bag/bag_0.mcap")).expect("read");
-    place.write("cut.mcap", &bytes[..bytes.len() / 2]);
+    place.write("cut.mcap", &bytes[..100]);
     place.write("old.bag", "#ROSBAG V1.2\n");
     let refused = |bag: &str, odom: &str, truth: &str, words: &[&str]| {
         let place_of = ["--odom", odom, "--truth", truth, "--profile", "p.toml"];

@@ -264,12 +264,14 @@ impl RangeCounts {
             );
             report.record(Treatment::Guessed, rule, "", "");
         }
+        // A wall at the limit is measured beyond it at times: where REP 117 is followed, that guesses nothing.
+        let treatment = if self.infinite > 0 { Treatment::NotUsed } else { Treatment::Guessed };
         if self.beyond_maximum > 0 && no_echo != NoEcho::Maximum {
             let rule = format!(
                 "ranges on {topic} above range_max: no echo ({})",
                 percent(self.beyond_maximum)
             );
-            report.record(Treatment::Guessed, rule, "", "");
+            report.record(treatment, rule, "", "");
         }
     }
 }
