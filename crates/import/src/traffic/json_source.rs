@@ -1,5 +1,5 @@
-//! State vectors of the OpenSky Network as JSON: answers of its REST interface, one or many, with states as lists or as
-//! objects, and its answer to a request for a track.
+//! JSON: answers of the REST interface of the OpenSky Network, one or many, with states as lists or as objects, and its
+//! answer to a request for a track; and rows of any table as objects, as the library `traffic` writes them.
 
 use super::columns::{Field, Layout, Source};
 use super::rows::{RowCollector, RowValues};
@@ -49,18 +49,10 @@ struct Answer {
     path: Option<Vec<Json>>,
 }
 
-/// One answer, or a list of them.
-#[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum Document {
-    Many(Vec<Answer>),
-    One(Box<Answer>),
-}
+/// A row of values, in the order of the columns of its layout.
+struct ValueRow(Vec<Json>);
 
-/// A row of values by the keys of a state.
-struct StateRow(Vec<Json>);
-
-impl RowValues for StateRow {
+impl RowValues for ValueRow {
     fn value(&self, column: usize) -> Value<'_> {
         match self.0.get(column) {
             Some(Json::Bool(flag)) => Value::Flag(*flag),
@@ -71,36 +63,31 @@ impl RowValues for StateRow {
     }
 }
 
-/// Reads the states of all answers in a text, which stand in a list or one after the other.
+/// The greatest number of names of columns.
+const MAX_COLUMNS: usize = 1000;
+
+/// Reads the states of all answers or the rows in a text, which stand in a list or one after the other.
 ///
 /// # Errors
-/// When the text is no JSON of this kind.
+/// When the text is no JSON of this kind, or its rows lack what a track cannot be without.
 pub(super) fn collect(collector: &mut RowCollector, text: &str) -> Result<(), InputError> {
     if text.len() > MAX_JSON_BYTES {
         let cause = format!("the JSON has more than {} MB", MAX_JSON_BYTES >> 20);
         return Err(InputError::new(collector.place(), cause, "give a part of it, or CSV"));
     }
     let layout = state_layout()?;
-    collector.describe_source(&layout, "JSON");
     collector.set_noun("state");
-    let mut states = StateReader { collector, layout, count: 0 };
-    for document in Deserializer::from_str(text).into_iter::<Document>() {
+    let mut states = StateReader { collector, layout, count: 0, records: Vec::new() };
+    for document in Deserializer::from_str(text).into_iter::<Json>() {
         match document {
-            Ok(Document::One(answer)) => states.push_answer(*answer)?,
-            Ok(Document::Many(answers)) => {
-                for answer in answers {
-                    states.push_answer(answer)?;
-                }
+            Ok(Json::Array(items)) => {
+                items.into_iter().try_for_each(|item| states.push_item(item))?
             }
-            Err(error) => {
-                let cause = format!("is no JSON of OpenSky: {error}");
-                let remedy = "give an answer of its REST interface with `time` and `states`, \
-                              several in a list or one after the other, or a table";
-                return Err(InputError::new(states.collector.place(), cause, remedy));
-            }
+            Ok(item) => states.push_item(item)?,
+            Err(error) => return Err(states.error(&error.to_string())),
         }
     }
-    Ok(())
+    states.push_records()
 }
 
 /// Returns where the fields of a state are.
@@ -118,16 +105,37 @@ struct StateReader<'a> {
     collector: &'a mut RowCollector,
     layout: Layout,
     count: usize,
+    /// Rows of a table, whose columns are those of all of them.
+    records: Vec<Map<String, Json>>,
 }
 
 impl StateReader<'_> {
-    fn push_answer(&mut self, answer: Answer) -> Result<(), InputError> {
-        let Answer { time, states, icao24, callsign, path } = answer;
-        if states.is_none() && path.is_none() {
-            let cause = "an answer has neither `states` nor `path`";
-            let remedy = "give answers of OpenSky's REST interface: `states` of all aircraft, or the `path` of one";
-            return Err(InputError::new(self.collector.place(), cause, remedy));
+    fn error(&self, cause: &str) -> InputError {
+        let remedy = "give answers of OpenSky's REST interface with `time` and `states`, or rows as objects, in a list \
+                      or one after the other";
+        let cause = format!("is no JSON of recorded traffic: {cause}");
+        InputError::new(self.collector.place(), cause, remedy)
+    }
+
+    fn push_item(&mut self, item: Json) -> Result<(), InputError> {
+        let Json::Object(map) = item else {
+            return Err(self.error("a list has something else than objects"));
+        };
+        if !map.contains_key("states") && !map.contains_key("path") {
+            self.records.push(map);
+            return Ok(());
         }
+        let answer = serde_json::from_value(Json::Object(map));
+        let answer: Answer = answer.map_err(|error| self.error(&error.to_string()))?;
+        self.push_answer(answer);
+        Ok(())
+    }
+
+    fn push_answer(&mut self, answer: Answer) {
+        if self.count == 0 {
+            self.collector.describe_source(&self.layout, "JSON");
+        }
+        let Answer { time, states, icao24, callsign, path } = answer;
         let time = time.map_or(Json::Null, Json::from);
         for state in states.unwrap_or_default() {
             let row = state_row(state, &time);
@@ -139,10 +147,34 @@ impl StateReader<'_> {
             let row = path_row(point, [&address, &callsign]);
             self.push(row);
         }
+    }
+
+    /// Reads the rows of a table, of whose columns any row may lack some.
+    fn push_records(&mut self) -> Result<(), InputError> {
+        if self.records.is_empty() {
+            return Ok(());
+        }
+        let mut names: Vec<String> = Vec::new();
+        for name in self.records.iter().flat_map(|record| record.keys()) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+            if names.len() > MAX_COLUMNS {
+                return Err(self.error(&format!("its rows have more than {MAX_COLUMNS} columns")));
+            }
+        }
+        let layout = Layout::find(self.collector.place(), &names)?;
+        self.collector.describe_source(&layout, "JSON");
+        self.collector.set_noun("row");
+        for (k, mut record) in std::mem::take(&mut self.records).into_iter().enumerate() {
+            let value = |name: &String| record.remove(name).unwrap_or(Json::Null);
+            let row = ValueRow(names.iter().map(value).collect());
+            self.collector.push(k + 1, &layout, &row);
+        }
         Ok(())
     }
 
-    fn push(&mut self, row: Option<StateRow>) {
+    fn push(&mut self, row: Option<ValueRow>) {
         self.count += 1;
         match row {
             Some(row) => self.collector.push(self.count, &self.layout, &row),
@@ -154,7 +186,7 @@ impl StateReader<'_> {
 }
 
 /// Returns a state as a row: a list, or an object with the names of the REST interface.
-fn state_row(state: Json, time: &Json) -> Option<StateRow> {
+fn state_row(state: Json, time: &Json) -> Option<ValueRow> {
     let mut row = match state {
         Json::Array(values) => std::iter::once(Json::Null).chain(values).collect(),
         Json::Object(map) => STATE_KEYS.map(|key| state_value(&map, key)).to_vec(),
@@ -163,7 +195,7 @@ fn state_row(state: Json, time: &Json) -> Option<StateRow> {
     if row[0].is_null() {
         row[0] = time.clone();
     }
-    Some(StateRow(row))
+    Some(ValueRow(row))
 }
 
 /// Returns a value of a state by its name, or by the one that tables of states use.
@@ -184,7 +216,7 @@ fn state_value(map: &Map<String, Json>, key: &str) -> Json {
 }
 
 /// Returns a point of a track as a row of a state.
-fn path_row(point: Json, [address, callsign]: [&Json; 2]) -> Option<StateRow> {
+fn path_row(point: Json, [address, callsign]: [&Json; 2]) -> Option<ValueRow> {
     let Json::Array(values) = point else { return None };
     let mut row = vec![Json::Null; STATE_KEYS.len()];
     for (key, value) in PATH_KEYS.iter().zip(values) {
@@ -193,5 +225,5 @@ fn path_row(point: Json, [address, callsign]: [&Json; 2]) -> Option<StateRow> {
     }
     row[1] = address.clone();
     row[2] = callsign.clone();
-    Some(StateRow(row))
+    Some(ValueRow(row))
 }

@@ -393,7 +393,8 @@ fn answers_of_openskys_interface_are_read_as_lists_objects_and_tracks() {
     let track = "{\"icao24\":\"aaaaa1\",\"callsign\":\"ABC1\",\"startTime\":1,\"endTime\":2,\"path\":\
                  [[1533114900,47.0,7.0,10668,90,false],[1533114910,47.0,7.03,10668,90,false]]}";
     assert_eq!(parse(&"track.json", track).unwrap().tracks[0].samples.len(), 2);
-    for wrong in ["{}", "{\"a\": 1}", "[1]", "{\"states\": [", "[[[["] {
+    assert!(parse(&"a.json", "[{\"a\": 1}]").unwrap_err().cause().contains("lacks a time"));
+    for wrong in ["[1]", "{\"states\": [", "{\"states\": 1}", "[[[["] {
         let error = parse(&"a.json", wrong).unwrap_err();
         assert!(error.remedy().contains("REST interface"), "{error}");
     }
@@ -412,6 +413,35 @@ fn tables_of_the_library_traffic_are_read_with_their_flights() {
     assert_eq!(ids, ["ABC123_001", "ABC123_002"]);
     assert_eq!(traffic.tracks[0].samples[0].time_s, 1_533_114_000.0);
     assert_eq!(traffic.tracks[0].samples[0].ground_speed_kt, Some(447.0));
+}
+
+#[test]
+fn rows_as_objects_are_a_table() {
+    let row = |k: u32, more: &str| {
+        let lon_deg = 8.0 + 0.03 * f64::from(k);
+        format!(
+            "{{\"icao24\":\"4b1234\",\"latitude\":47.0,\"longitude\":{lon_deg:.2},\"track\":90,\"altitude\":35000,\
+             \"groundspeed\":447,\"timestamp\":{}000{more}}}",
+            1_533_114_000 + 10 * k
+        )
+    };
+    let list = format!("[{},{},{}]", row(0, ""), row(1, ",\"callsign\":\"ABC1\""), row(2, ""));
+    let traffic = parse(&"a.json", &list).unwrap();
+    assert_eq!(traffic.report.format, "tracks of the library traffic (JSON)");
+    let [track] = &traffic.tracks[..] else { panic!("{:?}", traffic.tracks) };
+    assert_eq!((track.callsign.as_str(), track.samples.len()), ("ABC1", 3));
+    assert_eq!(format_utc(track.samples[0].time_s), "2018-08-01T09:00:00Z");
+    let lines = format!("{}\n{}", row(0, ""), row(1, ""));
+    assert_eq!(parse(&"a.json", &lines).unwrap().tracks[0].samples.len(), 2);
+}
+
+#[test]
+fn the_flight_over_the_alps_is_read_as_it_is() {
+    let Some(path) = shared("airspace/opensky/alpi_italiane.json.gz") else { return };
+    let traffic = read(&path).unwrap();
+    println!("{:#?}", traffic.report);
+    assert_eq!(traffic.report.format, "tracks of the library traffic (JSON)");
+    assert!(traffic.tracks.iter().all(|track| track.icao24 == "3ed6a0"));
 }
 
 #[test]
@@ -563,7 +593,8 @@ fn the_recording_over_switzerland_has_the_expected_aircraft_and_rows() {
         samples().map(of).fold(ends, |(low, high), value| (low.min(value), high.max(value)))
     };
     assert_eq!(range(|s| s.time_s), (1_533_114_900.0, 1_533_116_690.0));
-    assert_eq!(range(|s| s.altitude_ft), (31_000.0, 43_000.0));
+    assert_eq!(range(|s| s.altitude_ft), (32_075.0, 43_000.0), "but for two single rows");
+    assert_eq!(traffic.tracks.len(), 86);
     assert_eq!(range(|s| s.ground_speed_kt.unwrap()), (393.2, 509.0));
 }
 
