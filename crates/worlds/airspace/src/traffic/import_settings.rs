@@ -283,7 +283,7 @@ impl SettingsReader<'_> {
         let wind_m_s = wind_m_s(&self.now.winds, &self.file.traffic.aircraft);
         let wind_m_s = wind_m_s.unwrap_or_else(|cause| {
             let given = self.file.traffic.settings.iter();
-            let winds = given.filter(|one| matches!(one.setting, Setting::AddedWind(_)));
+            let mut winds = given.filter(|one| matches!(one.setting, Setting::AddedWind(_)));
             let last_s = timed.map_or(f64::INFINITY, |timed| timed.at_s);
             if let Some(last) = winds.rfind(|one| one.at_s <= last_s).cloned() {
                 self.refuse(&last, cause, "give one wind below the speed of all aircraft");
