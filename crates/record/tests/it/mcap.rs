@@ -228,7 +228,7 @@ fn a_run_with_a_date_is_recorded_in_utc_with_the_places_of_its_airplanes_on_eart
     recorder.finish(&end(Status::Complete)).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let mut fixes = Vec::new();
-    for message in mcap::MessageStream::new(&bytes).unwrap() {
+    for message in ::mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         assert!((START_NS..=START_NS + 1_000_000_000).contains(&message.log_time));
         if message.channel.topic == "/fix/DAT1" {

@@ -49,12 +49,17 @@ fn run(text: String) -> AirspaceRun {
 }
 
 /// Returns the smallest value of a function that falls and then rises at most once.
-fn smallest(of: impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
-    for _ in 0..16 {
+fn smallest(of: impl Fn(f64) -> f64, first: f64, last: f64) -> f64 {
+    let (mut from, mut to) = (first, last);
+    for _ in 0..24 {
         let third = (to - from) / 3.0;
-        if of(from + third) < of(to - third) { to -= third } else { from += third }
+        if of(from + third) < of(to - third) {
+            to -= third;
+        } else {
+            from += third;
+        }
     }
-    of(0.5 * (from + to))
+    of(0.5 * (from + to)).min(of(first)).min(of(last))
 }
 
 /// Numbers from 0 to 1, the same at each call.
