@@ -1,13 +1,13 @@
 //! Positions of other programs' traffic, as a geographic scenario writes them.
 
 use sidestep_import::local_plane::{LatLon, center};
-use sidestep_kernel::geodesy::GeoPosition;
+use sidestep_kernel::geodesy::{GeoPosition, turn_rad};
 use sidestep_kernel::math;
 
 /// Seconds between two way-points on the path of an aircraft that keeps its heading.
 const WAY_POINT_INTERVAL_S: f64 = 120.0;
 /// Steps between two of them, in which a path of one heading is followed.
-const STEPS: u32 = 60;
+const STEPS: u32 = 4;
 /// Latitude in radians beyond which a heading is not kept: at a pole it has no meaning.
 const MAX_LATITUDE_RAD: f64 = 1.5;
 
@@ -53,14 +53,13 @@ pub(super) fn path_of_heading(
     v_m_s: f64,
     seconds: f64,
 ) -> Vec<LatLon> {
-    let (sin, cos) = math::sin_cos(heading_deg.to_radians());
     let legs = (seconds / WAY_POINT_INTERVAL_S).ceil().max(1.0);
     let step_m = v_m_s * seconds / legs / f64::from(STEPS);
     let mut at = geo_position(from);
     let mut path = Vec::new();
     for _ in 0..legs as u32 {
         for _ in 0..STEPS {
-            at = at.destination([sin, cos], step_m).0;
+            at = step_along_heading(at, heading_deg.to_radians(), step_m);
         }
         if at.latitude_rad.abs() > MAX_LATITUDE_RAD {
             return vec![straight_ahead(from, heading_deg, v_m_s * seconds)];
@@ -68,6 +67,14 @@ pub(super) fn path_of_heading(
         path.push(lat_lon(at));
     }
     path
+}
+
+/// Returns the end of a shortest path that has this heading, clockwise from north, in its middle.
+fn step_along_heading(from: GeoPosition, heading_rad: f64, step_m: f64) -> GeoPosition {
+    let (sin, cos) = math::sin_cos(heading_rad);
+    let (_, middle) = from.destination([sin, cos], 0.5 * step_m);
+    let (sin, cos) = math::sin_cos(heading_rad + turn_rad([sin, cos], middle));
+    from.destination([sin, cos], step_m).0
 }
 
 #[cfg(test)]
@@ -80,7 +87,7 @@ mod tests {
         let path = path_of_heading(from, 90.0, 250.0, 1800.0);
         assert_eq!(path.len(), 15);
         let last = path[14];
-        assert!((last.lat_deg - 60.0).abs() < 1e-3, "{last:?}");
+        assert!((last.lat_deg - 60.0).abs() < 1e-6, "{last:?}");
         assert!(last.lon_deg < -172.0, "{last:?}");
         let straight = straight_ahead(from, 90.0, 450_000.0);
         assert!(straight.lat_deg < 59.8, "the shortest path leads to the south: {straight:?}");
