@@ -4,7 +4,7 @@
 //! its id, its call sign, and for each place the seconds since the start of the run, or since 1970 where the run has a
 //! date.
 
-use super::tables::{TableExport, TableFormat};
+use super::tables::{TableExport, TableFormat, partial_path};
 use super::target::Target;
 use super::{ExportContext, ExportResult};
 use crate::Error;
@@ -92,13 +92,18 @@ pub(super) fn export(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
         paths.iter().map(|(airplane, path)| path.feature(*airplane, has_date)).collect();
     let collection = json!({ "type": "FeatureCollection", "features": features });
     let path = target.path();
-    let written = File::create(path).and_then(|file| {
+    let partial = partial_path(path);
+    let written = File::create(&partial).and_then(|file| {
         let mut out = BufWriter::new(file);
         serde_json::to_writer(&mut out, &collection)?;
         out.write_all(b"\n")?;
-        out.into_inner().map_err(|e| e.into_error())?.sync_all()
+        out.into_inner().map_err(|e| e.into_error())?.sync_all()?;
+        std::fs::rename(&partial, path)
     });
-    written.map_err(|e| Error::cannot_write(path, &e))?;
+    if let Err(e) = written {
+        let _ = std::fs::remove_file(&partial);
+        return Err(Error::cannot_write(path, &e));
+    }
     Ok(ExportResult::single_file(path, false))
 }
 

@@ -165,7 +165,7 @@ fn close(csv: csv::Writer<BufWriter<File>>) -> io::Result<()> {
     file.sync_all()
 }
 
-fn partial_path(path: &Path) -> PathBuf {
+pub(super) fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".partial");
     name.into()
