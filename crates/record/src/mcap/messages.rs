@@ -356,7 +356,7 @@ mod tests {
                 let body = Body::new(kind, 4, ViewPose::from_position([0.0; 3]), ball.clone());
                 let appearance = body.appearance(dimensions);
                 let frame = Frame { bodies: vec![body], ..Frame::default() };
-                let update = scene(&frame, dimensions, &mut BTreeSet::new());
+                let update = scene(&frame, 0, dimensions, &mut BTreeSet::new());
                 let shown = update.entities[0].spheres[0].color.expect("a color");
                 let bytes = [shown.r, shown.g, shown.b].map(|part| (255.0 * part).round() as u8);
                 assert_eq!((bytes, shown.a), (appearance.color, appearance.opacity), "{kind}");

@@ -199,11 +199,8 @@ impl CompiledAirspace {
             return Compiler::with_seed(&self.recipe, seed, &self.world).compile();
         }
         let fingerprint = fingerprint(&self.recipe.source.text, seed);
-        let reseeded = |world: &AirspaceWorld| AirspaceWorld {
-            streams,
-            fingerprint,
-            ..world.clone()
-        };
+        let reseeded =
+            |world: &AirspaceWorld| AirspaceWorld { streams, fingerprint, ..world.clone() };
         let later = self.world.later_rules.iter().map(|(from, later)| (*from, reseeded(later)));
         let later_rules = Arc::new(later.collect());
         let world = Arc::new(AirspaceWorld { later_rules, ..reseeded(&self.world) });

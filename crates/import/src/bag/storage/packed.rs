@@ -46,10 +46,7 @@ pub(super) fn open(path: &Path) -> io::Result<Unpacked> {
 type Rewound<R> = io::Chain<Cursor<Vec<u8>>, R>;
 
 /// Returns the first bytes of a stream, and the stream from its start.
-fn with_head<R: Read>(
-    mut stream: R,
-    n: usize,
-) -> io::Result<(Vec<u8>, Rewound<R>)> {
+fn with_head<R: Read>(mut stream: R, n: usize) -> io::Result<(Vec<u8>, Rewound<R>)> {
     let mut head = Vec::with_capacity(n);
     stream.by_ref().take(n as u64).read_to_end(&mut head)?;
     Ok((head.clone(), Cursor::new(head).chain(stream)))
@@ -113,8 +110,7 @@ mod tests {
         bz2.write_all(&zeros).unwrap();
         let bz2 = bz2.finish().unwrap();
         type Unpack = fn(&[u8], usize) -> Result<Vec<u8>, String>;
-        let unpackers: [(Unpack, &[u8]); 3] =
-            [(unzstd, &zstd), (unlz4, &lz4), (unbzip2, &bz2)];
+        let unpackers: [(Unpack, &[u8]); 3] = [(unzstd, &zstd), (unlz4, &lz4), (unbzip2, &bz2)];
         for (unpack, packed) in unpackers {
             assert_eq!(unpack(packed, 1 << 20).unwrap(), zeros);
             assert!(unpack(packed, 9999).unwrap_err().contains("more than 9999 bytes"));
