@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 fn flown(name: &str, text: &str, shield: &str, method: &str) -> Metrics {
     let mut set =
         vec![format!("airspace.shield=\"{shield}\""), format!("airspace.method=\"{method}\"")];
-    if text.contains("\ntrack = ") {
+    if text.contains("\ntrack_deg = ") {
         set.push("airspace.replay_until_s=0".into());
     }
     let source = Source::new(name, text, "").with_overrides(&set).expect("known keys");
