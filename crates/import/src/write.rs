@@ -32,15 +32,25 @@ pub fn clean_map(path: &Path, image_name: &str) -> Result<[Vec<u8>; 2], InputErr
     let heading = "A map, written anew by sidestep inspect.";
     if let Some(map) = load_pixel_map(path, None)? {
         let size = [map.width(), map.height()];
-        let (resolution_m, plane) = (map.resolution_m(), map.plane());
-        let map = MapToWrite { heading, size, resolution_m, plane, cells: map.pixels() };
+        let map = MapToWrite {
+            heading,
+            size,
+            resolution_m: map.resolution_m(),
+            plane: map.plane(),
+            cells: map.pixels(),
+        };
         return Ok(map.files(image_name));
     }
     let boxes = GridOptions { box_size_m: 1.0, resolution_m: None, unknown: UnknownPolicy::Keep };
     let map = load_map(path, boxes)?;
     let size = [map.width(), map.height()];
-    let (resolution_m, plane) = (map.box_size_m, map.plane);
-    let map = MapToWrite { heading, size, resolution_m, plane, cells: map.cells() };
+    let map = MapToWrite {
+        heading,
+        size,
+        resolution_m: map.box_size_m,
+        plane: map.plane,
+        cells: map.cells(),
+    };
     Ok(map.files(image_name))
 }
 

@@ -39,8 +39,13 @@ impl Information {
         let reference = has_readings.iter().position(|has| *has).unwrap_or(0);
         let mut is_free = [hit, short, max, random, hit, short];
         is_free[reference] = false;
-        let (products, by_scan) = (Matrix::default(), BTreeMap::new());
-        Self { is_free, reference, readings: 0, products, by_scan }
+        Self {
+            is_free,
+            reference,
+            readings: 0,
+            products: Matrix::default(),
+            by_scan: BTreeMap::new(),
+        }
     }
 
     pub(crate) fn add(&mut self, scan: u32, scores: &Scores) {

@@ -193,7 +193,7 @@ impl Source {
         let table = self.text.parse::<toml::Table>();
         let world = table.as_ref().ok().and_then(|table| table.get("world")?.as_str());
         match (&table, world) {
-            (Err(error), _) if error.message().contains("overflow") => {
+            (Err(error), _) if is_too_large(error.message()) => {
                 format!("give at most {}, the largest whole number of a file", i64::MAX)
             }
             (Err(_), _) => "write valid TOML".into(),
@@ -318,6 +318,11 @@ impl Source {
     pub fn path(&self, path: &Path) -> PathBuf {
         self.folder.join(path)
     }
+}
+
+/// Returns whether the reader of TOML means a whole number that no file can hold: it has two ways to say so.
+fn is_too_large(message: &str) -> bool {
+    message.contains("overflow") || message.contains("too large")
 }
 
 #[cfg(test)]

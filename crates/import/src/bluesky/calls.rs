@@ -26,9 +26,8 @@ pub(super) struct CallFolder {
 impl CallFolder {
     /// Returns the folder of a file.
     pub(super) fn of_file(file: &Path) -> Self {
-        let folder = file.parent().map(|parent| match parent.as_os_str().is_empty() {
-            true => PathBuf::from("."),
-            false => parent.to_path_buf(),
+        let folder = file.parent().map(|parent| {
+            if parent.as_os_str().is_empty() { PathBuf::from(".") } else { parent.to_path_buf() }
         });
         Self { folder, ..Self::default() }
     }

@@ -215,7 +215,8 @@ impl LogicalLine<'_> {
         for part in content.split(';') {
             let command = part.trim_matches(BLANKS);
             if !command.is_empty() {
-                let (text, pieces) = (command.to_string(), self.pieces_of(command));
+                let text = command.to_string();
+                let pieces = self.pieces_of(command);
                 commands.push(CommandText { time_s, file: Rc::clone(file), text, pieces });
             }
         }

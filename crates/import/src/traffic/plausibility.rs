@@ -140,7 +140,8 @@ impl Flight<'_> {
     fn mark_frozen(&self, found: &mut [Option<Suspicion>]) {
         let mut first = 0;
         for (k, suspicion) in found.iter_mut().enumerate() {
-            let (here, there) = (&self.rows[k].sample, &self.rows[first].sample);
+            let here = &self.rows[k].sample;
+            let there = &self.rows[first].sample;
             if here.position != there.position {
                 first = k;
             }

@@ -109,7 +109,8 @@ impl BeamFit {
         let (model, steps, has_converged, log_likelihood) = fit.maximize();
         let mut scans: Vec<u32> = pairs.iter().map(|pair| pair.scan).collect();
         scans.dedup();
-        let (sigma, lambda) = (model.sigma_hit_m, model.lambda_short_per_m);
+        let sigma = model.sigma_hit_m;
+        let lambda = model.lambda_short_per_m;
         let values = [model.hit, model.short, model.max, model.random, sigma, lambda];
         let intervals = fit.intervals(&model);
         let parameters = NAMES.into_iter().zip(values).zip(intervals);

@@ -115,11 +115,10 @@ fn surface_text(world: &AirspaceWorld) -> Option<(String, String)> {
     if world.surface == Surface::Plane {
         return None;
     }
-    let margin = match world.shield {
-        true => {
-            format!("; the shield keeps {:.1} m more for its roundness", 2.0 * world.curvature_m)
-        }
-        false => String::new(),
+    let margin = if world.shield {
+        format!("; the shield keeps {:.1} m more for its roundness", 2.0 * world.curvature_m)
+    } else {
+        String::new()
     };
     Some(key_value_pair(
         "earth",

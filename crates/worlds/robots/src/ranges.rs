@@ -59,7 +59,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             let nearest = &mut into.nearest[into.sectors[index] as usize];
             *nearest = SampledReading::from(reported).nearness.min(*nearest);
             if let Some((sensor_samples, range_samples)) = &mut into.samples {
-                let (cycle, robot, sensor) = (self.now, body.id, number as u16);
+                let cycle = self.now;
+                let robot = body.id;
+                let sensor = number as u16;
                 sensor_samples.push(SensorSample { cycle, robot, sensor, truth, reported });
                 let beam = index as u16;
                 range_samples.push(RangeSample { cycle, robot, sensor, beam, true_m, reported_m });

@@ -54,7 +54,8 @@ impl Interpreter {
             PositionRef::Unresolved(name) => Some(name.clone()),
             _ => None,
         };
-        let (speed, altitude_ft) = (aircraft.speed, aircraft.altitude_ft);
+        let speed = aircraft.speed;
+        let altitude_ft = aircraft.altitude_ft;
         let has_type = !aircraft.kind.is_empty();
         self.add_aircraft(arguments, id, aircraft)?;
         self.note_supersonic(speed, altitude_ft);

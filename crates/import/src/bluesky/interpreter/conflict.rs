@@ -117,9 +117,10 @@ fn conflict_start(target: &KnownState, geometry: &ConflictGeometry) -> Option<Co
     let closing_east = target_mps * math::sin(track_rad) - own_mps * math::sin(own_track_rad);
     let closing_mps = math::hypot(closing_north, closing_east);
     let closest_m = geometry.closest_m;
-    let inside_m = match closest_m > ZONE_RADIUS_M {
-        true => 0.0,
-        false => (ZONE_RADIUS_M * ZONE_RADIUS_M - closest_m * closest_m).sqrt(),
+    let inside_m = if closest_m > ZONE_RADIUS_M {
+        0.0
+    } else {
+        (ZONE_RADIUS_M * ZONE_RADIUS_M - closest_m * closest_m).sqrt()
     };
     let way_m = geometry.horizontal_s * closing_mps + inside_m;
     let distance_m = math::hypot(way_m, closest_m);

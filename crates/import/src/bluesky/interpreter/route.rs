@@ -265,13 +265,15 @@ fn set_both(
         return Err(arguments.error(word, cause, "write ALT FL100, SPD 250 or FL100/250"));
     };
     let is_deleted = |text: &str| text.contains("--");
-    point.altitude_ft = match is_deleted(altitude) {
-        true => None,
-        false => Some(altitude_ft(arguments.place, Token { text: altitude, ..word })?),
+    point.altitude_ft = if is_deleted(altitude) {
+        None
+    } else {
+        Some(altitude_ft(arguments.place, Token { text: altitude, ..word })?)
     };
-    point.speed = match is_deleted(knots) {
-        true => None,
-        false => Some(speed(arguments.place, Token { text: knots, ..word })?),
+    point.speed = if is_deleted(knots) {
+        None
+    } else {
+        Some(speed(arguments.place, Token { text: knots, ..word })?)
     };
     Ok(())
 }

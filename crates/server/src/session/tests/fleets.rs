@@ -170,6 +170,6 @@ fn a_fleet_that_the_command_line_did_not_name_is_no_fleet() {
     let (_, refused) = Page::open_target(deps(folder.path(), 1), what, folder);
     assert_eq!(
         refused["problem"]["remedy"],
-        format!("start the studio with it: sidestep studio {AT}")
+        format!("start the studio with it: `sidestep studio {AT}`")
     );
 }

@@ -169,8 +169,10 @@ impl<'a> ConsideredTraffic<'a> {
         if !self.is_on_level(own, other) {
             return None;
         }
-        let (own_frame, other_frame) = (&frames[own], &frames[other]);
-        let (own, other) = (&all[own], &all[other]);
+        let own_frame = &frames[own];
+        let other_frame = &frames[other];
+        let own = &all[own];
+        let other = &all[other];
         if world.surface == Surface::Plane {
             return Some(*other);
         }

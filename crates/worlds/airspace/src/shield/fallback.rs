@@ -84,8 +84,9 @@ fn neighbors(group: &[ShieldedAircraft]) -> Vec<Vec<usize>> {
         for &j in next {
             interrupt::check();
             let reach_m = orbit_reach_m(&group[i]) + orbit_reach_m(&group[j]);
-            let (surface, at, other_at) =
-                (group[i].frame.surface(), group[i].orbit_pose.at, group[j].orbit_pose.at);
+            let surface = group[i].frame.surface();
+            let at = group[i].orbit_pose.at;
+            let other_at = group[j].orbit_pose.at;
             if group[i].is_protected_from(&group[j])
                 && !surface.is_surely_beyond(at, other_at, reach_m)
                 && surface.distance_m(at, other_at) < reach_m

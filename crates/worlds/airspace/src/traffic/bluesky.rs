@@ -5,15 +5,17 @@
 //! airspeed stays as it is until the next `SPD`, also in climbs. Settings are rules of the scenario or refused by name
 //! (`import_settings.rs`); `not_flown` counts all other commands.
 
+use super::flyable_aircraft::{
+    FlightCommand, FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
+};
 use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
 use super::{
-    DT_S, FOOT_M, LOOK_EVERY_S, MIN_SPEED_M_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
+    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
     banked_turn_deg_s, callsign, header_text,
 };
 use crate::flight::SeparationMinima;
-use crate::flight_plan::CLIMB_M_S;
-use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, Airspeed, ScnAircraft, ScnFile};
+use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::LatLon;
 use sidestep_kernel::InputError;
 use std::collections::BTreeMap;
@@ -50,58 +52,6 @@ pub(crate) fn settings_from_bluesky(place: &str, file: &ScnFile) -> ImportedScen
         settings.refused.push(error);
     }
     settings
-}
-
-/// An aircraft from the time when it starts to move.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct FlyableScnAircraft(ScnAircraft);
-
-impl FlyableScnAircraft {
-    /// The aircraft.
-    pub(super) fn scn(&self) -> &ScnAircraft {
-        &self.0
-    }
-
-    /// Returns the smallest speed that it has or is given.
-    pub(super) fn min_speed_m_s(&self) -> f64 {
-        let mut min_m_s = self.0.speed.true_airspeed_mps(self.0.altitude_ft);
-        for (_, command) in commands_from_changes(&self.0, false) {
-            if let FlightCommand::Speed(v_m_s) = command {
-                min_m_s = min_m_s.min(v_m_s);
-            }
-        }
-        min_m_s
-    }
-}
-
-/// Returns an aircraft as it is when it gets a speed: at its creation, or later, then with the
-/// heading and level that it was given until then. `None` for one that never gets a speed.
-pub(super) fn aircraft_at_flying_speed(aircraft: &ScnAircraft) -> Option<FlyableScnAircraft> {
-    let mut one = aircraft.clone();
-    if is_flying_speed(one.speed, one.altitude_ft) {
-        return Some(FlyableScnAircraft(one));
-    }
-    for (k, &(at_s, change)) in aircraft.changes.iter().enumerate() {
-        match change {
-            AircraftCommand::HeadingDeg(deg) => one.heading_deg = deg,
-            AircraftCommand::AltitudeFt(ft) => one.altitude_ft = ft,
-            AircraftCommand::Speed(speed) if is_flying_speed(speed, one.altitude_ft) => {
-                one.speed = speed;
-                one.created_s = at_s;
-                one.changes.drain(..=k);
-                return one
-                    .deleted_s
-                    .is_none_or(|end_s| end_s > at_s)
-                    .then_some(FlyableScnAircraft(one));
-            }
-            _ => {}
-        }
-    }
-    None
-}
-
-fn is_flying_speed(speed: Airspeed, altitude_ft: f64) -> bool {
-    speed.true_airspeed_mps(altitude_ft) >= MIN_SPEED_M_S
 }
 
 /// Returns the settings of a scenario that follow from those of a file.
@@ -158,32 +108,6 @@ pub(crate) fn omitted_commands(file: &ScnFile) -> BTreeMap<String, u64> {
     counts
 }
 
-/// A command to an airplane, in the scenario's terms.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum FlightCommand {
-    /// Degrees counterclockwise from east.
-    Heading(f64),
-    Speed(f64),
-    /// Meters, and meters per second.
-    Altitude(f64, f64),
-    Proceed,
-    Leave,
-}
-
-impl FlightCommand {
-    fn text(self) -> String {
-        match self {
-            Self::Heading(deg) => format!("heading_deg = {deg:?}"),
-            Self::Speed(v_m_s) => format!("speed_m_s = {v_m_s:?}"),
-            Self::Altitude(altitude_m, climb_m_s) => {
-                format!("altitude_m = {altitude_m:?}, climb_m_s = {climb_m_s:?}")
-            }
-            Self::Proceed => "proceeds = true".into(),
-            Self::Leave => "leaves = true".into(),
-        }
-    }
-}
-
 /// Writes an aircraft; all leave when the file ends the simulation, at `ends_s`.
 fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, ends_s: Option<f64>) {
     let at_deg = position_text(aircraft.position());
@@ -196,8 +120,8 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, ends_s: Option<f64>
         orders.push((ends_s, FlightCommand::Leave));
     }
     if way_points.is_empty() {
-        let (at, seconds) = (aircraft.position(), UNROUTED_FLIGHT_S);
-        way_points = path_of_heading(at, aircraft.heading_deg, v_m_s, seconds);
+        way_points =
+            path_of_heading(aircraft.position(), aircraft.heading_deg, v_m_s, UNROUTED_FLIGHT_S);
     }
     let way_points_deg = positions_text(&way_points);
     let ordered_m_s = orders.iter().filter_map(|(_, command)| match command {
@@ -287,41 +211,6 @@ fn route_command_times_s(aircraft: &ScnAircraft) -> Vec<f64> {
     let mut all: Vec<f64> = known.map(|p| p.added_s).chain(destination_s).collect();
     all.sort_by(f64::total_cmp);
     all
-}
-
-fn commands_from_changes(aircraft: &ScnAircraft, has_route: bool) -> Vec<(f64, FlightCommand)> {
-    let mut altitude_ft = aircraft.altitude_ft;
-    let mut climb_m_s = CLIMB_M_S;
-    let mut commands: Vec<(f64, FlightCommand)> = Vec::new();
-    for &(at_s, change) in &aircraft.changes {
-        match change {
-            AircraftCommand::HeadingDeg(deg) => {
-                commands.push((at_s, FlightCommand::Heading(90.0 - deg)))
-            }
-            AircraftCommand::Speed(speed) => {
-                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(MIN_SPEED_M_S);
-                commands.push((at_s, FlightCommand::Speed(v_m_s)));
-            }
-            AircraftCommand::AltitudeFt(to_ft) => {
-                altitude_ft = to_ft;
-                commands.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
-            }
-            AircraftCommand::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
-                climb_m_s = fpm.abs() * FOOT_M / 60.0;
-                // A rate after an `ALT` of the same time belongs to that command.
-                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = commands.last_mut()
-                    && *last_s == at_s
-                {
-                    *rate_m_s = climb_m_s;
-                }
-            }
-            AircraftCommand::LateralNavigation(true) if has_route => {
-                commands.push((at_s, FlightCommand::Proceed))
-            }
-            _ => {}
-        }
-    }
-    commands
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The settings of a BlueSky file, with their times: those that are flown, and those that cannot be.
 
-use super::bluesky::aircraft_at_flying_speed;
+use super::flyable_aircraft::aircraft_at_flying_speed;
 use super::{FOOT_M, KNOT_M_S, NAUTICAL_MILE_M};
 use sidestep_import::bluesky::{
     AircraftSetting, ResolutionMethod, ScnAircraft, ScnFile, Setting, TimedSetting, Wind,
@@ -183,7 +183,8 @@ fn change_text(before: &ImportedRules, after: &ImportedRules) -> String {
     if after.is_bare && !before.is_bare {
         text.push_str(", shield = \"off\"");
     }
-    let (old_mvp, new_mvp) = (before.mvp_text(), after.mvp_text());
+    let old_mvp = before.mvp_text();
+    let new_mvp = after.mvp_text();
     if new_mvp != old_mvp && !new_mvp.is_empty() {
         let _ = write!(text, ", mvp = {{ {new_mvp} }}");
     }

@@ -4,7 +4,7 @@
 use super::super::{
     AvoidanceSection, EffectorSection, RobotSection, RobotsFile, TransitionSection,
 };
-use super::known_tables::PRESETS;
+use super::known_tables::{PRESETS, Shadowed};
 use super::*;
 use crate::effector::STANDARD_ACTIONS;
 use std::collections::BTreeSet;
@@ -17,17 +17,6 @@ pub(super) struct Given<'a> {
     pub(super) effectors: &'a Effectors,
     pub(super) shadowed: &'a [Shadowed],
     pub(super) own: &'a Behaviours,
-}
-
-/// A table of a profile that a later one of the same name replaces.
-pub(super) struct Shadowed {
-    /// Number of the profile among those of the scenario.
-    pub(super) profile: usize,
-    /// `sensor` or `effector`.
-    pub(super) what: &'static str,
-    pub(super) name: String,
-    /// The text that has the later one.
-    pub(super) by: String,
 }
 
 /// Returns the remarks on a scenario, in the order of its sections.
@@ -75,7 +64,8 @@ impl Given<'_> {
 
 /// Returns notes on profiles of which nothing is used, and warnings of tables in use that another one replaces.
 fn profile_remarks(given: &Given<'_>) -> Vec<Remark> {
-    let (sensors, effectors) = (given.sensor_names(), given.effector_names());
+    let sensors = given.sensor_names();
+    let effectors = given.effector_names();
     let mut used: BTreeSet<&str> = BTreeSet::new();
     used.extend(sensors.iter().filter_map(|name| Some(&*given.sensors.get(*name)?.source.place)));
     used.extend(
@@ -146,7 +136,8 @@ fn kind_remarks(given: &Given<'_>) -> Vec<Remark> {
 
 /// Returns notes on the scenario's own sensors and effectors that no robot has.
 fn unused_tables(given: &Given<'_>) -> Vec<Remark> {
-    let (sensors, effectors) = (given.sensor_names(), given.effector_names());
+    let sensors = given.sensor_names();
+    let effectors = given.effector_names();
     let sensors = given.file.sensors.keys().filter(|name| !sensors.contains(name.as_str()));
     let effectors = given.file.effectors.keys().filter(|name| !effectors.contains(name.as_str()));
     let sensors = sensors.map(|name| format!("sensors.{name}"));

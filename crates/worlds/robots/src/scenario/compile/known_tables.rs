@@ -1,7 +1,17 @@
 //! The sensors and effectors that a scenario may name: the presets, those of its profiles, its own.
 
-use super::effectless::Shadowed;
 use super::*;
+
+/// A table of a profile that a later one of the same name replaces.
+pub(super) struct Shadowed {
+    /// Number of the profile among those of the scenario.
+    pub(super) profile: usize,
+    /// `sensor` or `effector`.
+    pub(super) what: &'static str,
+    pub(super) name: String,
+    /// The text that has the later one.
+    pub(super) by: String,
+}
 
 /// The sensors and effectors that a scenario may name.
 #[derive(Default)]
