@@ -69,8 +69,13 @@ impl MapToWrite<'_> {
     /// Returns the YAML file and the image, which the former calls `image_name`.
     fn files(&self, image_name: &str) -> [Vec<u8>; 2] {
         let Isometry2 { origin_m: [x_m, y_m], yaw_rad } = self.plane;
-        // The name as JSON, which is YAML: it may have blanks or colons.
-        let image_name = serde_json::Value::from(image_name);
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+        // Another name as JSON, which is YAML: it may have blanks or colons.
+        let image_name = if image_name.chars().all(is_plain) {
+            image_name.to_string()
+        } else {
+            serde_json::Value::from(image_name).to_string()
+        };
         let yaml = format!(
             "# {}\nimage: {image_name}\nresolution: {:?}\n\
              origin: [{x_m:?}, {y_m:?}, {yaw_rad:?}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",

@@ -172,7 +172,7 @@ fn seeds_that_run_over_are_told_as_such() {
     let place = TestFolder::new();
     place.write("six.toml", SIX);
     let last = ["compare", "six.toml", "--methods", "none", "--seed", "9223372036854775807"];
-    let told = place.run(&[&last[..], &["--replicate", "2"]].concat());
+    let told = place.run(&[&last[..], &["--runs", "2"]].concat());
     assert_eq!((told.code(), told.out().as_str()), (2, ""));
     let cause = "2 seeds from 9223372036854775807 on exceed 2^63 - 1";
     assert!(told.err().contains(cause) && !told.err().contains("line"), "{}", told.err());

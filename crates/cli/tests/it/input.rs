@@ -130,8 +130,8 @@ fn a_mistake_in_a_sensor_is_one_error_and_the_sensor_stays_known() {
             "invalid type: integer `3`",
         ),
         (
-            "[sensors.\"my eye\"]\nrange_m = 3\nbearings_deg = [0]\nobservations = []\n",
-            "the key `confusion` is missing",
+            "[sensors.\"my eye\"]\nrange_m = 3\nbearings_deg = [0]\nobservations = [\"nothing\"]\n",
+            "the sensor has no `confusion`",
         ),
     ] {
         let place = TestFolder::new();
