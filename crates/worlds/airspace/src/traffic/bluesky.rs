@@ -11,8 +11,8 @@ use super::flyable_aircraft::{
 use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
 use super::{
-    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
-    banked_turn_deg_s, callsign, header_text,
+    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S, banked_turn_deg_s, callsign,
+    header_text,
 };
 use crate::flight::SeparationMinima;
 use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, ScnAircraft, ScnFile};
