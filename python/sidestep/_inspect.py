@@ -65,7 +65,7 @@ def inspect(
     >>> import sidestep
     >>> report = sidestep.inspect("scenarios/chain/arm.urdf")
     >>> report.format, report.kept["joints"], report.dropped
-    ('URDF', 4, 0)
+    ('URDF', 8, 0)
     """
     found = _native.inspect(file)
     report = ImportReport(

@@ -170,6 +170,8 @@ def _is_missing(cell: Any) -> bool:
 
 
 def _word(cell: Any) -> Any:
+    # A list may hold numbers of NumPy, whose text is none that a table has.
+    cell = cell.item() if isinstance(cell, np.generic) else cell
     if cell is None or _is_missing(cell):
         return ""
     if isinstance(cell, bool):
