@@ -1,6 +1,6 @@
 //! The tables that a run records to learn from: readings, ranges and motions, with what they mean.
 
-use super::rows::{CYCLE_DESCRIPTION, box_notes};
+use super::table_notes::{CYCLE_DESCRIPTION, box_notes};
 use super::world::{RobotsWorld, Role};
 use super::{MotionSample, RangeSample, SensorSample};
 use sidestep_kernel::ports::Table;

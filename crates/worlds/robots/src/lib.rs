@@ -40,6 +40,7 @@ mod remarks;
 pub mod rows;
 pub mod scenario;
 pub mod state;
+mod table_notes;
 mod text;
 mod view;
 pub mod world;

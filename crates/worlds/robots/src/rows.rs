@@ -8,13 +8,14 @@ use super::odometry::DeadReckoning;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
 use super::state::{PoseBuffer, RobotsState};
+use super::table_notes::{CYCLE_DESCRIPTION, box_notes};
 use super::world::{RobotsWorld, Role};
 use super::{Event, EventKind, MotionSample, RangeSample, Scratch, SensorSample};
 use sidestep_kernel::ports::{
     ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnValues, RecordError, Recorder, Table,
     TableBuffer, TableBuffers, TableRowsBuffer, TableSchema,
 };
-use sidestep_kernel::view::{EventBuffer, Isometry2};
+use sidestep_kernel::view::EventBuffer;
 use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
@@ -27,7 +28,6 @@ const MAX_BUFFER_POSES: usize = 1 << 24;
 /// Number of bodies for which poses are collected together: a cache line of each cycle.
 const BODIES_PER_BLOCK: usize = 16;
 
-pub(super) const CYCLE_DESCRIPTION: &str = "cycle, counted from 0";
 const HEADING_DESCRIPTION: &str =
     "heading, counterclockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
 const BODY_DESCRIPTION: &str = "entity id: robots first, then people, then doors";
@@ -43,23 +43,6 @@ fn trajectory_table(world: &RobotsWorld) -> TableSchema {
         ColumnSpec::label("heading", HEADING_DESCRIPTION, HEADING_NAMES),
     ];
     TableSchema { about: box_notes(world), ..TableSchema::new("trajectories", columns) }
-}
-
-/// Returns the notes that turn boxes into meters of the world, and ids into kinds of bodies.
-pub(super) fn box_notes(world: &RobotsWorld) -> Vec<(String, String)> {
-    let Isometry2 { origin_m: [x, y], yaw_rad } = world.map.plane;
-    let box_m = world.map.box_size_m;
-    let numbers = [("box_m", box_m), ("origin_x_m", x), ("origin_y_m", y), ("yaw_rad", yaw_rad)];
-    let mut about: Vec<_> = numbers.map(|(name, v)| (name.into(), v.to_string())).into();
-    let ids: Vec<EntityId> = (0..world.bodies.len() as EntityId).collect();
-    // Bodies of one kind have ids in a row.
-    for same in ids.chunk_by(|&a, &b| world.visible_kind(a) == world.visible_kind(b)) {
-        if let (Some(first), Some(last)) = (same.first(), same.last()) {
-            let kind = world.visible_kind(*first);
-            about.push((format!("ids_{kind}"), format!("{first}-{last}")));
-        }
-    }
-    about
 }
 
 fn event_table(world: &RobotsWorld) -> Table<Event> {
