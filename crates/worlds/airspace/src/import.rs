@@ -209,7 +209,7 @@ fn track_import_report(recorded: &RecordedTraffic) -> (Value, KeyValues) {
         "aircraft": recorded.tracks.len(),
         "repeated_rows": recorded.repeated_rows,
         "aircraft_of_one_row": count_of(traffic::SINGLE_ROW_RULE),
-        "import": report,
+        "import_report": report,
     });
     (json, report_lines(recorded.rows, report))
 }
