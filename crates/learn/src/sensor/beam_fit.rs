@@ -9,6 +9,8 @@
 //! noise and the rate. Beams of one scan are not independent, so where scans are known their scores are summed first
 //! (the sandwich of White and Huber). A weight that rests on few readings has an interval of the likelihood ratio.
 
+use std::array;
+
 use serde::Serialize;
 
 use super::beam_interval::{likelihood_interval, log_interval, logit_interval};
@@ -23,6 +25,8 @@ use sidestep_statistics::{Interval, percentile};
 const MIN_RISE_NAT: f64 = 1e-9;
 /// or after this number of steps, which the report then says.
 const MAX_STEPS: usize = 1000;
+/// Longest leap, in steps: so far a part that is not there loses all of its weight at once.
+const MAX_LEAP: f64 = 1e4;
 /// Most readings that are fitted: neighboring beams say nearly the same, and each step reads all of them.
 const MAX_READINGS: usize = 100_000;
 /// Fewer readings say nothing about four parts.
@@ -192,6 +196,14 @@ struct Expectation {
     log_likelihood: f64,
 }
 
+/// A model with what the readings say of it.
+struct Evaluation {
+    model: BeamModel,
+    expected: Expectation,
+    /// Mean over the readings, in nat.
+    log_likelihood: f64,
+}
+
 impl Fit<'_> {
     fn length_m(&self) -> f64 {
         self.limits[1] - self.limits[0]
@@ -202,19 +214,33 @@ impl Fit<'_> {
     }
 
     /// Returns the most likely model, the number of steps, whether it has converged, and its mean log-likelihood.
+    ///
+    /// Two steps are followed by a leap along their direction, which is kept where it is more likely: a part that is
+    /// not there loses less and less with each step, so steps alone would hardly come to an end.
     fn maximize(&self) -> (BeamModel, usize, bool, f64) {
-        let mut model = self.first_guess();
-        let mut before = f64::NEG_INFINITY;
-        for step in 1..=MAX_STEPS {
-            let expected = self.expectation(&model);
-            let log_likelihood = expected.log_likelihood / self.pairs.len() as f64;
-            if log_likelihood - before < MIN_RISE_NAT && step > 2 {
-                return (model, step, true, log_likelihood);
+        let mut first = self.evaluate(self.first_guess());
+        for round in 1..=MAX_STEPS / 2 {
+            let second = self.step_from(&first);
+            let third = self.step_from(&second);
+            let rise = third.log_likelihood - second.log_likelihood;
+            if rise < MIN_RISE_NAT {
+                return (third.model, 2 * round, true, third.log_likelihood);
             }
-            before = log_likelihood;
-            model = self.maximization(&model, &expected);
+            let far = self.evaluate(leap([&first, &second, &third].map(|point| &point.model)));
+            first = if far.log_likelihood > third.log_likelihood { far } else { third };
         }
-        (model, MAX_STEPS, false, before)
+        (first.model, MAX_STEPS, false, first.log_likelihood)
+    }
+
+    fn evaluate(&self, model: BeamModel) -> Evaluation {
+        let expected = self.expectation(&model);
+        let log_likelihood = expected.log_likelihood / self.pairs.len() as f64;
+        Evaluation { model, expected, log_likelihood }
+    }
+
+    /// Takes one step of expectation and maximization.
+    fn step_from(&self, point: &Evaluation) -> Evaluation {
+        self.evaluate(self.maximization(&point.model, &point.expected))
     }
 
     /// Returns a model from which no part is missing; the noise is a robust spread of the deviations.
@@ -387,6 +413,43 @@ fn mean_cut(rate: f64, length_m: f64) -> f64 {
     let x = rate * length_m;
     // Where the exponential overflows nothing is cut.
     if x > 700.0 { 0.0 } else { length_m / (exp(x) - 1.0) }
+}
+
+/// Returns the model to which the direction of two steps leads: squared extrapolation of the logarithms of all
+/// parameters.
+///
+/// Source: Varadhan, Roland, "Simple and globally convergent methods for accelerating the convergence of any EM
+/// algorithm" (2008), scheme S3.
+fn leap(models: [&BeamModel; 3]) -> BeamModel {
+    let [start, middle, end] = models.map(log_parameters);
+    let step: [f64; 6] = array::from_fn(|k| middle[k] - start[k]);
+    let bend: [f64; 6] = array::from_fn(|k| end[k] - middle[k] - step[k]);
+    let length = |vector: &[f64; 6]| vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length(&bend) == 0.0 {
+        return *models[2];
+    }
+    // A factor of 1 is where the two steps themselves have led.
+    let factor = (length(&step) / length(&bend)).clamp(1.0, MAX_LEAP);
+    let values: [f64; 6] =
+        array::from_fn(|k| exp(start[k] + 2.0 * factor * step[k] + factor * factor * bend[k]));
+    let [hit, short, max, random, sigma_hit_m, lambda_short_per_m] = values;
+    let total = hit + short + max + random;
+    let within = |value: f64, [least, most]: [f64; 2]| value.clamp(least, most);
+    BeamModel {
+        hit: hit / total,
+        short: short / total,
+        max: max / total,
+        random: random / total,
+        sigma_hit_m: within(sigma_hit_m, SIGMA_LIMITS_M),
+        lambda_short_per_m: within(lambda_short_per_m, LAMBDA_LIMITS_PER_M),
+    }
+}
+
+fn log_parameters(model: &BeamModel) -> [f64; 6] {
+    let [hit, short, max, random] = model.weights();
+    let values = [hit, short, max, random, model.sigma_hit_m, model.lambda_short_per_m];
+    // A weight of nothing has no logarithm.
+    values.map(|value| ln(value.max(f64::MIN_POSITIVE)))
 }
 
 fn weighted(model: &BeamModel, chances: PartChances) -> [f64; 4] {

@@ -103,6 +103,22 @@ fn a_part_that_is_not_there_has_an_interval_from_nothing_on() {
 }
 
 #[test]
+fn a_part_that_is_not_there_beside_one_much_like_it_is_found_in_few_steps() {
+    // Ranges at random are told from short ones of a low rate by little.
+    let echo =
+        BeamModel { hit: 0.93, short: 0.0, max: 0.06, random: 0.01, sigma_hit_m: 0.01, ..BEAM };
+    let fit = fitted(&echo, 4, 40_000);
+    assert!(fit.has_converged && fit.steps < 200, "{fit}");
+    assert_eq!(fit.warnings(), Vec::<String>::new());
+    let short = fit.parameters[1].interval.unwrap();
+    assert!(short.low < 1e-9 && short.high < 0.005, "{fit}");
+    let random = &fit.parameters[3];
+    // Twice the interval, as above.
+    let half_width = random.interval.unwrap().half_width();
+    assert!((random.value - 0.01).abs() < 2.0 * half_width, "{fit}");
+}
+
+#[test]
 fn ranges_of_another_kind_are_warned_of_and_few_are_refused() {
     let mut biased = drawn(&BEAM, 3, 3000);
     for reading in &mut biased {
