@@ -65,10 +65,12 @@ fn run(mut words: Vec<String>) -> Result<String, String> {
     {
         return Err(format!("no option `{word}`\n\n{HELP}"));
     }
+    // Reading the workspace takes seconds: words that are wrong are told before.
+    list.as_deref().map(shape::check_figure).transpose()?;
     let before = before.map(|file| shape::read(Path::new(&file))).transpose()?;
     let tree = shape::of(folder.as_deref().map_or(root(), Path::new))?;
     if let Some(figure) = list {
-        shape::places(&tree, &figure)
+        Ok(shape::places(&tree, &figure))
     } else if words.iter().any(|word| word == "--ratchet") {
         ratchets::tighten(&tree.counts)
     } else if words.iter().any(|word| word == "--json") {

@@ -80,12 +80,17 @@ fn places_of(sources: &[Source], layers: Option<&Layers>) -> Vec<(&'static str, 
 }
 
 /// Returns the places that a figure counts, one a line.
-pub(crate) fn places(tree: &Tree, figure: &str) -> Result<String, String> {
-    if !FIGURES.contains(&figure) {
-        return Err(format!("no figure `{figure}`; there are: {}", FIGURES.join(", ")));
+pub(crate) fn check_figure(figure: &str) -> Result<(), String> {
+    if FIGURES.contains(&figure) {
+        Ok(())
+    } else {
+        Err(format!("no figure `{figure}`; there are: {}", FIGURES.join(", ")))
     }
+}
+
+pub(crate) fn places(tree: &Tree, figure: &str) -> String {
     let places = tree.places.get(figure);
-    Ok(places.into_iter().flatten().map(|place| format!("{place}\n")).collect())
+    places.into_iter().flatten().map(|place| format!("{place}\n")).collect()
 }
 
 pub(crate) fn json(counts: &Counts) -> String {
