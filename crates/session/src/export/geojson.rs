@@ -34,15 +34,20 @@ struct Path {
 impl Path {
     fn push(&mut self, place: Place, time_s: f64) {
         self.times_s.push(time_s);
-        let last = self.lines.last().and_then(|line| line.last()).copied();
-        match last {
-            Some(last) if (last[0] - place[0]).abs() > 180.0 => {
-                let [end, start] = date_line_crossing(last, place);
-                self.lines.last_mut().expect("it has a last place").push(end);
-                self.lines.push(vec![start, place]);
-            }
-            Some(_) => self.lines.last_mut().expect("it has a last place").push(place),
-            None => self.lines.push(vec![place]),
+        let Some(line) = self.lines.last_mut() else {
+            self.lines.push(vec![place]);
+            return;
+        };
+        let last = line[line.len() - 1];
+        if (last[0] - place[0]).abs() <= 180.0 {
+            line.push(place);
+        } else if line.len() == 1 && last[0].abs() == 180.0 {
+            // It begins on the date line, which lies on either side.
+            *line = vec![[-last[0], last[1], last[2]], place];
+        } else {
+            let [end, start] = date_line_crossing(last, place);
+            line.push(end);
+            self.lines.push(vec![start, place]);
         }
     }
 
@@ -160,6 +165,10 @@ mod tests {
                 vec![[-180.0, 11.0, 1000.0], [-179.0, 12.0, 1100.0], [-178.0, 12.0, 1100.0]],
             ]
         );
+        let mut begun_there = Path::default();
+        begun_there.push([180.0, 9.0, 0.0], 0.0);
+        begun_there.push([-179.9, 9.1, 0.0], 5.0);
+        assert_eq!(begun_there.lines, [vec![[-180.0, 9.0, 0.0], [-179.9, 9.1, 0.0]]]);
         let feature = path.feature(7, true);
         assert_eq!(feature["properties"]["utc_s"], json!([0.0, 10.0, 20.0]));
         assert_eq!(feature["geometry"]["type"], "MultiLineString");
