@@ -59,7 +59,7 @@ impl Conflict {
         Autopilot {
             model: &self.model,
             mission: &self.goals[i],
-            passing: WaypointRule { tolerance_m: 100.0, passes: true },
+            passing: WaypointRule { tolerance_m: 100.0, passes: true, passes_abeam: false },
             after: AfterLastWaypoint::Straight,
             dtau_s: TIMING.dtau_s,
         }

@@ -440,7 +440,7 @@ mod tests {
         } else {
             AfterLastWaypoint::Straight
         };
-        let passing = WaypointRule { tolerance_m: number("tol"), passes: false };
+        let passing = WaypointRule { tolerance_m: number("tol"), passes: false, passes_abeam: false };
         let expected = &case["expected"];
         let mut predictions = Vec::new();
         let planes = case["planes"].as_array().expect("planes");
@@ -514,7 +514,7 @@ mod tests {
         let model =
             AircraftModel { v_m_s: 35.0, omega_max_rad_s: 0.07, separation_m: 500.0, turns: 5 };
         let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
-        let passing = WaypointRule { tolerance_m: 100.0, passes: true };
+        let passing = WaypointRule { tolerance_m: 100.0, passes: true, passes_abeam: false };
         let all = [DetourAlternatives::default(), DetourAlternatives::default_preset()]
             .map(|legs| actions(&model, 5.0, &[], &legs));
         let mut meetings = 0;

@@ -80,6 +80,8 @@ struct AirspaceSection {
     #[schemars(skip)]
     horizon: Option<Spanned<toml::Value>>,
     tolerance_m: Option<Number<Tolerance>>,
+    /// Whether an airplane is done with a way-point that it has abeam, unless that is its last.
+    passes_abeam: bool,
     alpha: Option<Number<Weight>>,
     beta: Option<Number<Fading>>,
     inflation: Option<Number<Inflation>>,

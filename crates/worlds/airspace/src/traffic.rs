@@ -57,7 +57,7 @@ fn header_text(name: &str, zone: SeparationMinima, horizon_s: Option<f64>, more:
     format!(
         "format = 1\nworld = \"airspace\"\nname = {name}\n\n\
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
-         look_every_s = {LOOK_EVERY_S:?}\n\
+         look_every_s = {LOOK_EVERY_S:?}\npasses_abeam = true\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {gap_m:?}\n"
     )
 }

@@ -62,8 +62,8 @@ impl FlightConditions {
         let RoutePosition { mission, next, pose } = route;
         let drift_m = math::hypot(self.wind_m_s[0], self.wind_m_s[1]) * seconds;
         let from_m = math::hypot(pose.at[0], pose.at[1]);
-        let reach_m = way_point_reach_m(model, seconds, self.passing.tolerance_m);
-        frame.local_mission(mission, next, from_m + drift_m + reach_m)
+        let reach_m = from_m + drift_m + way_point_reach_m(model, seconds, self.passing.tolerance_m);
+        frame.local_mission((mission, next), reach_m, self.passing.passes_abeam)
     }
 
     /// Returns whether the air moves.

@@ -3,7 +3,9 @@
 use super::action::Action;
 use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m, sinc};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::geometry::{dot, normalized, sub};
 use sidestep_kernel::math;
+use std::ops::RangeInclusive;
 
 /// The flight after the last way-point, in predictions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -27,12 +29,21 @@ pub enum AfterLastWaypoint {
 /// An airplane that turns by more than a radian in a step is checked too rarely for that: it flies over a way-point,
 /// or past where it is abeam, between two checks. It passes a way-point in the step in which it comes nearest to it,
 /// if it is less than a step's length from it at either end.
+///
+/// An airplane that others keep off its route may be far beside a way-point when that is abeam. Where way-points are
+/// *passed abeam*, it is done with one then, however far away that is, unless it is the last one: it flies on along its
+/// route, as an airplane does whose flight management system sequences the way-points (BlueSky's `passedwp`), and does
+/// not turn back for it. Abeam is the line through the way-point at right angles to the leg that leads there. The leg to
+/// the first way-point begins where nobody keeps it; there it is the leg that leads on, and the airplane has to have the
+/// way-point behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WaypointRule {
     /// Distance in meters below which a way-point is reached.
     pub tolerance_m: f64,
     /// Whether a way-point inside a turning circle can be passed.
     pub passes: bool,
+    /// Whether all way-points but the last are passed abeam.
+    pub passes_abeam: bool,
 }
 
 impl WaypointRule {
@@ -79,6 +90,28 @@ fn is_passed((before, pose): (Pose2, Pose2), goal: Point, radius_m: f64, step_m:
     let is_inside = square_m2 < 2.0 * radius_m * left.abs();
     // Abeam since the last step: on a circle, `ahead` changes by less than a step per step.
     is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
+}
+
+/// Returns whether an airplane has passed a way-point abeam that is not the last one.
+#[inline(never)]
+fn has_abeam_behind(mission: &[Point], next: usize, pose: Pose2) -> bool {
+    let Some(leg) = leg_direction(mission, next) else { return false };
+    let way_point = mission[next];
+    let is_beyond = dot(sub(pose.at, way_point), leg) > 0.0;
+    is_beyond && (next > 0 || relative_position(pose, way_point)[0] <= 0.0)
+}
+
+/// Returns the numbers of the way-points between which the leg lies that decides what is abeam of a way-point: that to
+/// it, or from the first one.
+pub(super) fn leg_ends(next: usize) -> RangeInclusive<usize> {
+    let from = next.saturating_sub(1);
+    from..=from + 1
+}
+
+/// Returns the direction of that leg; none where there is none, and for the last way-point.
+pub(super) fn leg_direction(mission: &[Point], next: usize) -> Option<Point> {
+    let (&from, &to) = mission.get(*leg_ends(next).start()).zip(mission.get(*leg_ends(next).end()))?;
+    normalized(sub(to, from)).filter(|_| next + 1 < mission.len())
 }
 
 /// Returns how far ahead of an airplane a place is, and how far to its left.
@@ -200,7 +233,9 @@ impl Autopilot<'_> {
         let radius_m = self.model.turn_radius_m();
         let step_m = self.model.v_m_s * self.dtau_s;
         while let Some(&goal) = self.mission.get(next) {
-            if !self.passing.is_done((before, pose), goal, radius_m, step_m) {
+            if !self.passing.is_done((before, pose), goal, radius_m, step_m)
+                && !(self.passing.passes_abeam && has_abeam_behind(self.mission, next, pose))
+            {
                 break;
             }
             next += 1;
@@ -286,7 +321,7 @@ mod tests {
             let pilot = Autopilot {
                 model: &model,
                 mission: &mission,
-                passing: WaypointRule { tolerance_m: 100.0, passes: true },
+                passing: WaypointRule { tolerance_m: 100.0, passes: true, passes_abeam: false },
                 after: AfterLastWaypoint::Straight,
                 dtau_s: 1.0,
             };
@@ -317,7 +352,7 @@ mod tests {
             let pilot = Autopilot {
                 model: &model,
                 mission: &mission,
-                passing: WaypointRule { tolerance_m, passes: true },
+                passing: WaypointRule { tolerance_m, passes: true, passes_abeam: false },
                 after: AfterLastWaypoint::Straight,
                 dtau_s: 1.0,
             };
@@ -342,7 +377,7 @@ mod tests {
             let omega_max_rad_s = omega_deg_s.to_radians();
             let model = AircraftModel { v_m_s, omega_max_rad_s, ..model() };
             let mission = [[x, y]];
-            let passing = WaypointRule { tolerance_m, passes: true };
+            let passing = WaypointRule { tolerance_m, passes: true, passes_abeam: false };
             let pilot = Autopilot { model: &model, mission: &mission, passing, after: AfterLastWaypoint::Straight, dtau_s };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
             let timing = TimeDiscretization { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };

@@ -13,9 +13,10 @@
 //!
 //! The frames of two airplanes are compared in a third one, see [`PairPlane`](super::PairPlane).
 
+use super::autopilot::{leg_direction, leg_ends};
 use super::motion::{AircraftModel, Point, Pose2, distance_m};
 use sidestep_kernel::geodesy::{GeoPosition, MIN_CURVATURE_RADIUS_M, TangentPlane, turn_rad};
-use sidestep_kernel::geometry::{norm_squared, sub};
+use sidestep_kernel::geometry::{dot, norm_squared, sub};
 use sidestep_kernel::math;
 use std::borrow::Cow;
 
@@ -238,26 +239,39 @@ impl Frame {
     }
 
     /// Returns way-points in the frame, from number `next` on as far as an airplane can get that is at the frame's
-    /// origin and gets `reach_m` meters from there. Those before and after these have no meaning.
+    /// origin and gets `reach_m` meters from there, and where it passes them abeam, those between which the leg to the
+    /// next one lies. The others have no meaning.
     pub(crate) fn local_mission(
         self,
-        mission: &[Point],
-        next: usize,
+        (mission, next): (&[Point], usize),
         reach_m: f64,
+        passes_abeam: bool,
     ) -> Cow<'_, [Point]> {
         if self.0.is_none() {
             return Cow::Borrowed(mission);
         }
         let mut local = vec![[FAR_AHEAD_M; 2]; mission.len()];
-        for (place, &at) in local.iter_mut().zip(mission).skip(next) {
-            *place = self.to_local(at);
+        let leg = leg_ends(next);
+        let first = if passes_abeam { *leg.start() } else { next };
+        for k in first..mission.len() {
+            local[k] = self.to_local(mission[k]);
+            let is_leg_known = !passes_abeam || k >= *leg.end();
             // One that is not reached blocks all after it.
-            if norm_squared(*place) > reach_m * reach_m {
+            let mut latest = k.saturating_sub(1).max(next)..=k;
+            if is_leg_known && latest.any(|w| is_out_of_reach(&local, w, reach_m, passes_abeam)) {
                 break;
             }
         }
         Cow::Owned(local)
     }
+}
+
+/// Returns whether an airplane that gets `reach_m` meters from the origin is not done with a way-point in that time.
+fn is_out_of_reach(mission: &[Point], next: usize, reach_m: f64, passes_abeam: bool) -> bool {
+    let way_point = mission[next];
+    let is_ahead = |leg: Point| dot(way_point, leg) > reach_m;
+    norm_squared(way_point) > reach_m * reach_m
+        && !(passes_abeam && leg_direction(mission, next).is_some_and(|leg| !is_ahead(leg)))
 }
 
 /// Returns the distance from where it is within which an airplane may be done with way-points in some seconds, in still

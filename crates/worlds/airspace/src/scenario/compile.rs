@@ -192,7 +192,8 @@ impl<'a> Compiler<'a> {
         let given = self.file.airspace.tolerance_m;
         // The 100 m that go with the paper's separation of 500 m.
         let tolerance_m = given.map_or((radius_m / 5.0).max(1.0), f64::from);
-        WaypointRule { tolerance_m, passes: true }
+        let passes_abeam = self.file.airspace.passes_abeam;
+        WaypointRule { tolerance_m, passes: true, passes_abeam }
     }
 
     fn disturbance(&self) -> Disturbance {
