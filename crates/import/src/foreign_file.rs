@@ -6,6 +6,7 @@ use super::extension::extension;
 use super::mesh::Mesh;
 use super::report::{ImportReport, Treatment};
 use super::table::{CsvTable, data_lines};
+use super::traffic::begins_as_traffic;
 use super::{bag, carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
@@ -110,7 +111,7 @@ impl ForeignFormat {
             "png" | "pgm" | "jpg" | "jpeg" => Some(Self::Image),
             "map" => Some(Self::CharMap),
             // Any text may end so; a map in characters has no words.
-            "txt" if !has_carmen_message(&text) => Some(Self::CharMap),
+            "txt" if !has_carmen_message(&text) && !begins_as_traffic(&text) => Some(Self::CharMap),
             "scen" => Some(Self::Scen),
             "csv" | "tsv" => TableKind::of_text(&text).map(Self::Table),
             "urdf" | "xacro" => Some(Self::Urdf),

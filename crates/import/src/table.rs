@@ -120,7 +120,7 @@ pub fn rows<'a, const N: usize>(
 
 /// A CSV file with a header row, whose columns are found by name.
 ///
-/// The separator is the one of `,`, `;` and tab that the header has most of, or the one that a first line `sep=;` names;
+/// The separator is the one of `,`, `;`, tab and `|` that the header has most of, or the one that a first line `sep=;` names;
 /// quotes `"`, blanks around fields ignored, lines that start with `#` skipped. Numbers may have decimal commas where no
 /// number of the table has a decimal point.
 #[derive(Debug)]
@@ -194,6 +194,8 @@ impl CsvTable {
             let cause = format!("the table has more than {MAX_CSV_BYTES} bytes");
             return Err(InputError::new(place, cause, "give a part of it"));
         }
+        let bare = without_frame(text);
+        let text = bare.as_deref().unwrap_or(text);
         let (separator, text) = separator_of(text);
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(separator)
@@ -239,10 +241,15 @@ impl CsvTable {
         if misfit_rule == MisfitRule::Refuse {
             return record.len() == columns;
         }
-        // A quote that is not closed takes the lines after it into one field.
         record.len() >= columns
             && record.iter().skip(columns).all(str::is_empty)
-            && !record.iter().any(|field| field.contains('\n'))
+            && !record.iter().any(|field| self.holds_rows(field))
+    }
+
+    /// Returns whether a field of several lines has as many separators as a row: a quote that is not closed takes the
+    /// rows after it into one field, while a note of several lines is a field like others.
+    fn holds_rows(&self, field: &str) -> bool {
+        field.contains('\n') && field.matches(self.separator).count() + 1 >= self.header.len()
     }
 
     fn push(&mut self, text: &str, record: &csv::StringRecord) {
@@ -448,7 +455,29 @@ fn misfit_row(text: &str, record: &csv::StringRecord) -> MisfitRow {
 }
 
 /// Characters that separate fields, the usual one first.
-const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+const SEPARATORS: [u8; 4] = [b',', b';', b'\t', b'|'];
+
+/// Returns a table that is drawn with `+---+` and `|`, as shells of databases print it, without its frame; `None` for
+/// any other text. Lines keep their numbers.
+fn without_frame(text: &str) -> Option<String> {
+    let is_border = |line: &str| {
+        line.starts_with("+-") && line.bytes().all(|b| matches!(b, b'+' | b'-' | b' ' | b'\r'))
+    };
+    let (_, first) = data_lines(text).next()?;
+    if !is_border(first.trim_start()) {
+        return None;
+    }
+    let mut bare = String::with_capacity(text.len());
+    for line in text.lines() {
+        let line = line.trim();
+        if !is_border(line) {
+            let inner = line.strip_prefix('|').unwrap_or(line);
+            bare.push_str(inner.strip_suffix('|').unwrap_or(inner));
+        }
+        bare.push('\n');
+    }
+    Some(bare)
+}
 
 /// Returns the separator of a table, and its text: without a first line `sep=;`, which spreadsheets write, but with the
 /// end of that line, so that lines are counted as in the file.
@@ -567,6 +596,23 @@ mod tests {
         assert_eq!(values("a\tb\n1,5\t+0,25\n"), [1.5, 0.25]);
         assert_eq!(values("sep=;\r\na;b\r\n1,5;2\r\n"), [1.5, 2.0]);
         assert_eq!(values("\"a;x\",b\n\"1,5\",2\n"), [1.5, 2.0]);
+    }
+
+    #[test]
+    fn tables_of_databases_are_read_without_their_frames() {
+        assert_eq!(values("a|b\n1.5|-2\n"), [1.5, -2.0]);
+        let drawn = "+-----+----+\n| a   | b  |\n+-----+----+\n| 1.5 | -2 |\n+-----+----+\n";
+        assert_eq!(values(drawn), [1.5, -2.0]);
+        let table = CsvTable::parse(&"f.csv", drawn).unwrap();
+        assert_eq!(table.rows().next().unwrap().line(), 4, "borders are lines, too");
+    }
+
+    #[test]
+    fn a_field_of_several_lines_is_no_quote_that_was_left_open() {
+        let text = "a,b,c\n1,\"two\nlines\",3\n4,5,6\n";
+        let table = CsvTable::parse_recording(&"f.csv", text).unwrap();
+        assert_eq!((table.rows().count(), table.misfits().len()), (2, 0));
+        assert_eq!(table.rows().next().unwrap().text(1), "two\nlines");
     }
 
     #[test]

@@ -192,7 +192,7 @@ pub fn write_clean(path: &Path, out: &Path) -> Result<Vec<PathBuf>, Error> {
             replace_atomically(out, |partial| Ok(bag::write_clean(path, partial)?))?;
             Ok(vec![out.to_path_buf()])
         }
-        None if traffic::has_extension(path) => {
+        None if traffic::is_traffic(path) => {
             let text = traffic::to_csv(&traffic::read(path)?);
             write_atomically(out, |file| file.write_all(text.as_bytes()))?;
             Ok(vec![out.to_path_buf()])

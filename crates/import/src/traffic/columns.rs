@@ -40,10 +40,12 @@ pub(super) enum Field {
     OnGround,
     /// The time when the position was received.
     PositionTime,
+    /// The time in s since the position was received.
+    PositionAge,
 }
 
 /// Number of [`Field`]s.
-const FIELD_COUNT: usize = 14;
+const FIELD_COUNT: usize = 15;
 
 /// A column by its name, with the factor that turns its numbers into the unit of the field.
 pub(super) type NamedColumn = (&'static str, Field, f64);
@@ -55,6 +57,12 @@ pub(super) enum Source {
     OpenSky,
     TrafficLibrary,
     Flightradar24,
+    /// The decoder readsb, and the networks that give its JSON: adsb.lol, ADS-B Exchange, adsb.fi, airplanes.live.
+    Readsb,
+    /// The interface AeroAPI of FlightAware.
+    FlightAware,
+    /// Messages of BaseStation, which decoders give on port 30003.
+    BaseStation,
     /// Segments of flights, of EUROCONTROL.
     Segments,
     /// Encounters of DAIDALUS.
@@ -75,6 +83,15 @@ impl Source {
         if has("position") && has("direction") && has_any(&["timestamp", "utc"]) {
             return Self::Flightradar24;
         }
+        if has("gspeed") && has("alt") {
+            return Self::Flightradar24;
+        }
+        if has("alt_baro") && has_any(&["hex", "icao", "icao24"]) {
+            return Self::Readsb;
+        }
+        if has("fa_flight_id") {
+            return Self::FlightAware;
+        }
         if has("ectrl_id") && has("time_over") {
             return Self::FlightPoints;
         }
@@ -90,7 +107,9 @@ impl Source {
             Self::TrafficLibrary => TRAFFIC_LIBRARY,
             Self::Flightradar24 => FLIGHTRADAR24,
             Self::FlightPoints => FLIGHT_POINTS,
-            Self::Segments | Self::Encounter => &[],
+            Self::Readsb => READSB,
+            Self::FlightAware => FLIGHT_AWARE,
+            Self::Segments | Self::Encounter | Self::BaseStation => &[],
         }
     }
 
@@ -103,6 +122,11 @@ impl Source {
                 ("tracks of the library traffic", "altitude ft, speed kt, vertical speed ft/min")
             }
             Self::Flightradar24 => ("Flightradar24 track", "altitude ft, speed kt"),
+            Self::Readsb => ("aircraft of readsb", "altitude ft, speed kt, vertical speed ft/min"),
+            Self::FlightAware => ("positions of FlightAware", "altitude 100 ft, speed kt"),
+            Self::BaseStation => {
+                ("messages of BaseStation", "altitude ft, speed kt, vertical speed ft/min")
+            }
             Self::Segments => ("flight segments", "flight levels, minutes of arc"),
             Self::FlightPoints => ("flight points of EUROCONTROL", "flight levels"),
             Self::Encounter => ("encounter", "as its second line tells"),
@@ -169,6 +193,48 @@ const FLIGHTRADAR24: &[NamedColumn] = &[
     ("altitude", Field::Altitude, 1.0),
     ("speed", Field::GroundSpeed, 1.0),
     ("direction", Field::Track, 1.0),
+    // The same quantities in its interface for programs.
+    ("hex", Field::Address, 1.0),
+    ("fr24_id", Field::FlightId, 1.0),
+    ("lat", Field::Latitude, 1.0),
+    ("lon", Field::Longitude, 1.0),
+    ("alt", Field::Altitude, 1.0),
+    ("gspeed", Field::GroundSpeed, 1.0),
+    ("track", Field::Track, 1.0),
+    ("vspeed", Field::VerticalSpeed, 1.0),
+];
+
+/// Names of readsb's JSON. Source: readsb, README-json.md.
+const READSB: &[NamedColumn] = &[
+    ("now", Field::Time, 1.0),
+    ("time", Field::Time, 1.0),
+    ("timestamp", Field::Time, 1.0),
+    ("hex", Field::Address, 1.0),
+    ("icao", Field::Address, 1.0),
+    ("icao24", Field::Address, 1.0),
+    ("flight", Field::Callsign, 1.0),
+    ("callsign", Field::Callsign, 1.0),
+    ("lat", Field::Latitude, 1.0),
+    ("lon", Field::Longitude, 1.0),
+    ("alt_baro", Field::Altitude, 1.0),
+    ("alt_geom", Field::GeometricAltitude, 1.0),
+    ("gs", Field::GroundSpeed, 1.0),
+    ("track", Field::Track, 1.0),
+    ("baro_rate", Field::VerticalSpeed, 1.0),
+    ("geom_rate", Field::VerticalSpeed, 1.0),
+    ("seen_pos", Field::PositionAge, 1.0),
+];
+
+/// Names of AeroAPI, whose altitudes are in hundreds of feet. Source: AeroAPI, `/flights/{id}/track`.
+const FLIGHT_AWARE: &[NamedColumn] = &[
+    ("timestamp", Field::Time, 1.0),
+    ("fa_flight_id", Field::FlightId, 1.0),
+    ("ident", Field::Callsign, 1.0),
+    ("latitude", Field::Latitude, 1.0),
+    ("longitude", Field::Longitude, 1.0),
+    ("altitude", Field::Altitude, 100.0),
+    ("groundspeed", Field::GroundSpeed, 1.0),
+    ("heading", Field::Track, 1.0),
 ];
 
 const OWN: &[NamedColumn] = &[
@@ -353,8 +419,8 @@ impl Layout {
 
 /// What a table needs that no known source has written.
 const COLUMN_REMEDY: &str = "give each column the name of what it holds, with the unit that its numbers have: `alt_ft` or \
-                             `alt_m`, `gs_kt` or `gs_m_s`, `vs_fpm` or `vs_m_s`; tables of OpenSky, of the library \
-                             traffic and of Flightradar24 are read as they are";
+                             `alt_m`, `gs_kt` or `gs_m_s`, `vs_fpm` or `vs_m_s`; files of OpenSky, the library \
+                             traffic, Flightradar24, FlightAware and readsb are read as they are";
 
 /// Largest number of columns that an error lists.
 const MAX_LISTED: usize = 16;
@@ -381,6 +447,9 @@ mod tests {
             ("timestamp,icao24,latitude,longitude,altitude,groundspeed", Source::TrafficLibrary),
             ("Timestamp,UTC,Callsign,Position,Altitude,Speed,Direction", Source::Flightradar24),
             ("ECTRL ID,Time Over,Flight Level,Latitude,Longitude", Source::FlightPoints),
+            ("fr24_id,hex,callsign,lat,lon,track,alt,gspeed,timestamp", Source::Flightradar24),
+            ("now,hex,flight,lat,lon,alt_baro,alt_geom,gs,track,seen_pos", Source::Readsb),
+            ("fa_flight_id,altitude,groundspeed,latitude,longitude,timestamp", Source::FlightAware),
         ] {
             assert_eq!(layout(header).expect(header).source, source, "{header}");
         }

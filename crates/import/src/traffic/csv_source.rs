@@ -1,7 +1,7 @@
 //! Tables of text with a header.
 
 use super::columns::Layout;
-use super::rows::{RowCollector, RowValues};
+use super::rows::{MISFIT_RULE, RowCollector, RowValues};
 use super::value::Value;
 use crate::table::{CsvRow, CsvTable};
 use sidestep_kernel::InputError;
@@ -26,8 +26,7 @@ pub(super) fn collect(collector: &mut RowCollector, text: &str) -> Result<(), In
         collector.push(row.line(), &layout, &row);
     }
     for misfit in table.misfits() {
-        let rule = "rows with fewer or more fields than the header";
-        collector.leave_out(misfit.line, misfit.line_count, rule);
+        collector.leave_out(misfit.line, misfit.line_count, MISFIT_RULE);
     }
     Ok(())
 }

@@ -2,13 +2,16 @@
 
 use super::options::TrafficOptions;
 use super::plausibility::{self, Suspicion, distance_m, likely_unit, suspicions};
-use super::rows::{CheckedRows, Row, RowCollector, UNUSED_COLUMNS_RULE};
+use super::rows::{
+    CheckedRows, Row, RowCollector, SAME_INSTANT_RULE, UNREACHED_RULE, UNUSED_COLUMNS_RULE,
+    remedy_of,
+};
 use super::summary::describe;
 use super::time::format_utc;
 use super::{MAX_SPEED_M_S, RecordedTraffic, Track};
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
 use sidestep_kernel::InputError;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The longest time in s on the ground, between two rows in the air, within one flight: a flag that was wrong for a
 /// moment ends no flight.
@@ -19,6 +22,13 @@ const MIN_CALLSIGN_S: f64 = 60.0;
 
 /// What reported speeds may differ from those of rows, before their unit is in doubt.
 const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
+
+/// What reported directions may differ from those of rows, in degrees: in the median, no wind does that.
+const MAX_DIRECTION_OFFSET_DEG: f64 = 45.0;
+
+/// A speed in kt that no aircraft reaches below [`LOW_FT`] on most of its way.
+const FAST_KT: f64 = 300.0;
+const LOW_FT: f64 = 1000.0;
 
 /// The rule by which flights of a single row are left out.
 pub const SINGLE_ROW_RULE: &str = "flights of a single row";
@@ -33,8 +43,8 @@ pub(super) fn into_traffic(
     collector: RowCollector,
     options: &TrafficOptions,
 ) -> Result<RecordedTraffic, InputError> {
-    let CheckedRows { place, noun, rows, row_count, report } = collector.finish()?;
-    let mut builder = FlightBuilder { options, noun, report, repeated_rows: 0 };
+    let CheckedRows { place, noun, rows, row_count, bad_count, report } = collector.finish()?;
+    let mut builder = FlightBuilder { options, noun, report, repeated_rows: 0, bad_count };
     let mut flights = Vec::new();
     for rows in builder.by_aircraft(rows) {
         let rows = builder.sort_by_time(rows);
@@ -46,6 +56,8 @@ pub(super) fn into_traffic(
         }
     }
     let ratio = builder.check_speed_unit(&flights);
+    builder.check_directions(&flights);
+    builder.check_levels(&flights);
     let mut parts = Vec::new();
     for flight in flights {
         let (rows, jumps) = builder.check_positions(flight, ratio);
@@ -54,7 +66,8 @@ pub(super) fn into_traffic(
         }));
     }
     builder.count_gaps(&parts);
-    let is_snapshot = !parts.is_empty() && parts.iter().all(|rows| rows.len() == 1);
+    builder.check_bad_count(&place, row_count)?;
+    let is_snapshot = is_snapshot(&parts);
     let tracks: Vec<Track> =
         parts.into_iter().filter_map(|rows| builder.track(rows, is_snapshot)).collect();
     if tracks.is_empty() {
@@ -74,6 +87,8 @@ struct FlightBuilder<'a> {
     noun: &'static str,
     report: ImportReport,
     repeated_rows: usize,
+    /// Number of rows that cannot be used.
+    bad_count: usize,
 }
 
 impl FlightBuilder<'_> {
@@ -143,8 +158,8 @@ impl FlightBuilder<'_> {
             if is_same {
                 self.record(Treatment::Repaired, "rows given twice are kept once", &row, "");
             } else {
-                let rule = "rows with another position at the instant of an earlier row";
-                self.record(Treatment::Dropped, rule, &row, "");
+                self.bad_count += 1;
+                self.record(Treatment::Dropped, SAME_INSTANT_RULE, &row, "");
             }
         }
         kept
@@ -268,6 +283,57 @@ impl FlightBuilder<'_> {
         ratio
     }
 
+    /// Names a column of directions that is not where the rows move to: for one instant, nothing else would tell.
+    fn check_directions(&mut self, flights: &[Vec<Row>]) {
+        let Some(offset_deg) = plausibility::direction_offset_deg(flights.iter()) else { return };
+        if offset_deg <= MAX_DIRECTION_OFFSET_DEG {
+            return;
+        }
+        let mut rows = flights.iter().flatten();
+        let has_small_numbers =
+            rows.all(|row| row.sample.track_deg.is_none_or(|deg| deg <= std::f64::consts::TAU));
+        let likely = if has_small_numbers { "radians" } else { "another quantity or unit" };
+        let rule = format!(
+            "rows move in a direction {offset_deg:.0} deg from the one that they report: the column may have {likely}"
+        );
+        let remedy = "write the directions of motion in degrees, clockwise from north";
+        self.report.record(Treatment::Suspicious, rule, "", remedy);
+    }
+
+    /// Names levels at which nobody flies as fast as the rows say.
+    fn check_levels(&mut self, flights: &[Vec<Row>]) {
+        let samples = flights.iter().flatten().map(|row| &row.sample);
+        let is_fast = |kt: f64| kt > FAST_KT;
+        let fast: Vec<f64> = samples
+            .filter(|sample| sample.ground_speed_kt.is_some_and(is_fast))
+            .map(|sample| sample.altitude_ft)
+            .collect();
+        let low = fast.iter().filter(|altitude_ft| **altitude_ft < LOW_FT).count();
+        if low * 2 <= fast.len() {
+            return;
+        }
+        let rule = format!(
+            "{low} of {} rows faster than {FAST_KT} kt are below {LOW_FT} ft: the column may have flight levels, or \
+             numbers that stand for none",
+            fast.len()
+        );
+        let remedy = "name a column of flight levels `flight_level`, and leave cells without an altitude empty";
+        self.report.record(Treatment::Suspicious, rule, "", remedy);
+    }
+
+    /// Refuses a file of which more than half is left out.
+    fn check_bad_count(&self, place: &str, row_count: usize) -> Result<(), InputError> {
+        if self.bad_count * 2 <= row_count {
+            return Ok(());
+        }
+        let dropped =
+            self.report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+        let rules: Vec<String> = dropped.map(ToString::to_string).collect();
+        let bad = self.bad_count;
+        let cause = format!("{bad} of {row_count} rows cannot be used: {}", rules.join("; "));
+        Err(InputError::new(place, cause, remedy_of(&self.report)))
+    }
+
     /// Names rows that can hardly be right, and leaves them out where that is wanted. Returns the others, and the numbers
     /// of rows at which the flight goes on elsewhere.
     fn check_positions(&mut self, rows: Vec<Row>, ratio: f64) -> (Vec<Row>, Vec<usize>) {
@@ -319,8 +385,8 @@ impl FlightBuilder<'_> {
             if is_possible {
                 kept.push(row);
             } else {
-                let rule = "rows with a position that nothing reaches from the row before";
-                self.record(Treatment::Dropped, rule, &row, "");
+                self.bad_count += 1;
+                self.record(Treatment::Dropped, UNREACHED_RULE, &row, "");
             }
         }
         kept
@@ -355,6 +421,13 @@ impl FlightBuilder<'_> {
         let remedy = "give a recording of aircraft in the air, each in two rows at least";
         InputError::new(place, cause, remedy)
     }
+}
+
+/// Returns whether every aircraft has one row: with more, rows that are far apart are no picture of one instant.
+fn is_snapshot(parts: &[Vec<Row>]) -> bool {
+    let mut aircraft = BTreeSet::new();
+    !parts.is_empty()
+        && parts.iter().all(|rows| rows.len() == 1 && aircraft.insert(aircraft_key(&rows[0])))
 }
 
 /// Returns what tells aircraft apart: the address, which has no case and no leading zeros, or else a name; and the

@@ -1,5 +1,6 @@
 //! JSON: answers of the REST interface of the OpenSky Network, one or many, with states as lists or as objects, and its
-//! answer to a request for a track; and rows of any table as objects, as the library `traffic` writes them.
+//! answer to a request for a track; rows of any table as objects, as the library `traffic` writes them; and lists of such
+//! rows within an object, as other networks give them: readsb, adsb.lol, ADS-B Exchange, Flightradar24, FlightAware.
 
 use super::columns::{Field, Layout, Source};
 use super::rows::{RowCollector, RowValues};
@@ -36,6 +37,31 @@ const STATE_KEYS: [&str; 18] = [
 /// The names of the values of a track's points, in the order in which the REST interface lists them.
 const PATH_KEYS: [&str; 6] =
     ["time", "latitude", "longitude", "baro_altitude", "true_track", "on_ground"];
+
+/// Names of lists of rows within an object: of readsb, of the networks that give its rows, of Flightradar24, of
+/// FlightAware.
+const LIST_KEYS: [&str; 5] = ["aircraft", "ac", "data", "tracks", "positions"];
+
+/// Names of values beside such a list that each of its rows has.
+const SHARED_KEYS: [&str; 8] =
+    ["now", "time", "timestamp", "fr24_id", "fa_flight_id", "ident", "callsign", "hex"];
+
+/// The names of the values of a trace's points of readsb, in the order of its lists. Source: readsb, README-json.md.
+const TRACE_KEYS: [&str; 11] = [
+    "timestamp",
+    "lat",
+    "lon",
+    "alt_baro",
+    "gs",
+    "track",
+    "flags",
+    "baro_rate",
+    "details",
+    "source",
+    "alt_geom",
+];
+/// The flag of a point whose altitude is the geometric one.
+const GEOMETRIC_FLAG: u64 = 8;
 
 /// One answer: a state of the air, or a track.
 #[derive(Debug, Deserialize)]
@@ -77,15 +103,24 @@ pub(super) fn collect(collector: &mut RowCollector, text: &str) -> Result<(), In
     }
     let layout = state_layout()?;
     collector.set_noun("state");
-    let mut states = StateReader { collector, layout, count: 0, records: Vec::new() };
-    for document in Deserializer::from_str(text).into_iter::<Json>() {
-        match document {
-            Ok(Json::Array(items)) => {
-                items.into_iter().try_for_each(|item| states.push_item(item))?
+    let mut states =
+        StateReader { collector, layout, count: 0, records: Vec::new(), broken_lines: Vec::new() };
+    let mut begin = 0;
+    while begin < text.len() {
+        let mut documents = Deserializer::from_str(&text[begin..]).into_iter::<Json>();
+        let error = loop {
+            match documents.next() {
+                Some(Ok(Json::Array(items))) => {
+                    items.into_iter().try_for_each(|item| states.push_item(item))?;
+                }
+                Some(Ok(item)) => states.push_item(item)?,
+                Some(Err(error)) => break Some(error),
+                None => break None,
             }
-            Ok(item) => states.push_item(item)?,
-            Err(error) => return Err(states.error(&error.to_string())),
-        }
+        };
+        let Some(error) = error else { break };
+        let good_end = begin + documents.byte_offset();
+        begin = states.leave_out_line(text, good_end, &error)?;
     }
     states.push_records()
 }
@@ -107,7 +142,13 @@ struct StateReader<'a> {
     count: usize,
     /// Rows of a table, whose columns are those of all of them.
     records: Vec<Map<String, Json>>,
+    /// Numbers of lines from which on a line is no JSON.
+    broken_lines: Vec<usize>,
 }
+
+const GEO_JSON_CAUSE: &str = "is GeoJSON, whose lines have no times";
+const GEO_JSON_REMEDY: &str = "give a table with a row for each point: `time_s`, `callsign`, `lat_deg`, `lon_deg`, `alt_m` \
+                               (the third coordinate is in meters)";
 
 impl StateReader<'_> {
     fn error(&self, cause: &str) -> InputError {
@@ -117,10 +158,42 @@ impl StateReader<'_> {
         InputError::new(self.collector.place(), cause, remedy)
     }
 
+    /// Leaves out what is no JSON up to the end of its line, after `good_end`; returns where the next line begins.
+    ///
+    /// # Errors
+    /// When nothing was read before it: then the whole text is something else.
+    fn leave_out_line(
+        &mut self,
+        text: &str,
+        good_end: usize,
+        error: &serde_json::Error,
+    ) -> Result<usize, InputError> {
+        if self.count == 0 && self.records.is_empty() {
+            return Err(self.error(&error.to_string()));
+        }
+        let rest = &text[good_end..];
+        let bad_begin = good_end + (rest.len() - rest.trim_start().len());
+        let line = 1 + text[..bad_begin].matches('\n').count();
+        self.broken_lines.push(line);
+        let line_length = text[bad_begin..].find('\n').map(|length| length + 1);
+        Ok(line_length.map_or(text.len(), |length| bad_begin + length))
+    }
+
     fn push_item(&mut self, item: Json) -> Result<(), InputError> {
-        let Json::Object(map) = item else {
+        let Json::Object(mut map) = item else {
             return Err(self.error("a list has something else than objects"));
         };
+        if map.get("type").is_some_and(|kind| kind == "FeatureCollection" || kind == "Feature") {
+            return Err(InputError::new(self.collector.place(), GEO_JSON_CAUSE, GEO_JSON_REMEDY));
+        }
+        if let Some(Json::Array(points)) = map.get_mut("trace").map(Json::take) {
+            self.push_trace(&map, points);
+            return Ok(());
+        }
+        let list_key = LIST_KEYS.iter().find(|key| map.get(**key).is_some_and(Json::is_array));
+        if let Some(Json::Array(items)) = list_key.and_then(|key| map.remove(*key)) {
+            return self.push_list(&map, items);
+        }
         if !map.contains_key("states") && !map.contains_key("path") {
             self.records.push(map);
             return Ok(());
@@ -129,6 +202,52 @@ impl StateReader<'_> {
         let answer: Answer = answer.map_err(|error| self.error(&error.to_string()))?;
         self.push_answer(answer);
         Ok(())
+    }
+
+    /// Keeps the rows of a list, each with what the object around the list says of all.
+    fn push_list(
+        &mut self,
+        around: &Map<String, Json>,
+        items: Vec<Json>,
+    ) -> Result<(), InputError> {
+        for item in items {
+            let Json::Object(mut row) = item else {
+                return Err(self.error("a list of rows has something else than objects"));
+            };
+            for key in SHARED_KEYS {
+                if let Some(value) = around.get(key)
+                    && !row.contains_key(key)
+                {
+                    row.insert(key.to_owned(), value.clone());
+                }
+            }
+            self.records.push(row);
+        }
+        Ok(())
+    }
+
+    /// Keeps the points of a trace of readsb, whose times are seconds after that of the trace.
+    fn push_trace(&mut self, around: &Map<String, Json>, points: Vec<Json>) {
+        let begin_s = around.get("timestamp").and_then(Json::as_f64).unwrap_or(0.0);
+        for point in points {
+            let Json::Array(values) = point else { continue };
+            let mut row = Map::new();
+            row.extend(TRACE_KEYS.map(str::to_owned).into_iter().zip(values));
+            let after_s = row.get("timestamp").and_then(Json::as_f64);
+            row.insert("timestamp".into(), after_s.map_or(Json::Null, |s| Json::from(begin_s + s)));
+            row.insert("icao".into(), around.get("icao").cloned().unwrap_or(Json::Null));
+            if let Some(Json::Object(mut details)) = row.remove("details") {
+                row.extend(details.remove("flight").map(|flight| ("flight".into(), flight)));
+            }
+            row.remove("source");
+            let flags = row.remove("flags").and_then(|flags| flags.as_u64()).unwrap_or(0);
+            if flags & GEOMETRIC_FLAG > 0
+                && let Some(altitude) = row.insert("alt_baro".into(), Json::Null)
+            {
+                row.insert("alt_geom".into(), altitude);
+            }
+            self.records.push(row);
+        }
     }
 
     fn push_answer(&mut self, answer: Answer) {
@@ -151,6 +270,17 @@ impl StateReader<'_> {
 
     /// Reads the rows of a table, of whose columns any row may lack some.
     fn push_records(&mut self) -> Result<(), InputError> {
+        self.push_records_as_rows()?;
+        let row_noun = self.collector.noun();
+        self.collector.set_noun("line");
+        for line in std::mem::take(&mut self.broken_lines) {
+            self.collector.leave_out(line, 1, "lines that are no JSON");
+        }
+        self.collector.set_noun(row_noun);
+        Ok(())
+    }
+
+    fn push_records_as_rows(&mut self) -> Result<(), InputError> {
         if self.records.is_empty() {
             return Ok(());
         }

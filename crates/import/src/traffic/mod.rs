@@ -6,24 +6,29 @@
 //! | OpenSky Network, state vectors (CSV, JSON) | `velocity`, `baroaltitude` or `geoaltitude`; `states` | m/s, m |
 //! | library `traffic` (CSV, Parquet) | `timestamp`, `latitude`, `longitude`, `altitude`, `groundspeed` or `flight_id` | kt, ft, ft/min |
 //! | Flightradar24 (CSV) | `Timestamp`, `Position`, `Direction` | kt, ft |
+//! | readsb, adsb.lol, ADS-B Exchange (JSON: aircraft, traces) | `alt_baro`, `hex`; `trace` | kt, ft, ft/min |
+//! | Flightradar24 and FlightAware (JSON of their interfaces) | `gspeed`; `fa_flight_id` | kt, ft or 100 ft |
+//! | BaseStation (SBS-1) | lines of `MSG` and 22 fields | kt, ft, ft/min |
 //! | EUROCONTROL so6, m1 and m3 | 20 fields a line | flight levels, minutes of arc |
 //! | EUROCONTROL R&D data archive, flight points (CSV) | `ECTRL ID`, `Time Over` | flight levels, day before month |
 //! | DAIDALUS (.daa) | a line of names, a line of units | in the second line |
 //! | any other table | names with units: `alt_m`, `gs_m_s` | in the names |
 //!
-//! Tables have commas, semicolons or tabs, decimal points or commas, and times as ISO 8601 or as seconds, milliseconds,
+//! Tables have commas, semicolons, tabs or `|`, decimal points or commas, and times as ISO 8601 or as seconds, milliseconds,
 //! microseconds or nanoseconds since 1970. Files may be compressed with gzip.
 //!
 //! Rows without a position are left out. The rows of an aircraft become flights: they are split at gaps, at changes of
 //! call sign and at stops on the ground, whose rows are no traffic. Rows that can hardly be right are named; see
 //! [`TrafficOptions`]. All of it stands in the report.
 
+mod base_station;
 mod clean;
 mod columns;
 mod csv_source;
 mod daa;
 mod flights;
 mod json_source;
+mod named;
 mod options;
 mod parquet_source;
 #[cfg(test)]
@@ -34,8 +39,11 @@ mod so6;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod text;
 mod time;
 mod value;
+#[cfg(test)]
+mod wild_tests;
 
 use super::local_plane::LatLon;
 use super::report::ImportReport;
@@ -47,6 +55,8 @@ use std::path::Path;
 
 pub use clean::to_csv;
 pub use flights::SINGLE_ROW_RULE;
+pub(crate) use named::begins_as_traffic;
+pub use named::{has_extension, is_traffic};
 pub use options::TrafficOptions;
 pub use time::format_utc;
 
@@ -102,16 +112,6 @@ pub const MAX_SPEED_M_S: f64 = 1e6;
 /// The maximum size of a file in bytes after decompression.
 pub const MAX_TRAFFIC_BYTES: u64 = super::table::MAX_CSV_BYTES;
 
-/// Ends of names, without `.gz`, of files that hold recorded traffic.
-const EXTENSIONS: [&str; 6] = [".csv", ".tsv", ".json", ".parquet", ".so6", ".daa"];
-
-/// Returns whether a file holds recorded traffic, by its name.
-pub fn has_extension(file: &Path) -> bool {
-    let name = file.to_string_lossy().to_ascii_lowercase();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    EXTENSIONS.iter().any(|extension| name.ends_with(extension))
-}
-
 /// Reads a file, plain or compressed with gzip.
 ///
 /// # Errors
@@ -148,17 +148,28 @@ pub fn parse_with(
 ) -> Result<RecordedTraffic, InputError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut collector = RowCollector::new(place, "line");
+    collect(&mut collector, text)?;
+    flights::into_traffic(collector, options)
+}
+
+/// Reads the rows of a text, whose source its first lines tell.
+fn collect(collector: &mut RowCollector, text: &str) -> Result<(), InputError> {
     let start = text.trim_start();
     if start.starts_with(['{', '[']) {
-        json_source::collect(&mut collector, text)?;
-    } else if so6::is_so6(text) {
-        so6::collect(&mut collector, text);
-    } else if daa::is_daa(text) {
-        daa::collect(&mut collector, text)?;
-    } else {
-        csv_source::collect(&mut collector, text)?;
+        return json_source::collect(collector, text);
     }
-    flights::into_traffic(collector, options)
+    if so6::is_so6(text) {
+        so6::collect(collector, text);
+        return Ok(());
+    }
+    if base_station::is_base_station(text) {
+        base_station::collect(collector, text);
+        return Ok(());
+    }
+    if daa::is_daa(text) {
+        return daa::collect(collector, text);
+    }
+    csv_source::collect(collector, text)
 }
 
 /// Parses the content of a file, text or Parquet; `place` is its name in errors.
@@ -175,11 +186,8 @@ pub fn from_bytes(
         parquet_source::collect(&mut collector, bytes)?;
         return flights::into_traffic(collector, options);
     }
-    let text = String::from_utf8(bytes).map_err(|error| {
-        let cause = "is neither a text (UTF-8) nor a Parquet file";
-        let readable = String::from_utf8_lossy(error.as_bytes());
-        InputError::new(place, cause, "save the file as UTF-8")
-            .with_byte_offset(&readable, error.utf8_error().valid_up_to())
-    })?;
-    parse_with(place, &text, options)
+    let mut collector = RowCollector::new(place, "line");
+    let text = text::decode(bytes, &mut collector)?;
+    collect(&mut collector, text.strip_prefix('\u{feff}').unwrap_or(&text))?;
+    flights::into_traffic(collector, options)
 }

@@ -66,6 +66,53 @@ pub(super) fn speed_ratio<'a>(flights: impl Iterator<Item = &'a Vec<Row>>) -> Op
     if ratios.len() < MIN_STRETCHES { None } else { median(&mut ratios) }
 }
 
+/// Returns the median angle in degrees, from 0 to 180, between the directions in which rows move and those that they
+/// report; `None` where too few do either.
+pub(super) fn direction_offset_deg<'a>(flights: impl Iterator<Item = &'a Vec<Row>>) -> Option<f64> {
+    /// Fewer steps tell nothing about a column.
+    const MIN_STEPS: usize = 4;
+    let mut offsets = Vec::new();
+    for rows in flights {
+        let Some(mut from) = rows.first() else { continue };
+        for row in rows {
+            // A short step is mostly noise, and in a long one an aircraft may turn.
+            let length_m = distance_m(from.sample.position, row.sample.position);
+            let duration_s = row.sample.time_s - from.sample.time_s;
+            if length_m <= TOLERANCE_M && duration_s <= MIN_STRETCH_S {
+                continue;
+            }
+            let before = std::mem::replace(&mut from, row);
+            if let (Some(from_deg), Some(to_deg)) = (before.sample.track_deg, row.sample.track_deg)
+                && angle_deg(from_deg, to_deg) < MAX_TURN_DEG
+                && length_m > TOLERANCE_M
+            {
+                let moved_deg = bearing_deg(before.sample.position, row.sample.position);
+                offsets.push(angle_deg(moved_deg, from_deg));
+            }
+        }
+    }
+    if offsets.len() < MIN_STEPS { None } else { median(&mut offsets) }
+}
+
+/// The greatest turn in degrees within a step whose direction tells something.
+const MAX_TURN_DEG: f64 = 20.0;
+
+/// Returns the angle between two directions, from 0 to 180.
+fn angle_deg(a_deg: f64, b_deg: f64) -> f64 {
+    let turn_deg = (a_deg - b_deg).rem_euclid(360.0);
+    turn_deg.min(360.0 - turn_deg)
+}
+
+/// Returns the direction at `a` of the shortest way to `b`, in degrees, clockwise from north.
+fn bearing_deg(a: LatLon, b: LatLon) -> f64 {
+    let [a_rad, b_rad] = [a.lat_deg.to_radians(), b.lat_deg.to_radians()];
+    let east_rad = (b.lon_deg - a.lon_deg).to_radians();
+    let east = math::sin(east_rad) * math::cos(b_rad);
+    let north = math::cos(a_rad) * math::sin(b_rad)
+        - math::sin(a_rad) * math::cos(b_rad) * math::cos(east_rad);
+    math::atan2(east, north).to_degrees()
+}
+
 /// The shortest time in s over which speeds are compared: positions may be repeated for some seconds.
 const MIN_STRETCH_S: f64 = 30.0;
 

@@ -21,6 +21,37 @@ const MAX_DURATION_S: f64 = 1e9;
 /// The rule by which columns are not used.
 pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
+const NO_TIME: &str = "rows with a time that is neither ISO 8601 nor a number since 1970";
+const NO_NUMBER_POSITION: &str = "rows with a position that is no number";
+const NO_NUMBER_ALTITUDE: &str = "rows with an altitude that is no number";
+/// The rule by which rows with a wrong number of fields are left out.
+pub(super) const MISFIT_RULE: &str = "rows with fewer or more fields than the header";
+/// The rule by which one of several rows of an instant is kept.
+pub(super) const SAME_INSTANT_RULE: &str =
+    "rows with another position at the instant of an earlier row";
+/// The rule by which rows are left out that nothing reaches.
+pub(super) const UNREACHED_RULE: &str =
+    "rows with a position that nothing reaches from the row before";
+
+/// What helps where most rows are left out by a rule.
+const REMEDIES: [(&str, &str); 6] = [
+    (NO_TIME, "write times as 2018-08-01T09:00:00Z, or as seconds since 1970: 1533114000"),
+    (
+        NO_NUMBER_POSITION,
+        "write degrees as plain numbers, negative in the south and west: 47.5 and -7.25",
+    ),
+    (
+        NO_NUMBER_ALTITUDE,
+        "write plain numbers in the unit that the column's name has: 35000 in `alt_ft`, 350 in `flight_level`",
+    ),
+    (MISFIT_RULE, "give every row one field per column of the header"),
+    (SAME_INSTANT_RULE, "write times with all their digits: fractions of a second as well"),
+    (
+        UNREACHED_RULE,
+        "see that times are seconds since 1970 or ISO 8601, not days, and that positions are degrees",
+    ),
+];
+
 /// A row of one aircraft.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Row {
@@ -44,6 +75,9 @@ struct TimedRow {
     time: WrittenTime,
     position_time: Option<WrittenTime>,
 }
+
+/// The word that readsb writes for the altitude of an aircraft on the ground.
+const GROUND_WORD: &str = "ground";
 
 /// A row as its file holds it.
 pub(super) trait RowValues {
@@ -81,6 +115,11 @@ impl RowCollector {
     /// Returns the name of the file in errors.
     pub(super) fn place(&self) -> &str {
         &self.place
+    }
+
+    /// Returns the word for a row.
+    pub(super) fn noun(&self) -> &'static str {
+        self.noun
     }
 
     /// Sets the word for a row.
@@ -159,8 +198,9 @@ impl RowCollector {
             let TimedRow { mut row, time, position_time } = timed;
             zoneless += usize::from(matches!(time, WrittenTime::Calendar { has_zone: false, .. }));
             row.sample.time_s = seconds(time, unit);
-            let received_s = position_time.map_or(row.sample.time_s, |time| seconds(time, unit));
-            row.position_age_s = row.sample.time_s - received_s;
+            if let Some(time) = position_time {
+                row.position_age_s = row.sample.time_s - seconds(time, unit);
+            }
             rows.push(row);
         }
         if zoneless > 0 {
@@ -178,6 +218,7 @@ impl RowCollector {
             noun: self.noun,
             rows,
             row_count: self.row_count,
+            bad_count: self.bad_count,
             report: self.report,
         })
     }
@@ -229,13 +270,20 @@ impl RowCollector {
             self.row_count,
             rules.join("; ")
         );
-        let remedy = "restore these rows, or delete them and read the rest";
-        let error = InputError::new(&self.place, cause, remedy);
+        let error = InputError::new(&self.place, cause, remedy_of(&self.report));
         Err(match self.first_bad {
             Some(line) if self.noun == "line" => error.with_position(line, 1),
             _ => error,
         })
     }
+}
+
+/// Returns what helps against the rule that left out the most.
+pub(super) fn remedy_of(report: &ImportReport) -> &'static str {
+    let dropped = report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+    let first = dropped.max_by_key(|found| found.count);
+    let known = REMEDIES.iter().find(|(rule, _)| first.is_some_and(|found| found.rule == *rule));
+    known.map_or("restore these rows, or delete them and read the rest", |(_, remedy)| remedy)
 }
 
 /// Rows of a file that can be used, and what became of the others.
@@ -245,6 +293,8 @@ pub(super) struct CheckedRows {
     pub(super) noun: &'static str,
     pub(super) rows: Vec<Row>,
     pub(super) row_count: usize,
+    /// The number of rows that were left out.
+    pub(super) bad_count: usize,
     pub(super) report: ImportReport,
 }
 
@@ -282,7 +332,7 @@ impl RowReader<'_> {
             Some(time) => time,
             None if self.value(Field::Time) == Value::Missing => return Err("rows without a time"),
             None => {
-                return Err("rows with a time that is neither ISO 8601 nor a number since 1970");
+                return Err(NO_TIME);
             }
         };
         let position = self.position()?;
@@ -297,7 +347,7 @@ impl RowReader<'_> {
             callsign: self.name(Field::Callsign),
             flight_id: self.name(Field::FlightId),
             is_on_ground: self.is_on_ground(altitude_ft),
-            position_age_s: 0.0,
+            position_age_s: self.scaled(Field::PositionAge).ok().flatten().unwrap_or(0.0),
             sample: Sample {
                 time_s: 0.0,
                 position,
@@ -350,9 +400,8 @@ impl RowReader<'_> {
             }
             _ => (self.scaled(Field::Latitude), self.scaled(Field::Longitude)),
         };
-        const NO_NUMBER: Rule = "rows with a position that is no number";
-        let lat_deg = lat.map_err(|NotANumber| NO_NUMBER)?.ok_or(NONE)?;
-        let lon_deg = lon.map_err(|NotANumber| NO_NUMBER)?.ok_or(NONE)?;
+        let lat_deg = lat.map_err(|NotANumber| NO_NUMBER_POSITION)?.ok_or(NONE)?;
+        let lon_deg = lon.map_err(|NotANumber| NO_NUMBER_POSITION)?.ok_or(NONE)?;
         let is_on_earth = (-90.0..=90.0).contains(&lat_deg) && (-180.0..=360.0).contains(&lon_deg);
         if !is_on_earth {
             return Err("rows with a position that is not on the earth");
@@ -371,8 +420,13 @@ impl RowReader<'_> {
     fn altitude_ft(&self) -> Result<f64, Rule> {
         const NONE: Rule = "rows without an altitude";
         let column = self.layout.altitude().ok_or(NONE)?;
-        let value = self.values.value(column.index).number();
-        let value = value.map_err(|NotANumber| "rows with an altitude that is no number")?;
+        let cell = self.values.value(column.index);
+        let is_missing = cell == Value::Missing || is_ground_word(cell);
+        if is_missing && self.is_on_ground(f64::NAN) == Some(true) {
+            // Transponders report no level there, and the row is no traffic anyway.
+            return Ok(0.0);
+        }
+        let value = cell.number().map_err(|NotANumber| NO_NUMBER_ALTITUDE)?;
         let altitude_ft = value.ok_or(NONE)? * column.factor;
         if !ALTITUDES_FT.contains(&altitude_ft) {
             return Err("rows with an altitude that no aircraft has");
@@ -394,6 +448,13 @@ impl RowReader<'_> {
         if self.layout.source == Source::Flightradar24 && altitude_ft == 0.0 {
             return Some(true);
         }
+        if is_ground_word(self.value(Field::Altitude)) {
+            return Some(true);
+        }
         self.value(Field::OnGround).flag()
     }
+}
+
+fn is_ground_word(cell: Value<'_>) -> bool {
+    matches!(cell, Value::Text(text) if text.eq_ignore_ascii_case(GROUND_WORD))
 }

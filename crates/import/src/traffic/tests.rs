@@ -612,7 +612,7 @@ fn a_packed_file_reads_the_same() {
 #[test]
 fn a_file_that_is_neither_text_nor_parquet_is_refused() {
     let options = TrafficOptions::default();
-    let error = from_bytes(&"f", vec![0xff, 0xfe, 0, 1], &options).unwrap_err();
+    let error = from_bytes(&"f", vec![0xff, 0xfd, 0, 1], &options).unwrap_err();
     assert!(error.cause().contains("neither a text"), "{error}");
     for bytes in
         [&b"PAR1"[..], b"PAR1\0\0\0\0PAR1", b"PAR1xxxxxxxxxxxxxxxxxxxxx\xff\xff\xff\x7fPAR1"]

@@ -61,6 +61,9 @@ impl UnixUnit {
 /// Reads a number, or a date and a time of day as ISO 8601 and its relatives write them: `2018-08-01T09:00:00Z`,
 /// `2018-08-01 09:00:00.5+02:00`, `2018/08/01 09:00`.
 pub(super) fn parse_time(text: &str) -> Option<WrittenTime> {
+    if let Some(time) = parse_compact(text) {
+        return Some(time);
+    }
     if let Ok(value) = text.parse::<f64>() {
         return value.is_finite().then_some(WrittenTime::Unix(value));
     }
@@ -76,6 +79,21 @@ pub(super) fn parse_time(text: &str) -> Option<WrittenTime> {
         utc_s: time_s - offset_s.unwrap_or(0.0),
         has_zone: offset_s.is_some(),
     })
+}
+
+/// Reads the basic form of ISO 8601, `20180801T090000Z`, also without letters: as a count of milliseconds those digits
+/// would be six centuries from now.
+fn parse_compact(text: &str) -> Option<WrittenTime> {
+    let (date, rest) = text.split_at_checked(8)?;
+    let clock = rest.strip_prefix(['T', 't', ' ']).unwrap_or(rest);
+    let (clock, zone) = clock.split_at_checked(6)?;
+    let are_digits = [date, clock].iter().all(|part| part.bytes().all(|b| b.is_ascii_digit()));
+    if !are_digits || zone.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let (year, month, day) = (&date[..4], &date[4..6], &date[6..]);
+    let (hours, minutes, seconds) = (&clock[..2], &clock[2..4], &clock[4..]);
+    parse_time(&format!("{year}-{month}-{day}T{hours}:{minutes}:{seconds}{zone}"))
 }
 
 /// Reads a date and a time of day with the day first, `DD-MM-YYYY HH:MM:SS`, of a source that is known to write so.
@@ -119,7 +137,8 @@ pub(super) fn days_since_1970(year: u32, month: u32, day: u32) -> Option<i64> {
 
 /// Returns a clock without its offset from UTC, and the offset in s; `None` for an offset that is none.
 fn split_zone(text: &str) -> Option<(&str, Option<f64>)> {
-    if let Some(clock) = text.strip_suffix(['Z', 'z']).or_else(|| text.strip_suffix("UTC")) {
+    let universal = ["Z", "z", "UTC", "GMT"].iter().find_map(|zone| text.strip_suffix(zone));
+    if let Some(clock) = universal {
         return Some((clock.trim_end(), Some(0.0)));
     }
     let Some(at) = text.rfind(['+', '-']) else {
@@ -217,6 +236,10 @@ mod tests {
             "2018-08-01T09:00:00,0Z",
             "2018/08/01 09:00",
             "2018-08-01 09:00:00 UTC",
+            "2018-08-01 09:00:00 GMT",
+            "20180801T090000Z",
+            "20180801T110000.0+0200",
+            "20180801090000",
         ] {
             assert_eq!(utc_s(text), Some(1_533_114_000.0), "{text}");
         }
@@ -242,6 +265,7 @@ mod tests {
             "2018-08-01T09:00:00+1:0",
             "2018-08-0\u{e9}T09",
             "09:00:00",
+            "20180801T0900",
         ] {
             assert_eq!(parse_time(text), None, "{text}");
         }

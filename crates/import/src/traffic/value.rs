@@ -44,9 +44,9 @@ impl<'a> Value<'a> {
         match self {
             Self::Flag(flag) => Some(flag),
             Self::Number(0.0) => Some(false),
-            Self::Number(1.0) => Some(true),
+            Self::Number(1.0 | -1.0) => Some(true),
             Self::Text(text) => match text.to_ascii_lowercase().as_str() {
-                "true" | "t" | "yes" | "y" | "1" | "1.0" => Some(true),
+                "true" | "t" | "yes" | "y" | "1" | "1.0" | "-1" => Some(true),
                 "false" | "f" | "no" | "n" | "0" | "0.0" => Some(false),
                 _ => None,
             },

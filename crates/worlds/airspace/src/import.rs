@@ -26,7 +26,7 @@ fn traffic_file_format(file: &Path) -> TrafficFileFormat {
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     if name.ends_with(".scn") {
         TrafficFileFormat::Bluesky
-    } else if traffic::has_extension(file) {
+    } else if traffic::is_traffic(file) {
         TrafficFileFormat::Tracks
     } else {
         TrafficFileFormat::Other
