@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from . import _native
 from ._errors import input_error
@@ -52,12 +53,14 @@ def inspect(
     *,
     strict: bool = False,
     clean: str | os.PathLike[str] | None = None,
+    import_options: Mapping[str, Any] | None = None,
 ) -> ImportReport:
     """Returns what a file or folder is, and what becomes of it when it is read, like ``sidestep inspect``.
 
     It reads what any function or command reads: maps, robot models, logs, bags, recorded traffic, scenarios, folders of
     runs and sweeps, recordings. ``clean`` is a file to write what was kept to: tracks as CSV, a CARMEN log, a bag as
-    MCAP, a map as YAML and PGM.
+    MCAP, a map as YAML and PGM. ``import_options`` has what ``--set import.KEY=VALUE`` gives to the command:
+    ``{"max_gap_s": 120}``.
 
     Raises InputError when the file cannot be read, or more than half of it is bad; with ``strict`` when anything was
     left out.
@@ -67,7 +70,7 @@ def inspect(
     >>> report.format, report.kept["joints"], report.dropped
     ('URDF', 8, 0)
     """
-    found = _native.inspect(file)
+    found = _native.inspect(file, import_options)
     report = ImportReport(
         file=found["file"],
         format=found["format"],
@@ -79,5 +82,5 @@ def inspect(
         cause = f"{report.dropped} items were left out, and strict is set"
         raise input_error(report.file, cause, "mend them in the file, or go without strict")
     if clean is not None:
-        _native.write_clean(file, clean)
+        _native.write_clean(file, clean, import_options)
     return report

@@ -195,6 +195,19 @@ impl Arm {
         Ok(PyArray1::from_vec(py, self.0.named_posture(name).map_err(|e| option_error(&e))?))
     }
 
+    /// What was not taken as it stood in its files, as `Finding` objects, like `sidestep.inspect` names it.
+    ///
+    /// >>> [finding.treatment for finding in arm.findings]
+    /// []
+    #[getter]
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let findings = self.0.findings().into_iter().map(|finding| {
+            let fields = serde_json::to_value(finding).expect("a finding is plain data");
+            Fields::from_json(py, &fields)?.build(ResultClass("sidestep._inspect", "Finding"))
+        });
+        PyList::new(py, findings.collect::<PyResult<Vec<_>>>()?)
+    }
+
     fn __repr__(&self) -> String {
         let robot = &self.0.model.name;
         let chain = &self.0.chain;

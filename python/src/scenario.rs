@@ -8,7 +8,8 @@ use crate::worlds;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping};
 use sidestep::kernel::InputError;
-use sidestep::scenario::{CompiledScenario, ResolvedScenario, SeedTemplate, Source};
+use sidestep::scenario::{CompiledScenario, ImportOptions, ResolvedScenario, SeedTemplate, Source};
+use sidestep_session::GivenScenario;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -19,9 +20,10 @@ const MAX_UNINTERRUPTED_BODIES: usize = 100;
 
 /// A scenario, read, checked and compiled. It never changes; simulations share it.
 ///
-/// Scenario(scenario=None, *, text=None, base=None): a path (or a file of another program that the command reads,
-/// such as BlueSky's .scn), a dict with the keys of a scenario file, or `text`, the content of one. Paths in a dict
-/// or text are relative to `base`, by default the present folder.
+/// Scenario(scenario=None, *, text=None, base=None, import_options=None): a path (or a file of another program that the
+/// command reads, such as BlueSky's .scn or recorded traffic), a dict with the keys of a scenario file, or `text`, the
+/// content of one. Paths in a dict or text are relative to `base`, by default the present folder. `import_options` is a
+/// dict of what `--set import.KEY=VALUE` gives to the command: {"max_gap_s": 120, "leave_out_suspicious": True}.
 ///
 /// Raises InputError, with the key that is wrong. Examples of its methods continue from here:
 ///
@@ -43,6 +45,8 @@ pub(crate) struct LoadedScenario {
     seedless: OnceLock<Option<SeedTemplate>>,
     /// Holds its files, if it was unpacked from a bundle.
     unpacked: Option<Arc<tempfile::TempDir>>,
+    /// What was not taken as it stood in the file of another program, if it was one.
+    import_findings: Vec<String>,
 }
 
 /// Where the text of a scenario comes from, and whether it is written yet.
@@ -70,7 +74,8 @@ impl LoadedScenario {
     ) -> Self {
         let resolved = OnceLock::new();
         let seedless = OnceLock::new();
-        Self { compiled, text, is_dict, resolved, seedless, unpacked }
+        let import_findings = Vec::new();
+        Self { compiled, text, is_dict, resolved, seedless, unpacked, import_findings }
     }
 
     /// Returns the scenario of a bundle, whose files are unpacked to a temporary folder.
@@ -145,7 +150,9 @@ impl LoadedScenario {
         };
         let compiled = compiled.map_err(|e| scenario_error(&e, self.is_dict))?;
         let text = ScenarioText::Reseeded { of: Arc::clone(of), seed, source: OnceLock::new() };
-        Ok(Self::from_compiled(compiled, text, self.is_dict, self.unpacked.clone()))
+        let import_findings = self.import_findings.clone();
+        let reseeded = Self::from_compiled(compiled, text, self.is_dict, self.unpacked.clone());
+        Ok(Self { import_findings, ..reseeded })
     }
 
     /// Returns the same scenario with another seed, read and compiled anew.
@@ -161,7 +168,11 @@ impl LoadedScenario {
             .clone()
             .with_overrides(overrides)
             .map_err(|e| scenario_error(&e, self.is_dict))?;
-        Ok(Self { unpacked: self.unpacked.clone(), ..Self::new(py, source, self.is_dict)? })
+        Ok(Self {
+            unpacked: self.unpacked.clone(),
+            import_findings: self.import_findings.clone(),
+            ..Self::new(py, source, self.is_dict)?
+        })
     }
 }
 
@@ -194,16 +205,46 @@ pub(crate) fn load(scenario: &Bound<'_, PyAny>) -> PyResult<Arc<LoadedScenario>>
     if let Ok(scenario) = scenario.cast::<Scenario>() {
         return Ok(Arc::clone(&scenario.get().0));
     }
-    load_any(scenario.py(), Some(scenario), None, None).map(Arc::new)
+    load_any(scenario.py(), Some(scenario), ScenarioOrigin::default()).map(Arc::new)
+}
+
+/// Returns the options of an import: the keys and values that follow `--set import.` in the command.
+pub(crate) fn import_options(given: Option<&Bound<'_, PyMapping>>) -> PyResult<ImportOptions> {
+    Ok(ImportOptions::from_overrides(&import_overrides(given)?))
+}
+
+fn import_overrides(given: Option<&Bound<'_, PyMapping>>) -> PyResult<Vec<String>> {
+    let mut overrides = Vec::new();
+    for (key, value) in
+        given.map(|given| to_toml_table(given, "import_options")).transpose()?.unwrap_or_default()
+    {
+        let key = key.strip_prefix("import.").unwrap_or(&key);
+        overrides.push(format!("import.{key}={value}"));
+    }
+    Ok(overrides)
+}
+
+/// What belongs to a scenario beside the scenario itself.
+#[derive(Default)]
+struct ScenarioOrigin<'a, 'py> {
+    text: Option<&'a str>,
+    base: Option<PathBuf>,
+    import_options: Option<&'a Bound<'py, PyMapping>>,
 }
 
 fn load_any(
     py: Python<'_>,
     scenario: Option<&Bound<'_, PyAny>>,
-    text: Option<&str>,
-    base: Option<PathBuf>,
+    origin: ScenarioOrigin<'_, '_>,
 ) -> PyResult<LoadedScenario> {
+    let ScenarioOrigin { text, base, import_options } = origin;
     let base = base.unwrap_or_default();
+    let overrides = import_overrides(import_options)?;
+    let is_file = scenario.is_some_and(|given| given.cast::<PyMapping>().is_err());
+    if !is_file && !overrides.is_empty() {
+        let cause = "these are choices about a file of another program, and none is given";
+        return Err(argument_error("import_options", cause, "leave it out, or give a path"));
+    }
     match (scenario, text) {
         (None, Some(text)) => LoadedScenario::new(py, Source::new("text", text, base), false),
         (Some(given), None) => match given.cast::<PyMapping>() {
@@ -215,10 +256,16 @@ fn load_any(
                 })?;
                 refuse_text_as_path(&path)?;
                 let read = run_interruptible(py, || {
-                    sidestep_session::read_scenario(worlds::list(), &path, &[])
+                    let given = GivenScenario::read(worlds::list(), &path, &overrides)?;
+                    let compiled = given.compile(worlds::list(), &overrides)?;
+                    Ok::<_, InputError>((given, compiled))
                 })?;
-                let (source, compiled) = read.map_err(|e| error::input_error(&e))?;
-                Ok(LoadedScenario::from_compiled(compiled, ScenarioText::Own(source), false, None))
+                let (given, (source, compiled)) = read.map_err(|e| error::input_error(&e))?;
+                let text = ScenarioText::Own(source);
+                let loaded = LoadedScenario::from_compiled(compiled, text, false, None);
+                let imported = given.import_report().map(|imported| &imported.report.findings);
+                let import_findings = imported.into_iter().flatten().map(ToString::to_string);
+                Ok(LoadedScenario { import_findings: import_findings.collect(), ..loaded })
             }
         },
         _ => {
@@ -256,14 +303,16 @@ fn source_of_dict(mapping: &Bound<'_, PyMapping>, base: &Path) -> PyResult<Sourc
 #[pymethods]
 impl Scenario {
     #[new]
-    #[pyo3(signature = (scenario=None, *, text=None, base=None))]
+    #[pyo3(signature = (scenario=None, *, text=None, base=None, import_options=None))]
     fn new(
         py: Python<'_>,
         scenario: Option<&Bound<'_, PyAny>>,
         text: Option<&str>,
         base: Option<PathBuf>,
+        import_options: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<Self> {
-        load_any(py, scenario, text, base).map(|loaded| Self(Arc::new(loaded)))
+        let origin = ScenarioOrigin { text, base, import_options };
+        load_any(py, scenario, origin).map(|loaded| Self(Arc::new(loaded)))
     }
 
     /// Returns the same scenario with other values: `set(seed=3)`, `set({"robots.0.count": 5})`. A dotted key goes by tables and
@@ -291,13 +340,15 @@ impl Scenario {
         self.0.with(py, &overrides).map(|loaded| Self(Arc::new(loaded)))
     }
 
-    /// Returns the surprises for its author, the weightiest first: `key: words`.
+    /// Returns the surprises for its author: of a file of another program first what was not taken as it stood, then
+    /// `key: words`, the weightiest first.
     ///
     /// >>> scenario.check()
     /// []
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let remarks = self.0.compiled.remarks();
-        to_list(py, remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words)))
+        let remarks = remarks.into_iter().map(|remark| format!("{}: {}", remark.key, remark.words));
+        to_list(py, self.0.import_findings.iter().cloned().chain(remarks))
     }
 
     /// Name of its world.

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sidestep_kernel::InputError;
 use sidestep_kernel::shell::shell_quote;
+use sidestep_kernel::terminal::escape_controls;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, Deserializer};
@@ -310,7 +311,9 @@ impl Source {
 
     /// Returns the first line of a resolved scenario: its source, and the program that resolved it.
     pub fn heading(&self) -> String {
-        let name = Path::new(self.file_place()).file_name().unwrap_or_default().display();
+        let name = Path::new(self.file_place()).file_name().unwrap_or_default().to_string_lossy();
+        // A name may have line ends, and a comment ends with its line.
+        let name = escape_controls(&name);
         format!("# {name}, resolved by sidestep {}\n", env!("CARGO_PKG_VERSION"))
     }
 

@@ -179,6 +179,11 @@ impl ImportOptions {
         text.trim_start().starts_with(Self::PREFIX)
     }
 
+    /// Returns whether none are given.
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
     /// Returns the options, as keys and values.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
         self.pairs.iter().map(|(key, value)| (key.as_str(), value.as_str()))

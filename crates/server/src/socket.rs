@@ -15,7 +15,7 @@ use crate::session::{
 };
 use crate::state::AppState;
 use axum::extract::ws::{Message, WebSocket};
-use sidestep_scenario::{Source, Worlds};
+use sidestep_scenario::{ImportOptions, Source, Worlds};
 use sidestep_session::Error;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -305,7 +305,8 @@ fn import_report(deps: &SessionDeps, path: &str) -> Result<ReplyBody, Problem> {
         let remedy = "open a scenario instead, or choose a map, a profile or traffic";
         return Err(Problem::new(path.to_string(), "this is no file to import", remedy));
     }
-    let inspected = sidestep_session::inspect(&deps.worlds, &file).map_err(|e| match e {
+    let inspected = sidestep_session::inspect(&deps.worlds, &file, &ImportOptions::default());
+    let inspected = inspected.map_err(|e| match e {
         Error::Input(error) => problem(&error),
         other => Problem::new(path.to_string(), other.to_string(), "try another file"),
     })?;

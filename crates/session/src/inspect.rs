@@ -1,11 +1,13 @@
 //! What any file or folder that this program reads is, and what becomes of it when it is read.
 
 use crate::files::replace_atomically;
+use crate::sweep::check_variants;
 use crate::{Error, write_atomically};
 use serde::Serialize;
 use serde_json::Value;
 use sidestep_experiment::sweep::Sweep;
-use sidestep_import::{ForeignFormat, bag, carmen, clean_map, traffic};
+use sidestep_import::traffic::{self, TrafficOptions};
+use sidestep_import::{ForeignFormat, bag, carmen, clean_map};
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::SweepFolder;
 use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, row_count, tables};
@@ -24,16 +26,20 @@ pub struct InspectedFile {
 }
 
 /// Returns what is in the file or folder at `path`: one of this program (a scenario, a run, a sweep, a recording, a file
-/// that scenarios of a world name), or of another one.
+/// that scenarios of a world name), or of another one, which `options` may tell how to read.
 ///
 /// # Errors
-/// When it cannot be read, is of no kind that this program reads, or nothing in it is of use.
-pub fn inspect(worlds: &Worlds, path: &Path) -> Result<InspectedFile, Error> {
-    let report = report(worlds, path)?;
+/// When it cannot be read, is of no kind that this program reads, nothing in it is of use, or it has no such option.
+pub fn inspect(
+    worlds: &Worlds,
+    path: &Path,
+    options: &ImportOptions,
+) -> Result<InspectedFile, Error> {
+    let report = report(worlds, path, options)?;
     Ok(InspectedFile { file: crate::display_path(path), report })
 }
 
-fn report(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
+fn report(worlds: &Worlds, path: &Path, options: &ImportOptions) -> Result<ImportReport, Error> {
     if !path.exists() {
         let remedy = "check the path; relative ones start at the working directory";
         return Err(
@@ -41,37 +47,49 @@ fn report(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
         );
     }
     if let Some(report) = own_recording(path)? {
+        check_no_options(path, options)?;
         return Ok(report);
     }
     if let Some(format) = ForeignFormat::recognize(path)? {
+        check_no_options(path, options)?;
         return Ok(format.inspect(path)?);
     }
-    if let Some(imported) = worlds.import_scenario(path, &ImportOptions::default())? {
+    if let Some(imported) = worlds.import_scenario(path, options)? {
         return match imported.scenario {
             Ok(_) => Ok(imported.report),
             Err(error) => Err(error.into()),
         };
     }
+    check_no_options(path, options)?;
     for world in worlds.iter() {
         if let Some(report) = world.inspect_other_file(path)? {
             return Ok(report);
         }
     }
-    Ok(own_text(worlds, path)?)
+    own_text(worlds, path)
+}
+
+/// Refuses options of an import for a file that none of them is about.
+fn check_no_options(path: &Path, options: &ImportOptions) -> Result<(), InputError> {
+    let Some((key, _)) = options.iter().next() else { return Ok(()) };
+    let cause = format!("`import.{key}` has no effect on a file of this kind");
+    let remedy = "leave it out: recorded traffic and BlueSky files have such options";
+    Err(InputError::new(path.display(), cause, remedy))
 }
 
 /// Returns the report of a sweep file or a scenario.
-fn own_text(worlds: &Worlds, path: &Path) -> Result<ImportReport, InputError> {
+fn own_text(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
     let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if !is_toml {
-        return Err(unknown_kind(path));
+        return Err(unknown_kind(path).into());
     }
     let sweep = Sweep::read(path)?;
     // The reader of sweeps takes a scenario as a sweep of itself.
     if sweep.scenario == path {
-        return scenario_report(worlds, path);
+        return Ok(scenario_report(worlds, path)?);
     }
     sweep.check()?;
+    check_variants(worlds, &sweep)?;
     let mut report = ImportReport::new("sweep");
     report.add_fact("scenario", sweep.scenario.display().to_string());
     report.add_kept("variants", sweep.design.variants(&sweep.place)?.len());
@@ -174,7 +192,11 @@ fn scenario_report(worlds: &Worlds, path: &Path) -> Result<ImportReport, InputEr
 ///
 /// # Errors
 /// When the file cannot be read, is of a kind that is not written, or `out` cannot be written.
-pub fn write_clean(path: &Path, out: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn write_clean(
+    path: &Path,
+    out: &Path,
+    options: &ImportOptions,
+) -> Result<Vec<PathBuf>, Error> {
     match ForeignFormat::recognize(path)? {
         Some(ForeignFormat::RosMap | ForeignFormat::CharMap) => {
             let image = out.with_extension("pgm");
@@ -193,12 +215,21 @@ pub fn write_clean(path: &Path, out: &Path) -> Result<Vec<PathBuf>, Error> {
             Ok(vec![out.to_path_buf()])
         }
         None if traffic::is_traffic(path) => {
-            let text = traffic::to_csv(&traffic::read(path)?);
+            let options = traffic_options(path, options)?;
+            let text = traffic::to_csv(&traffic::read_with(path, &options)?);
             write_atomically(out, |file| file.write_all(text.as_bytes()))?;
             Ok(vec![out.to_path_buf()])
         }
         _ => Err(not_written(path)),
     }
+}
+
+/// Returns the options of an import as those of the reader of traffic.
+fn traffic_options(path: &Path, options: &ImportOptions) -> Result<TrafficOptions, InputError> {
+    let mut chosen = TrafficOptions::default();
+    let place = path.display().to_string();
+    options.iter().try_for_each(|(key, value)| chosen.set(&place, key, value))?;
+    Ok(chosen)
 }
 
 fn not_written(path: &Path) -> Error {
@@ -218,6 +249,27 @@ mod tests {
             std::fs::write(folder.path().join(name), text).expect("written");
         }
         folder
+    }
+
+    fn inspect_plain(path: &Path) -> Result<InspectedFile, Error> {
+        inspect(&WORLDS, path, &ImportOptions::default())
+    }
+
+    #[test]
+    fn an_unknown_key_of_a_variant_is_found_before_the_sweep_runs() {
+        let sweep = "format = 1\nscenario = \"s.toml\"\nreplicates = 2\nvary = { \"robots.0.conut\" = [1, 2] }\n";
+        let folder = folder_with(&[("s.toml", ROBOTS), ("w.toml", sweep)]);
+        let error = inspect_plain(&folder.path().join("w.toml")).expect_err("an unknown key");
+        assert!(error.to_string().contains("unknown key `conut`"), "{error}");
+    }
+
+    #[test]
+    fn options_of_an_import_are_refused_where_they_have_no_effect() {
+        let folder = folder_with(&[("a.map", "type octile\nheight 1\nwidth 2\nmap\n.@\n")]);
+        let options = ImportOptions::from_overrides(&["import.max_gap_s=60".to_string()]);
+        let error = inspect(&WORLDS, &folder.path().join("a.map"), &options);
+        let error = error.expect_err("a map has no gaps");
+        assert!(error.to_string().contains("`import.max_gap_s` has no effect"), "{error}");
     }
 
     const ROBOTS: &str =
@@ -252,7 +304,7 @@ mod tests {
         ];
         let folder = folder_with(&files.map(|(name, text, _)| (name, text)));
         for (name, _, format) in files {
-            let inspected = inspect(&WORLDS, &folder.path().join(name));
+            let inspected = inspect_plain(&folder.path().join(name));
             let inspected = inspected.unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(inspected.report.format, format, "{name}");
         }
@@ -264,7 +316,7 @@ mod tests {
                        observations = [\"nothing\", \"wall\"]\n\
                        confusion = { nothing = [0.5, 0.4], wall = [0.0, 1.0] }\n";
         let folder = folder_with(&[("p.toml", profile)]);
-        let error = inspect(&WORLDS, &folder.path().join("p.toml")).expect_err("a wrong row");
+        let error = inspect_plain(&folder.path().join("p.toml")).expect_err("a wrong row");
         let Error::Input(error) = error else { panic!("{error}") };
         assert!(
             error.place().ends_with("p.toml") && error.line_and_column() == Some((7, 25)),
@@ -275,11 +327,15 @@ mod tests {
     #[test]
     fn a_file_of_no_known_kind_is_refused_without_a_guess() {
         let folder = folder_with(&[("notes.md", "# Notes\n")]);
-        let error = inspect(&WORLDS, &folder.path().join("notes.md")).expect_err("no kind");
+        let error = inspect_plain(&folder.path().join("notes.md")).expect_err("no kind");
         assert!(error.to_string().contains("neither its content nor its name"), "{error}");
-        let error = inspect(&WORLDS, &folder.path().join("missing.map")).expect_err("missing");
+        let error = inspect_plain(&folder.path().join("missing.map")).expect_err("missing");
         assert!(error.to_string().contains("no such file"), "{error}");
-        let error = write_clean(&folder.path().join("notes.md"), &folder.path().join("out"));
+        let error = write_clean(
+            &folder.path().join("notes.md"),
+            &folder.path().join("out"),
+            &ImportOptions::default(),
+        );
         assert!(error.expect_err("no kind").to_string().contains("not written anew"));
     }
 
@@ -287,7 +343,8 @@ mod tests {
     fn a_clean_map_reads_as_the_map_that_it_was_made_from() {
         let folder = folder_with(&[("a.map", "type octile\nheight 2\nwidth 2\nmap\n.@\n..\n")]);
         let clean = folder.path().join("my map.yaml");
-        let written = write_clean(&folder.path().join("a.map"), &clean).expect("written");
+        let written = write_clean(&folder.path().join("a.map"), &clean, &ImportOptions::default())
+            .expect("written");
         assert_eq!(written.len(), 2);
         let boxes = |path: &Path| {
             let options = sidestep_import::GridOptions {

@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep::kernel::terminal::escape_controls;
+use sidestep::scenario::ImportOptions;
 use sidestep_session::{InspectedFile, display_path, inspect as inspect_file, write_clean};
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ Examples:
   sidestep inspect logs/*.csv --json | jq '.files[].findings'
   sidestep inspect day.csv --strict && sidestep run day.csv
   sidestep inspect day.csv --clean clean.csv
+  sidestep inspect day.csv --set import.leave_out_suspicious=true --clean clean.csv
 
 Reads what any command reads: maps, starts and goals (.scen), robot models (.urdf, .srdf), worlds of \
 Stage, meshes, logs (CARMEN, MRCLAM), bags of ROS 1 and ROS 2, BlueSky scenarios, recorded traffic, \
@@ -38,6 +40,11 @@ pub(crate) struct InspectArgs {
     /// Write what was kept of one file to this one: tracks as CSV, a CARMEN log, a bag as MCAP, a map as YAML and PGM
     #[arg(long, value_name = "OUT")]
     clean: Option<PathBuf>,
+
+    /// Set an option of the import of recorded traffic or BlueSky files, as for `run`: import.max_gap_s=600,
+    /// import.ground_speed_kt=30, import.leave_out_suspicious=true
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
 }
 
 /// # Errors
@@ -45,10 +52,11 @@ pub(crate) struct InspectArgs {
 /// the exit code alone.
 pub(crate) fn inspect(args: &InspectArgs, console: Console) -> Result<ExitCode, Failure> {
     check_clean_target(args)?;
+    let options = import_options(args)?;
     let mut reports = Vec::with_capacity(args.files.len());
     let mut failures = Vec::new();
     for file in &args.files {
-        match inspect_file(worlds(), file) {
+        match inspect_file(worlds(), file, &options) {
             Ok(report) => reports.push(report),
             Err(failure) => failures.push(failure),
         }
@@ -62,11 +70,22 @@ pub(crate) fn inspect(args: &InspectArgs, console: Console) -> Result<ExitCode, 
     if failures.is_empty()
         && let (Some(out), [file]) = (&args.clean, &args.files[..])
     {
-        for written in write_clean(file, out)? {
+        for written in write_clean(file, out, &options)? {
             console.note(format!("wrote {}", display_path(written)));
         }
     }
     end(failures, console)
+}
+
+/// Returns the options of an import, and refuses settings of a scenario: nothing is run here.
+fn import_options(args: &InspectArgs) -> Result<ImportOptions, InputError> {
+    if let Some(other) = args.overrides.iter().find(|text| !ImportOptions::is_option(text)) {
+        let cause = format!("`{other}` is no option of an import");
+        let remedy =
+            "give options such as import.max_gap_s=600; `sidestep check` sets keys of scenarios";
+        return Err(InputError::new("--set", cause, remedy));
+    }
+    Ok(ImportOptions::from_overrides(&args.overrides))
 }
 
 /// Refuses a file to write to for several files.

@@ -154,8 +154,14 @@ impl Repair {
 
     /// Returns whether an error of the draft with this change may only be there because of it.
     pub(super) fn may_lead_to(&self, next: &InputError) -> bool {
-        let guess = Guess::from(self.clone());
         let key = next.key().map(key_path).unwrap_or_default();
+        if let RepairKind::Rename(name) = &self.what {
+            // A value that does not fit the other key was hardly meant for it.
+            let table = &self.target[..self.target.len() - 1];
+            let renamed = [table, &[name.trim_matches(['"', '\'']).to_string()]].concat();
+            return key.starts_with(&renamed);
+        }
+        let guess = Guess::from(self.clone());
         if self.is_meant { guess.contains(&key) } else { guess.may_lead_to(next) }
     }
 }

@@ -9,7 +9,7 @@ use sidestep_document::Estimate;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::{MetricInfo, metric_label};
-use sidestep_statistics::{Sample, is_tied_measure, sample_sd, wilson};
+use sidestep_statistics::{Sample, is_tied, sample_sd, wilson};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of characters of a value in the name of a level that stands for several parameters: it is the name of
@@ -172,7 +172,7 @@ impl<'a> RunGroups<'a> {
                 return proportion(&values, self.seedless[*variant]);
             }
             let mut estimate = Estimate::from_values(values.iter().copied());
-            if is_tied_measure(&Sample::from_runs(values).values) {
+            if is_tied(&Sample::from_runs(values).values) {
                 estimate.interval = None;
             }
             return estimate;

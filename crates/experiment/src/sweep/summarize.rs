@@ -23,7 +23,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_scenario::suggestion;
 use sidestep_statistics::{
-    Bootstrap, MIN_TEST_PAIRS, Sample, holm, is_tied_measure, mean, mean_interval, percentile,
+    Bootstrap, MIN_TEST_PAIRS, Sample, holm, is_tied, mean, mean_interval, percentile,
     quantile_interval, rank_correlation, runs_for_half_width, sample_sd, wilson,
 };
 use std::collections::BTreeMap;
@@ -362,8 +362,8 @@ fn numeric_summary(sample: &Sample, bootstrap: Option<&Bootstrap>) -> NumericSum
     }
     let mean = mean(values);
     let sd = sample_sd(values);
-    // The spread of rounding is none.
-    let is_tied = is_tied_measure(values);
+    // Equal values, but for rounding, show no spread: an interval without width would claim that there is none.
+    let is_tied = is_tied(values);
     NumericSummary {
         mean,
         sd,

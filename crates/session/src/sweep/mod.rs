@@ -29,6 +29,7 @@ pub(crate) use finished_runs::run_picture;
 pub use finished_runs::{FinishedRuns, read_finished};
 pub use folder::Folder;
 pub use json::failed_rows;
+pub(crate) use prepare::check_variants;
 pub use run::{
     SweepEnd, SweepResult, collect, create, open_or_create, run_in_memory, run_remaining, run_share,
 };

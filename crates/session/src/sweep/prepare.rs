@@ -3,7 +3,7 @@
 
 use crate::scenario::{read_scenario, read_source};
 use crate::watcher::{Progress, ProgressGuard};
-use crate::{Error, Watcher};
+use crate::{Error, NoWatcher, Watcher};
 use sidestep_experiment::sweep::scheduler::run_trials;
 use sidestep_experiment::sweep::trial::metric_names;
 use sidestep_experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
@@ -56,6 +56,14 @@ pub(super) fn prepare<T: Send>(
     // A sweep without a name of its own has that of its scenario.
     let name = if plan.name.is_empty() { config.name } else { plan.name };
     Ok((Plan { agents, name, ..plan }, made))
+}
+
+/// Compiles every variant of a sweep.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub(crate) fn check_variants(worlds: &Worlds, sweep: &Sweep) -> Result<(), Error> {
+    prepare(worlds, sweep, 1, &NoWatcher, &|_, _, _| Ok(())).map(|_| ())
 }
 
 /// The scenario of a sweep, with the settings that all variants share.

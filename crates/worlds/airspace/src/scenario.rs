@@ -3,6 +3,7 @@
 mod airplanes;
 mod compile;
 mod earth;
+mod effectless;
 mod network;
 mod optimizer;
 mod rule_changes;
@@ -20,6 +21,7 @@ use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
+pub(super) use effectless::effectless_remarks;
 use network::NetworkSection;
 use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};
 use rule_changes::RuleChangeSection;

@@ -7,7 +7,7 @@ use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, Editing, ImportOptions, ImportedScenario, MetricInfo,
+    CompiledScenario as AnyCompiled, Editing, ImportOptions, ImportedScenario, MetricInfo, Remark,
     ResolvedScenario, SeedEffect, Source, WorldFacts, WorldType,
 };
 use std::any::Any;
@@ -104,6 +104,10 @@ impl AnyCompiled for CompiledAirspace {
 
     fn contents(&self, _: &Source) -> JsonTextReport {
         text::describe_scenario(self)
+    }
+
+    fn remarks(&self) -> Vec<Remark> {
+        super::scenario::effectless_remarks(self)
     }
 
     fn seed_effect(&self) -> SeedEffect {

@@ -75,6 +75,11 @@ pub(super) struct MvpSection {
 type ResolutionFactor = LeftOpen<0, 10>;
 
 impl MvpSection {
+    /// Returns whether the scenario gives any of them.
+    pub(super) fn is_given(&self) -> bool {
+        self.look_ahead_s.is_some() || self.margin.is_some() || self.resolution_factor.is_some()
+    }
+
     /// Returns the settings, with those of `default` where none are given.
     pub(super) fn or_default(&self, default: ReactiveSettings) -> ReactiveSettings {
         ReactiveSettings {
@@ -91,6 +96,11 @@ type LookAhead = LeftOpen<0, 100_000>;
 type SeparationFactor = Closed<1, 10>;
 
 impl ReactiveSection {
+    /// Returns whether the scenario gives any of them.
+    pub(super) fn is_given(&self) -> bool {
+        self.look_ahead_s.is_some() || self.margin.is_some()
+    }
+
     /// Returns the settings, with those of `default` where none are given.
     pub(super) fn or_default(&self, default: ReactiveSettings) -> ReactiveSettings {
         ReactiveSettings {

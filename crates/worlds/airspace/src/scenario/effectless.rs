@@ -1,0 +1,123 @@
+//! Remarks on keys that are given and change nothing: settings of a method that no airplane uses at any time.
+//!
+//! They are no errors, because sweeps and `compare` fly one scenario by several methods.
+
+use super::{AirspaceSection, CompiledAirspace};
+use crate::method::MethodKind;
+use sidestep_scenario::Remark;
+
+/// Returns the remarks on a scenario, in the order of its keys.
+pub(crate) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
+    let section = &compiled.recipe.file.airspace;
+    let uses = |is_used: fn(&MethodKind) -> bool| {
+        let mut rules = compiled.world.all_rules();
+        // Nobody knows what a method of a program's own reads.
+        rules.any(|rules| is_used(&rules.method) || matches!(rules.method, MethodKind::Own(_)))
+    };
+    let mut remarks = Vec::new();
+    let mut note = |key: &str, because: &str| {
+        let words = format!("has no effect: {because}");
+        remarks.push(Remark::note(format!("airspace.{key}"), words));
+    };
+    if !uses(|method| matches!(method, MethodKind::Pc)) {
+        for key in optimizer_keys(section) {
+            note(key, "no airplane avoids others by method pc");
+        }
+    }
+    if section.mvp.is_given() && !uses(|method| matches!(method, MethodKind::Mvp)) {
+        note("mvp", "no airplane avoids others by method mvp");
+    }
+    if section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca)) {
+        note("orca", "no airplane avoids others by method orca");
+    }
+    if section.look_every_s.is_some() && section.legs.is_none() && !looks_anew(compiled) {
+        note("look_every_s", "it is for scenarios that fly by mvp, orca or none alone");
+    }
+    if section.error_sigmas.is_some() && has_no_errors(section) {
+        note("error_sigmas", "position_noise_m and heading_noise_deg are 0");
+    }
+    remarks
+}
+
+/// Returns the keys of the optimizer that are given.
+fn optimizer_keys(section: &AirspaceSection) -> Vec<&'static str> {
+    let given = [
+        ("alpha", section.alpha.is_some()),
+        ("beta", section.beta.is_some()),
+        ("inflation", section.inflation.is_some()),
+        ("holds_s", !section.holds_s.0.is_empty()),
+        // With look_every_s beside it the scenario is made for methods of both kinds, as imported ones are.
+        ("legs", section.legs.is_some() && section.look_every_s.is_none()),
+        ("estimator", section.estimator.is_some()),
+        ("update", section.update.is_some()),
+        ("order", section.order.is_some()),
+        ("utility", section.utility.is_some()),
+        ("cooling", section.cooling.is_some()),
+        ("max_rounds", section.max_rounds.is_some()),
+        ("choice", section.choice.is_some()),
+        ("group_memory_gib", section.group_memory_gib.is_some()),
+    ];
+    given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key).collect()
+}
+
+/// Returns whether all methods of a scenario look anew each time, and plan nothing.
+fn looks_anew(compiled: &CompiledAirspace) -> bool {
+    let mut rules = compiled.world.all_rules();
+    rules.all(|rules| matches!(rules.method, MethodKind::Mvp | MethodKind::Orca | MethodKind::None))
+}
+
+fn has_no_errors(section: &AirspaceSection) -> bool {
+    let is_zero = |noise: Option<f64>| noise.is_none_or(|noise| noise == 0.0);
+    is_zero(section.position_noise_m.map(f64::from))
+        && is_zero(section.heading_noise_deg.map(f64::from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_scenario::Source;
+
+    fn remarks(keys: &str) -> Vec<String> {
+        let text = format!(
+            "format = 1\nworld = \"airspace\"\n[airspace]\n{keys}\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n"
+        );
+        let compiled = CompiledAirspace::new(&Source::new("test", text, "")).expect("a scenario");
+        effectless_remarks(&compiled).into_iter().map(|remark| remark.key).collect()
+    }
+
+    #[test]
+    fn settings_of_a_method_that_nobody_uses_are_named() {
+        let optimizer = "alpha = 0.1\nholds_s = [10.0]\ncooling = 0.5\nmax_rounds = 3\n";
+        assert_eq!(remarks(optimizer), [""; 0]);
+        let keys =
+            ["alpha", "holds_s", "cooling", "max_rounds"].map(|key| format!("airspace.{key}"));
+        for method in ["none", "mvp", "orca", "external"] {
+            assert_eq!(remarks(&format!("method = \"{method}\"\n{optimizer}")), keys, "{method}");
+        }
+        let mvp = "mvp = { margin = 1.3 }\n";
+        assert_eq!(remarks(mvp), ["airspace.mvp"]);
+        assert_eq!(remarks(&format!("method = \"mvp\"\n{mvp}")), [""; 0]);
+        assert_eq!(remarks("orca = { look_ahead_s = 20.0 }\n"), ["airspace.orca"]);
+        assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);
+        assert_eq!(remarks("method = \"none\"\nlook_every_s = 5.0\n"), [""; 0]);
+    }
+
+    #[test]
+    fn a_scenario_for_methods_of_both_kinds_is_no_mistake() {
+        let both = "legs = { turns_s = [20.0], until_s = [80.0] }\nlook_every_s = 5.0\n";
+        assert_eq!(remarks(both), [""; 0]);
+        assert_eq!(remarks(&format!("method = \"mvp\"\n{both}")), [""; 0]);
+    }
+
+    #[test]
+    fn settings_of_a_method_that_comes_later_have_an_effect() {
+        let changes = "changes = [{ at_s = 50.0, method = \"mvp\" }]\nmvp = { margin = 1.3 }\n";
+        assert_eq!(remarks(&format!("method = \"none\"\n{changes}")), [""; 0]);
+    }
+
+    #[test]
+    fn a_bound_on_errors_without_errors_is_named() {
+        assert_eq!(remarks("error_sigmas = 3.0\n"), ["airspace.error_sigmas"]);
+        assert_eq!(remarks("error_sigmas = 3.0\nposition_noise_m = 2.0\n"), [""; 0]);
+    }
+}
