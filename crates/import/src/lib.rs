@@ -28,6 +28,7 @@ pub mod rosmap;
 pub mod stage;
 pub mod table;
 pub mod track;
+mod track_pair;
 pub mod traffic;
 pub mod urdf;
 pub mod write;

@@ -129,7 +129,7 @@ struct SensorArgs {
 
     /// What the scanner writes where nothing answers [default: recognized by counts]
     #[arg(long, value_name = "VALUE", requires = "bag")]
-    #[arg(value_parser = ["inf", "nan", "zero", "max"])]
+    #[arg(value_parser = ["inf", "nan", "zero", "max", "near"])]
     no_echo: Option<String>,
 
     /// Map that the scans are compared with (with --bag)

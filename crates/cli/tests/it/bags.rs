@@ -198,7 +198,7 @@ fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
         "/tf:map:base_link",
         &["no transforms lead from `map`", "robot_0/odom > "],
     );
-    refused("bag", odom, "/tf:map", &["/tf:map: this is not a topic", "/tf:map:base_link"]);
+    refused("bag", odom, "/tf:map:a:b", &["/tf:map:a:b: this is not a topic", "/tf:map:base_link"]);
     refused("nowhere", odom, truth, &["nowhere", "cannot be read"]);
     let ended = place.run(&["learn", "effector", "--carmen", "x.log", "--max-speed", "0"]);
     assert!(ended.code() == 2 && ended.err().contains("--max-speed: no robot moves at 0 m/s"));

@@ -6,6 +6,7 @@
 use sidestep_kernel::InputError;
 
 use super::messages::LaserScan;
+use super::offsets::{self, Timing};
 use super::poses::StampedPose;
 use crate::report::{ImportReport, Treatment};
 use crate::track::StampedPose2;
@@ -84,7 +85,23 @@ pub(super) struct Stream<'a> {
     pub(super) items: Vec<&'a mut dyn HasStamp>,
 }
 
+impl Stream<'_> {
+    /// Returns the stamps with the times of the recording.
+    pub(super) fn timings(&self) -> Vec<Timing> {
+        self.items.iter().map(|item| Timing::of(&**item)).collect()
+    }
+
+    /// Moves the stamps from a message on.
+    pub(super) fn shift_from(&mut self, start: usize, secs: f64) {
+        for item in &mut self.items[start..] {
+            let t_secs = item.t_secs() + secs;
+            item.set_t_secs(t_secs);
+        }
+    }
+}
+
 /// A message at which the clock was set.
+#[derive(Debug, Clone, Copy)]
 struct Jump {
     item: usize,
     log_secs: f64,
@@ -105,14 +122,18 @@ pub(super) fn align(
     }
     let mut all_jumps = Vec::new();
     for stream in streams.iter() {
-        let jumps = backward_jumps(stream);
-        record_jumps(stream, &jumps, report);
+        let back = backward_jumps(stream);
+        record_jumps(stream, &back, report);
         record_forward_jumps(stream, report);
+        let mut jumps = [back, forward_jumps(stream)].concat();
+        jumps.sort_by_key(|jump| jump.item);
+        jumps.dedup_by_key(|jump| jump.item);
         all_jumps.push(jumps);
     }
     let Some(most) = all_jumps.iter().max_by_key(|jumps| jumps.len()) else { return Ok(()) };
     let bounds: Vec<f64> = most.iter().map(|jump| jump.log_secs).collect();
     if bounds.is_empty() {
+        offsets::compare_clocks(streams, report);
         return Ok(());
     }
     if bounds.len() >= MAX_EPOCHS {
@@ -125,7 +146,10 @@ pub(super) fn align(
         .zip(&all_jumps)
         .map(|(stream, jumps)| epochs_of(stream, jumps, &bounds))
         .collect();
-    shift_epochs(streams, &epochs, bounds.len() + 1);
+    let n = bounds.len() + 1;
+    offsets::undo_single_jumps(streams, &epochs, n, report);
+    offsets::compare_clocks(streams, report);
+    shift_epochs(streams, &epochs, n);
     Ok(())
 }
 
@@ -166,6 +190,16 @@ fn backward_jumps(stream: &Stream<'_>) -> Vec<Jump> {
     jumps
 }
 
+/// Returns the messages from which on the stamps are further ahead of the recording than before.
+fn forward_jumps(stream: &Stream<'_>) -> Vec<Jump> {
+    let jump = |(item, step_secs): (usize, f64)| Jump {
+        item,
+        log_secs: stream.items[item].log_secs(),
+        step_secs,
+    };
+    offsets::forward_jumps(&stream.timings()).into_iter().map(jump).collect()
+}
+
 fn record_jumps(stream: &Stream<'_>, jumps: &[Jump], report: &mut ImportReport) {
     for jump in jumps {
         let place = format!(
@@ -179,21 +213,27 @@ fn record_jumps(stream: &Stream<'_>, jumps: &[Jump], report: &mut ImportReport) 
     }
 }
 
+/// Records stamps that are far ahead of those before, by the times of the recording, or, where it has none, by themselves.
 fn record_forward_jumps(stream: &Stream<'_>, report: &mut ImportReport) {
-    for pair in stream.items.windows(2) {
+    let mut jumps: Vec<usize> = forward_jumps(stream).iter().map(|jump| jump.item).collect();
+    for (k, pair) in stream.items.windows(2).enumerate() {
         let step_secs = pair[1].t_secs() - pair[0].t_secs();
         let recorded_secs = pair[1].log_secs() - pair[0].log_secs();
         if step_secs > MAX_FORWARD_STEP_SECS && recorded_secs < 0.5 * step_secs {
-            let place = format!(
-                "message {} is stamped {step_secs:.3} s after the one before",
-                pair[1].message()
-            );
-            let rule = format!(
-                "stamps of {} that jump ahead: the time after is a part of its own",
-                stream.name
-            );
-            report.record(Treatment::Repaired, rule, place, "");
+            jumps.push(k + 1);
         }
+    }
+    jumps.sort_unstable();
+    jumps.dedup();
+    for item in jumps {
+        let step_secs = stream.items[item].t_secs() - stream.items[item - 1].t_secs();
+        let message = stream.items[item].message();
+        let place = format!("message {message} is stamped {step_secs:.3} s after the one before");
+        let rule = format!(
+            "stamps of {} that jump ahead: the time after is a part of its own",
+            stream.name
+        );
+        report.record(Treatment::Repaired, rule, place, "");
     }
 }
 

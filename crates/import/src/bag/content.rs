@@ -10,6 +10,7 @@ use super::cdr::{Encoding, decode_as};
 use super::clock::{self, HasStamp, RecordedScan, Stream};
 use super::frames::{self, Trajectory};
 use super::messages::{LaserScan, Message, TfMessage};
+use super::offsets::{self, Timing};
 use super::poses::{self, StampedPose, frame_name};
 use super::scans::{self, RangeCounts};
 use super::storage::{RawMessage, Topic};
@@ -277,6 +278,7 @@ impl<'a> BagContent<'a> {
 
     /// Puts all stamps on one axis of time.
     pub(super) fn align_clocks(&mut self, report: &mut ImportReport) -> Result<(), InputError> {
+        self.drop_unusable_stamps(report);
         let mut streams: BTreeMap<String, Vec<&mut dyn HasStamp>> = BTreeMap::new();
         for (topic, poses) in &mut self.poses {
             for pose in poses {
@@ -297,9 +299,45 @@ impl<'a> BagContent<'a> {
         clock::align(self.bag, &mut streams, report)
     }
 
+    /// Leaves out messages with a stamp that is none.
+    fn drop_unusable_stamps(&mut self, report: &mut ImportReport) {
+        for (topic, poses) in &mut self.poses {
+            let mut is_kept = vec![true; poses.len()];
+            for indices in by_frames(poses) {
+                let timings: Vec<Timing> = indices.iter().map(|k| Timing::of(&poses[*k])).collect();
+                for (item, why) in offsets::unusable_stamps(&timings) {
+                    let k = indices[item];
+                    is_kept[k] = false;
+                    let rule = format!("messages on {topic} {why}");
+                    let place = format!("message {}", poses[k].message);
+                    report.record(Treatment::Dropped, rule, place, "");
+                }
+            }
+            let mut kept = is_kept.into_iter();
+            poses.retain(|_| kept.next().unwrap_or(true));
+        }
+        let Some(topic) = &self.selection.scans else { return };
+        let timings: Vec<Timing> = self.scans.iter().map(|scan| Timing::of(scan)).collect();
+        let unusable = offsets::unusable_stamps(&timings);
+        for (k, why) in &unusable {
+            let rule = format!("messages on {topic} {why}");
+            report.record(
+                Treatment::Dropped,
+                rule,
+                format!("message {}", self.scans[*k].message),
+                "",
+            );
+        }
+        let mut k = 0;
+        self.scans.retain(|_| {
+            k += 1;
+            unusable.binary_search_by_key(&(k - 1), |(item, _)| *item).is_err()
+        });
+    }
+
     pub(super) fn trajectory(&self, source: &PoseTopic) -> Result<Trajectory, InputError> {
         let poses = self.poses.get(&source.topic).map_or(&[][..], Vec::as_slice);
-        frames::trajectory(self.bag, source, poses)
+        frames::trajectory(self.bag, source, poses, &self.statics)
     }
 
     /// Moves the scans out, by time and as REP 117 has them.
@@ -344,6 +382,15 @@ impl<'a> BagContent<'a> {
         }
         mounts
     }
+}
+
+/// Returns the indices of poses by their frames.
+fn by_frames(poses: &[StampedPose]) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<(&str, &str), Vec<usize>> = BTreeMap::new();
+    for (k, pose) in poses.iter().enumerate() {
+        groups.entry((&pose.parent, &pose.child)).or_default().push(k);
+    }
+    groups.into_values().collect()
 }
 
 /// Returns the scan in a message, without the strengths of its echoes.

@@ -22,7 +22,8 @@ pub(super) struct Trajectory {
     pub(super) child: String,
 }
 
-/// Returns the trajectory of the frames of `source`, from the poses on its topic.
+/// Returns the trajectory of the frames of `source`, from the poses on its topic; transforms that never change, `statics`,
+/// lead on where they do not.
 ///
 /// # Errors
 /// When the frames are missing, or `source` gives none and there are several.
@@ -30,31 +31,123 @@ pub(super) fn trajectory(
     bag: &str,
     source: &PoseTopic,
     all: &[StampedPose],
+    statics: &[StampedPose],
 ) -> Result<Trajectory, InputError> {
     let place = format!("{bag}: {}", source.topic);
-    let edges = by_child(all);
     let pairs: BTreeSet<(&str, &str)> =
         all.iter().map(|pose| (&*pose.parent, &*pose.child)).collect();
-    if pairs.is_empty() {
+    let Some(first) = pairs.first() else {
         let cause = "its messages hold no transforms";
         return Err(InputError::new(place, cause, "give another topic"));
-    }
+    };
+    let edges = Edges::of(all, statics);
     let chain = match &source.frames {
-        Some((parent, child)) => chain(&edges, frame(parent), frame(child)).ok_or_else(|| {
-            let cause = format!("no transforms lead from `{parent}` to `{child}`");
-            InputError::new(&place, cause, format!("it has {}", describe_pairs(&pairs)))
+        Some((parent, child)) => edges.chain(frame(parent), frame(child)).ok_or_else(|| {
+            let wanted = match child.as_str() {
+                "" => format!("it has no poses in the frame `{parent}` alone"),
+                _ => format!("no transforms lead from `{parent}` to `{child}`"),
+            };
+            InputError::new(&place, wanted, format!("it has {}", describe_pairs(&pairs)))
         })?,
-        None if pairs.len() == 1 => pairs.iter().map(|(_, child)| *child).collect(),
+        None if pairs.len() == 1 => vec![*first],
         None => {
             let cause = format!("it has several frames: {}", describe_pairs(&pairs));
-            let remedy = format!("give two of them: {}:map:base_link", source.topic);
+            let remedy = format!("give one of them: {}", topic_with_frames(&source.topic, *first));
             return Err(InputError::new(place, cause, remedy));
         }
     };
-    let links: Vec<Vec<&StampedPose>> =
-        chain.iter().map(|child| by_stamp(edges[child].clone())).collect();
-    let child = chain.last().map_or_else(String::new, |child| (*child).to_owned());
+    let links: Vec<Link<'_>> = chain.iter().map(|pair| edges.link(pair)).collect();
+    let child = chain.last().map_or_else(String::new, |(_, child)| (*child).to_owned());
     Ok(Trajectory { poses: compose_chain(&links), child })
+}
+
+/// Returns a topic with two frames as an option has them; messages may give the outer frame alone.
+fn topic_with_frames(topic: &str, (parent, child): (&str, &str)) -> String {
+    if child.is_empty() { format!("{topic}:{parent}") } else { format!("{topic}:{parent}:{child}") }
+}
+
+/// The transforms between two frames.
+#[derive(Debug, Clone)]
+struct Link<'a> {
+    /// By their stamps: messages on a network overtake each other.
+    poses: Vec<&'a StampedPose>,
+    /// Whether the last holds for all times.
+    is_static: bool,
+}
+
+impl<'a> Link<'a> {
+    /// Returns the transform that was reported last at a time, as those of a localization program stay in force.
+    fn at(&self, t_secs: f64) -> Option<&'a StampedPose> {
+        let reported = match self.is_static {
+            true => self.poses.len(),
+            false => self.poses.partition_point(|pose| pose.t_secs <= t_secs),
+        };
+        self.poses.get(reported.checked_sub(1)?).copied()
+    }
+}
+
+/// Transforms by the frames that they lead to and from.
+struct Edges<'a> {
+    links: BTreeMap<(&'a str, &'a str), Link<'a>>,
+}
+
+impl<'a> Edges<'a> {
+    fn of(all: &'a [StampedPose], statics: &'a [StampedPose]) -> Self {
+        let mut links: BTreeMap<(&str, &str), Link<'_>> = BTreeMap::new();
+        let pairs = |poses: &'a [StampedPose], is_static: bool| {
+            poses.iter().map(move |pose| (pose, is_static))
+        };
+        for (pose, is_static) in pairs(all, false).chain(pairs(statics, true)) {
+            let empty = Link { poses: Vec::new(), is_static };
+            let link = links.entry((&pose.parent, &pose.child)).or_insert(empty);
+            // A transform that changes is not static, whatever repeats it.
+            if link.is_static == is_static {
+                link.poses.push(pose);
+            }
+        }
+        for link in links.values_mut() {
+            link.poses.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
+        }
+        Self { links }
+    }
+
+    /// Returns the pairs of frames that lead from `parent` to `child`, the shortest way; where `child` is empty, to the only
+    /// one that has it as parent.
+    fn chain(&self, parent: &str, child: &str) -> Option<Vec<(&'a str, &'a str)>> {
+        if child.is_empty() {
+            let mut own =
+                self.links.keys().filter(|(outer, inner)| *outer == parent && inner.is_empty());
+            return Some(vec![*own.next()?]);
+        }
+        // From the inner frame outward, breadth first: each frame has the way from it to `child`.
+        let mut ways: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+        let mut frontier = vec![child];
+        for _ in 0..MAX_DEPTH {
+            let mut next = Vec::new();
+            for inner in frontier {
+                let way = ways.get(inner).cloned().unwrap_or_default();
+                for pair in self.links.keys().filter(|(_, own)| *own == inner) {
+                    let (outer, _) = *pair;
+                    if outer == child || ways.contains_key(outer) {
+                        continue;
+                    }
+                    let mut longer = vec![*pair];
+                    longer.extend(&way);
+                    ways.insert(outer, longer);
+                    next.push(outer);
+                }
+            }
+            if let Some(way) = ways.get(parent) {
+                return Some(way.clone());
+            }
+            frontier = next;
+        }
+        None
+    }
+
+    fn link(&self, pair: &(&'a str, &'a str)) -> Link<'a> {
+        self.links[pair].clone()
+    }
 }
 
 /// Returns the pose of frame `child` in the outermost frame that static transforms lead to, or in the first of
@@ -84,12 +177,6 @@ fn frame(name: &str) -> &str {
     name.strip_prefix('/').unwrap_or(name)
 }
 
-/// Returns poses by their stamps: messages on a network overtake each other.
-fn by_stamp(mut poses: Vec<&StampedPose>) -> Vec<&StampedPose> {
-    poses.sort_by(|a, b| a.t_secs.total_cmp(&b.t_secs));
-    poses
-}
-
 fn by_child(all: &[StampedPose]) -> BTreeMap<&str, Vec<&StampedPose>> {
     let mut edges: BTreeMap<&str, Vec<&StampedPose>> = BTreeMap::new();
     for pose in all {
@@ -98,37 +185,27 @@ fn by_child(all: &[StampedPose]) -> BTreeMap<&str, Vec<&StampedPose>> {
     edges
 }
 
-/// Returns the frames from `parent`, which is left out, down to `child`, which is last.
-fn chain<'a>(
-    edges: &BTreeMap<&'a str, Vec<&'a StampedPose>>,
-    parent: &str,
-    child: &str,
-) -> Option<Vec<&'a str>> {
-    let mut chain = Vec::new();
-    let mut frame = child;
-    while frame != parent && chain.len() < MAX_DEPTH {
-        let (name, transforms) = edges.get_key_value(frame)?;
-        chain.push(*name);
-        frame = &transforms.first()?.parent;
+/// Returns the poses of the last link's child in the first link's parent, at the times of the last link that changes; the
+/// others stay as they were last reported.
+fn compose_chain(links: &[Link<'_>]) -> Vec<StampedPose2> {
+    let Some(timed) = links.iter().rposition(|link| !link.is_static) else { return Vec::new() };
+    let compose = |pose: &&StampedPose| compose_at(pose, &links[..timed], &links[timed + 1..]);
+    links[timed].poses.iter().filter_map(compose).collect()
+}
+
+/// Returns a pose in the frame of the first outer link's parent, of the last inner link's child; `None` before the first
+/// pose of a link.
+fn compose_at(
+    timed: &StampedPose,
+    outer_links: &[Link<'_>],
+    inner_links: &[Link<'_>],
+) -> Option<StampedPose2> {
+    let mut stamped = timed.clone();
+    for link in inner_links {
+        stamped.pose = compose(&stamped.pose, &link.at(timed.t_secs)?.pose);
     }
-    chain.reverse();
-    (frame == parent && !chain.is_empty()).then_some(chain)
-}
-
-/// Returns the poses of the last link's child in the first link's parent, at the times of the last; the
-/// others stay as they were last reported, as those of a localization program do.
-fn compose_chain(links: &[Vec<&StampedPose>]) -> Vec<StampedPose2> {
-    let Some((last, outer_links)) = links.split_last() else { return Vec::new() };
-    last.iter().filter_map(|pose| compose_at(pose, outer_links)).collect()
-}
-
-/// Returns a pose in the frame of the first link's parent; `None` before the first pose of a link.
-fn compose_at(inner: &StampedPose, outer_links: &[Vec<&StampedPose>]) -> Option<StampedPose2> {
-    let mut stamped = inner.clone();
     for link in outer_links.iter().rev() {
-        let reported = link.partition_point(|outer| outer.t_secs <= inner.t_secs);
-        let outer = link.get(reported.checked_sub(1)?)?;
-        stamped.pose = compose(&outer.pose, &stamped.pose);
+        stamped.pose = compose(&link.at(timed.t_secs)?.pose, &stamped.pose);
     }
     Some(stamped.to_planar())
 }

@@ -7,7 +7,7 @@ use sidestep_kernel::InputError;
 
 use super::content::{Tally, decode_scan, log_secs};
 use super::messages::{LaserScan, Message, TfMessage};
-use super::poses;
+use super::poses::{self, StampedPose};
 use super::scans::RangeCounts;
 use super::storage::{self, RawMessage};
 use super::topics;
@@ -31,6 +31,10 @@ pub fn inspect(path: &Path) -> Result<ImportReport, InputError> {
     topics::add_facts(&storage.topics, &mut report);
     findings.report(&path.display().to_string(), &mut report)?;
     let messages: u64 = storage.topics.values().map(|topic| topic.messages).sum();
+    if let (0, Some(damage)) = (messages, report.findings.first()) {
+        let cause = format!("no message of the bag can be read: {damage}");
+        return Err(InputError::new(path.display(), cause, "give another bag"));
+    }
     report.add_kept("topics", storage.topics.len());
     report.add_kept("messages", usize::try_from(messages - findings.bad()).unwrap_or(usize::MAX));
     Ok(report)
@@ -46,11 +50,14 @@ pub(super) fn check(raw: &RawMessage<'_>) -> Result<Checked, String> {
     if !poses::SCHEMAS.contains(&&*raw.info.schema) {
         return Ok(Checked::Other);
     }
-    let mut first_secs = None;
-    for pose in poses::decode_poses(&raw.info.schema, encoding, bytes)? {
-        first_secs = first_secs.or(Some(pose?.t_secs));
+    let poses = poses::decode_poses(&raw.info.schema, encoding, bytes)?;
+    let poses: Vec<StampedPose> = poses.into_iter().collect::<Result<_, _>>()?;
+    if raw.info.schema == TfMessage::NAME {
+        let pairs =
+            poses.iter().map(|pose| [&pose.parent, &pose.child].map(|name| name.to_string()));
+        return Ok(Checked::Transforms(pairs.collect()));
     }
-    Ok(first_secs.map_or(Checked::Other, Checked::Poses))
+    Ok(poses.first().map_or(Checked::Other, |pose| Checked::Poses(pose.t_secs)))
 }
 
 /// A message that can be read.
@@ -58,6 +65,8 @@ pub(super) enum Checked {
     Scan(Box<LaserScan>),
     /// Poses, and the stamp of the first in s.
     Poses(f64),
+    /// Transforms, by their frames.
+    Transforms(Vec<[String; 2]>),
     Other,
 }
 
@@ -68,7 +77,18 @@ struct TopicFindings {
     ranges: BTreeMap<String, RangeCounts>,
     clocks: BTreeMap<String, ClockFindings>,
     recorded_secs: Option<[f64; 2]>,
+    /// Numbers of transforms by topic, parent and child.
+    frames: BTreeMap<(String, String, String), u64>,
 }
+
+/// Maximum number of pairs of frames that are listed.
+const MAX_FRAMES: usize = 20;
+/// Stamps further ahead of the recording than this, in s, cannot be times of measurements.
+const MAX_AHEAD_SECS: f64 = 0.3;
+/// The recording has times where it lasts at least this share of the time between stamps.
+const MIN_TIMED_SHARE: f64 = 0.1;
+/// Stamps further than this from the recording, in s, are of another clock, such as that of a simulation.
+const MAX_OFFSET_SECS: f64 = 1e6;
 
 /// The stamps of a topic.
 struct ClockFindings {
@@ -76,6 +96,10 @@ struct ClockFindings {
     first_secs: f64,
     last_secs: f64,
     latest_secs: f64,
+    /// The least time from a stamp to the recording of its message.
+    least_latency_secs: f64,
+    /// The times of the recording of the first and the last message.
+    recorded_secs: [f64; 2],
     backward_steps: Vec<String>,
     backward: u64,
 }
@@ -95,15 +119,26 @@ impl TopicFindings {
             Ok(Checked::Other) => tally.good += 1,
             Ok(Checked::Poses(t_secs)) => {
                 tally.good += 1;
+                self.add_stamp(raw, t_secs);
+            }
+            Ok(Checked::Transforms(pairs)) => {
+                tally.good += 1;
                 // Transforms of several programs share a topic, and not their time.
-                if raw.info.schema != TfMessage::NAME {
-                    self.add_stamp(raw, t_secs);
-                }
+                self.add_frames(raw.topic, pairs);
             }
             Ok(Checked::Scan(scan)) => {
                 tally.good += 1;
                 self.ranges.entry(raw.topic.into()).or_default().add(&scan);
                 self.add_stamp(raw, scan.header.stamp.secs());
+            }
+        }
+    }
+
+    fn add_frames(&mut self, topic: &str, pairs: Vec<[String; 2]>) {
+        for [parent, child] in pairs {
+            let key = (topic.to_owned(), parent, child);
+            if self.frames.len() <= MAX_FRAMES || self.frames.contains_key(&key) {
+                *self.frames.entry(key).or_insert(0) += 1;
             }
         }
     }
@@ -115,6 +150,8 @@ impl TopicFindings {
                 first_secs: t_secs,
                 last_secs: t_secs,
                 latest_secs: t_secs,
+                least_latency_secs: log_secs(raw) - t_secs,
+                recorded_secs: [log_secs(raw); 2],
                 backward_steps: Vec::new(),
                 backward: 0,
             };
@@ -122,6 +159,8 @@ impl TopicFindings {
             return;
         };
         clock.stamps += 1;
+        clock.recorded_secs[1] = log_secs(raw);
+        clock.least_latency_secs = clock.least_latency_secs.min(log_secs(raw) - t_secs);
         let back_secs = clock.latest_secs - t_secs;
         if back_secs > MAX_BACKWARD_STEP_SECS {
             clock.backward += 1;
@@ -154,6 +193,12 @@ impl TopicFindings {
         for (topic, clock) in &self.clocks {
             clock.report(topic, report);
         }
+        for ((topic, parent, child), n) in self.frames.iter().take(MAX_FRAMES) {
+            report.add_fact("frames", format!("{topic}: {parent} > {child}, {n} transforms"));
+        }
+        if self.frames.len() > MAX_FRAMES {
+            report.add_fact("frames", "and others");
+        }
         for (topic, counts) in &self.ranges {
             counts.convention(topic, None, report);
         }
@@ -169,6 +214,20 @@ impl ClockFindings {
         for k in 0..self.backward {
             let place = self.backward_steps.get(k as usize).cloned().unwrap_or_default();
             report.record(Treatment::Suspicious, rule.clone(), place, "");
+        }
+        let ahead_secs = -self.least_latency_secs;
+        let [recorded_first, recorded_last] = self.recorded_secs;
+        let is_timed = recorded_last - recorded_first > MIN_TIMED_SHARE * (last_secs - first_secs);
+        if is_timed && ahead_secs > MAX_AHEAD_SECS && ahead_secs < MAX_OFFSET_SECS {
+            let rule = format!(
+                "stamps of {topic} that lie up to {ahead_secs:.3} s after the recording of their messages"
+            );
+            report.record(
+                Treatment::Suspicious,
+                rule,
+                "",
+                "synchronize the clocks of the machines",
+            );
         }
         if self.stamps > 1 && *first_secs == 0.0 && *last_secs == 0.0 {
             let rule =

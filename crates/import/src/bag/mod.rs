@@ -22,6 +22,7 @@ mod clock;
 mod content;
 mod frames;
 mod inspect;
+mod offsets;
 mod poses;
 mod scans;
 mod storage;
@@ -43,6 +44,7 @@ pub use self::scans::NoEcho;
 pub use self::topics::{PoseTopic, TopicSelection};
 use crate::report::ImportReport;
 use crate::track::{SpeedRule, Track, cut_and_report, report_frozen};
+use crate::track_pair;
 
 /// The content that was read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -70,7 +72,7 @@ pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputErro
     let storage = storage::read(path, &|topic| selection.is_read(topic), &mut |message| {
         content.add(&message)
     })?;
-    selection.check(&bag, &storage.topics)?;
+    selection.check(&bag, &storage.topics, storage.report.findings.first())?;
     content.check(&storage.topics)?;
     let mut report = storage.report;
     topics::add_facts(&storage.topics, &mut report);
@@ -94,11 +96,14 @@ pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputErro
     let scans = content.take_scans(&mut report);
     let mounts = content.mounts(&scans, &body_frames);
     let odometry = odometry.map_or_else(Vec::new, |odometry| odometry.poses);
-    let rule = SpeedRule::for_tracks(selection.max_speed_mps, &[&truth.poses, &odometry]);
-    let truth = cut_and_report(&selection.truth.topic, truth.poses, &rule, &mut report);
     let odometry_topic = selection.odometry.as_ref().map_or("odometry", |source| &*source.topic);
+    let truth_topic = &*selection.truth.topic;
+    track_pair::check_units(&bag, [(odometry_topic, &odometry), (truth_topic, &truth.poses)])?;
+    let rule = SpeedRule::for_tracks(selection.max_speed_mps, &[&truth.poses, &odometry]);
+    let truth = cut_and_report(truth_topic, truth.poses, &rule, &mut report);
     let odometry = cut_and_report(odometry_topic, odometry, &rule, &mut report);
-    report_frozen(&selection.truth.topic, &truth, &odometry, &mut report);
+    report_frozen(truth_topic, &truth, &odometry, &mut report);
+    track_pair::report_pair([(odometry_topic, &odometry), (truth_topic, &truth)], &mut report);
     report.add_kept("true poses", truth.len());
     report.add_kept("poses of odometry", odometry.len());
     report.add_kept("scans", scans.len());

@@ -29,16 +29,19 @@ pub enum NoEcho {
     Zero,
     /// The greatest range.
     Maximum,
+    /// A range below the least one.
+    TooNear,
 }
 
 impl NoEcho {
-    /// Parses `inf`, `nan`, `zero` or `max`.
+    /// Parses `inf`, `nan`, `zero`, `max` or `near`.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "inf" => Some(Self::Infinite),
             "nan" => Some(Self::NotANumber),
             "zero" => Some(Self::Zero),
             "max" => Some(Self::Maximum),
+            "near" => Some(Self::TooNear),
             _ => None,
         }
     }
@@ -47,8 +50,9 @@ impl NoEcho {
         match self {
             Self::Infinite => "inf",
             Self::NotANumber => "NaN",
-            Self::Zero => "0",
+            Self::Zero => "0 or less",
             Self::Maximum => "the greatest range",
+            Self::TooNear => "a range below the least one",
         }
     }
 }
@@ -67,7 +71,29 @@ pub(super) fn check(scan: &LaserScan) -> Result<(), String> {
     if limits.iter().any(|limit| limit.is_nan()) || limits[0] < 0.0 || limits[1] <= limits[0] {
         return Err(format!("it measures ranges from {} to {} m", limits[0], limits[1]));
     }
+    if limits[0] > MAX_LEAST_RANGE_M {
+        return Err(format!("its least range is {} m, which looks like millimeters", limits[0]));
+    }
+    let span_rad = scan.angle_increment_rad.abs() * (n - 1) as f32;
+    if span_rad > MAX_SPAN_RAD {
+        return Err(format!("its beams span {span_rad} rad, which looks like degrees"));
+    }
+    if n > 1 && scan.angle_increment_rad == 0.0 {
+        return Err(format!("its {n} beams have one bearing: angle_increment is 0"));
+    }
     Ok(())
+}
+
+/// No scanner is blind as far as this: the least range of a scan in millimeters is larger.
+const MAX_LEAST_RANGE_M: f32 = 50.0;
+/// Beams span a turn, or a little more where they overlap.
+const MAX_SPAN_RAD: f32 = 2.5 * std::f32::consts::TAU / 2.0;
+/// A limit beyond this is none: drivers without one give the greatest number that there is.
+const MAX_LIMIT_M: f32 = 1e5;
+
+/// Returns whether a scan has a limit of its ranges.
+fn is_limited(scan: &LaserScan) -> bool {
+    scan.range_max_m < MAX_LIMIT_M
 }
 
 /// The kind of a range, by its own scan.
@@ -89,13 +115,13 @@ fn kind_of(range_m: f32, scan: &LaserScan) -> RangeKind {
     let max_m = scan.range_max_m;
     if range_m.is_nan() {
         RangeKind::NotANumber
-    } else if range_m == f32::INFINITY {
+    } else if range_m == f32::INFINITY || range_m >= MAX_LIMIT_M && !is_limited(scan) {
         RangeKind::Infinite
     } else if range_m == f32::NEG_INFINITY {
         RangeKind::TooNear
     } else if range_m <= 0.0 {
         RangeKind::Zero
-    } else if max_m.is_finite() && (range_m - max_m).abs() <= LIMIT_TOLERANCE * max_m {
+    } else if is_limited(scan) && (range_m - max_m).abs() <= LIMIT_TOLERANCE * max_m {
         RangeKind::AtMaximum
     } else if range_m > max_m {
         RangeKind::BeyondMaximum
@@ -120,9 +146,25 @@ pub(super) struct RangeCounts {
     beyond_maximum: u64,
     /// The least and the greatest limit of the ranges of a scan.
     max_m: Option<[f32; 2]>,
-    /// The greatest range between the limits of its scan.
+    /// The greatest range between the limits of its scan, how often it occurs, and how many come near to a limit.
     greatest_m: f32,
+    at_greatest: u64,
+    near_limit: u64,
+    /// The value of the ranges that are too near; `None` where there are several.
+    near_mark_m: Option<f32>,
+    has_several_near: bool,
+    /// Number of scans whose last bearing is not that of their last beam.
+    other_end: u64,
 }
+
+/// The last bearing of a scan may be that of its last beam, or of the one that would follow, in steps between beams.
+const MAX_END_STEPS: f32 = 1.5;
+/// A range is near to its limit from this share of it on.
+const NEAR_LIMIT: f32 = 0.9;
+/// So great a share of the ranges near to the limit is at one value where that value is a mark.
+const MIN_MARK_SHARE: f64 = 0.5;
+/// So many more ranges than are usual at the ends of a robot, as a share of all, are suspicious where they are too near.
+const MAX_NEAR_SHARE: f64 = 0.05;
 
 impl RangeCounts {
     pub(super) fn add(&mut self, scan: &LaserScan) {
@@ -130,8 +172,10 @@ impl RangeCounts {
         self.beams += scan.ranges_m.len() as u64;
         for range_m in &scan.ranges_m {
             let kind = kind_of(*range_m, scan);
-            if kind == RangeKind::Measured {
-                self.greatest_m = self.greatest_m.max(*range_m);
+            match kind {
+                RangeKind::Measured => self.add_measured(*range_m, scan),
+                RangeKind::TooNear => self.add_near(*range_m),
+                _ => {}
             }
             *match kind {
                 RangeKind::Measured => &mut self.measured,
@@ -146,6 +190,41 @@ impl RangeCounts {
         let max_m = scan.range_max_m;
         let [low, high] = self.max_m.unwrap_or([max_m; 2]);
         self.max_m = Some([low.min(max_m), high.max(max_m)]);
+        let last_rad = scan.angle_increment_rad * (scan.ranges_m.len() as f32 - 1.0);
+        let off_rad = (scan.angle_max_rad - scan.angle_min_rad - last_rad).abs();
+        self.other_end += u64::from(off_rad > MAX_END_STEPS * scan.angle_increment_rad.abs());
+    }
+
+    fn add_measured(&mut self, range_m: f32, scan: &LaserScan) {
+        if range_m > self.greatest_m {
+            (self.greatest_m, self.at_greatest) = (range_m, 0);
+        }
+        self.at_greatest += u64::from(range_m == self.greatest_m);
+        self.near_limit += u64::from(range_m > NEAR_LIMIT * scan.range_max_m);
+    }
+
+    fn add_near(&mut self, range_m: f32) {
+        self.has_several_near |= self.near_mark_m.is_some_and(|mark_m| mark_m != range_m);
+        self.near_mark_m = Some(range_m);
+    }
+
+    /// Returns the value just below the limit that a driver writes for no echo, where most ranges near to the limit have it.
+    fn mark_m(&self) -> Option<f32> {
+        let [low, high] = self.max_m?;
+        let is_mark = self.infinite == 0
+            && low == high
+            && self.greatest_m > NEAR_LIMIT * high
+            && self.at_greatest >= MIN_AT_LIMIT
+            && self.at_greatest as f64 >= MIN_SHARE_AT_LIMIT * self.beams as f64
+            && self.at_greatest as f64 >= MIN_MARK_SHARE * self.near_limit as f64
+            && self.at_maximum + self.beyond_maximum == 0;
+        is_mark.then_some(self.greatest_m)
+    }
+
+    /// Returns whether all ranges that are too near are at one value, which is no measurement then.
+    fn is_near_mark(&self) -> bool {
+        let is_finite = self.near_mark_m.is_some_and(f32::is_finite);
+        self.infinite == 0 && is_finite && !self.has_several_near && self.too_near >= MIN_AT_LIMIT
     }
 
     /// Returns whether each scan has the greatest of its own ranges as limit, so that a range at it is an echo.
@@ -158,7 +237,7 @@ impl RangeCounts {
     /// Returns the limit for all scans where their own are none.
     fn measured_limit_m(&self) -> Option<f32> {
         let [_, high] = self.max_m?;
-        if !high.is_finite() && self.greatest_m > 0.0 {
+        if high >= MAX_LIMIT_M && self.greatest_m > 0.0 {
             return Some(self.greatest_m);
         }
         self.is_limit_measured().then_some(high)
@@ -170,8 +249,11 @@ impl RangeCounts {
             return Some(NoEcho::Infinite);
         }
         let at_maximum = if self.is_limit_measured() { 0 } else { self.at_maximum };
+        let at_mark = self.mark_m().map_or(0, |_| self.at_greatest);
+        let near = if self.is_near_mark() { self.too_near } else { 0 };
         let counts = [
-            (NoEcho::Maximum, at_maximum + self.beyond_maximum),
+            (NoEcho::TooNear, near),
+            (NoEcho::Maximum, at_maximum + self.beyond_maximum + at_mark),
             (NoEcho::NotANumber, self.not_a_number),
             (NoEcho::Zero, self.zero),
         ];
@@ -190,6 +272,7 @@ impl RangeCounts {
         let convention = ScanConvention {
             no_echo,
             measured_limit_m: self.measured_limit_m(),
+            mark_m: self.mark_m().filter(|_| no_echo == NoEcho::Maximum),
             is_maximum_no_echo: no_echo == NoEcho::Maximum
                 || given.is_none() && self.is_maximum_repeated(),
         };
@@ -209,7 +292,12 @@ impl RangeCounts {
             NoEcho::Infinite => self.infinite,
             NoEcho::NotANumber => self.not_a_number,
             NoEcho::Zero => self.zero,
-            NoEcho::Maximum => self.at_maximum + self.beyond_maximum,
+            NoEcho::Maximum => {
+                self.at_maximum
+                    + self.beyond_maximum
+                    + self.mark_m().map_or(0, |_| self.at_greatest)
+            }
+            NoEcho::TooNear => self.too_near,
         }
     }
 
@@ -238,6 +326,7 @@ impl RangeCounts {
             let remedy = "give --no-echo inf where it is no measurement";
             report.record(Treatment::Guessed, rule, "", remedy);
         }
+        self.record_doubts(topic, no_echo, report);
         if let Some(limit_m) = convention.measured_limit_m {
             let cause =
                 if self.is_limit_measured() { "its own greatest range" } else { "infinite" };
@@ -276,6 +365,48 @@ impl RangeCounts {
     }
 }
 
+impl RangeCounts {
+    /// Records what can hardly be right with the ranges of a topic.
+    fn record_doubts(&self, topic: &str, no_echo: NoEcho, report: &mut ImportReport) {
+        let percent = |n: u64| 100.0 * n as f64 / self.beams.max(1) as f64;
+        if self.measured == 0 && self.beams > 0 {
+            let rule = format!("none of the {} ranges on {topic} is an echo", self.beams);
+            let remedy = "check that the scanner turned, and that lengths are in meters";
+            report.record(Treatment::Suspicious, rule, "", remedy);
+        }
+        let far_share = self.beyond_maximum as f64 / self.beams.max(1) as f64;
+        if far_share > 0.5 {
+            let rule = format!(
+                "{:.2} % of the ranges on {topic} are beyond range_max",
+                percent(self.beyond_maximum)
+            );
+            report.record(
+                Treatment::Suspicious,
+                rule,
+                "",
+                "check that ranges and range_max are both in meters",
+            );
+        }
+        let is_near_often = self.too_near as f64 > MAX_NEAR_SHARE * self.beams as f64;
+        if is_near_often && self.infinite == 0 && no_echo != NoEcho::TooNear {
+            let rule = format!(
+                "{:.2} % of the ranges on {topic} are nearer than the scanner measures, and none is inf",
+                percent(self.too_near)
+            );
+            let remedy = "give --no-echo near if the driver writes so where nothing answers";
+            report.record(Treatment::Suspicious, rule, "", remedy);
+        }
+        if self.other_end > 0 {
+            let rule = format!(
+                "scans on {topic} whose angle_max is not the bearing of their last beam: angle_min and angle_increment count \
+                 ({} of {} scans)",
+                self.other_end, self.scans
+            );
+            report.record(Treatment::Suspicious, rule, "", "");
+        }
+    }
+}
+
 /// How the scans of a topic are to be read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanConvention {
@@ -284,6 +415,8 @@ pub(super) struct ScanConvention {
     measured_limit_m: Option<f32>,
     /// Whether a range at the limit is no echo.
     is_maximum_no_echo: bool,
+    /// A range below the limit that is no echo.
+    mark_m: Option<f32>,
 }
 
 impl ScanConvention {
@@ -305,7 +438,8 @@ impl ScanConvention {
             RangeKind::NotANumber => self.no_echo == NoEcho::NotANumber,
             RangeKind::Zero => self.no_echo == NoEcho::Zero,
             RangeKind::AtMaximum => self.is_maximum_no_echo && self.measured_limit_m.is_none(),
-            RangeKind::Measured | RangeKind::TooNear => false,
+            RangeKind::Measured => self.mark_m == Some(range_m),
+            RangeKind::TooNear => self.no_echo == NoEcho::TooNear,
         };
         match kind {
             _ if is_no_echo => f32::INFINITY,
@@ -333,7 +467,7 @@ mod tests {
         LaserScan {
             header: Header { stamp: Time::from_ns(0), frame_id: "laser".into() },
             angle_min_rad: 0.0,
-            angle_max_rad: 1.0,
+            angle_max_rad: 0.1 * (ranges_m.len() as f32 - 1.0),
             angle_increment_rad: 0.1,
             time_increment_s: 0.0,
             scan_time_s: 0.1,
@@ -375,7 +509,7 @@ mod tests {
     fn each_way_to_write_no_echo_is_recognized_by_its_count_and_named() {
         let cases: [(&[f32], &str); 4] = [
             (&[1.0, NAN, 2.0, NAN], "guessed: NaN on /scan is no echo (2 of 4 ranges, 50.00 %)"),
-            (&[1.0, 0.0, 2.0, 0.0], "guessed: 0 on /scan is no echo (2 of 4"),
+            (&[1.0, 0.0, 2.0, 0.0], "guessed: 0 or less on /scan is no echo (2 of 4"),
             (&[1.0, 8.0, 2.0, 8.0], "guessed: the greatest range on /scan is no echo (2 of 4"),
             (&[1.0, 9.0, 2.0, 8.001], "guessed: the greatest range on /scan is no echo (2 of 4"),
         ];
@@ -443,6 +577,88 @@ mod tests {
     fn a_scan_without_any_range_is_blank() {
         assert!(is_blank(&scan(8.0, &[0.0, NAN])));
         assert!(!is_blank(&scan(8.0, &[0.0, INF])) && !is_blank(&scan(8.0, &[0.0, 8.0])));
+    }
+
+    #[test]
+    fn a_value_below_the_least_range_or_just_below_the_limit_is_no_echo_where_all_have_it() {
+        let near = [scan(8.0, &[1.0, 0.05, 2.0, 0.05, 0.05])];
+        let (scans, said) = read(&near, None);
+        assert_eq!(scans[0].ranges_m, [1.0, INF, 2.0, INF, INF]);
+        assert!(
+            said[0].starts_with("guessed: a range below the least one on /scan is no echo (3 of 5"),
+            "{said:?}"
+        );
+        let (scans, _) = read(&near, Some(NoEcho::Infinite));
+        assert_eq!(scans[0].ranges_m, [1.0, -INF, 2.0, -INF, -INF]);
+        let (scans, said) = read(&[scan(8.0, &[1.0, 7.99, 2.0, 7.99, 7.99, 7.5])], None);
+        assert_eq!(scans[0].ranges_m, [1.0, INF, 2.0, INF, INF, 7.5]);
+        assert!(
+            said[0].starts_with("guessed: the greatest range on /scan is no echo (3 of 6"),
+            "{said:?}"
+        );
+        // A wall that is seen at many ranges near to the limit.
+        let (scans, said) =
+            read(&[scan(8.0, &[7.9, 7.91, 7.92, 7.93, 7.94, 7.99, 7.99, 7.99])], None);
+        assert!(
+            scans[0].ranges_m.iter().all(|range_m| range_m.is_finite()) && said.is_empty(),
+            "{said:?}"
+        );
+    }
+
+    #[test]
+    fn ranges_that_are_too_near_often_are_doubted() {
+        let all = [scan(8.0, &[1.0, -INF, 2.0, -INF])];
+        let (scans, said) = read(&all, None);
+        assert_eq!(scans[0].ranges_m, [1.0, -INF, 2.0, -INF]);
+        assert!(
+            said[0].starts_with("suspicious: 50.00 % of the ranges on /scan are nearer"),
+            "{said:?}"
+        );
+        assert!(
+            said[0].ends_with("give --no-echo near if the driver writes so where nothing answers"),
+            "{said:?}"
+        );
+        let (scans, _) = read(&all, Some(NoEcho::TooNear));
+        assert_eq!(scans[0].ranges_m, [1.0, INF, 2.0, INF]);
+        let (_, said) = read(&[scan(8.0, &[INF, -INF, 2.0])], None);
+        assert_eq!(said, [""; 0], "a driver that writes inf for no echo means -inf");
+    }
+
+    #[test]
+    fn scans_in_degrees_or_millimeters_and_without_bearings_are_bad() {
+        let plain = scan(8.0, &[1.0; 31]);
+        assert_eq!(check(&plain), Ok(()));
+        let cause = |change: fn(&mut LaserScan)| {
+            let mut other = plain.clone();
+            change(&mut other);
+            check(&other).expect_err("a bad scan")
+        };
+        assert!(cause(|scan| scan.angle_increment_rad = 6.0).contains("looks like degrees"));
+        assert!(cause(|scan| scan.angle_increment_rad = 0.0).contains("one bearing"));
+        assert!(
+            cause(|scan| (scan.range_min_m, scan.range_max_m) = (100.0, 8e3))
+                .contains("millimeters")
+        );
+    }
+
+    #[test]
+    fn a_limit_that_is_the_greatest_number_is_none() {
+        let (scans, said) = read(&[scan(f32::MAX, &[1.0, 7.5, f32::MAX])], None);
+        assert_eq!((scans[0].range_max_m, &scans[0].ranges_m[..]), (7.5, &[1.0, 7.5, INF][..]));
+        assert!(said[0].contains("7.5 m, the greatest of all"), "{said:?}");
+    }
+
+    #[test]
+    fn scans_without_an_echo_and_those_that_end_elsewhere_are_doubted() {
+        let (_, said) = read(&[scan(8.0, &[INF, INF])], None);
+        assert!(
+            said[0].starts_with("suspicious: none of the 2 ranges on /scan is an echo"),
+            "{said:?}"
+        );
+        let mut other = scan(8.0, &[1.0, 2.0, 3.0, 4.0]);
+        other.angle_max_rad = other.angle_min_rad + 9.0 * other.angle_increment_rad;
+        let (_, said) = read(&[other], None);
+        assert!(said[0].contains("angle_max is not the bearing of their last beam"), "{said:?}");
     }
 
     proptest::proptest! {

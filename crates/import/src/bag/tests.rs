@@ -287,7 +287,7 @@ fn a_clock_that_is_set_back_starts_a_part_of_its_own_and_messages_that_overtake_
     let found = &back.report.findings[0];
     assert_eq!(found.treatment, Treatment::Repaired);
     assert!(found.places[0].contains("message 3 is stamped 0.600 s before"), "{found}");
-    let ahead = stamps(&[0, 4_000_000]);
+    let ahead = stamps(&[100, 4_000_100]);
     assert!(
         ahead.report.findings[0].to_string().contains("4000.000 s after"),
         "{:?}",
@@ -435,6 +435,7 @@ fn messages_files_and_both_that_are_packed_read_the_same() {
 /// Writes a bag in SQLite as `ros2 bag record` does.
 fn write_sqlite(path: &Path, entries: &[Entry]) {
     let database = rusqlite::Connection::open(path).unwrap();
+    database.execute_batch("PRAGMA synchronous = OFF").unwrap();
     database
         .execute_batch(
             "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, \
@@ -677,13 +678,192 @@ fn a_folder_is_read_in_the_order_that_its_metadata_list_or_else_of_its_numbers()
 }
 
 #[test]
-fn a_source_is_a_topic_or_a_topic_and_two_frames() {
+fn a_source_is_a_topic_alone_or_with_one_frame_or_two() {
     let source = PoseTopic::parse("/tf:map:robot/base").unwrap();
     assert_eq!(source.frames, Some(("map".into(), "robot/base".into())));
     assert_eq!(PoseTopic::parse("/odom").unwrap().frames, None);
-    for wrong in ["", "/tf:map", "/tf::base", "/tf:a:b:c"] {
+    assert_eq!(PoseTopic::parse("/truth:map").unwrap().frames, Some(("map".into(), String::new())));
+    for wrong in ["", "/tf:", "/tf::base", "/tf:a:b:c"] {
         assert!(PoseTopic::parse(wrong).unwrap_err().remedy().contains("/tf:map:base_link"));
     }
+}
+
+/// The messages of a bag with the times of their recording, in ms.
+fn timed_bag(entries: &[(u64, Entry)]) -> (tempfile::TempDir, PathBuf) {
+    let mut writer = WriteOptions::new().profile("ros2").create(Cursor::new(Vec::new())).unwrap();
+    let mut channels: BTreeMap<&str, u16> = BTreeMap::new();
+    for (log_ms, (topic, schema, data)) in entries {
+        let channel_id = *channels.entry(topic).or_insert_with(|| {
+            let schema = writer.add_schema(schema, "ros2msg", b"").unwrap();
+            writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap()
+        });
+        let log_time = log_ms * 1_000_000;
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    }
+    writer.finish().unwrap();
+    stored(&writer.into_inner().into_inner())
+}
+
+/// A drive of 30 s whose truth is stamped by a clock of its own; returns the truth, and what is said.
+fn read_with_clock(stamp_ms: impl Fn(u64) -> u64) -> (Vec<(f64, f64)>, Vec<String>) {
+    let mut entries = Vec::new();
+    for k in 0..300 {
+        let t_ms = 7_000_000 + 100 * k;
+        // It stands in every third second, so that its motion tells the time.
+        let x_m = 0.1 * (k - 10 * (k / 30)).min(20 * (k / 30) + 20) as f64;
+        entries.push((t_ms + 5, odometry(t_ms, x_m)));
+        entries.push((t_ms + 6, truth(stamp_ms(t_ms), x_m)));
+    }
+    let (_folder, path) = timed_bag(&entries);
+    let log = read(&path, &wanted("/truth", None)).unwrap();
+    let truth = log.truth.iter().map(|pose| (pose.t_secs, pose.position_m[0])).collect();
+    (truth, log.report.findings.iter().map(ToString::to_string).collect())
+}
+
+#[test]
+fn topics_whose_clocks_differ_are_moved_where_stamps_cannot_be_and_named_elsewhere() {
+    let (truth, said) = read_with_clock(|t_ms| t_ms);
+    assert_eq!((truth[100].0, said), (7010.0, Vec::new()));
+    let (ahead, said) = read_with_clock(|t_ms| t_ms + 1000);
+    assert!((ahead[100].0 - 7010.0).abs() < 0.01, "{:?}", ahead[100]);
+    assert!(
+        said[0].starts_with("guessed: the stamps of /truth lie 0.994 s after the recording"),
+        "{said:?}"
+    );
+    let (behind, said) = read_with_clock(|t_ms| t_ms - 1000);
+    assert_eq!(behind[100].0, 7009.0);
+    assert!(
+        said[0].starts_with("suspicious: the stamps of /truth are 1.001 s behind those of /odom"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn the_clock_of_one_topic_that_is_set_is_set_back_by_the_times_of_the_recording() {
+    for step_ms in [2000_i64, -2000] {
+        let (truth, said) = read_with_clock(|t_ms| {
+            if t_ms < 7_015_000 { t_ms } else { t_ms.checked_add_signed(step_ms).unwrap() }
+        });
+        // Parts are ten seconds apart; what lies after the step is as long after its start as it was.
+        let (start, end) = (truth[150], truth[299]);
+        assert!((end.0 - start.0 - 14.9).abs() < 0.01, "{start:?} {end:?}");
+        let undone = said
+            .iter()
+            .find(|line| line.contains("was set and that of /odom (odom > base) was not"));
+        assert!(undone.is_some_and(|line| line.contains("from message 151 on by")), "{said:?}");
+        assert!(!said.iter().any(|line| line.contains("moves as /odom does")), "{said:?}");
+    }
+}
+
+#[test]
+fn stamps_of_one_message_that_are_none_are_left_out() {
+    let (truth, said) = read_with_clock(|t_ms| match t_ms {
+        7_010_000 => 0,
+        7_011_000 => 9_000_000,
+        _ => t_ms,
+    });
+    assert_eq!(truth.len(), 298, "{said:?}");
+    let dropped: Vec<&String> = said.iter().filter(|line| line.starts_with("dropped")).collect();
+    assert!(dropped[0].contains("whose stamp is 0, message 101"), "{said:?}");
+    assert!(
+        dropped[1].contains("whose stamp is ahead of those before and after it, message 111"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn frames_with_two_parents_are_joined_by_the_pair_that_is_asked_for() {
+    let edges = |k: u64| {
+        let x_m = k as f64;
+        transforms(
+            "/tf",
+            100 * k,
+            &[("map", "base", at(2.0 * x_m, 0.0)), ("odom", "base", at(x_m, 0.0))],
+        )
+    };
+    let entries: Vec<Entry> = (0..20).map(edges).collect();
+    let selection = |odometry: &str, truth: &str| TopicSelection {
+        odometry: Some(PoseTopic::parse(odometry).unwrap()),
+        ..wanted(truth, None)
+    };
+    let log = read_all(&entries, &selection("/tf:odom:base", "/tf:map:base")).unwrap();
+    assert_eq!((log.odometry[3].position_m[0], log.truth[3].position_m[0]), (3.0, 6.0));
+}
+
+#[test]
+fn static_transforms_lead_on_where_those_that_change_do_not() {
+    let mut entries: Vec<Entry> = (0..20)
+        .map(|k| transforms("/tf", 100 * k, &[("map", "foot", at(k as f64, FRAC_PI_2))]))
+        .collect();
+    entries.push(transforms("/tf_static", 0, &[("foot", "base", at(0.5, 0.0))]));
+    let selection = TopicSelection { odometry: None, ..wanted("/tf:map:base", None) };
+    let log = read_all(&entries, &selection).unwrap();
+    let [x_m, y_m] = log.truth[3].position_m;
+    assert!((x_m - 3.0).abs() < 1e-12 && (y_m - 0.5).abs() < 1e-12, "{:?}", log.truth[3]);
+}
+
+#[test]
+fn the_remedy_for_several_frames_is_one_that_works() {
+    let mut entries = drive();
+    entries.extend((0..20).map(|k| {
+        let header = header(100 * k, "world");
+        ("/truth", POSE, encode(&PoseStamped { header, pose: at(5.0, 0.0) }))
+    }));
+    let error = refused(&entries, &wanted("/truth", None));
+    let advised = error.remedy().strip_prefix("give one of them: ").unwrap();
+    assert_eq!(advised, "/truth:map");
+    let log = read_all(&entries, &wanted(advised, None)).unwrap();
+    assert_eq!((log.truth.len(), log.truth[3].position_m[0]), (20, 6.0));
+}
+
+#[test]
+fn rows_on_a_damaged_page_of_sqlite_are_lost_and_those_behind_it_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hall_0.db3");
+    let entries: Vec<Entry> = (0..400).map(|k| truth(100 * k, 0.01 * k as f64)).collect();
+    write_sqlite(&path, &entries);
+    let whole = fs::read(&path).unwrap();
+    let selection = TopicSelection { odometry: None, ..wanted("/truth", None) };
+    assert_eq!(read(&path, &selection).unwrap().truth.len(), 400);
+    // A page in the middle of the table becomes zeros.
+    let mut damaged = whole.clone();
+    let page = damaged.len() / 2 / 4096 * 4096;
+    damaged[page..page + 4096].fill(0);
+    fs::write(&path, &damaged).unwrap();
+    let log = read(&path, &selection).unwrap();
+    assert!((340..400).contains(&log.truth.len()), "{}", log.truth.len());
+    assert!(log.truth.last().unwrap().t_secs > 39.0, "rows behind the page");
+    assert_eq!(log.report.findings[0].rule, "rows on damaged pages of a file");
+    // A copy that was interrupted.
+    fs::write(&path, &whole[..whole.len() * 7 / 10]).unwrap();
+    let log = read(&path, &selection).unwrap();
+    assert!((200..380).contains(&log.truth.len()), "{}", log.truth.len());
+    assert_eq!(log.report.findings[0].rule, "the end of a file that is cut off");
+}
+
+#[test]
+fn a_file_that_is_missing_between_others_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, part) in [("hall_0.mcap", &drive()[..20]), ("hall_2.mcap", &drive()[20..])] {
+        fs::write(folder.path().join(name), bytes_of(part, None)).unwrap();
+    }
+    let log = read(folder.path(), &wanted("/truth", None)).unwrap();
+    let said = log.report.findings[0].to_string();
+    assert!(
+        said.starts_with("dropped: files of the bag that are not there, hall_1.mcap"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_frames_of_transforms_are_listed() {
+    let edges = [("map", "odom", at(0.0, 0.0)), ("odom", "base", at(1.0, 0.0))];
+    let (_folder, path) = bag(&[transforms("/tf", 0, &edges), transforms("/tf", 100, &edges[1..])]);
+    let report = inspect(&path).unwrap();
+    let frames: Vec<&str> =
+        report.facts.iter().filter(|fact| fact.name == "frames").map(|fact| &*fact.value).collect();
+    assert_eq!(frames, ["/tf: map > odom, 1 transforms", "/tf: odom > base, 2 transforms"]);
 }
 
 proptest::proptest! {

@@ -6,7 +6,7 @@ use sidestep_kernel::InputError;
 
 use super::scans::NoEcho;
 use super::storage::Topic;
-use crate::report::ImportReport;
+use crate::report::{Finding, ImportReport};
 
 /// Maximum number of topics that an error or a report lists.
 const MAX_LISTED: usize = 20;
@@ -20,18 +20,22 @@ const TF_SUFFIX: &str = "/tf";
 pub struct PoseTopic {
     /// The name of the topic.
     pub topic: String,
-    /// The parent frame and the child frame.
+    /// The parent frame and the child frame, which is empty where messages do not give it.
     pub frames: Option<(String, String)>,
 }
 
 impl PoseTopic {
-    /// Parses `TOPIC` or `TOPIC:PARENT:CHILD`; names of topics have no colons.
+    /// Parses `TOPIC`, `TOPIC:PARENT:CHILD` or, for messages that give the outer frame alone, `TOPIC:PARENT`; names of topics
+    /// have no colons.
     ///
     /// # Errors
     /// When it is neither.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         match text.split(':').collect::<Vec<_>>()[..] {
             [topic] if !topic.is_empty() => Ok(Self { topic: topic.into(), frames: None }),
+            [topic, parent] if ![topic, parent].contains(&"") => {
+                Ok(Self { topic: topic.into(), frames: Some((parent.into(), String::new())) })
+            }
             [topic, parent, child] if ![topic, parent, child].contains(&"") => {
                 Ok(Self { topic: topic.into(), frames: Some((parent.into(), child.into())) })
             }
@@ -60,10 +64,14 @@ pub struct TopicSelection {
 }
 
 impl TopicSelection {
-    /// Returns whether messages of a topic are read: static transforms too, which give the pose of the scanner.
+    /// Returns whether messages of a topic are read: static transforms too, which give the pose of the scanner, and lead on
+    /// where transforms that change do not.
     pub(super) fn is_read(&self, topic: &str) -> bool {
-        let is_transforms = topic.ends_with(STATIC_TF_SUFFIX) || topic.ends_with(TF_SUFFIX);
-        self.contains(topic) || is_transforms && self.scans.is_some()
+        let is_static = topic.ends_with(STATIC_TF_SUFFIX);
+        let has_frames = self.pose_topics().any(|source| source.frames.is_some());
+        self.contains(topic)
+            || self.scans.is_some() && (is_static || topic.ends_with(TF_SUFFIX))
+            || has_frames && is_static
     }
 
     fn pose_topics(&self) -> impl Iterator<Item = &PoseTopic> {
@@ -75,11 +83,12 @@ impl TopicSelection {
             || self.pose_topics().any(|source| source.topic == topic)
     }
 
-    /// Checks that every selected topic exists and has messages.
+    /// Checks that every selected topic exists and has messages; `damage` is what was lost of the bag.
     pub(super) fn check(
         &self,
         bag: &str,
         topics: &BTreeMap<String, Topic>,
+        damage: Option<&Finding>,
     ) -> Result<(), InputError> {
         for name in self.pose_topics().map(|source| &source.topic).chain(&self.scans) {
             let problem = match topics.get(name) {
@@ -88,7 +97,8 @@ impl TopicSelection {
                 Some(_) => "has no messages",
                 None => "is not there",
             };
-            let cause = format!("the topic {name} {problem}");
+            let damage = damage.map_or_else(String::new, |found| format!(", and {found}"));
+            let cause = format!("the topic {name} {problem}{damage}");
             return Err(InputError::new(bag, cause, describe_topics(topics)));
         }
         Ok(())

@@ -7,6 +7,7 @@ use super::messages::{ScanKind, ScanMessage, TimedPose};
 use super::{CarmenMotion, CorrectedLog, LogContent, LogEntry, PoseXyTheta, Scan};
 use crate::report::{ImportReport, Treatment};
 use crate::track::{SpeedRule, StampedPose2, cut_and_report, report_frozen};
+use crate::track_pair::report_pair;
 
 /// Poses in a log are rounded to this, in m and rad.
 const ROUNDING: f64 = 1e-3;
@@ -255,6 +256,7 @@ fn tracks(
     let odometry = cut_and_report("ODOM", odometry, &rule, report);
     let truth = cut_and_report("the true poses", truth, &rule, report);
     report_frozen("the true poses", &truth, &odometry, report);
+    report_pair([("ODOM", &odometry), ("the truth", &truth)], report);
     CarmenMotion::Tracks { odometry, truth }
 }
 

@@ -43,7 +43,7 @@ pub(super) fn read(
         read_file(file, &mut sink)?;
     }
     for name in &files.missing {
-        sink.damaged_part("files that metadata.yaml lists and that are not there", name.clone());
+        sink.damaged_part("files of the bag that are not there", name.clone());
     }
     let damage = sink.report.findings.first();
     if let (true, Some(damage)) = (sink.topics.is_empty(), damage) {
@@ -52,7 +52,8 @@ pub(super) fn read(
             damage.rule,
             damage.places.join(", ")
         );
-        return Err(InputError::new(path.display(), cause, "copy it again, or give another bag"));
+        let remedy = "copy it again if its original is whole, or give another bag";
+        return Err(InputError::new(path.display(), cause, remedy));
     }
     if sink.packed_messages > 0 {
         let value = format!("zstd, message by message ({} messages)", sink.packed_messages);
@@ -198,8 +199,9 @@ impl BagFiles {
             let cause = format!("the folder holds bags of two kinds: {first} and {other}");
             return Err(InputError::new(folder.display(), cause, "give one of the files"));
         }
+        let missing = missing_names(&names);
         let paths = names.into_iter().map(|name| folder.join(name)).collect();
-        Ok(Self { paths, ..Self::default() })
+        Ok(Self { paths, missing, ..Self::default() })
     }
 
     /// Checks that at least half of the messages that metadata give were in the files.
@@ -215,8 +217,39 @@ impl BagFiles {
         }
         let cause =
             format!("{stored} of the {listed} messages that metadata.yaml gives are in the files");
-        Err(InputError::new(path.display(), cause, "copy the bag again, with all of its files"))
+        Err(InputError::new(
+            path.display(),
+            cause,
+            "put all files of the bag beside metadata.yaml; delete metadata.yaml to read those that are there",
+        ))
     }
+}
+
+/// Maximum number of files between two others that are missed.
+const MAX_MISSING: u64 = 100;
+
+/// Returns the files that are missing between others, by the numbers with which their names end: `hall_0.mcap`.
+fn missing_names(names: &[String]) -> Vec<String> {
+    let mut missing = Vec::new();
+    for pair in names.windows(2) {
+        let numbers = [numbered(&pair[0]), numbered(&pair[1])];
+        let [Some((stem, before, ending)), Some((other, after, other_ending))] = numbers else {
+            continue;
+        };
+        let is_series = (stem, ending) == (other, other_ending) && after > before;
+        if is_series && after - before <= MAX_MISSING {
+            missing.extend((before + 1..after).map(|n| format!("{stem}_{n}.{ending}")));
+        }
+    }
+    missing
+}
+
+/// Splits the name of a file into the part before its number, the number, and the ending.
+fn numbered(name: &str) -> Option<(&str, u64, &str)> {
+    let (stem, ending) = name.split_once('.')?;
+    let (stem, number) = stem.rsplit_once('_')?;
+    // `hall_2026` beside `hall_2027` are two bags of two years, not parts of one; parts begin at 0.
+    Some((stem, number.parse().ok().filter(|n| *n < 1000)?, ending))
 }
 
 /// Returns the ending of a bag's file, without that of its compression.

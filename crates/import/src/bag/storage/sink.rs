@@ -78,6 +78,9 @@ pub(super) fn ros2_name(schema: &str) -> String {
     }
 }
 
+/// The remedy for what is missing.
+const COPY: &str = "copy the bag again if its original is whole";
+
 /// Receives what the files of a bag hold, one after the other.
 pub(super) struct Sink<'a> {
     pub(super) topics: BTreeMap<String, Topic>,
@@ -153,12 +156,12 @@ impl<'a> Sink<'a> {
 
     /// Records a part of a file that is damaged.
     pub(super) fn damaged_part(&mut self, rule: &str, place: String) {
-        self.report.record(Treatment::Dropped, rule, place, "copy the bag again");
+        self.report.record(Treatment::Dropped, rule, place, COPY);
     }
 
     /// Records that a file ends before its end.
     pub(super) fn cut_off(&mut self, file: &str) {
         let rule = "the end of a file that is cut off";
-        self.report.record(Treatment::Dropped, rule, file, "copy the bag again");
+        self.report.record(Treatment::Dropped, rule, file, COPY);
     }
 }

@@ -1,9 +1,12 @@
-//! Bags of ROS 2 in SQLite (`.db3`), row by row.
+//! Bags of ROS 2 in SQLite (`.db3`), row by row; rows on damaged pages are skipped.
 //!
 //! SQLite itself reads the file, page by page and without a change to it. What the file defines beside the two tables
 //! of a bag (views, virtual tables, functions in them) is not run.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Range;
 use std::path::Path;
 
 use rusqlite::limits::Limit;
@@ -21,16 +24,22 @@ pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
 const SETTINGS: &str =
     "PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;";
 
-/// Hands the topics and messages of a file to `sink`; `file` is its name for people. Rows after a damaged page are
-/// lost.
+/// Hands the topics and messages of a file to `sink`; `file` is its name for people.
 ///
 /// # Errors
 /// When it is no bag; those of the sink.
 pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), InputError> {
+    let completed = completed_copy(path).ok().flatten();
+    if completed.is_some() {
+        sink.cut_off(file);
+    }
+    let path = completed.as_ref().map_or(path, |copy| copy.path());
     let opened = open(path).and_then(|opened| Ok((read_topics(&opened.database)?, opened)));
     let (topics, Opened { database, is_alone }) = opened.map_err(|error| {
         let cause = format!("is no readable bag in SQLite: {error}");
-        InputError::new(file, cause, "give a bag of `ros2 bag record`, or copy it again")
+        let remedy = "give a bag of `ros2 bag record`; what is left of a damaged one, `sqlite3 OLD.db3 .recover | sqlite3 \
+                      NEW.db3` saves";
+        InputError::new(file, cause, remedy)
     })?;
     if is_alone && has_journal(path) {
         let rule =
@@ -41,7 +50,7 @@ pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), I
     for (name, topic) in topics.values() {
         sink.declare(name, topic.clone());
     }
-    let read = read_messages(&database, &topics, sink);
+    let read = read_messages(file, &database, &topics, sink);
     match read {
         Ok(()) => Ok(()),
         Err(ReadError::Sink(error)) => Err(error),
@@ -50,6 +59,33 @@ pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), I
             Ok(())
         }
     }
+}
+
+/// Returns a copy of a file that was cut off, as long as its head says it was: without the pages that are missing, which are
+/// found as damaged ones are, SQLite reads none. `None` where the file is whole.
+fn completed_copy(path: &Path) -> io::Result<Option<tempfile::NamedTempFile>> {
+    const PAGE_SIZE: Range<usize> = 16..18;
+    const PAGE_COUNT: Range<usize> = 28..32;
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut head = [0; 32];
+    file.read_exact(&mut head)?;
+    let page_size = match head[PAGE_SIZE] {
+        [0, 1] => 1 << 16,
+        [high, low] => u64::from(u16::from_be_bytes([high, low])),
+        _ => 0,
+    };
+    let page_count =
+        head[PAGE_COUNT].iter().fold(0_u64, |count, byte| count << 8 | u64::from(*byte));
+    let whole = page_size * page_count;
+    // A file of less than half of its pages has lost more than it has.
+    if length >= whole || whole > 2 * length || has_journal(path) {
+        return Ok(None);
+    }
+    let copy = tempfile::NamedTempFile::new()?;
+    std::fs::copy(path, copy.path())?;
+    copy.as_file().set_len(whole)?;
+    Ok(Some(copy))
 }
 
 /// The end of reading rows before the last.
@@ -142,7 +178,9 @@ fn read_definitions(database: &Connection) -> rusqlite::Result<BTreeMap<String, 
     rows.collect()
 }
 
+/// Hands the messages on to `sink`. What is on a damaged page is skipped and counted.
 fn read_messages(
+    file: &str,
     database: &Connection,
     topics: &BTreeMap<i64, (String, Topic)>,
     sink: &mut Sink<'_>,
@@ -153,31 +191,99 @@ fn read_messages(
             wanted.push(id.to_string());
         }
     }
-    // Messages on other topics are counted without their data, which are most of the file.
-    let others =
-        format!("SELECT topic_id FROM messages WHERE topic_id NOT IN ({})", wanted.join(","));
-    let mut statement = database.prepare(&others)?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        if let Some((name, _)) = topics.get(&row.get(0)?) {
-            sink.count(name);
-        }
-    }
-    let query = format!(
-        "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) ORDER BY rowid",
-        wanted.join(",")
+    let wanted = wanted.join(",");
+    let messages = format!(
+        "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid > ?1 AND topic_id IN ({wanted}) ORDER BY rowid"
     );
-    let mut statement = database.prepare(&query)?;
-    let mut rows = statement.query([])?;
-    while let Some(row) = rows.next()? {
-        let Some((name, _)) = topics.get(&row.get(0)?) else { continue };
-        let time_ns = row.get::<_, i64>(1).unwrap_or(0);
-        let bytes = match row.get_ref(2)? {
+    let lost = read_rows(database, &messages, &mut |row| {
+        let Some((name, _)) = topics.get(&row.get(1)?) else { return Ok(()) };
+        let time_ns = row.get::<_, i64>(2).unwrap_or(0);
+        let bytes = match row.get_ref(3)? {
             ValueRef::Blob(bytes) => Ok(bytes),
             _ => Err("it has no data".to_owned()),
         };
         let time_ns = u64::try_from(time_ns).unwrap_or(0);
-        sink.deliver(name, time_ns, bytes).map_err(ReadError::Sink)?;
+        sink.deliver(name, time_ns, bytes).map_err(ReadError::Sink)
+    })?;
+    for rows in lost {
+        let rule = "rows on damaged pages of a file";
+        sink.damaged_part(rule, format!("{file}, {} to {}", rows.start, rows.end - 1));
     }
+    // Messages on other topics are counted without their data, which are most of the file.
+    let others = format!(
+        "SELECT rowid, topic_id FROM messages WHERE rowid > ?1 AND topic_id NOT IN ({wanted}) ORDER BY rowid"
+    );
+    read_rows(database, &others, &mut |row| {
+        if let Some((name, _)) = topics.get(&row.get(1)?) {
+            sink.count(name);
+        }
+        Ok(())
+    })?;
     Ok(())
+}
+
+/// Number of times that reading goes on behind a damaged page.
+const MAX_RESTARTS: usize = 1000;
+
+/// Calls `on_row` with the rows of a query that begins behind a row, and returns which rows were on damaged pages. Behind
+/// one it goes on at a row further and further away, until a page can be read again.
+fn read_rows(
+    database: &Connection,
+    query: &str,
+    on_row: &mut dyn FnMut(&rusqlite::Row<'_>) -> Result<(), ReadError>,
+) -> Result<Vec<Range<i64>>, ReadError> {
+    let end = database
+        .query_row("SELECT max(rowid) FROM messages", [], |row| row.get::<_, Option<i64>>(0));
+    let end = end.ok().flatten();
+    let mut statement = database.prepare(query)?;
+    let mut lost: Vec<Range<i64>> = Vec::new();
+    let mut last = 0_i64;
+    let mut skipped = 0_i64;
+    for _ in 0..MAX_RESTARTS {
+        let from = last.saturating_add(skipped);
+        let damage = read_from(&mut statement, from, on_row, &mut |row| {
+            if skipped > 0 {
+                lost.push(last + 1..row);
+            }
+            (last, skipped) = (row, 0);
+        })?;
+        let Some(damage) = damage else { return Ok(lost) };
+        skipped = skipped.saturating_mul(2).max(1);
+        match end {
+            Some(end) if last.saturating_add(skipped) < end => {}
+            Some(end) => {
+                lost.push(last + 1..end.saturating_add(1));
+                return Ok(lost);
+            }
+            None => return Err(ReadError::Database(damage)),
+        }
+    }
+    Ok(lost)
+}
+
+/// Reads the rows behind one, and returns the damage that ends them, if any.
+fn read_from(
+    statement: &mut rusqlite::Statement<'_>,
+    from: i64,
+    on_row: &mut dyn FnMut(&rusqlite::Row<'_>) -> Result<(), ReadError>,
+    on_number: &mut dyn FnMut(i64),
+) -> Result<Option<rusqlite::Error>, ReadError> {
+    let mut rows = match statement.query([from]) {
+        Ok(rows) => rows,
+        Err(damage) => return Ok(Some(damage)),
+    };
+    loop {
+        match rows.next() {
+            Ok(Some(row)) => {
+                let Ok(number) = row.get(0) else { continue };
+                on_number(number);
+                match on_row(row) {
+                    Err(ReadError::Database(_)) | Ok(()) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            Ok(None) => return Ok(None),
+            Err(damage) => return Ok(Some(damage)),
+        }
+    }
 }

@@ -1,0 +1,260 @@
+//! Stamps against the times of the recording, which all topics share: where one clock was set and others were not, and
+//! where topics are stamped by clocks that differ.
+
+use super::clock::{HasStamp, Stream};
+use crate::report::{ImportReport, Treatment};
+
+/// Number of messages before and after a moment by which it is told whether a clock was set in between.
+const NEIGHBORS: usize = 51;
+/// Clocks that differ by less are not told apart from latencies, in s.
+const MIN_OFFSET_SECS: f64 = 0.5;
+/// Stamps so far behind the recording of their messages cannot be: less is the error of clocks that are synchronized.
+const MAX_AHEAD_SECS: f64 = 0.3;
+/// The recording has times where it lasts at least this share of the time between stamps: tools that convert bags leave
+/// them out at times.
+const MIN_TIMED_SHARE: f64 = 0.1;
+/// Number of messages from which on the offset of a topic is known.
+const MIN_MESSAGES: usize = 10;
+/// Clocks that differ by more than this, in s, are of two kinds: those of a simulation and of the wall.
+const MAX_OFFSET_SECS: f64 = 1e6;
+/// A stamp of 0 beside others of more than this, in s, was never set: a simulation begins at 0.
+const MIN_SET_SECS: f64 = 3600.0;
+
+/// A stamp, and the time of the recording, in s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Timing {
+    pub(super) t_secs: f64,
+    pub(super) log_secs: f64,
+}
+
+impl Timing {
+    pub(super) fn of(item: &dyn HasStamp) -> Self {
+        Self { t_secs: item.t_secs(), log_secs: item.log_secs() }
+    }
+
+    /// Returns by how much the stamp is ahead of the recording, in s.
+    fn ahead_secs(self) -> f64 {
+        self.t_secs - self.log_secs
+    }
+}
+
+/// Returns whether the times of a recording tell how much time passed between messages.
+pub(super) fn is_timed(timings: &[Timing]) -> bool {
+    let mut steps: Vec<f64> = timings
+        .windows(2)
+        .map(|pair| pair[1].t_secs - pair[0].t_secs)
+        .filter(|step| *step > 0.0)
+        .collect();
+    let n = steps.len() as f64;
+    let (Some(first), Some(last), Some(usual)) =
+        (timings.first(), timings.last(), median(&mut steps))
+    else {
+        return false;
+    };
+    last.log_secs - first.log_secs >= MIN_TIMED_SHARE * usual * n
+}
+
+/// Returns which messages have a stamp that is none: 0 beside others that are set, or, of one message alone, far ahead of
+/// those before and after it.
+pub(super) fn unusable_stamps(timings: &[Timing]) -> Vec<(usize, &'static str)> {
+    let mut stamps: Vec<f64> =
+        timings.iter().map(|timing| timing.t_secs).filter(|t| *t != 0.0).collect();
+    let is_clock = median(&mut stamps).is_some_and(|usual| usual > MIN_SET_SECS);
+    let is_timed = is_timed(timings);
+    let mut unusable = Vec::new();
+    for (k, timing) in timings.iter().enumerate() {
+        if timing.t_secs == 0.0 && is_clock {
+            unusable.push((k, "whose stamp is 0"));
+            continue;
+        }
+        let around = [k.checked_sub(1), Some(k + 1)].map(|k| k.and_then(|k| timings.get(k)));
+        let [Some(before), Some(after)] = around else { continue };
+        let is_ahead_of = |other: &Timing| {
+            other.t_secs != 0.0
+                && timing.ahead_secs() - other.ahead_secs() > MIN_OFFSET_SECS
+                && timing.t_secs - other.t_secs > MIN_OFFSET_SECS
+        };
+        if is_timed && is_ahead_of(before) && is_ahead_of(after) {
+            unusable.push((k, "whose stamp is ahead of those before and after it"));
+        }
+    }
+    unusable
+}
+
+/// Returns the messages, with the steps in s, from which on stamps are ahead of the recording by more than before: there
+/// the clock was set forward.
+pub(super) fn forward_jumps(timings: &[Timing]) -> Vec<(usize, f64)> {
+    let mut jumps = Vec::new();
+    if !is_timed(timings) {
+        return jumps;
+    }
+    let mut latest = f64::INFINITY;
+    let mut recorded = f64::INFINITY;
+    for (k, timing) in timings.iter().enumerate() {
+        let step_secs = timing.t_secs - latest;
+        let excess_secs = step_secs - (timing.log_secs - recorded).max(0.0);
+        let is_lasting =
+            || change_at(timings, k).is_some_and(|change_secs| change_secs > MIN_OFFSET_SECS);
+        if excess_secs > MIN_OFFSET_SECS && is_lasting() {
+            jumps.push((k, step_secs));
+        }
+        if k == 0 || timing.t_secs > latest || latest - timing.t_secs > MIN_OFFSET_SECS {
+            (latest, recorded) = (timing.t_secs, timing.log_secs);
+        }
+    }
+    jumps
+}
+
+/// Returns by how much stamps from a message on are further ahead of the recording than those before it, in s.
+fn change_at(timings: &[Timing], start: usize) -> Option<f64> {
+    let before = &timings[start.saturating_sub(NEIGHBORS)..start];
+    let after = &timings[start..timings.len().min(start + NEIGHBORS)];
+    Some(usual_offset(after)? - usual_offset(before)?)
+}
+
+fn usual_offset(timings: &[Timing]) -> Option<f64> {
+    let mut offsets: Vec<f64> = timings.iter().map(|timing| timing.ahead_secs()).collect();
+    median(&mut offsets)
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Takes back what the clocks of some streams were set by, where those of others were not; `epochs` has the epoch of each
+/// message, of which there are `n`.
+pub(super) fn undo_single_jumps(
+    streams: &mut [Stream<'_>],
+    epochs: &[Vec<usize>],
+    n: usize,
+    report: &mut ImportReport,
+) {
+    let timings: Vec<Vec<Timing>> = streams.iter().map(Stream::timings).collect();
+    let timed: Vec<bool> = timings.iter().map(|timings| is_timed(timings)).collect();
+    for epoch in 1..n {
+        let changes: Vec<Option<f64>> = (0..streams.len())
+            .map(|s| {
+                let start = epochs[s].partition_point(|own| *own < epoch);
+                if timed[s] { change_at(&timings[s], start) } else { None }
+            })
+            .collect();
+        let steadiest = (0..streams.len())
+            .filter_map(|s| Some((s, changes[s]?)))
+            .min_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+        let Some((reference, least_secs)) = steadiest else { continue };
+        for s in 0..streams.len() {
+            let Some(excess_secs) = changes[s].map(|change_secs| change_secs - least_secs) else {
+                continue;
+            };
+            if excess_secs.abs() <= MIN_OFFSET_SECS {
+                continue;
+            }
+            let start = epochs[s].partition_point(|own| *own < epoch);
+            let place = format!(
+                "from message {} on by {excess_secs:.3} s",
+                streams[s].items[start].message()
+            );
+            let rule = format!(
+                "the clock of {} was set and that of {} was not: taken back by the times of the recording",
+                streams[s].name, streams[reference].name
+            );
+            report.record(Treatment::Repaired, rule, place, "");
+            streams[s].shift_from(start, -excess_secs);
+        }
+    }
+}
+
+/// Compares the stamps of streams by the times of the recording. Those that are later than the recording of their messages
+/// cannot be times of measurements, and are moved; others that differ are named.
+pub(super) fn compare_clocks(streams: &mut [Stream<'_>], report: &mut ImportReport) {
+    let offsets: Vec<Option<f64>> = streams.iter().map(known_offset).collect();
+    let nearest = (0..streams.len())
+        .filter_map(|s| Some((s, offsets[s]?)))
+        .min_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+    let Some((reference, reference_secs)) = nearest else { return };
+    for s in 0..streams.len() {
+        let Some(offset_secs) = offsets[s] else { continue };
+        let excess_secs = offset_secs - reference_secs;
+        let [name, other] = [&streams[s].name, &streams[reference].name].map(Clone::clone);
+        if offset_secs > MAX_AHEAD_SECS && excess_secs > MAX_AHEAD_SECS {
+            let rule = format!(
+                "the stamps of {name} lie {offset_secs:.3} s after the recording of their messages, which cannot be: they \
+                 are moved by {:.3} s to those of {other}",
+                -excess_secs
+            );
+            let remedy = "synchronize the clocks; a localization program stamps transforms ahead by its \
+                          transform_tolerance";
+            report.record(Treatment::Guessed, rule, "", remedy);
+            streams[s].shift_from(0, -excess_secs);
+        } else if excess_secs.abs() > MIN_OFFSET_SECS {
+            let side = if excess_secs > 0.0 { "ahead of" } else { "behind" };
+            let rule = format!(
+                "the stamps of {name} are {:.3} s {side} those of {other} by the times of the recording: their clocks \
+                 differ, or its messages came late",
+                excess_secs.abs()
+            );
+            let remedy =
+                "synchronize the clocks of the machines, and record again, if the clocks differ";
+            report.record(Treatment::Suspicious, rule, "", remedy);
+        }
+    }
+}
+
+/// Returns by how much the stamps of a stream are usually ahead of the recording, where that is known.
+fn known_offset(stream: &Stream<'_>) -> Option<f64> {
+    let timings = stream.timings();
+    if timings.len() < MIN_MESSAGES || !is_timed(&timings) {
+        return None;
+    }
+    usual_offset(&timings).filter(|offset_secs| offset_secs.abs() < MAX_OFFSET_SECS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten messages a second, with stamps by a function of the time in s.
+    fn timings(n: u32, stamp: impl Fn(f64) -> f64) -> Vec<Timing> {
+        let at = |k: u32| {
+            let t_secs = 1000.0 + 0.1 * f64::from(k);
+            Timing { t_secs: stamp(t_secs), log_secs: t_secs + 0.01 }
+        };
+        (0..n).map(at).collect()
+    }
+
+    #[test]
+    fn a_clock_that_is_set_forward_is_told_from_messages_that_come_late() {
+        let set = timings(200, |t| if t < 1010.0 { t } else { t + 2.0 });
+        let jumps = forward_jumps(&set);
+        assert_eq!(jumps.len(), 1);
+        assert!(jumps[0].0 == 100 && (jumps[0].1 - 2.1).abs() < 1e-9, "{jumps:?}");
+        let mut late = timings(200, |t| t);
+        late[100].t_secs -= 3.0;
+        assert_eq!(forward_jumps(&late), []);
+        // A network that stood for 3 s, and dropped all but the first and the last of the messages meanwhile.
+        let mut stalled = timings(200, |t| t);
+        stalled[100].log_secs += 3.0;
+        stalled.drain(101..130);
+        assert_eq!(forward_jumps(&stalled), []);
+        let gap: Vec<Timing> = [&timings(200, |t| t)[..50], &timings(200, |t| t)[150..]].concat();
+        assert_eq!(forward_jumps(&gap), []);
+    }
+
+    #[test]
+    fn stamps_that_were_not_set_are_found_and_a_simulation_begins_at_zero() {
+        let mut wall = timings(50, |t| t + 1.7e9);
+        (wall[7].t_secs, wall[20].t_secs) = (0.0, wall[20].t_secs + 18_000.0);
+        let found = unusable_stamps(&wall);
+        assert_eq!(found.iter().map(|(k, _)| *k).collect::<Vec<_>>(), [7, 20]);
+        assert_eq!(unusable_stamps(&timings(50, |t| t - 1000.0)), []);
+    }
+
+    #[test]
+    fn a_recording_without_times_tells_nothing() {
+        let mut untimed = timings(200, |t| if t < 1010.0 { t } else { t + 2.0 });
+        untimed.iter_mut().for_each(|timing| timing.log_secs = 5.0);
+        assert!(!is_timed(&untimed) && is_timed(&timings(200, |t| t)));
+        assert_eq!(forward_jumps(&untimed), []);
+    }
+}

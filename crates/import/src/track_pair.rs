@@ -1,0 +1,389 @@
+//! What odometry and true poses of one robot say about each other: whether their units, clocks and frames are the same.
+//!
+//! Where they are not, what is learned from the two is wrong without being damaged: the result of a table of numbers that
+//! looks as it should.
+
+use sidestep_kernel::InputError;
+use sidestep_kernel::math::{atan2, cos, hypot, sin, wrap_angle};
+
+use crate::report::{ImportReport, Treatment};
+use crate::track::{StampedPose2, Track};
+
+/// Both tracks are compared at moments as far apart, in s.
+const STEP_SECS: f64 = 0.1;
+/// Poses further apart, in s, tell nothing of the motion between them.
+const MAX_GAP_SECS: f64 = 2.0;
+/// Maximum number of moments: those of a day.
+const MAX_MOMENTS: usize = 1 << 20;
+/// The greatest lag of a clock that is searched for, in steps.
+const MAX_LAG: i64 = 30;
+/// A shorter lag, in steps, is one of filters and not of clocks.
+const MIN_LAG: i64 = 3;
+/// A lag is one where speeds agree so well with it, and so much worse without.
+const MIN_CORRELATION: f64 = 0.6;
+const MIN_GAIN: f64 = 0.1;
+/// Number of moments from which on speeds are compared.
+const MIN_COMPARED: usize = 100;
+
+/// Directions of motion are compared over this number of steps, in which the robot moves as far, in m, and turns no
+/// further, in rad.
+const MOVE_STEPS: usize = 5;
+const MIN_MOVE_M: f64 = 0.08;
+const MAX_MOVE_TURN_RAD: f64 = 0.2;
+/// Number of moves or turns from which on directions are compared.
+const MIN_MOVES: usize = 10;
+/// Moves agree on an angle where the mean of their directions, as vectors of length 1, is as long.
+const MIN_AGREEMENT: f64 = 0.9;
+/// A body that is turned by less, in rad, is turned by accident.
+const MIN_BODY_TURN_RAD: f64 = 0.2;
+/// A turn of odometry from which on it has a side, in rad.
+const MIN_SIDED_TURN_RAD: f64 = 0.1;
+/// Odometry that has turned by more than this in all, in rad, shows that headings which stay are none.
+const MIN_TURNED_RAD: f64 = 1.5;
+
+/// Lengths in other units than meters, as the factor by which they are too large.
+const UNITS: [(f64, &str); 2] = [(1000.0, "millimeters"), (100.0, "centimeters")];
+/// The least way of a track, in its unit, from which on ways are compared.
+const MIN_WAY: f64 = 1.0;
+
+/// Checks that the ways of two tracks, given by time, do not differ by the factor of a unit.
+///
+/// # Errors
+/// When one is a hundred or a thousand times the other, to 10 %.
+pub(crate) fn check_units(
+    file: &str,
+    [(odometry_name, odometry), (truth_name, truth)]: [(&str, &[StampedPose2]); 2],
+) -> Result<(), InputError> {
+    let [odometry_way, truth_way] = [odometry, truth].map(way_of);
+    if odometry_way < MIN_WAY || truth_way < MIN_WAY {
+        return Ok(());
+    }
+    let ratio = odometry_way / truth_way;
+    for (factor, unit) in UNITS {
+        let is_factor = |ratio: f64| (ratio / factor - 1.0).abs() < 0.1;
+        let name = match () {
+            () if is_factor(ratio) => odometry_name,
+            () if is_factor(1.0 / ratio) => truth_name,
+            () => continue,
+        };
+        let cause = format!(
+            "the way of {odometry_name} is {odometry_way:.1} and that of {truth_name} {truth_way:.1}: the lengths of \
+             {name} are {unit}"
+        );
+        return Err(InputError::new(file, cause, format!("give {name} in meters")));
+    }
+    Ok(())
+}
+
+/// Returns the length of the way of a track: steps far longer than the usual one are jumps.
+fn way_of(track: &[StampedPose2]) -> f64 {
+    let step = |pair: &[StampedPose2]| distance(&pair[0], &pair[1]);
+    let mut steps: Vec<f64> = track.windows(2).map(step).filter(|step| *step > 0.0).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let Some(usual) = steps.get(steps.len() / 2).copied() else { return 0.0 };
+    steps.iter().filter(|step| **step <= 20.0 * usual).sum()
+}
+
+/// Records where clocks or frames of odometry and truth can hardly be the same.
+pub(crate) fn report_pair(
+    [(odometry_name, odometry), (truth_name, truth)]: [(&str, &Track); 2],
+    report: &mut ImportReport,
+) {
+    let Some(pair) = SampledPair::of(odometry, truth) else { return };
+    if let Some(rule) = pair.lag_rule(odometry_name, truth_name) {
+        let remedy = "synchronize the clocks of the machines, and record again";
+        report.record(Treatment::Suspicious, rule, "", remedy);
+    }
+    if let Some((rule, remedy)) = pair.frame_rule(odometry_name, truth_name) {
+        report.record(Treatment::Suspicious, rule, "", remedy);
+    }
+}
+
+/// Two tracks at the same moments; `None` where one has no pose near.
+struct SampledPair {
+    odometry: Vec<Option<StampedPose2>>,
+    truth: Vec<Option<StampedPose2>>,
+}
+
+impl SampledPair {
+    fn of(odometry: &Track, truth: &Track) -> Option<Self> {
+        let start_secs = odometry.first()?.t_secs.max(truth.first()?.t_secs);
+        let end_secs = odometry.last()?.t_secs.min(truth.last()?.t_secs);
+        let n = ((end_secs - start_secs) / STEP_SECS).floor();
+        if n < 1.0 {
+            return None;
+        }
+        let n = (n as usize).min(MAX_MOMENTS);
+        let [odometry, truth] = [odometry, truth].map(|track| sample(track, start_secs, n));
+        Some(Self { odometry, truth })
+    }
+
+    /// Returns what to say of a lag between the motions.
+    fn lag_rule(&self, odometry_name: &str, truth_name: &str) -> Option<String> {
+        let motions = [&self.odometry, &self.truth].map(|track| Motion::of(track));
+        let without = agreement(&motions, 0)?;
+        let (lag, best) = (-MAX_LAG..=MAX_LAG)
+            .filter_map(|lag| Some((lag, agreement(&motions, lag)?)))
+            .max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let is_lag = lag.abs() >= MIN_LAG && best >= MIN_CORRELATION && best - without >= MIN_GAIN;
+        is_lag.then(|| {
+            let side = if lag > 0 { "later" } else { "earlier" };
+            format!(
+                "{truth_name} moves as {odometry_name} does, {:.1} s {side} (speeds correlate by {best:.2}, and by {without:.2} \
+                 without that lag): their clocks differ",
+                lag.abs() as f64 * STEP_SECS
+            )
+        })
+    }
+
+    /// Returns what to say of a truth that looks another way than the robot, and the remedy.
+    fn frame_rule(&self, odometry_name: &str, truth_name: &str) -> Option<(String, &'static str)> {
+        let turned_rad: f64 = steps(&self.odometry, 1).map(|[_, _, turn_rad]| turn_rad.abs()).sum();
+        let is_still = steps(&self.truth, 1).all(|[_, _, turn_rad]| turn_rad == 0.0);
+        if is_still && turned_rad > MIN_TURNED_RAD {
+            let rule = format!(
+                "the heading of {truth_name} never changes, while {odometry_name} turns by {turned_rad:.1} rad in all: it gives \
+                 positions without directions"
+            );
+            return Some((rule, "give true poses with the direction in which the robot looks"));
+        }
+        let pairs: Vec<[[f64; 3]; 2]> = self.displacements();
+        let sided: Vec<f64> = pairs
+            .iter()
+            .filter(|[claimed, _]| claimed[2].abs() > MIN_SIDED_TURN_RAD)
+            .map(|[claimed, real]| claimed[2] * real[2])
+            .collect();
+        let squares: f64 = pairs.iter().map(|[claimed, _]| claimed[2] * claimed[2]).sum();
+        if sided.len() >= MIN_MOVES && sided.iter().sum::<f64>() < -0.5 * squares {
+            let rule = format!(
+                "{truth_name} turns to the right where {odometry_name} turns to the left: one is mirrored"
+            );
+            return Some((
+                rule,
+                "give both in frames whose y axis points to the left of x, and z up",
+            ));
+        }
+        let off_rad = usual_angle(&pairs)?;
+        (off_rad.abs() > MIN_BODY_TURN_RAD).then(|| {
+            let side = if off_rad > 0.0 { "left" } else { "right" };
+            let rule = format!(
+                "the robot moves {:.0} degrees to the {side} of where {truth_name} looks, by {odometry_name}: the body of \
+                 {truth_name} is turned",
+                off_rad.to_degrees().abs()
+            );
+            (rule, "turn the body in the system that gives the true poses, so that its x axis points ahead")
+        })
+    }
+
+    /// Returns the motions of odometry and truth over the same times.
+    fn displacements(&self) -> Vec<[[f64; 3]; 2]> {
+        let last = self.odometry.len().saturating_sub(MOVE_STEPS);
+        let motion = |track: &[Option<StampedPose2>], k: usize| {
+            Some(displacement(track[k].as_ref()?, track[k + MOVE_STEPS].as_ref()?))
+        };
+        let starts = (0..last).step_by(MOVE_STEPS);
+        starts.filter_map(|k| Some([motion(&self.odometry, k)?, motion(&self.truth, k)?])).collect()
+    }
+}
+
+/// Returns the usual angle from the direction of motion by odometry to that by truth, each in its own body; `None` where
+/// moves do not agree on one.
+fn usual_angle(pairs: &[[[f64; 3]; 2]]) -> Option<f64> {
+    let mut sum = [0.0; 2];
+    let mut n = 0;
+    for [claimed, real] in pairs {
+        let is_move = [claimed, real].iter().all(|motion| {
+            hypot(motion[0], motion[1]) > MIN_MOVE_M && motion[2].abs() < MAX_MOVE_TURN_RAD
+        });
+        if is_move {
+            let angle_rad = atan2(real[1], real[0]) - atan2(claimed[1], claimed[0]);
+            sum = [sum[0] + cos(angle_rad), sum[1] + sin(angle_rad)];
+            n += 1;
+        }
+    }
+    let agreement = hypot(sum[0], sum[1]) / f64::from(n.max(1));
+    (n as usize >= MIN_MOVES && agreement > MIN_AGREEMENT).then(|| atan2(sum[1], sum[0]))
+}
+
+/// Returns the motion between two poses in the frame of the first: ahead and left in m, turn in rad.
+fn displacement(from: &StampedPose2, to: &StampedPose2) -> [f64; 3] {
+    let [dx_m, dy_m] = [0, 1].map(|i| to.position_m[i] - from.position_m[i]);
+    let [c, s] = [cos(from.heading_rad), sin(from.heading_rad)];
+    [c * dx_m + s * dy_m, c * dy_m - s * dx_m, wrap_angle(to.heading_rad - from.heading_rad)]
+}
+
+fn steps(track: &[Option<StampedPose2>], n: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
+    track
+        .windows(n + 1)
+        .filter_map(move |poses| Some(displacement(poses[0].as_ref()?, poses[n].as_ref()?)))
+}
+
+fn distance(from: &StampedPose2, to: &StampedPose2) -> f64 {
+    hypot(to.position_m[0] - from.position_m[0], to.position_m[1] - from.position_m[1])
+}
+
+/// Returns a track at moments from a time on.
+fn sample(track: &Track, start_secs: f64, n: usize) -> Vec<Option<StampedPose2>> {
+    let mut next = 0;
+    (0..=n)
+        .map(|k| {
+            let t_secs = start_secs + k as f64 * STEP_SECS;
+            while next < track.len() && track[next].t_secs <= t_secs {
+                next += 1;
+            }
+            let before = &track[next.checked_sub(1)?];
+            let Some(after) = track.get(next) else {
+                return (before.t_secs == t_secs).then_some(*before);
+            };
+            between(before, after, t_secs).filter(|_| !track.is_cut_before(next))
+        })
+        .collect()
+}
+
+fn between(before: &StampedPose2, after: &StampedPose2, t_secs: f64) -> Option<StampedPose2> {
+    let gap_secs = after.t_secs - before.t_secs;
+    if gap_secs > MAX_GAP_SECS {
+        return None;
+    }
+    let share = (t_secs - before.t_secs) / gap_secs;
+    let along =
+        |i: usize| before.position_m[i] + share * (after.position_m[i] - before.position_m[i]);
+    let turn_rad = wrap_angle(after.heading_rad - before.heading_rad);
+    let heading_rad = before.heading_rad + share * turn_rad;
+    Some(StampedPose2 { t_secs, position_m: [along(0), along(1)], heading_rad })
+}
+
+/// Speeds in m/s and rates in rad/s, without their side, from moment to moment.
+struct Motion {
+    speeds: Vec<Option<f64>>,
+    rates: Vec<Option<f64>>,
+}
+
+impl Motion {
+    fn of(track: &[Option<StampedPose2>]) -> Self {
+        let step = |pair: &[Option<StampedPose2>]| {
+            Some(displacement(pair[0].as_ref()?, pair[1].as_ref()?))
+        };
+        let steps: Vec<Option<[f64; 3]>> = track.windows(2).map(step).collect();
+        let of = |value: fn([f64; 3]) -> f64| steps.iter().map(|step| step.map(value)).collect();
+        Self {
+            speeds: of(|[ahead, left, _]| hypot(ahead, left) / STEP_SECS),
+            rates: of(|[_, _, turn]| turn.abs() / STEP_SECS),
+        }
+    }
+}
+
+/// Returns the mean of the correlations of speeds and of rates, with truth so many steps later.
+fn agreement([odometry, truth]: &[Motion; 2], lag: i64) -> Option<f64> {
+    let speeds = correlation(&odometry.speeds, &truth.speeds, lag);
+    let rates = correlation(&odometry.rates, &truth.rates, lag);
+    match (speeds, rates) {
+        (Some(a), Some(b)) => Some(0.5 * (a + b)),
+        (one, other) => one.or(other),
+    }
+}
+
+/// Returns the correlation of values with others `lag` places later; `None` where they are few or all the same.
+fn correlation(a: &[Option<f64>], b: &[Option<f64>], lag: i64) -> Option<f64> {
+    const MIN_VARIANCE: f64 = 1e-6;
+    let mut sums = [0.0; 5];
+    let mut n = 0;
+    for (k, a) in a.iter().enumerate() {
+        let other = usize::try_from(k as i64 + lag).ok().and_then(|k| b.get(k).copied().flatten());
+        if let (Some(a), Some(b)) = (*a, other) {
+            let terms = [a, b, a * a, b * b, a * b];
+            (0..5).for_each(|i| sums[i] += terms[i]);
+            n += 1;
+        }
+    }
+    if n < MIN_COMPARED {
+        return None;
+    }
+    let [a, b, aa, bb, ab] = sums.map(|sum| sum / n as f64);
+    let [variance_a, variance_b] = [aa - a * a, bb - b * b];
+    let is_varied = variance_a > MIN_VARIANCE && variance_b > MIN_VARIANCE;
+    is_varied.then(|| (ab - a * b) / (variance_a * variance_b).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot that drives ahead for 3 s and turns to the left for 1.7 s, again and again, at 20 poses a second; `view` makes
+    /// of its pose what a system reports.
+    fn drive(view: impl Fn([f64; 3]) -> [f64; 3], lag_secs: f64) -> Track {
+        let mut at = [0.0, 0.0, 0.0_f64];
+        let mut poses = Vec::new();
+        for k in 0..1200 {
+            let [x_m, y_m, heading_rad] = view(at);
+            let t_secs = 0.05 * f64::from(k) + lag_secs;
+            poses.push(StampedPose2 { t_secs, position_m: [x_m, y_m], heading_rad });
+            let is_ahead = k % 94 < 60;
+            let way_m = if is_ahead { 0.02 } else { 0.0 };
+            at[0] += way_m * cos(at[2]);
+            at[1] += way_m * sin(at[2]);
+            at[2] += if is_ahead { 0.0 } else { 0.04 };
+        }
+        poses.into()
+    }
+
+    fn said(truth: &Track) -> Vec<String> {
+        let odometry = drive(|[x, y, heading]| [0.97 * x, 0.97 * y, heading], 0.0);
+        let mut report = ImportReport::default();
+        report_pair([("/odom", &odometry), ("/truth", truth)], &mut report);
+        report.findings.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn tracks_of_one_clock_and_one_body_are_not_remarked() {
+        assert_eq!(said(&drive(|at| at, 0.0)), [""; 0]);
+        // In a frame of its own, and a little late.
+        assert_eq!(
+            said(&drive(|[x, y, heading]| [5.0 - y, x, heading + 1.5707963267948966], 0.1)),
+            [""; 0]
+        );
+    }
+
+    #[test]
+    fn a_clock_that_is_a_second_off_is_found_by_the_motion() {
+        let late = said(&drive(|at| at, 1.0));
+        assert!(
+            late[0].starts_with("suspicious: /truth moves as /odom does, 1.0 s later"),
+            "{late:?}"
+        );
+        let early = said(&drive(|at| at, -0.7));
+        assert!(early[0].contains("0.7 s earlier"), "{early:?}");
+    }
+
+    #[test]
+    fn a_truth_that_looks_elsewhere_is_named() {
+        let turned = said(&drive(|[x, y, heading]| [x, y, heading + 1.5707963267948966], 0.0));
+        assert!(
+            turned[0].contains("moves 90 degrees to the right of where /truth looks"),
+            "{turned:?}"
+        );
+        let mirrored = said(&drive(|[x, y, heading]| [x, -y, -heading], 0.0));
+        assert!(
+            mirrored[0].contains("turns to the right where /odom turns to the left"),
+            "{mirrored:?}"
+        );
+        let blind = said(&drive(|[x, y, _]| [x, y, 0.0], 0.0));
+        assert!(blind[0].contains("the heading of /truth never changes"), "{blind:?}");
+    }
+
+    #[test]
+    fn lengths_in_millimeters_are_refused() {
+        let plain = drive(|at| at, 0.0);
+        let in_mm = drive(|[x, y, heading]| [1000.0 * x, 1000.0 * y, heading], 0.0);
+        let check = |odometry: &[StampedPose2], truth: &[StampedPose2]| {
+            check_units("bag", [("/odom", odometry), ("/truth", truth)])
+        };
+        assert!(check(&plain, &plain).is_ok());
+        let error = check(&in_mm, &plain).expect_err("millimeters");
+        assert!(error.cause().ends_with("the lengths of /odom are millimeters"), "{error}");
+        assert_eq!(
+            check(&plain, &in_mm).expect_err("millimeters").remedy(),
+            "give /truth in meters"
+        );
+    }
+}
