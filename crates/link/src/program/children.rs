@@ -3,6 +3,7 @@
 //! A node ends when its standard input does, so it cannot outlive the server, however that ends. One that does not end
 //! when it is asked to is killed: a process that is stopped by a signal does not react to anything else.
 
+use crate::wire::zenoh::ONE_THREAD;
 use sidestep::kernel::EntityId;
 use sidestep_session::Error;
 use sidestep_session::fleet::{Job, JobError, LinkMessage, NodeJob};
@@ -23,10 +24,6 @@ const MAX_RESTART_DELAY: Duration = Duration::from_secs(16);
 
 /// Time after which a node counts as one that has lasted: it has joined, and done some cycles.
 const MIN_STABLE_UPTIME: Duration = Duration::from_secs(10);
-
-/// Threads of Zenoh in a node: one, because a node sends little, and each thread costs memory.
-const ZENOH_RUNTIME_CONFIG: &str = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), \
-                       net: (handover: rx), app: (handover: rx))";
 
 /// A node that is started here, and perhaps started again.
 struct NodeProcess {
@@ -49,10 +46,10 @@ impl NodeProcess {
     fn start(&mut self) -> Result<(), Error> {
         let program = std::env::current_exe().map_err(start_error)?;
         let mut command = Command::new(program);
-        command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .env("ZENOH_RUNTIME", ZENOH_RUNTIME_CONFIG);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        // With or without certificates: a node sends little, and each thread costs memory.
+        let (variable, one_thread) = ONE_THREAD;
+        command.env(variable, one_thread);
         // In a process group of its own it gets no Ctrl-C from a terminal: that is for the command that started the fleet,
         // which ends all processes in good order.
         #[cfg(unix)]

@@ -6,6 +6,7 @@
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates
+//! one_thread.rs      the one thread of the network that encrypted links need
 //! output.rs          lines for the parent process; parent_monitor.rs: the end of that process
 //! log.rs             logs to standard error
 //! metrics.rs         metrics in Prometheus' text format
@@ -18,6 +19,7 @@ mod fleet;
 mod log;
 mod metrics;
 mod node;
+mod one_thread;
 mod output;
 mod packet_table;
 mod parent_monitor;
@@ -41,24 +43,46 @@ and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 
 /// Does the job that standard input asks for. Exit codes are those of `sidestep`.
 pub fn main() -> ExitCode {
-    if let Some(word) = std::env::args().nth(1) {
-        let is_version = ["--version", "-V"].contains(&word.as_str());
-        let text = if is_version { program_and_build() } else { USAGE.into() };
-        println!("{text}");
-        let is_known = is_version || ["--help", "-h", "help"].contains(&word.as_str());
-        return ExitCode::from(if is_known { 0 } else { 2 });
-    }
-    let mut line = String::new();
-    let read = std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string());
-    let job = read.and_then(|_| serde_json::from_str::<Job>(&line).map_err(|e| e.to_string()));
+    let mut words = std::env::args().skip(1);
+    let read = match words.next().as_deref() {
+        None => read_line(),
+        Some(one_thread::JOB_WORD) => Ok(words.next().unwrap_or_default()),
+        Some(word) => return print_help(word),
+    };
+    let job = read.and_then(|line| {
+        let job = serde_json::from_str::<Job>(&line).map_err(|e| e.to_string())?;
+        Ok((job, line))
+    });
     match job {
-        Ok(job) => report_result(run_job(job)),
+        Ok((job, line)) if one_thread::is_missing_for(&job) => {
+            one_thread::start_again(&line).unwrap_or_else(|error| report_result(Err(error)))
+        }
+        Ok((job, _)) => report_result(run_job(job)),
         Err(reason) => {
             let reason = escape_controls(&reason);
             eprintln!("error: standard input has no job: {reason}\n{USAGE}");
             ExitCode::from(2)
         }
     }
+}
+
+/// Reads a job from standard input.
+///
+/// # Errors
+/// When it cannot be read.
+fn read_line() -> Result<String, String> {
+    let mut line = String::new();
+    std::io::stdin().lock().read_line(&mut line).map_err(|e| e.to_string())?;
+    Ok(line)
+}
+
+/// Answers a user who has started the program by hand.
+fn print_help(word: &str) -> ExitCode {
+    let is_version = ["--version", "-V"].contains(&word);
+    let text = if is_version { program_and_build() } else { USAGE.into() };
+    println!("{text}");
+    let is_known = is_version || ["--help", "-h", "help"].contains(&word);
+    ExitCode::from(if is_known { 0 } else { 2 })
 }
 
 fn program_and_build() -> String {

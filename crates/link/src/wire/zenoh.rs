@@ -37,6 +37,18 @@ const OPEN_TIMEOUT_MS: u64 = 3_000;
 /// Time in which the endpoints of a closed session can usually be bound again.
 const RELEASE_TIMEOUT: Duration = Duration::from_secs(1);
 
+/// The environment variable, with its value, by which Zenoh has one thread in a process. It is read when the first session
+/// opens.
+///
+/// Where links are encrypted this is no choice: Zenoh reads and writes a TLS link without a lock between the two, and with
+/// the threads that it has by default a process crashes now and then
+/// (<https://github.com/eclipse-zenoh/zenoh/issues/2557>). On two processors it is faster there, too: two airplanes with
+/// certificates fly twice as many cycles in a second by it.
+pub const ONE_THREAD: (&str, &str) = (
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), net: (handover: rx), app: (handover: rx))",
+);
+
 /// The parts of a Zenoh session's configuration that differ by session.
 #[derive(Debug, Clone, Default)]
 struct ZenohConfig<'a> {
@@ -240,7 +252,7 @@ fn publish_to_key(
 }
 
 impl ZenohWire {
-    /// Returns the server's wire, which listens at endpoints.
+    /// Returns the server's wire, which listens at endpoints. A process with certificates needs [`ONE_THREAD`].
     ///
     /// # Errors
     /// When one of them cannot be bound.
@@ -251,7 +263,8 @@ impl ZenohWire {
         Self::from_config(PeerId::Server, &config).map_err(|reason| endpoint_in_use(listen, reason))
     }
 
-    /// Returns the wire of a node to its server, at one of some endpoints.
+    /// Returns the wire of a node to its server, at one of some endpoints. A process with certificates needs
+    /// [`ONE_THREAD`].
     ///
     /// # Errors
     /// When none of them answers within some time, or a certificate is rejected.

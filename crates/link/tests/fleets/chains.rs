@@ -12,7 +12,7 @@ use sidestep_link::hosted_run::HostedRun;
 use sidestep_link::worlds::distributed_world;
 use sidestep_record::read_table;
 use sidestep_session::fleet::{
-    AgentName, ClockMode, FleetJob, FleetStatus, Job, LinkMessage, NodeJob, Topology,
+    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
 };
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun, RunStatus, replay_all};
 use std::path::Path;
@@ -61,14 +61,6 @@ fn chains_that_may_meet_decide_one_after_the_other_in_rounds_of_one_cycle() {
     assert_eq!(run.simulation().metrics()["stood"], 2, "{}", run.simulation().metrics());
 }
 
-fn end(program: &LinkProcess) -> (serde_json::Value, FleetStatus) {
-    program.until("the end", |message| match message {
-        LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
-        LinkMessage::Failed(failed) => panic!("{failed:?}"),
-        _ => None,
-    })
-}
-
 #[test]
 fn processes_come_out_as_one_process_does_and_leave_a_folder_that_is_replayed() {
     let mesh = (two_chains(3, 25, ""), Topology::Mesh);
@@ -78,7 +70,7 @@ fn processes_come_out_as_one_process_does_and_leave_a_folder_that_is_replayed() 
         let out = folder.path().join("run");
         let job = job(folder.path(), topology, ClockMode::Lockstep);
         let program = LinkProcess::start(&Job::Fleet(FleetJob { out: Some(out.clone()), ..job }));
-        let (summary, fleet) = end(&program);
+        let (summary, fleet) = program.complete();
         assert_eq!(program.end(), (Some(0), None));
         let one = run_in_one_process(&text);
         assert_eq!(summary["digest"], one.digest, "{text}");
@@ -170,7 +162,7 @@ fn a_chain_waits_for_a_node_that_is_stopped_and_comes_out_as_in_one_process_when
     let still = program.fleet("the next look", |_| true);
     assert_eq!(still.cycle, waits.cycle, "time stands still");
     signal(stopped, "CONT");
-    let (summary, fleet) = end(&program);
+    let (summary, fleet) = program.complete();
     assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert!(fleet.nodes.iter().all(|node| node.lives == 1 && node.late == 0), "{fleet:?}");
 }
@@ -273,7 +265,7 @@ fn a_node_joins_a_chain_by_the_name_of_its_connector_and_not_twice() {
     let said = refused(&node(0));
     assert!(said.contains("connector 0.0 has a node already"), "{said}");
     let last = LinkProcess::start(&node(3));
-    let (summary, _) = end(&program);
+    let (summary, _) = program.complete();
     assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert_eq!((program.end(), last.end()), ((Some(0), None), (Some(0), None)));
 }

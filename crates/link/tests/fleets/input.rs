@@ -97,11 +97,8 @@ fn nodes_that_do_not_belong_to_a_fleet_are_refused_and_the_one_that_does_complet
         assert!(said.contains(cause), "{cause} in {said}");
     }
     let last = LinkProcess::start(&node(&fleet, 1));
-    let digest = program.until("the end", |message| match message {
-        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
-        _ => None,
-    });
-    assert_eq!(digest, run_in_one_process(&text).digest);
+    let (summary, _) = program.complete();
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert_eq!((program.end(), last.end()), ((Some(0), None), (Some(0), None)));
 }
 

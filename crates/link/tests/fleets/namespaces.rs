@@ -104,12 +104,8 @@ fn two_machines_come_out_as_one_process_does() {
     let text = superconflict(4, "compact-team", 15, "");
     let folder = folder(&text);
     let (server, nodes) = start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
-    let digest = server.until("the end", |message| match message {
-        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
-        LinkMessage::Failed(failed) => panic!("{failed:?}"),
-        _ => None,
-    });
-    assert_eq!(digest, run_in_one_process(&text).digest);
+    let (summary, _) = server.complete();
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
     assert_eq!(server.end(), (Some(0), None));
     for node in nodes {
         assert_eq!(node.end(), (Some(0), None));
@@ -128,12 +124,8 @@ fn a_cable_that_loses_packets_costs_time_and_no_bit() {
     let folder = folder(&text);
     let (server, _nodes) =
         start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
-    let digest = server.until("the end", |message| match message {
-        LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
-        LinkMessage::Failed(failed) => panic!("{failed:?}"),
-        _ => None,
-    });
-    assert_eq!(digest, run_in_one_process(&text).digest);
+    let (summary, _) = server.complete();
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
 }
 
 const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };

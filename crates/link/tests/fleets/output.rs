@@ -225,11 +225,7 @@ fn the_table_of_packets_has_a_row_for_each_that_was_counted() {
         let lockstep = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
         let fleet = FleetJob { out: out_there, packets, ..lockstep };
         let program = LinkProcess::start(&Job::Fleet(fleet));
-        let (summary, fleet) = program.until("the end", |message| match message {
-            LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
-            LinkMessage::Failed(failed) => panic!("{failed:?}"),
-            _ => None,
-        });
+        let (summary, fleet) = program.complete();
         assert_eq!(program.end(), (Some(0), None));
         let table = sidestep_record::read_table(&out, "packets", ..).expect("a table");
         let column = |name: &str| -> Vec<u64> {

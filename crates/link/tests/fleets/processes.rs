@@ -1,6 +1,7 @@
 //! Fleets as processes: the program `sidestep-link` as started by `sidestep fleet`.
 
 use crate::support::{run_in_one_process, superconflict, untimed, wide};
+use serde_json::Value;
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobError, JobScenario, LinkMessage,
@@ -119,6 +120,29 @@ impl LinkProcess {
         })
     }
 
+    /// Returns the summary of a fleet that flies to its end, and the state of its nodes there. A fleet that has lost a node
+    /// has a summary of what it has reached: its digest is compared with none.
+    pub(crate) fn complete(&self) -> (Value, FleetStatus) {
+        self.complete_within(TEST_TIMEOUT)
+    }
+
+    /// Returns the same, where it takes longer.
+    pub(crate) fn complete_within(&self, within: Duration) -> (Value, FleetStatus) {
+        let (summary, fleet) = self.until_within("the end", within, |message| match message {
+            LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
+            LinkMessage::Failed(failed) => panic!("{failed:?}"),
+            _ => None,
+        });
+        if summary["status"] != "complete" {
+            let failed = self.until("the reason", |message| match message {
+                LinkMessage::Failed(failed) => Some(failed),
+                _ => None,
+            });
+            panic!("it has ended in cycle {}: {failed:?}, {:?}", fleet.cycle, self.logged());
+        }
+        (summary, fleet)
+    }
+
     /// Returns the exit code, and the reason if it failed.
     pub(crate) fn end(mut self) -> (Option<i32>, Option<JobError>) {
         let status = self.child.wait().expect("it ends");
@@ -182,11 +206,7 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
         ..job(folder.path(), Topology::Mesh, ClockMode::Lockstep)
     };
     let program = LinkProcess::start(&Job::Fleet(job));
-    let (summary, fleet) = program.until("the end", |message| match message {
-        LinkMessage::Ended { summary, fleet, .. } => Some((summary, fleet)),
-        LinkMessage::Failed(failed) => panic!("{failed:?}"),
-        _ => None,
-    });
+    let (summary, fleet) = program.complete();
     assert_eq!(program.end(), (Some(0), None));
     let one = run_in_one_process(&text);
     assert_eq!(summary["digest"], one.digest);
@@ -208,13 +228,9 @@ fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment
             let folder = folder(&text);
             let job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
             let program = LinkProcess::start(&Job::Fleet(job));
-            let digest =
-                program.until_within("the end", 60 * TEST_TIMEOUT, |message| match message {
-                    LinkMessage::Ended { summary, .. } => Some(summary["digest"].clone()),
-                    LinkMessage::Failed(failed) => panic!("{failed:?}"),
-                    _ => None,
-                });
-            assert_eq!(digest, run_in_one_process(&text).digest, "{deployment} {network}");
+            let (summary, _) = program.complete_within(60 * TEST_TIMEOUT);
+            let digest = run_in_one_process(&text).digest;
+            assert_eq!(summary["digest"], digest, "{deployment} {network}");
         }
     }
 }
