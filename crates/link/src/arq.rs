@@ -138,6 +138,11 @@ impl ArqLink {
         self.retransmit_at.into_iter().chain(self.acknowledge_at).min()
     }
 
+    /// Returns whether received messages have yet to be acknowledged.
+    pub(crate) fn owes_ack(&self) -> bool {
+        self.acknowledge_at.is_some()
+    }
+
     /// Returns whether all messages were acknowledged.
     pub(crate) fn has_delivered(&self) -> bool {
         self.unacked.is_empty()

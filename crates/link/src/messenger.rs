@@ -243,6 +243,17 @@ impl Messenger {
         }
     }
 
+    /// Acknowledges at once what has arrived: at the end no later frame carries the acknowledgments.
+    pub fn send_acks(&mut self) {
+        let owed = self.peers.iter().filter(|(_, state)| state.link.owes_ack());
+        let owed: Vec<PeerId> = owed.map(|(&peer, _)| peer).collect();
+        for peer in owed {
+            let Some(state) = self.peers.get_mut(&peer) else { continue };
+            let recipient = state.recipient_header(peer, None);
+            self.send_frame(vec![recipient], None);
+        }
+    }
+
     /// Opens the direct links from this node to all others, where there are any.
     ///
     /// # Errors

@@ -24,6 +24,10 @@ use std::time::{Duration, Instant};
 /// ([`SILENCE_TIMEOUT`](crate::server::SILENCE_TIMEOUT)), so that one lost report raises no alarm.
 const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 
+/// Time in which the server acknowledges the goodbye of a node, unless it is gone: retransmissions and the opening of a
+/// broken link have room in it.
+const FAREWELL_TIMEOUT: Duration = Duration::from_secs(5);
+
 /// Time without answers from the other end of an open link before the link counts as half-open: longer than Zenoh's own
 /// lease of 2 s, after which a link that is merely broken is closed.
 const HALF_OPEN_TIMEOUT: Duration = Duration::from_secs(3);
@@ -158,7 +162,7 @@ impl Node {
         }
     }
 
-    /// Sends the final status, and waits a little until it has arrived.
+    /// Sends the final status, and waits until it has arrived, unless the server is gone.
     fn leave(&mut self) {
         if let Some(cycle) = &mut self.cycle {
             cycle.send_log(&mut self.messenger);
@@ -166,7 +170,7 @@ impl Node {
         self.update_status();
         self.messenger.send_reliable(PeerId::Server, Message::Status(self.status.clone()));
         self.messenger.send_reliable(PeerId::Server, Message::Goodbye);
-        let until = Instant::now() + REPORT_INTERVAL;
+        let until = Instant::now() + FAREWELL_TIMEOUT;
         while !self.messenger.has_delivered_to(PeerId::Server) && Instant::now() < until {
             self.messenger.receive(POLL_INTERVAL);
         }

@@ -122,9 +122,20 @@ impl NodeProcesses {
         Ok(processes)
     }
 
-    /// Checks the processes, and starts those again that are due. Returns the nodes that have ended since the last call,
-    /// with the reasons. One that is started again listens where it did before, as given by `listens`: the other nodes
-    /// reconnect to these endpoints.
+    /// Returns the nodes that have ended since the last call, with the reasons.
+    pub(super) fn poll_exits(&mut self) -> Vec<(EntityId, String)> {
+        let mut ended = Vec::new();
+        for (&agent, node) in &mut self.nodes {
+            if let Some(reason) = node.poll_exit() {
+                ended.push((agent, reason));
+                node.restart_at = self.restarts.then(|| Instant::now() + node.restart_delay);
+            }
+        }
+        ended
+    }
+
+    /// Does the same, and starts nodes again that are due. One that is started again listens where it did before, as given by
+    /// `listens`: the other nodes reconnect to these endpoints.
     ///
     /// # Errors
     /// When one cannot be started again.
@@ -132,12 +143,8 @@ impl NodeProcesses {
         &mut self,
         listens: impl Fn(EntityId) -> Option<Vec<String>>,
     ) -> Result<Vec<(EntityId, String)>, Error> {
-        let mut ended = Vec::new();
+        let ended = self.poll_exits();
         for (&agent, node) in &mut self.nodes {
-            if let Some(reason) = node.poll_exit() {
-                ended.push((agent, reason));
-                node.restart_at = self.restarts.then(|| Instant::now() + node.restart_delay);
-            }
             if node.restart_at.is_some_and(|at| at <= Instant::now()) {
                 if let Some(listens) = listens(agent) {
                     node.job.listen = listens;

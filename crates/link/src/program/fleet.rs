@@ -354,6 +354,13 @@ impl ServerHooks for FleetSupervisor<'_> {
         Ok(ended)
     }
 
+    fn poll_farewell(&mut self) -> Result<Vec<EntityId>, FleetError> {
+        if self.parent.has_ended() {
+            return Err(FleetError::Interrupted);
+        }
+        Ok(self.children.poll_exits().into_iter().map(|(agent, _)| agent).collect())
+    }
+
     fn on_end(&mut self, fleet: &FleetContext<'_>) {
         self.update_status(fleet);
         self.views.publish_view(&self.status, true);

@@ -9,8 +9,8 @@ use std::time::Duration;
 /// Maximum number of events in a view, which has the last ones: a viewer may have missed any of the views before.
 const MAX_EVENTS: usize = 200;
 
-/// Time that viewers have at the end to fetch the last view.
-const LAST_VIEW_TIMEOUT: Duration = Duration::from_secs(1);
+/// Time that viewers have at the end to fetch the last view: as long as one that asks for nothing counts as a viewer.
+const LAST_VIEW_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The newest frame and the last events, from which views are made.
 #[derive(Debug)]

@@ -40,6 +40,9 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time between two signs of life to all nodes: several of them may be lost before a node's lease ends.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 
+/// Time that nodes have to say goodbye to a fleet that has failed or was interrupted.
+const FAREWELL_TIMEOUT: Duration = Duration::from_millis(500);
+
 /// What a server demands of nodes, and how it treats them.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
@@ -111,6 +114,14 @@ pub trait ServerHooks {
 
     /// Receives a frame that a viewer waits for.
     fn on_view_frame(&mut self, _: Frame) {}
+
+    /// Returns the nodes whose processes have ended since the last call, while the others say goodbye.
+    ///
+    /// # Errors
+    /// When the fleet is to end sooner.
+    fn poll_farewell(&mut self) -> Result<Vec<EntityId>, FleetError> {
+        Ok(Vec::new())
+    }
 
     /// Inspects the fleet when all nodes have said goodbye.
     fn on_end(&mut self, _: &FleetContext<'_>) {}
@@ -187,7 +198,9 @@ impl<'a> FleetServer<'a> {
     /// When it ends before.
     pub fn run(mut self) -> (Result<(), FleetError>, ServerMetrics) {
         let result = self.wait_for_nodes().and_then(|()| self.run_cycles());
-        self.shut_down();
+        // What nodes say last are results of a fleet that has flown to its end: it waits for them as long as for a control.
+        let farewell_timeout = if result.is_ok() { self.config.lease } else { FAREWELL_TIMEOUT };
+        self.shut_down(farewell_timeout);
         (result, self.metrics)
     }
 
@@ -204,23 +217,43 @@ impl<'a> FleetServer<'a> {
         }
     }
 
-    /// Tells all nodes that the fleet has ended, and waits a little until they have said goodbye, because their last
-    /// records of packets come before that.
-    fn shut_down(&mut self) {
+    /// Tells all nodes that the fleet has ended, and waits at most the given time until they have said goodbye, because
+    /// their last counts and records of packets come before that.
+    fn shut_down(&mut self, farewell_timeout: Duration) {
         self.send_to_joined(|messenger, node| messenger.send_reliable(node, Message::End));
-        let until = Instant::now() + HEARTBEAT_INTERVAL;
+        let mut until = Instant::now() + farewell_timeout;
         while self.joined_agents().any(|agent| !self.nodes[&agent].has_left)
             && Instant::now() < until
         {
             if let Some(received) = self.messenger.receive(POLL_INTERVAL) {
                 self.on_message(received);
             }
+            match self.hooks.poll_farewell() {
+                Ok(ended) => self.record_left(&ended),
+                Err(_) => until = until.min(Instant::now() + FAREWELL_TIMEOUT),
+            }
         }
+        self.messenger.send_acks();
         self.hooks.on_packets(std::mem::take(&mut self.packets));
         self.waits_for.clear();
         self.publish_frame();
         let (hooks, view) = self.hooks_and_context();
         hooks.on_end(&view);
+    }
+
+    /// Records that the processes of nodes have ended, after their last messages.
+    fn record_left(&mut self, agents: &[EntityId]) {
+        if agents.is_empty() {
+            return;
+        }
+        while let Some(received) = self.messenger.receive(Duration::ZERO) {
+            self.on_message(received);
+        }
+        for agent in agents {
+            if let Some(node) = self.nodes.get_mut(agent) {
+                node.has_left = true;
+            }
+        }
     }
 
     /// Agents that have nodes, in ascending order.

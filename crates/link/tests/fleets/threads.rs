@@ -1,14 +1,17 @@
 //! In lockstep a fleet gives the same results as one process: in threads, over memory and over sockets.
 
 use crate::support::{
-    FleetSetup, NoHooks, TEST_TIMEOUT, run_in_one_process, run_in_threads, superconflict,
+    FleetSetup, NoHooks, RunResult, TEST_TIMEOUT, run_in_one_process, run_in_threads,
+    superconflict, two_chains,
 };
 use sidestep::kernel::EntityId;
-use sidestep_link::protocol::{ClockMode, Topology};
+use sidestep_link::protocol::{ClockMode, Message, Topology, TransportFrame};
+use sidestep_link::server::{FleetContext, FleetError, ServerHooks};
 use sidestep_link::wire::endpoint::reserve_port;
-use sidestep_link::wire::memory::MemoryHub;
+use sidestep_link::wire::memory::{MemoryHub, MemoryWire};
 use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{PeerId, Wire};
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// Deployments in which each airplane has a program of its own.
@@ -20,15 +23,24 @@ const BAD_NETWORK: &str = "network = { loss = 0.1, duplication = 0.1, max_delay_
     partitions = [{ sides = [[0, 1], [2, 3]], from_s = 20, until_s = 50 }], \
     one_way = [{ sender = 0, receiver = 3, from_s = 60 }] }";
 
-pub(crate) fn run_over_memory(text: &str) -> crate::support::RunResult {
+pub(crate) fn run_over_memory(text: &str) -> RunResult {
+    run_over(text, &mut NoHooks, |_, wire| Box::new(wire))
+}
+
+/// Flies a scenario in threads, with the wire that `wrap` makes of each peer's.
+fn run_over(
+    text: &str,
+    hooks: &mut dyn ServerHooks,
+    wrap: impl Fn(PeerId, MemoryWire) -> Box<dyn Wire>,
+) -> RunResult {
     let exchange = MemoryHub::default();
     let setup = FleetSetup {
         clock: ClockMode::Lockstep,
         topology: Topology::Star,
         lease: TEST_TIMEOUT,
-        wire: &|me| Box::new(exchange.open_wire(me)),
+        wire: &|me| wrap(me, exchange.open_wire(me)),
         listens: &|_| Vec::new(),
-        hooks: &mut NoHooks,
+        hooks,
         liar: None,
     };
     let (result, flown, metrics) = run_in_threads(text, setup);
@@ -43,6 +55,123 @@ fn threads_come_out_as_one_process_does_in_every_deployment() {
         let text = superconflict(4, deployment, 30, "");
         assert_eq!(run_over_memory(&text), run_in_one_process(&text), "{deployment}");
     }
+}
+
+/// A wire at which frames of different senders arrive in an order of its own, some of them later than they could: as where
+/// a machine gives its time to others.
+struct LoadedWire {
+    wire: MemoryWire,
+    waiting: BTreeMap<PeerId, VecDeque<Vec<u8>>>,
+    /// State of a linear congruential generator.
+    draws: u64,
+}
+
+impl LoadedWire {
+    fn draw(&mut self, below: usize) -> usize {
+        self.draws = self.draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (self.draws >> 33) as usize % below
+    }
+
+    fn keep(&mut self, frame: Vec<u8>) {
+        let from = TransportFrame::<Message>::decode(&frame).expect("a frame").from;
+        self.waiting.entry(from).or_default().push_back(frame);
+    }
+}
+
+impl Wire for LoadedWire {
+    fn send(&mut self, to: &[PeerId], frame: &[u8]) {
+        self.wire.send(to, frame);
+    }
+
+    fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+        if self.waiting.is_empty() {
+            let frame = self.wire.receive(within)?;
+            self.keep(frame);
+        }
+        while let Some(frame) = self.wire.receive(Duration::ZERO) {
+            self.keep(frame);
+        }
+        if self.draw(3) == 0 {
+            return None;
+        }
+        let k = self.draw(self.waiting.len());
+        let from = *self.waiting.keys().nth(k)?;
+        let frames = self.waiting.get_mut(&from)?;
+        let frame = frames.pop_front();
+        if frames.is_empty() {
+            self.waiting.remove(&from);
+        }
+        frame
+    }
+}
+
+#[test]
+fn the_order_in_which_packets_of_different_agents_arrive_changes_nothing() {
+    let airplanes = DEPLOYMENTS.map(|deployment| superconflict(4, deployment, 8, ""));
+    for (k, text) in airplanes.into_iter().chain([two_chains(5, 20, "")]).enumerate() {
+        let loaded = run_over(&text, &mut NoHooks, |me, wire| {
+            let me = if let PeerId::Node(agent) = me { u64::from(agent) + 1 } else { 0 };
+            let draws = 1_000 * k as u64 + me;
+            Box::new(LoadedWire { wire, waiting: BTreeMap::new(), draws })
+        });
+        assert_eq!(loaded, run_in_one_process(&text), "{text}");
+    }
+}
+
+/// The wire of a node that loses the first frames which the node sends after the fleet's end.
+struct LossyFarewell {
+    wire: MemoryWire,
+    /// Number of frames that are lost yet; none before the end.
+    losses: Option<u32>,
+}
+
+impl Wire for LossyFarewell {
+    fn send(&mut self, to: &[PeerId], frame: &[u8]) {
+        match &mut self.losses {
+            Some(left) if *left > 0 => *left -= 1,
+            _ => self.wire.send(to, frame),
+        }
+    }
+
+    fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+        let frame = self.wire.receive(within)?;
+        let read = TransportFrame::<Message>::decode(&frame).expect("a frame");
+        if read.message == Some(Message::End) {
+            // The last status and the goodbye, twice each: the third time is later than half a second.
+            self.losses.get_or_insert(4);
+        }
+        Some(frame)
+    }
+}
+
+/// The packets that nodes have counted, at the end, and whether all nodes have said goodbye.
+#[derive(Default)]
+struct LastCounts {
+    packets: u64,
+    have_left: bool,
+}
+
+impl ServerHooks for LastCounts {
+    fn on_poll(&mut self, _: &FleetContext<'_>) -> Result<Vec<(EntityId, String)>, FleetError> {
+        Ok(Vec::new())
+    }
+
+    fn on_end(&mut self, fleet: &FleetContext<'_>) {
+        self.packets = fleet.nodes.values().map(|node| node.status.packets).sum();
+        self.have_left = fleet.nodes.values().all(|node| node.has_left);
+    }
+}
+
+#[test]
+fn what_nodes_say_last_is_waited_for_where_it_is_lost_on_its_way() {
+    let text = superconflict(3, "compact-team", 4, "");
+    let mut counts = LastCounts::default();
+    let result = run_over(&text, &mut counts, |me, wire| match me {
+        PeerId::Server => Box::new(wire),
+        PeerId::Node(_) => Box::new(LossyFarewell { wire, losses: None }),
+    });
+    assert!(counts.have_left, "all have said goodbye");
+    assert_eq!(result.metrics["messages"], counts.packets);
 }
 
 #[test]
