@@ -13,6 +13,12 @@ use std::time::{Duration, Instant};
 /// for a sign of life before it gives up a broken link by itself.
 const LINK_CHECK_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Time of not listening that counts as an absence: of a process that was stopped, or got no processor.
+const MIN_ABSENCE: Duration = Duration::from_millis(100);
+
+/// A clock: the time since a fixed start.
+type Clock = Box<dyn Fn() -> Duration + Send>;
+
 /// Reasons for which a messenger drops frames and messages: the labels of metrics.
 mod drop_reason {
     /// The frame is for an earlier process of this peer.
@@ -41,7 +47,7 @@ pub struct MessengerStats {
 struct PeerState {
     incarnation: Incarnation,
     link: ArqLink,
-    /// Time at which it was last heard, or connected.
+    /// Time at which it was last heard, or connected; later by the absences of this messenger since.
     last_heard: Duration,
 }
 
@@ -73,7 +79,9 @@ pub struct Messenger {
     me: PeerId,
     incarnation: Incarnation,
     wire: Box<dyn Wire>,
-    started: Instant,
+    clock: Clock,
+    /// Time at which it last listened.
+    listened_at: Duration,
     /// The peers with which it has connected.
     peers: BTreeMap<PeerId, PeerState>,
     stats: MessengerStats,
@@ -82,11 +90,13 @@ pub struct Messenger {
 impl Messenger {
     /// Returns the messenger of a peer in a new incarnation, not connected with any other.
     pub fn new(me: PeerId, wire: Box<dyn Wire>) -> Self {
+        let started = Instant::now();
         Self {
             me,
             incarnation: new_incarnation(),
             wire,
-            started: Instant::now(),
+            clock: Box::new(move || started.elapsed()),
+            listened_at: Duration::ZERO,
             peers: BTreeMap::new(),
             stats: MessengerStats::default(),
         }
@@ -108,7 +118,7 @@ impl Messenger {
     }
 
     fn now(&self) -> Duration {
-        self.started.elapsed()
+        (self.clock)()
     }
 
     /// Connects with one incarnation of another peer, so that reliable messages can be exchanged. Those that an earlier
@@ -128,7 +138,8 @@ impl Messenger {
         self.peers.remove(&peer);
     }
 
-    /// Returns the time since a connected peer was last heard.
+    /// Returns the time since a connected peer was last heard, without the absences of this messenger: who has not listened
+    /// cannot tell whether others were silent.
     pub fn silent_for(&self, peer: PeerId) -> Option<Duration> {
         let last_heard = self.peers.get(&peer)?.last_heard;
         Some(self.now().saturating_sub(last_heard))
@@ -269,7 +280,9 @@ impl Messenger {
     /// Returns the next message that arrives within some time, if any. Reliable messages arrive in the order in which
     /// their sender has sent them. Peers that are not connected can send only best-effort messages.
     pub fn receive(&mut self, within: Duration) -> Option<ReceivedMessage> {
-        let until = self.now().saturating_add(within);
+        let now = self.now();
+        self.excuse_absence(now.saturating_sub(self.listened_at));
+        let until = now.saturating_add(within);
         loop {
             self.send_due();
             let now = self.now();
@@ -277,13 +290,27 @@ impl Messenger {
             let next_due =
                 self.peers.values().filter_map(|state| state.link.next_send_time()).min();
             let wake_at = next_due.map_or(until, |due| due.min(until));
-            if let Some(bytes) = self.wire.receive(wake_at.saturating_sub(now)) {
+            let bytes = self.wire.receive(wake_at.saturating_sub(now));
+            self.listened_at = self.now();
+            self.excuse_absence(self.listened_at.saturating_sub(wake_at));
+            if let Some(bytes) = bytes {
                 if let Some(received) = self.decode_frame(&bytes) {
                     return Some(received);
                 }
             } else if self.now() >= until {
                 return None;
             }
+        }
+    }
+
+    /// Takes a time in which this messenger has not listened off the silence of all peers.
+    fn excuse_absence(&mut self, absence: Duration) {
+        if absence < MIN_ABSENCE {
+            return;
+        }
+        let now = self.now();
+        for state in self.peers.values_mut() {
+            state.last_heard = state.last_heard.saturating_add(absence).min(now);
         }
     }
 
@@ -346,6 +373,7 @@ fn new_incarnation() -> Incarnation {
 mod tests {
     use super::*;
     use crate::wire::memory::MemoryHub;
+    use std::sync::Mutex;
 
     const SOON: Duration = Duration::from_millis(1);
     const LATER: Duration = Duration::from_secs(20);
@@ -427,6 +455,41 @@ mod tests {
         }
         assert_eq!(received[0], [Message::Hello, Message::Close(1), Message::Close(2)]);
         assert_eq!(received[1], [Message::Close(2)], "lost at first, and sent again");
+    }
+
+    /// A wire on which nothing arrives. A wait takes as long as it shall, and the time in which its process is stopped, by
+    /// the clock of a test.
+    struct SilentWire {
+        clock: Arc<Mutex<Duration>>,
+        stop: Duration,
+    }
+
+    impl Wire for SilentWire {
+        fn send(&mut self, _: &[PeerId], _: &[u8]) {}
+
+        fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
+            *self.clock.lock().expect("no panic") += within + self.stop;
+            None
+        }
+    }
+
+    #[test]
+    fn the_silence_of_another_is_the_time_in_which_this_process_has_listened() {
+        let (second, minute) = (Duration::from_secs(1), Duration::from_secs(60));
+        for (stop_in_wait, stop_between) in [(minute, Duration::ZERO), (Duration::ZERO, minute)] {
+            let clock = Arc::new(Mutex::new(Duration::ZERO));
+            let wire = SilentWire { clock: clock.clone(), stop: stop_in_wait };
+            let mut messenger = Messenger::new(PeerId::Server, Box::new(wire));
+            let own = clock.clone();
+            messenger.clock = Box::new(move || *own.lock().expect("no panic"));
+            let peer = PeerId::Node(3);
+            messenger.connect(peer, Incarnation(1));
+            for listened in 1..5 {
+                *clock.lock().expect("no panic") += stop_between;
+                assert_eq!(messenger.receive(second), None);
+                assert_eq!(messenger.silent_for(peer), Some(listened * second));
+            }
+        }
     }
 
     #[test]
