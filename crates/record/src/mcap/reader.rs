@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
 use ::mcap::read::{attachment, metadata};
-use ::mcap::records::{AttachmentIndex, MetadataIndex};
+use ::mcap::records::{AttachmentIndex, MetadataIndex, op};
 use ::mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use ::mcap::{McapError, Summary};
 use sidestep_kernel::InputError;
@@ -14,6 +14,13 @@ use sidestep_kernel::InputError;
 use super::{METADATA, SCENARIO};
 use crate::format::FormatVersion;
 use crate::manifest::Status;
+
+/// The number of bytes before the content of a record: its kind and its length.
+const RECORD_HEAD_BYTES: usize = 9;
+
+/// The number of bytes of the last record and of the magic number after it: the place of the summary, that of its index, and a
+/// checksum.
+const FOOTER_BYTES: u64 = RECORD_HEAD_BYTES as u64 + 20 + MAGIC.len() as u64;
 
 /// The first bytes of every MCAP file.
 const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
@@ -145,8 +152,44 @@ impl McapFile {
 
     /// Reads the end of the file, which lists the position of everything.
     pub(super) fn summary(&mut self) -> Result<Summary, InputError> {
+        if self.has_chunk_in_summary().map_err(|e| damaged(&self.path, e))? {
+            return Err(damaged(
+                &self.path,
+                "its end says that its summary begins among its messages",
+            ));
+        }
         let summary = self.read_summary().map_err(|e| damaged(&self.path, e))?;
         summary.ok_or_else(|| damaged(&self.path, "it has no summary"))
+    }
+
+    /// Returns whether there is a chunk of messages between the place at which the summary shall begin and the end of the
+    /// file. The reader of summaries would unpack it, and its arithmetic on the size of a damaged one overflows.
+    fn has_chunk_in_summary(&mut self) -> std::io::Result<bool> {
+        let Some(footer) = self.length.checked_sub(FOOTER_BYTES) else { return Ok(false) };
+        self.file.seek(SeekFrom::Start(footer))?;
+        let mut file = BufReader::new(&mut self.file);
+        let mut start = [0; 8];
+        file.seek_relative(RECORD_HEAD_BYTES as i64)?;
+        file.read_exact(&mut start)?;
+        let mut at = u64::from_le_bytes(start);
+        if at == 0 {
+            return Ok(false);
+        }
+        file.seek(SeekFrom::Start(at))?;
+        while at < footer {
+            let mut head = [0; RECORD_HEAD_BYTES];
+            file.read_exact(&mut head)?;
+            let [opcode, length @ ..] = head;
+            if opcode == op::CHUNK {
+                return Ok(true);
+            }
+            let length = u64::from_le_bytes(length);
+            let end = at.checked_add(RECORD_HEAD_BYTES as u64 + length.min(self.length));
+            let Some(end) = end.filter(|end| *end <= footer) else { break };
+            file.seek_relative((end - at) as i64 - RECORD_HEAD_BYTES as i64)?;
+            at = end;
+        }
+        Ok(false)
     }
 
     fn read_summary(&mut self) -> Result<Option<Summary>, McapError> {

@@ -211,6 +211,30 @@ fn damage_is_an_error_and_never_a_panic() {
     }
 }
 
+/// Read as part of a summary, a chunk whose size is wrong would overflow the reader's count of what is left of it.
+#[test]
+fn a_recording_whose_summary_begins_at_a_damaged_chunk_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let whole = {
+        started(&path).finish(&end(Status::Complete)).unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    let le = |at: usize| u64::from_le_bytes(whole[at..at + 8].try_into().unwrap()) as usize;
+    let summary_start = whole.len() - 8 - 20;
+    // A chunk that holds one record, which says to be longer than the chunk.
+    let record = [&[0x03][..], &1_000_u64.to_le_bytes(), &[0; 16]].concat();
+    let head = [&[0; 16][..], &(record.len() as u64).to_le_bytes(), &[0; 4], &[0; 4]].concat();
+    let body = [&head[..], &(record.len() as u64).to_le_bytes(), &record].concat();
+    let chunk = [&[0x06][..], &(body.len() as u64).to_le_bytes(), &body].concat();
+    let mut changed = [&whole[..le(summary_start)], &chunk, &whole[le(summary_start)..]].concat();
+    // What is read after the chunk fills the record.
+    changed.splice(le(summary_start) + chunk.len()..le(summary_start) + chunk.len(), [0; 2_000]);
+    std::fs::write(&path, &changed).unwrap();
+    let error = McapRunInfo::open(&path).unwrap_err().to_string();
+    assert!(error.contains("its summary begins among its messages"), "{error}");
+}
+
 #[test]
 fn a_run_with_a_date_is_recorded_in_utc_with_the_places_of_its_airplanes_on_earth() {
     const START_NS: u64 = 1_533_114_900_000_000_000;
