@@ -62,7 +62,8 @@ impl FlightConditions {
         let RoutePosition { mission, next, pose } = route;
         let drift_m = math::hypot(self.wind_m_s[0], self.wind_m_s[1]) * seconds;
         let from_m = math::hypot(pose.at[0], pose.at[1]);
-        let reach_m = from_m + drift_m + way_point_reach_m(model, seconds, self.passing.tolerance_m);
+        let reach_m =
+            from_m + drift_m + way_point_reach_m(model, seconds, self.passing.tolerance_m);
         frame.local_mission((mission, next), reach_m, self.passing.passes_abeam)
     }
 
@@ -202,5 +203,46 @@ impl FlightConditions {
             *goal = [goal[0] - wx * flown_s, goal[1] - wy * flown_s];
         }
         drifted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::coordinates_from_degrees;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Only way-points that an airplane can get to are found in its frame; it needs no others.
+        #[test]
+        fn way_points_beyond_reach_are_not_missed(
+            lat in -80.0f64..80.0, lon in -180.0f64..180.0, heading_rad in -3.1f64..3.1,
+            offsets_m in prop::collection::vec(prop::array::uniform2(-20_000.0f64..20_000.0), 2..7),
+            next in 0usize..4, turns in prop::collection::vec(-1.0f64..=1.0, 1..30), passes_abeam in any::<bool>(),
+        ) {
+            let surface = Surface::Earth;
+            let at = coordinates_from_degrees([lat, lon]);
+            let frame = surface.frame_at(at);
+            let mission: Vec<Point> = offsets_m.iter().map(|&offset| frame.to_world(offset)).collect();
+            let timing = TimeDiscretization { dt_s: 10.0, dtau_s: 5.0, horizon: 30 };
+            let passing = WaypointRule { tolerance_m: 1852.0, passes: true, passes_abeam };
+            let air = FlightConditions { timing, passing, wind_m_s: [0.0; 2], surface };
+            let model = AircraftModel { v_m_s: 230.0, omega_max_rad_s: 0.02, separation_m: 9260.0, turns: 5 };
+            let pose = Pose2 { at: [0.0; 2], heading_rad };
+            let route = RoutePosition { mission: &mission, next, pose };
+            let near = air.local_mission(frame, &model, route, 5.0 * turns.len() as f64);
+            let [mut by_near, mut by_all] = [next; 2];
+            let mut flown = pose;
+            for turn in &turns {
+                let before = flown;
+                flown = before.step(model.v_m_s, turn * model.omega_max_rad_s, 5.0);
+                by_near = air.autopilot(&model, &near).next_way_point((before, flown), by_near);
+                by_all = air.autopilot(&model, &offsets_m).next_way_point((before, flown), by_all);
+                prop_assert_eq!(by_near, by_all);
+                if let Some(goal) = near.get(by_near) {
+                    prop_assert!(distance_m(*goal, offsets_m[by_near]) < 1e-3, "the next one is known");
+                }
+            }
+        }
     }
 }

@@ -110,7 +110,8 @@ pub(super) fn leg_ends(next: usize) -> RangeInclusive<usize> {
 
 /// Returns the direction of that leg; none where there is none, and for the last way-point.
 pub(super) fn leg_direction(mission: &[Point], next: usize) -> Option<Point> {
-    let (&from, &to) = mission.get(*leg_ends(next).start()).zip(mission.get(*leg_ends(next).end()))?;
+    let (&from, &to) =
+        mission.get(*leg_ends(next).start()).zip(mission.get(*leg_ends(next).end()))?;
     normalized(sub(to, from)).filter(|_| next + 1 < mission.len())
 }
 
@@ -297,6 +298,37 @@ mod tests {
             separation_m: 500.0,
             turns: 5,
         }
+    }
+
+    /// Returns the number of way-points that are done with at a pose, on the way to number `next`.
+    fn done_abeam(mission: &[Point], next: usize, pose: Pose2) -> usize {
+        let model = model();
+        let passing = WaypointRule { tolerance_m: 100.0, passes: true, passes_abeam: true };
+        let after = AfterLastWaypoint::Straight;
+        let pilot = Autopilot { model: &model, mission, passing, after, dtau_s: 1.0 };
+        pilot.next_way_point((pose, pose), next)
+    }
+
+    #[test]
+    fn a_way_point_that_is_abeam_is_passed_however_far_away_unless_it_is_the_last() {
+        let route = [[9e3, 0.0], [18e3, 0.0], [27e3, 0.0]];
+        let east = |x: f64| Pose2 { at: [x, 7e3], heading_rad: 0.0 };
+        let south = |x: f64| Pose2 { at: [x, 7e3], heading_rad: -1.5 };
+        assert_eq!([8.9e3, 9.1e3].map(|x| done_abeam(&route, 0, east(x))), [0, 1]);
+        assert_eq!(done_abeam(&route, 0, south(9.1e3)), 0, "it still has the first one ahead");
+        assert_eq!([17.9e3, 18.1e3].map(|x| done_abeam(&route, 1, east(x))), [1, 2]);
+        assert_eq!(done_abeam(&route, 0, east(18.1e3)), 2, "it has passed two");
+        assert_eq!(done_abeam(&route, 2, east(40e3)), 2, "it flies back to the last one");
+    }
+
+    /// On the way out it is nearer to the place to which the route comes back, and has turned away.
+    #[test]
+    fn a_way_point_from_which_the_route_comes_back_is_not_passed_on_the_way_there() {
+        let route = [[0.0, 0.0], [30e3, 0.0], [0.0, 5e3], [-9e3, 5e3]];
+        let aside = Pose2 { at: [8e3, 4e3], heading_rad: 2.0 };
+        assert_eq!(done_abeam(&route, 1, aside), 1);
+        // A heading for good is a way-point without a leg.
+        assert_eq!(done_abeam(&[[1e12, 0.0]; 3], 1, aside), 1);
     }
 
     proptest! {

@@ -8,11 +8,11 @@ proptest! {
     #[test]
     fn a_flight_alone_takes_as_long_as_flying_it_step_by_step(
         speed in 0.0f64..20.0, from_rad in -3.2f64..3.2, heading_deg in -180.0f64..180.0,
-        goals in prop::collection::vec(prop::array::uniform2(-40_000.0f64..40_000.0), 1..4),
+        goals in prop::collection::vec(prop::array::uniform2(-40_000.0f64..40_000.0), 1..4), abeam in any::<bool>(),
     ) {
         let wind = [speed * math::cos(from_rad), speed * math::sin(from_rad)];
         let text = format!(
-            "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\n[[airplanes]]\n\
+            "format = 1\nworld = \"airspace\"\n[airspace]\nwind_m_s = {wind:?}\npasses_abeam = {abeam}\n[[airplanes]]\n\
              at_m = [0, 0]\nheading_deg = {heading_deg:?}\nway_points_m = {goals:?}\n"
         );
         let world = CompiledAirspace::new(&Source::new("w", text, "")).expect("a scenario").world;
@@ -100,6 +100,18 @@ fn speeds_that_rounding_would_swallow_are_refused_with_the_least_one() {
             CompiledAirspace::new(&Source::new("s", text, "")).expect_err("refused").to_string();
         assert!(error.contains("give 0.001 to 1e6 m/s"), "{error}");
     }
+}
+
+/// It is led 6 km aside, and has the first way-point abeam there.
+#[test]
+fn an_airplane_that_was_kept_off_its_way_does_not_turn_back_where_way_points_are_passed_abeam() {
+    let flight = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0], [30000, 0]]\n\
+                  orders = [{ at_s = 5, heading_deg = 60 }, { at_s = 250, heading_deg = 0 }, { at_s = 400, proceeds = true }]\n";
+    let [back_s, on_s] =
+        [false, true].map(|abeam| alone_s(&format!("passes_abeam = {abeam}"), flight));
+    let detour_s = 2.0 * 245.0 * (1.0 - 60f64.to_radians().cos());
+    assert!(on_s < 30_000.0 / 35.0 + detour_s, "{on_s}");
+    assert!(back_s > on_s + 200.0, "{back_s} {on_s}");
 }
 
 #[test]
