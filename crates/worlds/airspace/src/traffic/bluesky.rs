@@ -8,11 +8,13 @@
 use super::flyable_aircraft::{
     FlightCommand, FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
 };
-use super::import_settings::{ImportedChange, ImportedScenarioSettings, import_settings};
+use super::import_settings::{
+    ImportedChange, ImportedRules, ImportedScenarioSettings, import_settings,
+};
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
 use super::{
-    DT_S, FOOT_M, LOOK_EVERY_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S, banked_turn_deg_s, callsign,
-    header_text,
+    DT_S, FOOT_M, LOOK_EVERY_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
+    banked_turn_deg_s, callsign, header_text,
 };
 use crate::flight::SeparationMinima;
 use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, ScnAircraft, ScnFile};
@@ -63,10 +65,9 @@ fn settings_text(settings: &ImportedScenarioSettings) -> String {
         let _ = writeln!(text, "method = {method:?}");
     }
     // BlueSky's own method looks as far ahead as the predictions of others, wherever it is chosen.
-    let mvp = start.mvp_text();
-    if !mvp.is_empty() {
-        let _ = writeln!(text, "mvp = {{ {mvp} }}");
-    }
+    let look_ahead_s = start.look_ahead_s.or(Some(MVP_LOOK_AHEAD_S));
+    let mvp = ImportedRules { look_ahead_s, ..start.clone() }.mvp_text();
+    let _ = writeln!(text, "mvp = {{ {mvp} }}");
     if start.is_bare {
         text.push_str("shield = \"off\"\n");
     }
@@ -267,8 +268,37 @@ mod tests {
             };
             assert!(contents.contains(&looks), "{contents}");
         }
-        // MVP that is chosen by `--set` instead of the file looks as far.
-        assert_eq!(compiled(&format!("{flights}DTLOOK 120")).world.mvp.look_ahead_s, 120.0);
+        // MVP that is chosen by `--set` instead of the file looks as far; ORCA as far as its authors do, or less.
+        for (settings, mvp_s, orca_s) in
+            [("DTLOOK 120", 120.0, 120.0), ("", 300.0, 150.0), ("RESO MVP", 300.0, 150.0)]
+        {
+            let world = compiled(&format!("{flights}{settings}")).world;
+            assert_eq!([world.mvp.look_ahead_s, world.orca.look_ahead_s], [mvp_s, orca_s]);
+        }
+    }
+
+    /// With the 45 s that airplanes of the paper look ahead, airliners lose separation here.
+    #[test]
+    fn imported_flights_keep_apart_by_orca_alone() {
+        let flights = [
+            ("00:00", "NOR01,A320,52.7,4.0,180", "51.3,4.0"),
+            ("00:00", "SOU02,B738,51.3,4.0,0", "52.7,4.0"),
+            ("00:00", "WES03,A320,52.0,2.9,90", "52.0,5.1"),
+            ("00:00", "EAS04,B738,52.0,5.1,270", "52.0,2.9"),
+            ("00:30", "LAT06,A320,51.5,3.2,45", "52.5,4.8"),
+        ];
+        let lines = flights.map(|(time, flight, goal)| {
+            let name = &flight[..5];
+            format!("00:{time}>CRE {flight},FL300,270\n00:{time}>ADDWPT {name},{goal}\n")
+        });
+        let text = from_bluesky("five", &parse(&"five.scn", &lines.concat()));
+        let set = ["airspace.method=\"orca\"", "airspace.shield=\"off\""].map(String::from);
+        let source = Source::new("five", text.expect("it has aircraft"), "");
+        let source = source.with_overrides(&set).expect("known keys");
+        let mut run = airspace_run(&source, 1).expect("a scenario");
+        run.advance(run.config().cycles);
+        let metrics = run.metrics();
+        assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5));
     }
 
     /// Losses of separation, and the nearest approach in meters, of two that meet head on after 7 minutes.

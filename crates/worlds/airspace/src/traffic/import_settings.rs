@@ -1,7 +1,7 @@
 //! The settings of a BlueSky file, with their times: those that are flown, and those that cannot be.
 
 use super::flyable_aircraft::aircraft_at_flying_speed;
-use super::{FOOT_M, KNOT_M_S, NAUTICAL_MILE_M};
+use super::{FOOT_M, KNOT_M_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M};
 use sidestep_import::bluesky::{
     AircraftSetting, ResolutionMethod, ScnAircraft, ScnFile, Setting, TimedSetting, Wind,
 };
@@ -49,8 +49,6 @@ const MAX_CHANGES: usize = 1000;
 /// Shortest and longest look-ahead of a scenario in seconds.
 const MIN_LOOK_AHEAD_S: f64 = 1.0;
 const MAX_LOOK_AHEAD_S: f64 = 36_000.0;
-/// The look-ahead of BlueSky's methods, unless `DTLOOK` gives another one.
-const DEFAULT_LOOK_AHEAD_S: f64 = 300.0;
 
 /// The settings that hold at one time, as BlueSky keeps them.
 #[derive(Debug, Clone)]
@@ -279,7 +277,7 @@ impl SettingsReader<'_> {
         let (method, is_bare) = resolution_method(&self.now);
         let mut look_ahead_s = self.now.look_ahead_s;
         if look_ahead_s.is_none() && method == Some("mvp") {
-            look_ahead_s = Some(DEFAULT_LOOK_AHEAD_S);
+            look_ahead_s = Some(MVP_LOOK_AHEAD_S);
         }
         let wind_m_s = wind_m_s(&self.now.winds, &self.file.traffic.aircraft);
         let wind_m_s = wind_m_s.unwrap_or_else(|cause| {
