@@ -2,6 +2,7 @@
 
 use super::decide::OptimizationStats;
 use super::events::{Event, EventKind};
+use super::flight::FlightPhase;
 use super::state::{AirplaneState, AirspaceState, PairRecord};
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,8 @@ pub struct Counters {
     pub events: BTreeMap<EventKind, u64>,
     /// Airplanes with errors beyond the shield's bounds, with the first cycle of each.
     pub beyond_bound: BTreeMap<EntityId, Cycle>,
+    /// Losses of separation of pairs of recorded flights, by their phase.
+    pub losses_by_phase: BTreeMap<FlightPhase, u64>,
 }
 
 impl Counters {
@@ -62,6 +65,13 @@ metrics! {
         pub losses_of_reported_pairs: u64 => "losses of reported pairs",
         /// Losses of all other pairs, for which the shield promises that there are none. Without a shield these are all.
         pub losses_of_unreported_pairs: u64 => "losses of unreported pairs",
+        /// Losses of recorded flights of which at least one climbed. By the record at that time, or at the handover to the
+        /// method; none where none is recorded. Rows on the ground are no traffic.
+        pub losses_in_climb: Option<u64> => "losses in climb",
+        /// Losses of recorded flights of which one descended and none climbed.
+        pub losses_in_descent: Option<u64> => "losses in descent",
+        /// Losses of recorded flights that both kept their levels.
+        pub losses_in_cruise: Option<u64> => "losses in cruise",
         /// Time that pairs spent nearer than their separation. In seconds.
         pub lost_s: f64 => "time with separation lost",
         /// Airplanes that have reached their last way-point.
@@ -71,6 +81,13 @@ metrics! {
         /// Mean, over those that have arrived, of the time beyond that of the flight alone, in percent of it. Airplanes
         /// that would never arrive alone are left out.
         pub mean_delay_percent: Option<f64> => "mean delay",
+        /// The same mean, over recorded flights that climbed at their handover to the method. It flies them on the level that
+        /// they had there.
+        pub climb_delay_percent: Option<f64> => "mean delay of flights in climb",
+        /// The same mean, over recorded flights that descended at their handover.
+        pub descent_delay_percent: Option<f64> => "mean delay of flights in descent",
+        /// The same mean, over recorded flights that kept their level at their handover.
+        pub cruise_delay_percent: Option<f64> => "mean delay of flights in cruise",
         /// Airplanes still in the air when the run ended, without a delay. The mean delay is too low where late ones are among
         /// them.
         pub in_flight: u64 => "airplanes still in the air",
@@ -290,6 +307,26 @@ fn losses_by_report(counters: &Counters) -> [u64; 2] {
     losses
 }
 
+/// Returns the losses of recorded flights in a phase; none where no two are recorded.
+fn losses_in_phase(world: &AirspaceWorld, counters: &Counters, phase: FlightPhase) -> Option<u64> {
+    let recorded = world.airplanes.iter().filter(|airplane| airplane.track.is_some());
+    let losses = counters.losses_by_phase.get(&phase).copied().unwrap_or(0);
+    (recorded.take(2).count() == 2).then_some(losses)
+}
+
+/// Returns the mean delay, in percent, of recorded flights that were in a phase at their handover to the method.
+fn delay_in_phase(
+    world: &AirspaceWorld,
+    all: &[AirplaneMetrics],
+    phase: FlightPhase,
+) -> Option<f64> {
+    let is_in_phase =
+        |one: &&AirplaneMetrics| world.flight_phase(one.airplane, f64::INFINITY) == Some(phase);
+    let delays: Vec<f64> =
+        all.iter().filter(is_in_phase).filter_map(|one| one.delay_percent).collect();
+    mean(delays.iter().sum(), delays.len())
+}
+
 fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
@@ -315,6 +352,8 @@ pub(crate) fn metrics(
     let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } =
         counters.effort;
     let [losses_of_reported_pairs, losses_of_unreported_pairs] = losses_by_report(counters);
+    let losses_in = |phase| losses_in_phase(world, counters, phase);
+    let delay_in = |phase| delay_in_phase(world, &all, phase);
     let not_appeared = not_appeared_count(world, now);
     let unfinished = count_airplanes_where(state, AirplaneState::is_unfinished);
     Metrics {
@@ -322,10 +361,16 @@ pub(crate) fn metrics(
         losses_of_separation: counters.pairs.values().map(|r| u64::from(r.losses)).sum(),
         losses_of_reported_pairs,
         losses_of_unreported_pairs,
+        losses_in_climb: losses_in(FlightPhase::Climb),
+        losses_in_descent: losses_in(FlightPhase::Descent),
+        losses_in_cruise: losses_in(FlightPhase::Cruise),
         lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
         arrived: count_airplanes_where(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
+        climb_delay_percent: delay_in(FlightPhase::Climb),
+        descent_delay_percent: delay_in(FlightPhase::Descent),
+        cruise_delay_percent: delay_in(FlightPhase::Cruise),
         in_flight: unfinished.saturating_sub(not_appeared),
         messages: traffic.messages,
         bytes: traffic.bytes,
@@ -453,6 +498,39 @@ mod tests {
         };
         assert_eq!(losses("on")[1], 0);
         assert_eq!(losses("off")[0], 0);
+    }
+
+    /// A climbs through the level of B, and C meets D on another level.
+    #[test]
+    fn losses_and_delays_of_recorded_flights_are_told_apart_by_phase() {
+        let metrics = |until_s: &str| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\nmethod = \"none\"\n\
+                 vertical_m = 300\nreplay_until_s = {until_s}\n[airplane]\nseparation_m = 1000\n\
+                 [[airplanes]]\ntrack = [[0, 0, 0, 0], [200, 20000, 0, 2000]]\n\
+                 [[airplanes]]\ntrack = [[0, 10000, -10000, 1000], [200, 10000, 10000, 1000]]\n\
+                 [[airplanes]]\ntrack = [[0, 50000, 0, 5000], [200, 70000, 0, 5000]]\n\
+                 [[airplanes]]\ntrack = [[0, 70000, 0, 5000], [200, 50000, 0, 5000]]\n"
+            );
+            let mut run = airspace_run(&Source::new("p", text, ""), 1).expect("a scenario");
+            run.advance(100);
+            run.metrics()
+        };
+        let in_phases = |m: &super::Metrics| {
+            ([m.losses_in_climb, m.losses_in_descent, m.losses_in_cruise], m.losses_of_separation)
+        };
+        let replayed = metrics("inf");
+        assert_eq!(in_phases(&replayed), ([Some(1), Some(0), Some(1)], 2));
+        let flown = metrics("0");
+        // The first is flown on the level at which it was taken over, below the second.
+        assert_eq!(in_phases(&flown), ([Some(0), Some(0), Some(1)], 1));
+        let delays =
+            [flown.climb_delay_percent, flown.descent_delay_percent, flown.cruise_delay_percent];
+        assert_eq!(delays.map(|delay| delay.is_some()), [true, false, true]);
+        assert_eq!(replayed.climb_delay_percent, None, "nothing delays a record");
+        let planned = "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
+        let run = airspace_run(&Source::new("n", planned, ""), 1).expect("a scenario");
+        assert_eq!(in_phases(&run.metrics()).0, [None; 3], "no record says so");
     }
 
     #[test]

@@ -440,7 +440,8 @@ mod tests {
         } else {
             AfterLastWaypoint::Straight
         };
-        let passing = WaypointRule { tolerance_m: number("tol"), passes: false, passes_abeam: false };
+        let passing =
+            WaypointRule { tolerance_m: number("tol"), passes: false, passes_abeam: false };
         let expected = &case["expected"];
         let mut predictions = Vec::new();
         let planes = case["planes"].as_array().expect("planes");

@@ -3,6 +3,7 @@
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::OptimizationRecord;
 use crate::events::Event;
+use crate::flight::FlightPhase;
 use crate::rows::FlownLeg;
 use crate::state::PairRecord;
 use crate::trace::InspectionTrace;
@@ -18,6 +19,8 @@ pub(crate) type PhaseContext<'a> = sidestep_kernel::PhaseContext<'a, AirspaceWor
 pub struct Scratch {
     /// Pairs that came near each other.
     pub(crate) pairs: BTreeMap<(EntitySlot, EntitySlot), PairRecord>,
+    /// Losses of separation of recorded flights, by their phase.
+    pub(crate) losses_by_phase: BTreeMap<FlightPhase, u64>,
     pub(crate) optimizations: Vec<OptimizationRecord>,
     /// Beacons by which airplanes have found their groups.
     pub(crate) grouped: NetworkTraffic,

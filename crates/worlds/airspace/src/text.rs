@@ -336,11 +336,14 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
     let nearest = m.min_separation_m.map_or("none came near".into(), |d| format!("{d:.1} m"));
     let lost = match m.losses_of_separation {
         0 => "none".into(),
-        n => format!("{}, {:.1} s in all{}", group_thousands(n), m.lost_s, reported_text(m)),
+        n => {
+            let lost = format!("{}, {:.1} s in all", group_thousands(n), m.lost_s);
+            lost + &phases_text(m) + &reported_text(m)
+        }
     };
-    let delay = m
-        .mean_delay_percent
-        .map_or("-".into(), |d| format!("{d:.1} % on average{}", in_flight_text(m.in_flight)));
+    let delay = m.mean_delay_percent.map_or("-".into(), |d| {
+        format!("{d:.1} % on average{}{}", phase_delays_text(m), in_flight_text(m.in_flight))
+    });
     let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
     vec![
         key_value_pair(
@@ -360,6 +363,38 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
             ),
         ),
     ]
+}
+
+/// Returns how many losses are in which phase of recorded flights, if any are known.
+fn phases_text(m: &Metrics) -> String {
+    let phases = [
+        (m.losses_in_climb, "climb"),
+        (m.losses_in_descent, "descent"),
+        (m.losses_in_cruise, "cruise"),
+    ];
+    let known = phases.iter().filter_map(|(losses, phase)| {
+        let losses = losses.filter(|losses| *losses > 0)?;
+        Some(format!("{} in {phase}", group_thousands(losses)))
+    });
+    in_parentheses(&known.collect::<Vec<_>>())
+}
+
+/// Returns the mean delays of recorded flights in which phase, where there are several.
+fn phase_delays_text(m: &Metrics) -> String {
+    let phases = [
+        (m.climb_delay_percent, "climb"),
+        (m.descent_delay_percent, "descent"),
+        (m.cruise_delay_percent, "cruise"),
+    ];
+    let known: Vec<String> = phases
+        .iter()
+        .filter_map(|(delay, phase)| delay.map(|percent| format!("{percent:.1} % in {phase}")))
+        .collect();
+    in_parentheses(&known)
+}
+
+fn in_parentheses(words: &[String]) -> String {
+    if words.is_empty() { String::new() } else { format!(" ({})", words.join(", ")) }
 }
 
 /// Returns how many losses are of pairs that the shield reported, if there are any.

@@ -6,8 +6,9 @@ mod tests;
 
 use super::flight::{
     Action, AirplaneStart, Chart, DetourAlternatives, FlightConditions, FlightLevelRange,
-    FlightTask, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition, SegmentAfterOrder,
-    Surface, TimeDiscretization, Track, WaypointRule, actions, segments_after_orders,
+    FlightPhase, FlightTask, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition,
+    SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
+    segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
@@ -298,6 +299,14 @@ impl AirspaceWorld {
     pub fn is_replayed(&self, slot: EntitySlot, now: Cycle) -> bool {
         self.airplanes[slot as usize].track.is_some()
             && now < self.first_controlled_cycle(slot as usize)
+    }
+
+    /// Returns the phase of a recorded flight at a time, in seconds after the start of the run: by its record then, or
+    /// by that at its handover to the method, which flies it on the level that it had.
+    pub(crate) fn flight_phase(&self, slot: EntitySlot, t_s: f64) -> Option<FlightPhase> {
+        let track = self.airplanes[slot as usize].track.as_ref()?;
+        let joins_s = self.cycle_start_s(self.first_controlled_cycle(slot as usize));
+        Some(track.phase_at(t_s.min(joins_s)))
     }
 
     /// Returns the distance in meters up to which two airplanes have to avoid each other, because

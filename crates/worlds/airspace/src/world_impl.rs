@@ -104,6 +104,9 @@ impl World for AirspaceWorld {
 
     fn collect(&self, collector: &mut Collector, scratch: &mut Scratch) {
         let counters = &mut collector.counters;
+        for (phase, losses) in std::mem::take(&mut scratch.losses_by_phase) {
+            *counters.losses_by_phase.entry(phase).or_default() += losses;
+        }
         for (pair, record) in std::mem::take(&mut scratch.pairs) {
             counters.add_pair(pair, record);
         }

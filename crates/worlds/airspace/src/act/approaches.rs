@@ -36,7 +36,7 @@ pub(super) fn record_distances(
             let b = &flights[i.max(j)];
             if let Some(plane) = plane_of_near_pair(world, a, b) {
                 let approach = closest_approach(world, &plane, [a, b], moment);
-                record_pair(a, b, approach, moment, scratch);
+                record_pair(world, [a, b], approach, moment, scratch);
             }
         }
     }
@@ -44,8 +44,8 @@ pub(super) fn record_distances(
 
 /// Stores the record of a pair in one step.
 fn record_pair(
-    a: &AircraftCycleMotion<'_>,
-    b: &AircraftCycleMotion<'_>,
+    world: &AirspaceWorld,
+    [a, b]: [&AircraftCycleMotion<'_>; 2],
     record: PairRecord,
     moment: SubStep,
     scratch: &mut Scratch,
@@ -57,6 +57,11 @@ fn record_pair(
     if record.losses > 0 {
         let event = Event::new_for_pair(moment.now, EventKind::LossOfSeparation, a.slot, b.slot);
         scratch.events.push(event.with_value(record.nearest_m));
+        let [phase, other] = [a, b].map(|one| world.flight_phase(one.slot, moment.step_s));
+        if let Some((phase, other)) = phase.zip(other) {
+            *scratch.losses_by_phase.entry(phase.both(other)).or_default() +=
+                u64::from(record.losses);
+        }
     }
     scratch.pairs.entry((a.slot, b.slot)).and_modify(|r| r.add(record)).or_insert(record);
 }
