@@ -6,6 +6,7 @@ use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_path;
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
@@ -41,6 +42,9 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
 /// the first byte that does not fit.
 pub fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
     String::from_utf8(bytes).map_err(|error| {
+        if let Some(error) = packed_error(path, error.as_bytes()) {
+            return error;
+        }
         if let Some(format) = binary_format(error.as_bytes()) {
             let cause = format!("is {format}, and a text file is read here");
             return InputError::new(path.display(), cause, "check that this is the right file");
@@ -75,6 +79,26 @@ const SIGNATURES: [(&[u8], &str); 18] = [
 
 /// Number of bytes in which a zero tells that a file is no text.
 const SEARCHED_BYTES: usize = 8192;
+
+/// Commands that unpack a file beside it, by the first bytes of its format.
+const UNPACK_COMMANDS: [(&[u8], &str); 5] = [
+    (b"PK\x03\x04", "unzip"),
+    (b"\x28\xb5\x2f\xfd", "zstd -d"),
+    (b"\x04\x22\x4d\x18", "lz4 -d"),
+    (b"BZh", "bunzip2 -k"),
+    (b"\xfd7zXZ", "unxz -k"),
+];
+
+/// Returns the error of a file that is packed in a way that is not unpacked here, with the command that does it.
+pub fn packed_error(path: &Path, start: &[u8]) -> Option<InputError> {
+    let (_, command) =
+        UNPACK_COMMANDS.iter().find(|(signature, _)| start.starts_with(signature))?;
+    let format = binary_format(start).unwrap_or("packed");
+    let file = shell_path(path);
+    let remedy =
+        format!("unpack it: `{command} {file}`, and give what comes out; gzip is read as it is");
+    Some(InputError::new(path.display(), format!("is {format}"), remedy))
+}
 
 /// Returns what a file that is not UTF-8 is, as the predicate of a sentence; `None` for a text of another encoding.
 fn binary_format(bytes: &[u8]) -> Option<&'static str> {
@@ -187,6 +211,20 @@ mod tests {
         let latin = file_with(b"name = \"Z\xfcrich\"");
         let error = read_text(latin.path(), 100).expect_err("Latin-1");
         assert_eq!(error.line_and_column(), Some((1, 10)));
+    }
+
+    #[test]
+    fn a_packed_file_is_refused_with_the_command_that_unpacks_it() {
+        for (bytes, command) in [
+            (b"PK\x03\x04\x14\0\xff".as_slice(), "`unzip 'my day.csv.x'`"),
+            (b"\x28\xb5\x2f\xfd\x04\xff", "`zstd -d 'my day.csv.x'`"),
+            (b"BZh91AY\xff", "`bunzip2 -k 'my day.csv.x'`"),
+            (b"\xfd7zXZ\0\xff", "`unxz -k 'my day.csv.x'`"),
+        ] {
+            let path = Path::new("my day.csv.x");
+            let error = decode_text(path, bytes.to_vec()).expect_err("packed");
+            assert!(error.remedy().contains(command), "{error}");
+        }
     }
 
     #[test]

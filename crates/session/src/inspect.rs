@@ -11,6 +11,7 @@ use sidestep_import::{ForeignFormat, bag, carmen, clean_map};
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::SweepFolder;
 use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, row_count, tables};
+use sidestep_scenario::file::{packed_error, read_start};
 use sidestep_scenario::{ImportOptions, ImportReport, Source, Treatment, Worlds};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -81,7 +82,8 @@ fn check_no_options(path: &Path, options: &ImportOptions) -> Result<(), InputErr
 fn own_text(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
     let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if !is_toml {
-        return Err(unknown_kind(path).into());
+        let start = read_start(path, 16)?;
+        return Err(packed_error(path, &start).unwrap_or_else(|| unknown_kind(path)).into());
     }
     let sweep = Sweep::read(path)?;
     // The reader of sweeps takes a scenario as a sweep of itself.

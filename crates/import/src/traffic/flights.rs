@@ -23,6 +23,9 @@ const MIN_CALLSIGN_S: f64 = 60.0;
 /// What reported speeds may differ from those of rows, before their unit is in doubt.
 const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
 
+/// What units of speed may differ from the one that a column says.
+const UNIT_RATIOS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
+
 /// What reported directions may differ from those of rows, in degrees: in the median, no wind does that.
 const MAX_DIRECTION_OFFSET_DEG: f64 = 45.0;
 
@@ -280,7 +283,8 @@ impl FlightBuilder<'_> {
         );
         let remedy = "write the speeds in the unit of the column";
         self.report.record(Treatment::Suspicious, rule, "", remedy);
-        ratio
+        // No unit is that different: then positions are wrong, and rows are compared with what they report.
+        if UNIT_RATIOS.contains(&ratio) { ratio } else { 1.0 }
     }
 
     /// Names a column of directions that is not where the rows move to: for one instant, nothing else would tell.

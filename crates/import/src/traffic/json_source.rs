@@ -2,6 +2,7 @@
 //! answer to a request for a track; rows of any table as objects, as the library `traffic` writes them; and lists of such
 //! rows within an object, as other networks give them: readsb, adsb.lol, ADS-B Exchange, Flightradar24, FlightAware.
 
+use super::POINTS_REMEDY;
 use super::columns::{Field, Layout, Source};
 use super::rows::{RowCollector, RowValues};
 use super::value::Value;
@@ -147,8 +148,6 @@ struct StateReader<'a> {
 }
 
 const GEO_JSON_CAUSE: &str = "is GeoJSON, whose lines have no times";
-const GEO_JSON_REMEDY: &str = "give a table with a row for each point: `time_s`, `callsign`, `lat_deg`, `lon_deg`, `alt_m` \
-                               (the third coordinate is in meters)";
 
 impl StateReader<'_> {
     fn error(&self, cause: &str) -> InputError {
@@ -184,7 +183,7 @@ impl StateReader<'_> {
             return Err(self.error("a list has something else than objects"));
         };
         if map.get("type").is_some_and(|kind| kind == "FeatureCollection" || kind == "Feature") {
-            return Err(InputError::new(self.collector.place(), GEO_JSON_CAUSE, GEO_JSON_REMEDY));
+            return Err(InputError::new(self.collector.place(), GEO_JSON_CAUSE, POINTS_REMEDY));
         }
         if let Some(Json::Array(points)) = map.get_mut("trace").map(Json::take) {
             self.push_trace(&map, points);

@@ -112,6 +112,10 @@ pub const MAX_SPEED_M_S: f64 = 1e6;
 /// The maximum size of a file in bytes after decompression.
 pub const MAX_TRAFFIC_BYTES: u64 = super::table::MAX_CSV_BYTES;
 
+/// What to give in place of a file for maps.
+const POINTS_REMEDY: &str = "give a table with a row for each point: `time_s`, `callsign`, `lat_deg`, `lon_deg`, `alt_m` \
+                             (heights in KML, GPX and GeoJSON are in meters)";
+
 /// Reads a file, plain or compressed with gzip.
 ///
 /// # Errors
@@ -157,6 +161,10 @@ fn collect(collector: &mut RowCollector, text: &str) -> Result<(), InputError> {
     let start = text.trim_start();
     if start.starts_with(['{', '[']) {
         return json_source::collect(collector, text);
+    }
+    if start.starts_with('<') {
+        let cause = "is XML, as KML and GPX are, and tracks are not read from that";
+        return Err(InputError::new(collector.place(), cause, POINTS_REMEDY));
     }
     if so6::is_so6(text) {
         so6::collect(collector, text);

@@ -8,8 +8,9 @@ use sidestep_scenario::file::read_start;
 use std::path::Path;
 
 /// Ends of names, without `.gz`, of files that hold recorded traffic.
-const EXTENSIONS: [&str; 12] = [
-    "csv", "tsv", "json", "jsonl", "ndjson", "geojson", "parquet", "so6", "m1", "m3", "daa", "sbs",
+const EXTENSIONS: [&str; 14] = [
+    "csv", "tsv", "kml", "gpx", "json", "jsonl", "ndjson", "geojson", "parquet", "so6", "m1", "m3",
+    "daa", "sbs",
 ];
 
 /// Ends of names of files that may hold anything.

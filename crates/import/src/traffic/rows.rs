@@ -406,6 +406,9 @@ impl RowReader<'_> {
         if !is_on_earth {
             return Err("rows with a position that is not on the earth");
         }
+        if lat_deg == 0.0 && lon_deg == 0.0 {
+            return Err("rows at latitude 0 and longitude 0, which stand for no position");
+        }
         let lon_deg = if lon_deg > 180.0 { lon_deg - 360.0 } else { lon_deg };
         Ok(LatLon { lat_deg, lon_deg })
     }

@@ -282,6 +282,25 @@ fn directions_that_are_not_those_of_motion_are_named_once() {
 }
 
 #[test]
+fn positions_at_0_0_and_far_away_do_not_hide_each_other() {
+    let zero = read_text(&table(31, |k, row| {
+        if k % 7 == 0 {
+            row.replace(",47,", ",0,")
+                .replace(&format!(",{:.2},", 7.0 + 0.03 * f64::from(k)), ",0,")
+        } else {
+            row
+        }
+    }));
+    assert_eq!(finding(&zero, "stand for no position").map(|found| found.count), Some(5));
+    assert_eq!(zero.tracks[0].samples.len(), 26);
+    let elsewhere =
+        read_text(&table(31, |k, row| if k % 7 == 3 { row.replace(",47,", ",-12,") } else { row }));
+    let far = finding(&elsewhere, "does not lead to").expect("a rule");
+    assert_eq!((far.treatment, far.count), (Treatment::Suspicious, 4), "{:?}", elsewhere.report);
+    assert_eq!(elsewhere.tracks[0].samples.len(), 27, "nothing reaches these rows");
+}
+
+#[test]
 fn levels_at_which_nobody_flies_so_fast_are_named_once() {
     for altitude in ["350", "0"] {
         let low = read_text(&table(12, |_, row| row.replace(",35000,", &format!(",{altitude},"))));
@@ -300,6 +319,18 @@ fn a_cell_with_its_unit_says_what_to_write() {
         let error = parse(&"f", &table(4, |_, row| row.replace(change.0, change.1)));
         let error = error.expect_err(change.1);
         assert!(error.remedy().contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn files_of_maps_say_what_to_give_in_their_place() {
+    let line = r#"{"type":"FeatureCollection","features":[]}"#;
+    let xml = r#"<?xml version="1.0"?><gpx version="1.1"><trk/></gpx>"#;
+    for text in [line, xml] {
+        let error = parse(&"f", text).expect_err("no table");
+        for column in ["`time_s`", "`lat_deg`", "`alt_m`"] {
+            assert!(error.remedy().contains(column), "{error}");
+        }
     }
 }
 
