@@ -53,10 +53,11 @@ impl Pairs {
         mean(&self.differences())
     }
 
-    /// Returns Student's 95 % interval of the mean difference; `None` for fewer than two pairs, and where
-    /// [they are one case](Self::is_one_case).
+    /// Returns Student's 95 % interval of the mean difference; `None` for fewer than two pairs, and where all
+    /// differences are equal but for rounding: they show no spread, and an interval without width would claim that there
+    /// is none.
     pub fn difference_interval(&self) -> Option<Interval> {
-        if self.is_one_case() {
+        if self.is_tied() {
             return None;
         }
         mean_interval(&self.differences())
@@ -123,9 +124,9 @@ impl Pairs {
     }
 
     /// Returns the bootstrap's 95 % interval of the mean difference; `None` where
-    /// [all pairs are one case](Self::is_one_case).
+    /// [that of Student](Self::difference_interval) is.
     pub fn difference_bootstrap(&self, bootstrap: &Bootstrap) -> Option<Interval> {
-        if self.is_one_case() {
+        if self.is_tied() {
             return None;
         }
         bootstrap.mean(&self.differences())

@@ -276,6 +276,12 @@ mod tests {
         assert!(gone.may_lead_to(&InputError::new("s", "no robots", "add some")));
         assert!(!gone.may_lead_to(&error("robots.0.effector", "unknown effector `ear`")));
         assert!(!gone.may_lead_to(&error("robots.0.eye", "unknown key `eye`")));
+        let renamed = Repair {
+            is_meant: true,
+            ..repair("map.unknwon", RepairKind::Rename("unknown".into()))
+        };
+        assert!(renamed.may_lead_to(&error("map.unknown", "wanted a word")));
+        assert!(!renamed.may_lead_to(&error("map.file", "wanted a word")));
         let other = repair("robots.0.size", RepairKind::Replace("2".into()));
         assert!(other.may_lead_to(&error("robots.0.size", "size = 2")));
         assert!(other.may_lead_to(&error("robots.0", "no place is free")));

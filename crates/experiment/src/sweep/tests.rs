@@ -138,6 +138,25 @@ fn counts_that_are_equal_in_a_few_runs_do_not_say_that_seeds_change_nothing() {
 }
 
 #[test]
+fn counts_that_are_equal_in_all_runs_have_no_interval_without_width() {
+    let groups = [2, 2, 2, 2, 2, 3, 3, 3, 3, 3].map(Some).into_iter().collect();
+    let delays = [1.0, 2.5, 1.5, 2.0, 1.8, 4.0, 5.0, 4.1, 5.3, 4.4];
+    let metrics = vec![
+        column("largest_group", Role::Metric, ColumnValues::I64(groups)),
+        column("delay_s", Role::Metric, numbers(delays)),
+    ];
+    let summary = summed(&two_variants(5, metrics));
+    let groups = of(&summary, "largest_group");
+    for variant in &groups.variants {
+        let MetricValues::Numbers(numbers) = &variant.values else { panic!("a share") };
+        assert_eq!((variant.n, numbers.interval, numbers.bootstrap), (5, None, None));
+    }
+    let comparison = &groups.comparisons[0];
+    assert_eq!((comparison.pairs, comparison.interval, comparison.p), (5, None, None));
+    assert!(of(&summary, "delay_s").comparisons[0].interval.is_some());
+}
+
+#[test]
 fn a_few_pairs_have_an_interval_and_no_p_value_and_a_note_says_so() {
     let values = [1.0, 2.5, 1.5, 2.0, 4.0, 5.0, 4.1, 5.3];
     let metrics = vec![column("delay_s", Role::Metric, numbers(values))];

@@ -23,6 +23,9 @@ const MIN_CALLSIGN_S: f64 = 60.0;
 /// What reported speeds may differ from those of rows, before their unit is in doubt.
 const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
 
+/// The greatest mean speed of a flight in m/s, some 5,000 kt: with a greater one most of its positions are wrong.
+const MAX_MEAN_SPEED_M_S: f64 = 2_600.0;
+
 /// What units of speed may differ from the one that a column says.
 const UNIT_RATIOS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 
@@ -69,10 +72,10 @@ pub(super) fn into_traffic(
         }));
     }
     builder.count_gaps(&parts);
-    builder.check_bad_count(&place, row_count)?;
     let is_snapshot = is_snapshot(&parts);
     let tracks: Vec<Track> =
         parts.into_iter().filter_map(|rows| builder.track(rows, is_snapshot)).collect();
+    builder.check_bad_count(&place, row_count)?;
     if tracks.is_empty() {
         return Err(builder.nothing_left(&place, row_count));
     }
@@ -404,6 +407,12 @@ impl FlightBuilder<'_> {
             self.record(Treatment::Dropped, SINGLE_ROW_RULE, first, "");
             return None;
         }
+        if mean_speed_m_s(&rows) > MAX_MEAN_SPEED_M_S {
+            let rule = "rows of flights that are faster than anything that flies";
+            rows.iter().for_each(|row| self.record(Treatment::Dropped, rule, row, ""));
+            self.bad_count += rows.len();
+            return None;
+        }
         if is_snapshot && (sample.ground_speed_kt.is_none() || sample.track_deg.is_none()) {
             let rule = "aircraft of one instant without a speed or a direction";
             self.record(Treatment::Dropped, rule, first, "");
@@ -425,6 +434,16 @@ impl FlightBuilder<'_> {
         let remedy = "give a recording of aircraft in the air, each in two rows at least";
         InputError::new(place, cause, remedy)
     }
+}
+
+/// Returns the length of the way through all rows over its duration; 0 for a single row.
+fn mean_speed_m_s(rows: &[Row]) -> f64 {
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return 0.0 };
+    let steps = rows.windows(2);
+    let length_m: f64 =
+        steps.map(|pair| distance_m(pair[0].sample.position, pair[1].sample.position)).sum();
+    let duration_s = last.sample.time_s - first.sample.time_s;
+    if duration_s > 0.0 { length_m / duration_s } else { 0.0 }
 }
 
 /// Returns whether every aircraft has one row: with more, rows that are far apart are no picture of one instant.

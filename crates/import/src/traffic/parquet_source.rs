@@ -3,16 +3,20 @@
 use super::columns::Layout;
 use super::rows::{RowCollector, RowValues};
 use super::value::Value;
+use crate::report::Treatment;
 use bytes::Bytes;
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, DataType};
+use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::{ParquetError, Result as ParquetResult};
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::schema::types::ColumnDescriptor;
 use sidestep_kernel::InputError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Words of the decoder about a compression that this program is built without.
+const DISABLED_WORDS: &str = "Disabled feature";
 
 /// The first and the last bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
@@ -35,6 +39,14 @@ pub(super) fn is_parquet(bytes: &[u8]) -> bool {
 pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<(), InputError> {
     let place = collector.place().to_string();
     let damaged = |cause: String| {
+        let missing = ["brotli", "lz4"].into_iter().find(|name| {
+            cause.contains(DISABLED_WORDS) && cause.to_ascii_lowercase().contains(name)
+        });
+        if let Some(name) = missing {
+            let cause = format!("is Parquet compressed with {name}, which is not read");
+            let remedy = "write it anew with Zstandard: in pandas `df.to_parquet(\"day.parquet\", compression=\"zstd\")`";
+            return InputError::new(&place, cause, remedy);
+        }
         let remedy = "copy the file again from its source; it may be compressed with Snappy, Zstandard or gzip, or plain";
         InputError::new(&place, format!("cannot be read as Parquet: {cause}"), remedy)
     };
@@ -44,6 +56,12 @@ pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<()
         .map_err(|error| damaged(error.to_string()))?;
     let layout = Layout::find(&place, &table.names)?;
     collector.describe_source(&layout, "Parquet");
+    for (name, cells) in table.names.iter().zip(&table.columns) {
+        if matches!(cells, Cells::Other) && !layout.unused.contains(name) {
+            let rule = "columns of a type that is not read";
+            collector.report.record(Treatment::NotUsed, rule, format!("`{name:.40}`"), "");
+        }
+    }
     for row in 0..table.row_count {
         collector.push(row + 1, &layout, &TableRow { table: &table, row });
     }
@@ -120,7 +138,10 @@ fn empty_cells(column: &ColumnDescriptor) -> Cells {
         _ if is_nested => Cells::Other,
         Type::BOOLEAN => Cells::Flags(Vec::new()),
         Type::BYTE_ARRAY => Cells::Texts(Vec::new()),
-        Type::FIXED_LEN_BYTE_ARRAY => Cells::Other,
+        Type::FIXED_LEN_BYTE_ARRAY => match FixedNumber::of_column(column) {
+            Some(_) => Cells::Numbers(Vec::new()),
+            None => Cells::Other,
+        },
         _ => Cells::Numbers(Vec::new()),
     }
 }
@@ -136,14 +157,22 @@ impl Cells {
         use ColumnReader as Reader;
         let is_nullable = column.max_def_level() > 0;
         let units_per_s = units_per_s(column);
+        let decimal_factor = decimal_scale(column).map_or(1.0, decimal_factor);
         let whole = |value: i64| match units_per_s {
             // Whole seconds apart from the rest: nanoseconds of the present have more digits than a float.
             Some(units) => {
                 value.div_euclid(units) as f64 + value.rem_euclid(units) as f64 / units as f64
             }
-            None => value as f64,
+            None => value as f64 / decimal_factor,
         };
         match (&mut *self, reader) {
+            (Self::Numbers(to), Reader::FixedLenByteArrayColumnReader(r)) => {
+                let number = FixedNumber::of_column(column);
+                let decode = |v: FixedLenByteArray| {
+                    number.map_or(f64::NAN, |number| number.decode(v.data()))
+                };
+                read_values(r, is_nullable, to, decode)?;
+            }
             (Self::Numbers(to), Reader::Int32ColumnReader(r)) => {
                 read_values(r, is_nullable, to, |v| whole(v.into()))?;
             }
@@ -182,6 +211,68 @@ impl Cells {
             Self::Other => 0,
         }
     }
+}
+
+/// A number in a fixed number of bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum FixedNumber {
+    /// A float of 16 bits.
+    Half,
+    /// A whole number of units of `10^-scale`, the first byte the greatest.
+    Decimal { scale: i32 },
+}
+
+impl FixedNumber {
+    fn of_column(column: &ColumnDescriptor) -> Option<Self> {
+        if matches!(column.logical_type_ref(), Some(LogicalType::Float16)) {
+            return Some(Self::Half);
+        }
+        decimal_scale(column).map(|scale| Self::Decimal { scale })
+    }
+
+    fn decode(self, bytes: &[u8]) -> f64 {
+        match self {
+            Self::Half => match bytes {
+                [low, high] => half_to_f64(u16::from_le_bytes([*low, *high])),
+                _ => f64::NAN,
+            },
+            Self::Decimal { scale } => {
+                let is_negative = bytes.first().is_some_and(|byte| byte & 0x80 != 0);
+                let start = if is_negative { -1_i128 } else { 0 };
+                let whole =
+                    bytes.iter().fold(start, |whole, byte| whole << 8 | i128::from(*byte));
+                if bytes.len() > 16 { f64::NAN } else { whole as f64 / decimal_factor(scale) }
+            }
+        }
+    }
+}
+
+fn half_to_f64(bits: u16) -> f64 {
+    /// The smallest step of this type: 2 to the power of -24.
+    const STEP: f64 = 1.0 / 16_777_216.0;
+    let (sign, exponent, fraction) = (bits & 0x8000, bits >> 10 & 0x1f, bits & 0x3ff);
+    let size = match exponent {
+        0 => f64::from(fraction) * STEP,
+        31 => f64::NAN,
+        // The exponents of 32 bits begin 112 lower, and the fraction has 13 more digits.
+        _ => f64::from(f32::from_bits((u32::from(exponent) + 112) << 23 | u32::from(fraction) << 13)),
+    };
+    if sign == 0 { size } else { -size }
+}
+
+/// Returns the number of digits after the point of a column of decimals.
+fn decimal_scale(column: &ColumnDescriptor) -> Option<i32> {
+    match column.logical_type_ref() {
+        Some(LogicalType::Decimal(decimal)) => Some(decimal.scale),
+        _ if column.converted_type() == ConvertedType::DECIMAL => Some(column.type_scale()),
+        _ => None,
+    }
+}
+
+fn decimal_factor(scale: i32) -> f64 {
+    /// Decimals have at most so many digits.
+    const MAX_SCALE: i32 = 38;
+    (0..scale.clamp(0, MAX_SCALE)).fold(1.0, |factor, _| factor * 10.0)
 }
 
 /// Returns the number of units in a second of a column of times.

@@ -3,7 +3,10 @@
 use super::tests::finding;
 use super::{TrafficOptions, from_bytes};
 use parquet::basic::{Compression, GzipLevel, ZstdLevel};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::data_type::{
+    BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FixedLenByteArray,
+    FixedLenByteArrayType, Int32Type, Int64Type,
+};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
@@ -69,6 +72,43 @@ fn tables_of_the_library_traffic_are_read_plain_and_compressed() {
         assert_eq!(traffic.tracks[0].callsign, "ABC1");
         assert_eq!(finding(&traffic, "without a position").unwrap().places, ["row 3"]);
     }
+}
+
+/// Columns of decimals, as databases write them, and of short floats.
+const DECIMAL_SCHEMA: &str = "message schema {
+    REQUIRED INT64 timestamp (TIMESTAMP(MICROS,true));
+    REQUIRED BYTE_ARRAY icao24 (STRING);
+    REQUIRED FIXED_LEN_BYTE_ARRAY(5) latitude (DECIMAL(10,4));
+    REQUIRED INT64 longitude (DECIMAL(12,3));
+    REQUIRED INT32 altitude (DECIMAL(9,1));
+    REQUIRED FIXED_LEN_BYTE_ARRAY(2) groundspeed (FLOAT16);
+    REQUIRED FIXED_LEN_BYTE_ARRAY(3) track;
+}";
+
+#[test]
+fn decimals_and_short_floats_have_their_values_and_other_types_are_named() {
+    let schema = Arc::new(parse_message_type(DECIMAL_SCHEMA).unwrap());
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let times: Vec<i64> = (0..2).map(|k| (1_533_114_900 + 10 * k) * 1_000_000).collect();
+    write::<Int64Type>(&mut group, &times, None);
+    write::<ByteArrayType>(&mut group, &vec![ByteArray::from("4b1234"); 2], None);
+    let fixed = |bytes: &[u8]| vec![FixedLenByteArray::from(bytes.to_vec()); 2];
+    // -470000 as five bytes, the first the greatest.
+    write::<FixedLenByteArrayType>(&mut group, &fixed(&(-470_000_i64).to_be_bytes()[3..]), None);
+    write::<Int64Type>(&mut group, &[7_000, 7_030], None);
+    write::<Int32Type>(&mut group, &[350_000; 2], None);
+    // 440 is 1.71875 times 256: exponent 23, fraction 736.
+    write::<FixedLenByteArrayType>(&mut group, &fixed(&0x5ee0_u16.to_le_bytes()), None);
+    write::<FixedLenByteArrayType>(&mut group, &fixed(b"abc"), None);
+    group.close().unwrap();
+    let bytes = writer.into_inner().unwrap();
+    let traffic = from_bytes(&"f.parquet", bytes, &TrafficOptions::default()).unwrap();
+    let sample = traffic.tracks[0].samples[1];
+    assert_eq!((sample.position.lat_deg, sample.position.lon_deg), (-47.0, 7.03));
+    assert_eq!((sample.altitude_ft, sample.ground_speed_kt), (35_000.0, Some(440.0)));
+    assert_eq!(finding(&traffic, "of a type that is not read").unwrap().places, ["`track`"]);
 }
 
 #[test]

@@ -12,8 +12,8 @@ use std::ops::RangeInclusive;
 /// The range of altitudes in ft: beyond it the column must hold another quantity.
 const ALTITUDES_FT: RangeInclusive<f64> = -5_000.0..=200_000.0;
 
-/// The range of speeds in kt.
-const SPEEDS_KT: RangeInclusive<f64> = 0.0..=10_000.0;
+/// The range of speeds in kt: nothing that flies in air is faster, and 9999 stands for no speed.
+const SPEEDS_KT: RangeInclusive<f64> = 0.0..=5_000.0;
 
 /// The longest time in s between the middle row and any other: no recording takes 30 years.
 const MAX_DURATION_S: f64 = 1e9;

@@ -301,6 +301,23 @@ fn positions_at_0_0_and_far_away_do_not_hide_each_other() {
 }
 
 #[test]
+fn a_flight_that_is_faster_than_anything_is_left_out() {
+    let jumps = |k: u32, row: String| if k % 3 == 1 { row.replace(",47,", ",48,") } else { row };
+    let good: String = table(30, |_, row| row.replace("aaaaa1,ABC1,47", "bbbbb2,XYZ9,40")).split_off(HEADER.len());
+    let traffic = read_text(&(table(12, jumps) + &good));
+    assert_eq!(finding(&traffic, "faster than anything").map(|found| found.count), Some(12));
+    assert_eq!(traffic.tracks.len(), 1);
+    assert!(parse(&"f", &table(12, jumps)).is_err(), "nothing remains");
+}
+
+#[test]
+fn a_number_that_stands_for_no_speed_is_none() {
+    let traffic = read_text(&table(12, |_, row| row.replace(",440,", ",9999,")));
+    assert_eq!(finding(&traffic, "a speed that is none").map(|found| found.count), Some(12));
+    assert_eq!(traffic.tracks[0].samples[3].ground_speed_kt, None);
+}
+
+#[test]
 fn levels_at_which_nobody_flies_so_fast_are_named_once() {
     for altitude in ["350", "0"] {
         let low = read_text(&table(12, |_, row| row.replace(",35000,", &format!(",{altitude},"))));

@@ -20,6 +20,7 @@ use sidestep_kernel::{InputError, Seed, math};
 use sidestep_rods::geometry::{Point, add_scaled, normalized, perpendicular, unit_x};
 use sidestep_rods::{Chain, Connector, Mobility, Obstacles, Rod};
 use sidestep_scenario::{NumberRange, Sections, Spanned};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Free distance around the parts of a chain that starts anywhere, as a multiple of its radius: at exactly one radius
@@ -119,6 +120,19 @@ pub(super) struct LimitSection<const D: usize> {
     radius_m: Option<f64>,
     /// Whether it has failed and stands still.
     failed: Option<bool>,
+}
+
+impl<const D: usize> LimitSection<D> {
+    /// Returns the keys of the limits that are given.
+    fn given_keys(&self) -> Vec<&'static str> {
+        let given = [
+            ("mobility", self.mobility.is_some()),
+            ("max_bend_deg", self.max_bend_deg.is_some()),
+            ("radius_m", self.radius_m.is_some()),
+            ("failed", self.failed.is_some()),
+        ];
+        given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key).collect()
+    }
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {
@@ -380,6 +394,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 connector.max_bend_rad = deg.to_radians();
             }
         }
+        self.check_limits(&s.limits)?;
         for limit in &s.limits.0 {
             self.apply_limit_section(&mut connectors, limit)?;
         }
@@ -405,6 +420,27 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 Err(self.source.error(at, "radius_m beside robots", remedy))
             }
         }
+    }
+
+    /// Refuses limits of which one replaces another one, or that limit nothing.
+    fn check_limits(&self, limits: &Sections<LimitSection<D>>) -> Result<(), InputError> {
+        let mut known = BTreeSet::new();
+        for section in &limits.0 {
+            let limit = section.get_ref();
+            let keys = limit.given_keys();
+            let twice = keys.iter().find(|key| !known.insert((limit.connector, **key)));
+            if let Some(key) = twice {
+                let cause = format!("connector {} has `{key}` twice", limit.connector);
+                let at = self.source.key_span(section.span(), &[key]);
+                return Err(self.source.error(at, cause, "give each limit of a connector once"));
+            }
+            if keys.is_empty() {
+                let cause = format!("connector {} is given without a limit", limit.connector);
+                let remedy = "give mobility, max_bend_deg, radius_m or failed, or leave it out";
+                return Err(self.source.error(section.span(), cause, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// Removes the margin from leaders, because they are exactly where their connectors are.
@@ -444,6 +480,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         // `D` is three here, which the compiler cannot know.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let mut connectors: Vec<_> = solid.connectors().iter().map(convert_arm_connector).collect();
+        self.check_limits(&s.limits)?;
         for limit in &s.limits.0 {
             self.apply_limit_section(&mut connectors, limit)?;
         }

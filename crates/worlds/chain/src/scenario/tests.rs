@@ -57,6 +57,20 @@ fn numbers_of_a_navigator_are_numbers_and_in_order() {
     assert_valid(&navigator("sector_deg = [0, 90], detects_from_m = inf"));
 }
 
+#[test]
+fn a_limit_that_another_one_replaces_or_that_limits_nothing_is_refused() {
+    let limits = |more: &str| {
+        format!(
+            "[[chains]]\nconnectors = 4\nrod_m = 0.4\nlimits = [{{ connector = 2, mobility = \"fixed\" }}, {more}]\n\
+             [[chains.tasks]]\nkind = \"rest\"\n"
+        )
+    };
+    let twice = limits("{ connector = 2, mobility = \"free\" }");
+    assert_refused(&twice, &["connector 2 has `mobility` twice", "once"]);
+    assert_refused(&limits("{ connector = 1 }"), &["connector 1 is given without a limit"]);
+    assert_valid(&limits("{ connector = 2, max_bend_deg = 90.0 }"));
+}
+
 /// Two chains anywhere on a map.
 fn anywhere(second: &str) -> String {
     let chain = "[[chains]]\nconnectors = 3\nrod_m = 0.4\nradius_m = 0.1\nanywhere = true\n";
