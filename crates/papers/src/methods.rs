@@ -7,7 +7,7 @@ use sidestep::experiment::sweep::plan::check_seeds;
 use sidestep::experiment::sweep::seeds::seed_remedy;
 use sidestep::kernel::{Digest, InputError, Interrupt, Simulation};
 use sidestep::scenario::{SeedEffect, Source};
-use sidestep::statistics::{Interval, wilson};
+use sidestep::statistics::{Interval, is_tied, wilson};
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep::worlds::airspace::metrics::Metrics;
@@ -182,8 +182,15 @@ fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> Me
     }
 }
 
+/// Returns the mean over all runs. Where they are equal it has no interval: one without width would claim that no other
+/// run is different.
 fn mean(all: &[Metrics], value: fn(&Metrics) -> Option<f64>) -> Estimate {
-    Estimate::from_values(all.iter().map(value))
+    let mut estimate = Estimate::from_values(all.iter().map(value));
+    let values: Vec<f64> = all.iter().filter_map(value).collect();
+    if is_tied(&values) {
+        estimate.interval = None;
+    }
+    estimate
 }
 
 /// Returns a table of the results side by side.
@@ -250,7 +257,9 @@ fn table_note(results: &[MethodResult]) -> String {
     let mut sentences = vec!["Every method flies the same traffic.".to_string()];
     sentences.extend(shield_note(results));
     if results.iter().any(|result| result.seeds == SeedEffect::Decide) {
-        sentences.push("Means over runs, with their 95 % intervals.".into());
+        sentences.push(
+            "Means over runs, with their 95 % intervals; none where all runs are equal.".into(),
+        );
     }
     if let Some(names) = method_names(results, |r| r.seeds == SeedEffect::Nothing) {
         sentences.push(format!(
@@ -309,6 +318,7 @@ mod tests {
         let results = compare(&source, &methods, 3);
         assert_eq!((results[0].loss_free, results[1].loss_free), (3, 0));
         assert_eq!(results[0].arrived.mean, Some(1.0));
+        assert_eq!(results[0].arrived.interval, None, "three equal runs show no spread");
         let table = table("t", &results);
         let [pc, none] = &table.rows[..] else { panic!("two rows: {table:?}") };
         assert!(pc[0] == "pc" && pc[1].starts_with("3/3"), "{pc:?}");

@@ -81,7 +81,7 @@ impl Pairs {
     }
 
     /// Returns the mean of `a` over the mean of `b`, with its 95 % interval, which is absent where
-    /// [all pairs are one case](Self::is_one_case).
+    /// [all pairs are one case](Self::is_one_case), or their ratios are all equal.
     ///
     /// The interval is Fieller's (1954) for pairs: exact where both are normal. `None` where a
     /// value is negative (a ratio of signed quantities means little), with fewer than two pairs,
@@ -120,7 +120,8 @@ impl Pairs {
         let root = ((ratio - ab) * (ratio - ab) - leading * (ratio * ratio - aa)).max(0.0).sqrt();
         let interval =
             Interval { low: (ratio - ab - root) / leading, high: (ratio - ab + root) / leading };
-        Some((ratio, (!self.is_one_case()).then_some(interval)))
+        let has_width = interval.high - interval.low > TIE_FRACTION * interval.high.abs();
+        Some((ratio, (has_width && !self.is_one_case()).then_some(interval)))
     }
 
     /// Returns the bootstrap's 95 % interval of the mean difference; `None` where
@@ -261,7 +262,10 @@ mod tests {
         assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[1.0; 5])).p_value(), Some(1.0));
         assert_eq!(Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).p_value(), None);
         let sure = Pairs::from_columns(&some(&[1.0; 5]), &some(&[2.0; 5])).ratio().unwrap();
-        assert_eq!(sure, (0.5, Some(Interval { low: 0.5, high: 0.5 })));
+        assert_eq!(sure, (0.5, None), "an interval without width would claim too much");
+        let counts = Pairs::from_columns(&some(&[2.0; 5]), &some(&[3.0; 5]));
+        assert_eq!((counts.difference(), counts.difference_interval()), (Some(-1.0), None));
+        assert_eq!(counts.difference_bootstrap(&Bootstrap::default()), None);
     }
 
     #[test]

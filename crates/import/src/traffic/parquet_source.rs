@@ -239,8 +239,7 @@ impl FixedNumber {
             Self::Decimal { scale } => {
                 let is_negative = bytes.first().is_some_and(|byte| byte & 0x80 != 0);
                 let start = if is_negative { -1_i128 } else { 0 };
-                let whole =
-                    bytes.iter().fold(start, |whole, byte| whole << 8 | i128::from(*byte));
+                let whole = bytes.iter().fold(start, |whole, byte| whole << 8 | i128::from(*byte));
                 if bytes.len() > 16 { f64::NAN } else { whole as f64 / decimal_factor(scale) }
             }
         }
@@ -255,7 +254,9 @@ fn half_to_f64(bits: u16) -> f64 {
         0 => f64::from(fraction) * STEP,
         31 => f64::NAN,
         // The exponents of 32 bits begin 112 lower, and the fraction has 13 more digits.
-        _ => f64::from(f32::from_bits((u32::from(exponent) + 112) << 23 | u32::from(fraction) << 13)),
+        _ => {
+            f64::from(f32::from_bits((u32::from(exponent) + 112) << 23 | u32::from(fraction) << 13))
+        }
     };
     if sign == 0 { size } else { -size }
 }

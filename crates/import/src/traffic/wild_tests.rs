@@ -303,7 +303,8 @@ fn positions_at_0_0_and_far_away_do_not_hide_each_other() {
 #[test]
 fn a_flight_that_is_faster_than_anything_is_left_out() {
     let jumps = |k: u32, row: String| if k % 3 == 1 { row.replace(",47,", ",48,") } else { row };
-    let good: String = table(30, |_, row| row.replace("aaaaa1,ABC1,47", "bbbbb2,XYZ9,40")).split_off(HEADER.len());
+    let good: String =
+        table(30, |_, row| row.replace("aaaaa1,ABC1,47", "bbbbb2,XYZ9,40")).split_off(HEADER.len());
     let traffic = read_text(&(table(12, jumps) + &good));
     assert_eq!(finding(&traffic, "faster than anything").map(|found| found.count), Some(12));
     assert_eq!(traffic.tracks.len(), 1);
