@@ -18,6 +18,7 @@ const LEGEND: Legend = Legend {
         _ => None,
     },
     remedy: "draw with `#` (wall), `.` or a blank (free) and `?` (unknown)",
+    width_remedy: "give all rows the same number of characters",
 };
 
 /// Reads the file at `path` (also with gzip) as a map of boxes with a side of `box_size_m` meters.

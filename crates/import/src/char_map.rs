@@ -56,6 +56,8 @@ pub(super) struct Legend {
     pub(super) cell: fn(char) -> Option<Cell>,
     /// The remedy for other characters: a list of those with a meaning.
     pub(super) remedy: &'static str,
+    /// The remedy for rows of another width.
+    pub(super) width_remedy: &'static str,
 }
 
 impl Legend {
@@ -76,16 +78,21 @@ impl Legend {
             cells.push(cell);
         }
         let length = cells.len() - row_start;
-        if length == width { Ok(()) } else { Err(uneven_row(source, line, length, width)) }
+        if length == width { Ok(()) } else { Err(self.uneven_row(source, line, length, width)) }
     }
-}
 
-/// Returns the error of a row of `length` instead of `width` characters, at the position where it
-/// should end.
-fn uneven_row(source: SourceText<'_>, line: Line<'_>, length: usize, width: usize) -> InputError {
-    let end = line.text.char_indices().nth(width).map_or(line.text.len(), |(offset, _)| offset);
-    let cause = format!("this row has {length} characters, not {width}");
-    source.error(line.offset + end, cause, "give all rows the same number of characters")
+    /// Returns the error of a row of `length` instead of `width` characters, at the position where it should end.
+    fn uneven_row(
+        &self,
+        source: SourceText<'_>,
+        line: Line<'_>,
+        length: usize,
+        width: usize,
+    ) -> InputError {
+        let end = line.text.char_indices().nth(width).map_or(line.text.len(), |(offset, _)| offset);
+        let cause = format!("this row has {length} characters, not {width}");
+        source.error(line.offset + end, cause, self.width_remedy)
+    }
 }
 
 /// Creates a map of `cells` that are given row by row from the top, `width` in a row.

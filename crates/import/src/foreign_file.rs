@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::extension::extension;
+use super::map_file::is_image;
 use super::mesh::Mesh;
-use super::report::{ImportReport, Treatment};
+use super::report::{ImportReport, ItemCount, Treatment};
 use super::table::{CsvTable, data_lines};
 use super::traffic::begins_as_traffic;
-use super::{bag, carmen, load_pixel_map, mesh, movingai, mrclam, rosmap, stage};
+use super::{bag, carmen, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
@@ -108,7 +109,9 @@ impl ForeignFormat {
         Ok(match extension(path).as_str() {
             "yaml" | "yml" if text.contains(BAG_METADATA_KEY) => Some(Self::Bag),
             "yaml" | "yml" => Some(Self::RosMap),
-            "png" | "pgm" | "jpg" | "jpeg" => Some(Self::Image),
+            kind if is_image(kind) => Some(Self::Image),
+            // An image that is not read: its own reader says so.
+            _ if is_image_content(&start) => Some(Self::Image),
             "map" => Some(Self::CharMap),
             // Any text may end so; a map in characters has no words.
             "txt" if !has_carmen_message(&text) && !begins_as_traffic(&text) => Some(Self::CharMap),
@@ -136,7 +139,7 @@ impl ForeignFormat {
                 import_map(path, CHARACTER_BOXES).map(|ImportedMap { report, .. }| report)
             }
             Self::Scen => movingai::load_scen(path).map(|file| file.report),
-            Self::Urdf => Model::load(path).map(|model| model.report),
+            Self::Urdf => inspect_urdf(path),
             Self::Srdf => inspect_srdf(path),
             Self::Stage => stage::load(path).map(|world| world.report),
             Self::Mesh => inspect_mesh(path),
@@ -150,6 +153,11 @@ impl ForeignFormat {
 
 /// First bytes of bags that are one file: MCAP, ROS 1, SQLite.
 const BAG_MAGICS: [&[u8]; 3] = [b"\x89MCAP", b"#ROSBAG V", b"SQLite format 3\0"];
+/// The length in m beyond which a mesh is in millimeters.
+const MAX_MESH_M: f64 = 50.0;
+/// First bytes of images: PNG, JPEG, GIF, TIFF in both byte orders, WebP and others in RIFF, BMP.
+const IMAGE_MAGICS: [&[u8]; 7] =
+    [b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"II*\0", b"MM\0*", b"RIFF", b"BM"];
 /// The key of `metadata.yaml` by which it differs from the YAML file of a map.
 const BAG_METADATA_KEY: &str = "rosbag2_bagfile_information";
 /// Messages with which logs of CARMEN begin, after comments.
@@ -158,6 +166,11 @@ const CARMEN_MESSAGES: [&str; 8] =
 /// Boxes for the report of a map in characters.
 const CHARACTER_BOXES: GridOptions =
     GridOptions { box_size_m: CHARACTER_M, resolution_m: None, unknown: UnknownPolicy::Keep };
+
+fn is_image_content(start: &[u8]) -> bool {
+    // Any text may begin with two letters; an image has zeros.
+    start.contains(&0) && IMAGE_MAGICS.iter().any(|magic| start.starts_with(magic))
+}
 
 /// Returns whether a text has a line that begins as a message of CARMEN.
 fn has_carmen_message(text: &str) -> bool {
@@ -183,14 +196,7 @@ fn folder_format(folder: &Path) -> Option<ForeignFormat> {
 
 /// Returns the report of an image, in pixels: their size is not in the file.
 fn inspect_image(path: &Path) -> Result<ImportReport, InputError> {
-    let pixels = load_pixel_map(path, Some(1.0))?;
-    let map = pixels.ok_or_else(|| {
-        InputError::new(
-            path.display(),
-            "this is no image of a map",
-            "give a .png, .pgm or .jpg file",
-        )
-    })?;
+    let map = rosmap::load_image(path, 1.0)?;
     let [width, height] = [map.width(), map.height()];
     let mut report = map.into_report();
     report.facts.retain(|fact| !METRIC_FACTS.contains(&fact.name));
@@ -202,6 +208,18 @@ fn inspect_image(path: &Path) -> Result<ImportReport, InputError> {
 
 /// Properties of a map that follow from the side of a pixel.
 const METRIC_FACTS: [&str; 3] = ["pixels", "extent", "origin"];
+
+/// Returns the report of a robot model, and of the meshes that it names.
+fn inspect_urdf(path: &Path) -> Result<ImportReport, InputError> {
+    let model = Model::load(path)?;
+    let solids = model.solids(path).report;
+    let mut report = model.report;
+    for item in solids.kept.into_iter().filter(|item| item.count > 0) {
+        report.kept.push(ItemCount { noun: format!("collision {}", item.noun), ..item });
+    }
+    report.findings.extend(solids.findings);
+    Ok(report)
+}
 
 /// Returns the report of an SRDF file, read for the model beside it: `panda.urdf` for `panda.srdf`.
 fn inspect_srdf(path: &Path) -> Result<ImportReport, InputError> {
@@ -239,6 +257,18 @@ fn inspect_mesh(path: &Path) -> Result<ImportReport, InputError> {
             let rule = "the unit is the meter: the file says none";
             report.record(Treatment::Guessed, rule, "", "give `scale` where a URDF names it");
         }
+    }
+    if (0..3).any(|axis| hi_m[axis] - lo_m[axis] > MAX_MESH_M) {
+        let rule = format!("it is larger than {MAX_MESH_M} m, which looks like millimeters");
+        report.record(
+            Treatment::Suspicious,
+            rule,
+            "",
+            "write scale=\"0.001 0.001 0.001\" where a URDF names it",
+        );
+    }
+    for what in &mesh.not_used {
+        report.record(Treatment::NotUsed, what.clone(), "", "");
     }
     report.add_kept("vertices", mesh.points_m.len());
     Ok(report)

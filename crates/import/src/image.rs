@@ -10,6 +10,7 @@ use ::image::{
 };
 use sidestep_kernel::InputError;
 
+use super::pnm;
 use sidestep_scenario::file::read_bytes;
 
 /// The maximum number of pixels, as a square of 16,384; larger images are refused before memory is allocated for them.
@@ -29,6 +30,8 @@ pub struct Bitmap {
     pub is_turned: bool,
     /// Whether the file holds the grays of its pixels with errors, as JPEG does.
     pub is_lossy: bool,
+    /// Number of bytes behind the pixels, which are not read.
+    pub trailing_bytes: usize,
 }
 
 impl Bitmap {
@@ -46,6 +49,12 @@ impl Bitmap {
     /// # Errors
     /// As [`Bitmap::load`], except those of reading the file.
     pub fn decode(place: &str, bytes: Vec<u8>) -> Result<Self, InputError> {
+        let bytes = pnm::with_short_line_ends(bytes);
+        if bytes.starts_with(JPEG_MAGIC) && !has_jpeg_end(&bytes) {
+            return Err(cut_short(place));
+        }
+        let length = bytes.len();
+        let pnm_bytes = pnm::expected_bytes(&bytes);
         let (format, mut decoder) =
             decoder(bytes).map_err(|error| decoding_error(place, &error))?;
         check_pixel_count(place, decoder.dimensions())?;
@@ -53,7 +62,9 @@ impl Bitmap {
         let pixels =
             DynamicImage::from_decoder(decoder).map_err(|error| decoding_error(place, &error))?;
         let is_turned = orientation != Orientation::NoTransforms;
-        Ok(Self { pixels, is_turned, is_lossy: format == Some(ImageFormat::Jpeg) })
+        let is_lossy = format == Some(ImageFormat::Jpeg);
+        let trailing_bytes = pnm_bytes.map_or(0, |expected| length.saturating_sub(expected));
+        Ok(Self { pixels, is_turned, is_lossy, trailing_bytes })
     }
 
     /// Number of pixels from left to right.
@@ -85,6 +96,14 @@ impl Bitmap {
             DynamicImage::ImageRgba16(pixels) => map_channels(pixels, 3, read),
             other => map_channels(&other.to_rgba16(), 3, read),
         }
+    }
+
+    /// Returns the greatest opacity of a pixel, from 0 to 1.
+    pub fn max_opacity(&self) -> f64 {
+        if !self.has_opacity() {
+            return 1.0;
+        }
+        self.map_shades(|shade| shade.opacity).into_iter().fold(0.0, f64::max)
     }
 
     /// Returns whether the pixels can be transparent.
@@ -170,17 +189,43 @@ fn check_pixel_count(place: &str, (width, height): (u32, u32)) -> Result<(), Inp
     Err(InputError::new(place, cause, "scale the image, or cut out the part you need"))
 }
 
+fn cut_short(place: &str) -> InputError {
+    let cause = "the image is cut short: it has fewer pixels than its header says";
+    InputError::new(place, cause, "download or write the image again")
+}
+
+/// The first bytes of a JPEG.
+const JPEG_MAGIC: &[u8] = b"\xff\xd8\xff";
+
+/// Returns whether the data of a JPEG have an end. Decoders fill the rest of one that was cut short with gray.
+fn has_jpeg_end(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    let mut at = 2;
+    while let Some([first, marker]) = bytes.get(at..at + 2) {
+        let is_marker = *first == 0xff;
+        match *marker {
+            // Between segments any number of fill bytes may lie; in data 0xff is followed by 0, or by a restart.
+            _ if !is_marker => at += 1,
+            0xff => at += 1,
+            0x00 | 0x01 | 0xd0..=0xd7 => at += 2,
+            END => return true,
+            // A segment with its length, also between the scans of a progressive image.
+            _ => {
+                let Some([high, low]) = bytes.get(at + 2..at + 4) else { return false };
+                at += 2 + usize::from(u16::from_be_bytes([*high, *low]));
+            }
+        }
+    }
+    false
+}
+
 fn decoding_error(place: &str, error: &ImageError) -> InputError {
     match error {
-        ImageError::IoError(io) if io.kind() == ErrorKind::UnexpectedEof => InputError::new(
-            place,
-            "the image is cut short: it has fewer pixels than its header says",
-            "download or write the image again",
-        ),
+        ImageError::IoError(io) if io.kind() == ErrorKind::UnexpectedEof => cut_short(place),
         ImageError::Unsupported(_) => InputError::new(
             place,
             format!("no image of a kind that is read ({error})"),
-            "give a PNG, a PGM (P2 or P5), a JPEG or a BMP image",
+            "save it as PNG, PGM (P2 or P5), JPEG or BMP",
         ),
         _ => InputError::new(
             place,
@@ -233,6 +278,36 @@ mod tests {
         for end in [3, 30, jpeg.len() / 2] {
             let _ = Bitmap::decode("test", jpeg[..end].to_vec());
         }
+    }
+
+    #[test]
+    fn a_jpeg_that_is_cut_short_is_no_image_in_gray() {
+        let image = GrayImage::from_fn(64, 64, |x, y| Luma([((x * 7 + y * 13) % 251) as u8]));
+        let jpeg = encoded(image, ImageFormat::Jpeg);
+        assert!(Bitmap::decode("test", jpeg.clone()).is_ok());
+        for end in [jpeg.len() / 3, jpeg.len() / 2, jpeg.len() - 2] {
+            let error = Bitmap::decode("test", jpeg[..end].to_vec()).expect_err("cut");
+            assert!(error.cause().contains("cut short"), "{end}: {error}");
+        }
+        let with_more = [&jpeg[..], b"a trailer of the camera"].concat();
+        assert!(Bitmap::decode("test", with_more).is_ok());
+    }
+
+    #[test]
+    fn a_pgm_whose_lines_end_as_on_windows_has_its_pixels_where_they_are() {
+        let windows = b"P5\r\n3 1\r\n255\r\n\x00\xcd\xff";
+        assert_eq!(brightness(windows), [0.0, 205.0, 255.0]);
+        // One blank character ends the header: here the first pixel happens to be 10.
+        assert_eq!(brightness(b"P5\n3 1\n255\r\n\xcd\xff"), [10.0, 205.0, 255.0]);
+    }
+
+    #[test]
+    fn bytes_behind_the_pixels_are_counted() {
+        let trailing =
+            |bytes: &[u8]| Bitmap::decode("test", bytes.to_vec()).expect("an image").trailing_bytes;
+        assert_eq!(trailing(b"P5 3 1 255\n\x00\xcd\xff"), 0);
+        assert_eq!(trailing(b"P5 3 1 255\n\x00\xcd\xff\x01\x02"), 2);
+        assert_eq!(trailing(b"P2 3 1 255\n0 205 255\n\n"), 0);
     }
 
     #[test]

@@ -23,6 +23,7 @@ pub mod movingai;
 pub mod mrclam;
 mod named_file;
 mod pixel_map;
+mod pnm;
 mod raycast;
 pub mod rosmap;
 pub mod stage;

@@ -11,7 +11,8 @@ use super::{PixelMap, ascii, movingai, rosmap};
 use sidestep_map::{GridMap, UnknownPolicy};
 
 /// Endings of the names of images, in lower case: files that do not say the side of their pixels, which has to be given.
-pub const IMAGE_ENDINGS: &[&str] = &[".png", ".pgm", ".jpg", ".jpeg", ".bmp"];
+pub const IMAGE_ENDINGS: &[&str] =
+    &[".png", ".pgm", ".jpg", ".jpeg", ".bmp", ".pbm", ".ppm", ".pnm"];
 
 /// The conversion of a file into boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +78,7 @@ pub fn load_pixel_map(
 }
 
 /// Returns whether an extension is that of a plain image.
-fn is_image(extension: &str) -> bool {
+pub(crate) fn is_image(extension: &str) -> bool {
     IMAGE_ENDINGS.iter().any(|ending| ending[1..] == *extension)
 }
 
@@ -113,8 +114,8 @@ fn unknown_map_format(path: &Path) -> InputError {
     InputError::new(
         path.display(),
         "the extension is not that of a map",
-        "give a .yaml or .yml (ROS map_server), a .png, .pgm, .jpg, .jpeg or .bmp (image), a .map \
-         (MovingAI) or a .txt (characters) file, each also with .gz",
+        "give a .yaml or .yml (ROS map_server), a .png, .pgm, .jpg, .jpeg, .bmp, .pbm, .ppm or .pnm (image), a .map \
+         (MovingAI) or a .txt (characters) file, each also with .gz; save other images as PNG",
     )
 }
 

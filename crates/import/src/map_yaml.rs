@@ -19,6 +19,13 @@ const MAX_LINE_BYTES: usize = 1000;
 /// The largest side of a pixel in meters that is no mistake.
 const MAX_PIXEL_M: f64 = 2.0;
 
+/// The smallest side of a pixel in meters that is no mistake.
+const MIN_PIXEL_M: f64 = 0.001;
+
+/// The largest coordinate of the origin in meters: positions far from 0 lose their digits. Coordinates of countries have up to
+/// 1e7 m.
+const MAX_ORIGIN_M: f64 = 1e9;
+
 /// The largest rotation of an image in radians: a whole turn, with room for rounding.
 const MAX_YAW_RAD: f64 = std::f64::consts::TAU + 1e-3;
 
@@ -43,6 +50,7 @@ impl MapMetadata {
         report: &mut ImportReport,
     ) -> Result<Self, InputError> {
         let place = path.display().to_string();
+        let text = &with_blanks(text);
         let document = Document::parse(&place, text)?;
         document.record_unused_keys(report);
         Ok(Self {
@@ -59,6 +67,8 @@ struct Document<'a> {
     place: &'a str,
     text: &'a str,
     root: MarkedYaml<'a>,
+    /// Number of documents behind it in the file.
+    others: usize,
 }
 
 impl<'a> Document<'a> {
@@ -66,8 +76,9 @@ impl<'a> Document<'a> {
         check_line_lengths(place, text)?;
         let documents =
             MarkedYaml::load_from_str(text).map_err(|error| malformed(place, text, &error))?;
+        let others = documents.len().saturating_sub(1);
         match documents.into_iter().next() {
-            Some(root) if root.data.is_mapping() => Ok(Self { place, text, root }),
+            Some(root) if root.data.is_mapping() => Ok(Self { place, text, root, others }),
             _ => Err(InputError::new(place, "is not a list of `key: value` lines", KEYS)),
         }
     }
@@ -75,6 +86,12 @@ impl<'a> Document<'a> {
     fn resolution_m(&self, report: &mut ImportReport) -> Result<f64, InputError> {
         let value = self.value("resolution")?;
         let resolution_m = self.number(value, "resolution")?;
+        if resolution_m > 0.0 && resolution_m < MIN_PIXEL_M {
+            let rule = format!("pixels of {resolution_m} m, smaller than a millimeter");
+            let remedy = "`resolution` is the side of a pixel in meters, such as 0.05";
+            let line = format!("line {}", value.span.start.line());
+            report.record(Treatment::Suspicious, rule, line, remedy);
+        }
         if resolution_m > MAX_PIXEL_M {
             let rule = format!("pixels of {resolution_m} m");
             let remedy = "`resolution` is the side of a pixel in meters, such as 0.05";
@@ -95,6 +112,12 @@ impl<'a> Document<'a> {
             return Err(self.error(value, "`origin` is not a list of three numbers", remedy));
         };
         let origin_m = [self.number(x, "origin")?, self.number(y, "origin")?];
+        for (value, coordinate_m) in [(x, origin_m[0]), (y, origin_m[1])] {
+            if coordinate_m.abs() > MAX_ORIGIN_M {
+                let cause = format!("an origin {coordinate_m:e} m away");
+                return Err(self.error(value, cause, "give meters, at most 1e9"));
+            }
+        }
         let yaw_rad = self.number(yaw, "origin")?;
         if yaw_rad.abs() > MAX_YAW_RAD {
             let cause = format!("an origin yaw of {yaw_rad} rad, more than a turn");
@@ -186,12 +209,24 @@ impl<'a> Document<'a> {
             let remedy = "copy the image beside this file, and write its name without a folder";
             return Err(self.error(value, cause, remedy));
         }
+        if let Some(other) = in_other_case(folder, own_name) {
+            let found = other.file_name().unwrap_or_default().display().to_string();
+            let rule =
+                format!("there is no image `{shown}`, and `{}` is read", found.escape_debug());
+            let line = format!("line {}", value.span.start.line());
+            report.record(Treatment::Guessed, rule, line, "write the name as the file has it");
+            return Ok(other);
+        }
         let cause = format!("there is no image file `{shown}`");
         Err(self.error(value, cause, "give the image's path, relative to this file's folder"))
     }
 
     /// Records keys that mean nothing to `map_server`.
     fn record_unused_keys(&self, report: &mut ImportReport) {
+        if self.others > 0 {
+            let rule = format!("{} YAML documents behind the first", self.others);
+            report.record(Treatment::NotUsed, rule, "", "give each map a file of its own");
+        }
         for (key, _) in self.root.data.as_mapping().into_iter().flatten() {
             let name = key.data.as_str().unwrap_or("a key that is no text");
             if !KNOWN_KEYS.contains(&name) {
@@ -233,6 +268,19 @@ fn with_gz(folder: &Path, name: &str) -> Option<PathBuf> {
     [folder.join(name), folder.join(format!("{name}.gz"))].into_iter().find(|path| path.is_file())
 }
 
+/// Returns the only file of a folder whose name differs from this in its case alone.
+fn in_other_case(folder: &Path, name: &str) -> Option<PathBuf> {
+    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+    let is_same = |path: &PathBuf| {
+        let own = path.file_name().and_then(|own| own.to_str());
+        own.is_some_and(|own| own.eq_ignore_ascii_case(name))
+    };
+    let entries = folder.read_dir().ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut found = entries.filter(|path| is_same(path) && path.is_file());
+    let first = found.next()?;
+    found.next().is_none().then(|| folder.join(first.file_name().unwrap_or_default()))
+}
+
 /// Returns a value as a finite number; also in quotes, as `map_server` accepts it.
 fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
     let YamlData::Value(scalar) = &value.data else { return None };
@@ -243,6 +291,20 @@ fn number_of(value: &MarkedYaml<'_>) -> Option<f64> {
         Scalar::Boolean(_) | Scalar::Null => return None,
     };
     number.is_finite().then_some(number)
+}
+
+/// Returns a text with blanks in place of tabs behind colons, as `map_server` reads them and the parser here does not;
+/// positions stay the same.
+fn with_blanks(text: &str) -> String {
+    let mut is_behind_colon = false;
+    text.chars()
+        .map(|character| {
+            let is_blank = is_behind_colon && character == '\t';
+            is_behind_colon =
+                character == ':' || is_behind_colon && [' ', '\t'].contains(&character);
+            if is_blank { ' ' } else { character }
+        })
+        .collect()
 }
 
 fn check_line_lengths(place: &str, text: &str) -> Result<(), InputError> {
@@ -256,7 +318,9 @@ fn check_line_lengths(place: &str, text: &str) -> Result<(), InputError> {
 }
 
 fn malformed(place: &str, text: &str, error: &ScanError) -> InputError {
-    InputError::new(place, format!("is not YAML: {}", error.info()), KEYS)
+    let is_double = error.info().contains("duplicated key");
+    let remedy = if is_double { "write each key once" } else { KEYS };
+    InputError::new(place, format!("is not YAML: {}", error.info()), remedy)
         .with_byte_offset(text, byte_offset(text, error.marker().index()))
 }
 
@@ -292,6 +356,12 @@ impl OccupancyRule {
         let shade = if self.negate { brightness } else { 255.0 - brightness };
         let occupancy = shade / 255.0;
         occupancy == self.occupied_thresh || occupancy == self.free_thresh
+    }
+
+    /// Returns whether a raw value is unknown, and not the 255 that programs write for unknown.
+    pub(super) fn is_beyond_raw(&self, brightness: f64) -> bool {
+        let value = if self.negate { 255.0 - brightness } else { brightness };
+        (101.0..255.0).contains(&value)
     }
 
     /// Returns whether a raw value is neither free, occupied nor unknown by itself, so that the thresholds decide.
@@ -473,6 +543,40 @@ free_thresh: 0.196
         assert!(beside("../../kernel/src/lib.rs")[0].contains("lies elsewhere"));
         let outside = error("map.rs", "../../kernel/src/world.rs");
         assert!(outside.cause().contains("outside of the map's folder"), "{outside}");
+    }
+
+    #[test]
+    fn an_image_whose_name_has_another_case_is_the_one_that_there_is() {
+        let (meta, said) = parse_with_report(&YAML.replace("map.rs", "LIB.RS")).expect("read");
+        assert!(meta.image.ends_with("src/lib.rs"), "{:?}", meta.image);
+        assert!(
+            said[0].starts_with("guessed: there is no image `LIB.RS`, and `lib.rs` is read"),
+            "{said:?}"
+        );
+    }
+
+    #[test]
+    fn tabs_behind_colons_are_blanks_and_a_key_that_is_there_twice_is_named() {
+        let plain = parse(YAML).expect("read");
+        assert_eq!(parse(&YAML.replace(": ", ":\t")), Ok(plain));
+        let twice = parse(&format!("{YAML}resolution: 0.1\n")).expect_err("twice");
+        assert_eq!(
+            (twice.line_and_column(), twice.remedy()),
+            (Some((7, 1)), "write each key once")
+        );
+    }
+
+    #[test]
+    fn what_is_hardly_meant_is_said() {
+        let said = |text: String| parse_with_report(&text).expect("read").1.join("\n");
+        assert!(
+            said(format!("{YAML}---\nresolution: 1\n"))
+                .contains("1 YAML documents behind the first")
+        );
+        assert!(
+            said(YAML.replace("0.05", "0.00005")).starts_with("suspicious: pixels of 0.00005 m")
+        );
+        assert_eq!(error("[-1.5, 2, 0.]", "[0, 1e12, 0]").line_and_column(), Some((3, 13)));
     }
 
     #[test]

@@ -23,6 +23,7 @@ const LEGEND: Legend = Legend {
         _ => None,
     },
     remedy: "use `.`, `G`, `S`, `E` (passable) and `@`, `O`, `T`, `W` (blocked)",
+    width_remedy: "give all rows as many characters as `width` says",
 };
 
 /// Symbols that mean more than free or blocked, with what becomes of them. `S` means one thing in games and another in
@@ -90,7 +91,9 @@ impl ScenRow {
         }
         for (name, (col, row)) in [("start", self.start), ("goal", self.goal)] {
             if map.cell(col, row) != Cell::Free {
-                let cause = format!("the {name}, column {col} and row {row}, is not free");
+                // As the file counts, from the top.
+                let from_top = self.height - 1 - row;
+                let cause = format!("the {name}, x {col} and y {from_top}, is not free");
                 return error(cause, "give the map that the scenario was made for");
             }
         }
@@ -260,11 +263,33 @@ pub fn parse_scen(place: &str, text: &str) -> Result<ScenFile, InputError> {
     }
     let mut report = ImportReport::new("list of starts and goals (MovingAI)");
     report.add_kept("rows", rows.len());
+    record_maps(&rows, &mut report);
     let unsolved = rows.iter().filter(|row| row.optimal_length.is_none()).count();
     if unsolved > 0 {
         report.add_kept("rows without an optimal length (-1)", unsolved);
     }
     Ok(ScenFile { rows, report })
+}
+
+/// Maximum number of maps that a report lists.
+const MAX_MAPS: usize = 5;
+
+/// Records which maps the rows are for.
+fn record_maps(rows: &[ScenRow], report: &mut ImportReport) {
+    let mut maps: Vec<String> = Vec::new();
+    for row in rows {
+        let map = format!("{}, {} x {} boxes", row.map, row.width, row.height);
+        if maps.len() <= MAX_MAPS && !maps.contains(&map) {
+            maps.push(map);
+        }
+    }
+    for map in maps.iter().take(MAX_MAPS) {
+        report.add_fact("map", map.clone());
+    }
+    if maps.len() > 1 {
+        let rule = "the rows are for several maps";
+        report.record(Treatment::Suspicious, rule, "", "keep the rows for the map that you give");
+    }
 }
 
 fn is_version_1(line: &str) -> bool {
@@ -585,6 +610,28 @@ mod tests {
     fn scen_error(row: &str) -> (usize, usize) {
         let text = format!("version 1.0\r\n{row}\r\n");
         parse_scen("s", &text).expect_err(row).line_and_column().expect("a position")
+    }
+
+    #[test]
+    fn rows_of_another_width_than_the_header_says_have_a_remedy_that_helps() {
+        let text = "type octile\nheight 2\nwidth 3\nmap\n..\n..\n";
+        let error = parse_map("m.map", text, 1.0).expect_err("narrow");
+        assert_eq!(error.remedy(), "give all rows as many characters as `width` says");
+        assert!(parse_map("m.map", &text.replace("width 3", "width 2"), 1.0).is_ok());
+    }
+
+    #[test]
+    fn the_maps_of_a_list_are_told_and_several_are_suspicious() {
+        let row = |map: &str| format!("0\t{map}\t6\t4\t0\t0\t5\t3\t6.4\n");
+        let one = parse_scen("s.scen", &format!("version 1\n{}{}", row("a.map"), row("a.map")))
+            .expect("read");
+        assert_eq!(
+            (one.report.facts[0].value.as_str(), one.report.findings.len()),
+            ("a.map, 6 x 4 boxes", 0)
+        );
+        let two = parse_scen("s.scen", &format!("version 1\n{}{}", row("a.map"), row("b.map")))
+            .expect("read");
+        assert_eq!(two.report.findings[0].rule, "the rows are for several maps");
     }
 
     #[test]

@@ -120,14 +120,19 @@ fn cells_from_bottom(
     let lossy = if image.is_lossy { ", with the errors of JPEG" } else { "" };
     report.add_fact("image", image.pixel_type() + lossy);
     let survey = Survey::of(image, reading);
-    let ground = TransparentGround::of(&survey, reading.mode);
+    let ground = TransparentGround::of(&survey, reading.mode, image.max_opacity());
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
     if image.is_turned {
         let rule = "the orientation that the camera wrote into the image, as in map_server";
         report.record(Treatment::NotUsed, rule, "", "turn the image, and save it as PNG");
     }
+    if image.trailing_bytes > 0 {
+        let rule = format!("{} bytes behind the pixels of the image", image.trailing_bytes);
+        report.record(Treatment::NotUsed, rule, "", "give each image a file of its own");
+    }
     survey.record_choices(reading, report);
+    survey.record_grays_of_raw(report);
     survey.record_shades(reading.mode, report);
     survey.record_grays(thresholds, report);
     if reading.mode != MapMode::Raw {
@@ -163,8 +168,9 @@ struct Survey {
     colored: usize,
     /// Number of opaque pixels whose occupancy is a threshold.
     at_threshold: usize,
-    /// Number of pixels between free and occupied of the mode raw.
+    /// Number of pixels between free and occupied of the mode raw, and of those above occupied and below unknown.
     raw_between: usize,
+    raw_beyond: usize,
     /// The darkest and the lightest brightness.
     range: [f64; 2],
 }
@@ -179,6 +185,7 @@ impl Survey {
             colored: 0,
             at_threshold: 0,
             raw_between: 0,
+            raw_beyond: 0,
             free_grays: [0; 256],
             range: [255.0, 0.0],
         };
@@ -191,6 +198,7 @@ impl Survey {
         self.range = [self.range[0].min(shade.brightness), self.range[1].max(shade.brightness)];
         if reading.mode == MapMode::Raw {
             self.raw_between += usize::from(reading.is_between_raw(shade.brightness));
+            self.raw_beyond += usize::from(reading.is_beyond_raw(shade.brightness));
         }
         if shade.opacity < 1.0 {
             self.transparent += 1;
@@ -238,6 +246,23 @@ impl Survey {
             let rule = "`negate` turns the values of the mode raw around, as in ROS 1; Nav2 does not obey it";
             report.record(Treatment::Guessed, rule, "", "set `negate: 0`, and negate the image");
         }
+    }
+
+    /// Records values of the mode raw that no program writes: an image of grays is none of occupancies.
+    fn record_grays_of_raw(&self, report: &mut ImportReport) {
+        if self.raw_beyond == 0 {
+            return;
+        }
+        report.findings.push(Finding {
+            treatment: Treatment::Suspicious,
+            rule: format!(
+                "values of the mode raw from 101 to 254, which are unknown ({}); black is free in this mode",
+                self.share(self.raw_beyond)
+            ),
+            count: self.raw_beyond as u64,
+            places: Vec::new(),
+            remedy: "set `mode: trinary` if dark pixels are walls".to_string(),
+        });
     }
 
     /// Records shades that `map_server` gives an occupancy between free and occupied.
@@ -328,11 +353,18 @@ enum TransparentGround {
     Free,
     /// The mode `raw` has no transparency.
     NotUsed,
+    /// All pixels are fully transparent, and have grays all the same.
+    Unset,
 }
 
 impl TransparentGround {
-    fn of(survey: &Survey, mode: MapMode) -> Self {
+    fn of(survey: &Survey, mode: MapMode, max_opacity: f64) -> Self {
+        let [darkest, lightest] = survey.range;
         match mode {
+            // Nothing would be seen of the image at all: its program has not filled the channel in.
+            MapMode::Trinary | MapMode::Scale if max_opacity == 0.0 && darkest < lightest => {
+                Self::Unset
+            }
             MapMode::Scale => Self::UnknownByFormat,
             MapMode::Raw => Self::NotUsed,
             MapMode::Trinary if survey.opaque_free > 0 => Self::Unknown,
@@ -344,7 +376,7 @@ impl TransparentGround {
     /// it would be one on free ground.
     fn cell(self, shade: Shade, reading: OccupancyRule) -> Cell {
         let Shade { brightness, opacity, .. } = shade;
-        if opacity >= 1.0 || self == Self::NotUsed {
+        if opacity >= 1.0 || [Self::NotUsed, Self::Unset].contains(&self) {
             return reading.cell(brightness);
         }
         let on_ground = opacity * brightness + (1.0 - opacity) * reading.ground_brightness();
@@ -375,6 +407,11 @@ fn record_transparency(survey: &Survey, ground: TransparentGround, report: &mut 
                 "transparent pixels are free, because the image has nothing but ink on them ({share})"
             ),
             "save the image without transparency, on a gray ground (128), if they are unknown",
+        ),
+        TransparentGround::Unset => (
+            Treatment::Guessed,
+            "transparency does not count, because every pixel is fully transparent".to_string(),
+            "save the image without transparency",
         ),
         TransparentGround::NotUsed => (
             Treatment::NotUsed,
@@ -737,6 +774,37 @@ mod tests {
             found[0].starts_with("suspicious: no pixel is occupied; the darkest has 254"),
             "{found:?}"
         );
+    }
+
+    #[test]
+    fn an_image_whose_every_pixel_is_transparent_is_read_by_its_grays() {
+        let row = read_row("negate: 0", &[[0, 0], [254, 0], [205, 0]]);
+        assert_eq!(row.pixels(), [Wall, Free, Unknown]);
+        assert!(
+            findings(&row)[0].starts_with("guessed: transparency does not count"),
+            "{:?}",
+            findings(&row)
+        );
+        // Nothing at all is drawn.
+        assert_eq!(read_row("negate: 0", &[[0, 0], [0, 0]]).pixels(), [Free, Free]);
+    }
+
+    #[test]
+    fn an_image_of_grays_under_the_mode_raw_is_suspicious() {
+        let row = read_row("mode: raw\nnegate: 0", &[[0, 255], [205, 255], [254, 255], [255, 255]]);
+        assert_eq!(row.pixels(), [Free, Unknown, Unknown, Unknown], "as map_server reads it");
+        let said = findings(&row);
+        assert!(
+            said[0].starts_with("suspicious: values of the mode raw from 101 to 254"),
+            "{said:?}"
+        );
+    }
+
+    #[test]
+    fn bytes_behind_an_image_are_said() {
+        let (_folder, path) = written("a.pgm", b"P5 1 2 255\n\xff\x00P5 1 2 255\n\xff\x00");
+        let said = findings(&load(&path).expect("a map"));
+        assert!(said[0].starts_with("not used: 13 bytes behind the pixels"), "{said:?}");
     }
 
     #[test]

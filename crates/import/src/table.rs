@@ -167,6 +167,14 @@ impl CsvTable {
         Self::parse(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
     }
 
+    /// Reads the CSV file of a recording, plain or compressed with gzip, see [`parse_recording`](Self::parse_recording).
+    ///
+    /// # Errors
+    /// When it cannot be read, or those of [`parse_recording`](Self::parse_recording).
+    pub fn read_recording(path: &Path) -> Result<Self, InputError> {
+        Self::parse_recording(&path.display(), &read_text(path, MAX_CSV_BYTES)?)
+    }
+
     /// Parses the text of a CSV file; `place` is its name in errors.
     ///
     /// # Errors
@@ -261,7 +269,8 @@ impl CsvTable {
         }
     }
 
-    fn misfit_error(&self, misfit: MisfitRow) -> InputError {
+    /// Returns the error of a row with another number of fields than the header.
+    pub fn misfit_error(&self, misfit: MisfitRow) -> InputError {
         let columns = self.header.len();
         let cause = format!("the row has {} fields, the header {columns}", misfit.field_count);
         let remedy = format!(
@@ -349,8 +358,14 @@ impl CsvTable {
     /// Returns the indices of the columns called `names`.
     ///
     /// # Errors
-    /// When some of them are missing: all of these in one error.
+    /// When some of them are missing: all of these in one error; when one is there twice.
     pub fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], InputError> {
+        let count = |name: &str| self.header.iter().filter(|column| *column == name).count();
+        if let Some(twice) = names.iter().find(|name| count(name) > 1) {
+            let cause = format!("the header has `{twice}` more than once");
+            let error = InputError::new(&self.place, cause, "keep one of these columns");
+            return Err(error.with_position(self.header_line, 1));
+        }
         let missing: Vec<&str> =
             names.into_iter().filter(|name| self.find(name).is_none()).collect();
         if missing.is_empty() {
@@ -363,7 +378,7 @@ impl CsvTable {
             quote_names(&missing),
             describe_columns(&known, &other)
         );
-        let remedy = "rename the columns that mean these, or add them";
+        let remedy = "rename the columns that mean these, with numbers in the unit that the name has, or add them";
         Err(InputError::new(&self.place, cause, remedy).with_position(self.header_line, 1))
     }
 
@@ -633,6 +648,14 @@ mod tests {
         let mut usual = ImportReport::new("CSV");
         CsvTable::parse(&"f.csv", "a,b\n1.5,2\n").unwrap().record_separators(&mut usual);
         assert_eq!(usual, ImportReport::new("CSV"));
+    }
+
+    #[test]
+    fn a_column_that_is_there_twice_is_refused_where_it_is_read() {
+        let table = CsvTable::parse(&"f.csv", "a,b,a\n1,2,3\n").unwrap();
+        assert_eq!(table.columns(["b"]), Ok([1]));
+        let error = table.columns(["a"]).unwrap_err();
+        assert!(error.cause().contains("`a` more than once"), "{error}");
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub use left_out::LeftOut;
 
 use serde::Serialize;
 
+use sidestep_import::table::CsvTable;
 use sidestep_import::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 
@@ -83,6 +84,33 @@ pub(crate) fn import_warnings(name: &str, report: &ImportReport) -> Vec<String> 
     let findings = report.findings.iter().filter(|found| found.treatment != Treatment::NotUsed);
     findings.map(|finding| format!("{name}: {finding}")).collect()
 }
+
+/// Returns what to say of a table that is learned from: how it was read, and which of its columns are not.
+pub(crate) fn table_warnings(table: &CsvTable, columns: &[&str]) -> Vec<String> {
+    let mut report = ImportReport::default();
+    table.record_separators(&mut report);
+    let mut warnings = import_warnings("the table", &report);
+    let is_other = |name: &&String| !name.is_empty() && !columns.contains(&name.as_str());
+    let others: Vec<String> = table
+        .header()
+        .iter()
+        .filter(is_other)
+        .map(|name| format!("`{}`", name.escape_debug()))
+        .collect();
+    // Tables of recorded runs have columns of their own.
+    if !others.is_empty() && !table.header().iter().any(|name| RUN_COLUMNS.contains(&name.as_str()))
+    {
+        let listed = others.iter().take(MAX_LISTED_COLUMNS).cloned().collect::<Vec<_>>().join(", ");
+        let more = if others.len() > MAX_LISTED_COLUMNS { ", ..." } else { "" };
+        warnings.push(format!("the table: not used: columns {listed}{more}"));
+    }
+    warnings
+}
+
+/// Maximum number of columns that a warning names.
+const MAX_LISTED_COLUMNS: usize = 8;
+/// Columns that only tables of recorded runs have.
+const RUN_COLUMNS: [&str; 2] = ["cycle", "seed"];
 
 #[cfg(test)]
 mod tests {

@@ -33,6 +33,7 @@ pub fn parse(place: &str, bytes: &[u8]) -> Result<Mesh, InputError> {
     let file = XmlFile::parse(&source)?;
     let root = file.root("COLLADA")?;
     let unit_m = unit_m(root)?;
+    let scale_m = unit_m.unwrap_or(1.0);
     let mut reader = SceneReader {
         elements: BTreeMap::new(),
         geometries: BTreeMap::new(),
@@ -44,23 +45,32 @@ pub fn parse(place: &str, bytes: &[u8]) -> Result<Mesh, InputError> {
             reader.elements.insert(id.text(), element);
         }
     }
-    let scale = Placement::scale([unit_m; 3]);
+    let scale = Placement::scale([scale_m; 3]);
     for scene in reader.scenes(root)? {
         for node in scene.children("node") {
             reader.add_node(node, scale, 0)?;
         }
     }
-    let mesh = Mesh::new(place, reader.points)?;
-    Ok(Mesh { unit_m: (unit_m != 1.0).then_some(unit_m), ..mesh })
+    let mut mesh = Mesh::new(place, reader.points)?;
+    mesh.unit_m = unit_m;
+    let up = asset(root).and_then(|asset| asset.children("up_axis").next());
+    let up =
+        up.map(|up| up.text().trim().to_owned()).filter(|up| !["", "Z_UP"].contains(&up.as_str()));
+    mesh.not_used.extend(up.map(|up| format!("the upward axis {}, as in RViz", up.escape_debug())));
+    Ok(mesh)
 }
 
-fn unit_m(root: Element) -> Result<f64, InputError> {
-    let asset = root.children("asset").next();
-    let unit = asset.and_then(|asset| asset.children("unit").next());
-    let Some(value) = unit.and_then(|unit| unit.attribute("meter")) else { return Ok(1.0) };
+fn asset(root: Element<'_>) -> Option<Element<'_>> {
+    root.children("asset").next()
+}
+
+/// Returns the unit of the file in meters, where it gives one.
+fn unit_m(root: Element) -> Result<Option<f64>, InputError> {
+    let unit = asset(root).and_then(|asset| asset.children("unit").next());
+    let Some(value) = unit.and_then(|unit| unit.attribute("meter")) else { return Ok(None) };
     let unit_m = value.number()?;
     if unit_m > 0.0 {
-        return Ok(unit_m);
+        return Ok(Some(unit_m));
     }
     Err(value.error(format!("a unit of {unit_m} m"), "write the meters of a unit, such as 0.001"))
 }
@@ -303,7 +313,12 @@ mod tests {
             assert!(error_m < 1e-15, "{:?}", mesh.points_m);
         }
         let plain = read(&DAE.replace("0.5\"", "1\"")).expect("a mesh");
-        assert_eq!(plain.unit_m, None);
+        assert_eq!(
+            (plain.unit_m, plain.not_used),
+            (Some(1.0), vec!["the upward axis Y_UP, as in RViz".to_string()])
+        );
+        let unsaid = read(&DAE.replace(" meter=\"0.5\"", "")).expect("a mesh");
+        assert_eq!(unsaid.unit_m, None);
         // The same by a matrix, and by a node of a library.
         let matrix = "<matrix>0 -1 0 0  2 0 0 0  0 0 1 0  0 0 0 1</matrix>";
         let by_matrix = DAE.replace("<rotate>0 0 2 90</rotate><scale>2 1 1</scale>", matrix);

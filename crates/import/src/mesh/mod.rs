@@ -26,8 +26,10 @@ pub const EXTENSIONS: [&str; 3] = ["stl", "obj", "dae"];
 pub struct Mesh {
     /// Its vertices, each once and in ascending order, in the unit of the file; in meters where that says its unit.
     pub points_m: Vec<[f64; 3]>,
-    /// The unit that the file says in meters, if it is not one.
+    /// The unit that the file says, in meters; `None` where it says none.
     pub unit_m: Option<f64>,
+    /// What of the file is not read though it has a meaning, as subjects of sentences.
+    pub not_used: Vec<String>,
 }
 
 impl Mesh {
@@ -47,7 +49,7 @@ impl Mesh {
             axes.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         });
         points_m.dedup();
-        Ok(Self { points_m, unit_m: None })
+        Ok(Self { points_m, unit_m: None, not_used: Vec::new() })
     }
 
     /// Reads the mesh at `path`, also with gzip; its extension is one of [`EXTENSIONS`].

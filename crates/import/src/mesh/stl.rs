@@ -17,14 +17,21 @@ const TRIANGLE_BYTES: usize = 50;
 /// # Errors
 /// When it is no STL mesh, is cut short, or has no vertex with finite coordinates.
 pub fn parse(place: &str, bytes: &[u8]) -> Result<Mesh, InputError> {
-    let points_m = binary(bytes, usize::eq).or_else(|| ascii(bytes));
-    // Some programs leave bytes of their own behind the triangles.
-    let points_m = points_m.or_else(|| binary(bytes, usize::gt));
+    let whole = binary(bytes, usize::eq).or_else(|| ascii(bytes));
+    let is_whole = whole.is_some();
+    // Some programs leave bytes of their own behind the triangles, and some count fewer triangles than there are.
+    let points_m = whole.or_else(|| binary(bytes, usize::gt));
     let points_m = points_m.ok_or_else(|| {
         let remedy = "save the mesh again as binary or ASCII STL";
         InputError::new(place, "is no STL mesh, or cut short", remedy)
     })?;
-    Mesh::new(place, points_m)
+    let n = points_m.len() / 3;
+    let mut mesh = Mesh::new(place, points_m)?;
+    if !is_whole {
+        let rest = bytes.len() - HEADER_BYTES - n * TRIANGLE_BYTES;
+        mesh.not_used.push(format!("{rest} bytes behind the {n} triangles that the file counts"));
+    }
+    Ok(mesh)
 }
 
 /// Reads a binary mesh; `None` if its size does not compare so to that of its triangles. Some start with the word
@@ -98,6 +105,15 @@ mod tests {
         assert_eq!(points(&bytes), expected);
         let with_more = [&bytes[..], b"made by hand"].concat();
         assert_eq!(points(&with_more), expected);
+    }
+
+    #[test]
+    fn bytes_behind_the_triangles_that_a_file_counts_are_said() {
+        let bytes = packed(&[[0.25, -2.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.5]]);
+        assert_eq!(parse("a.stl", &bytes).expect("a mesh").not_used, [""; 0]);
+        let more = [&bytes[..], &[0; 50]].concat();
+        let mesh = parse("a.stl", &more).expect("a mesh");
+        assert_eq!(mesh.not_used, ["50 bytes behind the 1 triangles that the file counts"]);
     }
 
     #[test]

@@ -155,7 +155,15 @@ impl SolidReader<'_> {
         if self.points > MAX_POINTS {
             return Err(format!("the meshes have more than {MAX_POINTS} points in all"));
         }
-        if let Some(unit_m) = mesh.unit_m {
+        for what in &mesh.not_used {
+            self.report.record(
+                Treatment::NotUsed,
+                format!("of a mesh, {what}"),
+                format!("`{file}`"),
+                "",
+            );
+        }
+        if let Some(unit_m) = mesh.unit_m.filter(|unit_m| *unit_m != 1.0) {
             let rule = format!("the unit of a mesh, {unit_m} m, counts as in RViz");
             let remedy = "save the mesh in meters, because some programs ignore its unit";
             self.report.record(Treatment::Guessed, rule, format!("`{file}`"), remedy);

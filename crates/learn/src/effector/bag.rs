@@ -4,10 +4,10 @@ use super::carmen::{EventRule, learn_with_rule};
 use super::{LearnedEffector, check_box};
 use crate::EstimateOptions;
 use crate::track::{Gaps, Pose2, pose_at};
-use sidestep_import::ImportReport;
 use sidestep_import::bag::BagLog;
 use sidestep_import::carmen::{CorrectedLog, Scan};
 use sidestep_import::track::{StampedPose2, Track};
+use sidestep_import::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::hypot;
 
@@ -34,7 +34,7 @@ pub(super) fn learn(
     let rule = EventRule {
         words: RULE,
         path_m: PATH_FRACTION * box_m,
-        remedy: "choose a smaller box, or a bag in which the robot drives",
+        remedy: "choose a smaller box, or a bag in which the robot drives and its true pose is told often",
     };
     let windows = Windows::cut(&log.odometry, &log.truth, box_m);
     let mut model = learn_with_rule(&rule, source, &windows.log, options)?;
@@ -73,6 +73,20 @@ pub(super) fn learn_tracks(
 /// Adds what was found in a log to the warnings of what was learned from it.
 pub(super) fn add_findings(model: &mut LearnedEffector, name: &str, report: &ImportReport) {
     model.report.warnings.extend(crate::import_warnings(name, report));
+}
+
+/// Number of findings that an error repeats.
+const MAX_CAUSES: usize = 3;
+
+/// Returns an error of learning with what was found in the log before: it may be the cause.
+pub(super) fn with_findings(error: InputError, report: &ImportReport) -> InputError {
+    let findings = report.findings.iter().filter(|found| found.treatment != Treatment::NotUsed);
+    let found: Vec<String> = findings.take(MAX_CAUSES).map(ToString::to_string).collect();
+    if found.is_empty() {
+        return error;
+    }
+    let cause = format!("{}; {}", error.cause(), found.join("; "));
+    InputError::new(error.place(), cause, error.remedy())
 }
 
 /// The true pose at the end of each window, and the poses that odometry claims in between.

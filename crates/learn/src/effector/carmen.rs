@@ -99,7 +99,11 @@ pub(super) fn learn_with_rule(
         turns: pairs.iter().filter_map(|pair| pair.as_turn(rule.path_m)).collect(),
     };
     if events.moves.is_empty() {
-        let cause = format!("odometry claims no move of {} m ahead between two poses", rule.path_m);
+        let cause = format!(
+            "odometry claims no move of {} m ahead between two of the {} poses that it is compared with",
+            rule.path_m,
+            log.scans.len()
+        );
         return Err(InputError::new(source, cause, rule.remedy));
     }
     let mut report = events.report(source, options);

@@ -72,10 +72,30 @@ pub(super) fn learn(
         ));
     }
     report.warnings.extend(damage);
+    report.warnings.extend(radian_warning(&free));
     report.judge_left_out(free.len() as u64);
     Ok(LearnedEffector {
         report,
         profile: EffectorProfile { box_m, ..profile(&by_action, estimate) },
+    })
+}
+
+/// Turns of so many degrees are usual where a quarter turn was commanded and the table has radians.
+const QUARTER_TURN_IN_RADIANS: std::ops::RangeInclusive<f64> = 1.3..=1.9;
+/// Number of turns from which on their usual size is known.
+const MIN_TURNS: usize = 5;
+
+/// Returns the warning on turns that look like radians.
+fn radian_warning(displacements: &[MeasuredDisplacement]) -> Option<String> {
+    let is_turn = |displacement: &&MeasuredDisplacement| {
+        intended_displacement(STANDARD_ACTIONS[displacement.action]).quarters != 0
+    };
+    let mut turns: Vec<f64> =
+        displacements.iter().filter(is_turn).map(|d| d.turn_deg.abs()).collect();
+    turns.sort_by(f64::total_cmp);
+    let usual = *turns.get(turns.len() / 2)?;
+    (turns.len() >= MIN_TURNS && QUARTER_TURN_IN_RADIANS.contains(&usual)).then(|| {
+        format!("turns to the side are usually of {usual:.2} degrees: the column turn_deg looks like radians")
     })
 }
 

@@ -150,7 +150,8 @@ pub fn from_bag(
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let log = sidestep_import::bag::read(path, wanted)?;
-    let mut model = bag::learn(&path.display().to_string(), &log, box_m, options)?;
+    let learned = bag::learn(&path.display().to_string(), &log, box_m, options);
+    let mut model = learned.map_err(|error| bag::with_findings(error, &log.report))?;
     bag::add_findings(&mut model, "the bag", &log.report);
     Ok(judged(model))
 }
@@ -201,7 +202,7 @@ impl EffectorOptions {
 /// When the file is missing or damaged, holds no row, more than half of its rows are damaged, it has several effectors
 /// and none is chosen, or `options` are not valid.
 pub fn from_csv(file: &Path, options: &EffectorOptions) -> Result<LearnedEffector, InputError> {
-    learn_csv(&CsvTable::read(file)?, options)
+    learn_csv(&CsvTable::read_recording(file)?, options)
 }
 
 /// Learns from a CSV table that was already read, see [`from_csv`].
@@ -214,11 +215,16 @@ pub fn learn_csv(
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
     let mut model = csv::learn(table, options)?;
+    model.report.warnings.extend(crate::table_warnings(table, COLUMNS));
     if model.profile.box_m.is_none() {
         model.report.warnings.push(NO_BOX.to_string());
     }
     Ok(model)
 }
+
+/// The columns of a table of displacements.
+const COLUMNS: &[&str] =
+    &["action", "ahead_boxes", "left_boxes", "turn_deg", "contact", "robot", "effector", "box_m"];
 
 /// The warning on a table that does not say how long a box is.
 const NO_BOX: &str = "the table gives displacements in boxes and does not say how long a box is, so that a scenario \

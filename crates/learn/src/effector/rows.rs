@@ -52,7 +52,11 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
         effector: chosen.effector,
         box_m: columns.box_m(table, options)?,
     };
-    let mut first_error = None;
+    let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
+    let misfits = table.misfits().len() as u64;
+    if misfits > 0 {
+        parsed.rejected.insert("damaged_row".to_string(), misfits);
+    }
     for row in &chosen.rows {
         let cause = match columns.read(table.place(), *row) {
             Ok(Row::Free(displacement)) => {
@@ -70,7 +74,7 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
     }
     let damaged = parsed.rejected.get("damaged_row").copied().unwrap_or(0);
     if let Some(error) = first_error {
-        if 2 * damaged > chosen.rows.len() as u64 {
+        if 2 * damaged > chosen.rows.len() as u64 + misfits {
             return Err(error);
         }
         parsed.damage = Some(left_out::damage_warning(damaged, &error));

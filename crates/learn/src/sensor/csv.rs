@@ -24,6 +24,7 @@ pub(super) fn learn(
         read(table, options.sensor.as_deref(), classes)?;
     let log = ReadingLog { observations, classes, readings, rule: RULE };
     let mut model = log.model(table.place(), options);
+    model.report.warnings.extend(name_warnings(&log.observations));
     if let Some(error) = first_error {
         let report = &mut model.report;
         report.measurements += damaged;
@@ -36,6 +37,31 @@ pub(super) fn learn(
         model.fit_beam(&log.readings, [0.0, options.range_m]);
     }
     Ok(model)
+}
+
+/// Names that people give to an observation of nothing.
+const NAMES_OF_NOTHING: [&str; 6] = ["none", "empty", "null", "free", "no_echo", "-"];
+
+/// Returns warnings on names of observations that hardly mean things of their own.
+fn name_warnings(observations: &[String]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (k, name) in observations.iter().enumerate() {
+        let other = observations[..k].iter().find(|other| other.eq_ignore_ascii_case(name));
+        if let Some(other) = other {
+            warnings.push(format!(
+                "the observations `{}` and `{}` are two kinds of things here: their names differ in case alone",
+                other.escape_debug(),
+                name.escape_debug()
+            ));
+        }
+        if NAMES_OF_NOTHING.contains(&name.to_ascii_lowercase().as_str()) {
+            warnings.push(format!(
+                "`{}` is a kind of thing here: no observation is written `nothing`",
+                name.escape_debug()
+            ));
+        }
+    }
+    warnings
 }
 
 /// Refuses a table to which no beam model can be fitted.
@@ -280,6 +306,21 @@ mod tests {
     const METERS: &str = "true,reported,true_distance_m,reported_distance_m\n\
         robot,robot,1.0,1.2\nrobot,nothing,2.0,\nrobot,robot,1.4,1.6\n\
         nothing,robot,,1.0\nnothing,nothing,,\nnothing,nothing,beyond,beyond\n";
+
+    #[test]
+    fn names_that_hardly_mean_things_of_their_own_are_warned_of() {
+        let text = METERS.replace("nothing", "none").replacen("robot,robot", "robot,Robot", 1);
+        let warnings = learned(&text, &SensorOptions::default()).unwrap().report.warnings;
+        assert!(
+            warnings.iter().any(|w| w.contains("`Robot` and `robot` are two kinds")),
+            "{warnings:?}"
+        );
+        assert!(
+            warnings.iter().any(|w| w.starts_with("`none` is a kind of thing here")),
+            "{warnings:?}"
+        );
+        assert_eq!(name_warnings(&["nothing".into(), "robot".into()]), Vec::<String>::new());
+    }
 
     #[test]
     fn readings_in_meters_become_rows_by_class() {

@@ -146,8 +146,21 @@ pub fn from_bag(
 /// # Errors
 /// When the file is missing or damaged, more than half of its rows are, or `options` are not valid.
 pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
-    learn_csv(&CsvTable::read(file)?, options)
+    learn_csv(&CsvTable::read_recording(file)?, options)
 }
+
+/// The columns of a table of readings.
+const COLUMNS: &[&str] = &[
+    "true",
+    "reported",
+    "true_distance_m",
+    "reported_distance_m",
+    "true_class",
+    "reported_class",
+    "sensor",
+    "sensor_name",
+    "robot",
+];
 
 /// Learns from a CSV table that was already read, see [`from_csv`].
 ///
@@ -155,6 +168,7 @@ pub fn from_csv(file: &Path, options: &SensorOptions) -> Result<LearnedSensor, I
 /// When the table is damaged or `options` are not valid.
 pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
     let mut model = learn_known_csv(table, options)?;
+    model.report.warnings.extend(crate::table_warnings(table, COLUMNS));
     if table.find("true_class").is_some() {
         let edges_m: Vec<String> = options.distance_edges_m.iter().map(f64::to_string).collect();
         model.report.warnings.push(format!(

@@ -72,8 +72,9 @@ pub(super) fn read(
     let observations = observations(table.place(), &rows, &columns)?;
     let parser = RowParser { place: table.place(), columns, observations, classes };
     let mut readings = Vec::with_capacity(rows.len());
-    let mut damaged = 0;
-    let mut first_error = None;
+    let misfits = table.misfits().len();
+    let mut damaged = misfits as u64;
+    let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
     let cycle = table.find("cycle");
     let mut scan = 0;
     let mut before = None;
@@ -92,7 +93,7 @@ pub(super) fn read(
         }
     }
     match first_error {
-        Some(error) if 2 * damaged > rows.len() as u64 => Err(error),
+        Some(error) if 2 * damaged > (rows.len() + misfits) as u64 => Err(error),
         first_error => {
             Ok(ParsedReadings { observations: parser.observations, readings, damaged, first_error })
         }

@@ -207,3 +207,39 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn rows_with_fields_too_many_or_too_few_are_left_out_and_counted() {
+    let rows = "forward,1,0,0\n".repeat(8);
+    let text = format!("{HEAD}{rows}forward,1,0\nforward,1,0,0,9\n");
+    let table = CsvTable::parse_recording(&"f.csv", &text).unwrap();
+    let report = learn(&table, &EffectorOptions::default()).unwrap().report;
+    assert_eq!((report.events, report.rejected["damaged_row"]), (8, 2));
+    let warning = report.warnings.iter().find(|warning| warning.contains("damaged rows")).unwrap();
+    assert!(warning.contains("f.csv:10:1: the row has 3 fields, the header 4"), "{warning}");
+    let half = format!("{HEAD}forward,1,0,0\nforward,1\nforward,1\n");
+    let table = CsvTable::parse_recording(&"f.csv", &half).unwrap();
+    assert!(learn(&table, &EffectorOptions::default()).is_err(), "more than half");
+}
+
+#[test]
+fn turns_in_radians_are_warned_of() {
+    let warnings = |turn: &str| {
+        let rows = format!("left,0,0,{turn}\nright,0,0,-{turn}\n").repeat(5);
+        learned(&rows, 0.5).unwrap().report.warnings
+    };
+    assert!(warnings("1.571").iter().any(|w| w.ends_with("turn_deg looks like radians")));
+    assert!(!warnings("88").iter().any(|w| w.contains("radians")));
+}
+
+#[test]
+fn a_table_says_which_columns_are_not_read_and_how_numbers_were() {
+    let text =
+        format!("{}forward;1,5;0;0;no\n", HEAD.replace(',', ";").replace("deg", "deg;contakt"));
+    let table = CsvTable::parse(&"f.csv", &text).unwrap();
+    let warnings =
+        super::super::learn_csv(&table, &EffectorOptions::default()).unwrap().report.warnings;
+    let has = |words: &str| warnings.iter().any(|warning| warning.contains(words));
+    assert!(has("guessed: commas in numbers are decimal commas"), "{warnings:?}");
+    assert!(has("not used: columns `contakt`"), "{warnings:?}");
+}
