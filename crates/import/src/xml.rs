@@ -31,6 +31,28 @@ pub(super) fn read_xml_text(path: &Path, max_bytes: u64) -> Result<String, Input
     })
 }
 
+/// The maximum depth of elements in each other; a model has some ten, and a scene of nodes some dozens.
+const MAX_DEPTH: usize = 256;
+
+/// Returns the line of the first element that is too deep in others.
+fn too_deep(document: &Document<'_>) -> Option<usize> {
+    let mut depth = 0;
+    let mut node = document.root();
+    loop {
+        if let Some(child) = node.first_child() {
+            (node, depth) = (child, depth + 1);
+            if depth > MAX_DEPTH {
+                return Some(document.text_pos_at(node.range().start).row as usize);
+            }
+            continue;
+        }
+        while node.next_sibling().is_none() {
+            (node, depth) = (node.parent()?, depth - 1);
+        }
+        node = node.next_sibling()?;
+    }
+}
+
 /// The text of an XML file in which each prefix is declared.
 ///
 /// Exporters and merged models leave declarations out, and the readers of robot programs do not ask for them. Missing
@@ -70,7 +92,10 @@ impl<'a> XmlSource<'a> {
         };
         loop {
             let error = match source.document() {
-                Ok(_) => return Ok(source),
+                Ok(document) => match too_deep(&document) {
+                    Some(line) => return Err(source.too_deep(line)),
+                    None => return Ok(source),
+                },
                 Err(error) => error,
             };
             let Some(prefix) = source.new_undeclared(&error) else {
@@ -78,6 +103,13 @@ impl<'a> XmlSource<'a> {
             };
             source.declare(prefix);
         }
+    }
+
+    fn too_deep(&self, line: usize) -> InputError {
+        let skipped = self.original[..self.skipped].matches('\n').count();
+        let cause = format!("has elements more than {MAX_DEPTH} deep in each other");
+        InputError::new(self.place, cause, "check that this is the right kind of file")
+            .with_position(line + skipped, 1)
     }
 
     /// Records the prefixes that were declared in place of the file, in the order of their first use.
@@ -502,6 +534,15 @@ mod tests {
         std::fs::write(&path, [0xff, 0xfe, 0x00, 0xd8]).expect("written");
         assert!(read_xml_text(&path, 1 << 10).is_err());
         assert!(read_xml_text(&path, 3).is_err());
+    }
+
+    #[test]
+    fn elements_in_each_other_are_limited() {
+        let nested = |n: usize| format!("<robot>\n{}{}</robot>", "<a>".repeat(n), "</a>".repeat(n));
+        assert!(XmlSource::new("a.urdf", &nested(MAX_DEPTH - 1)).is_ok());
+        let error = XmlSource::new("a.urdf", &nested(20_000)).err().expect("too deep");
+        assert!(error.cause().contains("more than 256 deep"), "{error}");
+        assert_eq!(error.line_and_column().map(|(line, _)| line), Some(2));
     }
 
     #[test]

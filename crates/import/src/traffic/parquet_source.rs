@@ -5,7 +5,7 @@ use super::rows::{RowCollector, RowValues};
 use super::value::Value;
 use crate::report::Treatment;
 use bytes::Bytes;
-use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::{ParquetError, Result as ParquetResult};
@@ -16,7 +16,6 @@ use sidestep_kernel::InputError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Words of the decoder about a compression that this program is built without.
-const DISABLED_WORDS: &str = "Disabled feature";
 
 /// The first and the last bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
@@ -39,17 +38,13 @@ pub(super) fn is_parquet(bytes: &[u8]) -> bool {
 pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<(), InputError> {
     let place = collector.place().to_string();
     let damaged = |cause: String| {
-        let missing = ["brotli", "lz4"].into_iter().find(|name| {
-            cause.contains(DISABLED_WORDS) && cause.to_ascii_lowercase().contains(name)
-        });
-        if let Some(name) = missing {
-            let cause = format!("is Parquet compressed with {name}, which is not read");
-            let remedy = "write it anew with Zstandard: in pandas `df.to_parquet(\"day.parquet\", compression=\"zstd\")`";
-            return InputError::new(&place, cause, remedy);
-        }
-        let remedy = "copy the file again from its source; it may be compressed with Snappy, Zstandard or gzip, or plain";
+        let remedy = "copy the file again from its source";
         InputError::new(&place, format!("cannot be read as Parquet: {cause}"), remedy)
     };
+    if let Some(codec) = unknown_codec(&bytes) {
+        let cause = format!("is Parquet compressed with {codec}, which is not read");
+        return Err(InputError::new(&place, cause, recompression(&place)));
+    }
     // Its decoders may panic on damaged pages.
     let table = catch_unwind(AssertUnwindSafe(|| Table::read(bytes)))
         .map_err(|_| damaged("a page is damaged".to_string()))?
@@ -66,6 +61,36 @@ pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<()
         collector.push(row + 1, &layout, &TableRow { table: &table, row });
     }
     Ok(())
+}
+
+/// Returns the name of a compression of a column that is not read here.
+fn unknown_codec(bytes: &[u8]) -> Option<String> {
+    let bytes = Bytes::copy_from_slice(bytes);
+    // Damage of the file is found, and told, where it is read.
+    let file = catch_unwind(|| SerializedFileReader::new(bytes).ok()).ok().flatten()?;
+    let groups = file.metadata().row_groups().iter();
+    let mut codecs = groups.flat_map(|group| group.columns()).map(|column| column.compression());
+    let unknown = codecs.find(|codec| {
+        let is_read = matches!(
+            codec,
+            Compression::UNCOMPRESSED
+                | Compression::SNAPPY
+                | Compression::GZIP(_)
+                | Compression::ZSTD(_)
+        );
+        !is_read
+    })?;
+    let name = unknown.to_string();
+    Some(name.split('(').next().unwrap_or(&name).to_string())
+}
+
+/// Returns the command that compresses a file with Zstandard.
+fn recompression(place: &str) -> String {
+    let path = place.replace(['\\', '\''], "?");
+    format!(
+        "compress it with Zstandard: python3 -c \"import pyarrow.parquet as p; p.write_table(p.read_table('{path}'), \
+         'zstd.parquet', compression='zstd')\""
+    )
 }
 
 /// The values of a column, one for each row.

@@ -250,6 +250,11 @@ fn behaviour_remarks(given: &Given<'_>, k: usize, s: &RobotSection) -> Vec<Remar
                      uses the library";
         remarks.push(Remark::warning(&key, words));
     }
+    let goals = behaviour.and_then(|b| b.goals.as_ref()).map_or(0, Vec::len);
+    if kind == "goto" && goals == 1 && behaviour.and_then(|b| b.repeat) == Some(true) {
+        let words = "a robot at its only goal completes a trip in each cycle, and stays there: give several goals";
+        remarks.push(Remark::warning(format!("{key}.repeat"), words));
+    }
     let senses = matches!(avoidance, Some(AvoidanceSection::Avoid | AvoidanceSection::Filter));
     if senses && s.sensors.is_empty() {
         let words = "has no effect: it avoids what sensors report, and the robots have none";
@@ -305,6 +310,10 @@ mod tests {
         assert_remark(&robots(goes), "robots.0.behaviour.avoidance", "have none");
         let random = format!("{}sensors = [\"bumper-4\"]\n", robots("kind = \"random\""));
         assert_remark(&random, "robots.0.sensors", "asks no sensor");
+        let once =
+            |more: &str| robots(&format!("kind = \"goto\", goals = [[5, 0]{more}], repeat = true"));
+        assert_remark(&once(""), "robots.0.behaviour.repeat", "completes a trip in each cycle");
+        assert_eq!(remarks(&once(", [0, 0]")), []);
         let radio = format!("{}[radio]\nrange_m = 2.0\n", robots("kind = \"announce\""));
         assert_eq!(remarks(&radio), []);
         assert_eq!(remarks(&robots("kind = \"wander\"")), []);
@@ -342,6 +351,15 @@ mod tests {
             "{MAP}[kinds.cart]\nobservation = \"robot\"\n[robots]\ncount = 1\nkind = \"cart\"\n"
         );
         assert_remark(&kind, "kinds.cart.observation", "no robot has a sensor");
+    }
+
+    #[test]
+    fn a_rule_about_unknown_boxes_of_a_map_that_is_known_is_named() {
+        let map = |art: &str| {
+            format!("map.ascii = \"{art}\"\nmap.unknown = \"free\"\n[robots]\ncount = 1\n")
+        };
+        assert_remark(&map("......"), "map.unknown", "nothing of the map is unknown");
+        assert_eq!(remarks(&map("....?.")), []);
     }
 
     #[test]

@@ -35,7 +35,18 @@ pub(super) fn load_map(
         let remedy = "use smaller boxes, another map, or unknown = \"free\"";
         return Err(source.error(section.span(), "the map has no free box", remedy));
     }
-    Ok(LoadedMap { map: Arc::new(map), doors, remarks: report.remarks("map.file") })
+    let mut remarks = report.remarks("map.file");
+    remarks.extend(unknown_remark(source, section.get_ref(), &report));
+    Ok(LoadedMap { map: Arc::new(map), doors, remarks })
+}
+
+/// Returns a note on the key `unknown` of a map in which nothing is unknown.
+fn unknown_remark(source: &Source, s: &MapSection, report: &ImportReport) -> Option<Remark> {
+    let is_given = source.keys("map").iter().any(|key| key.name == "unknown");
+    let is_drawn = s.ascii.as_ref().is_some_and(|art| art.contains('?'));
+    let is_read = report.kept.iter().any(|item| item.noun.starts_with("unknown") && item.count > 0);
+    let words = "has no effect: nothing of the map is unknown";
+    (is_given && !is_drawn && !is_read).then(|| Remark::note("map.unknown", words))
 }
 
 fn read_map(

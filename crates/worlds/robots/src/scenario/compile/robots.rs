@@ -45,6 +45,8 @@ impl Compiler<'_> {
     ) -> Result<BodyGroup, InputError> {
         let list = load_scen(&self.source.path(scen.get_ref()));
         let rows = list.map_err(|error| self.source.with_key_at(scen.span(), error))?.rows;
+        let remark = self.other_map_remark(&rows);
+        self.remarks.extend(remark);
         let count = s.count.as_ref().map_or(rows.len(), |c| *c.get_ref() as usize);
         if count > rows.len() {
             let cause = format!("count = {count}, but the list has {} rows", rows.len());
@@ -75,6 +77,22 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
         })
+    }
+
+    /// Returns a warning where rows of a list are for a map of another name than that of the scenario.
+    fn other_map_remark(&self, rows: &[ScenRow]) -> Option<Remark> {
+        let file = self.file.map.get_ref().file.as_ref()?;
+        let name_of = |path: &str| path.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+        let own = name_of(&file.get_ref().display().to_string());
+        let own = own.strip_suffix(".gz").unwrap_or(&own);
+        let other = rows.iter().find(|row| name_of(&row.map) != own)?;
+        let words = format!(
+            "line {} of the list is for the map `{}`, and the scenario has `{}`: starts and goals may be others than meant",
+            other.line,
+            other.map.escape_debug(),
+            own.escape_debug()
+        );
+        Some(Remark::warning("robots.scen", words))
     }
 
     /// Returns the shortest paths to the goal of a row of a MovingAI list.
