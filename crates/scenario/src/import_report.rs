@@ -175,6 +175,15 @@ impl ImportReport {
 }
 
 impl Finding {
+    /// Returns it as a line of a command's report: what was done as the name, the rest as the value. All readers whose
+    /// findings are told by `check` and `run` use it.
+    pub fn line(&self) -> (String, String) {
+        let name = self.treatment.word();
+        let text = self.to_string();
+        let rest = text.strip_prefix(name).and_then(|rest| rest.strip_prefix(": "));
+        (name.to_string(), rest.unwrap_or(&text).to_string())
+    }
+
     /// Returns it as a remark on a scenario whose `key` names the file: a warning where the file may be another than
     /// meant.
     pub fn remark(&self, key: &str) -> Remark {

@@ -3,6 +3,7 @@
 mod aircraft;
 mod calling;
 mod conflict;
+mod notes;
 mod place;
 mod reason;
 mod route;
@@ -65,6 +66,12 @@ struct AircraftBuilder {
     vertical_speed_fpm: f64,
     /// Whether it is gone before any time has passed.
     is_void: bool,
+    /// Whether its way-points are to be flown over from now on.
+    flies_over: bool,
+    /// The places where it was given a way-point that BlueSky flies by.
+    fly_by_place: Option<String>,
+    /// The places of its vertical speeds until it is given a level.
+    vertical_speed_places: Vec<String>,
 }
 
 /// Carries out commands in their order.
@@ -80,6 +87,11 @@ pub(super) struct Interpreter {
     defined: BTreeMap<String, LatLon>,
     /// The place from which places of the same name are told apart.
     reference: LatLon,
+    /// The heading of the runway that was named last, in degrees.
+    runway_deg: Option<f64>,
+    /// The place of the first command that asks for MVP, unless its limits are given.
+    mvp_place: Option<String>,
+    has_resolution_limits: bool,
     defaults: SettingDefaults,
     /// Commands for each new aircraft (`CRECMD`).
     creation_commands: Vec<CommandText>,
@@ -105,6 +117,9 @@ impl Interpreter {
             by_id: BTreeMap::new(),
             defined: BTreeMap::new(),
             reference: LatLon { lat_deg: 0.0, lon_deg: 0.0 },
+            runway_deg: None,
+            mvp_place: None,
+            has_resolution_limits: false,
             defaults: SettingDefaults::default(),
             creation_commands: Vec::new(),
             calls: 0,
@@ -127,6 +142,7 @@ impl Interpreter {
     }
 
     fn finish(mut self) -> ScnFile {
+        self.note_differences();
         self.result.unparsed.sort_by_key(InputError::line_and_column);
         for builder in self.builders.into_iter().filter(|builder| !builder.is_void) {
             let AircraftBuilder { aircraft, unresolved_start, .. } = builder;
@@ -214,6 +230,7 @@ impl Interpreter {
         match canonical_name(name) {
             "CRE" => self.create(arguments),
             "CRECMD" => self.add_creation_command(command, arguments),
+            "CLRCRECMD" => self.clear_creation_commands(),
             "CRECONFS" => self.create_conflict(arguments),
             "DEL" => self.delete(arguments),
             "DEFWPT" => self.define(arguments),

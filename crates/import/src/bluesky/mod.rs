@@ -10,7 +10,7 @@
 //!   a way-point must be defined, and an aircraft created, before it is used.
 //! - `PCALL` reads a file in the same folder, with `%0`, `%1`, ... replaced, relative to the time of the call.
 //!
-//! The commands that take effect are `CRE`, `CRECMD`, `CRECONFS`, `DEL`, `DEFWPT`, `ADDWPT`, `AFTER` and `BEFORE`
+//! The commands that take effect are `CRE`, `CRECMD`, `CLRCRECMD`, `CRECONFS`, `DEL`, `DEFWPT`, `ADDWPT`, `AFTER` and `BEFORE`
 //! `.. ADDWPT`, `AT`, `RTA`, `ORIG`, `DEST`, `HDG`, `SPD`, `ALT`, `VS`, `LNAV`, `VNAV`, `SYN SUPER|WALL|MATRIX`, the
 //! settings of [`Setting`] and [`AircraftSetting`], `PCALL`, `IC`, `SCHEDULE`, `DELAY`, `RESET` and `QUIT`. Nothing is
 //! dropped silently: each line that has no effect is in [`ScnFile::unused`] with the reason, each command and argument

@@ -318,6 +318,57 @@ fn commands_are_given_at_a_time_after_a_time_and_on_creation() {
     assert_eq!(file.traffic.aircraft[0].changes, expected);
 }
 
+#[test]
+fn commands_on_creation_outlast_a_reset_until_they_are_cleared() {
+    let text = "\
+        00:00:00>CRECMD HDG 180\n\
+        00:00:10>RESET\n\
+        00:00:10>CRE A B744 52 4 0 FL200 250\n\
+        00:00:20>CLRCRECMD\n\
+        00:00:30>CRE B B744 52 4 0 FL200 250\n";
+    let file = parse(&"f.scn", text);
+    let counts: Vec<usize> = file.traffic.aircraft.iter().map(|one| one.changes.len()).collect();
+    assert_eq!((counts, file.unused.len()), (vec![1, 0], 0), "as in BlueSky 1.1.1");
+}
+
+#[test]
+fn what_flies_otherwise_than_in_bluesky_is_named_once_per_line_that_says_it() {
+    let found = |commands: &str| -> Vec<String> {
+        let findings = scenario(commands).report.findings;
+        let kept = findings.iter().filter(|one| !one.rule.starts_with("types of aircraft"));
+        kept.map(|one| one.to_string().chars().take(40).collect()).collect()
+    };
+    let route = "CRE A B744 52 4 90 FL200 250\nADDWPT A 52 5\nADDWPT A 53 5";
+    let [turns] = &found(route)[..] else { panic!("{:?}", found(route)) };
+    assert!(turns.starts_with("guessed: turns at way-points"), "{turns}");
+    let over = "CRE A B744 52 4 90 FL200 250\nADDWPT A FLYOVER\nADDWPT A 52 5\nADDWPT A 53 5";
+    assert_eq!(found(over), [""; 0], "they are flown over");
+    assert_eq!(found("CRE A B744 52 4 90 FL200 250\nADDWPT A 52 5"), [""; 0], "no turn");
+    let [mvp] = &found("RESO MVP\nRESO MVP")[..] else { panic!() };
+    assert!(mvp.starts_with("guessed: RESO MVP: resolutions by heading"), "{mvp}");
+    assert_eq!(found("RESO MVP\nRMETHH HDG"), [""; 0], "that is asked for");
+    let [stands] = &found("CRE A B744 52 4 90 FL200 250\nSPD A 0")[..] else { panic!() };
+    assert!(stands.starts_with("guessed: speeds below 1 m/s"), "{stands}");
+    assert_eq!(found("CRE A B744 52 4 90 FL200 0\nSPD A 0"), [""; 0], "it does not fly");
+    let [level] = &found("CRE A B744 52 4 90 FL200 250\nVS A 500")[..] else { panic!() };
+    assert!(level.starts_with("not used: VS without ALT"), "{level}");
+    let climbs = "CRE A B744 52 4 90 FL200 250\nVS A 500\nALT A FL300";
+    assert_eq!(found(climbs), [""; 0]);
+}
+
+#[test]
+fn an_aircraft_on_a_runway_has_its_heading_unless_one_is_given() {
+    let headings = |commands: &str| -> Vec<f64> {
+        scenario(commands).traffic.unplaced.iter().map(|one| one.aircraft.heading_deg).collect()
+    };
+    let commands = "CRE A,B744,EHAM,RWY18L,,FL10,250\nCRE B B744 EHAM/RW06\n\
+                    CRE C,B744,EHAM,RW36C,90,FL10,250\nCRE D,B744,EHAM,,FL10,250";
+    assert_eq!(headings(commands), [180.0, 60.0, 90.0, 0.0]);
+    let found = scenario(commands).report.findings;
+    let guess = found.iter().find(|one| one.rule.starts_with("headings of aircraft"));
+    assert_eq!(guess.map(|one| one.count), Some(2), "{found:?}");
+}
+
 /// Arguments with latitude, longitude, heading and altitude of the new aircraft.
 const CONFLICTS: [(&str, f64, f64, f64, f64); 5] = [
     ("90 1 120 0 0 300", 52.390059, 3.743150, 120.0, 30_000.0),

@@ -15,8 +15,6 @@ use parquet::schema::types::ColumnDescriptor;
 use sidestep_kernel::InputError;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Words of the decoder about a compression that this program is built without.
-
 /// The first and the last bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
 

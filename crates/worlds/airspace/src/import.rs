@@ -103,11 +103,10 @@ fn bluesky_report(
     lines.extend(count_line("display only", &scn.ignored));
     lines.extend(first_names_line("left out, place unknown", &unresolved_start_positions(scn)));
     lines.extend(first_names_line("unknown way-points", &unresolved_uses(scn)));
-    for finding in &report.findings {
-        if !RULES_WITH_ERRORS.contains(&finding.rule.as_str()) && finding.rule != DISPLAY_RULE {
-            lines.push(("import".to_string(), finding.to_string()));
-        }
-    }
+    let has_line = |finding: &&Finding| {
+        !RULES_WITH_ERRORS.contains(&finding.rule.as_str()) && finding.rule != DISPLAY_RULE
+    };
+    lines.extend(report.findings.iter().filter(has_line).map(Finding::line));
     lines.extend(error_lines("unparsed", &scn.unparsed));
     lines.extend(error_lines("not carried out", &refused));
     (json, lines)
@@ -226,16 +225,8 @@ fn report_lines(rows: usize, report: &ImportReport) -> KeyValues {
     let kept = format!("{} of {} kept", count("rows"), group_thousands(rows as u64));
     lines.push(("rows".to_string(), kept));
     lines.push(("flights".to_string(), count("flights")));
-    lines.extend(report.findings.iter().map(finding_line));
+    lines.extend(report.findings.iter().map(Finding::line));
     lines
-}
-
-/// Returns a finding as a line: what was done as its name, the rest as its value.
-fn finding_line(finding: &Finding) -> (String, String) {
-    let name = finding.treatment.word();
-    let text = finding.to_string();
-    let rest = text.strip_prefix(name).and_then(|rest| rest.strip_prefix(": "));
-    (name.to_string(), rest.unwrap_or(&text).to_string())
 }
 
 /// Returns names with their counts on one line; no line for none.

@@ -8,6 +8,7 @@
 //! by default, they are flown anew.
 
 mod bluesky;
+mod commanded_flight;
 mod flyable_aircraft;
 mod import_settings;
 mod position;

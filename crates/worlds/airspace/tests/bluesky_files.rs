@@ -1,24 +1,23 @@
 //! Scenario files fly here as they do in BlueSky: the same aircraft, at the same places, with the same losses.
 //!
-//! Both fly each file for some minutes without a window. Here a file that says nothing about conflicts flies with
-//! method `none` and without the shield, as in BlueSky, and all others as they are imported, without the shield.
-//! The interpreter of SIDESTEP_PYTHON, else `python3`, needs the package `bluesky-simulator` 1.1.1, whose tables of
-//! places both read. SIDESTEP_BLUESKY_SCENARIOS names a folder of scenarios, such as that of BlueSky's own repository;
-//! without it those of `../shared/data/airspace/bluesky` are flown. SIDESTEP_BLUESKY_TABLE names a file for the rows,
-//! and SIDESTEP_BLUESKY_FLOWN one that keeps what BlueSky has flown for the next time.
+//! Both fly each file for some minutes without a window. Here a file that asks for no method that BlueSky has flies
+//! with method `none` and without the shield, as in BlueSky, and all others as they are imported, without the shield.
+//! In BlueSky MVP resolves by headings only, and types have no limits, as here. The interpreter of SIDESTEP_PYTHON, else
+//! `python3`, needs the package `bluesky-simulator` 1.1.1, whose tables of places both read. SIDESTEP_BLUESKY_SCENARIOS
+//! names a folder of scenarios, such as that of BlueSky's own repository; without it those of
+//! `../shared/data/airspace/bluesky` are flown. SIDESTEP_BLUESKY_TABLE names a file for the rows of files, beside which
+//! those of aircraft are written, and SIDESTEP_BLUESKY_FLOWN one that keeps what BlueSky has flown for the next time.
 
-use serde::Deserialize;
-use serde_json::json;
-use sidestep_airspace::state::FlightEnd;
+mod bluesky_flights;
+
+use bluesky_flights::{FlownFile, OwnFlight, bluesky_flights, bluesky_navdata, own_flight};
 use sidestep_airspace::traffic::from_bluesky;
-use sidestep_airspace::{AirspaceRun, airspace_run};
-use sidestep_import::bluesky::{NavigationData, ScnFile, Setting, read_with_places};
-use sidestep_import::local_plane::{LatLon, LocalPlane};
-use sidestep_kernel::Simulation;
-use sidestep_scenario::Source;
-use std::collections::{BTreeMap, BTreeSet};
+use sidestep_import::bluesky::{
+    NavigationData, ResolutionMethod, ScnFile, Setting, read_with_places,
+};
+use sidestep_kernel::geodesy::GeoPosition;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 
 /// Seconds for which each file is flown.
@@ -26,31 +25,15 @@ const UNTIL_S: f64 = 300.0;
 /// Largest distance in meters at which two positions count as one: BlueSky accelerates, and turns before a way-point.
 const SAME_PLACE_M: f64 = 2000.0;
 
-/// A file as flown in BlueSky.
-#[derive(Debug, Clone, Deserialize)]
-struct FlownFile {
-    /// Latitude, longitude, altitude in ft and true airspeed in m/s.
-    aircraft: BTreeMap<String, [f64; 4]>,
-    losses: BTreeSet<(String, String)>,
-    error: Option<String>,
-}
-
 /// A file as both have flown it.
 #[derive(Debug, Default)]
 struct ComparedFile {
     /// Aircraft in both, only in BlueSky, and only here.
     aircraft: [usize; 3],
-    /// Distances between both places in meters, by rising distance.
-    gaps_m: Vec<f64>,
+    /// Distances between both places in meters, by rising distance, and whose they are.
+    gaps_m: Vec<(f64, String)>,
     /// Pairs that lose separation in both, only in BlueSky, and only here.
     losses: [usize; 3],
-}
-
-/// A file as flown here.
-struct OwnFlight {
-    /// Positions of those in the air at the end, and of all others none.
-    aircraft: BTreeMap<String, Option<LatLon>>,
-    losses: BTreeSet<(String, String)>,
 }
 
 fn files_below(folder: &Path) -> Vec<String> {
@@ -71,58 +54,19 @@ fn files_below(folder: &Path) -> Vec<String> {
     found
 }
 
-/// Returns whether a file asks for a resolution of conflicts at any time.
+/// Returns whether a file asks at any time for a resolution of conflicts that BlueSky has: SSD and EBY are plugins.
 fn resolves(file: &ScnFile) -> bool {
-    file.traffic.settings.iter().any(|timed| matches!(timed.setting, Setting::Resolution(_)))
+    let is_known = |setting| matches!(setting, Setting::Resolution(ResolutionMethod::Mvp));
+    file.traffic.settings.iter().any(|timed| is_known(timed.setting))
 }
 
 fn fly(name: &str, file: &ScnFile) -> Option<OwnFlight> {
     let text = from_bluesky(name, file)?;
-    let mut overrides = vec!["airspace.shield=\"off\"".to_string()];
+    let mut overrides = vec!["airspace.shield=\"off\""];
     if !resolves(file) {
-        overrides.push("airspace.method=\"none\"".to_string());
+        overrides.push("airspace.method=\"none\"");
     }
-    let source = Source::new(name, text, "").with_overrides(&overrides).expect("settings");
-    let mut run = airspace_run(&source, 1).unwrap_or_else(|error| panic!("{error}"));
-    let cycles = (UNTIL_S / run.world().timing.dt_s) as u64;
-    run.advance(cycles);
-    Some(flown(&run))
-}
-
-/// Returns the aircraft and the losses of a run.
-fn flown(run: &AirspaceRun) -> OwnFlight {
-    let world = run.world();
-    let name = |id: usize| world.airplanes[id].callsign.clone().unwrap_or_default();
-    let mut aircraft = BTreeMap::new();
-    for (id, airplane) in run.state().airplanes.iter().enumerate() {
-        let has_appeared = world.airplanes[id].appears_s < UNTIL_S;
-        if has_appeared && !matches!(airplane.end(), Some(FlightEnd::Left(_))) {
-            let position = airplane.is_unfinished().then(|| position_of(run, id));
-            aircraft.insert(name(id), position);
-        }
-    }
-    let pairs: serde_json::Value = run.pair_metrics();
-    let mut losses = BTreeSet::new();
-    for pair in pairs.as_array().expect("pairs") {
-        if pair["losses"].as_u64().is_some_and(|losses| losses > 0) {
-            let [a, b] =
-                [0, 1].map(|k| name(pair["airplanes"][k].as_u64().expect("an id") as usize));
-            losses.insert(if a < b { (a, b) } else { (b, a) });
-        }
-    }
-    OwnFlight { aircraft, losses }
-}
-
-/// Returns where an airplane is on earth.
-fn position_of(run: &AirspaceRun, id: usize) -> LatLon {
-    let [lat_deg, lon_deg] = run.world().origin_deg.expect("traffic on earth");
-    let plane = LocalPlane::centered_at(LatLon { lat_deg, lon_deg });
-    plane.to_lat_lon(run.state().airplanes[id].pose().at)
-}
-
-fn gap_m(a: LatLon, b: LatLon) -> f64 {
-    let [east_m, north_m] = LocalPlane::centered_at(a).to_plane_m(b);
-    sidestep_kernel::math::hypot(east_m, north_m)
+    Some(own_flight(name, text, &overrides, UNTIL_S))
 }
 
 /// Counts the members of both sets, of the first alone, and of the second alone.
@@ -133,6 +77,28 @@ fn counts<T: Ord>(theirs: &BTreeSet<T>, ours: &BTreeSet<T>) -> [usize; 3] {
 
 /// Smallest airspeed in m/s at which an aircraft flies: those that stand are left out here, by name.
 const MIN_SPEED_M_S: f64 = 1.0;
+
+/// Returns the aircraft that BlueSky itself does not create, because it cannot read their commands.
+fn refused_aircraft(flown: &FlownFile) -> BTreeSet<String> {
+    let mut refused = BTreeSet::new();
+    for command in &flown.refused {
+        let mut words = command.split([' ', ',', '\t']).filter(|word| !word.is_empty());
+        if words.next().is_some_and(|name| name.eq_ignore_ascii_case("CRE")) {
+            refused.extend(words.next().map(str::to_ascii_uppercase));
+        }
+    }
+    refused
+}
+
+/// Leaves out the aircraft that BlueSky does not create, and their losses.
+fn without_refused(ours: OwnFlight, refused: &BTreeSet<String>) -> OwnFlight {
+    let OwnFlight { mut aircraft, mut nearest_m, mut losses } = ours;
+    aircraft.retain(|name, _| !refused.contains(name));
+    let is_flown = |(a, b): &(String, String)| !refused.contains(a) && !refused.contains(b);
+    nearest_m.retain(|pair, _| is_flown(pair));
+    losses.retain(is_flown);
+    OwnFlight { aircraft, nearest_m, losses }
+}
 
 /// Leaves out the aircraft that stand, and their losses.
 fn without_standing(flown: &FlownFile) -> FlownFile {
@@ -154,50 +120,26 @@ fn compare(theirs: &FlownFile, ours: &OwnFlight) -> ComparedFile {
     let mut gaps_m = Vec::new();
     for (name, [lat_deg, lon_deg, ..]) in &theirs.aircraft {
         if let Some(Some(own)) = ours.aircraft.get(name) {
-            gaps_m.push(gap_m(*own, LatLon { lat_deg: *lat_deg, lon_deg: *lon_deg }));
+            let there = GeoPosition::from_degrees(*lat_deg, *lon_deg);
+            gaps_m.push((own.geodesic_to(there).length_m, name.clone()));
         }
     }
-    gaps_m.sort_by(f64::total_cmp);
+    gaps_m.sort_by(|a, b| a.0.total_cmp(&b.0));
     let losses = counts(&theirs.losses, &ours.losses);
     ComparedFile { aircraft: counts(&their_names, &own_names), gaps_m, losses }
 }
 
-/// Returns what BlueSky makes of files below a folder.
-fn bluesky_flights(folder: &Path, files: &[String]) -> Vec<FlownFile> {
+/// Returns what BlueSky makes of files below a folder, or has made of them before.
+fn flights(folder: &Path, files: &[String]) -> Vec<FlownFile> {
     let kept = std::env::var_os("SIDESTEP_BLUESKY_FLOWN").map(PathBuf::from);
     if let Some(Ok(text)) = kept.as_ref().map(std::fs::read) {
         return serde_json::from_slice(&text).expect("what was flown before");
     }
-    let python = sidestep_testing::python();
-    let request = std::env::temp_dir().join(format!("sidestep-files-{}.json", std::process::id()));
-    let asked = json!({ "folder": folder, "files": files, "until_s": UNTIL_S });
-    std::fs::write(&request, asked.to_string()).expect("room");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/fly_bluesky_files.py");
-    let output = Command::new(&python).arg(script).arg(&request).output().expect("python starts");
-    std::fs::remove_file(&request).expect("it was written");
-    let said = String::from_utf8_lossy(&output.stderr);
-    let flown = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
+    let answer = bluesky_flights(folder, files, UNTIL_S);
     if let Some(kept) = kept {
-        std::fs::write(kept, &output.stdout).expect("room");
+        std::fs::write(kept, &answer).expect("room");
     }
-    flown
-}
-
-/// Returns the folder of the navigation database that BlueSky brings; `None` without BlueSky.
-fn bluesky_navdata() -> Option<PathBuf> {
-    let python = sidestep_testing::python();
-    let code = "import bluesky, pathlib; \
-                print(pathlib.Path(bluesky.__file__).parent / 'resources' / 'navdata')";
-    let output = Command::new(&python).args(["-c", code]).output().ok()?;
-    if !output.status.success() {
-        sidestep_testing::skip(format!(
-            "{} has no bluesky (pip install bluesky-simulator==1.1.1)",
-            python.display()
-        ));
-        return None;
-    }
-    let said = String::from_utf8_lossy(&output.stdout);
-    said.lines().last().map(|line| PathBuf::from(line.trim()))
+    serde_json::from_slice(&answer).expect("flights")
 }
 
 #[test]
@@ -208,31 +150,39 @@ fn files_fly_as_in_bluesky() {
         return;
     };
     let files = files_below(&folder);
-    let theirs = bluesky_flights(&folder, &files);
+    let theirs = flights(&folder, &files);
     assert_eq!(theirs.len(), files.len());
     let places = Arc::new(NavigationData::read(&navdata).expect("tables of places"));
     let mut rows = String::from(
         "file\tboth\tonly BlueSky\tonly here\tat one place\tplaces\tmedian gap m\tlosses both\tonly BlueSky\tonly here\n",
     );
+    let mut place_rows = String::from("file\taircraft\tgap m\n");
     let mut total = ComparedFile::default();
     let (mut same_aircraft, mut same_losses, mut compared_files) = (0, 0, 0);
     let mut not_flown_there = 0;
+    let mut not_created_there = 0;
     for (name, theirs) in files.iter().zip(&theirs) {
         let scn = read_with_places(&folder.join(name), &places).expect("a text");
         let ours = fly(name, &scn);
-        let empty = OwnFlight { aircraft: BTreeMap::new(), losses: BTreeSet::new() };
-        let one = compare(&without_standing(theirs), ours.as_ref().unwrap_or(&empty));
-        let median_m = one.gaps_m.get(one.gaps_m.len() / 2).copied().unwrap_or(0.0);
-        let near = one.gaps_m.iter().filter(|gap_m| **gap_m <= SAME_PLACE_M).count();
+        let is_flown_here = ours.is_some();
+        let refused = refused_aircraft(theirs);
+        not_created_there += refused.len();
+        let ours = without_refused(ours.unwrap_or_default(), &refused);
+        let one = compare(&without_standing(theirs), &ours);
+        let median_m = one.gaps_m.get(one.gaps_m.len() / 2).map_or(0.0, |gap| gap.0);
+        let near = one.gaps_m.iter().filter(|gap| gap.0 <= SAME_PLACE_M).count();
+        for (gap_m, aircraft) in &one.gaps_m {
+            place_rows += &format!("{name}\t{aircraft}\t{gap_m:.0}\n");
+        }
         let [both, theirs_alone, ours_alone] = one.aircraft;
         let [lost, lost_there, lost_here] = one.losses;
-        let said = theirs.error.clone().unwrap_or_default();
+        let said = theirs.error.as_ref().or(theirs.refused.first()).cloned().unwrap_or_default();
         rows += &format!(
             "{name}\t{both}\t{theirs_alone}\t{ours_alone}\t{near}\t{}\t{median_m:.0}\t{lost}\t{lost_there}\t{lost_here}\t{said}\n",
             one.gaps_m.len()
         );
         // A file in which BlueSky itself fails, or creates nothing, compares nothing.
-        if theirs.error.is_some() || (theirs.aircraft.is_empty() && ours.is_some()) {
+        if theirs.error.is_some() || (theirs.aircraft.is_empty() && is_flown_here) {
             not_flown_there += 1;
             continue;
         }
@@ -246,12 +196,14 @@ fn files_fly_as_in_bluesky() {
         total.gaps_m.extend(one.gaps_m);
     }
     if let Some(table) = std::env::var_os("SIDESTEP_BLUESKY_TABLE") {
+        let beside = PathBuf::from(&table).with_extension("aircraft.tsv");
         std::fs::write(table, &rows).expect("room");
+        std::fs::write(beside, &place_rows).expect("room");
     }
-    let near = total.gaps_m.iter().filter(|gap_m| **gap_m <= SAME_PLACE_M).count();
+    let near = total.gaps_m.iter().filter(|gap| gap.0 <= SAME_PLACE_M).count();
     println!("{rows}");
     println!(
-        "{compared_files} files, {not_flown_there} more that BlueSky does not fly: {same_aircraft} with the same aircraft, {same_losses} with the same losses; \
+        "{compared_files} files, {not_flown_there} more that BlueSky does not fly, and {not_created_there} aircraft that it does not create: {same_aircraft} with the same aircraft, {same_losses} with the same losses; \
          aircraft {:?}, at one place {near} of {}, losses {:?}",
         total.aircraft,
         total.gaps_m.len(),

@@ -1,5 +1,6 @@
 //! Commands that create, change and remove aircraft.
 
+use super::notes::{MIN_SPEED_MPS, RUNWAY_HEADING_RULE, STANDING_RULE};
 use super::{
     AircraftBuilder, CommandError, CommandOutcome, CommandResult, Interpreter, refusal, upper,
 };
@@ -32,14 +33,17 @@ impl Interpreter {
     pub(super) fn create(&mut self, arguments: &mut Arguments) -> CommandResult {
         let id = arguments.required("an aircraft")?;
         let kind = arguments.next().map_or(String::new(), |word| word.text.to_owned());
+        self.runway_deg = None;
         let place = self.place(arguments)?;
+        let heading_deg = arguments.optional(heading_deg)?;
+        let runway_deg = self.runway_deg.filter(|_| heading_deg.is_none());
         let aircraft = ScnAircraft {
             id: upper(id),
             kind,
             created_s: self.now_s,
             lat_deg: place.position().map_or(0.0, |position| position.lat_deg),
             lon_deg: place.position().map_or(0.0, |position| position.lon_deg),
-            heading_deg: arguments.optional(heading_deg)?.unwrap_or(0.0),
+            heading_deg: heading_deg.or(runway_deg).unwrap_or(0.0),
             altitude_ft: arguments.optional(altitude_ft)?.unwrap_or(0.0),
             speed: arguments.optional(speed)?.unwrap_or(Airspeed::CasKt(0.0)),
             way_points: Vec::new(),
@@ -63,6 +67,9 @@ impl Interpreter {
             let rule = "types of aircraft: each flies with the speeds and climbs of its commands";
             self.note(Treatment::NotUsed, rule, "");
         }
+        if runway_deg.is_some() {
+            self.note(Treatment::Guessed, RUNWAY_HEADING_RULE, "give the heading");
+        }
         self.set_unresolved_start(unresolved_start);
         self.add_unresolved(arguments.command, Some(id.text), &place);
         Ok(CommandOutcome::Done)
@@ -75,6 +82,17 @@ impl Interpreter {
             let rule = "speeds above that of sound, which no limit of a type reduces here";
             self.note(Treatment::Suspicious, rule, "give a Mach number such as M0.8");
         }
+    }
+
+    /// Names a speed that an aircraft is given and does not fly with.
+    fn note_speed(&mut self, index: usize, speed: Airspeed) {
+        let builder = &self.builders[index];
+        let altitude_ft = builder.last_altitude_ft;
+        let is_flying = builder.aircraft.speed.true_airspeed_mps(altitude_ft) >= MIN_SPEED_MPS;
+        if is_flying && speed.true_airspeed_mps(altitude_ft) < MIN_SPEED_MPS {
+            self.note(Treatment::Guessed, STANDING_RULE, "delete it with DEL");
+        }
+        self.note_supersonic(speed, altitude_ft);
     }
 
     fn set_unresolved_start(&mut self, name: Option<String>) {
@@ -111,6 +129,9 @@ impl Interpreter {
             unresolved_start: None,
             vertical_speed_fpm: 0.0,
             is_void: false,
+            flies_over: false,
+            fly_by_place: None,
+            vertical_speed_places: Vec::new(),
         });
         for command in &self.creation_commands {
             let told = command.with_text(format!("{id} {}", command.text));
@@ -129,6 +150,12 @@ impl Interpreter {
         let text = command.text_from(first).to_string();
         arguments.skip_all();
         self.creation_commands.push(command.with_text(text));
+        Ok(CommandOutcome::Done)
+    }
+
+    /// `CLRCRECMD`: new aircraft are given no commands any more.
+    pub(super) fn clear_creation_commands(&mut self) -> CommandResult {
+        self.creation_commands.clear();
         Ok(CommandOutcome::Done)
     }
 
@@ -201,11 +228,23 @@ impl Interpreter {
             }
             _ => {}
         }
-        if let Some(AircraftCommand::Speed(speed)) = change {
-            self.note_supersonic(speed, self.builders[index].last_altitude_ft);
-        }
-        if let Some(AircraftCommand::AltitudeFt(altitude_ft)) = change {
-            self.builders[index].last_altitude_ft = altitude_ft;
+        match change {
+            Some(AircraftCommand::Speed(speed)) => self.note_speed(index, speed),
+            Some(AircraftCommand::AltitudeFt(altitude_ft)) => {
+                self.builders[index].last_altitude_ft = altitude_ft;
+                self.builders[index].vertical_speed_places.clear();
+            }
+            Some(AircraftCommand::VerticalSpeedFpm(_)) => {
+                let place = self.place.clone();
+                let has_level = |(_, command): &(f64, AircraftCommand)| {
+                    matches!(command, AircraftCommand::AltitudeFt(_))
+                };
+                let builder = &mut self.builders[index];
+                if !builder.aircraft.changes.iter().any(has_level) {
+                    builder.vertical_speed_places.push(place);
+                }
+            }
+            _ => {}
         }
         let changes = change.into_iter().chain(climb.map(AircraftCommand::VerticalSpeedFpm));
         let changes = changes.map(|change| (self.now_s, change));

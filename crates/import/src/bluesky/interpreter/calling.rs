@@ -130,7 +130,7 @@ impl Interpreter {
         Ok(CommandOutcome::Done)
     }
 
-    /// `RESET`: aircraft, way-points, settings and all commands that wait are gone.
+    /// `RESET`: aircraft, way-points, settings and all commands that wait are gone, but not those of `CRECMD`.
     pub(super) fn reset(&mut self) -> CommandResult {
         self.restart("RESET");
         Ok(CommandOutcome::Done)
@@ -140,7 +140,6 @@ impl Interpreter {
         self.drop_waiting(name);
         self.delete_all();
         self.defined.clear();
-        self.creation_commands.clear();
         self.defaults = Default::default();
         if !self.result.traffic.settings.is_empty() {
             self.add_setting("RESET", Setting::Reset);

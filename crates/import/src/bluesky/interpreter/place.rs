@@ -48,10 +48,13 @@ impl Interpreter {
         let mut name = upper(arguments.required("a place")?);
         let mut airport = name.split('/').next().unwrap_or_default().to_string();
         let runway = arguments.peek().unwrap_or("").to_ascii_uppercase();
-        if is_runway(&runway) {
+        if let Some((_, runway)) = name.split_once('/') {
+            self.runway_deg = runway_heading_deg(runway);
+        } else if is_runway(&runway) {
             arguments.next();
             airport.clone_from(&name);
             name = format!("{name} {runway}");
+            self.runway_deg = runway_heading_deg(&runway);
         }
         let Some(position) = self.navdata.find(&airport, self.reference) else {
             return Ok(PositionRef::Unresolved(name));
@@ -114,6 +117,13 @@ fn is_deletion(word: &str) -> bool {
 
 /// `RW18L` or `RWY18L`.
 fn is_runway(name: &str) -> bool {
-    let number = name.strip_prefix("RWY").or_else(|| name.strip_prefix("RW"));
-    number.is_some_and(|number| number.starts_with(|c: char| c.is_ascii_digit()))
+    runway_heading_deg(name).is_some()
+}
+
+/// Returns the heading that the number of a runway stands for: 180 for `RW18L`.
+fn runway_heading_deg(name: &str) -> Option<f64> {
+    let number = name.strip_prefix("RWY").or_else(|| name.strip_prefix("RW"))?;
+    let digits = number.trim_end_matches(|c: char| !c.is_ascii_digit());
+    let number: u32 = digits.get(..digits.len().min(2))?.parse().ok()?;
+    Some(f64::from(number * 10 % 360))
 }

@@ -46,9 +46,10 @@ const AIRCRAFT_COMMANDS: [&str; 41] = [
 ];
 
 /// Commands beside those to an aircraft and those of a display.
-const OTHER_COMMANDS: [&str; 22] = [
+const OTHER_COMMANDS: [&str; 23] = [
     "ASAS",
     "CDMETHOD",
+    "CLRCRECMD",
     "CRE",
     "CREATE",
     "CRECMD",

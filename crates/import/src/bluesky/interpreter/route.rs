@@ -8,8 +8,8 @@ use crate::report::Treatment;
 use crate::table::Token;
 use sidestep_kernel::InputError;
 
-/// Modes that `ADDWPT` takes in place of a way-point. Airplanes here fly by all way-points, so both have no
-/// effect.
+/// Modes that `ADDWPT` takes in place of a way-point. Airplanes here fly over all way-points, which is named where that
+/// is not what is asked for.
 const TURN_MODES: [&str; 2] = ["FLYBY", "FLYOVER"];
 
 /// Settings of turns that `ADDWPT` takes in place of a way-point, with a value.
@@ -44,6 +44,7 @@ impl Interpreter {
         let mode = arguments.peek().unwrap_or("").to_ascii_uppercase().replace('-', "");
         if TURN_MODES.contains(&&*mode) {
             arguments.next();
+            self.builders[index].flies_over = mode == "FLYOVER";
             return Ok(CommandOutcome::Done);
         }
         if TURN_SETTINGS.contains(&&*mode) {
@@ -126,12 +127,21 @@ impl Interpreter {
             return Err(refusal(arguments, arguments.command, cause, "write fewer"));
         }
         self.add_unresolved(arguments.command, id, &way_point.place);
-        if slot < route_length && self.now_s > self.builders[index].aircraft.created_s {
+        let aircraft = &self.builders[index].aircraft;
+        // Until now it flew to its destination.
+        let precedes_all =
+            route_length == 0 && aircraft.destination_s.is_some_and(|s| s < self.now_s);
+        if (slot < route_length || precedes_all) && self.now_s > aircraft.created_s {
             let rule = "way-points that are put into a route on the way: the route has them from the start";
             self.note(Treatment::Guessed, rule, "");
         }
         self.note_constraints(way_point.altitude_ft.is_some(), way_point.speed.is_some());
-        self.builders[index].aircraft.way_points.insert(slot, way_point);
+        let place = self.place.clone();
+        let builder = &mut self.builders[index];
+        if !builder.flies_over {
+            builder.fly_by_place.get_or_insert(place);
+        }
+        builder.aircraft.way_points.insert(slot, way_point);
         Ok(CommandOutcome::Done)
     }
 
@@ -246,6 +256,11 @@ impl Interpreter {
                 "destinations that change on the way: the route has the last one from the start";
             self.note(Treatment::Guessed, rule, "");
         }
+        self.note(
+            Treatment::NotUsed,
+            "descents to destinations: not flown yet",
+            "give ALT with a time",
+        );
         let aircraft = &mut self.builders[index].aircraft;
         aircraft.destination = Some(place);
         aircraft.destination_s = Some(self.now_s);

@@ -107,6 +107,9 @@ impl Interpreter {
         match canonical_name(name) {
             "RESO" => {
                 let method = resolution(arguments, value)?;
+                if method == ResolutionMethod::Mvp {
+                    self.mvp_place.get_or_insert(self.place.clone());
+                }
                 self.add_setting("RESO", Setting::Resolution(method));
             }
             "DTLOOK" => {
@@ -144,6 +147,7 @@ impl Interpreter {
 
     /// `RMETHH HDG` and `RMETHV OFF` are what MVP does here; all else is named.
     fn limit_resolution(&mut self, name: &str, value: Token) -> CommandOutcome {
+        self.has_resolution_limits |= name == "RMETHH";
         match (name, upper(value).as_str()) {
             ("RMETHH", "HDG") | ("RMETHV", "OFF" | "OF" | "NONE") => CommandOutcome::Done,
             (_, value) => {

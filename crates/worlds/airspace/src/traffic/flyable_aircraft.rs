@@ -1,8 +1,11 @@
 //! Aircraft of a BlueSky file from the time when they move, and the commands to them.
 
-use super::{FOOT_M, MIN_SPEED_M_S};
-use crate::flight_plan::CLIMB_M_S;
+use super::MIN_SPEED_M_S;
+use super::commanded_flight::CommandedFlight;
 use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft};
+
+/// The largest time of a file in seconds; no climb is followed beyond it.
+const MAX_TIME_S: f64 = 1000.0 * 3600.0;
 
 /// An aircraft from the time when it starts to move.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,41 +85,28 @@ impl FlightCommand {
     }
 }
 
-/// Returns the commands that an aircraft is given on the way, with their times.
+/// Returns the commands that an aircraft is given on the way, with their times, and the true airspeeds that its
+/// calibrated one or its Mach number means on the levels that it climbs through.
 pub(super) fn commands_from_changes(
     aircraft: &ScnAircraft,
     has_route: bool,
 ) -> Vec<(f64, FlightCommand)> {
-    let mut altitude_ft = aircraft.altitude_ft;
-    let mut climb_m_s = CLIMB_M_S;
-    let mut commands: Vec<(f64, FlightCommand)> = Vec::new();
+    let mut flight = CommandedFlight::new(aircraft);
     for &(at_s, change) in &aircraft.changes {
+        flight.climb_until(at_s);
         match change {
             AircraftCommand::HeadingDeg(deg) => {
-                commands.push((at_s, FlightCommand::Heading(90.0 - deg)))
+                flight.commands.push((at_s, FlightCommand::Heading(90.0 - deg)))
             }
-            AircraftCommand::Speed(speed) => {
-                let v_m_s = speed.true_airspeed_mps(altitude_ft).max(MIN_SPEED_M_S);
-                commands.push((at_s, FlightCommand::Speed(v_m_s)));
-            }
-            AircraftCommand::AltitudeFt(to_ft) => {
-                altitude_ft = to_ft;
-                commands.push((at_s, FlightCommand::Altitude(to_ft * FOOT_M, climb_m_s)));
-            }
-            AircraftCommand::VerticalSpeedFpm(fpm) if fpm != 0.0 => {
-                climb_m_s = fpm.abs() * FOOT_M / 60.0;
-                // A rate after an `ALT` of the same time belongs to that command.
-                if let Some((last_s, FlightCommand::Altitude(_, rate_m_s))) = commands.last_mut()
-                    && *last_s == at_s
-                {
-                    *rate_m_s = climb_m_s;
-                }
-            }
+            AircraftCommand::Speed(speed) => flight.take_speed(speed),
+            AircraftCommand::AltitudeFt(to_ft) => flight.take_level(to_ft),
+            AircraftCommand::VerticalSpeedFpm(fpm) => flight.take_vertical_speed(fpm),
             AircraftCommand::LateralNavigation(true) if has_route => {
-                commands.push((at_s, FlightCommand::Proceed))
+                flight.commands.push((at_s, FlightCommand::Proceed))
             }
             _ => {}
         }
     }
-    commands
+    flight.climb_until(aircraft.deleted_s.unwrap_or(MAX_TIME_S));
+    flight.commands
 }

@@ -38,6 +38,8 @@ pub(crate) struct ImportedScenarioSettings {
     pub(super) start: ImportedRules,
     /// Changes on the way, by rising time.
     pub(super) changes: Vec<ImportedChange>,
+    /// The winds that blow, each from its time on: meters per second to the east and to the north.
+    pub(super) winds: Vec<(f64, [f64; 2])>,
     /// Commands that cannot be flown.
     pub(crate) refused: Vec<InputError>,
     /// Choices that are not in the file.
@@ -49,6 +51,9 @@ const MAX_CHANGES: usize = 1000;
 /// Shortest and longest look-ahead of a scenario in seconds.
 const MIN_LOOK_AHEAD_S: f64 = 1.0;
 const MAX_LOOK_AHEAD_S: f64 = 36_000.0;
+/// The factor on the zone out of which BlueSky's MVP moves a conflict, unless `RFACH` gives another one. Conflicts are
+/// found with the zone itself.
+const DEFAULT_RESOLUTION_FACTOR: f64 = 1.01;
 
 /// The settings that hold at one time, as BlueSky keeps them.
 #[derive(Debug, Clone)]
@@ -105,6 +110,7 @@ pub(super) fn import_settings(file: &ScnFile) -> ImportedScenarioSettings {
     let mut imported = ImportedScenarioSettings {
         start: states[0].1.clone(),
         changes: changes_between(&states),
+        winds: winds_of(&states),
         refused: reader.refused,
         guesses,
     };
@@ -154,6 +160,14 @@ fn fill_silent_start(states: &mut [(f64, ImportedRules)]) -> Vec<String> {
         );
     }
     guesses
+}
+
+/// Returns the winds of all states; none where none blows at any time.
+fn winds_of(states: &[(f64, ImportedRules)]) -> Vec<(f64, [f64; 2])> {
+    if states.iter().all(|(_, rules)| rules.wind_m_s.is_none()) {
+        return Vec::new();
+    }
+    states.iter().map(|(at_s, rules)| (*at_s, rules.wind_m_s.unwrap_or_default())).collect()
 }
 
 /// Returns the changes from each state to the next.
@@ -221,11 +235,16 @@ fn changes_of_aircraft(file: &ScnFile) -> Vec<ImportedChange> {
 }
 
 impl ImportedRules {
-    /// Returns the settings of MVP, as a scenario writes them; empty for its own ones.
+    /// Returns the settings of MVP, as a scenario writes them: where the file asks for it, those of BlueSky; else empty for
+    /// the scenario's own.
     pub(super) fn mvp_text(&self) -> String {
+        let is_chosen = self.method == Some("mvp");
         let look_ahead = self.look_ahead_s.map(|s| format!("look_ahead_s = {s:?}"));
-        let factor = self.resolution_factor.map(|factor| format!("resolution_factor = {factor:?}"));
-        let keys: Vec<String> = look_ahead.into_iter().chain(factor).collect();
+        let margin = is_chosen.then(|| "margin = 1.0".to_string());
+        let default = is_chosen.then_some(DEFAULT_RESOLUTION_FACTOR);
+        let factor = self.resolution_factor.or(default);
+        let factor = factor.map(|factor| format!("resolution_factor = {factor:?}"));
+        let keys: Vec<String> = look_ahead.into_iter().chain(margin).chain(factor).collect();
         keys.join(", ")
     }
 }
@@ -373,6 +392,9 @@ mod tests {
         let (settings, _) = found("DTLOOK 120\nWIND 0,1,,270,36\nRFACH 1.2\nZONER 3\nZONEDH 500");
         let start = settings.start;
         assert_eq!(start.mvp_text(), "look_ahead_s = 120.0, resolution_factor = 1.2");
+        let (settings, _) = found("RESO MVP\nRFACH 1.2");
+        let as_in_bluesky = "look_ahead_s = 300.0, margin = 1.0, resolution_factor = 1.2";
+        assert_eq!(settings.start.mvp_text(), as_in_bluesky);
         assert_eq!((start.separation_m, start.vertical_m), (5556.0, 152.4));
         let [east, north] = start.wind_m_s.expect("a wind");
         assert!((east - 18.52).abs() < 1e-9 && north.abs() < 1e-9, "{east} {north}");
@@ -390,13 +412,19 @@ mod tests {
             (
                 "00:10:00>RESO MVP\n",
                 Some("none"),
-                vec![(600.0, ", method = \"mvp\", mvp = { look_ahead_s = 300.0 }")],
+                vec![(
+                    600.0,
+                    ", method = \"mvp\", mvp = { look_ahead_s = 300.0, margin = 1.0, resolution_factor = 1.01 }",
+                )],
             ),
             (
                 "00:00:00>RESO MVP\n00:01:00>ZONER 3;DTLOOK 60\n00:02:00>ZONEDH 500;ZONER 3\n",
                 Some("mvp"),
                 vec![
-                    (60.0, ", mvp = { look_ahead_s = 60.0 }, separation_m = 5556.0"),
+                    (
+                        60.0,
+                        ", mvp = { look_ahead_s = 60.0, margin = 1.0, resolution_factor = 1.01 }, separation_m = 5556.0",
+                    ),
                     (120.0, ", vertical_m = 152.4"),
                 ],
             ),
