@@ -92,7 +92,7 @@ fn is_passed((before, pose): (Pose2, Pose2), goal: Point, radius_m: f64, step_m:
     is_inside && left.abs() < radius_m && (-step_m..=0.0).contains(&ahead)
 }
 
-/// Returns whether an airplane has passed a way-point abeam that is not the last one.
+/// Returns whether an airplane has a way-point abeam or behind that is not the last one.
 #[inline(never)]
 fn has_abeam_behind(mission: &[Point], next: usize, pose: Pose2) -> bool {
     let Some(leg) = leg_direction(mission, next) else { return false };
@@ -234,9 +234,9 @@ impl Autopilot<'_> {
         let radius_m = self.model.turn_radius_m();
         let step_m = self.model.v_m_s * self.dtau_s;
         while let Some(&goal) = self.mission.get(next) {
-            if !self.passing.is_done((before, pose), goal, radius_m, step_m)
-                && !(self.passing.passes_abeam && has_abeam_behind(self.mission, next, pose))
-            {
+            let is_done = self.passing.is_done((before, pose), goal, radius_m, step_m)
+                || (self.passing.passes_abeam && has_abeam_behind(self.mission, next, pose));
+            if !is_done {
                 break;
             }
             next += 1;
