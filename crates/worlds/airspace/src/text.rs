@@ -390,7 +390,8 @@ fn phase_delays_text(m: &Metrics) -> String {
         .iter()
         .filter_map(|(delay, phase)| delay.map(|percent| format!("{percent:.1} % in {phase}")))
         .collect();
-    in_parentheses(&known)
+    // Of one phase it is the mean of all.
+    if known.len() > 1 { in_parentheses(&known) } else { String::new() }
 }
 
 fn in_parentheses(words: &[String]) -> String {

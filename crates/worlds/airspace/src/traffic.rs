@@ -34,7 +34,7 @@ const LOOK_EVERY_S: f64 = 1.0;
 /// of 1.5 m radius look ahead 10 s, in which they fly 6.7 radii; airliners fly as many radii of 2.5 nautical miles in
 /// 140 s. The 45 s of scenarios in the paper's size are as many for its airplanes, and too few for airliners.
 const ORCA_LOOK_AHEAD_S: f64 = 150.0;
-/// Look-ahead of MVP in seconds, unless a file gives one: BlueSky's own (`asas_dtlookahead`).
+/// Look-ahead of MVP in seconds in a BlueSky file, unless that gives one: BlueSky's own (`asas_dtlookahead`).
 const MVP_LOOK_AHEAD_S: f64 = 300.0;
 
 /// Smallest speed in meters per second at which an aircraft counts as in the air.

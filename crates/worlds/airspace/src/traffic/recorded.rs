@@ -2,8 +2,8 @@
 
 use super::position::{origin_text, position_text, straight_ahead};
 use super::{
-    FOOT_M, KNOT_M_S, MIN_SPEED_M_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
-    banked_turn_deg_s, callsign, header_text,
+    FOOT_M, KNOT_M_S, MIN_SPEED_M_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S, banked_turn_deg_s,
+    callsign, header_text,
 };
 use crate::flight::SeparationMinima;
 use sidestep_import::local_plane::LocalPlane;
@@ -24,8 +24,7 @@ pub fn from_tracks(name: &str, traffic: &RecordedTraffic) -> Option<String> {
     let replay = "# seconds after which recorded airplanes are flown anew; inf: never\n\
                   replay_until_s = inf\n";
     let replay = if traffic.is_snapshot { "" } else { replay };
-    let mvp = format!("mvp = {{ look_ahead_s = {MVP_LOOK_AHEAD_S:?} }}\n");
-    let more = format!("{mvp}{replay}start_utc_s = {start_s:?}\n{origin}");
+    let more = format!("{replay}start_utc_s = {start_s:?}\n{origin}");
     let mut text = header_text(name, ZONE, None, &more);
     for track in &traffic.tracks {
         if traffic.is_snapshot {
