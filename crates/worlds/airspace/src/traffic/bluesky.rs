@@ -5,8 +5,9 @@
 //! calibrated airspeed or the Mach number stays, so the true one changes with the level. Settings are rules of the scenario or refused by name
 //! (`import_settings.rs`); `not_flown` counts all other commands.
 
+use super::commanded_flight::FlightCommand;
 use super::flyable_aircraft::{
-    FlightCommand, FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
+    FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
 };
 use super::import_settings::{
     ImportedChange, ImportedRules, ImportedScenarioSettings, import_settings,

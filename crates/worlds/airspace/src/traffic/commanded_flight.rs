@@ -1,6 +1,5 @@
 //! The level and the airspeed of an aircraft of a BlueSky file from command to command.
 
-use super::flyable_aircraft::FlightCommand;
 use super::{FOOT_M, MIN_SPEED_M_S};
 use crate::flight_plan::CLIMB_M_S;
 use sidestep_import::bluesky::{Airspeed, ScnAircraft};
@@ -12,6 +11,32 @@ const LEVEL_STEP_FT: f64 = 100.0;
 const MAX_SPEED_ERROR_M_S: f64 = 0.5;
 /// Smallest vertical speed in ft/min that BlueSky takes for one; for others it takes its own.
 const MIN_VERTICAL_SPEED_FPM: f64 = 0.01;
+
+/// A command to an airplane, in the scenario's terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum FlightCommand {
+    /// Degrees counterclockwise from east.
+    Heading(f64),
+    Speed(f64),
+    /// Meters, and meters per second.
+    Altitude(f64, f64),
+    Proceed,
+    Leave,
+}
+
+impl FlightCommand {
+    pub(super) fn text(self) -> String {
+        match self {
+            Self::Heading(deg) => format!("heading_deg = {deg:?}"),
+            Self::Speed(v_m_s) => format!("speed_m_s = {v_m_s:?}"),
+            Self::Altitude(altitude_m, climb_m_s) => {
+                format!("altitude_m = {altitude_m:?}, climb_m_s = {climb_m_s:?}")
+            }
+            Self::Proceed => "proceeds = true".into(),
+            Self::Leave => "leaves = true".into(),
+        }
+    }
+}
 
 /// An aircraft on its way through its commands.
 pub(super) struct CommandedFlight {
@@ -112,64 +137,5 @@ impl CommandedFlight {
     fn command_climb(&mut self) {
         let climb = FlightCommand::Altitude(self.level_ft * FOOT_M, self.climb_m_s());
         self.commands.push((self.now_s, climb));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::flyable_aircraft::commands_from_changes;
-    use super::*;
-    use sidestep_import::bluesky::parse;
-
-    fn commands(text: &str) -> Vec<(f64, FlightCommand)> {
-        let file = parse(&"c.scn", &format!("00:00:00>CRE A1,B744,52,4,90,FL100,250\n{text}"));
-        commands_from_changes(&file.traffic.aircraft[0], false)
-    }
-
-    #[test]
-    fn a_calibrated_airspeed_stays_in_a_climb_and_a_mach_number_too() {
-        let all = commands("00:01:00>ALT A1 FL200 2000\n");
-        let level = Airspeed::CasKt(250.0);
-        let (last_s, FlightCommand::Speed(top_m_s)) = all[all.len() - 1] else { panic!("{all:?}") };
-        assert!((last_s - 360.0).abs() < 1e-6, "five minutes of climb: {last_s}");
-        assert_eq!(top_m_s, level.true_airspeed_mps(20_000.0));
-        for &(at_s, command) in &all[1..] {
-            let FlightCommand::Speed(v_m_s) = command else { panic!("{all:?}") };
-            let altitude_ft = 10_000.0 + (at_s - 60.0) * 2000.0 / 60.0;
-            let off_m_s = v_m_s - level.true_airspeed_mps(altitude_ft);
-            assert!(off_m_s.abs() < 0.51, "{at_s} s: {off_m_s}");
-        }
-        let mach = commands("00:00:00>SPD A1 M0.5\n00:00:00>ALT A1 FL200\n");
-        let (_, FlightCommand::Speed(slower_m_s)) = mach[mach.len() - 1] else {
-            panic!("{mach:?}")
-        };
-        assert_eq!(slower_m_s, Airspeed::Mach(0.5).true_airspeed_mps(20_000.0));
-    }
-
-    #[test]
-    fn a_speed_in_a_climb_is_that_of_the_level_reached_by_then() {
-        let all = commands("00:00:00>ALT A1 FL200 2000\n00:02:30>SPD A1 300\n");
-        let ordered = all.iter().find(|(at_s, _)| *at_s == 150.0);
-        let halfway_m_s = Airspeed::CasKt(300.0).true_airspeed_mps(15_000.0);
-        let Some((_, FlightCommand::Speed(v_m_s))) = ordered else { panic!("{all:?}") };
-        assert!((v_m_s - halfway_m_s).abs() < 1e-9, "{v_m_s} {halfway_m_s}");
-    }
-
-    #[test]
-    fn a_vertical_speed_in_a_climb_holds_for_the_rest_of_it() {
-        let climbs = |text: &str| -> Vec<(f64, f64)> {
-            let climb = |(at_s, command)| match command {
-                FlightCommand::Altitude(_, m_s) => Some((at_s, f64::round(m_s / FOOT_M * 60.0))),
-                _ => None,
-            };
-            commands(text).into_iter().filter_map(climb).collect()
-        };
-        let changed = climbs("00:00:00>ALT A1 FL200\n00:01:00>VS A1 500\n");
-        assert_eq!(changed, [(0.0, 1500.0), (60.0, 500.0)]);
-        assert_eq!(climbs("00:00:00>VS A1 500\n00:00:00>ALT A1 FL200\n"), [(0.0, 500.0)]);
-        // One that leads away from the level is not taken, and 0 stands for BlueSky's own.
-        assert_eq!(climbs("00:00:00>VS A1 500\n00:00:00>ALT A1 FL050\n"), [(0.0, 1500.0)]);
-        let own = climbs("00:00:00>ALT A1 FL200 500\n00:01:00>VS A1 0\n");
-        assert_eq!(own, [(0.0, 500.0), (60.0, 1500.0)]);
     }
 }
