@@ -23,8 +23,9 @@ const MIN_CALLSIGN_S: f64 = 60.0;
 /// What reported speeds may differ from those of rows, before their unit is in doubt.
 const SPEED_RATIOS: std::ops::RangeInclusive<f64> = 0.75..=1.35;
 
-/// The greatest mean speed of a flight in m/s, some 5,000 kt: with a greater one most of its positions are wrong.
-const MAX_MEAN_SPEED_M_S: f64 = 2_600.0;
+/// The greatest median speed between the rows of a flight in m/s, some 5,000 kt: with a greater one most of its positions
+/// are wrong.
+const MAX_TYPICAL_SPEED_M_S: f64 = 2_600.0;
 
 /// What units of speed may differ from the one that a column says.
 const UNIT_RATIOS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
@@ -220,8 +221,9 @@ impl FlightBuilder<'_> {
         for pair in parts.windows(2) {
             let (Some(before), Some(row)) = (pair[0].last(), pair[1].first()) else { continue };
             if aircraft_key(before) == aircraft_key(row) && self.is_gap(before, row) {
-                let remedy = "add `--set import.max_gap_s=SECONDS` for another limit";
-                self.record(Treatment::Guessed, &rule, row, remedy);
+                let twice_s = 2.0 * self.options.max_gap_s;
+                let remedy = format!("add `--set import.max_gap_s={twice_s}` for twice that limit");
+                self.record(Treatment::Guessed, &rule, row, &remedy);
             }
         }
     }
@@ -407,7 +409,7 @@ impl FlightBuilder<'_> {
             self.record(Treatment::Dropped, SINGLE_ROW_RULE, first, "");
             return None;
         }
-        if mean_speed_m_s(&rows) > MAX_MEAN_SPEED_M_S {
+        if plausibility::typical_speed_m_s(&rows) > MAX_TYPICAL_SPEED_M_S {
             let rule = "rows of flights that are faster than anything that flies";
             rows.iter().for_each(|row| self.record(Treatment::Dropped, rule, row, ""));
             self.bad_count += rows.len();
@@ -434,16 +436,6 @@ impl FlightBuilder<'_> {
         let remedy = "give a recording of aircraft in the air, each in two rows at least";
         InputError::new(place, cause, remedy)
     }
-}
-
-/// Returns the length of the way through all rows over its duration; 0 for a single row.
-fn mean_speed_m_s(rows: &[Row]) -> f64 {
-    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return 0.0 };
-    let steps = rows.windows(2);
-    let length_m: f64 =
-        steps.map(|pair| distance_m(pair[0].sample.position, pair[1].sample.position)).sum();
-    let duration_s = last.sample.time_s - first.sample.time_s;
-    if duration_s > 0.0 { length_m / duration_s } else { 0.0 }
 }
 
 /// Returns whether every aircraft has one row: with more, rows that are far apart are no picture of one instant.

@@ -121,9 +121,15 @@ pub(super) fn collect(collector: &mut RowCollector, text: &str) -> Result<(), In
         };
         let Some(error) = error else { break };
         let good_end = begin + documents.byte_offset();
-        begin = states.leave_out_line(text, good_end, &error)?;
+        let list_end = good_end + states.push_items_of_cut_list(&text[good_end..])?;
+        begin = states.leave_out_line(text, list_end, &error)?;
     }
     states.push_records()
+}
+
+/// Returns whether a character stands between the items of a list.
+fn is_separator(c: char) -> bool {
+    c == ',' || c.is_whitespace()
 }
 
 /// Returns where the fields of a state are.
@@ -157,6 +163,22 @@ impl StateReader<'_> {
         InputError::new(self.collector.place(), cause, remedy)
     }
 
+    /// Reads the items of a list that is not whole, as of a file that was cut short. Returns where the last whole one
+    /// ends; 0 where the text begins with no list.
+    fn push_items_of_cut_list(&mut self, text: &str) -> Result<usize, InputError> {
+        let Some(mut rest) = text.trim_start().strip_prefix('[') else { return Ok(0) };
+        let mut end = 0;
+        loop {
+            rest = rest.trim_start_matches(is_separator);
+            let mut items = Deserializer::from_str(rest).into_iter::<Json>();
+            let Some(Ok(item)) = items.next() else { return Ok(end) };
+            let length = items.byte_offset();
+            self.push_item(item)?;
+            rest = &rest[length..];
+            end = text.len() - rest.len();
+        }
+    }
+
     /// Leaves out what is no JSON up to the end of its line, after `good_end`; returns where the next line begins.
     ///
     /// # Errors
@@ -171,7 +193,7 @@ impl StateReader<'_> {
             return Err(self.error(&error.to_string()));
         }
         let rest = &text[good_end..];
-        let bad_begin = good_end + (rest.len() - rest.trim_start().len());
+        let bad_begin = good_end + (rest.len() - rest.trim_start_matches(is_separator).len());
         let line = 1 + text[..bad_begin].matches('\n').count();
         self.broken_lines.push(line);
         let line_length = text[bad_begin..].find('\n').map(|length| length + 1);

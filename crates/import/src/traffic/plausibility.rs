@@ -163,7 +163,7 @@ pub(super) fn suspicions(rows: &[Row], speed_ratio: f64) -> Vec<Option<Suspicion
 }
 
 /// Returns the median speed between rows.
-fn typical_speed_m_s(rows: &[Row]) -> f64 {
+pub(super) fn typical_speed_m_s(rows: &[Row]) -> f64 {
     let mut speeds: Vec<f64> = Vec::with_capacity(rows.len());
     for pair in rows.windows(2) {
         let length_m = distance_m(pair[0].sample.position, pair[1].sample.position);

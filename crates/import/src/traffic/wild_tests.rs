@@ -236,6 +236,11 @@ fn what_follows_a_broken_line_of_json_is_read() {
     let found = finding(&traffic, "no JSON").expect("a rule");
     assert_eq!((found.count, &found.places[..]), (1, &["line 4".to_string()][..]));
     assert!(parse(&"f", &lines[0][..90]).is_err(), "nothing was read before");
+    let list = format!("[{}]", lines.join(",\n"));
+    let traffic = read_text(&list[..list.len() - 30]);
+    assert_eq!(traffic.tracks[0].samples.len(), 5, "{:?}", traffic.report);
+    let found = finding(&traffic, "no JSON").expect("a rule");
+    assert_eq!((found.count, &found.places[..]), (1, &["line 6".to_string()][..]));
 }
 
 #[test]

@@ -47,6 +47,9 @@ fn write_track(text: &mut String, track: &Track, start_s: f64) {
     let omega_deg_s = banked_turn_deg_s(mean_speed_m_s(track).max(1.0));
     text.push_str(&section_head(track));
     // Writing to a string cannot fail.
+    if let Some(v_m_s) = speed_beside_jumps_m_s(track) {
+        let _ = writeln!(text, "v_m_s = {v_m_s:?}");
+    }
     let _ = writeln!(text, "omega_max_deg_s = {omega_deg_s:?}\ntrack_deg = [");
     for sample in &track.samples {
         let at = position_text(sample.position);
@@ -76,6 +79,29 @@ fn write_straight_flight(text: &mut String, track: &Track, start_s: f64) {
         sample.time_s - start_s,
         banked_turn_deg_s(v_m_s)
     );
+}
+
+/// The greatest speed in m/s, some 5,000 kt, that the way of a flight has without jumps.
+const MAX_WAY_SPEED_M_S: f64 = 2_600.0;
+
+/// Returns the median speed between the rows of a flight whose way is so long that positions of it must be wrong; `None`
+/// where its way gives its speed.
+fn speed_beside_jumps_m_s(track: &Track) -> Option<f64> {
+    let mut speeds = Vec::with_capacity(track.samples.len());
+    let (mut length_m, mut duration_s) = (0.0, 0.0);
+    for pair in track.samples.windows(2) {
+        let step_m = LocalPlane::centered_at(pair[0].position).to_plane_m(pair[1].position);
+        let step_length_m = math::hypot(step_m[0], step_m[1]);
+        let step_s = pair[1].time_s - pair[0].time_s;
+        length_m += step_length_m;
+        duration_s += step_s;
+        speeds.push(step_length_m / step_s);
+    }
+    if length_m <= MAX_WAY_SPEED_M_S * duration_s {
+        return None;
+    }
+    speeds.sort_by(f64::total_cmp);
+    Some(speeds.get(speeds.len() / 2)?.clamp(1.0, MAX_WAY_SPEED_M_S))
 }
 
 /// Returns the mean of the speeds that a flight reports, or else that of its rows.
@@ -141,6 +167,19 @@ mod tests {
         let [east_m, north_m] = world.surface.offset_m(first.start.at, first.mission[0]);
         assert!(first.start.heading_rad.abs() < 1e-9 && east_m > 400_000.0);
         assert!(north_m.abs() < 1.0);
+    }
+
+    #[test]
+    fn a_recording_with_a_jump_that_inspect_keeps_can_be_run() {
+        let mut text = String::from("time_s,icao24,callsign,lat_deg,lon_deg,alt_ft,gs_kt\n");
+        for k in 0..20 {
+            let lon_deg = 7.0 + 0.03 * f64::from(k);
+            let lat_deg = if k < 10 { 47.0 } else { 54.0 };
+            let _ = writeln!(text, "{},aaaaa1,A1,{lat_deg},{lon_deg:.2},35000,440", 10 * k);
+        }
+        let compiled = CompiledAirspace::new(&Source::new("t", scenario(&text), ""));
+        let v_m_s = compiled.expect("a scenario").world.airplanes[0].model.v_m_s;
+        assert!((v_m_s - 227.0).abs() < 30.0, "{v_m_s}");
     }
 
     #[test]
