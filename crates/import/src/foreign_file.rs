@@ -106,6 +106,11 @@ impl ForeignFormat {
             return Ok(Some(Self::Bag));
         }
         let text = String::from_utf8_lossy(&start);
+        if is_of_robot_runners(&text) {
+            let cause = "is a problem of the League of Robot Runners, or a part of one, of which only the map is read";
+            let remedy = "give the .map file that its `mapFile` names, in the folder `maps`";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
         Ok(match extension(path).as_str() {
             "yaml" | "yml" if text.contains(BAG_METADATA_KEY) => Some(Self::Bag),
             "yaml" | "yml" => Some(Self::RosMap),
@@ -170,6 +175,12 @@ const CHARACTER_BOXES: GridOptions =
 fn is_image_content(start: &[u8]) -> bool {
     // Any text may begin with two letters; an image has zeros.
     start.contains(&0) && IMAGE_MAGICS.iter().any(|magic| start.starts_with(magic))
+}
+
+/// Returns whether a text is a problem of the League of Robot Runners, or its list of agents or tasks.
+fn is_of_robot_runners(text: &str) -> bool {
+    const KEYS: [&str; 2] = ["\"mapFile\"", "\"agentFile\""];
+    text.starts_with("# version for LoRR") || KEYS.iter().all(|key| text.contains(key))
 }
 
 /// Returns whether a text has a line that begins as a message of CARMEN.
@@ -237,11 +248,23 @@ fn inspect_srdf(path: &Path) -> Result<ImportReport, InputError> {
 }
 
 fn inspect_table(path: &Path, kind: TableKind) -> Result<ImportReport, InputError> {
-    let table = CsvTable::read(path)?;
+    let table = match kind {
+        TableKind::Targets => CsvTable::read(path)?,
+        TableKind::Readings | TableKind::Motions => CsvTable::read_recording(path)?,
+    };
     let mut report = ImportReport::new(kind.format());
     report.add_fact("columns", table.header().join(", "));
     table.record_separators(&mut report);
-    report.add_kept("rows", table.rows().count());
+    let rows = table.rows().count();
+    report.add_kept("rows", rows);
+    let misfits = table.misfits();
+    if misfits.len() > rows {
+        return Err(table.misfit_error(misfits[0]));
+    }
+    for misfit in misfits {
+        let rule = "rows with another number of fields than the header";
+        report.record(Treatment::Dropped, rule, format!("line {}", misfit.line), "");
+    }
     Ok(report)
 }
 
@@ -272,4 +295,75 @@ fn inspect_mesh(path: &Path) -> Result<ImportReport, InputError> {
     }
     report.add_kept("vertices", mesh.points_m.len());
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The report of a file among others in a folder, by its own name.
+    fn inspected(name: &str, files: &[(&str, &[u8])]) -> Result<ImportReport, InputError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for (name, bytes) in files {
+            std::fs::write(folder.path().join(name), bytes).expect("written");
+        }
+        let path = folder.path().join(name);
+        let format = ForeignFormat::recognize(&path)?.expect("a known kind");
+        format.inspect(&path)
+    }
+
+    #[test]
+    fn every_image_of_a_map_is_inspected_and_others_say_what_to_do() {
+        for name in ["a.pgm", "A.PNM", "a.pbm"] {
+            let report = inspected(name, &[(name, b"P5 1 2 255\n\xff\x00")]).expect(name);
+            assert_eq!(report.kept[0].count, 1, "{name}");
+        }
+        for (name, bytes) in
+            [("a.gif", &b"GIF89a\x01\0\x01\0"[..]), ("a.webp", b"RIFF\x1a\0\0\0WEBPVP8 ")]
+        {
+            let error = inspected(name, &[(name, bytes)]).expect_err(name);
+            assert_eq!(error.remedy(), "save it as PNG, PGM (P2 or P5), JPEG or BMP", "{name}");
+        }
+    }
+
+    #[test]
+    fn the_report_of_a_model_has_its_meshes() {
+        let mesh = |file: &str| {
+            format!("<collision><geometry><mesh filename='{file}'/></geometry></collision>")
+        };
+        let model = format!(
+            "<robot name='r'><link name='l'>{}{}</link></robot>",
+            mesh("a.obj"),
+            mesh("b.stl")
+        );
+        let obj = b"v 0 0 0\nv 90 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n";
+        let report =
+            inspected("r.urdf", &[("r.urdf", model.as_bytes()), ("a.obj", obj)]).expect("a model");
+        let kept = report.kept.iter().find(|item| item.noun == "collision meshes").expect("meshes");
+        assert_eq!(kept.count, 1);
+        let said: Vec<String> = report.findings.iter().map(ToString::to_string).collect();
+        let has = |words: &str| said.iter().any(|line| line.contains(words));
+        assert!(has("b.stl: the file is absent") && has("look like millimeters"), "{said:?}");
+    }
+
+    #[test]
+    fn a_problem_of_the_robot_runners_names_what_is_read_of_it() {
+        let problem = b"{ \"mapFile\": \"maps/a.map\", \"agentFile\": \"agents/a.agents\" }";
+        for (name, bytes) in
+            [("a.json", &problem[..]), ("a.tasks", b"# version for LoRR 2026\n3\n")]
+        {
+            let error = inspected(name, &[(name, bytes)]).expect_err(name);
+            assert!(error.cause().contains("League of Robot Runners"), "{error}");
+        }
+    }
+
+    #[test]
+    fn rows_of_a_table_to_learn_from_that_do_not_fit_are_counted() {
+        let text =
+            b"action,ahead_boxes,left_boxes,turn_deg\nforward,1,0,0\nforward,1\nforward,1,0,0\n";
+        let report = inspected("m.csv", &[("m.csv", text)]).expect("a table");
+        assert_eq!((report.dropped(), report.kept[0].count), (1, 2));
+        let targets = b"x,y,z\n1,2,3\n1,2\n";
+        assert!(inspected("t.csv", &[("t.csv", targets)]).is_err(), "targets are a model");
+    }
 }
