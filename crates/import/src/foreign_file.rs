@@ -111,6 +111,11 @@ impl ForeignFormat {
             let remedy = "give the .map file that its `mapFile` names, in the folder `maps`";
             return Err(InputError::new(path.display(), cause, remedy));
         }
+        if extension(path) == "dat" && path.parent().is_some_and(is_mrclam_folder) {
+            let cause = "is a part of an MRCLAM data set, which is read as a whole";
+            let remedy = "give the folder of the data set";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
         Ok(match extension(path).as_str() {
             "yaml" | "yml" if text.contains(BAG_METADATA_KEY) => Some(Self::Bag),
             "yaml" | "yml" => Some(Self::RosMap),
@@ -140,9 +145,7 @@ impl ForeignFormat {
         match self {
             Self::RosMap => Ok(rosmap::load(path)?.into_report()),
             Self::Image => inspect_image(path),
-            Self::CharMap => {
-                import_map(path, CHARACTER_BOXES).map(|ImportedMap { report, .. }| report)
-            }
+            Self::CharMap => inspect_char_map(path),
             Self::Scen => movingai::load_scen(path).map(|file| file.report),
             Self::Urdf => inspect_urdf(path),
             Self::Srdf => inspect_srdf(path),
@@ -189,10 +192,14 @@ fn has_carmen_message(text: &str) -> bool {
     firsts.any(|word| CARMEN_MESSAGES.contains(&word))
 }
 
+fn is_mrclam_folder(folder: &Path) -> bool {
+    ["Barcodes.dat", "Barcodes.dat.gz"].iter().any(|name| folder.join(name).is_file())
+}
+
 /// Returns the kind of a folder by the names in it.
 fn folder_format(folder: &Path) -> Option<ForeignFormat> {
     let has = |name: &str| folder.join(name).is_file();
-    if has("Barcodes.dat") || has("Barcodes.dat.gz") {
+    if is_mrclam_folder(folder) {
         return Some(ForeignFormat::Mrclam);
     }
     if has("metadata.yaml") {
@@ -201,7 +208,7 @@ fn folder_format(folder: &Path) -> Option<ForeignFormat> {
     let names = folder.read_dir().ok()?.filter_map(|entry| Some(entry.ok()?.path()));
     let mut extensions = names.map(|path| extension(&path));
     extensions
-        .any(|extension| extension == "mcap" || extension == "db3")
+        .any(|extension| ["mcap", "db3", "bag"].contains(&extension.as_str()))
         .then_some(ForeignFormat::Bag)
 }
 
@@ -213,6 +220,16 @@ fn inspect_image(path: &Path) -> Result<ImportReport, InputError> {
     report.facts.retain(|fact| !METRIC_FACTS.contains(&fact.name));
     report.add_fact("pixels", format!("{width} x {height}"));
     let needs = "the side of a pixel: `--resolution 0.05`, in a scenario `map.resolution_m = 0.05`";
+    report.add_fact("not in the file", needs);
+    Ok(report)
+}
+
+/// Returns the report of a map in characters, in boxes: their size is not in the file.
+fn inspect_char_map(path: &Path) -> Result<ImportReport, InputError> {
+    let ImportedMap { map, mut report } = import_map(path, CHARACTER_BOXES)?;
+    report.facts.retain(|fact| fact.name != "boxes");
+    report.add_fact("boxes", format!("{} x {}", map.width(), map.height()));
+    let needs = "the side of a box: `--box 0.5`, in a scenario `map.box_size_m = 0.5`";
     report.add_fact("not in the file", needs);
     Ok(report)
 }
@@ -355,6 +372,20 @@ mod tests {
             let error = inspected(name, &[(name, bytes)]).expect_err(name);
             assert!(error.cause().contains("League of Robot Runners"), "{error}");
         }
+    }
+
+    #[test]
+    fn what_is_not_in_a_file_is_said_and_not_invented() {
+        let map = b"type octile\nheight 1\nwidth 2\nmap\n.@\n";
+        let report = inspected("a.map", &[("a.map", map)]).expect("a map");
+        let facts: Vec<&str> = report.facts.iter().map(|fact| &*fact.value).collect();
+        assert_eq!(facts[0], "2 x 1");
+        assert!(facts[1].starts_with("the side of a box"), "{facts:?}");
+        let part = inspected(
+            "Robot1_Odometry.dat",
+            &[("Barcodes.dat", b""), ("Robot1_Odometry.dat", b"1 2 3")],
+        );
+        assert_eq!(part.expect_err("a part").remedy(), "give the folder of the data set");
     }
 
     #[test]

@@ -98,14 +98,6 @@ impl Bitmap {
         }
     }
 
-    /// Returns the greatest opacity of a pixel, from 0 to 1.
-    pub fn max_opacity(&self) -> f64 {
-        if !self.has_opacity() {
-            return 1.0;
-        }
-        self.map_shades(|shade| shade.opacity).into_iter().fold(0.0, f64::max)
-    }
-
     /// Returns whether the pixels can be transparent.
     pub fn has_opacity(&self) -> bool {
         self.pixels.color().has_alpha()

@@ -466,9 +466,9 @@ mod tests {
             findings,
             [
                 "not used: the symbol `E` (emitter point, where goods are delivered), read as a free \
-                 box (3 times), line 5, line 7, ...",
+                 box (3 times), line 5, line 7",
                 "not used: the symbol `S` (swamp, or service point, where goods are picked up), read \
-                 as a free box (2 times), line 6, ...",
+                 as a free box (2 times), line 6",
             ]
         );
         let plain = parse_map("m", &WAREHOUSE.replace(['E', 'S'], "."), 1.0).expect("a map");

@@ -120,7 +120,7 @@ fn cells_from_bottom(
     let lossy = if image.is_lossy { ", with the errors of JPEG" } else { "" };
     report.add_fact("image", image.pixel_type() + lossy);
     let survey = Survey::of(image, reading);
-    let ground = TransparentGround::of(&survey, reading.mode, image.max_opacity());
+    let ground = TransparentGround::of(&survey, reading.mode);
     let from_top = image.map_shades(|shade| ground.cell(shade, reading));
     record_transparency(&survey, ground, report);
     if image.is_turned {
@@ -158,6 +158,8 @@ struct Survey {
     pixels: usize,
     /// Number of pixels that are not opaque.
     transparent: usize,
+    /// The greatest opacity of a pixel, from 0 to 1.
+    max_opacity: f64,
     /// Number of opaque pixels whose brightness is that of free ground.
     opaque_free: usize,
     /// Number of those of each whole gray.
@@ -180,6 +182,7 @@ impl Survey {
         let mut survey = Self {
             pixels: 0,
             transparent: 0,
+            max_opacity: 0.0,
             opaque_free: 0,
             opaque_between: 0,
             colored: 0,
@@ -196,6 +199,7 @@ impl Survey {
     fn add(&mut self, shade: Shade, reading: OccupancyRule) {
         self.pixels += 1;
         self.range = [self.range[0].min(shade.brightness), self.range[1].max(shade.brightness)];
+        self.max_opacity = self.max_opacity.max(shade.opacity);
         if reading.mode == MapMode::Raw {
             self.raw_between += usize::from(reading.is_between_raw(shade.brightness));
             self.raw_beyond += usize::from(reading.is_beyond_raw(shade.brightness));
@@ -358,11 +362,13 @@ enum TransparentGround {
 }
 
 impl TransparentGround {
-    fn of(survey: &Survey, mode: MapMode, max_opacity: f64) -> Self {
+    fn of(survey: &Survey, mode: MapMode) -> Self {
         let [darkest, lightest] = survey.range;
         match mode {
             // Nothing would be seen of the image at all: its program has not filled the channel in.
-            MapMode::Trinary | MapMode::Scale if max_opacity == 0.0 && darkest < lightest => {
+            MapMode::Trinary | MapMode::Scale
+                if survey.max_opacity == 0.0 && darkest < lightest =>
+            {
                 Self::Unset
             }
             MapMode::Scale => Self::UnknownByFormat,

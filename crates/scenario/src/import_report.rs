@@ -134,8 +134,10 @@ impl ImportReport {
             return;
         };
         finding.count += 1;
+        // A place that is used again and again, such as a definition, is named once.
+        let new = places.into_iter().find(|place| !finding.places.contains(place));
         if finding.places.len() < MAX_PLACES {
-            finding.places.extend(places);
+            finding.places.extend(new);
         }
     }
 
@@ -206,7 +208,8 @@ impl std::fmt::Display for Finding {
         }
         if !self.places.is_empty() {
             write!(f, ", {}", escape_controls(&self.places.join(", ")))?;
-            if self.count > self.places.len() as u64 {
+            // Fewer places are all that there are, however often the rule applied there.
+            if self.places.len() == MAX_PLACES && self.count > MAX_PLACES as u64 {
                 write!(f, ", ...")?;
             }
         }
@@ -240,6 +243,15 @@ mod tests {
             "dropped: rows without a position (5 times), line 7, line 8, line 9, ..."
         );
         assert_eq!(lines[1], "guessed: the delimiter is `;`; give --delimiter");
+    }
+
+    #[test]
+    fn a_place_where_a_rule_applied_several_times_is_named_once() {
+        let mut report = ImportReport::new("CSV");
+        for line in [7, 7, 7, 9, 9] {
+            report.record(Treatment::NotUsed, "notes", format!("line {line}"), "");
+        }
+        assert_eq!(report.findings[0].to_string(), "not used: notes (5 times), line 7, line 9");
     }
 
     #[test]

@@ -60,7 +60,7 @@ impl Tally {
         let first =
             self.places.first().map_or_else(String::new, |place| format!(", first {place}"));
         let cause = format!("{bad} of {} messages cannot be read{first}", bad + self.good);
-        let remedy = "record the bag again, or give another topic";
+        let remedy = "give another topic, or correct the program that publishes this one";
         Err(InputError::new(format!("{bag}: {topic}"), cause, remedy))
     }
 

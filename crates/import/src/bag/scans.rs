@@ -146,10 +146,14 @@ pub(super) struct RangeCounts {
     beyond_maximum: u64,
     /// The least and the greatest limit of the ranges of a scan.
     max_m: Option<[f32; 2]>,
-    /// The greatest range between the limits of its scan, how often it occurs, and how many come near to a limit.
+    /// The greatest range between the limits of its scan.
     greatest_m: f32,
-    at_greatest: u64,
+    /// Number of ranges just below their limit; a value that most of them may have, its votes against the others, and how
+    /// often it was seen.
     near_limit: u64,
+    candidate_m: f32,
+    votes: u64,
+    at_candidate: u64,
     /// The value of the ranges that are too near; `None` where there are several.
     near_mark_m: Option<f32>,
     has_several_near: bool,
@@ -159,8 +163,8 @@ pub(super) struct RangeCounts {
 
 /// The last bearing of a scan may be that of its last beam, or of the one that would follow, in steps between beams.
 const MAX_END_STEPS: f32 = 1.5;
-/// A range is near to its limit from this share of it on.
-const NEAR_LIMIT: f32 = 0.9;
+/// A range is just below its limit from this share of it on.
+const NEAR_LIMIT: f32 = 0.99;
 /// So great a share of the ranges near to the limit is at one value where that value is a mark.
 const MIN_MARK_SHARE: f64 = 0.5;
 /// So many more ranges than are usual at the ends of a robot, as a share of all, are suspicious where they are too near.
@@ -196,11 +200,20 @@ impl RangeCounts {
     }
 
     fn add_measured(&mut self, range_m: f32, scan: &LaserScan) {
-        if range_m > self.greatest_m {
-            (self.greatest_m, self.at_greatest) = (range_m, 0);
+        self.greatest_m = self.greatest_m.max(range_m);
+        if range_m <= NEAR_LIMIT * scan.range_max_m {
+            return;
         }
-        self.at_greatest += u64::from(range_m == self.greatest_m);
-        self.near_limit += u64::from(range_m > NEAR_LIMIT * scan.range_max_m);
+        self.near_limit += 1;
+        // The vote of Boyer and Moore, which finds a value that most have without keeping them.
+        if self.votes == 0 && range_m != self.candidate_m {
+            (self.candidate_m, self.at_candidate) = (range_m, 0);
+        }
+        if range_m == self.candidate_m {
+            (self.votes, self.at_candidate) = (self.votes + 1, self.at_candidate + 1);
+        } else {
+            self.votes -= 1;
+        }
     }
 
     fn add_near(&mut self, range_m: f32) {
@@ -208,17 +221,16 @@ impl RangeCounts {
         self.near_mark_m = Some(range_m);
     }
 
-    /// Returns the value just below the limit that a driver writes for no echo, where most ranges near to the limit have it.
+    /// Returns the value just below the limit that a driver writes for no echo, where most ranges there have it.
     fn mark_m(&self) -> Option<f32> {
         let [low, high] = self.max_m?;
         let is_mark = self.infinite == 0
             && low == high
-            && self.greatest_m > NEAR_LIMIT * high
-            && self.at_greatest >= MIN_AT_LIMIT
-            && self.at_greatest as f64 >= MIN_SHARE_AT_LIMIT * self.beams as f64
-            && self.at_greatest as f64 >= MIN_MARK_SHARE * self.near_limit as f64
+            && self.at_candidate >= MIN_AT_LIMIT
+            && self.at_candidate as f64 >= MIN_SHARE_AT_LIMIT * self.beams as f64
+            && self.at_candidate as f64 >= MIN_MARK_SHARE * self.near_limit as f64
             && self.at_maximum + self.beyond_maximum == 0;
-        is_mark.then_some(self.greatest_m)
+        is_mark.then_some(self.candidate_m)
     }
 
     /// Returns whether all ranges that are too near are at one value, which is no measurement then.
@@ -249,7 +261,7 @@ impl RangeCounts {
             return Some(NoEcho::Infinite);
         }
         let at_maximum = if self.is_limit_measured() { 0 } else { self.at_maximum };
-        let at_mark = self.mark_m().map_or(0, |_| self.at_greatest);
+        let at_mark = self.mark_m().map_or(0, |_| self.at_candidate);
         let near = if self.is_near_mark() { self.too_near } else { 0 };
         let counts = [
             (NoEcho::TooNear, near),
@@ -295,7 +307,7 @@ impl RangeCounts {
             NoEcho::Maximum => {
                 self.at_maximum
                     + self.beyond_maximum
-                    + self.mark_m().map_or(0, |_| self.at_greatest)
+                    + self.mark_m().map_or(0, |_| self.at_candidate)
             }
             NoEcho::TooNear => self.too_near,
         }
@@ -590,15 +602,15 @@ mod tests {
         );
         let (scans, _) = read(&near, Some(NoEcho::Infinite));
         assert_eq!(scans[0].ranges_m, [1.0, -INF, 2.0, -INF, -INF]);
-        let (scans, said) = read(&[scan(8.0, &[1.0, 7.99, 2.0, 7.99, 7.99, 7.5])], None);
-        assert_eq!(scans[0].ranges_m, [1.0, INF, 2.0, INF, INF, 7.5]);
+        let (scans, said) = read(&[scan(8.0, &[1.0, 7.99, 7.995, 7.99, 7.99, 7.5])], None);
+        assert_eq!(scans[0].ranges_m, [1.0, INF, 7.995, INF, INF, 7.5]);
         assert!(
             said[0].starts_with("guessed: the greatest range on /scan is no echo (3 of 6"),
             "{said:?}"
         );
         // A wall that is seen at many ranges near to the limit.
         let (scans, said) =
-            read(&[scan(8.0, &[7.9, 7.91, 7.92, 7.93, 7.94, 7.99, 7.99, 7.99])], None);
+            read(&[scan(8.0, &[7.93, 7.94, 7.95, 7.96, 7.97, 7.99, 7.99, 7.99])], None);
         assert!(
             scans[0].ranges_m.iter().all(|range_m| range_m.is_finite()) && said.is_empty(),
             "{said:?}"

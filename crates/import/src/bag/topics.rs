@@ -112,7 +112,7 @@ fn describe_topics(topics: &BTreeMap<String, Topic>) -> String {
         .map(|(name, topic)| format!("{name} ({}, {} messages)", topic.schema, topic.messages))
         .collect();
     match topics.len() {
-        0 => "the bag has no topics: record it again".into(),
+        0 => "the bag has no topics; `ros2 bag record -a` records all that are published".into(),
         n if n > MAX_LISTED => {
             format!("the bag has {} and {} more", listed.join(", "), n - MAX_LISTED)
         }

@@ -160,8 +160,8 @@ fn robots_and_boxes_have_what_they_inherit() {
         said(&world),
         [
             "not used: settings of Stage itself, `speedup` at line 2",
-            "not used: the property `drive` of models (2 times), line 3, line 3",
-            "not used: models of the kind `ranger` on robots (2 times), line 3, line 3",
+            "not used: the property `drive` of models (2 times), line 3",
+            "not used: models of the kind `ranger` on robots (2 times), line 3",
             "not used: models that neither robots touch nor rangers see (`obstacle_return 0`, \
              `ranger_return` below 0), line 10",
             "not used: models of the kind `window`, line 11",

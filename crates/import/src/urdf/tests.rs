@@ -157,7 +157,7 @@ fn with_limit(limit: &str) -> Model {
 
 #[test]
 fn numbers_that_stand_for_no_limit_are_none_and_said() {
-    const UNLIMITED: &str = "repaired: limits beyond 1e6, which are none (2 times), line 7, line 7";
+    const UNLIMITED: &str = "repaired: limits beyond 1e6, which are none (2 times), line 7";
     for infinity in ["1e+16", "1e16", "1.79769e+308", "1.8e308", "inf", "3.4e38", "1e10"] {
         let model = with_limit(&format!("<limit lower=\"-{infinity}\" upper=\"{infinity}\"/>"));
         assert_eq!(model.joints[0].limits, None, "{infinity}");

@@ -58,6 +58,7 @@ pub(super) fn learn(
     report.measurements = report.sightings + n_skipped;
     report.skipped = n_skipped;
     report.skipped_by_cause = judged.skipped;
+    report.warnings.extend(against.frame_warning());
     report.warnings.extend(against.warning(MAX_IN_FRONT_FRACTION));
     report.warnings.extend(crate::import_warnings("the bag", &log.report));
     report.warnings.extend(mount_warnings(log));
@@ -348,6 +349,13 @@ mod tests {
         let against =
             MapComparison { agreeing: 5, missed: 1, seen_through: 1, in_front: 1, not_there: 1 };
         assert_eq!(model.report.against_map, Some(against));
+        assert_eq!(against.frame_warning(), None);
+        let elsewhere = MapComparison { agreeing: 2, ..against };
+        let warning = elsewhere.frame_warning().expect("most beams disagree");
+        assert!(
+            warning.starts_with("only 33.3 % of the beams end where the map has a wall"),
+            "{warning}"
+        );
         assert_eq!(model.report.confusion.cells(), [[2.0, 1.0], [1.0, 5.0]]);
         assert_eq!(model.report.distance_counts.0.cells(), [[2.0, 0.0], [1.0, 2.0]]);
         assert!(model.report.warnings[0].starts_with("11.1 % of the beams"));

@@ -128,6 +128,20 @@ impl MapComparison {
         self.agreeing + self.missed + self.seen_through + self.in_front + self.not_there
     }
 
+    /// Returns a warning where most beams see something else than the map has.
+    pub(super) fn frame_warning(&self) -> Option<String> {
+        const MIN_AGREEING: f64 = 0.5;
+        let share = self.agreeing as f64 / self.total().max(1) as f64;
+        (self.total() > 0 && share < MIN_AGREEING).then(|| {
+            format!(
+                "only {:.1} % of the beams end where the map has a wall: what is learned is hardly the sensor's; check \
+                 that the true poses are in the frame of the map, that the scanner is mounted as /tf_static says, and \
+                 that clocks and units are right",
+                100.0 * share
+            )
+        })
+    }
+
     /// Returns a warning where more than a share of beams ends before the walls.
     pub(super) fn warning(&self, max_fraction: f64) -> Option<String> {
         let share = self.in_front as f64 / self.total().max(1) as f64;
