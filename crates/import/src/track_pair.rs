@@ -308,6 +308,7 @@ fn correlation(a: &[Option<f64>], b: &[Option<f64>], lag: i64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::FRAC_PI_2;
 
     /// A robot that drives ahead for 3 s and turns to the left for 1.7 s, again and again, at 20 poses a second; `view` makes
     /// of its pose what a system reports.
@@ -338,10 +339,7 @@ mod tests {
     fn tracks_of_one_clock_and_one_body_are_not_remarked() {
         assert_eq!(said(&drive(|at| at, 0.0)), [""; 0]);
         // In a frame of its own, and a little late.
-        assert_eq!(
-            said(&drive(|[x, y, heading]| [5.0 - y, x, heading + 1.5707963267948966], 0.1)),
-            [""; 0]
-        );
+        assert_eq!(said(&drive(|[x, y, heading]| [5.0 - y, x, heading + FRAC_PI_2], 0.1)), [""; 0]);
     }
 
     #[test]
@@ -357,7 +355,7 @@ mod tests {
 
     #[test]
     fn a_truth_that_looks_elsewhere_is_named() {
-        let turned = said(&drive(|[x, y, heading]| [x, y, heading + 1.5707963267948966], 0.0));
+        let turned = said(&drive(|[x, y, heading]| [x, y, heading + FRAC_PI_2], 0.0));
         assert!(
             turned[0].contains("moves 90 degrees to the right of where /truth looks"),
             "{turned:?}"

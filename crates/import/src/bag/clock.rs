@@ -1,13 +1,13 @@
 //! The clocks by which messages are stamped.
 //!
-//! Topics share a clock. Where it is set back, the messages after it belong to another epoch: epochs are moved apart by
-//! whole seconds, the same for all topics, so that stamps in an epoch stay as they are and nothing reaches across.
+//! Topics share a clock. Where it is set, the messages after it belong to another epoch: epochs are moved apart by
+//! whole seconds, the same for all topics, so that stamps in an epoch stay as they are and nothing reaches across. Where
+//! topics do not share one, the times of the recording tell, see [`offsets`].
 
 use sidestep_kernel::InputError;
 
-use super::messages::LaserScan;
-use super::offsets::{self, Timing};
-use super::poses::StampedPose;
+use super::offsets;
+use super::streams::Stream;
 use crate::report::{ImportReport, Treatment};
 use crate::track::StampedPose2;
 
@@ -21,84 +21,6 @@ const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 const EPOCH_GAP_SECS: f64 = 10.0;
 /// Maximum number of epochs: more are a recording without any clock.
 const MAX_EPOCHS: usize = 1000;
-
-/// A value of a message with a stamp.
-pub(super) trait HasStamp {
-    /// Returns the time in s.
-    fn t_secs(&self) -> f64;
-    /// Returns the time of the recording in s.
-    fn log_secs(&self) -> f64;
-    /// Returns the number of its message on its topic from 1, which reports give.
-    fn message(&self) -> u64;
-    /// Sets the time.
-    fn set_t_secs(&mut self, t_secs: f64);
-}
-
-impl HasStamp for StampedPose {
-    fn t_secs(&self) -> f64 {
-        self.t_secs
-    }
-
-    fn log_secs(&self) -> f64 {
-        self.log_secs
-    }
-
-    fn message(&self) -> u64 {
-        self.message
-    }
-
-    fn set_t_secs(&mut self, t_secs: f64) {
-        self.t_secs = t_secs;
-    }
-}
-
-/// A scan, and when it was recorded.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct RecordedScan {
-    pub(super) message: u64,
-    pub(super) log_secs: f64,
-    pub(super) scan: LaserScan,
-}
-
-impl HasStamp for RecordedScan {
-    fn t_secs(&self) -> f64 {
-        self.scan.header.stamp.secs()
-    }
-
-    fn log_secs(&self) -> f64 {
-        self.log_secs
-    }
-
-    fn message(&self) -> u64 {
-        self.message
-    }
-
-    fn set_t_secs(&mut self, t_secs: f64) {
-        self.scan.header.stamp = super::messages::Time::from_secs(t_secs);
-    }
-}
-
-/// The messages of one source in the order of the recording.
-pub(super) struct Stream<'a> {
-    /// Its name for people: `/odom`.
-    pub(super) name: String,
-    pub(super) items: Vec<&'a mut dyn HasStamp>,
-}
-
-impl Stream<'_> {
-    /// Returns the stamps with the times of the recording.
-    pub(super) fn timings(&self) -> Vec<Timing> {
-        self.items.iter().map(|item| Timing::of(&**item)).collect()
-    }
-
-    /// Moves the stamps from a message on.
-    pub(super) fn shift_from(&mut self, start: usize, secs: f64) {
-        for item in &mut self.items[start..] {
-            let t_secs = item.t_secs() + secs;
-            item.set_t_secs(t_secs);
-        }
-    }
-}
 
 /// A message at which the clock was set.
 #[derive(Debug, Clone, Copy)]

@@ -7,13 +7,14 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::view::Pose;
 
 use super::cdr::{Encoding, decode_as};
-use super::clock::{self, HasStamp, RecordedScan, Stream};
+use super::clock;
 use super::frames::{self, Trajectory};
 use super::messages::{LaserScan, Message, TfMessage};
-use super::offsets::{self, Timing};
+use super::offsets;
 use super::poses::{self, StampedPose, frame_name};
 use super::scans::{self, RangeCounts};
 use super::storage::{RawMessage, Topic};
+use super::streams::{HasStamp, RecordedScan, Stream, Timing};
 use super::topics::{PoseTopic, TopicSelection, is_static};
 use crate::report::{ImportReport, Treatment};
 

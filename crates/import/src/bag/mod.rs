@@ -11,8 +11,9 @@
 //!
 //! Times are the stamps of the headers, not those of the recording, which are late by the latency of the network.
 //! Messages that have overtaken each other by up to half a second are sorted. Where several stamps go further back the
-//! clock was set: the time after is a part of its own. Tracks are cut where the robot cannot have moved from one pose to the next,
-//! see [`SpeedRule`]. Scans follow REP 117, whatever their driver writes, see [`NoEcho`].
+//! clock was set: the time after is a part of its own. Stamps of topics are compared by the times of the recording, and
+//! odometry and truth by their motion, so that clocks, units and frames that differ are found. Tracks are cut where the
+//! robot cannot have moved from one pose to the next, see [`SpeedRule`]. Scans follow REP 117, whatever their driver writes, see [`NoEcho`].
 
 pub mod cdr;
 pub mod messages;
@@ -26,6 +27,7 @@ mod offsets;
 mod poses;
 mod scans;
 mod storage;
+mod streams;
 #[cfg(test)]
 mod tests;
 mod topics;

@@ -1,14 +1,14 @@
 //! Stamps against the times of the recording, which all topics share: where one clock was set and others were not, and
 //! where topics are stamped by clocks that differ.
 
-use super::clock::{HasStamp, Stream};
+use super::streams::{Stream, Timing};
 use crate::report::{ImportReport, Treatment};
 
 /// Number of messages before and after a moment by which it is told whether a clock was set in between.
 const NEIGHBORS: usize = 51;
 /// Clocks that differ by less are not told apart from latencies, in s.
 const MIN_OFFSET_SECS: f64 = 0.5;
-/// Stamps so far behind the recording of their messages cannot be: less is the error of clocks that are synchronized.
+/// Stamps so long after the recording of their messages, in s, cannot be: less is the error of clocks that are synchronized.
 const MAX_AHEAD_SECS: f64 = 0.3;
 /// The recording has times where it lasts at least this share of the time between stamps: tools that convert bags leave
 /// them out at times.
@@ -19,24 +19,6 @@ const MIN_MESSAGES: usize = 10;
 const MAX_OFFSET_SECS: f64 = 1e6;
 /// A stamp of 0 beside others of more than this, in s, was never set: a simulation begins at 0.
 const MIN_SET_SECS: f64 = 3600.0;
-
-/// A stamp, and the time of the recording, in s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Timing {
-    pub(super) t_secs: f64,
-    pub(super) log_secs: f64,
-}
-
-impl Timing {
-    pub(super) fn of(item: &dyn HasStamp) -> Self {
-        Self { t_secs: item.t_secs(), log_secs: item.log_secs() }
-    }
-
-    /// Returns by how much the stamp is ahead of the recording, in s.
-    fn ahead_secs(self) -> f64 {
-        self.t_secs - self.log_secs
-    }
-}
 
 /// Returns whether the times of a recording tell how much time passed between messages.
 pub(super) fn is_timed(timings: &[Timing]) -> bool {
