@@ -11,8 +11,11 @@ fn a_report_names_the_format_the_counts_and_what_was_not_taken_as_it_stood() {
     let output = place.run(&["inspect", "a.map"]);
     assert_eq!(output.code(), 0);
     let text = output.out();
-    assert!(text.starts_with("a.map\n  format         map in characters (MovingAI)\n"), "{text}");
-    assert!(text.contains("free boxes     5\n"), "{text}");
+    assert!(text.starts_with("a.map\n  format           map in characters (MovingAI)\n"), "{text}");
+    assert!(
+        text.contains("boxes            3 x 2\n") && text.contains("free boxes       5\n"),
+        "{text}"
+    );
     assert!(text.contains("  not used: the symbol `S` (swamp, or service point"), "{text}");
     let json = place.json(&["inspect", "a.map"]);
     let file = &json["files"][0];
