@@ -5,8 +5,7 @@
 //! Pairs whose closest approach lies within 1 % of the zone may be told differently; they are listed with both distances.
 //! BlueSky computes on a sphere of 6,371 km, here airplanes fly over the ellipsoid: for all others that are told
 //! differently a reference for geodesics on the ellipsoid decides, from which no closest approach here differs by more
-//! than 1 % of the zone. Most of that is the way of a heading that is kept: along shortest paths of two minutes, which
-//! bow by up to 30 m at high latitude.
+//! than 1 % of the zone: it looks once per second, and so misses the nearest instant of a head-on pass.
 
 mod bluesky_flights;
 
@@ -67,6 +66,13 @@ fn ahead([lat, lon]: [f64; 2], azimuth_deg: f64, length_m: f64) -> ([f64; 2], f6
     ([lat2, lon2], azimuth)
 }
 
+/// Returns the end of a shortest path that has this heading in its middle.
+fn along_heading(at_deg: [f64; 2], heading_deg: f64, length_m: f64) -> [f64; 2] {
+    let (_, middle_deg) = ahead(at_deg, heading_deg, 0.5 * length_m);
+    let turned_deg = (middle_deg - heading_deg + 540.0).rem_euclid(360.0) - 180.0;
+    ahead(at_deg, heading_deg - turned_deg, length_m).0
+}
+
 fn azimuth_deg([lat1, lon1]: [f64; 2], [lat2, lon2]: [f64; 2]) -> f64 {
     let (azimuth, _, _): (f64, f64, f64) = Geodesic::wgs84().inverse(lat1, lon1, lat2, lon2);
     azimuth
@@ -89,7 +95,7 @@ impl Flight {
         for second in 1..=UNTIL_S {
             at_deg = match to_goal_deg {
                 Some(azimuth) => ahead(self.at_deg, azimuth, self.v_m_s() * f64::from(second)).0,
-                None => ahead(at_deg, self.heading_deg, self.v_m_s()).0,
+                None => along_heading(at_deg, self.heading_deg, self.v_m_s()),
             };
             path.push(at_deg);
         }
