@@ -226,7 +226,7 @@ fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {
             let held = ports.get(agent as usize).map(|port| reserve_port(port).expect("free"));
             Box::new(wire.with_listeners(held.into_iter().collect()))
         };
-        let (clock, lease) = (ClockMode::Lockstep, Duration::from_secs(10));
+        let (clock, lease) = (ClockMode::Lockstep, TEST_TIMEOUT);
         let setup = FleetSetup {
             clock,
             topology,
