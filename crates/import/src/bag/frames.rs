@@ -78,9 +78,10 @@ struct Link<'a> {
 impl<'a> Link<'a> {
     /// Returns the transform that was reported last at a time, as those of a localization program stay in force.
     fn at(&self, t_secs: f64) -> Option<&'a StampedPose> {
-        let reported = match self.is_static {
-            true => self.poses.len(),
-            false => self.poses.partition_point(|pose| pose.t_secs <= t_secs),
+        let reported = if self.is_static {
+            self.poses.len()
+        } else {
+            self.poses.partition_point(|pose| pose.t_secs <= t_secs)
         };
         self.poses.get(reported.checked_sub(1)?).copied()
     }

@@ -272,7 +272,9 @@ impl FixedNumber {
 fn half_to_f64(bits: u16) -> f64 {
     /// The smallest step of this type: 2 to the power of -24.
     const STEP: f64 = 1.0 / 16_777_216.0;
-    let (sign, exponent, fraction) = (bits & 0x8000, bits >> 10 & 0x1f, bits & 0x3ff);
+    let sign = bits & 0x8000;
+    let exponent = bits >> 10 & 0x1f;
+    let fraction = bits & 0x3ff;
     let size = match exponent {
         0 => f64::from(fraction) * STEP,
         31 => f64::NAN,

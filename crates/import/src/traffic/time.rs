@@ -91,9 +91,9 @@ fn parse_compact(text: &str) -> Option<WrittenTime> {
     if !are_digits || zone.starts_with(|c: char| c.is_ascii_digit()) {
         return None;
     }
-    let (year, month, day) = (&date[..4], &date[4..6], &date[6..]);
-    let (hours, minutes, seconds) = (&clock[..2], &clock[2..4], &clock[4..]);
-    parse_time(&format!("{year}-{month}-{day}T{hours}:{minutes}:{seconds}{zone}"))
+    let date = format!("{}-{}-{}", &date[..4], &date[4..6], &date[6..]);
+    let clock = format!("{}:{}:{}", &clock[..2], &clock[2..4], &clock[4..]);
+    parse_time(&format!("{date}T{clock}{zone}"))
 }
 
 /// Reads a date and a time of day with the day first, `DD-MM-YYYY HH:MM:SS`, of a source that is known to write so.

@@ -88,7 +88,8 @@ const MAX_WAY_SPEED_M_S: f64 = 2_600.0;
 /// where its way gives its speed.
 fn speed_beside_jumps_m_s(track: &Track) -> Option<f64> {
     let mut speeds = Vec::with_capacity(track.samples.len());
-    let (mut length_m, mut duration_s) = (0.0, 0.0);
+    let mut length_m = 0.0;
+    let mut duration_s = 0.0;
     for pair in track.samples.windows(2) {
         let step_m = LocalPlane::centered_at(pair[0].position).to_plane_m(pair[1].position);
         let step_length_m = math::hypot(step_m[0], step_m[1]);
