@@ -79,7 +79,7 @@ fn places_of(sources: &[Source], layers: Option<&Layers>) -> Vec<(&'static str, 
     places
 }
 
-/// Returns the places that a figure counts, one a line.
+/// Refuses words that are no figure.
 pub(crate) fn check_figure(figure: &str) -> Result<(), String> {
     if FIGURES.contains(&figure) {
         Ok(())
@@ -88,6 +88,7 @@ pub(crate) fn check_figure(figure: &str) -> Result<(), String> {
     }
 }
 
+/// Returns the places that a figure counts, one a line.
 pub(crate) fn places(tree: &Tree, figure: &str) -> String {
     let places = tree.places.get(figure);
     places.into_iter().flatten().map(|place| format!("{place}\n")).collect()

@@ -142,7 +142,7 @@ impl Messenger {
     /// cannot tell whether others were silent.
     pub fn silent_for(&self, peer: PeerId) -> Option<Duration> {
         let last_heard = self.peers.get(&peer)?.last_heard;
-        Some(self.now().saturating_sub(last_heard))
+        Some(self.listened_at.saturating_sub(last_heard))
     }
 
     /// Returns whether the direct link to another node is half-open: no message arrives there, and the link's other end
@@ -487,6 +487,9 @@ mod tests {
             for listened in 1..5 {
                 *clock.lock().expect("no panic") += stop_between;
                 assert_eq!(messenger.receive(second), None);
+                assert_eq!(messenger.silent_for(peer), Some(listened * second));
+                // Nor before it listens again.
+                *clock.lock().expect("no panic") += stop_between;
                 assert_eq!(messenger.silent_for(peer), Some(listened * second));
             }
         }

@@ -41,8 +41,8 @@ pub(crate) struct InspectArgs {
     #[arg(long, value_name = "OUT")]
     clean: Option<PathBuf>,
 
-    /// Set an option of the import of recorded traffic or BlueSky files, as for `run`: import.max_gap_s=600,
-    /// import.ground_speed_kt=30, import.leave_out_suspicious=true
+    /// Set an option of an import, as for `run`: import.max_gap_s=600, import.ground_speed_kt=30 or
+    /// import.leave_out_suspicious=true of recorded traffic, import.navdata=DIR of a BlueSky file
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
 }

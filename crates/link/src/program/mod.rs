@@ -46,7 +46,7 @@ pub fn main() -> ExitCode {
     let mut words = std::env::args().skip(1);
     let read = match words.next().as_deref() {
         None => read_line(),
-        Some(one_thread::JOB_WORD) => Ok(words.next().unwrap_or_default()),
+        Some(one_thread::JOB_WORD) => Ok(words.collect()),
         Some(word) => return print_help(word),
     };
     let job = read.and_then(|line| {
@@ -60,7 +60,7 @@ pub fn main() -> ExitCode {
         Ok((job, _)) => report_result(run_job(job)),
         Err(reason) => {
             let reason = escape_controls(&reason);
-            eprintln!("error: standard input has no job: {reason}\n{USAGE}");
+            eprintln!("error: this is no job: {reason}\n{USAGE}");
             ExitCode::from(2)
         }
     }

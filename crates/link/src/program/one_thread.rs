@@ -9,6 +9,9 @@ use std::process::{Command, ExitCode};
 /// The word before a job that is given as an argument: a process that starts again has read its standard input.
 pub(super) const JOB_WORD: &str = "job";
 
+/// Longest part of a job in bytes: Linux allows 128 KiB in one argument, and far more in all of them.
+const MAX_ARGUMENT_BYTES: usize = 100_000;
+
 /// Returns whether this process has more threads than a job allows.
 pub(super) fn is_missing_for(job: &Job) -> bool {
     let (variable, one_thread) = ONE_THREAD;
@@ -31,8 +34,20 @@ pub(super) fn start_again(line: &str) -> Result<ExitCode, Error> {
     let program = std::env::current_exe().map_err(start_error)?;
     let (variable, one_thread) = ONE_THREAD;
     let mut command = Command::new(program);
-    command.args([JOB_WORD, line]).env(variable, one_thread);
+    command.arg(JOB_WORD).args(job_arguments(line)).env(variable, one_thread);
     replace_process(&mut command)
+}
+
+/// Returns a job in parts that are short enough for arguments; joined they are the job.
+fn job_arguments(line: &str) -> Vec<&str> {
+    let mut parts = Vec::new();
+    let mut rest = line;
+    while !rest.is_empty() {
+        let (part, after) = rest.split_at(rest.floor_char_boundary(MAX_ARGUMENT_BYTES));
+        parts.push(part);
+        rest = after;
+    }
+    parts
 }
 
 /// Puts a program in the place of this one, which keeps its process id: who has started it signals that one.
@@ -53,4 +68,18 @@ fn start_error(error: std::io::Error) -> Error {
     let (variable, one_thread) = ONE_THREAD;
     let cause = format!("{LINK_PROGRAM} cannot start again for encrypted links: {error}");
     Error::other(cause, format!("start it with {variable}='{one_thread}'"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_job_is_given_in_parts_that_an_argument_can_have() {
+        let job = "é".repeat(MAX_ARGUMENT_BYTES);
+        let parts = job_arguments(&job);
+        assert!(parts.iter().all(|part| part.len() <= MAX_ARGUMENT_BYTES));
+        assert_eq!(parts.concat(), job);
+        assert_eq!(job_arguments("{}"), ["{}"]);
+    }
 }

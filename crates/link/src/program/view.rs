@@ -1,16 +1,12 @@
 //! Views of the fleet for its viewers.
 
-use crate::wire::view_server::ViewServer;
+use crate::wire::view_server::{VIEWER_TIMEOUT, ViewServer};
 use sidestep::kernel::Cycle;
 use sidestep::kernel::view::{Frame, LogEvent};
 use sidestep_session::fleet::{FleetFrame, FleetScene, FleetStatus};
-use std::time::Duration;
 
 /// Maximum number of events in a view, which has the last ones: a viewer may have missed any of the views before.
 const MAX_EVENTS: usize = 200;
-
-/// Time that viewers have at the end to fetch the last view: as long as one that asks for nothing counts as a viewer.
-const LAST_VIEW_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// The newest frame and the last events, from which views are made.
 #[derive(Debug)]
@@ -57,7 +53,7 @@ impl ViewPublisher {
 
     /// Waits a little until the last view was fetched.
     pub(super) fn wait_for_viewers(&self) {
-        self.server.wait_until_fetched(LAST_VIEW_TIMEOUT);
+        self.server.wait_until_fetched(VIEWER_TIMEOUT);
     }
 }
 

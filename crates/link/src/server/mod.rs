@@ -221,10 +221,10 @@ impl<'a> FleetServer<'a> {
     /// their last counts and records of packets come before that.
     fn shut_down(&mut self, farewell_timeout: Duration) {
         self.send_to_joined(|messenger, node| messenger.send_reliable(node, Message::End));
+        // One that joins after this is never told the end, and has nothing to say.
+        let told: Vec<EntityId> = self.joined_agents().collect();
         let mut until = Instant::now() + farewell_timeout;
-        while self.joined_agents().any(|agent| !self.nodes[&agent].has_left)
-            && Instant::now() < until
-        {
+        while told.iter().any(|agent| !self.nodes[agent].has_left) && Instant::now() < until {
             if let Some(received) = self.messenger.receive(POLL_INTERVAL) {
                 self.on_message(received);
             }

@@ -21,7 +21,7 @@ const SCENE_KEY: &str = "sidestep/scene";
 const VIEW_KEY: &str = "sidestep/view";
 
 /// Time after a query in which there counts as being a viewer: much longer than the time between two queries of one.
-const VIEWER_TIMEOUT: Duration = Duration::from_secs(3);
+pub(crate) const VIEWER_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Time between two checks whether the last view was fetched.
 const FETCH_POLL_INTERVAL: Duration = Duration::from_millis(10);
