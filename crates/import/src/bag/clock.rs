@@ -42,6 +42,7 @@ pub(super) fn align(
     for stream in streams.iter_mut() {
         replace_unset_stamps(stream, report);
     }
+    offsets::add_rates(streams, report);
     let mut all_jumps = Vec::new();
     for stream in streams.iter() {
         let back = backward_jumps(stream);
@@ -59,7 +60,7 @@ pub(super) fn align(
         return Ok(());
     }
     if bounds.len() >= MAX_EPOCHS {
-        let cause = format!("its stamps go back {} times", bounds.len());
+        let cause = format!("the clock of its stamps is set {} times", bounds.len());
         let remedy = "stamp the messages by one clock, and record the bag again";
         return Err(InputError::new(bag, cause, remedy));
     }

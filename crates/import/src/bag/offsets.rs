@@ -9,7 +9,7 @@ const NEIGHBORS: usize = 51;
 /// Clocks that differ by less are not told apart from latencies, in s.
 const MIN_OFFSET_SECS: f64 = 0.5;
 /// Stamps so long after the recording of their messages, in s, cannot be: less is the error of clocks that are synchronized.
-const MAX_AHEAD_SECS: f64 = 0.3;
+pub(super) const MAX_AHEAD_SECS: f64 = 0.3;
 /// The recording has times where it lasts at least this share of the time between stamps: tools that convert bags leave
 /// them out at times.
 const MIN_TIMED_SHARE: f64 = 0.1;
@@ -17,6 +17,14 @@ const MIN_TIMED_SHARE: f64 = 0.1;
 const MIN_MESSAGES: usize = 10;
 /// Clocks that differ by more than this, in s, are of two kinds: those of a simulation and of the wall.
 const MAX_OFFSET_SECS: f64 = 1e6;
+/// Stamps run as the recording does where their rate differs by no more: others are those of a simulation, or of a bag that
+/// was played faster or slower.
+const MAX_RATE_ERROR: f64 = 0.02;
+/// The rate of stamps is taken over parts of a recording as long, in s, of which there are so many at least.
+const RATE_SPAN_SECS: f64 = 20.0;
+const MIN_RATE_SPANS: usize = 8;
+/// Messages are recorded as unevenly, in s.
+const JITTER_SECS: f64 = 0.25;
 /// A stamp of 0 beside others of more than this, in s, was never set: a simulation begins at 0.
 const MIN_SET_SECS: f64 = 3600.0;
 
@@ -63,24 +71,101 @@ pub(super) fn unusable_stamps(timings: &[Timing]) -> Vec<(usize, &'static str)> 
     unusable
 }
 
-/// Returns the messages, with the steps in s, from which on stamps are ahead of the recording by more than before: there
-/// the clock was set forward.
+/// How fast stamps run by the times of the recording.
+struct Rate {
+    /// 1 for a clock on the wall.
+    ratio: f64,
+    /// The error that uneven recording may make of it.
+    error: f64,
+}
+
+impl Rate {
+    /// Returns the rate of stamps; `None` where the recording has no times, or too few.
+    fn of(timings: &[Timing]) -> Option<Self> {
+        if !is_timed(timings) {
+            return None;
+        }
+        let mut steps: Vec<f64> =
+            timings.windows(2).map(|pair| pair[1].t_secs - pair[0].t_secs).collect();
+        let usual_secs = median(&mut steps).filter(|step| *step > 0.0)?;
+        let longest = timings.len() / MIN_RATE_SPANS;
+        let wanted = (RATE_SPAN_SECS / usual_secs).ceil() as usize;
+        let span = wanted.max(NEIGHBORS).min(longest).max(1);
+        let spans = || timings.iter().zip(timings.iter().skip(span));
+        let mut recorded: Vec<f64> =
+            spans().map(|(from, to)| to.log_secs - from.log_secs).collect();
+        let mut ratios: Vec<f64> = spans()
+            .map(|(from, to)| (to.t_secs - from.t_secs) / (to.log_secs - from.log_secs))
+            .filter(|ratio| ratio.is_finite())
+            .collect();
+        let ratio = median(&mut ratios)?;
+        let recorded_secs = median(&mut recorded).filter(|secs| *secs > 0.0)?;
+        Some(Self { ratio, error: JITTER_SECS / recorded_secs })
+    }
+
+    /// Returns whether stamps run as the recording does, so that it tells by how much their clock was set.
+    fn is_of_recording(&self) -> bool {
+        (self.ratio - 1.0).abs() <= MAX_RATE_ERROR + self.error
+    }
+}
+
+/// Returns whether stamps run as the recording does.
+fn run_as_recorded(timings: &[Timing]) -> bool {
+    Rate::of(timings).is_some_and(|rate| rate.is_of_recording())
+}
+
+/// Names streams whose stamps do not run as the recording does.
+pub(super) fn add_rates(streams: &[Stream<'_>], report: &mut ImportReport) {
+    let mut names = Vec::new();
+    let mut first_rate = None;
+    for stream in streams {
+        let timings = stream.timings();
+        let other = Rate::of(&timings).filter(|rate| !rate.is_of_recording());
+        if let (Some(rate), true) = (other, timings.len() >= MIN_MESSAGES) {
+            first_rate.get_or_insert(rate.ratio);
+            names.push(&*stream.name);
+        }
+    }
+    if let (Some(rate), Some(name)) = (first_rate, names.first()) {
+        let others = match names.len() - 1 {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let value = format!(
+            "the stamps of {name}{others} run {rate:.2} times as fast as the recording, as those of a simulation or of a bag \
+             that is played do: by it is not told whether their clock was set forward or differs from others"
+        );
+        report.add_fact("clock", value);
+    }
+}
+
+/// Returns the messages, with the steps in s, from which on stamps are ahead of the recording by more than ever before:
+/// there the clock was set forward. Stamps that lagged and return to where they were are those of a network that recovers.
 pub(super) fn forward_jumps(timings: &[Timing]) -> Vec<(usize, f64)> {
     let mut jumps = Vec::new();
-    if !is_timed(timings) {
+    if !run_as_recorded(timings) {
         return jumps;
     }
     let mut latest = f64::INFINITY;
     let mut recorded = f64::INFINITY;
+    let mut most_ahead_secs = f64::INFINITY;
     for (k, timing) in timings.iter().enumerate() {
         let step_secs = timing.t_secs - latest;
-        let excess_secs = step_secs - (timing.log_secs - recorded).max(0.0);
+        let recorded_secs = (timing.log_secs - recorded).max(0.0);
+        let excess_secs = step_secs - recorded_secs * (1.0 + MAX_RATE_ERROR);
+        let is_farthest = timing.ahead_secs() > most_ahead_secs + MIN_OFFSET_SECS;
         let is_lasting =
             || change_at(timings, k).is_some_and(|change_secs| change_secs > MIN_OFFSET_SECS);
-        if excess_secs > MIN_OFFSET_SECS && is_lasting() {
+        if excess_secs > MIN_OFFSET_SECS && is_farthest && is_lasting() {
             jumps.push((k, step_secs));
         }
-        if k == 0 || timing.t_secs > latest || latest - timing.t_secs > MIN_OFFSET_SECS {
+        let is_back = latest - timing.t_secs > MIN_OFFSET_SECS;
+        // What a clock has shown before it was set back is no measure for what it shows later.
+        if k == 0 || is_back {
+            most_ahead_secs = timing.ahead_secs();
+        }
+        most_ahead_secs = most_ahead_secs.max(timing.ahead_secs());
+        if k == 0 || timing.t_secs > latest || is_back {
             (latest, recorded) = (timing.t_secs, timing.log_secs);
         }
     }
@@ -113,7 +198,7 @@ pub(super) fn undo_single_jumps(
     report: &mut ImportReport,
 ) {
     let timings: Vec<Vec<Timing>> = streams.iter().map(Stream::timings).collect();
-    let timed: Vec<bool> = timings.iter().map(|timings| is_timed(timings)).collect();
+    let timed: Vec<bool> = timings.iter().map(|timings| run_as_recorded(timings)).collect();
     for epoch in 1..n {
         let changes: Vec<Option<f64>> = (0..streams.len())
             .map(|s| {
@@ -150,7 +235,8 @@ pub(super) fn undo_single_jumps(
 /// Compares the stamps of streams by the times of the recording. Those that are later than the recording of their messages
 /// cannot be times of measurements, and are moved; others that differ are named.
 pub(super) fn compare_clocks(streams: &mut [Stream<'_>], report: &mut ImportReport) {
-    let offsets: Vec<Option<f64>> = streams.iter().map(known_offset).collect();
+    let offsets: Vec<Option<f64>> =
+        streams.iter().map(|stream| known_offset(&stream.timings())).collect();
     let nearest = (0..streams.len())
         .filter_map(|s| Some((s, offsets[s]?)))
         .min_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
@@ -183,13 +269,10 @@ pub(super) fn compare_clocks(streams: &mut [Stream<'_>], report: &mut ImportRepo
     }
 }
 
-/// Returns by how much the stamps of a stream are usually ahead of the recording, where that is known.
-fn known_offset(stream: &Stream<'_>) -> Option<f64> {
-    let timings = stream.timings();
-    if timings.len() < MIN_MESSAGES || !is_timed(&timings) {
-        return None;
-    }
-    usual_offset(&timings).filter(|offset_secs| offset_secs.abs() < MAX_OFFSET_SECS)
+/// Returns by how much stamps are usually ahead of the recording, where that is known.
+pub(super) fn known_offset(timings: &[Timing]) -> Option<f64> {
+    let is_known = timings.len() >= MIN_MESSAGES && run_as_recorded(timings);
+    usual_offset(timings).filter(|offset_secs| is_known && offset_secs.abs() < MAX_OFFSET_SECS)
 }
 
 #[cfg(test)]
@@ -221,6 +304,38 @@ mod tests {
         assert_eq!(forward_jumps(&stalled), []);
         let gap: Vec<Timing> = [&timings(200, |t| t)[..50], &timings(200, |t| t)[150..]].concat();
         assert_eq!(forward_jumps(&gap), []);
+    }
+
+    #[test]
+    fn stamps_that_run_faster_than_the_recording_are_not_those_of_a_clock_that_is_set() {
+        for rate in [0.5, 2.0, 3.0, 5.0] {
+            let at = |k: u32| {
+                let t_secs = 1000.0 + f64::from(k);
+                Timing { t_secs, log_secs: 5000.0 + f64::from(k) / rate }
+            };
+            let slow: Vec<Timing> = (0..200).map(at).collect();
+            assert_eq!(forward_jumps(&slow), [], "{rate}");
+            assert_eq!(known_offset(&slow), None, "their offset changes");
+        }
+        let drifting: Vec<Timing> = (0..200)
+            .map(|k| Timing { t_secs: 60.6 * f64::from(k), log_secs: 60.0 * f64::from(k) })
+            .collect();
+        assert_eq!(forward_jumps(&drifting), [], "one message a minute, and one percent too fast");
+    }
+
+    #[test]
+    fn a_network_that_lags_more_and_more_and_recovers_is_no_clock_that_is_set() {
+        let mut lagging = timings(600, |t| t);
+        for (k, timing) in lagging.iter_mut().enumerate().skip(200).take(300) {
+            timing.log_secs += 0.01 * (k - 200) as f64;
+        }
+        // The backlog of 3 s is dropped.
+        lagging.drain(470..500);
+        assert_eq!(forward_jumps(&lagging), []);
+        // A clock that is set on top of that is found.
+        lagging[520..].iter_mut().for_each(|timing| timing.t_secs += 2.0);
+        let jumps = forward_jumps(&lagging);
+        assert!(jumps.len() == 1 && jumps[0].0 == 520, "{jumps:?}");
     }
 
     #[test]
