@@ -43,22 +43,29 @@ const MIN_TURNED_RAD: f64 = 1.5;
 
 /// Lengths in other units than meters, as the factor by which they are too large.
 const UNITS: [(f64, &str); 2] = [(1000.0, "millimeters"), (100.0, "centimeters")];
-/// The least way of a track, in its unit, from which on ways are compared.
+/// The least way of a track over the moves that are compared, in its unit.
 const MIN_WAY: f64 = 1.0;
+/// Moves whose lengths are compared last at least as long, in s.
+const MIN_MOVE_SECS: f64 = 0.5;
+/// A shorter part of the usual move of a track is none: systems that measure a robot that stands report some millimeters.
+const MIN_MOVE_SHARE: f64 = 0.3;
 
-/// Checks that the ways of two tracks, given by time, do not differ by the factor of a unit.
+/// Checks that the moves of two tracks, given by time, do not differ by the factor of a unit.
 ///
 /// # Errors
-/// When one is a hundred or a thousand times the other, to 10 %.
+/// When those of one are a hundred or a thousand times those of the other over the same times, to 10 %.
 pub(crate) fn check_units(
     file: &str,
     [(odometry_name, odometry), (truth_name, truth)]: [(&str, &[StampedPose2]); 2],
 ) -> Result<(), InputError> {
-    let [odometry_way, truth_way] = [odometry, truth].map(way_of);
-    if odometry_way < MIN_WAY || truth_way < MIN_WAY {
+    let moves = common_moves([odometry, truth]);
+    let [odometry_way, truth_way] = [0, 1].map(|i| moves.iter().map(|lengths| lengths[i]).sum());
+    if moves.len() < MIN_MOVES || f64::min(odometry_way, truth_way) < MIN_WAY {
         return Ok(());
     }
-    let ratio = odometry_way / truth_way;
+    let mut ratios: Vec<f64> = moves.iter().map(|[claimed, real]| claimed / real).collect();
+    ratios.sort_unstable_by(f64::total_cmp);
+    let ratio = ratios[ratios.len() / 2];
     for (factor, unit) in UNITS {
         let is_factor = |ratio: f64| (ratio / factor - 1.0).abs() < 0.1;
         let name = match () {
@@ -67,21 +74,65 @@ pub(crate) fn check_units(
             () => continue,
         };
         let cause = format!(
-            "the way of {odometry_name} is {odometry_way:.1} and that of {truth_name} {truth_way:.1}: the lengths of \
-             {name} are {unit}"
+            "over {} moves of the same times the way of {odometry_name} is {odometry_way:.1} and that of {truth_name} \
+             {truth_way:.1}: the lengths of {name} are {unit}",
+            moves.len()
         );
         return Err(InputError::new(file, cause, format!("give {name} in meters")));
     }
     Ok(())
 }
 
-/// Returns the length of the way of a track: steps far longer than the usual one are jumps.
-fn way_of(track: &[StampedPose2]) -> f64 {
-    let step = |pair: &[StampedPose2]| distance(&pair[0], &pair[1]);
-    let mut steps: Vec<f64> = track.windows(2).map(step).filter(|step| *step > 0.0).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    let Some(usual) = steps.get(steps.len() / 2).copied() else { return 0.0 };
-    steps.iter().filter(|step| **step <= 20.0 * usual).sum()
+/// Returns the distances that two tracks move over the same times, where both do: between poses of the one that has fewer.
+fn common_moves(tracks: [&[StampedPose2]; 2]) -> Vec<[f64; 2]> {
+    let [Some(start_secs), Some(end_secs)] = [
+        latest(tracks.map(|track| track.first().map(|pose| pose.t_secs))),
+        latest(tracks.map(|track| track.last().map(|pose| -pose.t_secs))).map(|t_secs| -t_secs),
+    ] else {
+        return Vec::new();
+    };
+    let common = tracks.map(|track| {
+        let start = track.partition_point(|pose| pose.t_secs < start_secs);
+        let end = track.partition_point(|pose| pose.t_secs <= end_secs);
+        &track[start.min(end)..end]
+    });
+    let sparse = if common[0].len() <= common[1].len() { common[0] } else { common[1] };
+    let mut moments: Vec<f64> = Vec::new();
+    for pose in sparse {
+        if moments.last().is_none_or(|last| pose.t_secs - last >= MIN_MOVE_SECS) {
+            moments.push(pose.t_secs);
+        }
+    }
+    let [claimed, real] = tracks.map(|track| sample(track, &|_| false, moments.iter().copied()));
+    let way =
+        |poses: &[Option<StampedPose2>]| Some(distance(poses[0].as_ref()?, poses[1].as_ref()?));
+    let pairs = claimed.windows(2).zip(real.windows(2));
+    let moves: Vec<[f64; 2]> =
+        pairs.filter_map(|(claimed, real)| Some([way(claimed)?, way(real)?])).collect();
+    let usual = [0, 1].map(|i| usual_move(moves.iter().map(|lengths| lengths[i]).collect()));
+    let is_move = |lengths: &[f64; 2]| {
+        (0..2).all(|i| lengths[i] > 0.0 && lengths[i] >= MIN_MOVE_SHARE * usual[i])
+    };
+    moves.into_iter().filter(is_move).collect()
+}
+
+fn latest([a, b]: [Option<f64>; 2]) -> Option<f64> {
+    Some(a?.max(b?))
+}
+
+/// Returns the length of a move such that longer ones make up half of the way: neither those of a robot that stands nor a
+/// few jumps change it.
+fn usual_move(mut lengths: Vec<f64>) -> f64 {
+    lengths.sort_unstable_by(f64::total_cmp);
+    let way: f64 = lengths.iter().sum();
+    let mut passed = 0.0;
+    for length in lengths {
+        passed += length;
+        if passed >= 0.5 * way {
+            return length;
+        }
+    }
+    0.0
 }
 
 /// Records where clocks or frames of odometry and truth can hardly be the same.
@@ -114,7 +165,9 @@ impl SampledPair {
             return None;
         }
         let n = (n as usize).min(MAX_MOMENTS);
-        let [odometry, truth] = [odometry, truth].map(|track| sample(track, start_secs, n));
+        let moments = (0..=n).map(|k| start_secs + k as f64 * STEP_SECS);
+        let [odometry, truth] = [odometry, truth]
+            .map(|track| sample(track, &|k| track.is_cut_before(k), moments.clone()));
         Some(Self { odometry, truth })
     }
 
@@ -129,7 +182,7 @@ impl SampledPair {
         is_lag.then(|| {
             let side = if lag > 0 { "later" } else { "earlier" };
             format!(
-                "{truth_name} moves as {odometry_name} does, {:.1} s {side} (speeds correlate by {best:.2}, and by {without:.2} \
+                "the motion by {truth_name} is that by {odometry_name}, {:.1} s {side} (speeds correlate by {best:.2}, and by {without:.2} \
                  without that lag): their clocks differ",
                 lag.abs() as f64 * STEP_SECS
             )
@@ -138,11 +191,11 @@ impl SampledPair {
 
     /// Returns what to say of a truth that looks another way than the robot, and the remedy.
     fn frame_rule(&self, odometry_name: &str, truth_name: &str) -> Option<(String, &'static str)> {
-        let turned_rad: f64 = steps(&self.odometry, 1).map(|[_, _, turn_rad]| turn_rad.abs()).sum();
-        let is_still = steps(&self.truth, 1).all(|[_, _, turn_rad]| turn_rad == 0.0);
-        if is_still && turned_rad > MIN_TURNED_RAD {
+        if let Some(turned_rad) = self.turn_beside_still_truth()
+            && turned_rad > MIN_TURNED_RAD
+        {
             let rule = format!(
-                "the heading of {truth_name} never changes, while {odometry_name} turns by {turned_rad:.1} rad in all: it gives \
+                "the heading of {truth_name} never changes, while {odometry_name} turns by {turned_rad:.1} rad in all: these are \
                  positions without directions"
             );
             return Some((rule, "give true poses with the direction in which the robot looks"));
@@ -156,7 +209,7 @@ impl SampledPair {
         let squares: f64 = pairs.iter().map(|[claimed, _]| claimed[2] * claimed[2]).sum();
         if sided.len() >= MIN_MOVES && sided.iter().sum::<f64>() < -0.5 * squares {
             let rule = format!(
-                "{truth_name} turns to the right where {odometry_name} turns to the left: one is mirrored"
+                "by {truth_name} the robot turns to the right where by {odometry_name} it turns to the left: one is mirrored"
             );
             return Some((
                 rule,
@@ -167,12 +220,30 @@ impl SampledPair {
         (off_rad.abs() > MIN_BODY_TURN_RAD).then(|| {
             let side = if off_rad > 0.0 { "left" } else { "right" };
             let rule = format!(
-                "the robot moves {:.0} degrees to the {side} of where {truth_name} looks, by {odometry_name}: the body of \
+                "the robot moves {:.0} degrees to the {side} of the heading by {truth_name}, as {odometry_name} shows: the body of \
                  {truth_name} is turned",
                 off_rad.to_degrees().abs()
             );
             (rule, "turn the body in the system that gives the true poses, so that its x axis points ahead")
         })
+    }
+
+    /// Returns by how much odometry turns in all beside a truth whose heading never changes; `None` where it does, or too
+    /// little of both is known.
+    fn turn_beside_still_truth(&self) -> Option<f64> {
+        let mut turned_rad = 0.0;
+        let mut n = 0;
+        for (claimed, real) in self.odometry.windows(2).zip(self.truth.windows(2)) {
+            let [Some(claimed), Some(real)] = [claimed, real].map(displacement_of) else {
+                continue;
+            };
+            if real[2] != 0.0 {
+                return None;
+            }
+            turned_rad += claimed[2].abs();
+            n += 1;
+        }
+        (n >= MIN_COMPARED).then_some(turned_rad)
     }
 
     /// Returns the motions of odometry and truth over the same times.
@@ -212,30 +283,32 @@ fn displacement(from: &StampedPose2, to: &StampedPose2) -> [f64; 3] {
     [c * dx_m + s * dy_m, c * dy_m - s * dx_m, wrap_angle(to.heading_rad - from.heading_rad)]
 }
 
-fn steps(track: &[Option<StampedPose2>], n: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
-    track
-        .windows(n + 1)
-        .filter_map(move |poses| Some(displacement(poses[0].as_ref()?, poses[n].as_ref()?)))
+/// Returns the motion between two moments where both have a pose.
+fn displacement_of(poses: &[Option<StampedPose2>]) -> Option<[f64; 3]> {
+    Some(displacement(poses[0].as_ref()?, poses[1].as_ref()?))
 }
 
 fn distance(from: &StampedPose2, to: &StampedPose2) -> f64 {
     hypot(to.position_m[0] - from.position_m[0], to.position_m[1] - from.position_m[1])
 }
 
-/// Returns a track at moments from a time on.
-fn sample(track: &Track, start_secs: f64, n: usize) -> Vec<Option<StampedPose2>> {
+/// Returns a track at moments in their order; `is_cut` tells before which of its poses it is cut.
+fn sample(
+    track: &[StampedPose2],
+    is_cut: &dyn Fn(usize) -> bool,
+    moments: impl Iterator<Item = f64>,
+) -> Vec<Option<StampedPose2>> {
     let mut next = 0;
-    (0..=n)
-        .map(|k| {
-            let t_secs = start_secs + k as f64 * STEP_SECS;
+    moments
+        .map(|t_secs| {
             while next < track.len() && track[next].t_secs <= t_secs {
                 next += 1;
             }
             let before = &track[next.checked_sub(1)?];
-            let Some(after) = track.get(next) else {
-                return (before.t_secs == t_secs).then_some(*before);
-            };
-            between(before, after, t_secs).filter(|_| !track.is_cut_before(next))
+            if before.t_secs == t_secs {
+                return Some(*before);
+            }
+            between(before, track.get(next)?, t_secs).filter(|_| !is_cut(next))
         })
         .collect()
 }
@@ -261,10 +334,7 @@ struct Motion {
 
 impl Motion {
     fn of(track: &[Option<StampedPose2>]) -> Self {
-        let step = |pair: &[Option<StampedPose2>]| {
-            Some(displacement(pair[0].as_ref()?, pair[1].as_ref()?))
-        };
-        let steps: Vec<Option<[f64; 3]>> = track.windows(2).map(step).collect();
+        let steps: Vec<Option<[f64; 3]>> = track.windows(2).map(displacement_of).collect();
         let of = |value: fn([f64; 3]) -> f64| steps.iter().map(|step| step.map(value)).collect();
         Self {
             speeds: of(|[ahead, left, _]| hypot(ahead, left) / STEP_SECS),
@@ -346,7 +416,7 @@ mod tests {
     fn a_clock_that_is_a_second_off_is_found_by_the_motion() {
         let late = said(&drive(|at| at, 1.0));
         assert!(
-            late[0].starts_with("suspicious: /truth moves as /odom does, 1.0 s later"),
+            late[0].starts_with("suspicious: the motion by /truth is that by /odom, 1.0 s later"),
             "{late:?}"
         );
         let early = said(&drive(|at| at, -0.7));
@@ -357,12 +427,12 @@ mod tests {
     fn a_truth_that_looks_elsewhere_is_named() {
         let turned = said(&drive(|[x, y, heading]| [x, y, heading + FRAC_PI_2], 0.0));
         assert!(
-            turned[0].contains("moves 90 degrees to the right of where /truth looks"),
+            turned[0].contains("moves 90 degrees to the right of the heading by /truth"),
             "{turned:?}"
         );
         let mirrored = said(&drive(|[x, y, heading]| [x, -y, -heading], 0.0));
         assert!(
-            mirrored[0].contains("turns to the right where /odom turns to the left"),
+            mirrored[0].contains("turns to the right where by /odom it turns to the left"),
             "{mirrored:?}"
         );
         let blind = said(&drive(|[x, y, _]| [x, y, 0.0], 0.0));
@@ -383,5 +453,59 @@ mod tests {
             check(&plain, &in_mm).expect_err("millimeters").remedy(),
             "give /truth in meters"
         );
+    }
+
+    #[test]
+    fn a_truth_whose_poses_are_far_apart_is_not_called_one_without_directions() {
+        let dense = drive(|at| at, 0.0);
+        let sparse: Vec<StampedPose2> = dense.iter().step_by(50).copied().collect();
+        assert_eq!(said(&sparse.into()), [""; 0]);
+        // A truth that ends while the robot still drives ahead.
+        let short: Vec<StampedPose2> = dense.iter().take(55).copied().collect();
+        assert_eq!(said(&short.into()), [""; 0]);
+    }
+
+    #[test]
+    fn meters_are_not_taken_for_centimeters() {
+        let check = |odometry: &[StampedPose2], truth: &[StampedPose2]| {
+            check_units("bag", [("/odom", odometry), ("/truth", truth)])
+        };
+        let pose = |t_secs: f64, x_m: f64| StampedPose2 {
+            t_secs,
+            position_m: [x_m, 0.0],
+            heading_rad: 0.0,
+        };
+        // It stands for more than half of the time, and the cameras see it shake by a fiftieth of a millimeter.
+        let mut x_m = 0.0;
+        let mut standing = [Vec::new(), Vec::new()];
+        for k in 0..6000 {
+            let t_secs = 0.01 * f64::from(k);
+            x_m += if k % 1000 < 400 { 0.02 } else { 0.0 };
+            standing[0].push(pose(t_secs, 0.98 * x_m));
+            standing[1].push(pose(t_secs, x_m + 1e-5 * f64::from(k % 3 - 1)));
+        }
+        assert_eq!(check(&standing[0], &standing[1]), Ok(()));
+        // A truth for one part of the way of odometry.
+        let long: Vec<StampedPose2> =
+            (0..20_000).map(|k| pose(0.1 * f64::from(k), 0.05 * f64::from(k))).collect();
+        let part = &long[500..700];
+        assert_eq!(check(&long, part), Ok(()));
+        // Three poses of a truth, each a round after the one before.
+        let round: Vec<StampedPose2> = (0..=10_000)
+            .map(|k| {
+                let angle_rad = 1e-3 * f64::from(k) * std::f64::consts::TAU;
+                let position_m = [10.0 * cos(angle_rad), 10.0 * sin(angle_rad)];
+                StampedPose2 { position_m, ..pose(0.1 * f64::from(k), 0.0) }
+            })
+            .collect();
+        let seldom = [0, 1009, 2018].map(|k| round[k]);
+        assert_eq!(check(&round, &seldom), Ok(()));
+        // A truth every five seconds is compared all the same.
+        let in_cm: Vec<StampedPose2> = long
+            .iter()
+            .step_by(50)
+            .map(|own| pose(own.t_secs, 100.0 * own.position_m[0]))
+            .collect();
+        assert!(check(&long, &in_cm).is_err());
     }
 }

@@ -256,7 +256,7 @@ fn tracks(
     let odometry = cut_and_report("ODOM", odometry, &rule, report);
     let truth = cut_and_report("the true poses", truth, &rule, report);
     report_frozen("the true poses", &truth, &odometry, report);
-    report_pair([("ODOM", &odometry), ("the truth", &truth)], report);
+    report_pair([("ODOM", &odometry), ("the true poses", &truth)], report);
     CarmenMotion::Tracks { odometry, truth }
 }
 
