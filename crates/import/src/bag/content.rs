@@ -369,8 +369,9 @@ impl<'a> BagContent<'a> {
     /// Returns the pose on the robot of each frame of scans, as far as the bag places it.
     pub(super) fn mounts(&self, scans: &[LaserScan], bodies: &[&str]) -> BTreeMap<String, Pose> {
         let mut links = self.statics.clone();
+        let known: BTreeSet<&str> = self.statics.iter().map(|link| &*link.child).collect();
         for link in self.fixed.values().flatten() {
-            if !self.statics.iter().any(|known| known.child == link.child) {
+            if !known.contains(&*link.child) {
                 links.push(link.clone());
             }
         }

@@ -120,26 +120,27 @@ impl<'a> Edges<'a> {
                 self.links.keys().filter(|(outer, inner)| *outer == parent && inner.is_empty());
             return Some(vec![*own.next()?]);
         }
-        // From the inner frame outward, breadth first: each frame has the way from it to `child`.
-        let mut ways: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+        let mut by_inner: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+        for pair in self.links.keys() {
+            by_inner.entry(pair.1).or_default().push(*pair);
+        }
+        // From the inner frame outward, breadth first: each frame has the pair that leads from it toward `child`.
+        let mut inward: BTreeMap<&str, (&str, &str)> = BTreeMap::new();
         let mut frontier = vec![child];
         for _ in 0..MAX_DEPTH {
             let mut next = Vec::new();
             for inner in frontier {
-                let way = ways.get(inner).cloned().unwrap_or_default();
-                for pair in self.links.keys().filter(|(_, own)| *own == inner) {
+                for pair in by_inner.get(inner).into_iter().flatten() {
                     let (outer, _) = *pair;
-                    if outer == child || ways.contains_key(outer) {
+                    if outer == child || inward.contains_key(outer) {
                         continue;
                     }
-                    let mut longer = vec![*pair];
-                    longer.extend(&way);
-                    ways.insert(outer, longer);
+                    inward.insert(outer, *pair);
                     next.push(outer);
                 }
             }
-            if let Some(way) = ways.get(parent) {
-                return Some(way.clone());
+            if inward.contains_key(parent) {
+                return Some(way_inward(&inward, parent));
             }
             frontier = next;
         }
@@ -149,6 +150,20 @@ impl<'a> Edges<'a> {
     fn link(&self, pair: &(&'a str, &'a str)) -> Link<'a> {
         self.links[pair].clone()
     }
+}
+
+/// Returns the pairs of frames from one inward, as far as they lead.
+fn way_inward<'a>(
+    inward: &BTreeMap<&'a str, (&'a str, &'a str)>,
+    from: &str,
+) -> Vec<(&'a str, &'a str)> {
+    let mut way: Vec<(&str, &str)> = Vec::new();
+    let mut at = from;
+    while let Some(pair) = inward.get(at) {
+        way.push(*pair);
+        at = pair.1;
+    }
+    way
 }
 
 /// Returns the pose of frame `child` in the outermost frame that static transforms lead to, or in the first of

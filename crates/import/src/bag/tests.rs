@@ -826,6 +826,22 @@ fn frames_with_two_parents_are_joined_by_the_pair_that_is_asked_for() {
     assert_eq!((log.odometry[3].position_m[0], log.truth[3].position_m[0]), (3.0, 6.0));
 }
 
+/// As many comparisons as pairs of links would not end.
+#[test]
+fn a_frame_with_a_hundred_thousand_parents_is_found() {
+    let mut edges: Vec<(String, String)> =
+        (0..100_000).map(|k| (format!("p{k}"), "base".to_owned())).collect();
+    edges.push(("map".into(), "p99999".into()));
+    let edges: Vec<(&str, &str, Pose)> =
+        edges.iter().map(|(outer, inner)| (&**outer, &**inner, at(1.0, 0.0))).collect();
+    let entries = [transforms("/tf", 0, &edges), transforms("/tf", 100, &edges)];
+    let selection = TopicSelection { odometry: None, ..wanted("/tf:map:base", None) };
+    let log = read_all(&entries, &selection).unwrap();
+    assert_eq!(log.truth[0].position_m, [2.0, 0.0]);
+    let selection = TopicSelection { odometry: None, ..wanted("/tf:no:base", None) };
+    assert!(refused(&entries, &selection).cause().contains("no transforms lead"));
+}
+
 #[test]
 fn static_transforms_lead_on_where_those_that_change_do_not() {
     let mut entries: Vec<Entry> = (0..20)

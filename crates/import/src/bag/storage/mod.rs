@@ -55,6 +55,16 @@ pub(super) fn read(
         let remedy = "copy it again if its original is whole, or give another bag";
         return Err(InputError::new(path.display(), cause, remedy));
     }
+    let read: u64 = sink.topics.values().map(|topic| topic.messages).sum();
+    if sink.lost_rows > read {
+        let cause = format!(
+            "more than half of its rows are on damaged pages: {read} can be read, and about {} cannot",
+            sink.lost_rows
+        );
+        let remedy = "copy the bag again if its original is whole; what is left of a damaged file, `sqlite3 OLD.db3 .recover | \
+                      sqlite3 NEW.db3` saves";
+        return Err(InputError::new(path.display(), cause, remedy));
+    }
     if sink.packed_messages > 0 {
         let value = format!("zstd, message by message ({} messages)", sink.packed_messages);
         sink.report.add_fact("compression", value);

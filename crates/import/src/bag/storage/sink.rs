@@ -6,7 +6,7 @@ use sidestep_kernel::InputError;
 
 use super::packed;
 use crate::bag::cdr::Encoding;
-use crate::report::{ImportReport, Treatment};
+use crate::report::{Finding, ImportReport, Treatment};
 
 /// Maximum size of a record, of a chunk or of a message in bytes, before and after it is unpacked: an image of sixty
 /// megapixels and more. No more of a bag than one record is in memory at a time.
@@ -89,6 +89,8 @@ pub(super) struct Sink<'a> {
     on_message: &'a mut dyn FnMut(RawMessage<'_>) -> Result<(), InputError>,
     /// Number of messages that were packed one by one.
     pub(super) packed_messages: u64,
+    /// Number of rows that cannot be read, of topics that nothing tells.
+    pub(super) lost_rows: u64,
 }
 
 impl<'a> Sink<'a> {
@@ -102,6 +104,7 @@ impl<'a> Sink<'a> {
             is_read,
             on_message,
             packed_messages: 0,
+            lost_rows: 0,
         }
     }
 
@@ -157,6 +160,23 @@ impl<'a> Sink<'a> {
     /// Records a part of a file that is damaged.
     pub(super) fn damaged_part(&mut self, rule: &str, place: String) {
         self.report.record(Treatment::Dropped, rule, place, COPY);
+    }
+
+    /// Records rows of a file that cannot be read.
+    pub(super) fn lose_rows(&mut self, rule: &str, n: u64, place: String) {
+        self.lost_rows = self.lost_rows.saturating_add(n);
+        self.damaged_part(rule, place);
+        let is_known =
+            |found: &&mut Finding| found.treatment == Treatment::Dropped && found.rule == rule;
+        if let Some(found) = self.report.findings.iter_mut().find(is_known) {
+            found.count = found.count.saturating_add(n.saturating_sub(1));
+        }
+    }
+
+    /// Records the rest of a file, of about `n` rows.
+    pub(super) fn lose_rest(&mut self, n: u64, place: String) {
+        self.lost_rows = self.lost_rows.saturating_add(n);
+        self.damaged_part("the rest of a file that is damaged", place);
     }
 
     /// Records that a file ends before its end.

@@ -13,6 +13,7 @@ use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_path;
 
 use super::sink::{MAX_RECORD_BYTES, Sink, Topic, ros2_name};
 use crate::report::Treatment;
@@ -29,10 +30,13 @@ const SETTINGS: &str =
 /// # Errors
 /// When it is no bag; those of the sink.
 pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), InputError> {
-    let completed = completed_copy(path).ok().flatten();
-    if completed.is_some() {
-        sink.cut_off(file);
-    }
+    let completed = match whole_length(path).ok().flatten() {
+        Some(whole) => {
+            sink.cut_off(file);
+            Some(completed_copy(file, path, [whole, MAX_COPY_BYTES])?)
+        }
+        None => None,
+    };
     let path = completed.as_ref().map_or(path, |copy| copy.path());
     let opened = open(path).and_then(|opened| Ok((read_topics(&opened.database)?, opened)));
     let (topics, Opened { database, is_alone }) = opened.map_err(|error| {
@@ -50,8 +54,9 @@ pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), I
     for (name, topic) in topics.values() {
         sink.declare(name, topic.clone());
     }
-    let read = read_messages(file, &database, &topics, sink);
-    match read {
+    let file_bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let source = Source { file, file_bytes, database: &database, topics: &topics };
+    match source.read_messages(sink) {
         Ok(()) => Ok(()),
         Err(ReadError::Sink(error)) => Err(error),
         Err(ReadError::Database(error)) => {
@@ -61,9 +66,11 @@ pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), I
     }
 }
 
-/// Returns a copy of a file that was cut off, as long as its head says it was: without the pages that are missing, which are
-/// found as damaged ones are, SQLite reads none. `None` where the file is whole.
-fn completed_copy(path: &Path) -> io::Result<Option<tempfile::NamedTempFile>> {
+/// Maximum size of a file that is copied to be completed, in bytes: the folder for such files may be in memory.
+const MAX_COPY_BYTES: u64 = 1 << 32;
+
+/// Returns the length of a file before it was cut off, as its head says; `None` where it is whole.
+fn whole_length(path: &Path) -> io::Result<Option<u64>> {
     const PAGE_SIZE: Range<usize> = 16..18;
     const PAGE_COUNT: Range<usize> = 28..32;
     let mut file = File::open(path)?;
@@ -79,13 +86,43 @@ fn completed_copy(path: &Path) -> io::Result<Option<tempfile::NamedTempFile>> {
         head[PAGE_COUNT].iter().fold(0_u64, |count, byte| count << 8 | u64::from(*byte));
     let whole = page_size * page_count;
     // A file of less than half of its pages has lost more than it has.
-    if length >= whole || whole > 2 * length || has_journal(path) {
-        return Ok(None);
+    let is_cut = length < whole && whole <= 2 * length && !has_journal(path);
+    Ok(is_cut.then_some(whole))
+}
+
+/// Returns a copy of a file that was cut off, as long as it was whole: without the pages that are missing, which are found
+/// as damaged ones are, SQLite reads none.
+///
+/// # Errors
+/// When it was longer than `limit` bytes, or cannot be copied.
+fn completed_copy(
+    file: &str,
+    path: &Path,
+    [whole, limit]: [u64; 2],
+) -> Result<tempfile::NamedTempFile, InputError> {
+    let error = |cause: String| {
+        let remedy = format!(
+            "copy it again if its original is whole; else complete a copy of it: `cp {} whole.db3 && truncate -s {whole} \
+             whole.db3`, and give whole.db3",
+            shell_path(path)
+        );
+        InputError::new(file, cause, remedy)
+    };
+    if whole > limit {
+        let cause = format!(
+            "is cut off, and too large to be completed in the folder of temporary files: {whole} bytes, of at most {limit}"
+        );
+        return Err(error(cause));
     }
-    let copy = tempfile::NamedTempFile::new()?;
-    std::fs::copy(path, copy.path())?;
-    copy.as_file().set_len(whole)?;
-    Ok(Some(copy))
+    let copied = || {
+        let copy = tempfile::NamedTempFile::new()?;
+        std::fs::copy(path, copy.path())?;
+        copy.as_file().set_len(whole)?;
+        Ok(copy)
+    };
+    copied().map_err(|e: io::Error| {
+        error(format!("is cut off, and cannot be completed in the folder of temporary files: {e}"))
+    })
 }
 
 /// The end of reading rows before the last.
@@ -178,90 +215,183 @@ fn read_definitions(database: &Connection) -> rusqlite::Result<BTreeMap<String, 
     rows.collect()
 }
 
-/// Hands the messages on to `sink`. What is on a damaged page is skipped and counted.
-fn read_messages(
-    file: &str,
-    database: &Connection,
-    topics: &BTreeMap<i64, (String, Topic)>,
-    sink: &mut Sink<'_>,
-) -> Result<(), ReadError> {
-    let mut wanted = Vec::new();
-    for (id, (name, _)) in topics {
-        if sink.is_read(name) {
-            wanted.push(id.to_string());
-        }
-    }
-    let wanted = wanted.join(",");
-    let messages = format!(
-        "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid > ?1 AND topic_id IN ({wanted}) ORDER BY rowid"
-    );
-    let lost = read_rows(database, &messages, &mut |row| {
-        let Some((name, _)) = topics.get(&row.get(1)?) else { return Ok(()) };
-        let time_ns = row.get::<_, i64>(2).unwrap_or(0);
-        let bytes = match row.get_ref(3)? {
-            ValueRef::Blob(bytes) => Ok(bytes),
-            _ => Err("it has no data".to_owned()),
-        };
-        let time_ns = u64::try_from(time_ns).unwrap_or(0);
-        sink.deliver(name, time_ns, bytes).map_err(ReadError::Sink)
-    })?;
-    for rows in lost {
-        let rule = "rows on damaged pages of a file";
-        sink.damaged_part(rule, format!("{file}, {} to {}", rows.start, rows.end - 1));
-    }
-    // Messages on other topics are counted without their data, which are most of the file.
-    let others = format!(
-        "SELECT rowid, topic_id FROM messages WHERE rowid > ?1 AND topic_id NOT IN ({wanted}) ORDER BY rowid"
-    );
-    read_rows(database, &others, &mut |row| {
-        if let Some((name, _)) = topics.get(&row.get(1)?) {
-            sink.count(name);
-        }
-        Ok(())
-    })?;
-    Ok(())
+/// A file that is read.
+struct Source<'a> {
+    /// Its name for people.
+    file: &'a str,
+    file_bytes: u64,
+    database: &'a Connection,
+    /// Topics by their numbers.
+    topics: &'a BTreeMap<i64, (String, Topic)>,
 }
 
-/// Number of times that reading goes on behind a damaged page.
-const MAX_RESTARTS: usize = 1000;
+impl Source<'_> {
+    /// Hands the messages on to `sink`. What is on a damaged page is skipped and counted.
+    fn read_messages(&self, sink: &mut Sink<'_>) -> Result<(), ReadError> {
+        let mut wanted = Vec::new();
+        for (id, (name, _)) in self.topics {
+            if sink.is_read(name) {
+                wanted.push(id.to_string());
+            }
+        }
+        // Messages on other topics are counted without their data, which are most of the file.
+        let query = format!(
+            "SELECT rowid, topic_id, timestamp, length(data), CASE WHEN topic_id IN ({}) THEN data END \
+             FROM messages WHERE rowid >= ?1 ORDER BY rowid",
+            wanted.join(",")
+        );
+        let mut size = ReadSize::default();
+        let lost = read_rows(self.database, &query, MAX_RESTARTS, &mut |row| {
+            size.add(row);
+            let Some((name, _)) = topic_of(row).and_then(|id| self.topics.get(&id)) else {
+                let number: i64 = row.get(0)?;
+                let place = format!("{}, row {number}", self.file);
+                sink.lose_rows("rows of no topic of a file", 1, place);
+                return Ok(());
+            };
+            if !sink.is_read(name) {
+                sink.count(name);
+                return Ok(());
+            }
+            let time_ns = u64::try_from(row.get::<_, i64>(2).unwrap_or(0)).unwrap_or(0);
+            let bytes = match row.get_ref(4)? {
+                ValueRef::Blob(bytes) => Ok(bytes),
+                _ => Err("it has no data".to_owned()),
+            };
+            sink.deliver(name, time_ns, bytes).map_err(ReadError::Sink)
+        })?;
+        for rows in &lost.ranges {
+            let place = format!("{}, {} to {}", self.file, rows.start, rows.end - 1);
+            sink.lose_rows("rows on damaged pages of a file", rows_in(rows), place);
+        }
+        if let Some(first) = lost.rest_from {
+            let known = lost.ranges.iter().map(rows_in).sum();
+            let rest = self.rows_behind(&size, known);
+            sink.lose_rest(rest, format!("{}, from row {first} on", self.file));
+        }
+        Ok(())
+    }
 
-/// Calls `on_row` with the rows of a query that begins behind a row, and returns which rows were on damaged pages. Behind
-/// one it goes on at a row further and further away, until a page can be read again.
+    /// Returns about how many rows are left of a file beside those that were read and those known to be lost.
+    fn rows_behind(&self, read: &ReadSize, known_lost: u64) -> u64 {
+        /// Bytes of tables and pages that have no messages.
+        const OTHER_BYTES: u64 = 1 << 16;
+        let definitions: usize =
+            self.topics.values().map(|(_, topic)| topic.definition.len()).sum();
+        let content = self.file_bytes.saturating_sub(OTHER_BYTES + definitions as u64);
+        let rows = content / (read.bytes / read.rows.max(1)).max(1);
+        rows.saturating_sub(read.rows).saturating_sub(known_lost).max(1)
+    }
+}
+
+fn topic_of(row: &rusqlite::Row<'_>) -> Option<i64> {
+    row.get(1).ok()
+}
+
+fn rows_in(range: &Range<i64>) -> u64 {
+    range.end.abs_diff(range.start)
+}
+
+/// The size of the rows that were read.
+#[derive(Default)]
+struct ReadSize {
+    rows: u64,
+    bytes: u64,
+}
+
+impl ReadSize {
+    fn add(&mut self, row: &rusqlite::Row<'_>) {
+        /// Bytes of a row, and of its place in the index, beside its data.
+        const ROW_BYTES: u64 = 40;
+        let data: i64 = row.get(3).unwrap_or(0);
+        self.rows += 1;
+        self.bytes += ROW_BYTES + data.unsigned_abs();
+    }
+}
+
+/// Number of times that reading goes on behind damaged pages.
+const MAX_RESTARTS: usize = 20_000;
+
+/// Rows that cannot be read.
+#[derive(Debug, Default, PartialEq)]
+struct LostRows {
+    ranges: Vec<Range<i64>>,
+    /// The first of those at the end, where nothing tells the last.
+    rest_from: Option<i64>,
+}
+
+/// Calls `on_row` with the rows of a query that begins at a row, and returns which were on damaged pages. Behind those it
+/// goes on, so many times at most.
 fn read_rows(
     database: &Connection,
     query: &str,
+    max_restarts: usize,
     on_row: &mut dyn FnMut(&rusqlite::Row<'_>) -> Result<(), ReadError>,
-) -> Result<Vec<Range<i64>>, ReadError> {
+) -> Result<LostRows, ReadError> {
     let end = database
         .query_row("SELECT max(rowid) FROM messages", [], |row| row.get::<_, Option<i64>>(0));
     let end = end.ok().flatten();
     let mut statement = database.prepare(query)?;
-    let mut lost: Vec<Range<i64>> = Vec::new();
-    let mut last = 0_i64;
-    let mut skipped = 0_i64;
-    for _ in 0..MAX_RESTARTS {
-        let from = last.saturating_add(skipped);
-        let damage = read_from(&mut statement, from, on_row, &mut |row| {
-            if skipped > 0 {
-                lost.push(last + 1..row);
-            }
-            (last, skipped) = (row, 0);
+    let mut lost = LostRows::default();
+    let mut next = 1_i64;
+    for _ in 0..max_restarts {
+        let damage = read_from(&mut statement, next, on_row, &mut |row| {
+            next = row.saturating_add(1);
         })?;
-        let Some(damage) = damage else { return Ok(lost) };
-        skipped = skipped.saturating_mul(2).max(1);
-        match end {
-            Some(end) if last.saturating_add(skipped) < end => {}
-            Some(end) => {
-                lost.push(last + 1..end.saturating_add(1));
-                return Ok(lost);
-            }
-            None => return Err(ReadError::Database(damage)),
+        if damage.is_none() {
+            return Ok(lost);
         }
+        let Some(readable) = next_readable(&mut statement, next, end) else { break };
+        lost.ranges.push(next..readable);
+        next = readable;
+    }
+    match end {
+        Some(end) if next <= end => lost.ranges.push(next..end.saturating_add(1)),
+        Some(_) => {}
+        None => lost.rest_from = Some(next),
     }
     Ok(lost)
 }
 
-/// Reads the rows behind one, and returns the damage that ends them, if any.
+/// Returns the first row behind a damaged one that can be read: found further and further away, and then between there and
+/// the last that cannot.
+fn next_readable(
+    statement: &mut rusqlite::Statement<'_>,
+    damaged: i64,
+    end: Option<i64>,
+) -> Option<i64> {
+    const MAX_SKIPPED: i64 = 1 << 40;
+    let limit = end.unwrap_or(i64::MAX).min(damaged.saturating_add(MAX_SKIPPED));
+    let mut unreadable = damaged;
+    let mut skipped = 1_i64;
+    let mut readable = loop {
+        let probe = damaged.saturating_add(skipped).min(limit);
+        if probe <= unreadable {
+            return None;
+        }
+        if is_readable(statement, probe) {
+            break probe;
+        }
+        unreadable = probe;
+        skipped *= 2;
+    };
+    while readable - unreadable > 1 {
+        let middle = unreadable + (readable - unreadable) / 2;
+        if is_readable(statement, middle) {
+            readable = middle;
+        } else {
+            unreadable = middle;
+        }
+    }
+    Some(readable)
+}
+
+fn is_readable(statement: &mut rusqlite::Statement<'_>, row: i64) -> bool {
+    let rows = statement.query([row]);
+    rows.is_ok_and(|mut rows| matches!(rows.next(), Ok(Some(_))))
+}
+
+/// Reads the rows from one on, and returns the damage that ends them, if any.
 fn read_from(
     statement: &mut rusqlite::Statement<'_>,
     from: i64,
@@ -285,5 +415,123 @@ fn read_from(
             Ok(None) => return Ok(None),
             Err(damage) => return Ok(Some(damage)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE_BYTES: usize = 4096;
+    const QUERY: &str = "SELECT rowid, topic_id, timestamp, length(data), data FROM messages WHERE rowid >= ?1 ORDER BY rowid";
+
+    /// A bag of 2,010 messages of 200 bytes.
+    fn bag(path: &Path) -> Vec<u8> {
+        let database = Connection::open(path).unwrap();
+        database
+            .execute_batch(
+                "PRAGMA synchronous = OFF; PRAGMA page_size = 4096; \
+                 CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT); \
+                 CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB); \
+                 INSERT INTO topics VALUES (1, '/note', 'std_msgs/msg/String', 'cdr'); \
+                 WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k < 2010) \
+                 INSERT INTO messages SELECT k, 1, k, zeroblob(200) FROM n;",
+            )
+            .unwrap();
+        drop(database);
+        std::fs::read(path).unwrap()
+    }
+
+    /// The starts of pages with rows, in the order of the rows, and how many rows each has.
+    fn leaves(bytes: &[u8]) -> Vec<(usize, u64)> {
+        const LEAF_OF_TABLE: u8 = 0x0d;
+        let mut leaves = Vec::new();
+        for start in (PAGE_BYTES..bytes.len()).step_by(PAGE_BYTES) {
+            let rows = u16::from_be_bytes([bytes[start + 3], bytes[start + 4]]);
+            if bytes[start] == LEAF_OF_TABLE && rows > 5 {
+                leaves.push((start, rows.into()));
+            }
+        }
+        leaves
+    }
+
+    /// The number of rows that are read of a file, and those that are lost.
+    fn read_all(path: &Path, max_restarts: usize) -> (u64, LostRows) {
+        let database = open(path).unwrap().database;
+        let mut read = 0;
+        let lost = read_rows(&database, QUERY, max_restarts, &mut |_| {
+            read += 1;
+            Ok(())
+        });
+        (read, lost.ok().unwrap())
+    }
+
+    #[test]
+    fn just_the_rows_on_damaged_pages_are_lost_and_all_of_them_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.db3");
+        let mut bytes = bag(&path);
+        let leaves = leaves(&bytes);
+        let mut on_damaged = 0;
+        for (start, rows) in [leaves[20], leaves[21], leaves[60]] {
+            bytes[start..start + PAGE_BYTES].fill(0);
+            on_damaged += rows;
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        let (read, lost) = read_all(&path, MAX_RESTARTS);
+        let lost_rows: u64 = lost.ranges.iter().map(rows_in).sum();
+        assert_eq!((read, lost_rows), (2010 - on_damaged, on_damaged));
+        // Where reading does not go on any more, the rest is lost.
+        let (read, lost) = read_all(&path, 1);
+        let lost_rows: u64 = lost.ranges.iter().map(rows_in).sum();
+        assert!(read < 2010 - on_damaged && read + lost_rows == 2010, "{read}, {lost:?}");
+    }
+
+    fn read_file(path: &Path) -> Result<crate::report::ImportReport, InputError> {
+        super::super::read(path, &|_| true, &mut |_| Ok(())).map(|storage| storage.report)
+    }
+
+    #[test]
+    fn a_file_of_which_more_than_half_is_damaged_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.db3");
+        let bytes = bag(&path);
+        let leaves = leaves(&bytes);
+        let damaged = |leaves: &[(usize, u64)]| {
+            let mut bytes = bytes.clone();
+            for (start, _) in leaves {
+                bytes[*start..*start + PAGE_BYTES].fill(0);
+            }
+            std::fs::write(&path, bytes).unwrap();
+            read_file(&path)
+        };
+        let n = leaves.len();
+        let report = damaged(&leaves[n / 10..n / 2]).unwrap();
+        let rows: u64 = leaves[n / 10..n / 2].iter().map(|(_, rows)| rows).sum();
+        assert_eq!(report.dropped(), rows);
+        let most = damaged(&leaves[n / 10..n * 9 / 10]).unwrap_err();
+        assert!(most.cause().starts_with("more than half of its rows"), "{most}");
+        // Nothing tells how many rows there were.
+        let end = damaged(&leaves[n / 10..]).unwrap_err();
+        assert!(end.cause().starts_with("more than half of its rows"), "{end}");
+        assert_eq!(damaged(&leaves[n * 9 / 10..]).unwrap().dropped(), 1);
+    }
+
+    #[test]
+    fn a_file_that_is_too_large_to_be_completed_is_named_with_a_remedy_that_works() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.db3");
+        let bytes = bag(&path);
+        let whole = bytes.len() as u64;
+        std::fs::write(&path, &bytes[..bytes.len() * 4 / 5]).unwrap();
+        assert_eq!(whole_length(&path).unwrap(), Some(whole));
+        let error = completed_copy("a.db3", &path, [whole, whole - 1]).unwrap_err();
+        assert!(error.cause().contains("too large to be completed"), "{error}");
+        assert!(error.remedy().contains(&format!("truncate -s {whole} whole.db3")), "{error}");
+        let by_hand = folder.path().join("whole.db3");
+        std::fs::copy(&path, &by_hand).unwrap();
+        File::options().write(true).open(&by_hand).unwrap().set_len(whole).unwrap();
+        assert!(read_file(&by_hand).is_ok());
+        assert!(completed_copy("a.db3", &path, [whole, whole]).is_ok());
     }
 }
