@@ -7,9 +7,11 @@ use sidestep_kernel::InputError;
 
 use super::content::{Tally, decode_scan, log_secs};
 use super::messages::{LaserScan, Message, TfMessage};
+use super::offsets;
 use super::poses::{self, StampedPose};
 use super::scans::RangeCounts;
 use super::storage::{self, RawMessage};
+use super::streams::Timing;
 use super::topics;
 use crate::report::{ImportReport, Treatment};
 
@@ -83,12 +85,10 @@ struct TopicFindings {
 
 /// Maximum number of pairs of frames that are listed.
 const MAX_FRAMES: usize = 20;
-/// Stamps further ahead of the recording than this, in s, cannot be times of measurements.
-const MAX_AHEAD_SECS: f64 = 0.3;
-/// The recording has times where it lasts at least this share of the time between stamps.
-const MIN_TIMED_SHARE: f64 = 0.1;
-/// Stamps further than this from the recording, in s, are of another clock, such as that of a simulation.
-const MAX_OFFSET_SECS: f64 = 1e6;
+/// Maximum number of topics whose stamps are listed.
+const MAX_STAMPED: usize = 20;
+/// Maximum number of stamps of a topic that are compared with the recording: of more every second, every fourth, and so on.
+const MAX_TIMINGS: usize = 1 << 12;
 
 /// The stamps of a topic.
 struct ClockFindings {
@@ -96,10 +96,9 @@ struct ClockFindings {
     first_secs: f64,
     last_secs: f64,
     latest_secs: f64,
-    /// The least time from a stamp to the recording of its message.
-    least_latency_secs: f64,
-    /// The times of the recording of the first and the last message.
-    recorded_secs: [f64; 2],
+    /// Every so many stamps are kept with the times of the recording.
+    every: u64,
+    timings: Vec<Timing>,
     backward_steps: Vec<String>,
     backward: u64,
 }
@@ -144,23 +143,23 @@ impl TopicFindings {
     }
 
     fn add_stamp(&mut self, raw: &RawMessage<'_>, t_secs: f64) {
+        let secs = log_secs(raw);
         let Some(clock) = self.clocks.get_mut(raw.topic) else {
             let clock = ClockFindings {
                 stamps: 1,
                 first_secs: t_secs,
                 last_secs: t_secs,
                 latest_secs: t_secs,
-                least_latency_secs: log_secs(raw) - t_secs,
-                recorded_secs: [log_secs(raw); 2],
+                every: 1,
+                timings: vec![Timing { t_secs, log_secs: secs }],
                 backward_steps: Vec::new(),
                 backward: 0,
             };
             self.clocks.insert(raw.topic.into(), clock);
             return;
         };
+        clock.keep_timing(Timing { t_secs, log_secs: secs });
         clock.stamps += 1;
-        clock.recorded_secs[1] = log_secs(raw);
-        clock.least_latency_secs = clock.least_latency_secs.min(log_secs(raw) - t_secs);
         let back_secs = clock.latest_secs - t_secs;
         if back_secs > MAX_BACKWARD_STEP_SECS {
             clock.backward += 1;
@@ -190,8 +189,16 @@ impl TopicFindings {
         for (topic, tally) in &self.tallies {
             tally.report(topic, report);
         }
-        for (topic, clock) in &self.clocks {
+        for (k, (topic, clock)) in self.clocks.iter().enumerate() {
+            if k < MAX_STAMPED {
+                let value =
+                    format!("{topic}: from {:.3} to {:.3} s", clock.first_secs, clock.last_secs);
+                report.add_fact("stamps", value);
+            }
             clock.report(topic, report);
+        }
+        if self.clocks.len() > MAX_STAMPED {
+            report.add_fact("stamps", format!("{} more topics", self.clocks.len() - MAX_STAMPED));
         }
         for ((topic, parent, child), n) in self.frames.iter().take(MAX_FRAMES) {
             report.add_fact("frames", format!("{topic}: {parent} > {child}, {n} transforms"));
@@ -207,20 +214,32 @@ impl TopicFindings {
 }
 
 impl ClockFindings {
+    fn keep_timing(&mut self, timing: Timing) {
+        if !self.stamps.is_multiple_of(self.every) {
+            return;
+        }
+        self.timings.push(timing);
+        if self.timings.len() > MAX_TIMINGS {
+            self.every *= 2;
+            let mut is_even = false;
+            self.timings.retain(|_| {
+                is_even = !is_even;
+                is_even
+            });
+        }
+    }
+
     fn report(&self, topic: &str, report: &mut ImportReport) {
         let Self { first_secs, last_secs, .. } = self;
-        report.add_fact("stamps", format!("{topic}: from {first_secs:.3} to {last_secs:.3} s"));
         let rule = format!("stamps of {topic} that go back");
         for k in 0..self.backward {
             let place = self.backward_steps.get(k as usize).cloned().unwrap_or_default();
             report.record(Treatment::Suspicious, rule.clone(), place, "");
         }
-        let ahead_secs = -self.least_latency_secs;
-        let [recorded_first, recorded_last] = self.recorded_secs;
-        let is_timed = recorded_last - recorded_first > MIN_TIMED_SHARE * (last_secs - first_secs);
-        if is_timed && ahead_secs > MAX_AHEAD_SECS && ahead_secs < MAX_OFFSET_SECS {
+        let offset_secs = offsets::known_offset(&self.timings);
+        if let Some(ahead_secs) = offset_secs.filter(|secs| *secs > offsets::MAX_AHEAD_SECS) {
             let rule = format!(
-                "stamps of {topic} that lie up to {ahead_secs:.3} s after the recording of their messages"
+                "stamps of {topic} that lie {ahead_secs:.3} s after the recording of their messages"
             );
             report.record(
                 Treatment::Suspicious,

@@ -18,6 +18,7 @@
 pub mod cdr;
 pub mod messages;
 
+mod beams;
 mod clean;
 mod clock;
 mod content;

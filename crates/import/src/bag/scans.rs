@@ -3,6 +3,7 @@
 //! Many drivers break it. How one writes "no echo" is recognized by counts over the whole recording, and named; the
 //! scans that are handed on follow REP 117.
 
+use super::beams::BeamSet;
 use super::messages::LaserScan;
 use crate::report::{ImportReport, Treatment};
 
@@ -17,6 +18,10 @@ const MAX_AT_OWN_LIMIT: f64 = 2.0;
 /// in a million times.
 const MIN_AT_LIMIT: u64 = 3;
 const MIN_SHARE_AT_LIMIT: f64 = 0.001;
+/// Nothing answers in several directions; a wall or a part of the robot is seen in one, by beams side by side.
+const MIN_RUNS: u64 = 2;
+/// Parts of the robot are seen by the same beams in so great a share of the scans.
+const FIXED_SHARE: f64 = 0.9;
 
 /// What a driver writes where nothing answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -157,6 +162,9 @@ pub(super) struct RangeCounts {
     /// The value of the ranges that are too near; `None` where there are several.
     near_mark_m: Option<f32>,
     has_several_near: bool,
+    /// The beams with the value near to the limit, and those with one that is too near.
+    candidate_beams: BeamSet,
+    near_beams: BeamSet,
     /// Number of scans whose last bearing is not that of their last beam.
     other_end: u64,
 }
@@ -174,11 +182,11 @@ impl RangeCounts {
     pub(super) fn add(&mut self, scan: &LaserScan) {
         self.scans += 1;
         self.beams += scan.ranges_m.len() as u64;
-        for range_m in &scan.ranges_m {
+        for (beam, range_m) in scan.ranges_m.iter().enumerate() {
             let kind = kind_of(*range_m, scan);
             match kind {
-                RangeKind::Measured => self.add_measured(*range_m, scan),
-                RangeKind::TooNear => self.add_near(*range_m),
+                RangeKind::Measured => self.add_measured(beam, *range_m, scan),
+                RangeKind::TooNear => self.add_near(beam, *range_m),
                 _ => {}
             }
             *match kind {
@@ -199,7 +207,7 @@ impl RangeCounts {
         self.other_end += u64::from(off_rad > MAX_END_STEPS * scan.angle_increment_rad.abs());
     }
 
-    fn add_measured(&mut self, range_m: f32, scan: &LaserScan) {
+    fn add_measured(&mut self, beam: usize, range_m: f32, scan: &LaserScan) {
         self.greatest_m = self.greatest_m.max(range_m);
         if range_m <= NEAR_LIMIT * scan.range_max_m {
             return;
@@ -208,15 +216,18 @@ impl RangeCounts {
         // The vote of Boyer and Moore, which finds a value that most have without keeping them.
         if self.votes == 0 && range_m != self.candidate_m {
             (self.candidate_m, self.at_candidate) = (range_m, 0);
+            self.candidate_beams.clear();
         }
         if range_m == self.candidate_m {
             (self.votes, self.at_candidate) = (self.votes + 1, self.at_candidate + 1);
+            self.candidate_beams.insert(beam);
         } else {
             self.votes -= 1;
         }
     }
 
-    fn add_near(&mut self, range_m: f32) {
+    fn add_near(&mut self, beam: usize, range_m: f32) {
+        self.near_beams.insert(beam);
         self.has_several_near |= self.near_mark_m.is_some_and(|mark_m| mark_m != range_m);
         self.near_mark_m = Some(range_m);
     }
@@ -229,14 +240,25 @@ impl RangeCounts {
             && self.at_candidate >= MIN_AT_LIMIT
             && self.at_candidate as f64 >= MIN_SHARE_AT_LIMIT * self.beams as f64
             && self.at_candidate as f64 >= MIN_MARK_SHARE * self.near_limit as f64
+            && self.candidate_beams.runs() >= MIN_RUNS
             && self.at_maximum + self.beyond_maximum == 0;
         is_mark.then_some(self.candidate_m)
     }
 
     /// Returns whether all ranges that are too near are at one value, which is no measurement then.
     fn is_near_mark(&self) -> bool {
-        let is_finite = self.near_mark_m.is_some_and(f32::is_finite);
-        self.infinite == 0 && is_finite && !self.has_several_near && self.too_near >= MIN_AT_LIMIT
+        let is_one_value = self.near_mark_m.is_some_and(f32::is_finite) && !self.has_several_near;
+        let n = self.too_near as f64;
+        let in_all_scans = self.near_beams.len() as f64 * self.scans as f64;
+        let is_of_robot = self.scans > 1
+            && n >= FIXED_SHARE * in_all_scans
+            && n <= MAX_NEAR_SHARE * self.beams as f64;
+        self.infinite == 0
+            && is_one_value
+            && self.too_near >= MIN_AT_LIMIT
+            && n >= MIN_SHARE_AT_LIMIT * self.beams as f64
+            && self.near_beams.runs() >= MIN_RUNS
+            && !is_of_robot
     }
 
     /// Returns whether each scan has the greatest of its own ranges as limit, so that a range at it is an echo.
@@ -615,6 +637,35 @@ mod tests {
             scans[0].ranges_m.iter().all(|range_m| range_m.is_finite()) && said.is_empty(),
             "{said:?}"
         );
+    }
+
+    #[test]
+    fn what_is_near_in_one_direction_or_by_the_same_beams_is_no_mark() {
+        let with = |beams: &[usize], range_m: f32| {
+            let mut ranges_m: Vec<f32> = (0..100_u8).map(|k| 1.0 + 0.01 * f32::from(k)).collect();
+            beams.iter().for_each(|beam| ranges_m[*beam] = range_m);
+            scan(8.0, &ranges_m)
+        };
+        // Two struts of the robot, and a wall just within the least range, as a robot sees them that stands.
+        let wall: Vec<usize> = (40..60).collect();
+        for beams in [&[7, 93][..], &wall] {
+            let (scans, said) = read(&vec![with(beams, 0.09); 20], None);
+            assert_eq!(scans[0].ranges_m[beams[0]], -INF, "{said:?}");
+            assert!(!said.iter().any(|line| line.contains("is no echo")), "{said:?}");
+        }
+        // A few equal ranges in a long recording.
+        let mut rare = vec![with(&[], 0.0); 100];
+        for (k, beam) in [(3, 8), (50, 20), (70, 77)] {
+            rare[k] = with(&[beam], 0.09);
+        }
+        let (_, said) = read(&rare, None);
+        assert_eq!(said, [""; 0]);
+        let (scans, said) = read(&vec![with(&wall, 7.96); 20], None);
+        assert_eq!((scans[0].ranges_m[50], said.len()), (7.96, 0), "{said:?}");
+        let moving: Vec<LaserScan> =
+            (0..20).map(|k| with(&[k, 30 + 2 * k, 90 - k], 0.05)).collect();
+        let (scans, said) = read(&moving, None);
+        assert_eq!(scans[0].ranges_m[0], INF, "{said:?}");
     }
 
     #[test]

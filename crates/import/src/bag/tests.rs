@@ -705,6 +705,38 @@ fn timed_bag(entries: &[(u64, Entry)]) -> (tempfile::TempDir, PathBuf) {
     stored(&writer.into_inner().into_inner())
 }
 
+#[test]
+fn a_report_warns_of_a_clock_that_is_ahead_and_not_of_one_stray_stamp() {
+    let said = |stamp_ms: &dyn Fn(u64) -> u64| {
+        let entries: Vec<(u64, Entry)> =
+            (0..9000).map(|k| (7_000_000 + 100 * k, truth(stamp_ms(k), 0.0))).collect();
+        let (_folder, path) = timed_bag(&entries);
+        let report = inspect(&path).unwrap();
+        report.findings.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let stray = said(&|k| 7_000_000 + 100 * k + if k == 4321 { 450 } else { 0 });
+    assert_eq!(stray, [""; 0]);
+    let ahead = said(&|k| 7_000_400 + 100 * k);
+    assert!(
+        ahead[0].starts_with("suspicious: stamps of /truth that lie 0.400 s after the recording"),
+        "{ahead:?}"
+    );
+}
+
+#[test]
+fn a_report_lists_the_stamps_of_a_few_topics() {
+    let names: Vec<&'static str> = vec![
+        "/a", "/b", "/c", "/d", "/e", "/f", "/g", "/h", "/i", "/j", "/k", "/l", "/m", "/n", "/o",
+        "/p", "/q", "/r", "/s", "/t", "/u", "/v",
+    ];
+    let entries: Vec<Entry> = names.iter().map(|name| posed(name, 5, at(0.0, 0.0))).collect();
+    let (_folder, path) = bag(&entries);
+    let report = inspect(&path).unwrap();
+    let stamps: Vec<&str> =
+        report.facts.iter().filter(|fact| fact.name == "stamps").map(|fact| &*fact.value).collect();
+    assert_eq!((stamps.len(), stamps[20]), (21, "2 more topics"));
+}
+
 /// A drive of 30 s whose truth is stamped by a clock of its own; returns the truth, and what is said.
 fn read_with_clock(stamp_ms: impl Fn(u64) -> u64) -> (Vec<(f64, f64)>, Vec<String>) {
     let mut entries = Vec::new();
