@@ -53,7 +53,7 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
         box_m: columns.box_m(table, options)?,
     };
     let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
-    let misfits = table.misfits().len() as u64;
+    let misfits = left_out::misfits_among(table, chosen.rows.len());
     if misfits > 0 {
         parsed.rejected.insert("damaged_row".to_string(), misfits);
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::camera::NOTHING;
 use super::options::{BEYOND, DistanceClasses};
+use crate::left_out;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
 
@@ -72,8 +73,8 @@ pub(super) fn read(
     let observations = observations(table.place(), &rows, &columns)?;
     let parser = RowParser { place: table.place(), columns, observations, classes };
     let mut readings = Vec::with_capacity(rows.len());
-    let misfits = table.misfits().len();
-    let mut damaged = misfits as u64;
+    let misfits = left_out::misfits_among(table, rows.len());
+    let mut damaged = misfits;
     let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
     let cycle = table.find("cycle");
     let mut scan = 0;
@@ -93,7 +94,7 @@ pub(super) fn read(
         }
     }
     match first_error {
-        Some(error) if 2 * damaged > (rows.len() + misfits) as u64 => Err(error),
+        Some(error) if 2 * damaged > rows.len() as u64 + misfits => Err(error),
         first_error => {
             Ok(ParsedReadings { observations: parser.observations, readings, damaged, first_error })
         }
@@ -255,5 +256,26 @@ impl RowParser<'_> {
             word.error(&self.place, cause, &format!("use one of {}", names.join(", ")))
         })?;
         Ok(Distance { class, range_m: None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_has_its_share_of_the_rows_whose_own_is_not_known() {
+        let text = format!(
+            "sensor_name,true,reported,true_class,reported_class\n{}{}{}",
+            "left,nothing,nothing,beyond,beyond\n".repeat(90),
+            "right,nothing,nothing,beyond,beyond\n".repeat(10),
+            "left\n".repeat(20)
+        );
+        let table = CsvTable::parse_recording(&"f.csv", &text).unwrap();
+        let rows = rows_of_sensor(&table, Some("right")).unwrap();
+        assert_eq!((rows.len(), left_out::misfits_among(&table, rows.len())), (10, 2));
+        let classes = DistanceClasses::new(&[1.0], &["near".to_owned(), "far".to_owned()]).unwrap();
+        let parsed = read(&table, Some("right"), &classes).unwrap();
+        assert_eq!(parsed.damaged, 2);
     }
 }

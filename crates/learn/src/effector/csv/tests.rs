@@ -223,6 +223,23 @@ fn rows_with_fields_too_many_or_too_few_are_left_out_and_counted() {
 }
 
 #[test]
+fn an_effector_has_its_share_of_the_rows_whose_own_is_not_known() {
+    let text = format!(
+        "effector,action,ahead_boxes,left_boxes,turn_deg\n{}{}{}",
+        "slow,forward,0,0,0\n".repeat(90),
+        "fast,forward,1,0,0\n".repeat(10),
+        "forward\n".repeat(20)
+    );
+    let table = CsvTable::parse_recording(&"f.csv", &text).unwrap();
+    for (name, rows, damaged) in [("fast", 10, 2), ("slow", 90, 18)] {
+        let effector = Some(name.to_string());
+        let report =
+            learn(&table, &EffectorOptions { effector, ..Default::default() }).unwrap().report;
+        assert_eq!((report.events, report.rejected["damaged_row"]), (rows, damaged));
+    }
+}
+
+#[test]
 fn turns_in_radians_are_warned_of() {
     let warnings = |turn: &str| {
         let rows = format!("left,0,0,{turn}\nright,0,0,-{turn}\n").repeat(5);
