@@ -15,9 +15,11 @@ use std::collections::BTreeMap;
 const FIELD_COUNT: usize = 22;
 /// Words with which lines begin.
 const KINDS: [&str; 6] = ["MSG", "SEL", "ID", "AIR", "STA", "CLK"];
-/// The most lines after a message of speed in which a position of the same aircraft has that speed. Lines have no time
-/// that can be compared as text, and a decoder gives a speed twice a second.
+/// The most lines after a message of speed in which a position of the same aircraft has that speed. It is no time: a
+/// decoder gives a speed twice a second, and its clock may be unset.
 const MAX_SPEED_AGE: u32 = 10;
+/// The greatest number of bytes of a call sign, which all later positions of the aircraft have.
+const MAX_CALLSIGN_BYTES: usize = 64;
 
 /// What an aircraft has said of itself.
 #[derive(Debug, Clone, Copy, Default)]
@@ -87,7 +89,9 @@ pub(super) fn collect(collector: &mut RowCollector, text: &str) {
             continue;
         }
         let words: Vec<&str> = line.split(',').map(str::trim).take(FIELD_COUNT + 1).collect();
-        let fields = <[&str; FIELD_COUNT]>::try_from(words).ok().filter(|_| kind == KINDS[0]);
+        let fields = <[&str; FIELD_COUNT]>::try_from(words)
+            .ok()
+            .filter(|fields| kind == KINDS[0] && fields[10].len() <= MAX_CALLSIGN_BYTES);
         let Some(fields) = fields else {
             collector.leave_out(number, 1, "lines that are no message of 22 fields");
             continue;

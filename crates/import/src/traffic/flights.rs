@@ -1,10 +1,11 @@
 //! Rows of all aircraft, put together as flights.
 
+use super::columns::NAUTICAL_MILE_M;
 use super::options::TrafficOptions;
 use super::plausibility::{self, Suspicion, distance_m, likely_unit, suspicions};
 use super::rows::{
     CheckedRows, Row, RowCollector, SAME_INSTANT_RULE, UNREACHED_RULE, UNUSED_COLUMNS_RULE,
-    remedy_of,
+    aircraft_key, remedy_of,
 };
 use super::summary::describe;
 use super::time::format_utc;
@@ -36,6 +37,17 @@ const MAX_DIRECTION_OFFSET_DEG: f64 = 45.0;
 /// A speed in kt that no aircraft reaches below [`LOW_FT`] on most of its way.
 const FAST_KT: f64 = 300.0;
 const LOW_FT: f64 = 1000.0;
+/// The number of fast rows that say something of their column, and that of a file of mostly fast rows: a row or two may
+/// be wrong.
+const MIN_FAST_ROWS: usize = 20;
+const MIN_FAST_ROWS_OF_FEW: usize = 5;
+
+/// The speed of aircraft in kt that report none.
+const USUAL_SPEED_KT: f64 = 500.0;
+/// What positions may differ by error, in m: those of transponders have steps of some meters.
+const POSITION_ERROR_M: f64 = 30.0;
+/// What altitudes may differ within a second, in ft: a step of transponders, and what aircraft climb.
+const SECOND_CLIMB_FT: f64 = 200.0;
 
 /// The rule by which flights of a single row are left out.
 pub const SINGLE_ROW_RULE: &str = "flights of a single row";
@@ -164,6 +176,9 @@ impl FlightBuilder<'_> {
                 && last.sample.altitude_ft == row.sample.altitude_ft;
             if is_same {
                 self.record(Treatment::Repaired, "rows given twice are kept once", &row, "");
+            } else if is_within_second(last, &row) {
+                let rule = "rows of one second, which has no fractions, are kept once";
+                self.record(Treatment::Repaired, rule, &row, "");
             } else {
                 self.bad_count += 1;
                 self.record(Treatment::Dropped, SAME_INSTANT_RULE, &row, "");
@@ -312,11 +327,18 @@ impl FlightBuilder<'_> {
     /// Names levels at which nobody flies as fast as the rows say.
     fn check_levels(&mut self, flights: &[Vec<Row>]) {
         let samples = flights.iter().flatten().map(|row| &row.sample);
-        let is_fast = |kt: f64| kt > FAST_KT;
-        let fast: Vec<f64> = samples
-            .filter(|sample| sample.ground_speed_kt.is_some_and(is_fast))
-            .map(|sample| sample.altitude_ft)
-            .collect();
+        let mut row_count = 0;
+        let mut fast = Vec::new();
+        for sample in samples {
+            row_count += 1;
+            if sample.ground_speed_kt.is_some_and(|kt| kt > FAST_KT) {
+                fast.push(sample.altitude_ft);
+            }
+        }
+        let is_most = fast.len() >= MIN_FAST_ROWS_OF_FEW && fast.len() * 2 > row_count;
+        if fast.len() < MIN_FAST_ROWS && !is_most {
+            return;
+        }
         let low = fast.iter().filter(|altitude_ft| **altitude_ft < LOW_FT).count();
         if low * 2 <= fast.len() {
             return;
@@ -445,16 +467,15 @@ fn is_snapshot(parts: &[Vec<Row>]) -> bool {
         && parts.iter().all(|rows| rows.len() == 1 && aircraft.insert(aircraft_key(&rows[0])))
 }
 
-/// Returns what tells aircraft apart: the address, which has no case and no leading zeros, or else a name; and the
-/// flight, where the file names it.
-fn aircraft_key(row: &Row) -> [String; 2] {
-    let address = row.address.to_ascii_lowercase();
-    let address = address.strip_prefix("0x").unwrap_or(&address).trim_start_matches('0');
-    let flight = row.flight_id.clone();
-    if row.address.is_empty() && flight.is_empty() {
-        return [format!("callsign {}", row.callsign), flight];
-    }
-    [address.to_string(), flight]
+/// Returns whether a row can be of the same second as another one: times are whole, and it is no farther than an aircraft
+/// flies and climbs in a second.
+fn is_within_second(first: &Row, row: &Row) -> bool {
+    let [a, b] = [&first.sample, &row.sample];
+    let reported_kt = a.ground_speed_kt.into_iter().chain(b.ground_speed_kt).reduce(f64::max);
+    let step_m = reported_kt.unwrap_or(USUAL_SPEED_KT) * NAUTICAL_MILE_M / 3600.0;
+    a.time_s.fract() == 0.0
+        && distance_m(a.position, b.position) <= step_m + POSITION_ERROR_M
+        && (a.altitude_ft - b.altitude_ft).abs() <= SECOND_CLIMB_FT
 }
 
 /// Gives rows without a call sign that of the row before, or else that of the row after.

@@ -4,10 +4,11 @@
 
 use super::POINTS_REMEDY;
 use super::columns::{Field, Layout, Source};
+use super::json_items::{Broken, Item, JsonItems};
 use super::rows::{RowCollector, RowValues};
 use super::value::Value;
 use serde::Deserialize;
-use serde_json::{Deserializer, Map, Value as Json};
+use serde_json::{Map, Value as Json};
 use sidestep_kernel::InputError;
 
 /// The maximum size of a file in bytes: as values it takes several times the memory.
@@ -61,6 +62,12 @@ const TRACE_KEYS: [&str; 11] = [
     "source",
     "alt_geom",
 ];
+/// The greatest number of bytes of a text that all rows of a list have: names of flights are shorter.
+const MAX_SHARED_BYTES: usize = 64;
+
+/// The rule by which items of a list are left out.
+const NO_OBJECT_RULE: &str = "items of a list that are no object";
+
 /// The flag of a point whose altitude is the geometric one.
 const GEOMETRIC_FLAG: u64 = 8;
 
@@ -104,32 +111,23 @@ pub(super) fn collect(collector: &mut RowCollector, text: &str) -> Result<(), In
     }
     let layout = state_layout()?;
     collector.set_noun("state");
-    let mut states =
-        StateReader { collector, layout, count: 0, records: Vec::new(), broken_lines: Vec::new() };
-    let mut begin = 0;
-    while begin < text.len() {
-        let mut documents = Deserializer::from_str(&text[begin..]).into_iter::<Json>();
-        let error = loop {
-            match documents.next() {
-                Some(Ok(Json::Array(items))) => {
-                    items.into_iter().try_for_each(|item| states.push_item(item))?;
-                }
-                Some(Ok(item)) => states.push_item(item)?,
-                Some(Err(error)) => break Some(error),
-                None => break None,
-            }
-        };
-        let Some(error) = error else { break };
-        let good_end = begin + documents.byte_offset();
-        let list_end = good_end + states.push_items_of_cut_list(&text[good_end..])?;
-        begin = states.leave_out_line(text, list_end, &error)?;
+    let mut states = StateReader {
+        collector,
+        layout,
+        count: 0,
+        records: Vec::new(),
+        broken: Vec::new(),
+        other_count: 0,
+    };
+    let mut items = JsonItems::new(text);
+    while let Some(item) = items.next().map_err(|cause| states.error(&cause))? {
+        match item {
+            Item::Value(value, line) => states.push_item(value, line)?,
+            Item::Broken(broken) => states.broken.push(broken),
+        }
     }
+    states.check_any(items.first_error())?;
     states.push_records()
-}
-
-/// Returns whether a character stands between the items of a list.
-fn is_separator(c: char) -> bool {
-    c == ',' || c.is_whitespace()
 }
 
 /// Returns where the fields of a state are.
@@ -149,8 +147,9 @@ struct StateReader<'a> {
     count: usize,
     /// Rows of a table, whose columns are those of all of them.
     records: Vec<Map<String, Json>>,
-    /// Numbers of lines from which on a line is no JSON.
-    broken_lines: Vec<usize>,
+    broken: Vec<Broken>,
+    /// Number of items that are no object.
+    other_count: usize,
 }
 
 const GEO_JSON_CAUSE: &str = "is GeoJSON, whose lines have no times";
@@ -163,46 +162,33 @@ impl StateReader<'_> {
         InputError::new(self.collector.place(), cause, remedy)
     }
 
-    /// Reads the items of a list that is not whole, as of a file that was cut short. Returns where the last whole one
-    /// ends; 0 where the text begins with no list.
-    fn push_items_of_cut_list(&mut self, text: &str) -> Result<usize, InputError> {
-        let Some(mut rest) = text.trim_start().strip_prefix('[') else { return Ok(0) };
-        let mut end = 0;
-        loop {
-            rest = rest.trim_start_matches(is_separator);
-            let mut items = Deserializer::from_str(rest).into_iter::<Json>();
-            let Some(Ok(item)) = items.next() else { return Ok(end) };
-            let length = items.byte_offset();
-            self.push_item(item)?;
-            rest = &rest[length..];
-            end = text.len() - rest.len();
+    /// Checks that something was read: if not, the whole text is something else.
+    fn check_any(&self, first_error: Option<String>) -> Result<(), InputError> {
+        if self.count > 0 || !self.records.is_empty() {
+            return Ok(());
         }
-    }
-
-    /// Leaves out what is no JSON up to the end of its line, after `good_end`; returns where the next line begins.
-    ///
-    /// # Errors
-    /// When nothing was read before it: then the whole text is something else.
-    fn leave_out_line(
-        &mut self,
-        text: &str,
-        good_end: usize,
-        error: &serde_json::Error,
-    ) -> Result<usize, InputError> {
-        if self.count == 0 && self.records.is_empty() {
-            return Err(self.error(&error.to_string()));
+        if let Some(error) = first_error {
+            return Err(self.error(&error));
         }
-        let rest = &text[good_end..];
-        let bad_begin = good_end + (rest.len() - rest.trim_start_matches(is_separator).len());
-        let line = 1 + text[..bad_begin].matches('\n').count();
-        self.broken_lines.push(line);
-        let line_length = text[bad_begin..].find('\n').map(|length| length + 1);
-        Ok(line_length.map_or(text.len(), |length| bad_begin + length))
-    }
-
-    fn push_item(&mut self, item: Json) -> Result<(), InputError> {
-        let Json::Object(mut map) = item else {
+        if self.other_count > 0 {
             return Err(self.error("a list has something else than objects"));
+        }
+        Ok(())
+    }
+
+    /// Counts something in a list that is no row; `noun` and `number` are its place.
+    fn leave_out(&mut self, noun: &'static str, number: usize, rule: &str) {
+        self.other_count += 1;
+        let row_noun = self.collector.noun();
+        self.collector.set_noun(noun);
+        self.collector.leave_out(number, 1, rule);
+        self.collector.set_noun(row_noun);
+    }
+
+    fn push_item(&mut self, item: Json, line: usize) -> Result<(), InputError> {
+        let Json::Object(mut map) = item else {
+            self.leave_out("line", line, NO_OBJECT_RULE);
+            return Ok(());
         };
         if map.get("type").is_some_and(|kind| kind == "FeatureCollection" || kind == "Feature") {
             return Err(InputError::new(self.collector.place(), GEO_JSON_CAUSE, POINTS_REMEDY));
@@ -213,7 +199,8 @@ impl StateReader<'_> {
         }
         let list_key = LIST_KEYS.iter().find(|key| map.get(**key).is_some_and(Json::is_array));
         if let Some(Json::Array(items)) = list_key.and_then(|key| map.remove(*key)) {
-            return self.push_list(&map, items);
+            self.push_list(&map, items);
+            return Ok(());
         }
         if !map.contains_key("states") && !map.contains_key("path") {
             self.records.push(map);
@@ -226,37 +213,39 @@ impl StateReader<'_> {
     }
 
     /// Keeps the rows of a list, each with what the object around the list says of all.
-    fn push_list(
-        &mut self,
-        around: &Map<String, Json>,
-        items: Vec<Json>,
-    ) -> Result<(), InputError> {
-        for item in items {
+    fn push_list(&mut self, around: &Map<String, Json>, items: Vec<Json>) {
+        let shared: Vec<(&str, Json)> = SHARED_KEYS
+            .into_iter()
+            .filter_map(|key| Some((key, shared_value(around, key)?)))
+            .collect();
+        for (k, item) in items.into_iter().enumerate() {
             let Json::Object(mut row) = item else {
-                return Err(self.error("a list of rows has something else than objects"));
+                self.leave_out("item", k + 1, NO_OBJECT_RULE);
+                continue;
             };
-            for key in SHARED_KEYS {
-                if let Some(value) = around.get(key)
-                    && !row.contains_key(key)
-                {
-                    row.insert(key.to_owned(), value.clone());
+            for (key, value) in &shared {
+                if !row.contains_key(*key) {
+                    row.insert((*key).to_owned(), value.clone());
                 }
             }
             self.records.push(row);
         }
-        Ok(())
     }
 
     /// Keeps the points of a trace of readsb, whose times are seconds after that of the trace.
     fn push_trace(&mut self, around: &Map<String, Json>, points: Vec<Json>) {
         let begin_s = around.get("timestamp").and_then(Json::as_f64).unwrap_or(0.0);
-        for point in points {
-            let Json::Array(values) = point else { continue };
+        let address = shared_value(around, "icao").unwrap_or(Json::Null);
+        for (k, point) in points.into_iter().enumerate() {
+            let Json::Array(values) = point else {
+                self.leave_out("point", k + 1, "points of a trace that are no list");
+                continue;
+            };
             let mut row = Map::new();
             row.extend(TRACE_KEYS.map(str::to_owned).into_iter().zip(values));
             let after_s = row.get("timestamp").and_then(Json::as_f64);
             row.insert("timestamp".into(), after_s.map_or(Json::Null, |s| Json::from(begin_s + s)));
-            row.insert("icao".into(), around.get("icao").cloned().unwrap_or(Json::Null));
+            row.insert("icao".into(), address.clone());
             if let Some(Json::Object(mut details)) = row.remove("details") {
                 row.extend(details.remove("flight").map(|flight| ("flight".into(), flight)));
             }
@@ -281,8 +270,9 @@ impl StateReader<'_> {
             let row = state_row(state, &time);
             self.push(row);
         }
-        let address = icao24.map_or(Json::Null, Json::from);
-        let callsign = callsign.map_or(Json::Null, Json::from);
+        let name = |name: Option<String>| name.filter(|name| name.len() <= MAX_SHARED_BYTES);
+        let address = name(icao24).map_or(Json::Null, Json::from);
+        let callsign = name(callsign).map_or(Json::Null, Json::from);
         for point in path.unwrap_or_default() {
             let row = path_row(point, [&address, &callsign]);
             self.push(row);
@@ -294,8 +284,8 @@ impl StateReader<'_> {
         self.push_records_as_rows()?;
         let row_noun = self.collector.noun();
         self.collector.set_noun("line");
-        for line in std::mem::take(&mut self.broken_lines) {
-            self.collector.leave_out(line, 1, "lines that are no JSON");
+        for broken in std::mem::take(&mut self.broken) {
+            self.collector.leave_out(broken.line, broken.count, "rows that are no JSON");
         }
         self.collector.set_noun(row_noun);
         Ok(())
@@ -334,6 +324,17 @@ impl StateReader<'_> {
             }
         }
     }
+}
+
+/// Returns a value that an object gives for all rows of a list in it. It is a short one: a file can have millions of rows.
+fn shared_value(around: &Map<String, Json>, key: &str) -> Option<Json> {
+    let value = around.get(key)?;
+    let is_short = match value {
+        Json::Null | Json::Bool(_) | Json::Number(_) => true,
+        Json::String(text) => text.len() <= MAX_SHARED_BYTES,
+        Json::Array(_) | Json::Object(_) => false,
+    };
+    is_short.then(|| value.clone())
 }
 
 /// Returns a state as a row: a list, or an object with the names of the REST interface.

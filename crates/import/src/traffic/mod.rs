@@ -27,7 +27,10 @@ mod columns;
 mod csv_source;
 mod daa;
 mod flights;
+mod json_items;
 mod json_source;
+#[cfg(test)]
+mod json_tests;
 mod named;
 mod options;
 mod parquet_source;

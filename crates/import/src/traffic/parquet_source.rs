@@ -13,6 +13,7 @@ use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::schema::types::ColumnDescriptor;
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_path;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The first and the last bytes of a Parquet file.
@@ -39,9 +40,11 @@ pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<()
         let remedy = "copy the file again from its source";
         InputError::new(&place, format!("cannot be read as Parquet: {cause}"), remedy)
     };
-    if let Some(codec) = unknown_codec(&bytes) {
+    // Its clones share one memory.
+    let bytes = Bytes::from(bytes);
+    if let Some(codec) = unknown_codec(bytes.clone()) {
         let cause = format!("is Parquet compressed with {codec}, which is not read");
-        return Err(InputError::new(&place, cause, recompression(&place)));
+        return Err(InputError::new(&place, cause, recompression(&place, &codec)));
     }
     // Its decoders may panic on damaged pages.
     let table = catch_unwind(AssertUnwindSafe(|| Table::read(bytes)))
@@ -62,8 +65,7 @@ pub(super) fn collect(collector: &mut RowCollector, bytes: Vec<u8>) -> Result<()
 }
 
 /// Returns the name of a compression of a column that is not read here.
-fn unknown_codec(bytes: &[u8]) -> Option<String> {
-    let bytes = Bytes::copy_from_slice(bytes);
+fn unknown_codec(bytes: Bytes) -> Option<String> {
     // Damage of the file is found, and told, where it is read.
     let file = catch_unwind(|| SerializedFileReader::new(bytes).ok()).ok().flatten()?;
     let groups = file.metadata().row_groups().iter();
@@ -82,12 +84,16 @@ fn unknown_codec(bytes: &[u8]) -> Option<String> {
     Some(name.split('(').next().unwrap_or(&name).to_string())
 }
 
-/// Returns the command that compresses a file with Zstandard.
-fn recompression(place: &str) -> String {
-    let path = place.replace(['\\', '\''], "?");
+/// Returns what to do with a file that is compressed with a codec that is not read.
+fn recompression(place: &str, codec: &str) -> String {
+    // No library for people's scripts reads this one.
+    if codec == "LZO" {
+        return "write it again with Zstandard, by the program that wrote it".to_string();
+    }
+    let path = shell_path(place);
     format!(
-        "compress it with Zstandard: python3 -c \"import pyarrow.parquet as p; p.write_table(p.read_table('{path}'), \
-         'zstd.parquet', compression='zstd')\""
+        "compress it with Zstandard: python3 -c 'import sys, pyarrow.parquet as p; \
+         p.write_table(p.read_table(sys.argv[1]), \"zstd.parquet\", compression=\"zstd\")' {path}"
     )
 }
 
@@ -107,8 +113,8 @@ struct Table {
 }
 
 impl Table {
-    fn read(bytes: Vec<u8>) -> ParquetResult<Self> {
-        let file = SerializedFileReader::new(Bytes::from(bytes))?;
+    fn read(bytes: Bytes) -> ParquetResult<Self> {
+        let file = SerializedFileReader::new(bytes)?;
         let schema = file.metadata().file_metadata().schema_descr_ptr();
         let mut table = Self { names: Vec::new(), columns: Vec::new(), row_count: 0 };
         for column in schema.columns() {

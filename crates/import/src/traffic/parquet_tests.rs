@@ -114,18 +114,26 @@ fn decimals_and_short_floats_have_their_values_and_other_types_are_named() {
 #[test]
 fn a_compression_that_is_not_read_is_named_with_a_command_that_changes_it() {
     // In the footer the number of the codec stands between two fields: 1 is Snappy, 4 Brotli, 5 and 7 LZ4.
-    for (codec, name) in [(4, "BROTLI"), (5, "LZ4"), (7, "LZ4_RAW")] {
+    let error = |codec: u8, path: &str| {
         let mut bytes = file(Compression::SNAPPY);
         for at in 0..bytes.len() - 3 {
             if bytes[at..at + 3] == [0x15, 0x02, 0x16] {
                 bytes[at + 1] = 2 * codec;
             }
         }
-        let error =
-            from_bytes(&"my tracks.parquet", bytes, &TrafficOptions::default()).unwrap_err();
+        from_bytes(&path, bytes, &TrafficOptions::default()).unwrap_err()
+    };
+    for (codec, name) in [(4, "BROTLI"), (5, "LZ4"), (7, "LZ4_RAW")] {
+        let error = error(codec, "my tracks.parquet");
         assert_eq!(error.cause(), format!("is Parquet compressed with {name}, which is not read"));
-        assert!(error.remedy().contains("p.read_table('my tracks.parquet')"), "{error}");
+        let remedy = error.remedy();
+        assert!(remedy.contains("read_table(sys.argv[1])"), "{error}");
+        assert!(remedy.ends_with("' 'my tracks.parquet'"), "{error}");
     }
+    let quoted = error(4, "$(id) `id` \"it's\".parquet");
+    assert!(quoted.remedy().ends_with(r#"' '$(id) `id` "it'\''s".parquet'"#), "{quoted}");
+    let lzo = error(3, "a.parquet");
+    assert!(!lzo.remedy().contains("pyarrow") && lzo.remedy().contains("Zstandard"), "{lzo}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::value::{NotANumber, Value};
 use super::{LatLon, Sample};
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
 use sidestep_kernel::InputError;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -22,6 +23,10 @@ const MAX_DURATION_S: f64 = 1e9;
 pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
 const NO_TIME: &str = "rows with a time that is neither ISO 8601 nor a number since 1970";
+const NO_POSITION: &str = "rows without a position";
+const NO_ALTITUDE: &str = "rows without an altitude";
+/// What readsb lists beside traffic: aircraft that answer radar alone, and those not heard of for long.
+const SILENT_RULE: &str = "rows of aircraft that send no position";
 const NO_NUMBER_POSITION: &str = "rows with a position that is no number";
 const NO_NUMBER_ALTITUDE: &str = "rows with an altitude that is no number";
 /// The rule by which rows with a wrong number of fields are left out.
@@ -65,6 +70,8 @@ pub(super) struct Row {
     pub(super) is_on_ground: Option<bool>,
     /// The time in s for which its position was not received anew, where the file tells.
     pub(super) position_age_s: f64,
+    /// Whether its altitude is the geometric one, in a file that has others.
+    is_geometric: bool,
     pub(super) sample: Sample,
 }
 
@@ -172,6 +179,11 @@ impl RowCollector {
         let reader = RowReader { layout, values };
         match reader.row(number) {
             Ok(row) => self.push_row(row),
+            Err(NO_POSITION) if reader.is_silent() => {
+                self.row_count += 1;
+                let place = self.row_place(SILENT_RULE, number);
+                self.report.record(Treatment::NotUsed, SILENT_RULE, place, "");
+            }
             Err(rule) => self.leave_out(number, 1, rule),
         }
     }
@@ -212,6 +224,7 @@ impl RowCollector {
             self.report.record(Treatment::Guessed, rule, "", "");
         }
         self.leave_out_far_times(&mut rows);
+        self.leave_out_geometric(&mut rows);
         self.check_counts(rows.len())?;
         Ok(CheckedRows {
             place: self.place,
@@ -253,6 +266,39 @@ impl RowCollector {
         }
     }
 
+    /// Leaves out rows with another kind of altitude than the other rows of their aircraft: between the two are steps.
+    fn leave_out_geometric(&mut self, rows: &mut Vec<Row>) {
+        if !rows.iter().any(|row| row.is_geometric) {
+            return;
+        }
+        let has_level = |row: &&Row| !row.is_geometric && row.is_on_ground != Some(true);
+        let with_level: BTreeSet<_> = rows.iter().filter(has_level).map(aircraft_key).collect();
+        let mut geometric = BTreeSet::new();
+        let mut left_out = Vec::new();
+        rows.retain(|row| {
+            if !row.is_geometric {
+                return true;
+            }
+            let key = aircraft_key(row);
+            let is_kept = !with_level.contains(&key);
+            if is_kept {
+                geometric.insert(key);
+            } else {
+                left_out.push(row.number);
+            }
+            is_kept
+        });
+        for [name, _] in &geometric {
+            let rule = "aircraft with geometric altitudes alone, whose levels are compared by them";
+            self.report.record(Treatment::Guessed, rule, format!("`{name:.40}`"), "");
+        }
+        // These were counted as rows when they were read.
+        self.row_count -= left_out.len();
+        for number in left_out {
+            self.leave_out(number, 1, NO_ALTITUDE);
+        }
+    }
+
     fn check_counts(&self, kept: usize) -> Result<(), InputError> {
         if kept > 0 && self.bad_count * 2 <= self.row_count {
             return Ok(());
@@ -261,15 +307,13 @@ impl RowCollector {
             let remedy = "give a recording with one row per aircraft and instant";
             return Err(InputError::new(&self.place, "has no rows", remedy));
         }
-        let dropped =
-            self.report.findings.iter().filter(|found| found.treatment == Treatment::Dropped);
+        let dropped = self.report.findings.iter().filter(|found| {
+            found.treatment == Treatment::Dropped || found.rule == SILENT_RULE && kept == 0
+        });
         let rules: Vec<String> = dropped.map(|found| found.to_string()).collect();
-        let cause = format!(
-            "{} of {} rows cannot be used: {}",
-            self.bad_count,
-            self.row_count,
-            rules.join("; ")
-        );
+        let unused = if kept == 0 { self.row_count } else { self.bad_count };
+        let cause =
+            format!("{unused} of {} rows cannot be used: {}", self.row_count, rules.join("; "));
         let error = InputError::new(&self.place, cause, remedy_of(&self.report));
         Err(match self.first_bad {
             Some(line) if self.noun == "line" => error.with_position(line, 1),
@@ -296,6 +340,18 @@ pub(super) struct CheckedRows {
     /// The number of rows that were left out.
     pub(super) bad_count: usize,
     pub(super) report: ImportReport,
+}
+
+/// Returns what tells aircraft apart: the address, which has no case and no leading zeros, or else a name; and the
+/// flight, where the file names it.
+pub(super) fn aircraft_key(row: &Row) -> [String; 2] {
+    let address = row.address.to_ascii_lowercase();
+    let address = address.strip_prefix("0x").unwrap_or(&address).trim_start_matches('0');
+    let flight = row.flight_id.clone();
+    if row.address.is_empty() && flight.is_empty() {
+        return [format!("callsign {}", row.callsign), flight];
+    }
+    [address.to_string(), flight]
 }
 
 /// Returns the middle one of some numbers, which it sorts.
@@ -336,7 +392,7 @@ impl RowReader<'_> {
             }
         };
         let position = self.position()?;
-        let altitude_ft = self.altitude_ft()?;
+        let (altitude_ft, is_geometric) = self.altitude_ft()?;
         let (ground_speed_kt, bad_speed) = self.optional(Field::GroundSpeed, SPEEDS_KT);
         let (track_deg, bad_track) = self.optional(Field::Track, -360.0..=360.0);
         let (vertical_speed_fpm, bad_climb) =
@@ -348,6 +404,7 @@ impl RowReader<'_> {
             flight_id: self.name(Field::FlightId),
             is_on_ground: self.is_on_ground(altitude_ft),
             position_age_s: self.scaled(Field::PositionAge).ok().flatten().unwrap_or(0.0),
+            is_geometric,
             sample: Sample {
                 time_s: 0.0,
                 position,
@@ -392,7 +449,7 @@ impl RowReader<'_> {
     }
 
     fn position(&self) -> Result<LatLon, Rule> {
-        const NONE: Rule = "rows without a position";
+        const NONE: Rule = NO_POSITION;
         let (lat, lon) = match self.value(Field::Position) {
             Value::Text(text) => {
                 let (lat, lon) = text.split_once(',').ok_or(NONE)?;
@@ -420,21 +477,33 @@ impl RowReader<'_> {
         Ok(value.map(|value| value * column.factor))
     }
 
-    fn altitude_ft(&self) -> Result<f64, Rule> {
-        const NONE: Rule = "rows without an altitude";
-        let column = self.layout.altitude().ok_or(NONE)?;
+    /// Returns whether the aircraft sends no position, and is in the file all the same.
+    fn is_silent(&self) -> bool {
+        let lacks = |field| matches!(self.value(field).number(), Ok(None));
+        self.layout.source == Source::Readsb && lacks(Field::Latitude) && lacks(Field::Longitude)
+    }
+
+    /// Returns the altitude, and whether it is the geometric one in a file that has others.
+    fn altitude_ft(&self) -> Result<(f64, bool), Rule> {
+        let mut column = self.layout.altitude().ok_or(NO_ALTITUDE)?;
         let cell = self.values.value(column.index);
-        let is_missing = cell == Value::Missing || is_ground_word(cell);
-        if is_missing && self.is_on_ground(f64::NAN) == Some(true) {
+        let is_missing = matches!(cell.number(), Ok(None));
+        if (is_missing || is_ground_word(cell)) && self.is_on_ground(f64::NAN) == Some(true) {
             // Transponders report no level there, and the row is no traffic anyway.
-            return Ok(0.0);
+            return Ok((0.0, false));
         }
-        let value = cell.number().map_err(|NotANumber| NO_NUMBER_ALTITUDE)?;
-        let altitude_ft = value.ok_or(NONE)? * column.factor;
+        let other = self.layout.column(Field::GeometricAltitude).filter(|other| *other != column);
+        let is_geometric = is_missing && other.is_some();
+        if is_missing && let Some(other) = other {
+            column = other;
+        }
+        let value = self.values.value(column.index).number();
+        let value = value.map_err(|NotANumber| NO_NUMBER_ALTITUDE)?;
+        let altitude_ft = value.ok_or(NO_ALTITUDE)? * column.factor;
         if !ALTITUDES_FT.contains(&altitude_ft) {
             return Err("rows with an altitude that no aircraft has");
         }
-        Ok(altitude_ft)
+        Ok((altitude_ft, is_geometric))
     }
 
     /// Returns a quantity that a row may lack, and whether its cell is wrong.

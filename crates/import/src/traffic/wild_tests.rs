@@ -266,6 +266,32 @@ fn more_than_half_left_out_after_reading_is_refused_with_what_helps() {
 }
 
 #[test]
+fn several_positions_of_one_second_without_fractions_are_kept_once() {
+    // Four a second, at 440 kt.
+    let position =
+        |k: u32, row: String, step_deg: f64| {
+            let lon_deg = format!(",{:.5},", 7.0 + step_deg * f64::from(k));
+            row.replacen(&(BEGIN_S + 10 * k).to_string(), &(BEGIN_S + k / 4).to_string(), 1)
+                .replacen(&format!(",{:.2},", 7.0 + 0.03 * f64::from(k)), &lon_deg, 1)
+        };
+    let traffic = read_text(&table(40, |k, row| position(k, row, 0.000_75)));
+    assert_eq!(traffic.report.dropped(), 0, "{:?}", traffic.report);
+    assert_eq!((traffic.tracks[0].samples.len(), traffic.repeated_rows), (10, 30));
+    let found = finding(&traffic, "rows of one second").expect("a rule");
+    assert_eq!((found.treatment, found.count), (Treatment::Repaired, 30));
+    // Farther than it flies in a second, which fractions would not explain.
+    assert!(parse(&"f", &table(40, |k, row| position(k, row, 0.01))).is_err());
+    let fractions = table(40, |k, row| {
+        position(k, row, 0.000_75).replacen(
+            &(BEGIN_S + k / 4).to_string(),
+            &format!("{}.5", BEGIN_S + k / 4),
+            1,
+        )
+    });
+    assert!(parse(&"f", &fractions).is_err(), "these times have fractions");
+}
+
+#[test]
 fn rows_of_one_aircraft_far_apart_are_no_picture_of_one_instant() {
     let hourly = table(3, |k, row| {
         row.replacen(&(BEGIN_S + 10 * k).to_string(), &(BEGIN_S + 3600 * k).to_string(), 1)
@@ -330,6 +356,19 @@ fn levels_at_which_nobody_flies_so_fast_are_named_once() {
         let found = finding(&low, "faster than 300 kt").expect("a rule");
         assert_eq!((found.treatment, found.count), (Treatment::Suspicious, 1));
     }
+}
+
+#[test]
+fn a_row_that_is_fast_and_low_says_nothing_of_its_column() {
+    let light = |k: u32, row: String| {
+        let row = row.replace(",440,", ",110,").replace(",35000,", ",800,");
+        let lon_deg = 7.0 + 0.03 * f64::from(k);
+        let slow = row
+            .replace(&format!(",{lon_deg:.2},"), &format!(",{:.4},", 7.0 + 0.0075 * f64::from(k)));
+        if k == 9 { slow.replace(",110,", ",310,") } else { slow }
+    };
+    let traffic = read_text(&table(30, light));
+    assert!(finding(&traffic, "faster than 300 kt").is_none(), "{:?}", traffic.report);
 }
 
 #[test]
