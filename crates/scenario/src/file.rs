@@ -1,8 +1,9 @@
 //! Bounded reading of files, plain or compressed with gzip.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
 use sidestep_kernel::InputError;
@@ -80,24 +81,43 @@ const SIGNATURES: [(&[u8], &str); 18] = [
 /// Number of bytes in which a zero tells that a file is no text.
 const SEARCHED_BYTES: usize = 8192;
 
-/// Commands that unpack a file beside it, by the first bytes of its format.
+/// Commands that unpack a file, whatever its name ends with, by the first bytes of its format; `IN` and `OUT` stand for the
+/// file and for what comes out.
 const UNPACK_COMMANDS: [(&[u8], &str); 5] = [
-    (b"PK\x03\x04", "unzip"),
-    (b"\x28\xb5\x2f\xfd", "zstd -d"),
-    (b"\x04\x22\x4d\x18", "lz4 -d"),
-    (b"BZh", "bunzip2 -k"),
-    (b"\xfd7zXZ", "unxz -k"),
+    (b"PK\x03\x04", "unzip IN"),
+    (b"\x28\xb5\x2f\xfd", "zstd -d IN -o OUT"),
+    (b"\x04\x22\x4d\x18", "lz4 -d IN OUT"),
+    (b"BZh", "bunzip2 -c IN > OUT"),
+    (b"\xfd7zXZ", "xz -dc IN > OUT"),
 ];
+
+/// What the names of packed files end with.
+const PACKED_EXTENSIONS: [&str; 5] = ["zst", "lz4", "bz2", "xz", "zip"];
 
 /// Returns the error of a file that is packed in a way that is not unpacked here, with the command that does it.
 pub fn packed_error(path: &Path, start: &[u8]) -> Option<InputError> {
-    let (_, command) =
+    let (_, template) =
         UNPACK_COMMANDS.iter().find(|(signature, _)| start.starts_with(signature))?;
     let format = binary_format(start).unwrap_or("packed");
-    let file = shell_path(path);
-    let remedy =
-        format!("unpack it: `{command} {file}`, and give what comes out; gzip is read as it is");
+    let words = template.split(' ').map(|word| match word {
+        "IN" => shell_path(path),
+        "OUT" => shell_path(unpacked_path(path)),
+        _ => word.to_owned(),
+    });
+    let command = words.collect::<Vec<String>>().join(" ");
+    let remedy = format!("unpack it: `{command}`, and give what comes out; gzip is read as it is");
     Some(InputError::new(path.display(), format!("is {format}"), remedy))
+}
+
+/// Returns the path of a new file beside a packed one, with the extension of its content.
+fn unpacked_path(path: &Path) -> PathBuf {
+    let is_packed = |extension: &OsStr| {
+        PACKED_EXTENSIONS.iter().any(|packed| extension.eq_ignore_ascii_case(packed))
+    };
+    let stem = path.file_stem().filter(|_| path.extension().is_some_and(is_packed));
+    let mut name = OsString::from("unpacked-");
+    name.push(stem.or(path.file_name()).unwrap_or_default());
+    path.with_file_name(name)
 }
 
 /// Returns what a file that is not UTF-8 is, as the predicate of a sentence; `None` for a text of another encoding.
@@ -215,14 +235,24 @@ mod tests {
 
     #[test]
     fn a_packed_file_is_refused_with_the_command_that_unpacks_it() {
-        for (bytes, command) in [
-            (b"PK\x03\x04\x14\0\xff".as_slice(), "`unzip 'my day.csv.x'`"),
-            (b"\x28\xb5\x2f\xfd\x04\xff", "`zstd -d 'my day.csv.x'`"),
-            (b"BZh91AY\xff", "`bunzip2 -k 'my day.csv.x'`"),
-            (b"\xfd7zXZ\0\xff", "`unxz -k 'my day.csv.x'`"),
+        // These commands take any name: `zstd -d` alone asks for one with `.zst`.
+        for (bytes, name, command) in [
+            (b"PK\x03\x04\x14\0\xff".as_slice(), "my day.csv", "`unzip 'my day.csv'`"),
+            (
+                b"\x28\xb5\x2f\xfd\x04\xff",
+                "my day.csv",
+                "`zstd -d 'my day.csv' -o 'unpacked-my day.csv'`",
+            ),
+            (
+                b"\x28\xb5\x2f\xfd\x04\xff",
+                "b/a.csv.zst",
+                "`zstd -d b/a.csv.zst -o b/unpacked-a.csv`",
+            ),
+            (b"\x04\x22\x4d\x18\xff", "a.lz4", "`lz4 -d a.lz4 unpacked-a`"),
+            (b"BZh91AY\xff", "day.csv", "`bunzip2 -c day.csv > unpacked-day.csv`"),
+            (b"\xfd7zXZ\0\xff", "-a.tsv.XZ", "`xz -dc ./-a.tsv.XZ > unpacked--a.tsv`"),
         ] {
-            let path = Path::new("my day.csv.x");
-            let error = decode_text(path, bytes.to_vec()).expect_err("packed");
+            let error = decode_text(Path::new(name), bytes.to_vec()).expect_err("packed");
             assert!(error.remedy().contains(command), "{error}");
         }
     }
