@@ -40,18 +40,18 @@ const FAULTS: [(&str, &str); 5] = [
 #[test]
 fn one_broken_row_of_a_list_is_one_row_less() {
     for (good, bad) in FAULTS {
-        for broken in [0, 40, 99] {
-            let mut rows: Vec<String> = (0..100).map(row).collect();
+        for broken in [0, 12, 29] {
+            let mut rows: Vec<String> = (0..30).map(row).collect();
             rows[broken] = rows[broken].replacen(good, bad, 1);
             let line = format!("line {}", broken + 2);
-            assert_broken(&format!("[\n{}\n]\n", rows.join(",\n")), 99, 1, &[&line]);
-            assert_broken(&format!("[{}]", rows.join(",")), 99, 1, &["line 1"]);
+            assert_broken(&format!("[\n{}\n]\n", rows.join(",\n")), 29, 1, &[&line]);
+            assert_broken(&format!("[{}]", rows.join(",")), 29, 1, &["line 1"]);
             let line = format!("line {}", broken + 1);
-            assert_broken(&rows.join("\n"), 99, 1, &[&line]);
+            assert_broken(&rows.join("\n"), 29, 1, &[&line]);
             let line = format!("line {}", 10 * broken + 2);
             let many_lines = rows.iter().map(|row| row.replace(",\"", ",\n\"") + "\n\n\n");
             let many_lines: Vec<String> = many_lines.collect();
-            assert_broken(&format!("[\n{}]", many_lines.join(",")), 99, 1, &[&line]);
+            assert_broken(&format!("[\n{}]", many_lines.join(",")), 29, 1, &[&line]);
         }
     }
 }
@@ -79,15 +79,15 @@ fn lines_that_are_something_else_count_as_rows() {
     let error = parse(&"f", &text).expect_err("more than half");
     assert!(error.cause().contains("6 of 11 rows"), "{error}");
     // Each line was looked for from the start of the file, so that this took hours.
-    let text = format!("{}\n{}", rows[0], "x\n".repeat(2_000_000));
+    let text = format!("{}\n{}", rows[0], "x\n".repeat(500_000));
     assert!(parse(&"f", &text).is_err());
-    let text = format!("{}\n{}", rows[0], "{\"time_s\":x\n".repeat(100_000));
+    let text = format!("{}\n{}", rows[0], "{\"time_s\":x\n".repeat(50_000));
     assert!(parse(&"f", &text).is_err());
 }
 
 #[test]
 fn broken_items_within_one_another_are_refused() {
-    let pad = "1,".repeat(20_000);
+    let pad = "1,".repeat(2_000);
     let text = format!("{}\n{}", row(0), format!("{{\"time_s\":[{pad}").repeat(60));
     let error = parse(&"f", &text).expect_err("no row");
     assert!(error.cause().contains("within one another"), "{error}");

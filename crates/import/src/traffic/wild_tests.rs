@@ -162,6 +162,24 @@ fn a_speed_of_long_ago_is_not_that_of_a_position() {
 }
 
 #[test]
+fn a_call_sign_that_takes_a_page_is_none() {
+    let head = "1,1,AAAAA1,1,2018/08/01,09:15:0";
+    let mut text =
+        format!("MSG,1,{head}0.000,2018/08/01,09:15:00.000,{},,,,,,,,,,,0\n", "X".repeat(5000));
+    for k in 1..5 {
+        let lon_deg = 7.0 + 0.003 * f64::from(k);
+        writeln!(
+            text,
+            "MSG,3,{head}{k}.000,2018/08/01,09:15:0{k}.000,,35000,,,47.0,{lon_deg:.4},,,0,0,0,0"
+        )
+        .unwrap();
+    }
+    let traffic = read_text(&text);
+    assert_eq!(finding(&traffic, "no message of 22 fields").map(|found| found.count), Some(1));
+    assert_eq!(traffic.tracks[0].callsign, "");
+}
+
+#[test]
 fn tables_that_a_shell_of_a_database_drew_are_read() {
     let text = table(5, |_, row| row).replace(',', " | ");
     let mut drawn = String::new();
