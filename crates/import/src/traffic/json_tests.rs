@@ -131,7 +131,8 @@ fn trace(address: &str, levels: impl Fn(u32) -> (&'static str, u32, &'static str
     let mut points = Vec::new();
     for k in 0..6 {
         let (altitude, flags, geometric) = levels(k);
-        let (time_s, lon_deg) = (10 * k, 7.0 + 0.03 * f64::from(k));
+        let time_s = 10 * k;
+        let lon_deg = 7.0 + 0.03 * f64::from(k);
         points.push(format!(
             "[{time_s}.0,47.0,{lon_deg:.2},{altitude},440.0,90.0,{flags},0,null,\"adsb_icao\",{geometric}]"
         ));
@@ -172,7 +173,8 @@ fn a_point_of_a_trace_that_is_no_list_is_counted() {
 fn aircraft_of_readsb_that_send_no_position_are_no_loss() {
     let mut text = String::new();
     for k in 0..3 {
-        let (now_s, lon_deg) = (BEGIN_S + 10 * k, 7.0 + 0.03 * f64::from(k));
+        let now_s = BEGIN_S + 10 * k;
+        let lon_deg = 7.0 + 0.03 * f64::from(k);
         text.push_str(&format!(
             "{{\"now\":{now_s},\"aircraft\":[{{\"hex\":\"aaaaa1\",\"lat\":47.0,\"lon\":{lon_deg:.2},\
              \"alt_baro\":35000,\"gs\":440.0,\"track\":90.0}},{{\"hex\":\"bbbbb2\",\"alt_baro\":35000}},\
