@@ -23,6 +23,9 @@ const MAX_DURATION_S: f64 = 1e9;
 pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
 const NO_TIME: &str = "rows with a time that is neither ISO 8601 nor a number since 1970";
+/// Largest latitude and longitude in degrees of what is near 0 0: an aircraft that flies over it has rows there, too.
+const NEAR_DEG: f64 = 1.0;
+
 const NO_POSITION: &str = "rows without a position";
 const NO_ALTITUDE: &str = "rows without an altitude";
 /// What readsb lists beside traffic: aircraft that answer radar alone, and those not heard of for long.
@@ -224,6 +227,7 @@ impl RowCollector {
             self.report.record(Treatment::Guessed, rule, "", "");
         }
         self.leave_out_far_times(&mut rows);
+        self.leave_out_zero_positions(&mut rows);
         self.leave_out_geometric(&mut rows);
         self.check_counts(rows.len())?;
         Ok(CheckedRows {
@@ -263,6 +267,31 @@ impl RowCollector {
         self.row_count -= far.len();
         for number in far {
             self.leave_out(number, 1, "rows with a time decades from that of the others");
+        }
+    }
+
+    /// Leaves out rows at latitude 0 and longitude 0, which stand for no position, unless others are near that place.
+    fn leave_out_zero_positions(&mut self, rows: &mut Vec<Row>) {
+        let has_neighbors = rows.iter().any(|row| {
+            let LatLon { lat_deg, lon_deg } = row.sample.position;
+            !is_zero_position(row) && lat_deg.abs() < NEAR_DEG && lon_deg.abs() < NEAR_DEG
+        });
+        if has_neighbors {
+            return;
+        }
+        let mut zero = Vec::new();
+        rows.retain(|row| {
+            let is_zero = is_zero_position(row);
+            if is_zero {
+                zero.push(row.number);
+            }
+            !is_zero
+        });
+        // These were counted as rows when they were read.
+        self.row_count -= zero.len();
+        for number in zero {
+            let rule = "rows at latitude 0 and longitude 0, which stand for no position";
+            self.leave_out(number, 1, rule);
         }
     }
 
@@ -463,9 +492,6 @@ impl RowReader<'_> {
         if !is_on_earth {
             return Err("rows with a position that is not on the earth");
         }
-        if lat_deg == 0.0 && lon_deg == 0.0 {
-            return Err("rows at latitude 0 and longitude 0, which stand for no position");
-        }
         let lon_deg = if lon_deg > 180.0 { lon_deg - 360.0 } else { lon_deg };
         Ok(LatLon { lat_deg, lon_deg })
     }
@@ -529,4 +555,8 @@ impl RowReader<'_> {
 
 fn is_ground_word(cell: Value<'_>) -> bool {
     matches!(cell, Value::Text(text) if text.eq_ignore_ascii_case(GROUND_WORD))
+}
+
+fn is_zero_position(row: &Row) -> bool {
+    row.sample.position == (LatLon { lat_deg: 0.0, lon_deg: 0.0 })
 }

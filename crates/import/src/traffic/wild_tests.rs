@@ -342,6 +342,12 @@ fn positions_at_0_0_and_far_away_do_not_hide_each_other() {
     }));
     assert_eq!(finding(&zero, "stand for no position").map(|found| found.count), Some(5));
     assert_eq!(zero.tracks[0].samples.len(), 26);
+    let over_it = read_text(&table(31, |k, row| {
+        let longitude = format!("{:.2}", 7.0 + 0.03 * f64::from(k));
+        let shifted = format!("{:?}", 0.03 * f64::from(k - 15));
+        row.replace(",47,", ",0,").replace(&format!(",{longitude},"), &format!(",{shifted},"))
+    }));
+    assert_eq!(over_it.tracks[0].samples.len(), 31, "{:?}", over_it.report);
     let elsewhere =
         read_text(&table(31, |k, row| if k % 7 == 3 { row.replace(",47,", ",-12,") } else { row }));
     let far = finding(&elsewhere, "does not lead to").expect("a rule");
