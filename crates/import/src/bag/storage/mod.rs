@@ -3,6 +3,7 @@
 //! Whatever the size of a bag, one record or chunk of it is in memory at a time, at most
 //! [`MAX_RECORD_BYTES`](sink::MAX_RECORD_BYTES); SQLite reads its files page by page.
 
+mod cut_file;
 mod mcap;
 mod metadata;
 mod packed;

@@ -4,8 +4,6 @@
 //! of a bag (views, virtual tables, functions in them) is not run.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, Read};
 use std::ops::Range;
 use std::path::Path;
 
@@ -13,8 +11,8 @@ use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 use sidestep_kernel::InputError;
-use sidestep_kernel::shell::shell_path;
 
+use super::cut_file::{MAX_COPY_BYTES, completed_copy, has_journal, whole_length};
 use super::sink::{MAX_RECORD_BYTES, Sink, Topic, ros2_name};
 use crate::report::Treatment;
 
@@ -66,65 +64,6 @@ pub(super) fn read(file: &str, path: &Path, sink: &mut Sink<'_>) -> Result<(), I
     }
 }
 
-/// Maximum size of a file that is copied to be completed, in bytes: the folder for such files may be in memory.
-const MAX_COPY_BYTES: u64 = 1 << 32;
-
-/// Returns the length of a file before it was cut off, as its head says; `None` where it is whole.
-fn whole_length(path: &Path) -> io::Result<Option<u64>> {
-    const PAGE_SIZE: Range<usize> = 16..18;
-    const PAGE_COUNT: Range<usize> = 28..32;
-    let mut file = File::open(path)?;
-    let length = file.metadata()?.len();
-    let mut head = [0; 32];
-    file.read_exact(&mut head)?;
-    let page_size = match head[PAGE_SIZE] {
-        [0, 1] => 1 << 16,
-        [high, low] => u64::from(u16::from_be_bytes([high, low])),
-        _ => 0,
-    };
-    let page_count =
-        head[PAGE_COUNT].iter().fold(0_u64, |count, byte| count << 8 | u64::from(*byte));
-    let whole = page_size * page_count;
-    // A file of less than half of its pages has lost more than it has.
-    let is_cut = length < whole && whole <= 2 * length && !has_journal(path);
-    Ok(is_cut.then_some(whole))
-}
-
-/// Returns a copy of a file that was cut off, as long as it was whole: without the pages that are missing, which are found
-/// as damaged ones are, SQLite reads none.
-///
-/// # Errors
-/// When it was longer than `limit` bytes, or cannot be copied.
-fn completed_copy(
-    file: &str,
-    path: &Path,
-    [whole, limit]: [u64; 2],
-) -> Result<tempfile::NamedTempFile, InputError> {
-    let error = |cause: String| {
-        let remedy = format!(
-            "copy it again if its original is whole; else complete a copy of it: `cp {} whole.db3 && truncate -s {whole} \
-             whole.db3`, and give whole.db3",
-            shell_path(path)
-        );
-        InputError::new(file, cause, remedy)
-    };
-    if whole > limit {
-        let cause = format!(
-            "is cut off, and too large to be completed in the folder of temporary files: {whole} bytes, of at most {limit}"
-        );
-        return Err(error(cause));
-    }
-    let copied = || {
-        let copy = tempfile::NamedTempFile::new()?;
-        std::fs::copy(path, copy.path())?;
-        copy.as_file().set_len(whole)?;
-        Ok(copy)
-    };
-    copied().map_err(|e: io::Error| {
-        error(format!("is cut off, and cannot be completed in the folder of temporary files: {e}"))
-    })
-}
-
 /// The end of reading rows before the last.
 enum ReadError {
     Database(rusqlite::Error),
@@ -141,12 +80,6 @@ impl From<rusqlite::Error> for ReadError {
 struct Opened {
     database: Connection,
     is_alone: bool,
-}
-
-fn has_journal(path: &Path) -> bool {
-    ["-wal", "-journal"]
-        .iter()
-        .any(|suffix| Path::new(&format!("{}{suffix}", path.display())).is_file())
 }
 
 fn open(path: &Path) -> rusqlite::Result<Opened> {
@@ -419,119 +352,4 @@ fn read_from(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PAGE_BYTES: usize = 4096;
-    const QUERY: &str = "SELECT rowid, topic_id, timestamp, length(data), data FROM messages WHERE rowid >= ?1 ORDER BY rowid";
-
-    /// A bag of 2,010 messages of 200 bytes.
-    fn bag(path: &Path) -> Vec<u8> {
-        let database = Connection::open(path).unwrap();
-        database
-            .execute_batch(
-                "PRAGMA synchronous = OFF; PRAGMA page_size = 4096; \
-                 CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT); \
-                 CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB); \
-                 INSERT INTO topics VALUES (1, '/note', 'std_msgs/msg/String', 'cdr'); \
-                 WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k < 2010) \
-                 INSERT INTO messages SELECT k, 1, k, zeroblob(200) FROM n;",
-            )
-            .unwrap();
-        drop(database);
-        std::fs::read(path).unwrap()
-    }
-
-    /// The starts of pages with rows, in the order of the rows, and how many rows each has.
-    fn leaves(bytes: &[u8]) -> Vec<(usize, u64)> {
-        const LEAF_OF_TABLE: u8 = 0x0d;
-        let mut leaves = Vec::new();
-        for start in (PAGE_BYTES..bytes.len()).step_by(PAGE_BYTES) {
-            let rows = u16::from_be_bytes([bytes[start + 3], bytes[start + 4]]);
-            if bytes[start] == LEAF_OF_TABLE && rows > 5 {
-                leaves.push((start, rows.into()));
-            }
-        }
-        leaves
-    }
-
-    /// The number of rows that are read of a file, and those that are lost.
-    fn read_all(path: &Path, max_restarts: usize) -> (u64, LostRows) {
-        let database = open(path).unwrap().database;
-        let mut read = 0;
-        let lost = read_rows(&database, QUERY, max_restarts, &mut |_| {
-            read += 1;
-            Ok(())
-        });
-        (read, lost.ok().unwrap())
-    }
-
-    #[test]
-    fn just_the_rows_on_damaged_pages_are_lost_and_all_of_them_are_counted() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.db3");
-        let mut bytes = bag(&path);
-        let leaves = leaves(&bytes);
-        let mut on_damaged = 0;
-        for (start, rows) in [leaves[20], leaves[21], leaves[60]] {
-            bytes[start..start + PAGE_BYTES].fill(0);
-            on_damaged += rows;
-        }
-        std::fs::write(&path, &bytes).unwrap();
-        let (read, lost) = read_all(&path, MAX_RESTARTS);
-        let lost_rows: u64 = lost.ranges.iter().map(rows_in).sum();
-        assert_eq!((read, lost_rows), (2010 - on_damaged, on_damaged));
-        // Where reading does not go on any more, the rest is lost.
-        let (read, lost) = read_all(&path, 1);
-        let lost_rows: u64 = lost.ranges.iter().map(rows_in).sum();
-        assert!(read < 2010 - on_damaged && read + lost_rows == 2010, "{read}, {lost:?}");
-    }
-
-    fn read_file(path: &Path) -> Result<crate::report::ImportReport, InputError> {
-        super::super::read(path, &|_| true, &mut |_| Ok(())).map(|storage| storage.report)
-    }
-
-    #[test]
-    fn a_file_of_which_more_than_half_is_damaged_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.db3");
-        let bytes = bag(&path);
-        let leaves = leaves(&bytes);
-        let damaged = |leaves: &[(usize, u64)]| {
-            let mut bytes = bytes.clone();
-            for (start, _) in leaves {
-                bytes[*start..*start + PAGE_BYTES].fill(0);
-            }
-            std::fs::write(&path, bytes).unwrap();
-            read_file(&path)
-        };
-        let n = leaves.len();
-        let report = damaged(&leaves[n / 10..n / 2]).unwrap();
-        let rows: u64 = leaves[n / 10..n / 2].iter().map(|(_, rows)| rows).sum();
-        assert_eq!(report.dropped(), rows);
-        let most = damaged(&leaves[n / 10..n * 9 / 10]).unwrap_err();
-        assert!(most.cause().starts_with("more than half of its rows"), "{most}");
-        // Nothing tells how many rows there were.
-        let end = damaged(&leaves[n / 10..]).unwrap_err();
-        assert!(end.cause().starts_with("more than half of its rows"), "{end}");
-        assert_eq!(damaged(&leaves[n * 9 / 10..]).unwrap().dropped(), 1);
-    }
-
-    #[test]
-    fn a_file_that_is_too_large_to_be_completed_is_named_with_a_remedy_that_works() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.db3");
-        let bytes = bag(&path);
-        let whole = bytes.len() as u64;
-        std::fs::write(&path, &bytes[..bytes.len() * 4 / 5]).unwrap();
-        assert_eq!(whole_length(&path).unwrap(), Some(whole));
-        let error = completed_copy("a.db3", &path, [whole, whole - 1]).unwrap_err();
-        assert!(error.cause().contains("too large to be completed"), "{error}");
-        assert!(error.remedy().contains(&format!("truncate -s {whole} whole.db3")), "{error}");
-        let by_hand = folder.path().join("whole.db3");
-        std::fs::copy(&path, &by_hand).unwrap();
-        File::options().write(true).open(&by_hand).unwrap().set_len(whole).unwrap();
-        assert!(read_file(&by_hand).is_ok());
-        assert!(completed_copy("a.db3", &path, [whole, whole]).is_ok());
-    }
-}
+mod tests;
