@@ -95,7 +95,5 @@ def test_an_arm_shows_what_was_not_taken_as_it_stood(tmp_path):
     )
     arm = sidestep.Arm(file)
     assert all(isinstance(finding, sidestep.Finding) for finding in arm.findings)
-    assert [finding.rule for finding in arm.findings] == [
-        finding.rule for finding in sidestep.inspect(file).findings
-    ]
+    assert [finding.rule for finding in arm.findings] == [finding.rule for finding in sidestep.inspect(file).findings]
     assert any("transmission" in finding.rule for finding in arm.findings)

@@ -234,11 +234,10 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
         "{told}"
     );
     assert_eq!(told["unresolved_names"][0], "ARTIP", "{told}");
-    let words = place.run(&["check", "lost.scn"]).out();
-    let in_one_line = words.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(in_one_line.contains("X5 at EHAM RWY18L and 2 more"), "{words}");
+    let words = in_one_line(&place.run(&["check", "lost.scn"]).out());
+    assert!(words.contains("X5 at EHAM RWY18L and 2 more"), "{words}");
     assert!(words.contains("unknown way-points") && !words.contains("X6"), "{words}");
-    assert!(in_one_line.contains("ARTIP (ADDWPT of A1, line 6, and 1 more)"), "{words}");
+    assert!(words.contains("ARTIP (ADDWPT of A1, line 6, and 1 more)"), "{words}");
     for wrong in ["airspace.method=magic", "airspace.dt_s=-1.0", "airspce.dt_s=1.0"] {
         let ended = place.run(&["check", "two.scn", "--set", wrong]);
         assert_eq!((ended.code(), ended.out().as_str()), (2, ""), "{wrong}: {}", ended.err());
@@ -249,7 +248,7 @@ fn a_bluesky_file_is_a_scenario_and_check_counts_its_commands() {
     assert!(place.read("two/scenario.toml").contains("[[airplanes]]"));
     assert_eq!(ran["file"]["not_understood"]["MCRE"], 1, "{ran}");
     assert_eq!(ran["file"]["unparsed_lines"], 1, "{ran}");
-    let report = place.run(&["run", "two.scn", "--cycles", "5"]).out();
+    let report = in_one_line(&place.run(&["run", "two.scn", "--cycles", "5"]).out());
     for expected in ["MCRE: aircraft that", "line 4", "PAN 1", "two.scn:5:13"] {
         assert!(report.contains(expected), "{expected} is missing in\n{report}");
     }
@@ -270,8 +269,8 @@ fn a_bluesky_file_calls_files_beside_it_and_finds_places_in_the_users_tables() {
     place.write("nav/fix.dat", " 52.5 8.0 SPY\n");
     let unknown = place.run(&["check", "a.scn"]);
     assert_eq!(unknown.code(), 0, "{}", unknown.err());
-    assert!(unknown.out().contains("give --navdata"), "{}", unknown.out());
-    assert!(unknown.out().contains("sub.scn line 2"), "{}", unknown.out());
+    let words = in_one_line(&unknown.out());
+    assert!(words.contains("give --navdata") && words.contains("sub.scn line 2"), "{words}");
     let told = place.json(&["check", "a.scn", "--navdata", "nav"]);
     assert_eq!((&told["airplanes"], &told["unresolved_places"]), (&2.into(), &0.into()), "{told}");
     let ran = place.json(&["run", "a.scn", "--navdata", "nav", "--cycles", "3", "--out", "a"]);
@@ -287,6 +286,11 @@ fn a_bluesky_file_calls_files_beside_it_and_finds_places_in_the_users_tables() {
         place.run(&["run", "a/scenario.toml", "--replicate", "2", "--cycles", "2"]).code(),
         0
     );
+}
+
+/// Returns a text without the line ends that fit it to a terminal.
+fn in_one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Rows of two airplanes on one level over the equator that meet head on after 400 s.
