@@ -23,11 +23,20 @@ pub(crate) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
         for key in optimizer_keys(section) {
             note(key, "no airplane avoids others by method pc");
         }
+        // The look-ahead and the margin of all methods but these two are those of the predictions.
+        let has_own_margin =
+            |method: &MethodKind| matches!(method, MethodKind::Mvp | MethodKind::Orca);
+        let mut rules = compiled.world.all_rules();
+        if section.inflation.is_some() && rules.all(|rules| has_own_margin(&rules.method)) {
+            note("inflation", "all airplanes avoid others by method mvp or orca");
+        }
     }
-    if section.mvp.is_given() && !uses(|method| matches!(method, MethodKind::Mvp)) {
+    let is_for_both = section.look_every_s.is_some() && section.legs.is_some();
+    if !is_for_both && section.mvp.is_given() && !uses(|method| matches!(method, MethodKind::Mvp)) {
         note("mvp", "no airplane avoids others by method mvp");
     }
-    if section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca)) {
+    if !is_for_both && section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca))
+    {
         note("orca", "no airplane avoids others by method orca");
     }
     if section.look_every_s.is_some() && section.legs.is_none() && !looks_anew(compiled) {
@@ -39,15 +48,12 @@ pub(crate) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     remarks
 }
 
-/// Returns the keys of the optimizer that are given.
+/// Returns the keys of the optimizer that are given. The actions, which `holds_s` and `legs` give, are none of them: those
+/// of all methods are the shield's alternatives and the orders of an external method.
 fn optimizer_keys(section: &AirspaceSection) -> Vec<&'static str> {
     let given = [
         ("alpha", section.alpha.is_some()),
         ("beta", section.beta.is_some()),
-        ("inflation", section.inflation.is_some()),
-        ("holds_s", !section.holds_s.0.is_empty()),
-        // With look_every_s beside it the scenario is made for methods of both kinds, as imported ones are.
-        ("legs", section.legs.is_some() && section.look_every_s.is_none()),
         ("estimator", section.estimator.is_some()),
         ("update", section.update.is_some()),
         ("order", section.order.is_some()),
@@ -87,10 +93,9 @@ mod tests {
 
     #[test]
     fn settings_of_a_method_that_nobody_uses_are_named() {
-        let optimizer = "alpha = 0.1\nholds_s = [10.0]\ncooling = 0.5\nmax_rounds = 3\n";
+        let optimizer = "alpha = 0.1\ncooling = 0.5\nmax_rounds = 3\n";
         assert_eq!(remarks(optimizer), [""; 0]);
-        let keys =
-            ["alpha", "holds_s", "cooling", "max_rounds"].map(|key| format!("airspace.{key}"));
+        let keys = ["alpha", "cooling", "max_rounds"].map(|key| format!("airspace.{key}"));
         for method in ["none", "mvp", "orca", "external"] {
             assert_eq!(remarks(&format!("method = \"{method}\"\n{optimizer}")), keys, "{method}");
         }
@@ -100,6 +105,36 @@ mod tests {
         assert_eq!(remarks("orca = { look_ahead_s = 20.0 }\n"), ["airspace.orca"]);
         assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);
         assert_eq!(remarks("method = \"none\"\nlook_every_s = 5.0\n"), [""; 0]);
+    }
+
+    #[test]
+    fn actions_have_an_effect_with_every_method() {
+        let actions = "holds_s = [2.0]\nlegs = { turns_s = [20.0], until_s = [80.0] }\n";
+        for method in ["pc", "none", "mvp", "orca", "external"] {
+            assert_eq!(remarks(&format!("method = \"{method}\"\n{actions}")), [""; 0], "{method}");
+        }
+    }
+
+    #[test]
+    fn a_margin_of_predictions_has_no_effect_beside_methods_with_margins_of_their_own() {
+        for (method, is_named) in
+            [("none", false), ("external", false), ("mvp", true), ("orca", true)]
+        {
+            let found = remarks(&format!("method = \"{method}\"\ninflation = 1.3\n"));
+            assert_eq!(found == ["airspace.inflation"], is_named, "{method}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn nobody_is_told_of_keys_that_an_import_has_written() {
+        let flights = "00:00:00>CRE A1,B744,0,-0.4,90,FL200,250\n00:00:00>DEST A1 0,0.4\n";
+        for settings in ["", "00:00:00>RESO MVP\n", "00:00:00>RESO OFF\n", "00:00:00>DTLOOK 60\n"] {
+            let file = sidestep_import::bluesky::parse(&"r.scn", &format!("{settings}{flights}"));
+            let text = crate::traffic::from_bluesky("r", &file).expect("it has aircraft");
+            let compiled = CompiledAirspace::new(&Source::new("r", text, "")).expect("a scenario");
+            let found = effectless_remarks(&compiled);
+            assert!(found.is_empty(), "{settings}: {found:?}");
+        }
     }
 
     #[test]
