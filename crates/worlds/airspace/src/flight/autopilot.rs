@@ -102,16 +102,20 @@ fn has_abeam_behind(mission: &[Point], next: usize, pose: Pose2) -> bool {
 }
 
 /// Returns the numbers of the way-points between which the leg lies that decides what is abeam of a way-point: that to
-/// it, or from the first one.
-pub(super) fn leg_ends(next: usize) -> RangeInclusive<usize> {
-    let from = next.saturating_sub(1);
-    from..=from + 1
+/// it from the last one at another place, or where there is none, from the first one.
+pub(super) fn leg_ends(mission: &[Point], next: usize) -> RangeInclusive<usize> {
+    let earlier = mission.get(..next).unwrap_or_default();
+    let from = earlier.iter().rposition(|way_point| Some(way_point) != mission.get(next));
+    match from {
+        Some(from) => from..=next,
+        None => 0..=next.max(1),
+    }
 }
 
 /// Returns the direction of that leg; none where there is none, and for the last way-point.
 pub(super) fn leg_direction(mission: &[Point], next: usize) -> Option<Point> {
-    let (&from, &to) =
-        mission.get(*leg_ends(next).start()).zip(mission.get(*leg_ends(next).end()))?;
+    let (from, to) = leg_ends(mission, next).into_inner();
+    let (&from, &to) = mission.get(from).zip(mission.get(to))?;
     normalized(sub(to, from)).filter(|_| next + 1 < mission.len())
 }
 
@@ -329,6 +333,16 @@ mod tests {
         assert_eq!(done_abeam(&route, 1, aside), 1);
         // A heading for good is a way-point without a leg.
         assert_eq!(done_abeam(&[[1e12, 0.0]; 3], 1, aside), 1);
+    }
+
+    #[test]
+    fn a_way_point_given_twice_is_passed_abeam_like_one_given_once() {
+        let route = [[9e3, 0.0], [18e3, 0.0], [18e3, 0.0], [18e3, 0.0], [27e3, 0.0]];
+        let east = |x: f64| Pose2 { at: [x, 7e3], heading_rad: 0.0 };
+        for next in 1..=3 {
+            assert_eq!(done_abeam(&route, next, east(17.9e3)), next);
+            assert_eq!(done_abeam(&route, next, east(18.1e3)), 4);
+        }
     }
 
     proptest! {

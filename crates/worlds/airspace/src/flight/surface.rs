@@ -251,7 +251,7 @@ impl Frame {
             return Cow::Borrowed(mission);
         }
         let mut local = vec![[FAR_AHEAD_M; 2]; mission.len()];
-        let leg = leg_ends(next);
+        let leg = leg_ends(mission, next);
         let first = if passes_abeam { *leg.start() } else { next };
         for k in first..mission.len() {
             local[k] = self.to_local(mission[k]);
