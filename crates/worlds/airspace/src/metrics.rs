@@ -66,7 +66,7 @@ metrics! {
         /// Losses of all other pairs, for which the shield promises that there are none. Without a shield these are all.
         pub losses_of_unreported_pairs: u64 => "losses of unreported pairs",
         /// Losses of recorded flights of which at least one climbed. By the record at that time, or at the handover to the
-        /// method; none where none is recorded. Rows on the ground are no traffic.
+        /// method; none where fewer than two are recorded. Rows on the ground are no traffic.
         pub losses_in_climb: Option<u64> => "losses in climb",
         /// Losses of recorded flights of which one descended and none climbed.
         pub losses_in_descent: Option<u64> => "losses in descent",
