@@ -8,11 +8,11 @@
 //! by default, they are flown anew.
 
 mod bluesky;
-mod commanded_flight;
 mod flyable_aircraft;
 mod import_settings;
 mod position;
 mod recorded;
+mod scn_flight;
 
 pub use bluesky::from_bluesky;
 pub(crate) use bluesky::{omitted_commands, settings_from_bluesky};

@@ -5,7 +5,6 @@
 //! calibrated airspeed or the Mach number stays, so the true one changes with the level. Settings are rules of the scenario or refused by name
 //! (`import_settings.rs`); `not_flown` counts all other commands.
 
-use super::commanded_flight::FlightCommand;
 use super::flyable_aircraft::{
     FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
 };
@@ -13,6 +12,7 @@ use super::import_settings::{
     ImportedChange, ImportedRules, ImportedScenarioSettings, import_settings,
 };
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
+use super::scn_flight::FlightCommand;
 use super::{
     DT_S, FOOT_M, LOOK_EVERY_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M, UNROUTED_FLIGHT_S,
     banked_turn_deg_s, callsign, header_text,

@@ -1,7 +1,7 @@
 //! Aircraft of a BlueSky file from the time when they move, and the commands to them.
 
 use super::MIN_SPEED_M_S;
-use super::commanded_flight::{CommandedFlight, FlightCommand};
+use super::scn_flight::{FlightCommand, ScnFlight};
 use sidestep_import::bluesky::{AircraftCommand, Airspeed, ScnAircraft};
 
 /// The largest time of a file in seconds; no climb is followed beyond it.
@@ -65,7 +65,7 @@ pub(super) fn commands_from_changes(
     aircraft: &ScnAircraft,
     has_route: bool,
 ) -> Vec<(f64, FlightCommand)> {
-    let mut flight = CommandedFlight::new(aircraft);
+    let mut flight = ScnFlight::new(aircraft);
     for &(at_s, change) in &aircraft.changes {
         flight.climb_until(at_s);
         match change {

@@ -39,7 +39,7 @@ impl FlightCommand {
 }
 
 /// An aircraft on its way through its commands.
-pub(super) struct CommandedFlight {
+pub(super) struct ScnFlight {
     pub(super) commands: Vec<(f64, FlightCommand)>,
     now_s: f64,
     altitude_ft: f64,
@@ -52,7 +52,7 @@ pub(super) struct CommandedFlight {
     flown_m_s: f64,
 }
 
-impl CommandedFlight {
+impl ScnFlight {
     /// Returns an aircraft at its creation.
     pub(super) fn new(aircraft: &ScnAircraft) -> Self {
         let ScnAircraft { created_s, altitude_ft, speed, .. } = *aircraft;
