@@ -13,9 +13,9 @@ use super::calls::CallFolder;
 use super::lines::{CommandFile, CommandText};
 use super::navdata::NavigationData;
 use super::schedule::Schedule;
-use super::traffic::{ScnAircraft, UnplacedAircraft};
+use super::traffic::{AircraftCommand, ScnAircraft, UnplacedAircraft};
 use super::values::Arguments;
-use super::{DISPLAY_RULE, ScnFile, UnusedCommand};
+use super::{Airspeed, DISPLAY_RULE, ScnFile, UnusedCommand};
 use crate::local_plane::LatLon;
 use crate::report::{ImportReport, Treatment};
 use crate::table::Token;
@@ -72,6 +72,17 @@ struct AircraftBuilder {
     fly_by_place: Option<String>,
     /// The places of its vertical speeds until it is given a level.
     vertical_speed_places: Vec<String>,
+}
+
+impl AircraftBuilder {
+    /// Returns the speed that it was given last.
+    fn last_speed(&self) -> Airspeed {
+        let speed = |(_, command): &(f64, AircraftCommand)| match command {
+            AircraftCommand::Speed(speed) => Some(*speed),
+            _ => None,
+        };
+        self.aircraft.changes.iter().rev().find_map(speed).unwrap_or(self.aircraft.speed)
+    }
 }
 
 /// Carries out commands in their order.

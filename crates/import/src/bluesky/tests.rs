@@ -268,6 +268,26 @@ fn what_a_type_would_limit_is_named() {
 }
 
 #[test]
+fn a_level_on_which_a_speed_is_above_that_of_sound_is_named_with_its_line() {
+    let findings = |text: &str| {
+        let file = parse(&"f.scn", text);
+        file.report.findings.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let rule = "suspicious: speeds above that of sound";
+    let is_named = |text: &str, line: &str| {
+        let found = findings(text);
+        found.iter().any(|one| one.starts_with(rule) && one.contains(line))
+    };
+    let start = "00:00:00>CRE A,,52,4,90,FL100,300\n";
+    assert!(is_named(&format!("{start}00:01:00>ALT A FL430\n"), ", line 2;"));
+    assert!(is_named(&format!("{start}00:01:00>ALT A,FL3000\n"), ", line 2;"), "a slip");
+    assert!(!is_named(&format!("{start}00:01:00>ALT A FL360\n"), ""));
+    // With the speed that it has by then.
+    let slower = format!("{start}00:01:00>SPD A M0.8\n00:01:00>ALT A FL430\n");
+    assert!(!is_named(&slower, ""), "{:?}", findings(&slower));
+}
+
+#[test]
 fn a_reset_ends_all_flights_and_all_that_waits() {
     let text = "\
         00:00:00>CRE A B744 52 4 0 FL200 250;DEFWPT HOME 52 4;ZONER 3\n\

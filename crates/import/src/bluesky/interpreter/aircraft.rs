@@ -231,6 +231,7 @@ impl Interpreter {
         match change {
             Some(AircraftCommand::Speed(speed)) => self.note_speed(index, speed),
             Some(AircraftCommand::AltitudeFt(altitude_ft)) => {
+                self.note_supersonic(self.builders[index].last_speed(), altitude_ft);
                 self.builders[index].last_altitude_ft = altitude_ft;
                 self.builders[index].vertical_speed_places.clear();
             }
