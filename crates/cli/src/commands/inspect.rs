@@ -17,7 +17,7 @@ Examples:
   sidestep inspect logs/*.csv --json | jq '.files[].findings'
   sidestep inspect day.csv --strict && sidestep run day.csv
   sidestep inspect day.csv --clean clean.csv
-  sidestep inspect day.csv --set import.leave_out_suspicious=true --clean clean.csv
+  sidestep inspect day.csv --set import.max_gap_s=120 --clean clean.csv
 
 Reads what any command reads: maps, starts and goals (.scen), robot models (.urdf, .srdf), worlds of \
 Stage, meshes, logs (CARMEN, MRCLAM), bags of ROS 1 and ROS 2, BlueSky scenarios, recorded traffic, \

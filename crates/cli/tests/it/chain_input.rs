@@ -92,7 +92,7 @@ const TABLE: &[(&str, &str, &str, &str)] = &[
     ("no points", "connectors = 4\nat_m = [0.0, 0.0]", "points_m = []", "points_m"),
     ("placed twice", "connectors = 4", "connectors = 4\npoints_m = [[0.0, 0.0]]", "placed twice"),
     ("initiator that is not there", "kind = \"targets\"", "kind = \"targets\"\nconnector = 4", "connector = 4 of a chain of 4"),
-    ("limit of nobody", "[[chains.tasks]]", "[[chains.limits]]\nconnector = 9\n[[chains.tasks]]", "connector = 9"),
+    ("limit of nobody", "[[chains.tasks]]", "[[chains.limits]]\nconnector = 9\nfailed = true\n[[chains.tasks]]", "connector = 9"),
     ("change of nobody", "[[chains.tasks]]", "[[chains.changes]]\nat_s = 1.0\nconnector = 9\nfailed = true\n[[chains.tasks]]", "of 4"),
     ("change at no time", "[[chains.tasks]]", "[[chains.changes]]\nat_s = nan\nconnector = 1\nfailed = true\n[[chains.tasks]]", "at_s = NaN"),
     ("change of two things", "[[chains.tasks]]", "[[chains.changes]]\nat_s = 1\nconnector = 1\nfailed = true\nreform = true\n[[chains.tasks]]", "not one thing"),
@@ -201,7 +201,7 @@ fn an_error_of_a_key_points_at_the_key_not_at_its_section() {
     for (header, line) in [
         ("[[chains.tasks]]", "connector = 9"),
         ("[[chains.tasks]]", "turn_deg = 5.0"),
-        ("[[chains.limits]]", "connector = 9"),
+        ("[[chains.limits]]\nfailed = true", "connector = 9"),
         ("[[chains.changes]]\nat_s = 1.0\nfailed = true", "connector = 9"),
         ("[[chains.changes]]\nat_s = 1.0", "scatter = [0, 1]"),
         ("[[chains.changes]]\nat_s = 1.0\nconnector = 1", "max_bend_deg = -3"),

@@ -43,7 +43,11 @@ fn job_arguments(line: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut rest = line;
     while !rest.is_empty() {
-        let (part, after) = rest.split_at(rest.floor_char_boundary(MAX_ARGUMENT_BYTES));
+        let mut end = rest.len().min(MAX_ARGUMENT_BYTES);
+        while !rest.is_char_boundary(end) {
+            end -= 1;
+        }
+        let (part, after) = rest.split_at(end);
         parts.push(part);
         rest = after;
     }
