@@ -344,7 +344,7 @@ fn positions_at_0_0_and_far_away_do_not_hide_each_other() {
     assert_eq!(zero.tracks[0].samples.len(), 26);
     let over_it = read_text(&table(31, |k, row| {
         let longitude = format!("{:.2}", 7.0 + 0.03 * f64::from(k));
-        let shifted = format!("{:?}", 0.03 * f64::from(k - 15));
+        let shifted = format!("{:?}", 0.03 * (f64::from(k) - 15.0));
         row.replace(",47,", ",0,").replace(&format!(",{longitude},"), &format!(",{shifted},"))
     }));
     assert_eq!(over_it.tracks[0].samples.len(), 31, "{:?}", over_it.report);

@@ -1,6 +1,6 @@
 //! Commands that create, change and remove aircraft.
 
-use super::notes::{MIN_SPEED_MPS, RUNWAY_HEADING_RULE, STANDING_RULE};
+use super::notes::{MIN_SPEED_MPS, RUNWAY_HEADING_RULE, STANDING_RULE, SUPERSONIC_CLIMB_RULE};
 use super::{
     AircraftBuilder, CommandError, CommandOutcome, CommandResult, Interpreter, refusal, upper,
 };
@@ -77,8 +77,7 @@ impl Interpreter {
 
     /// Names a speed at which no airliner flies: a calibrated airspeed means more and more on higher levels.
     fn note_supersonic(&mut self, speed: Airspeed, altitude_ft: f64) {
-        let mach = speed.true_airspeed_mps(altitude_ft) / sound_mps(altitude_ft);
-        if mach > 1.0 {
+        if is_supersonic(speed, altitude_ft) {
             let rule = "speeds above that of sound, which no limit of a type reduces here";
             self.note(Treatment::Suspicious, rule, "give a Mach number such as M0.8");
         }
@@ -231,7 +230,9 @@ impl Interpreter {
         match change {
             Some(AircraftCommand::Speed(speed)) => self.note_speed(index, speed),
             Some(AircraftCommand::AltitudeFt(altitude_ft)) => {
-                self.note_supersonic(self.builders[index].last_speed(), altitude_ft);
+                if is_supersonic(self.builders[index].last_speed(), altitude_ft) {
+                    self.note(Treatment::Suspicious, SUPERSONIC_CLIMB_RULE, "give a lower level");
+                }
                 self.builders[index].last_altitude_ft = altitude_ft;
                 self.builders[index].vertical_speed_places.clear();
             }
@@ -349,4 +350,8 @@ fn pattern_size(arguments: &mut Arguments, per_size: usize) -> Result<u32, Comma
         return Err(refusal(arguments, word, cause, "take another number"));
     }
     Ok(size)
+}
+
+fn is_supersonic(speed: Airspeed, altitude_ft: f64) -> bool {
+    speed.true_airspeed_mps(altitude_ft) > sound_mps(altitude_ft)
 }

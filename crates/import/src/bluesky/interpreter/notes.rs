@@ -11,6 +11,10 @@ pub(super) const MIN_SPEED_MPS: f64 = 1.0;
 pub(super) const STANDING_RULE: &str =
     "speeds below 1 m/s of aircraft that fly: flown with 1 m/s, for none stands in the air";
 
+/// The rule for levels on which the calibrated airspeed would be above the speed of sound.
+pub(super) const SUPERSONIC_CLIMB_RULE: &str =
+    "speeds above that of sound on the level that is given: the climb ends at Mach 1";
+
 /// The rule for headings that a runway gives.
 pub(super) const RUNWAY_HEADING_RULE: &str =
     "headings of aircraft that are created on a runway: ten times its number";

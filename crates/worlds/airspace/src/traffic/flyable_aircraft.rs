@@ -126,6 +126,24 @@ mod tests {
     }
 
     #[test]
+    fn no_climb_leads_beyond_the_speed_of_sound() {
+        let speeds = |text: &str| -> Vec<f64> {
+            let speed = |(_, command)| match command {
+                FlightCommand::Speed(m_s) => Some(m_s),
+                _ => None,
+            };
+            commands(text).into_iter().filter_map(speed).collect()
+        };
+        let sound_m_s = Airspeed::Mach(1.0).true_airspeed_mps(97_500.0);
+        let fastest = speeds("00:00:00>ALT A1 97500\n").into_iter().fold(0.0, f64::max);
+        assert!(fastest < sound_m_s + 1.0, "{fastest} {sound_m_s}");
+        // One that is faster already keeps its speed.
+        let given = speeds("00:00:00>SPD A1 M1.2\n00:00:00>ALT A1 FL110\n");
+        let kept_m_s = Airspeed::Mach(1.2).true_airspeed_mps(11_000.0);
+        assert!((given[given.len() - 1] - kept_m_s).abs() < 1e-9, "{given:?} {kept_m_s}");
+    }
+
+    #[test]
     fn a_vertical_speed_in_a_climb_holds_for_the_rest_of_it() {
         let climbs = |text: &str| -> Vec<(f64, f64)> {
             let climb = |(at_s, command)| match command {

@@ -48,6 +48,8 @@ pub(super) struct ScnFlight {
     /// The vertical speed that it was given last, up or down; 0 for BlueSky's own.
     vertical_fpm: f64,
     speed: Airspeed,
+    /// The true airspeed that this was when it was given, in m/s.
+    given_m_s: f64,
     /// True airspeed that it flies with.
     flown_m_s: f64,
 }
@@ -56,6 +58,7 @@ impl ScnFlight {
     /// Returns an aircraft at its creation.
     pub(super) fn new(aircraft: &ScnAircraft) -> Self {
         let ScnAircraft { created_s, altitude_ft, speed, .. } = *aircraft;
+        let given_m_s = speed.true_airspeed_mps(altitude_ft);
         Self {
             commands: Vec::new(),
             now_s: created_s,
@@ -63,7 +66,8 @@ impl ScnFlight {
             level_ft: altitude_ft,
             vertical_fpm: 0.0,
             speed,
-            flown_m_s: speed.true_airspeed_mps(altitude_ft),
+            given_m_s,
+            flown_m_s: given_m_s,
         }
     }
 
@@ -90,9 +94,17 @@ impl ScnFlight {
         self.now_s = self.now_s.max(until_s);
     }
 
+    /// Returns the true airspeed at the present level. No climb leads beyond the speed of sound: a calibrated airspeed means
+    /// more and more on higher levels, and an aircraft so fast would turn in circles as wide as a country.
+    fn airspeed_m_s(&self) -> f64 {
+        let kept_m_s = self.speed.true_airspeed_mps(self.altitude_ft);
+        let sound_m_s = Airspeed::Mach(1.0).true_airspeed_mps(self.altitude_ft);
+        kept_m_s.min(sound_m_s.max(self.given_m_s)).max(MIN_SPEED_M_S)
+    }
+
     /// Adds the true airspeed at the present level if it differs; in a climb as far beyond it as the last one fell behind.
     fn fly_at_level(&mut self, is_reached: bool) {
-        let right_m_s = self.speed.true_airspeed_mps(self.altitude_ft).max(MIN_SPEED_M_S);
+        let right_m_s = self.airspeed_m_s();
         let behind_m_s = right_m_s - self.flown_m_s;
         if is_reached && behind_m_s != 0.0 {
             self.fly_with(right_m_s);
@@ -109,7 +121,8 @@ impl ScnFlight {
 
     pub(super) fn take_speed(&mut self, speed: Airspeed) {
         self.speed = speed;
-        self.fly_with(speed.true_airspeed_mps(self.altitude_ft).max(MIN_SPEED_M_S));
+        self.given_m_s = speed.true_airspeed_mps(self.altitude_ft).max(MIN_SPEED_M_S);
+        self.fly_with(self.given_m_s);
     }
 
     /// Climbs to a level, with BlueSky's own vertical speed where the one that was given leads away from it.
