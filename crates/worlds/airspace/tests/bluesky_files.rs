@@ -2,7 +2,7 @@
 //!
 //! Both fly each file for some minutes without a window. Here a file that asks for no method that BlueSky has flies
 //! with method `none` and without the shield, as in BlueSky, and all others as they are imported, without the shield.
-//! In BlueSky MVP resolves by headings only, and types have no limits, as here, where MVP has BlueSky's factors. The interpreter of SIDESTEP_PYTHON, else
+//! In BlueSky MVP resolves by headings only, and types have no limits, as here. The interpreter of SIDESTEP_PYTHON, else
 //! `python3`, needs the package `bluesky-simulator` 1.1.1, whose tables of places both read. SIDESTEP_BLUESKY_SCENARIOS
 //! names a folder of scenarios, such as that of BlueSky's own repository; without it those of
 //! `../shared/data/airspace/bluesky` are flown. SIDESTEP_BLUESKY_TABLE names a file for the rows of files, beside which
@@ -13,7 +13,7 @@ mod bluesky_flights;
 use bluesky_flights::{FlownFile, OwnFlight, bluesky_flights, bluesky_navdata, own_flight};
 use sidestep_airspace::traffic::from_bluesky;
 use sidestep_import::bluesky::{
-    NavigationData, ResolutionMethod, ScnFile, Setting, TimedSetting, read_with_places,
+    NavigationData, ResolutionMethod, ScnFile, Setting, read_with_places,
 };
 use sidestep_kernel::geodesy::GeoPosition;
 use std::collections::BTreeSet;
@@ -65,13 +65,6 @@ fn fly(name: &str, file: &ScnFile) -> Option<OwnFlight> {
     let mut overrides = vec!["airspace.shield=\"off\""];
     if !resolves(file) {
         overrides.push("airspace.method=\"none\"");
-    }
-    // With BlueSky's own factors both resolve the same conflicts; imported files have the margin of this world, with
-    // which turns alone keep aircraft apart as well as BlueSky's turns and speeds do.
-    overrides.push("airspace.mvp.margin=1.0");
-    let has_factor = |timed: &TimedSetting| matches!(timed.setting, Setting::ResolutionFactor(_));
-    if !file.traffic.settings.iter().any(has_factor) {
-        overrides.push("airspace.mvp.resolution_factor=1.01");
     }
     Some(own_flight(name, text, &overrides, UNTIL_S))
 }

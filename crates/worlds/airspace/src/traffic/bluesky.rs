@@ -305,9 +305,10 @@ mod tests {
         ] {
             let compiled = compiled(&format!("{flights}{settings}"));
             assert_eq!(compiled.world.reactive_settings().look_ahead_s, s, "{settings}");
-            // By turns alone BlueSky's own factors lead to more losses than its method has.
+            // In BlueSky a conflict is found with the zone itself, and moved out of 1.01 of it.
+            let factors = if settings.contains("MVP") { (1.0, 1.01) } else { (1.05, 1.05) };
             let mvp = compiled.world.mvp;
-            assert_eq!((mvp.margin, mvp.resolution_factor), (1.05, 1.05), "{settings}");
+            assert_eq!((mvp.margin, mvp.resolution_factor), factors, "{settings}");
             let contents = crate::text::describe_scenario(&compiled).text;
             let looks = match settings.contains("MVP") {
                 true => format!("decides every 1 s, looks {s} s ahead, anew every 1 s"),

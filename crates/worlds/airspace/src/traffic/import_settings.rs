@@ -51,6 +51,12 @@ const MAX_CHANGES: usize = 1000;
 /// Shortest and longest look-ahead of a scenario in seconds.
 const MIN_LOOK_AHEAD_S: f64 = 1.0;
 const MAX_LOOK_AHEAD_S: f64 = 36_000.0;
+/// The factor on the zone out of which BlueSky's MVP moves a conflict, unless `RFACH` gives another one. Conflicts are
+/// found with the zone itself.
+///
+/// In BlueSky's nycGrid.scn (zone of 0.027 NM and 25 ft, DTLOOK 30) these factors lead to 149 losses of separation here, and
+/// the margin of 5 % of own scenarios to 47; BlueSky 1.1.1 has 205 with its own MVP, which changes speeds as well.
+const DEFAULT_RESOLUTION_FACTOR: f64 = 1.01;
 
 /// The settings that hold at one time, as BlueSky keeps them.
 #[derive(Debug, Clone)]
@@ -232,16 +238,16 @@ fn changes_of_aircraft(file: &ScnFile) -> Vec<ImportedChange> {
 }
 
 impl ImportedRules {
-    /// Returns the settings of MVP that the file gives, as a scenario writes them; empty for the scenario's own.
-    // BlueSky's own factors, 1.0 for finding conflicts and 1.01 for resolving them, are not written: they go with
-    // changes of speed, which airplanes here do not make. In its nycGrid.scn (zone of 0.027 NM and 25 ft, DTLOOK 30,
-    // 1,800 s) BlueSky 1.1.1 loses separation 205 times, and 813 times where MVP may only turn. Here, by turns alone,
-    // those factors lead to 542 to 786 losses, and the scenario's own margin of 5 % to 237 to 327, which is nearer to
-    // the method of its authors.
+    /// Returns the settings of MVP, as a scenario writes them: where the file asks for it, those of BlueSky; else empty for
+    /// the scenario's own.
     pub(super) fn mvp_text(&self) -> String {
+        let is_chosen = self.method == Some("mvp");
         let look_ahead = self.look_ahead_s.map(|s| format!("look_ahead_s = {s:?}"));
-        let factor = self.resolution_factor.map(|factor| format!("resolution_factor = {factor:?}"));
-        let keys: Vec<String> = look_ahead.into_iter().chain(factor).collect();
+        let margin = is_chosen.then(|| "margin = 1.0".to_string());
+        let default = is_chosen.then_some(DEFAULT_RESOLUTION_FACTOR);
+        let factor = self.resolution_factor.or(default);
+        let factor = factor.map(|factor| format!("resolution_factor = {factor:?}"));
+        let keys: Vec<String> = look_ahead.into_iter().chain(margin).chain(factor).collect();
         keys.join(", ")
     }
 }
@@ -390,7 +396,8 @@ mod tests {
         let start = settings.start;
         assert_eq!(start.mvp_text(), "look_ahead_s = 120.0, resolution_factor = 1.2");
         let (settings, _) = found("RESO MVP\nRFACH 1.2");
-        assert_eq!(settings.start.mvp_text(), "look_ahead_s = 300.0, resolution_factor = 1.2");
+        let as_in_bluesky = "look_ahead_s = 300.0, margin = 1.0, resolution_factor = 1.2";
+        assert_eq!(settings.start.mvp_text(), as_in_bluesky);
         assert_eq!((start.separation_m, start.vertical_m), (5556.0, 152.4));
         let [east, north] = start.wind_m_s.expect("a wind");
         assert!((east - 18.52).abs() < 1e-9 && north.abs() < 1e-9, "{east} {north}");
@@ -408,13 +415,19 @@ mod tests {
             (
                 "00:10:00>RESO MVP\n",
                 Some("none"),
-                vec![(600.0, ", method = \"mvp\", mvp = { look_ahead_s = 300.0 }")],
+                vec![(
+                    600.0,
+                    ", method = \"mvp\", mvp = { look_ahead_s = 300.0, margin = 1.0, resolution_factor = 1.01 }",
+                )],
             ),
             (
                 "00:00:00>RESO MVP\n00:01:00>ZONER 3;DTLOOK 60\n00:02:00>ZONEDH 500;ZONER 3\n",
                 Some("mvp"),
                 vec![
-                    (60.0, ", mvp = { look_ahead_s = 60.0 }, separation_m = 5556.0"),
+                    (
+                        60.0,
+                        ", mvp = { look_ahead_s = 60.0, margin = 1.0, resolution_factor = 1.01 }, separation_m = 5556.0",
+                    ),
                     (120.0, ", vertical_m = 152.4"),
                 ],
             ),
