@@ -217,21 +217,13 @@ pub fn write_clean(
             Ok(vec![out.to_path_buf()])
         }
         None if traffic::is_traffic(path) => {
-            let options = traffic_options(path, options)?;
+            let options = TrafficOptions::from_import(path, options)?;
             let text = traffic::to_csv(&traffic::read_with(path, &options)?);
             write_atomically(out, |file| file.write_all(text.as_bytes()))?;
             Ok(vec![out.to_path_buf()])
         }
         _ => Err(not_written(path)),
     }
-}
-
-/// Returns the options of an import as those of the reader of traffic.
-fn traffic_options(path: &Path, options: &ImportOptions) -> Result<TrafficOptions, InputError> {
-    let mut chosen = TrafficOptions::default();
-    let place = path.display().to_string();
-    options.iter().try_for_each(|(key, value)| chosen.set(&place, key, value))?;
-    Ok(chosen)
 }
 
 fn not_written(path: &Path) -> Error {

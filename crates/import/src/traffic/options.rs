@@ -1,6 +1,8 @@
 //! Choices of a reader of recorded traffic that a file does not tell.
 
 use sidestep_kernel::InputError;
+use sidestep_scenario::ImportOptions;
+use std::path::Path;
 
 /// How rows become flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +25,19 @@ impl Default for TrafficOptions {
 impl TrafficOptions {
     /// The keys of [`set`](Self::set).
     pub const KEYS: [&str; 3] = ["max_gap_s", "ground_speed_kt", "leave_out_suspicious"];
+
+    /// Returns the options that are given for the import of a file.
+    ///
+    /// # Errors
+    /// Those of [`set`](Self::set).
+    pub fn from_import(file: &Path, options: &ImportOptions) -> Result<Self, InputError> {
+        let mut chosen = Self::default();
+        for (key, value) in options.iter() {
+            let place = format!("{} with --set import.{key}={value}", file.display());
+            chosen.set(&place, key, value)?;
+        }
+        Ok(chosen)
+    }
 
     /// Sets an option by its key.
     ///

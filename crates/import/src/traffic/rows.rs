@@ -22,10 +22,10 @@ const MAX_DURATION_S: f64 = 1e9;
 /// The rule by which columns are not used.
 pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
-const NO_TIME: &str = "rows with a time that is neither ISO 8601 nor a number since 1970";
 /// Largest latitude and longitude in degrees of what is near 0 0: an aircraft that flies over it has rows there, too.
 const NEAR_DEG: f64 = 1.0;
 
+const NO_TIME: &str = "rows with a time that is neither ISO 8601 nor a number since 1970";
 const NO_POSITION: &str = "rows without a position";
 const NO_ALTITUDE: &str = "rows without an altitude";
 /// What readsb lists beside traffic: aircraft that answer radar alone, and those not heard of for long.

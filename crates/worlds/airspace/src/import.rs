@@ -51,7 +51,7 @@ pub(super) fn import_file(
             (from_bluesky(&name, &scn), report.clone(), bluesky_report(&scn, &settings, &report))
         }
         TrafficFileFormat::Tracks => {
-            let tracks = traffic::read_with(file, &traffic_options(file, options)?)?;
+            let tracks = traffic::read_with(file, &TrafficOptions::from_import(file, options)?)?;
             (from_tracks(&name, &tracks), tracks.report.clone(), track_import_report(&tracks))
         }
     };
@@ -184,15 +184,6 @@ fn bluesky_options(file: &Path, options: &ImportOptions) -> Result<ScnOptions, I
             return Err(InputError::new(file.display(), cause, remedy).with_key(key));
         }
         chosen.navdata = Some(value.into());
-    }
-    Ok(chosen)
-}
-
-fn traffic_options(file: &Path, options: &ImportOptions) -> Result<TrafficOptions, InputError> {
-    let mut chosen = TrafficOptions::default();
-    for (key, value) in options.iter() {
-        let place = format!("{} with --set import.{key}={value}", file.display());
-        chosen.set(&place, key, value)?;
     }
     Ok(chosen)
 }
