@@ -143,6 +143,24 @@ fn a_mistake_in_a_sensor_is_one_error_and_the_sensor_stays_known() {
     }
 }
 
+/// Names that a profile may have are not unknown where the profile cannot be read.
+#[test]
+fn a_mistake_in_a_profile_is_one_error_and_its_names_stay_known() {
+    let profiles = [None, Some("[sensors.\"my eye\"]\nrange_m = \"x\"\n"), Some("format = ")];
+    for text in profiles {
+        let place = TestFolder::new();
+        if let Some(text) = text {
+            place.write("p.toml", text);
+        }
+        let scenario = SCENARIO.replace("bumper-4", "my eye");
+        place.write("s.toml", format!("profiles = [\"p.toml\"]\n{scenario}"));
+        let ended = place.run(&["check", "s.toml"]);
+        assert_eq!(ended.code(), 2);
+        assert!(ended.err().contains("p.toml"), "{text:?}: {}", ended.err());
+        assert!(!ended.err().contains("unknown sensor"), "{text:?}: {}", ended.err());
+    }
+}
+
 #[test]
 fn a_wrong_override_is_named() {
     let place = TestFolder::new();

@@ -210,7 +210,9 @@ impl Guess {
         // Names of its own key are in the error anyway, and numbers of elements are no names.
         let mut names =
             self.key.iter().filter(|part| part.parse::<usize>().is_err() && !key.contains(part));
-        names.any(|name| mentions(error, name)) || self.is_unknown_by_removal(error)
+        names.any(|name| mentions(error, name))
+            || self.is_unknown_by_removal(error)
+            || self.is_unknown_without_profile(error)
     }
 
     /// Returns whether an error is about a name that nothing has because the table with it was removed.
@@ -218,6 +220,13 @@ impl Guess {
         let is_unknown = error.cause().starts_with("unknown ");
         let named = text_between(error.cause(), "`", "`");
         is_unknown && named.is_some_and(|named| self.removed_names.iter().any(|name| name == named))
+    }
+
+    /// Returns whether an error is about a name that a profile may have given, which cannot be read.
+    fn is_unknown_without_profile(&self, error: &InputError) -> bool {
+        let is_profile = self.is_removed && self.key.first().is_some_and(|key| key == "profiles");
+        let kinds = ["unknown sensor ", "unknown effector "];
+        is_profile && kinds.iter().any(|kind| error.cause().starts_with(kind))
     }
 }
 
@@ -276,6 +285,10 @@ mod tests {
         assert!(gone.may_lead_to(&InputError::new("s", "no robots", "add some")));
         assert!(!gone.may_lead_to(&error("robots.0.effector", "unknown effector `ear`")));
         assert!(!gone.may_lead_to(&error("robots.0.eye", "unknown key `eye`")));
+        let profile = repair("profiles.0", RepairKind::Remove);
+        assert!(profile.may_lead_to(&error("robots.0.sensors.0", "unknown sensor `eye`")));
+        assert!(profile.may_lead_to(&error("robots.0.effector", "unknown effector `ear`")));
+        assert!(!profile.may_lead_to(&error("robots.0.kind", "unknown kind `ear`")));
         let renamed = Repair {
             is_meant: true,
             ..repair("map.unknwon", RepairKind::Rename("unknown".into()))
