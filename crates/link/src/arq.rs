@@ -41,6 +41,9 @@ pub(crate) struct ArqLink {
     retransmit_at: Option<Duration>,
     /// Delay of the next retransmission; it doubles each time and is reset by an acknowledgment.
     retransmit_delay: Duration,
+    /// Sequence number below which all messages were sent since a loss was last noticed: the receiver drops those after
+    /// it, even if they have been sent before.
+    resent_below: u64,
     /// Sequence number of the next message to be accepted from the other end.
     next_received: u64,
     /// Time at which received messages are acknowledged by a frame of its own.
@@ -55,6 +58,7 @@ impl Default for ArqLink {
             oldest_since: None,
             retransmit_at: None,
             retransmit_delay: MIN_RETRANSMIT_DELAY,
+            resent_below: 0,
             next_received: 0,
             acknowledge_at: None,
         }
@@ -73,10 +77,18 @@ pub(crate) struct DueRetransmissions {
 impl ArqLink {
     /// Keeps a message until it is acknowledged, and returns its sequence number.
     pub(crate) fn push_unacked(&mut self, message: Arc<Message>, now: Duration) -> u64 {
+        let sequence = self.next_sequence();
         self.unacked.push_back(message);
         self.oldest_since.get_or_insert(now);
         self.retransmit_at.get_or_insert(now + self.retransmit_delay);
-        self.oldest + self.unacked.len() as u64 - 1
+        if self.resent_below == sequence {
+            self.resent_below += 1;
+        }
+        sequence
+    }
+
+    fn next_sequence(&self) -> u64 {
+        self.oldest + self.unacked.len() as u64
     }
 
     /// Returns the cumulative acknowledgment for the next frame to the other end; no frame of its own is due for it then.
@@ -106,8 +118,18 @@ impl ArqLink {
         self.unacked.drain(..newly_acked as usize);
         self.oldest += newly_acked;
         self.retransmit_delay = MIN_RETRANSMIT_DELAY;
+        self.resent_below = self.resent_below.max(self.oldest);
         self.oldest_since = (!self.unacked.is_empty()).then_some(now);
-        self.retransmit_at = self.oldest_since.map(|since| since + self.retransmit_delay);
+        // Of a backlog that is sent again, the next part follows at once.
+        let is_next_due = self.resent_below == self.oldest;
+        let delay = if is_next_due { Duration::ZERO } else { self.retransmit_delay };
+        self.retransmit_at = self.oldest_since.map(|since| since + delay);
+    }
+
+    /// Retransmits at once, as soon as the other end is heard again after a long silence.
+    pub(crate) fn hasten(&mut self, now: Duration) {
+        self.retransmit_delay = MIN_RETRANSMIT_DELAY;
+        self.retransmit_at = self.retransmit_at.map(|_| now);
     }
 
     /// Returns what is due by now, and sets the time of the next retransmission.
@@ -117,6 +139,7 @@ impl ArqLink {
             let sequence = (self.oldest..).zip(&self.unacked).take(MAX_RETRANSMIT_BURST);
             due.retransmissions =
                 sequence.map(|(sequence, message)| (sequence, message.clone())).collect();
+            self.resent_below = self.oldest + due.retransmissions.len() as u64;
             self.retransmit_delay = (2 * self.retransmit_delay).min(MAX_RETRANSMIT_DELAY);
             self.retransmit_at = Some(now + self.retransmit_delay);
         }
@@ -260,6 +283,34 @@ mod tests {
         assert_eq!(times, [200, 600, 1400, 3000, 5000, 7000]);
         link.on_ack(1, Duration::from_secs(8));
         assert!(link.has_delivered() && link.next_send_time().is_none());
+    }
+
+    /// The other end acknowledges at once what arrives, and the backlog of a broken link arrives without a further wait.
+    #[test]
+    fn a_backlog_is_sent_again_as_fast_as_it_is_acknowledged_and_nothing_else_is_sent_twice() {
+        let (mut from, mut to) = (ArqLink::default(), ArqLink::default());
+        let backlog = 5 * MAX_RETRANSMIT_BURST as u64;
+        for sequence in 0..backlog {
+            from.push_unacked(message(sequence), Duration::ZERO);
+        }
+        let mut now = Duration::from_secs(9);
+        from.hasten(now);
+        let mut transmissions = 0;
+        for step in 0..100 {
+            for (sequence, _) in from.take_due_retransmissions(now).retransmissions {
+                transmissions += 1;
+                assert!(to.accept_in_order(sequence, now), "{sequence} is sent twice");
+            }
+            if step % 2 == 0 {
+                let sequence = from.push_unacked(message(step), now);
+                // After all of the backlog it arrives at its first transmission.
+                to.accept_in_order(sequence, now);
+            }
+            now += STEP;
+            from.on_ack(to.take_outgoing_ack(), now);
+        }
+        assert!(from.has_delivered());
+        assert!(transmissions < backlog + 10, "{transmissions}");
     }
 
     #[test]

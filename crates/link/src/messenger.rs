@@ -16,6 +16,11 @@ const LINK_CHECK_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time of not listening that counts as an absence: of a process that was stopped, or got no processor.
 const MIN_ABSENCE: Duration = Duration::from_millis(100);
 
+/// Time of not listening after which the silence of all others is forgotten: links are broken after as long, so others
+/// need time to be heard again. Shorter absences are taken off the silence, so that a process which is often late does
+/// notice that another one is gone.
+const RENEWAL_ABSENCE: Duration = LINK_CHECK_TIMEOUT;
+
 /// A clock: the time since a fixed start.
 type Clock = Box<dyn Fn() -> Duration + Send>;
 
@@ -154,10 +159,10 @@ impl Messenger {
             && self.wire.is_half_open(member, within)
     }
 
-    /// Closes the direct links to all other nodes, and opens them again.
+    /// Closes the direct links to all other nodes, without waiting for that, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be bound again: everything goes through the server then, and the call can be repeated.
+    /// When an endpoint cannot be bound yet: everything goes through the server then, and the call is to be repeated.
     pub fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         self.wire.reopen_links()
     }
@@ -303,14 +308,16 @@ impl Messenger {
         }
     }
 
-    /// Takes a time in which this messenger has not listened off the silence of all peers.
+    /// Takes a time in which this messenger has not listened off the silence of all peers; after a long one they count as
+    /// heard just now.
     fn excuse_absence(&mut self, absence: Duration) {
         if absence < MIN_ABSENCE {
             return;
         }
         let now = self.now();
+        let excuse = if absence < RENEWAL_ABSENCE { absence } else { Duration::MAX };
         for state in self.peers.values_mut() {
-            state.last_heard = state.last_heard.saturating_add(absence).min(now);
+            state.last_heard = state.last_heard.saturating_add(excuse).min(now);
         }
     }
 
@@ -349,6 +356,9 @@ impl Messenger {
         let Some(state) = state else {
             return if header.sequence.is_none() { Ok(()) } else { Err(drop_reason::STRANGER) };
         };
+        if now.saturating_sub(state.last_heard) > LINK_CHECK_TIMEOUT {
+            state.link.hasten(now);
+        }
         state.last_heard = now;
         // Without an incarnation the sender is not connected, and has nothing to acknowledge.
         if header.incarnation.is_some() {
@@ -475,8 +485,9 @@ mod tests {
 
     #[test]
     fn the_silence_of_another_is_the_time_in_which_this_process_has_listened() {
-        let (second, minute) = (Duration::from_secs(1), Duration::from_secs(60));
-        for (stop_in_wait, stop_between) in [(minute, Duration::ZERO), (Duration::ZERO, minute)] {
+        let second = Duration::from_secs(1);
+        let stop = RENEWAL_ABSENCE / 4;
+        for (stop_in_wait, stop_between) in [(stop, Duration::ZERO), (Duration::ZERO, stop)] {
             let clock = Arc::new(Mutex::new(Duration::ZERO));
             let wire = SilentWire { clock: clock.clone(), stop: stop_in_wait };
             let mut messenger = Messenger::new(PeerId::Server, Box::new(wire));
@@ -492,6 +503,27 @@ mod tests {
                 *clock.lock().expect("no panic") += stop_between;
                 assert_eq!(messenger.silent_for(peer), Some(listened * second));
             }
+        }
+    }
+
+    /// Links are broken by then, and all processes of a machine that was suspended were stopped together.
+    #[test]
+    fn who_was_stopped_for_long_takes_nobody_for_silent() {
+        let (second, stop) = (Duration::from_secs(1), RENEWAL_ABSENCE);
+        for (stop_in_wait, stop_between) in [(stop, Duration::ZERO), (Duration::ZERO, stop)] {
+            let clock = Arc::new(Mutex::new(Duration::ZERO));
+            let wire = SilentWire { clock: clock.clone(), stop: Duration::ZERO };
+            let mut messenger = Messenger::new(PeerId::Server, Box::new(wire));
+            let own = clock.clone();
+            messenger.clock = Box::new(move || *own.lock().expect("no panic"));
+            let peer = PeerId::Node(3);
+            messenger.connect(peer, Incarnation(1));
+            assert_eq!(messenger.receive(9 * second), None);
+            assert_eq!(messenger.silent_for(peer), Some(9 * second));
+            messenger.wire = Box::new(SilentWire { clock: clock.clone(), stop: stop_in_wait });
+            *clock.lock().expect("no panic") += stop_between;
+            assert_eq!(messenger.receive(Duration::ZERO), None);
+            assert_eq!(messenger.silent_for(peer), Some(Duration::ZERO));
         }
     }
 

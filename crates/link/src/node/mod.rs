@@ -28,6 +28,10 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 /// broken link have room in it.
 const FAREWELL_TIMEOUT: Duration = Duration::from_secs(5);
 
+/// Time beyond the lease for which a node waits for a silent server in real time: the fleet flies on without it, and gives
+/// it its place back. A partition may last that long.
+const RETURN_TIMEOUT: Duration = Duration::from_secs(60);
+
 /// Time without answers from the other end of an open link before the link counts as half-open: longer than Zenoh's own
 /// lease of 2 s, after which a link that is merely broken is closed.
 const HALF_OPEN_TIMEOUT: Duration = Duration::from_secs(3);
@@ -78,8 +82,10 @@ pub struct Node {
     channel: Option<Box<dyn ChannelModel>>,
     clock: ClockMode,
     logs_packets: bool,
-    /// Time without a message from the server after which the node ends.
+    /// Time without a message from the server after which it counts as gone.
     lease: Duration,
+    /// Whether the server has been silent for longer than that.
+    is_alone: bool,
     members: Vec<FleetMember>,
     /// Whether all other nodes have acknowledged its `Hello`.
     is_ready: bool,
@@ -114,6 +120,7 @@ impl Node {
             clock: welcome.clock,
             logs_packets: welcome.logs_packets,
             lease: Duration::MAX,
+            is_alone: false,
             members: Vec::new(),
             is_ready: false,
             cycle: None,
@@ -127,7 +134,8 @@ impl Node {
         }
     }
 
-    /// Makes the node end when it has not heard the server for some time.
+    /// Makes the node end when it has not heard the server for some time: at once in lockstep, which has ended for it then,
+    /// and a minute later in real time.
     #[must_use]
     pub fn with_server_timeout(self, lease: Duration) -> Self {
         Self { lease, ..self }
@@ -153,13 +161,31 @@ impl Node {
             };
             self.advance();
             self.report_status();
-            let silent = self.messenger.silent_for(PeerId::Server);
             // If this process was stopped, messages have queued up meanwhile: they are received before the server counts
             // as silent.
-            if received == 0 && silent.is_some_and(|silent| silent > self.lease) {
-                return Err(NodeError::ServerSilent(self.lease.as_secs()));
+            if received == 0 {
+                self.check_server()?;
             }
         }
+    }
+
+    /// Checks whether the server is silent for so long that the node ends.
+    fn check_server(&mut self) -> Result<(), NodeError> {
+        let Some(silent) = self.messenger.silent_for(PeerId::Server) else { return Ok(()) };
+        let is_alone = silent > self.lease;
+        let limit = match self.clock {
+            ClockMode::Lockstep => self.lease,
+            ClockMode::Realtime { .. } => self.lease.saturating_add(RETURN_TIMEOUT),
+        };
+        if silent > limit {
+            return Err(NodeError::ServerSilent(limit.as_secs()));
+        }
+        if is_alone && !self.is_alone {
+            let (agent, lease_s) = (self.agent, self.lease.as_secs_f64());
+            tracing::warn!(agent, lease_s, "the server is not heard: this node waits for it");
+        }
+        self.is_alone = is_alone;
+        Ok(())
     }
 
     /// Sends the final status, and waits until it has arrived, unless the server is gone.
@@ -335,13 +361,16 @@ impl Node {
         }
         let agent = self.agent;
         let other = half_open.map(|member| member.agent);
-        tracing::warn!(agent, other, "a link is half-open or closed: all links are opened again");
-        self.reopen_at = now + MIN_REOPEN_INTERVAL;
+        if !self.are_links_closed {
+            tracing::warn!(agent, other, "a link is half-open: all links are opened again");
+        }
         let result = self.messenger.reopen_links();
         self.are_links_closed = result.is_err();
+        // Until it can be done, everything goes through the server.
+        let retry_delay = if self.are_links_closed { REPORT_INTERVAL } else { MIN_REOPEN_INTERVAL };
+        self.reopen_at = now + retry_delay;
         if let Err(error) = result {
-            // Until it can be done, everything goes through the server.
-            tracing::warn!(agent, %error, "links cannot be opened yet");
+            tracing::debug!(agent, %error, "links cannot be opened yet");
         }
     }
 

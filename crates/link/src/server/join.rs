@@ -57,10 +57,15 @@ impl FleetServer<'_> {
 
     /// Sends all nodes the list of members, once all have joined.
     fn send_roster(&mut self) {
+        let joined: Vec<EntityId> = self.joined_agents().collect();
+        self.send_roster_to(&joined);
+    }
+
+    /// Does the same for some of them.
+    pub(super) fn send_roster_to(&mut self, agents: &[EntityId]) {
         let members = self.nodes.values().map(|node| node.member.clone());
         let Some(members) = members.collect::<Option<Vec<FleetMember>>>() else { return };
-        let joined: Vec<EntityId> = self.joined_agents().collect();
-        for agent in joined {
+        for &agent in agents {
             self.messenger.send_reliable(PeerId::Node(agent), Message::Roster(members.clone()));
         }
     }

@@ -31,17 +31,35 @@ impl FleetServer<'_> {
         !self.is_in_lockstep() || self.run.world().waits_for_lost_nodes()
     }
 
-    /// Records that a node is lost.
+    /// Records that a node is lost: it has ended.
     ///
     /// # Errors
     /// When the fleet cannot continue without it.
     pub(super) fn mark_lost(&mut self, agent: EntityId, reason: String) -> Result<(), FleetError> {
+        let Some(node) = self.nodes.get_mut(&agent) else { return Ok(()) };
+        node.may_return = false;
+        self.messenger.disconnect(PeerId::Node(agent));
+        self.record_loss(agent, reason)
+    }
+
+    /// Records that a node is lost, because it was not heard for the lease. What it was sent and has not acknowledged is
+    /// kept, for the case that it is heard again.
+    ///
+    /// # Errors
+    /// When the fleet cannot continue without it.
+    pub(super) fn mark_silent(&mut self, agent: EntityId) -> Result<(), FleetError> {
+        if let Some(node) = self.nodes.get_mut(&agent) {
+            node.may_return = true;
+        }
+        self.record_loss(agent, format!("not heard for {} s", self.config.lease.as_secs_f64()))
+    }
+
+    fn record_loss(&mut self, agent: EntityId, reason: String) -> Result<(), FleetError> {
         let Some(node) = self.nodes.get_mut(&agent).filter(|node| node.incarnation().is_some())
         else {
             return Ok(());
         };
         node.is_lost = true;
-        self.messenger.disconnect(PeerId::Node(agent));
         let who = self.run.agent_display_name(agent);
         let cycle = self.run.cycle();
         tracing::warn!(agent, who, cycle, reason, "a node is gone");
@@ -51,19 +69,36 @@ impl FleetServer<'_> {
         Ok(())
     }
 
-    /// Tells a node that was given up, and still sends, that it has lost its place: it ends then, and can be started again
-    /// under a new incarnation.
+    /// Gives a node that is heard again after a silence its place back, if the fleet has gone on without it. Returns
+    /// whether it has a place now.
+    pub(super) fn take_back(&mut self, agent: EntityId, incarnation: Incarnation) -> bool {
+        let Some(node) = self.nodes.get_mut(&agent).filter(|node| node.may_return) else {
+            return false;
+        };
+        let is_former = node.member.as_ref().is_some_and(|known| known.incarnation == incarnation);
+        if !is_former {
+            return false;
+        }
+        node.is_lost = false;
+        node.may_return = false;
+        let who = self.run.agent_display_name(agent);
+        tracing::info!(agent, who, cycle = self.run.cycle(), "a node is heard again");
+        // Others may have joined meanwhile.
+        self.send_roster_to(&[agent]);
+        true
+    }
+
+    /// Tells a node whose agent has lost it, or has another one, that it has no place anymore: it ends then.
     pub(super) fn dismiss(&mut self, agent: EntityId, incarnation: Incarnation) {
         let Some(node) = self.nodes.get(&agent) else { return };
-        let is_former = node.member.as_ref().is_some_and(|known| known.incarnation == incarnation);
-        if node.is_lost && is_former {
-            let error = JoinError {
-                cause: "the server has not heard this node for too long, and considers it lost"
-                    .into(),
-                remedy: "start it again".into(),
-            };
-            self.messenger.reply(PeerId::Node(agent), incarnation, Message::Refused(error));
-        }
+        let Some(known) = &node.member else { return };
+        let cause = match known.incarnation == incarnation {
+            true if node.is_lost => "the server considers this node lost",
+            true => return,
+            false => "another node has the place of this one",
+        };
+        let error = JoinError { cause: cause.into(), remedy: "start it again".into() };
+        self.messenger.reply(PeerId::Node(agent), incarnation, Message::Refused(error));
     }
 
     /// Waits until all nodes are there and ready, including replacements of lost ones.

@@ -296,13 +296,14 @@ impl<'a> FleetServer<'a> {
         }
         self.publish_frame();
         let (hooks, view) = self.hooks_and_context();
-        let mut lost = hooks.on_poll(&view)?;
-        let lease = self.config.lease;
-        for agent in self.joined_agents().filter(|&agent| self.is_silent(agent, lease)) {
-            lost.push((agent, format!("not heard for {} s", lease.as_secs_f64())));
-        }
+        let lost = hooks.on_poll(&view)?;
         for (agent, reason) in lost {
             self.mark_lost(agent, reason)?;
+        }
+        let lease = self.config.lease;
+        let silent = self.joined_agents().filter(|&agent| self.is_silent(agent, lease));
+        for agent in silent.collect::<Vec<EntityId>>() {
+            self.mark_silent(agent)?;
         }
         self.report_waits();
         Ok(())
@@ -334,10 +335,12 @@ impl<'a> FleetServer<'a> {
             self.on_join(agent, incarnation, join);
             return;
         }
-        let node = self.nodes.get_mut(&agent);
-        let Some(node) = node.filter(|node| node.incarnation() == Some(incarnation)) else {
+        let is_known =
+            self.nodes.get(&agent).is_some_and(|node| node.incarnation() == Some(incarnation));
+        if !is_known && !self.take_back(agent, incarnation) {
             return self.dismiss(agent, incarnation);
-        };
+        }
+        let Some(node) = self.nodes.get_mut(&agent) else { return };
         match message {
             Message::Ready => node.is_ready = true,
             Message::Status(status) => node.status = status,

@@ -15,6 +15,8 @@ pub struct NodeEntry {
     pub status: NodeStatusReport,
     /// Whether the node is lost: it has ended, or was not heard for too long.
     pub is_lost: bool,
+    /// Whether a lost node takes its place again as soon as it is heard: it has not ended, as far as is known.
+    pub may_return: bool,
     /// Whether the node has said goodbye.
     pub has_left: bool,
     /// The present cycle's control, once it has arrived.
@@ -49,5 +51,6 @@ impl NodeEntry {
         self.member = Some(member);
         self.process = process;
         self.is_lost = false;
+        self.may_return = false;
     }
 }

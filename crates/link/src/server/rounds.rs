@@ -17,7 +17,10 @@ impl FleetServer<'_> {
         self.nodes.values_mut().for_each(|node| node.control = None);
         let mut groups = Vec::new();
         for AgentPercept { agent, group, start } in self.run.percepts() {
-            self.messenger.send_reliable(PeerId::Node(agent), Message::CycleStart(start));
+            // A lost node that returns needs the next percept, and none of those that it has missed.
+            if !self.has_no_node(agent) {
+                self.messenger.send_reliable(PeerId::Node(agent), Message::CycleStart(start));
+            }
             // Each member has the whole group: it is taken from the first one.
             if group.first() == Some(&agent) {
                 groups.push(group);

@@ -50,10 +50,11 @@ pub trait Wire: Send {
         false
     }
 
-    /// Closes the direct links to all other nodes, and opens them again.
+    /// Closes the direct links to all other nodes, without waiting for that, and opens them again.
     ///
     /// # Errors
-    /// When an endpoint cannot be bound again: there are no direct links then, and the call can be repeated.
+    /// When an endpoint cannot be bound yet, usually because the former links are still being closed: there are no direct
+    /// links then, and the call is to be repeated.
     fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         Ok(())
     }

@@ -16,8 +16,10 @@ use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Once;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
+use std::thread::JoinHandle;
+use std::time::Duration;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
@@ -34,9 +36,6 @@ const LEASE_MS: u64 = 2_000;
 /// and half-open (`Wire::reopen_links`).
 const OPEN_TIMEOUT_MS: u64 = 3_000;
 
-/// Time in which the endpoints of a closed session can usually be bound again.
-const RELEASE_TIMEOUT: Duration = Duration::from_secs(1);
-
 /// The environment variable, with its value, by which Zenoh has one thread in a process. It is read when the first session
 /// opens.
 ///
@@ -48,6 +47,28 @@ pub const ONE_THREAD: (&str, &str) = (
     "ZENOH_RUNTIME",
     "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), net: (handover: rx), app: (handover: rx))",
 );
+
+/// The times in seconds for which the close of a TCP link, or of an encrypted one, waits until the other end has received
+/// everything; none where Zenoh was compiled with its own, ten seconds.
+///
+/// The wait blocks a thread, which may be the only one ([`ONE_THREAD`]): the links to all others stand still meanwhile. A
+/// link is closed when its other end is silent, so the wait is in vain, and what must arrive is sent again over the next
+/// link. Zenoh reads the times as variables of its compiler; `.cargo/config.toml` sets them.
+const LINGER_S: [Option<&str>; 2] =
+    [option_env!("TCP_LINGER_TIMEOUT"), option_env!("TLS_LINGER_TIMEOUT")];
+
+/// Logs, once, that this program was built with links that block when they are closed.
+fn warn_of_linger() {
+    static ONCE: Once = Once::new();
+    if LINGER_S != [Some("0"); 2] {
+        ONCE.call_once(|| {
+            tracing::warn!(
+                "a broken link can stop the others for 10 s in this build: build in the folder of its sources, where \
+                 .cargo/config.toml sets TCP_LINGER_TIMEOUT=0 and TLS_LINGER_TIMEOUT=0"
+            );
+        });
+    }
+}
 
 /// The parts of a Zenoh session's configuration that differ by session.
 #[derive(Debug, Clone, Default)]
@@ -114,6 +135,7 @@ impl ZenohConfig<'_> {
     }
 
     fn open(&self) -> Result<Session, String> {
+        warn_of_linger();
         let mut config = Config::default();
         for (key, value) in self.json_entries() {
             config.insert_json5(key, &value).map_err(|e| format!("{key} = {value}: {e}"))?;
@@ -147,6 +169,8 @@ pub struct ZenohWire {
     mesh_openings: u32,
     /// Probes of the links of the mesh.
     echoes: EchoProbes,
+    /// The thread that closes the former links of the mesh, if any were closed.
+    closing: Option<JoinHandle<()>>,
 }
 
 /// A session, and the keys of the peers reached over it.
@@ -231,6 +255,12 @@ impl ZenohLink {
         peers.any(|id| u128::from_le_bytes(id.to_le_bytes()) & ZENOH_ID_MASK == wanted)
     }
 
+    /// Closes all links, which takes up to some seconds where another end is out of reach.
+    fn close(self) {
+        // Unsent frames are lost, like frames in transit.
+        let _ = self.session.close().wait();
+    }
+
     /// Sends a frame to all nodes that this session reaches, except itself.
     fn broadcast(&self, frame: &[u8]) {
         let key = KeyExpr::try_from(BROADCAST_KEY).expect("a path of letters is a key");
@@ -301,6 +331,7 @@ impl ZenohWire {
             mesh_id: 0,
             mesh_openings: 0,
             echoes,
+            closing: None,
         })
     }
 
@@ -420,20 +451,17 @@ impl Wire for ZenohWire {
 
     fn reopen_links(&mut self) -> Result<(), WireSetupError> {
         if let Some(mesh) = self.mesh.take() {
-            // Unsent frames are lost, like frames in transit.
-            let _ = mesh.session.close().wait();
+            self.closing = Some(std::thread::spawn(move || mesh.close()));
         }
         self.echoes.clear();
         if self.listens.is_empty() {
             return Ok(());
         }
-        let until = Instant::now() + RELEASE_TIMEOUT;
-        loop {
-            match self.open_mesh() {
-                Err(_) if Instant::now() < until => std::thread::sleep(RELEASE_TIMEOUT / 100),
-                result => return result,
-            }
+        if self.closing.as_ref().is_some_and(|closing| !closing.is_finished()) {
+            let reason = "the former links are being closed".to_string();
+            return Err(endpoint_in_use(&self.listens, reason));
         }
+        self.open_mesh()
     }
 }
 
